@@ -1,0 +1,169 @@
+//! What is typed.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::lang::Setting;
+use crate::sim::Method;
+
+/// Differential L-systems: plants as growing strings of modules, whose parameters follow differential
+/// equations and whose productions fire when a trajectory reaches the boundary of its domain.
+#[derive(Debug, Parser)]
+#[command(name = "dlsys", version, propagate_version = true)]
+pub struct Command {
+    #[command(subcommand)]
+    pub action: Action,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Action {
+    /// Read a model and say what is wrong with it, without running it
+    Check(CheckArgs),
+    /// Run a model and print its strings of modules
+    Run(RunArgs),
+    /// Run a model and draw it, a file for each frame
+    Render(RenderArgs),
+}
+
+#[derive(Debug, Args)]
+pub struct CheckArgs {
+    /// Model file (*.dls)
+    pub model: PathBuf,
+    /// Set a `param` of the model; can be repeated
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
+    pub settings: Vec<Setting>,
+}
+
+#[derive(Debug, Args)]
+pub struct RunArgs {
+    #[command(flatten)]
+    pub shared: SharedArgs,
+    /// How strings are printed
+    #[arg(long, value_enum, default_value_t = TextFormat::Text)]
+    pub format: TextFormat,
+}
+
+#[derive(Debug, Args)]
+pub struct RenderArgs {
+    #[command(flatten)]
+    pub shared: SharedArgs,
+    /// Directory for the frames; made if it is not there
+    #[arg(short, long = "out", value_name = "DIR")]
+    pub out: PathBuf,
+    /// File format of the frames
+    #[arg(long, value_enum, default_value_t = FrameFormat::Svg)]
+    pub format: FrameFormat,
+    /// From where to look (SVG): front, side, top, or AZIMUTH,ELEVATION in degrees
+    #[arg(long, default_value = "front", allow_hyphen_values = true)]
+    pub view: String,
+    /// Write into a directory that holds other files
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// Flags of everything that runs a model.
+#[derive(Debug, Args)]
+pub struct SharedArgs {
+    /// Model file (*.dls)
+    pub model: PathBuf,
+    /// Times to observe
+    #[arg(long, value_name = "T1,T2,…", value_delimiter = ',', value_parser = time, conflicts_with_all = ["from", "to", "step"])]
+    pub at: Option<Vec<f64>>,
+    /// First of equidistant times to observe [default: the model's `frames`]
+    #[arg(long, value_name = "A", value_parser = time, requires = "to", requires = "step")]
+    pub from: Option<f64>,
+    /// Last of them
+    #[arg(long, value_name = "B", value_parser = time, requires = "from")]
+    pub to: Option<f64>,
+    /// Time between them
+    #[arg(long, value_name = "S", value_parser = positive, requires = "from")]
+    pub step: Option<f64>,
+    /// Set a `param` of the model; can be repeated
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
+    pub settings: Vec<Setting>,
+    /// Error aimed at in every parameter, relative to max(1, |value|)
+    #[arg(long, value_name = "TOL", default_value = "1e-6", value_parser = tolerance)]
+    pub tolerance: f64,
+    /// How equations are integrated: auto, dopri5, rk4, euler
+    #[arg(long, default_value = "auto", value_parser = method)]
+    pub method: Method,
+    /// Step of the methods with a fixed one (rk4, euler)
+    #[arg(long, value_name = "H", value_parser = positive)]
+    pub step_size: Option<f64>,
+    /// How time is advanced
+    #[arg(long, value_enum, default_value_t = Scheduler::Auto)]
+    pub scheduler: Scheduler,
+    /// Seed of random numbers, for models that draw them (none does yet)
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// More modules than this are an error
+    #[arg(long, value_name = "N", default_value_t = 10_000_000)]
+    pub max_modules: usize,
+    /// Write times and counts of work as JSON
+    #[arg(long, value_name = "FILE")]
+    pub stats: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Scheduler {
+    /// The default; at present the same as `global`
+    Auto,
+    /// One clock for all modules: the reference
+    Global,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum TextFormat {
+    /// For people
+    Text,
+    /// One JSON object a line and a time
+    Json,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum FrameFormat {
+    /// Vector graphics, one view
+    Svg,
+    /// Meshes in three dimensions
+    Obj,
+}
+
+fn number(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(x) if x.is_finite() => Ok(x),
+        _ => Err("not a number".to_owned()),
+    }
+}
+
+fn time(text: &str) -> Result<f64, String> {
+    match number(text)? {
+        t if t >= 0.0 => Ok(t),
+        _ => Err("time begins at 0".to_owned()),
+    }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    match number(text)? {
+        x if x > 0.0 => Ok(x),
+        _ => Err("must be greater than 0".to_owned()),
+    }
+}
+
+fn tolerance(text: &str) -> Result<f64, String> {
+    match number(text)? {
+        x if (1e-13..=0.1).contains(&x) => Ok(x),
+        _ => Err("must be between 1e-13 and 0.1".to_owned()),
+    }
+}
+
+fn setting(text: &str) -> Result<Setting, String> {
+    let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE")?;
+    Ok(Setting { name: name.trim().to_owned(), value: number(value)? })
+}
+
+fn method(text: &str) -> Result<Method, String> {
+    let names: Vec<&str> = Method::NAMED.iter().map(|(name, _)| *name).collect();
+    let found = Method::NAMED.iter().find(|(name, _)| *name == text);
+    found.map(|(_, method)| *method).ok_or_else(|| format!("methods are {}", names.join(", ")))
+}

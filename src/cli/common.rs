@@ -1,0 +1,163 @@
+//! What the commands share: reading the model, times, settings, statistics, failures.
+
+use std::io::IsTerminal;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use serde::Serialize;
+
+use super::args::SharedArgs;
+use crate::diagnostic::Diagnostic;
+use crate::lang::Setting;
+use crate::model::Frames;
+use crate::session::Session;
+use crate::sim::{self, Settings, Simulation, Stats};
+
+/// Why a command ends without success; its exit status.
+#[derive(Debug)]
+pub enum Failure {
+    /// The model or the run is at fault: 1. The message is already drawn.
+    Model(String),
+    /// The command line is: 2.
+    Usage(String),
+    /// Nobody reads the output any more. That is their right: 0.
+    ClosedPipe,
+}
+
+/// What an error of standard output means.
+pub fn out_error(error: std::io::Error) -> Failure {
+    match error.kind() {
+        std::io::ErrorKind::BrokenPipe => Failure::ClosedPipe,
+        _ => Failure::Model(format!("error: cannot write: {error}\n")),
+    }
+}
+
+/// True if messages may be coloured.
+fn coloured() -> bool {
+    std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none()
+}
+
+/// Reads a model, prints its warnings.
+pub fn open(path: &Path, settings: &[Setting]) -> Result<Session, Failure> {
+    match Session::open(path, settings) {
+        Ok(session) => {
+            for warning in &session.warnings {
+                eprint!("{}", warning.render(&session.source, coloured()));
+            }
+            Ok(session)
+        }
+        Err(refused) => {
+            let draw = |all: &[Diagnostic]| -> String {
+                all.iter().map(|d| d.render(&refused.source, coloured())).collect()
+            };
+            if refused.diagnostics.iter().any(|d| d.severity == crate::diagnostic::Severity::Error) {
+                return Err(Failure::Model(draw(&refused.diagnostics)));
+            }
+            Err(Failure::Usage(draw(&refused.settings)))
+        }
+    }
+}
+
+/// Time spent, by stage.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Clock {
+    pub parse: Duration,
+    pub simulate: Duration,
+    pub output: Duration,
+}
+
+/// A model that was read, and what is to be done with it.
+pub struct Run {
+    pub session: Session,
+    pub times: Vec<f64>,
+    pub settings: Settings,
+    /// Time spent on reading the model.
+    pub clock: Clock,
+}
+
+/// What `--stats` writes.
+#[derive(Serialize)]
+struct StatsFile {
+    parse_s: f64,
+    simulate_s: f64,
+    output_s: f64,
+    frames: usize,
+    #[serde(flatten)]
+    counts: Stats,
+}
+
+impl Run {
+    pub fn start(args: &SharedArgs) -> Result<Run, Failure> {
+        let before = Instant::now();
+        if args.method.is_fixed_step() && args.step_size.is_none() {
+            return Err(Failure::Usage(
+                "error: this method has a fixed step: give it with `--step-size H`\n".to_owned(),
+            ));
+        }
+        let session = open(&args.model, &args.settings)?;
+        let times = times(args, &session)?;
+        let defaults = Settings::default();
+        let settings = Settings {
+            method: args.method,
+            tolerance: args.tolerance,
+            step_size: args.step_size.unwrap_or(defaults.step_size),
+            max_modules: args.max_modules,
+        };
+        let clock = Clock { parse: before.elapsed(), ..Clock::default() };
+        Ok(Run { session, times, settings, clock })
+    }
+
+    /// Starts a simulation.
+    pub fn simulate(&self) -> Result<Simulation<'_>, Failure> {
+        self.session.simulate(self.settings).map_err(|error| self.fault(&error))
+    }
+
+    /// An error of the run, drawn.
+    pub fn fault(&self, error: &sim::Error) -> Failure {
+        Failure::Model(error.diagnostic().render(&self.session.source, coloured()))
+    }
+
+    /// Writes the file that `--stats` asks for.
+    pub fn write_stats(&self, args: &SharedArgs, clock: Clock, counts: Stats) -> Result<(), Failure> {
+        let Some(path) = &args.stats else { return Ok(()) };
+        let file = StatsFile {
+            parse_s: clock.parse.as_secs_f64(),
+            simulate_s: clock.simulate.as_secs_f64(),
+            output_s: clock.output.as_secs_f64(),
+            frames: self.times.len(),
+            counts,
+        };
+        let text = serde_json::to_string_pretty(&file).expect("numbers become JSON") + "\n";
+        std::fs::write(path, text)
+            .map_err(|error| Failure::Model(format!("error: cannot write {}: {error}\n", path.display())))
+    }
+}
+
+/// The observation times that were asked for, in order, each once.
+fn times(args: &SharedArgs, session: &Session) -> Result<Vec<f64>, Failure> {
+    if let Some(at) = &args.at {
+        let mut times = at.clone();
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        return Ok(times);
+    }
+    let frames = match (args.from, args.to, args.step) {
+        (Some(from), Some(to), Some(step)) => {
+            let frames = Frames { from, to, step };
+            if to < from {
+                return Err(Failure::Usage(format!("error: --to {to} is before --from {from}\n")));
+            }
+            if (to - from) / step >= Frames::LIMIT as f64 {
+                return Err(Failure::Usage(format!("error: more than {} frames\n", Frames::LIMIT)));
+            }
+            frames
+        }
+        _ => session.model.frames.ok_or_else(|| {
+            Failure::Usage(
+                "error: the model has no `frames`: say when to look with `--at T1,T2,…` or `--from A --to B --step S`\n"
+                    .to_owned(),
+            )
+        })?,
+    };
+    Ok(frames.times().collect())
+}

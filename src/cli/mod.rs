@@ -1,0 +1,40 @@
+//! The command line: `dlsys check`, `dlsys run`, `dlsys render`.
+//!
+//! Exit status: 0 done; 1 the model or the run is at fault; 2 the command line is.
+
+mod args;
+mod common;
+mod run;
+
+use clap::Parser;
+
+use args::{Action, Command};
+use common::Failure;
+
+/// Runs the command line of this process; returns its exit status.
+pub fn main() -> u8 {
+    let command = match Command::try_parse() {
+        Ok(command) => command,
+        Err(error) => {
+            // Help and version are answers, not errors; clap knows which stream they belong on.
+            let _ = error.print();
+            return u8::try_from(error.exit_code()).unwrap_or(2);
+        }
+    };
+    let done = match &command.action {
+        Action::Check(args) => run::check(args),
+        Action::Run(args) => run::run(args),
+        Action::Render(_) => todo!(),
+    };
+    match done {
+        Ok(()) | Err(Failure::ClosedPipe) => 0,
+        Err(Failure::Model(message)) => {
+            eprint!("{message}");
+            1
+        }
+        Err(Failure::Usage(message)) => {
+            eprint!("{message}");
+            2
+        }
+    }
+}

@@ -1,0 +1,163 @@
+//! `dlsys check` and `dlsys run`.
+
+use std::io::Write;
+use std::time::Instant;
+
+use super::args::{CheckArgs, RunArgs, TextFormat};
+use super::common::{Failure, Run, out_error};
+use crate::model::Model;
+use crate::sim::describe;
+use crate::structure::ModuleString;
+
+/// Reads a model and reports on it.
+pub fn check(args: &CheckArgs) -> Result<(), Failure> {
+    let session = super::common::open(&args.model, &args.settings)?;
+    let model = &session.model;
+    let title = model.title.as_ref().map_or(String::new(), |t| format!("{t}: "));
+    let warnings = session.warnings.len();
+    let summary = format!(
+        "{title}{} rules, {} kinds of modules, {} params, {}",
+        model.rules.len(),
+        // Brackets are kinds, but nobody counts them.
+        model.kinds.len() - 2,
+        model.parameters.len(),
+        match warnings {
+            0 => "no warnings".to_owned(),
+            1 => "1 warning".to_owned(),
+            n => format!("{n} warnings"),
+        }
+    );
+    writeln!(std::io::stdout(), "{summary}").map_err(out_error)
+}
+
+/// Runs a model and prints its strings.
+pub fn run(args: &RunArgs) -> Result<(), Failure> {
+    let run = Run::start(&args.shared)?;
+    let mut clock = run.clock;
+    let mut out = std::io::BufWriter::with_capacity(1 << 16, std::io::stdout().lock());
+    let printer = Printer::new(&run.session.model);
+    let result = (|| {
+        let mut simulation = run.simulate()?;
+        let mut string = ModuleString::default();
+        let mut text = String::new();
+        for &t in &run.times {
+            let before = Instant::now();
+            let done = simulation.at(t, &mut string);
+            clock.simulate += before.elapsed();
+            done.map_err(|error| run.fault(&error))?;
+            let before = Instant::now();
+            text.clear();
+            match args.format {
+                TextFormat::Json => printer.json(&string, &mut text),
+                TextFormat::Text => printer.text(&string, &mut text),
+            }
+            out.write_all(text.as_bytes()).map_err(out_error)?;
+            clock.output += before.elapsed();
+        }
+        Ok(simulation.stats())
+    })();
+    // What was computed before an error is printed before the error.
+    out.flush().map_err(out_error)?;
+    drop(out);
+    run.write_stats(&args.shared, clock, result?)
+}
+
+/// Writes strings of modules as text.
+pub struct Printer<'m> {
+    model: &'m Model,
+    /// Each kind's name as a JSON string.
+    names: Vec<String>,
+}
+
+impl<'m> Printer<'m> {
+    pub fn new(model: &'m Model) -> Printer<'m> {
+        let names =
+            model.kinds.iter().map(|(_, kind)| serde_json::Value::from(kind.name.as_str()).to_string());
+        Printer { model, names: names.collect() }
+    }
+
+    /// One line: the time, and each module as its name and parameters.
+    pub fn json(&self, string: &ModuleString, out: &mut String) {
+        out.push_str("{\"t\":");
+        number(string.time, out);
+        out.push_str(",\"modules\":[");
+        for (i, module) in string.iter().enumerate() {
+            out.push_str(if i == 0 { "[" } else { ",[" });
+            out.push_str(&self.names[module.kind.index()]);
+            out.push_str(",[");
+            for (j, &x) in module.parameters.iter().enumerate() {
+                if j > 0 {
+                    out.push(',');
+                }
+                number(x, out);
+            }
+            out.push_str("]]");
+        }
+        out.push_str("]}\n");
+    }
+
+    /// The time, and the string as it would be typed, with six digits.
+    pub fn text(&self, string: &ModuleString, out: &mut String) {
+        out.push_str("t = ");
+        number(string.time, out);
+        out.push('\n');
+        let mut column = 0;
+        for module in string.iter() {
+            let rounded: Vec<f64> = module.parameters.iter().map(|x| six_digits(*x)).collect();
+            let shown = describe(self.model, module.kind, &rounded);
+            let width = shown.chars().count() + 1;
+            if column > 0 && column + width > 100 {
+                out.push('\n');
+                column = 0;
+            }
+            out.push_str(if column == 0 { "  " } else { " " });
+            out.push_str(&shown);
+            column += width;
+        }
+        out.push('\n');
+    }
+}
+
+/// The shortest decimal that reads back as the same float.
+fn number(x: f64, out: &mut String) {
+    use std::fmt::Write;
+    let start = out.len();
+    // Writing to a string does not fail. Both forms have the fewest digits; large and small numbers
+    // are shorter with an exponent.
+    let _ = write!(out, "{x}");
+    if out.len() - start > 6 {
+        let plain = out.len() - start;
+        let exponent = format!("{x:e}");
+        if exponent.len() < plain {
+            out.truncate(start);
+            out.push_str(&exponent);
+        }
+    }
+}
+
+fn six_digits(x: f64) -> f64 {
+    format!("{x:.5e}").parse().unwrap_or(x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short_and_exact() {
+        for (x, shown) in [
+            (0.35355339059327373, "0.35355339059327373"),
+            (1.0, "1"),
+            (-0.0, "-0"),
+            (1e300, "1e300"),
+            (1.5e-9, "1.5e-9"),
+            (100000.0, "100000"),
+            (10000000.0, "1e7"),
+        ] {
+            let mut out = String::new();
+            number(x, &mut out);
+            assert_eq!(out, shown);
+            assert_eq!(out.parse::<f64>().map(f64::to_bits), Ok(x.to_bits()));
+        }
+    }
+}

@@ -1,0 +1,224 @@
+//! What is said about a model: messages with the place in the text that they are about.
+//!
+//! Every stage has its own errors; all of them end here, in a [`Diagnostic`], and there is one function
+//! that draws them ([`Diagnostic::render`]), for the command line, the tests and whoever embeds the library.
+
+use std::ops::Range;
+
+use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
+
+/// A stretch of the source text, in bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Span {
+    pub start: u32,
+    pub end: u32,
+}
+
+impl Span {
+    pub fn new(start: usize, end: usize) -> Span {
+        // Sources are bounded far below 4 GiB (`Source::LIMIT`).
+        Span { start: start as u32, end: end as u32 }
+    }
+
+    /// From the start of `self` to the end of `other`.
+    pub fn to(self, other: Span) -> Span {
+        Span { start: self.start.min(other.start), end: self.end.max(other.end) }
+    }
+
+    pub fn range(self) -> Range<usize> {
+        self.start as usize..self.end as usize
+    }
+}
+
+/// A model's text and where it came from.
+#[derive(Clone, Debug)]
+pub struct Source {
+    /// The file as the user named it.
+    pub name: String,
+    pub text: String,
+    /// Byte at which each line starts.
+    lines: Vec<u32>,
+}
+
+impl Source {
+    /// Greatest size of a model file, in bytes.
+    pub const LIMIT: usize = 256 << 20;
+
+    /// Takes text that is known to be good, as in tests and examples.
+    pub fn new(name: impl Into<String>, text: impl Into<String>) -> Source {
+        let text = text.into();
+        let mut lines = vec![0];
+        lines.extend(text.bytes().enumerate().filter(|(_, b)| *b == b'\n').map(|(i, _)| i as u32 + 1));
+        Source { name: name.into(), text, lines }
+    }
+
+    /// Takes the bytes of a file: drops a byte-order mark, rejects what is not UTF-8.
+    pub fn from_bytes(name: impl Into<String>, bytes: Vec<u8>) -> Result<Source, Box<(Source, Diagnostic)>> {
+        let name = name.into();
+        if bytes.len() > Source::LIMIT {
+            let message =
+                format!("this file has {} MB; a model may have {}", bytes.len() >> 20, Source::LIMIT >> 20);
+            return Err(Box::new((Source::new(name, ""), Diagnostic::error(message))));
+        }
+        match String::from_utf8(bytes) {
+            Ok(mut text) => {
+                if text.starts_with('\u{feff}') {
+                    text.drain(..'\u{feff}'.len_utf8());
+                }
+                Ok(Source::new(name, text))
+            }
+            Err(error) => {
+                let at = error.utf8_error().valid_up_to();
+                let byte = error.as_bytes()[at];
+                // The text is shown with the bad bytes replaced; up to the first of them nothing moves.
+                let source = Source::new(name, String::from_utf8_lossy(error.as_bytes()).into_owned());
+                let diagnostic = Diagnostic::error("the file is not valid UTF-8")
+                    .at(
+                        Span::new(at, at + '\u{fffd}'.len_utf8()),
+                        format!("byte 0x{byte:02x} begins no character"),
+                    )
+                    .help("save the file as UTF-8 (in most editors: “Save with encoding”)");
+                Err(Box::new((source, diagnostic)))
+            }
+        }
+    }
+
+    /// Line and column of a byte, both from 1; columns count characters.
+    pub fn position(&self, byte: u32) -> (usize, usize) {
+        let line = self.lines.partition_point(|&start| start <= byte) - 1;
+        let column = self.text[self.lines[line] as usize..].char_indices();
+        let offset = (byte - self.lines[line]) as usize;
+        (line + 1, column.take_while(|(i, _)| *i < offset).count() + 1)
+    }
+
+    /// The text of a span.
+    pub fn slice(&self, span: Span) -> &str {
+        &self.text[span.range()]
+    }
+
+    fn line_range(&self, line: usize) -> Range<usize> {
+        let end = self.lines.get(line + 1).map_or(self.text.len(), |&next| next as usize);
+        self.lines[line] as usize..end
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Severity {
+    Error,
+    /// Does not stop a run.
+    Warning,
+}
+
+/// One message.
+#[derive(Clone, Debug)]
+pub struct Diagnostic {
+    pub severity: Severity,
+    pub message: String,
+    /// Places in the text with a remark each; the first is where the fault is.
+    pub labels: Vec<(Span, String)>,
+    /// Further facts.
+    pub notes: Vec<String>,
+    /// What to try.
+    pub help: Vec<String>,
+}
+
+impl Diagnostic {
+    fn new(severity: Severity, message: impl Into<String>) -> Diagnostic {
+        Diagnostic {
+            severity,
+            message: message.into(),
+            labels: Vec::new(),
+            notes: Vec::new(),
+            help: Vec::new(),
+        }
+    }
+
+    pub fn error(message: impl Into<String>) -> Diagnostic {
+        Diagnostic::new(Severity::Error, message)
+    }
+
+    pub fn warning(message: impl Into<String>) -> Diagnostic {
+        Diagnostic::new(Severity::Warning, message)
+    }
+
+    /// Adds a place in the text.
+    pub fn at(mut self, span: Span, remark: impl Into<String>) -> Diagnostic {
+        self.labels.push((span, remark.into()));
+        self
+    }
+
+    pub fn note(mut self, note: impl Into<String>) -> Diagnostic {
+        self.notes.push(note.into());
+        self
+    }
+
+    pub fn help(mut self, help: impl Into<String>) -> Diagnostic {
+        self.help.push(help.into());
+        self
+    }
+
+    /// Adds advice if there is any.
+    pub fn help_opt(mut self, help: Option<String>) -> Diagnostic {
+        self.help.extend(help);
+        self
+    }
+
+    /// Draws the message as text: what, where (file, line, column, source line), why, what to try.
+    pub fn render(&self, source: &Source, coloured: bool) -> String {
+        /// Lines longer than this are quoted in part: nobody reads a line of 50 MB.
+        const LONG: usize = 400;
+
+        let level = match self.severity {
+            Severity::Error => Level::ERROR,
+            Severity::Warning => Level::WARNING,
+        };
+        let mut group = Group::with_title(level.primary_title(&self.message));
+        let mut excerpts = Vec::new();
+        let mut labels: Vec<&(Span, String)> = self.labels.iter().collect();
+        while let Some((span, remark)) = labels.first().copied() {
+            let (first, _) = source.position(span.start);
+            let (last, _) = source.position(span.end.saturating_sub(1).max(span.start));
+            let mut range = source.line_range(first - 1);
+            range.end = range.end.max(source.line_range(last - 1).end).min(source.text.len());
+            if range.len() > LONG {
+                let (line, column) = source.position(span.start);
+                let excerpt: String = source.text[span.range()].chars().take(60).collect();
+                excerpts.push(format!(
+                    "{}:{line}:{column}: {remark} (at `{}`)",
+                    source.name,
+                    excerpt.trim_end()
+                ));
+                labels.remove(0);
+                continue;
+            }
+            let mut snippet =
+                Snippet::source(&source.text[range.clone()]).line_start(first).path(&source.name);
+            let mut kind = AnnotationKind::Primary;
+            labels.retain(|(other, remark)| {
+                let inside = range.start <= other.range().start && other.range().end <= range.end;
+                if inside {
+                    let at = other.range().start - range.start..other.range().end - range.start;
+                    snippet = std::mem::replace(&mut snippet, Snippet::source(""))
+                        .annotation(kind.span(at).label(remark.as_str()));
+                    kind = AnnotationKind::Context;
+                }
+                !inside
+            });
+            group = group.element(snippet);
+        }
+        if self.labels.is_empty() && !source.name.is_empty() {
+            group = group.element(annotate_snippets::Origin::path(&source.name));
+        }
+        for excerpt in &excerpts {
+            group = group.element(Level::NOTE.message(excerpt));
+        }
+        for note in &self.notes {
+            group = group.element(Level::NOTE.message(note));
+        }
+        for help in &self.help {
+            group = group.element(Level::HELP.message(help));
+        }
+        let renderer = if coloured { Renderer::styled() } else { Renderer::plain() };
+        renderer.render(&[group]) + "\n"
+    }
+}

@@ -1,0 +1,54 @@
+//! Numbers as short text that is the same on every machine.
+
+use std::fmt::Write;
+
+/// Rounds to so many decimals.
+pub(super) fn rounded(x: f64, decimals: usize) -> f64 {
+    let mut text = String::new();
+    push(&mut text, x, decimals);
+    text.parse().unwrap_or(x)
+}
+
+/// Appends a number, rounded to so many decimals, without trailing zeros and without a negative zero.
+pub(super) fn push(out: &mut String, x: f64, decimals: usize) {
+    let start = out.len();
+    // Writing to a string does not fail.
+    let _ = write!(out, "{x:.decimals$}");
+    if decimals > 0 {
+        out.truncate(out.trim_end_matches('0').len());
+        out.truncate(out.trim_end_matches('.').len());
+    }
+    if &out[start..] == "-0" {
+        out.replace_range(start.., "0");
+    }
+}
+
+/// The decimals that tell apart a millionth of a length.
+pub(super) fn decimals_for(extent: f64) -> usize {
+    if !(extent > 0.0 && extent.is_finite()) {
+        return 6;
+    }
+    (6 - extent.log10().floor() as i64).clamp(0, 300) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short() {
+        let text = |x, decimals| {
+            let mut out = String::from("100");
+            push(&mut out, x, decimals);
+            out.split_off(3)
+        };
+        assert_eq!(text(1.0, 3), "1");
+        assert_eq!(text(100.0, 0), "100");
+        assert_eq!(text(-0.0001, 3), "0");
+        assert_eq!(text(0.1 + 0.2, 3), "0.3");
+        assert_eq!(text(-12.3456, 2), "-12.35");
+        assert_eq!(decimals_for(1.0), 6);
+        assert_eq!(decimals_for(5000.0), 3);
+        assert_eq!(decimals_for(0.0), 6);
+    }
+}

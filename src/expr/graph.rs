@@ -1,0 +1,199 @@
+//! Hash-consed expression graphs.
+
+use std::collections::HashMap;
+
+use super::{Binary, Unary, Value};
+
+/// An expression in a [`Graph`]. Two expressions of the same graph that are built alike are equal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct NodeId(u32);
+
+impl NodeId {
+    /// Position in [`Graph::nodes`].
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// One operation; operands always have smaller ids.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Node {
+    /// A constant, by its bits, so that it can be hashed.
+    Const(u64),
+    /// A variable, by number; what it stands for is the user's business.
+    Var(u32),
+    Unary(Unary, NodeId),
+    Binary(Binary, NodeId, NodeId),
+    /// `Select(condition, then, else)`.
+    Select(NodeId, NodeId, NodeId),
+}
+
+/// An arena of expressions in which equal expressions are stored once.
+#[derive(Clone, Debug, Default)]
+pub struct Graph {
+    nodes: Vec<Node>,
+    ids: HashMap<Node, NodeId>,
+}
+
+impl Graph {
+    /// All nodes, operands before their users.
+    pub fn nodes(&self) -> &[Node] {
+        &self.nodes
+    }
+
+    pub fn node(&self, id: NodeId) -> Node {
+        self.nodes[id.index()]
+    }
+
+    fn intern(&mut self, node: Node) -> NodeId {
+        if let Some(&id) = self.ids.get(&node) {
+            return id;
+        }
+        let id = NodeId(u32::try_from(self.nodes.len()).expect("bounded by the front end"));
+        self.nodes.push(node);
+        self.ids.insert(node, id);
+        id
+    }
+
+    pub fn constant(&mut self, x: f64) -> NodeId {
+        self.intern(Node::Const(x.to_bits()))
+    }
+
+    pub fn var(&mut self, index: u32) -> NodeId {
+        self.intern(Node::Var(index))
+    }
+
+    /// The value of a constant expression.
+    pub fn as_constant(&self, id: NodeId) -> Option<f64> {
+        match self.node(id) {
+            Node::Const(bits) => Some(f64::from_bits(bits)),
+            _ => None,
+        }
+    }
+
+    pub fn unary(&mut self, op: Unary, a: NodeId) -> NodeId {
+        match self.as_constant(a) {
+            Some(x) => self.constant(f64::unary(op, x)),
+            None => self.intern(Node::Unary(op, a)),
+        }
+    }
+
+    /// Constants are folded with the same arithmetic that evaluates them later, and identities are
+    /// used only where they hold for every IEEE number, so a value never depends on folding.
+    pub fn binary(&mut self, op: Binary, a: NodeId, b: NodeId) -> NodeId {
+        match (self.as_constant(a), self.as_constant(b)) {
+            (Some(x), Some(y)) => return self.constant(f64::binary(op, x, y)),
+            (Some(1.0), None) if op == Binary::Mul => return b,
+            (None, Some(1.0)) if matches!(op, Binary::Mul | Binary::Div | Binary::Pow) => return a,
+            (None, Some(2.0)) if op == Binary::Pow => return self.intern(Node::Binary(Binary::Mul, a, a)),
+            _ => {}
+        }
+        self.intern(Node::Binary(op, a, b))
+    }
+
+    pub fn select(&mut self, condition: NodeId, a: NodeId, b: NodeId) -> NodeId {
+        match self.as_constant(condition) {
+            Some(c) if c != 0.0 => a,
+            Some(_) => b,
+            None if a == b => a,
+            None => self.intern(Node::Select(condition, a, b)),
+        }
+    }
+
+    /// Rebuilds `roots` from the operands up. `replace` is asked for each node, which it gets as it was
+    /// (by id) and with its operands already rebuilt; where it answers, its answer stands for the node.
+    pub fn rewrite(
+        &mut self,
+        roots: &[NodeId],
+        mut replace: impl FnMut(&mut Graph, NodeId, Node) -> Option<NodeId>,
+    ) -> Vec<NodeId> {
+        let mut new: HashMap<NodeId, NodeId> = HashMap::new();
+        for id in self.reachable(roots) {
+            let rebuilt = match self.node(id) {
+                leaf @ (Node::Const(_) | Node::Var(_)) => leaf,
+                Node::Unary(op, a) => Node::Unary(op, new[&a]),
+                Node::Binary(op, a, b) => Node::Binary(op, new[&a], new[&b]),
+                Node::Select(c, a, b) => Node::Select(new[&c], new[&a], new[&b]),
+            };
+            let image = match replace(self, id, rebuilt) {
+                Some(image) => image,
+                None => match rebuilt {
+                    Node::Const(_) | Node::Var(_) => id,
+                    Node::Unary(op, a) => self.unary(op, a),
+                    Node::Binary(op, a, b) => self.binary(op, a, b),
+                    Node::Select(c, a, b) => self.select(c, a, b),
+                },
+            };
+            new.insert(id, image);
+        }
+        roots.iter().map(|r| new[r]).collect()
+    }
+
+    /// Everything that `roots` are built from, operands first.
+    pub fn reachable(&self, roots: &[NodeId]) -> Vec<NodeId> {
+        let mut stack: Vec<NodeId> = roots.to_vec();
+        let mut seen: std::collections::HashSet<NodeId> = roots.iter().copied().collect();
+        while let Some(id) = stack.pop() {
+            for operand in self.node(id).operands().into_iter().flatten() {
+                if seen.insert(operand) {
+                    stack.push(operand);
+                }
+            }
+        }
+        let mut all: Vec<NodeId> = seen.into_iter().collect();
+        // Operands have smaller ids, so this is an order of evaluation, and not one of hashing.
+        all.sort_unstable();
+        all
+    }
+
+    /// The variables that `roots` read, ascending.
+    pub fn variables(&self, roots: &[NodeId]) -> Vec<u32> {
+        let mut all: Vec<u32> = self
+            .reachable(roots)
+            .into_iter()
+            .filter_map(|id| match self.node(id) {
+                Node::Var(v) => Some(v),
+                _ => None,
+            })
+            .collect();
+        all.sort_unstable();
+        all
+    }
+}
+
+impl Node {
+    /// The operands in order; absent ones are `None`.
+    pub fn operands(self) -> [Option<NodeId>; 3] {
+        match self {
+            Node::Const(_) | Node::Var(_) => [None; 3],
+            Node::Unary(_, a) => [Some(a), None, None],
+            Node::Binary(_, a, b) => [Some(a), Some(b), None],
+            Node::Select(c, a, b) => [Some(c), Some(a), Some(b)],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_expressions_are_one_node() {
+        let mut g = Graph::default();
+        let (x, y) = (g.var(0), g.var(1));
+        let a = g.binary(Binary::Add, x, y);
+        let b = g.binary(Binary::Add, x, y);
+        assert_eq!(a, b);
+        assert_eq!(g.variables(&[a]), [0, 1]);
+    }
+
+    #[test]
+    fn folding_keeps_the_sign_of_zero_and_nan() {
+        let mut g = Graph::default();
+        let (x, zero) = (g.var(0), g.constant(0.0));
+        let sum = g.binary(Binary::Add, x, zero);
+        let product = g.binary(Binary::Mul, x, zero);
+        assert_ne!(sum, x, "-0 + 0 is +0");
+        assert_ne!(product, zero, "NaN * 0 is NaN");
+    }
+}

@@ -1,0 +1,126 @@
+//! Straight-line code for expressions.
+
+use std::collections::HashMap;
+
+use super::{Binary, Graph, Node, NodeId, Unary, Value};
+
+/// A register: variables come first, then temporaries.
+type Register = u32;
+
+/// One instruction. The destination may be one of the operands' registers.
+#[derive(Clone, Copy, Debug)]
+enum Instruction {
+    Const(Register, f64),
+    Unary(Unary, Register, Register),
+    Binary(Binary, Register, Register, Register),
+    Select(Register, Register, Register, Register),
+}
+
+/// Registers of an evaluation, kept from one to the next so that nothing is allocated.
+pub type Scratch<T> = Vec<T>;
+
+/// Code that computes a few expressions of one [`Graph`] from its variables.
+#[derive(Clone, Debug, Default)]
+pub struct Program {
+    code: Vec<Instruction>,
+    outputs: Vec<Register>,
+    variables: usize,
+    registers: usize,
+}
+
+impl Program {
+    /// Compiles `roots`, which may read the variables `0..variables`.
+    ///
+    /// # Panics
+    /// If a root reads a variable beyond that range: a mistake of the caller, not of a model.
+    pub fn compile(graph: &Graph, roots: &[NodeId], variables: usize) -> Program {
+        let order = graph.reachable(roots);
+        let mut uses: HashMap<NodeId, usize> = HashMap::new();
+        for &id in order.iter() {
+            for operand in graph.node(id).operands().into_iter().flatten() {
+                *uses.entry(operand).or_default() += 1;
+            }
+        }
+        for root in roots {
+            // One use that never ends: an output's register is not given away.
+            *uses.entry(*root).or_default() += 1;
+        }
+
+        let mut place: HashMap<NodeId, Register> = HashMap::new();
+        let mut free: Vec<Register> = Vec::new();
+        let mut registers = variables as Register;
+        let mut code = Vec::new();
+        for id in order {
+            let node = graph.node(id);
+            if let Node::Var(v) = node {
+                assert!((v as usize) < variables, "variable {v} of {variables}");
+                place.insert(id, v);
+                continue;
+            }
+            let operands = node.operands().map(|o| o.map(|o| place[&o]));
+            for operand in node.operands().into_iter().flatten() {
+                let left = uses.get_mut(&operand).expect("counted above");
+                *left -= 1;
+                if *left == 0 && !matches!(graph.node(operand), Node::Var(_)) {
+                    free.push(place[&operand]);
+                }
+            }
+            let to = free.pop().unwrap_or_else(|| {
+                registers += 1;
+                registers - 1
+            });
+            place.insert(id, to);
+            code.push(match (node, operands) {
+                (Node::Const(bits), _) => Instruction::Const(to, f64::from_bits(bits)),
+                (Node::Unary(op, _), [Some(a), ..]) => Instruction::Unary(op, to, a),
+                (Node::Binary(op, ..), [Some(a), Some(b), _]) => Instruction::Binary(op, to, a, b),
+                (Node::Select(..), [Some(c), Some(a), Some(b)]) => Instruction::Select(to, c, a, b),
+                _ => unreachable!("a node has the operands of its kind"),
+            });
+        }
+        Program {
+            code,
+            outputs: roots.iter().map(|r| place[r]).collect(),
+            variables,
+            registers: registers as usize,
+        }
+    }
+
+    /// Number of values that an evaluation gives.
+    pub fn outputs(&self) -> usize {
+        self.outputs.len()
+    }
+
+    /// Evaluates all roots, in the order in which they were compiled.
+    ///
+    /// `variables` gives the variables from 0 on; `out` takes as many values as there are roots.
+    pub fn eval<T: Value>(&self, variables: &[T], scratch: &mut Scratch<T>, out: &mut [T]) {
+        debug_assert!(variables.len() >= self.variables && out.len() == self.outputs.len());
+        scratch.clear();
+        scratch.extend_from_slice(&variables[..self.variables]);
+        scratch.resize(self.registers, T::constant(0.0));
+        for &instruction in &self.code {
+            let (to, value) = match instruction {
+                Instruction::Const(to, x) => (to, T::constant(x)),
+                Instruction::Unary(op, to, a) => (to, T::unary(op, scratch[a as usize])),
+                Instruction::Binary(op, to, a, b) => {
+                    (to, T::binary(op, scratch[a as usize], scratch[b as usize]))
+                }
+                Instruction::Select(to, c, a, b) => {
+                    (to, T::select(scratch[c as usize], scratch[a as usize], scratch[b as usize]))
+                }
+            };
+            scratch[to as usize] = value;
+        }
+        for (value, &register) in out.iter_mut().zip(&self.outputs) {
+            *value = scratch[register as usize];
+        }
+    }
+
+    /// Evaluates a program of one root; convenient where speed does not matter.
+    pub fn eval_one(&self, variables: &[f64]) -> f64 {
+        let mut out = [f64::NAN];
+        self.eval(variables, &mut Vec::new(), &mut out);
+        out[0]
+    }
+}

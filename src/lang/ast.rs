@@ -1,0 +1,163 @@
+//! The text of a model as a tree, close to how it is written.
+//!
+//! Expressions live in one arena, operands before their users, so that passes over them are loops: a
+//! sum of a million terms is a million nodes, not a million stack frames.
+
+use std::sync::Arc;
+
+use crate::diagnostic::Span;
+use crate::model::Comparison;
+
+/// A name and where it stands.
+#[derive(Clone, Debug)]
+pub struct Name {
+    pub text: Arc<str>,
+    pub span: Span,
+}
+
+/// A node of an expression, by its place in [`Expressions`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct ExprId(pub u32);
+
+/// A whole expression: its nodes are those from `first` to `root`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Expression {
+    pub first: ExprId,
+    pub root: ExprId,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Operator {
+    Add,
+    Sub,
+    Mul,
+    Div,
+    Pow,
+    And,
+    Or,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub enum Expr {
+    Number(f64),
+    Name(Arc<str>),
+    Call(Arc<str>, Vec<ExprId>),
+    Negate(ExprId),
+    Not(ExprId),
+    Binary(Operator, ExprId, ExprId),
+    /// `2c`: a number written directly before its factor.
+    Scale(f64, ExprId),
+    /// `a < b <= c`
+    Compare(ExprId, Vec<(Comparison, ExprId)>),
+    /// Condition, then, else.
+    If(ExprId, ExprId, ExprId),
+    Parenthesis(ExprId),
+}
+
+/// The arena of all expressions of a document.
+#[derive(Clone, Debug, Default)]
+pub struct Expressions {
+    nodes: Vec<Expr>,
+    spans: Vec<Span>,
+}
+
+impl Expressions {
+    pub fn push(&mut self, node: Expr, span: Span) -> ExprId {
+        self.nodes.push(node);
+        self.spans.push(span);
+        ExprId(self.nodes.len() as u32 - 1)
+    }
+
+    /// The id that the next node will get.
+    pub fn next(&self) -> ExprId {
+        ExprId(self.nodes.len() as u32)
+    }
+
+    pub fn get(&self, id: ExprId) -> &Expr {
+        &self.nodes[id.0 as usize]
+    }
+
+    pub fn get_mut(&mut self, id: ExprId) -> &mut Expr {
+        &mut self.nodes[id.0 as usize]
+    }
+
+    pub fn span(&self, id: ExprId) -> Span {
+        self.spans[id.0 as usize]
+    }
+
+    /// Widens the place of a node in the text, as parentheses do.
+    pub fn widen(&mut self, id: ExprId, span: Span) {
+        self.spans[id.0 as usize] = self.spans[id.0 as usize].to(span);
+    }
+}
+
+/// A module of the initial string or of a successor.
+#[derive(Clone, Debug)]
+pub struct Module {
+    pub name: Arc<str>,
+    pub span: Span,
+    pub arguments: Vec<Expression>,
+}
+
+/// A module of a rule's head: a name and the names of its parameters.
+#[derive(Clone, Debug)]
+pub struct HeadModule {
+    pub name: Name,
+    pub parameters: Vec<Name>,
+    pub span: Span,
+}
+
+#[derive(Clone, Debug)]
+pub struct Rule {
+    pub left: Vec<HeadModule>,
+    /// The strict predecessor; its name is `±` where one rule stands for both turns.
+    pub predecessor: HeadModule,
+    pub right: Vec<HeadModule>,
+    /// The whole head.
+    pub head: Span,
+    pub clauses: Vec<Clause>,
+}
+
+#[derive(Clone, Debug)]
+pub struct Clause {
+    pub guard: Option<Expression>,
+    pub action: Action,
+    pub span: Span,
+}
+
+#[derive(Clone, Debug)]
+pub enum Action {
+    Solve(Vec<Equation>),
+    Produce(Vec<Module>),
+}
+
+/// `dx/dt = …`
+#[derive(Clone, Debug)]
+pub struct Equation {
+    /// The parameter, without the `d`.
+    pub parameter: Name,
+    pub rate: Expression,
+}
+
+#[derive(Clone, Debug)]
+pub enum Item {
+    Title(String),
+    Const { name: Name, value: Expression },
+    Param { name: Name, value: Expression, range: Option<(Expression, Expression)> },
+    Def { name: Name, parameters: Vec<Name>, body: Expression },
+    Angle(Expression),
+    Frames { from: Expression, to: Expression, step: Expression },
+    Ignore(Vec<Name>),
+    Consider(Vec<Name>),
+    Axiom(Vec<Module>),
+    Interpret { head: HeadModule, drawn: Vec<Module> },
+    Rule(Rule),
+}
+
+/// A parsed model.
+#[derive(Clone, Debug, Default)]
+pub struct Document {
+    /// The declarations and rules in the order written, each with its place.
+    pub items: Vec<(Item, Span)>,
+    pub expressions: Expressions,
+}

@@ -1,0 +1,400 @@
+//! What can be known of a model before it runs.
+
+use std::collections::{HashMap, HashSet};
+
+use super::ast::{self, HeadModule};
+use super::print;
+use super::suggest::nearest;
+use crate::diagnostic::{Diagnostic, Span};
+use crate::model::{
+    BUILT_IN_SURFACES, Class, Condition, DRAWN_WORDS, KindId, Kinds, Model, Pattern, Rule, Step, base_of,
+    class_of,
+};
+
+/// Most rules that one strict predecessor can have.
+const MAX_RULES: usize = 1000;
+/// Most messages about modules that do nothing.
+const MAX_INERT: usize = 20;
+
+/// Kinds by the names that a context can call them.
+struct ByName<'k> {
+    exact: HashMap<&'k str, Vec<KindId>>,
+    base: HashMap<&'k str, Vec<KindId>>,
+}
+
+impl<'k> ByName<'k> {
+    fn new(kinds: &'k Kinds) -> ByName<'k> {
+        let mut index = ByName { exact: HashMap::new(), base: HashMap::new() };
+        for (id, kind) in kinds.iter() {
+            index.exact.entry(&kind.name).or_default().push(id);
+            index.base.entry(kind.base()).or_default().push(id);
+        }
+        index
+    }
+
+    /// A name without `_` stands for all kinds with that base name, any other for itself.
+    fn matching(&self, name: &str) -> &[KindId] {
+        let exact = class_of(name) != Class::Word || name.contains('_');
+        let index = if exact { &self.exact } else { &self.base };
+        index.get(name).map_or(&[], Vec::as_slice)
+    }
+}
+
+/// Matches the modules of contexts to kinds; a context that nothing can match is an error.
+pub fn resolve_contexts(model: &mut Model, rules: &[&ast::Rule], diagnostics: &mut Vec<Diagnostic>) {
+    let names = ByName::new(&model.kinds);
+    for (rule, written) in model.rules.iter_mut().zip(rules) {
+        let sides = [(&mut rule.left, &written.left), (&mut rule.right, &written.right)];
+        for (patterns, heads) in sides {
+            for (pattern, head) in patterns.iter_mut().zip(heads) {
+                resolve(&model.kinds, &names, pattern, head, diagnostics);
+            }
+        }
+    }
+}
+
+fn resolve(
+    kinds: &Kinds,
+    names: &ByName,
+    pattern: &mut Pattern,
+    head: &HeadModule,
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    let name = &*head.name.text;
+    let named = names.matching(name);
+    pattern.kinds = named.iter().copied().filter(|id| kinds.get(*id).arity == pattern.arity).collect();
+    if pattern.kinds.is_empty() {
+        let error = match named.first().map(|id| kinds.get(*id)) {
+            Some(kind) => Diagnostic::error(format!(
+                "`{}` has {}, not {}",
+                kind.name,
+                super::scope::plural(kind.arity, "parameter"),
+                pattern.arity
+            ))
+            .at(head.span, "the number of parameters must agree, or the context is never there"),
+            None => Diagnostic::error(format!("there is no module `{name}`"))
+                .at(head.span, "this context is never there")
+                .help_opt(near_kind(kinds, name)),
+        };
+        diagnostics.push(error);
+    } else if pattern.kinds.iter().all(|id| kinds.get(*id).skipped) {
+        diagnostics.push(
+            Diagnostic::error(format!("`{name}` is passed over in the search for context"))
+                .at(head.span, "this context is never there")
+                .help(format!("declare `consider {name}` (with all other modules that count), or take it out of `ignore`")),
+        );
+    }
+}
+
+fn near_kind(kinds: &Kinds, name: &str) -> Option<String> {
+    let known = kinds.iter().map(|(_, k)| k.name.as_str());
+    nearest(name, known).map(|near| format!("did you mean `{near}`?"))
+}
+
+/// `ignore` and `consider`.
+pub fn filter_contexts(
+    kinds: &mut Kinds,
+    ignored: &[&ast::Name],
+    considered: &[&ast::Name],
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    let find = |kinds: &Kinds, name: &ast::Name, diagnostics: &mut Vec<Diagnostic>| -> Vec<KindId> {
+        let found = ByName::new(kinds).matching(&name.text).to_vec();
+        if found.is_empty() {
+            diagnostics.push(
+                Diagnostic::warning(format!("there is no module `{}`", name.text))
+                    .at(name.span, "nothing to skip or to consider")
+                    .help_opt(near_kind(kinds, &name.text)),
+            );
+        }
+        found
+    };
+    if !considered.is_empty() {
+        let chosen: HashSet<KindId> =
+            considered.iter().flat_map(|name| find(kinds, name, diagnostics)).collect();
+        let all: Vec<KindId> = kinds.iter().map(|(id, _)| id).collect();
+        for id in all {
+            kinds.get_mut(id).skipped = !chosen.contains(&id);
+        }
+    }
+    for name in ignored {
+        for id in find(kinds, name, diagnostics) {
+            kinds.get_mut(id).skipped = true;
+        }
+    }
+}
+
+/// Rules and clauses that can never be reached.
+pub fn reachability(
+    model: &Model,
+    rules: &[&ast::Rule],
+    occurs: &HashMap<KindId, Span>,
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    let mut kinds_of: Vec<Vec<KindId>> = vec![Vec::new(); model.rules.len()];
+    for (id, kind) in model.kinds.iter() {
+        for &rule in &kind.rules {
+            kinds_of[rule].push(id);
+        }
+    }
+    for (i, rule) in model.rules.iter().enumerate() {
+        let own = &kinds_of[i];
+        if let Some(at) = model.kinds.get(own[0]).rules.get(MAX_RULES)
+            && *at == i
+        {
+            diagnostics.push(
+                Diagnostic::error(format!("more than {MAX_RULES} rules for one module"))
+                    .at(rule.span, "this one is too many"),
+            );
+        }
+        shadowed_rule(model, i, own, diagnostics);
+        clauses(rule, diagnostics);
+        if own.iter().all(|kind| !occurs.contains_key(kind)) {
+            diagnostics.push(never_made(model, rules[i], occurs));
+        }
+    }
+    // What the initial string can grow into.
+    let mut alive: HashSet<KindId> = model.axiom.kinds.iter().copied().collect();
+    let mut queue: Vec<KindId> = model.axiom.kinds.clone();
+    while let Some(kind) = queue.pop() {
+        for &rule in &model.kinds.get(kind).rules {
+            for made in model.rules[rule].produces.iter().flat_map(|p| &p.successor.kinds) {
+                if alive.insert(*made) {
+                    queue.push(*made);
+                }
+            }
+        }
+    }
+    for (i, rule) in model.rules.iter().enumerate() {
+        let own = &kinds_of[i];
+        if own.iter().any(|k| occurs.contains_key(k)) && !own.iter().any(|k| alive.contains(k)) {
+            diagnostics.push(
+                Diagnostic::warning("this rule is not used")
+                    .at(rule.span, "the initial string never grows into this module"),
+            );
+        }
+    }
+}
+
+fn shadowed_rule(model: &Model, index: usize, own: &[KindId], diagnostics: &mut Vec<Diagnostic>) {
+    let rule = &model.rules[index];
+    let wider = |a: &Pattern, b: &Pattern| b.kinds.iter().all(|k| a.matches(*k));
+    let earlier = model.kinds.get(own[0]).rules.iter().take(MAX_RULES).take_while(|j| **j < index);
+    let shadow = earlier.map(|j| (*j, &model.rules[*j])).find(|(j, before)| {
+        own.iter().all(|k| model.kinds.get(*k).rules.contains(j))
+            && before.left.len() <= rule.left.len()
+            && before.right.len() <= rule.right.len()
+            && before.left.iter().rev().zip(rule.left.iter().rev()).all(|(a, b)| wider(a, b))
+            && before.right.iter().zip(&rule.right).all(|(a, b)| wider(a, b))
+    });
+    if let Some((_, before)) = shadow {
+        diagnostics.push(
+            Diagnostic::error("this rule can never be reached")
+                .at(rule.span, "whenever its context is there, so is that of the rule before it")
+                .at(before.span, "this rule comes first")
+                .help("of several rules the first whose context is there applies: put the special one first"),
+        );
+    }
+}
+
+fn clauses(rule: &Rule, diagnostics: &mut Vec<Diagnostic>) {
+    let solves: Vec<(&Condition, Span)> = rule.solves.iter().map(|s| (&s.guard, s.span)).collect();
+    let produces: Vec<(&Condition, Span)> = rule.produces.iter().map(|p| (&p.guard, p.span)).collect();
+    for (kind, clauses) in [("solve", solves), ("produce", produces)] {
+        for (i, (guard, span)) in clauses.iter().enumerate() {
+            if guard.0 == [Step::Constant(false)] {
+                diagnostics.push(
+                    Diagnostic::error("this clause can never be reached")
+                        .at(*span, "its condition is always false"),
+                );
+            }
+            let before = clauses[..i].iter().find(|(other, _)| other.is_always() || other == guard);
+            if let Some((other, first)) = before {
+                let why = if other.is_always() {
+                    "this one always holds, and comes first"
+                } else {
+                    "this one has the same condition, and comes first"
+                };
+                let message = if kind == "solve" {
+                    "two `solve` clauses for the same state"
+                } else {
+                    "this clause can never be reached"
+                };
+                diagnostics.push(
+                    Diagnostic::error(message).at(*span, "this one never has its turn").at(*first, why).help(
+                        if kind == "solve" {
+                            "write the equations in one clause, with commas: `solve dx/dt = …, dy/dt = …`"
+                        } else {
+                            "of several productions that hold at once, the first written wins"
+                        },
+                    ),
+                );
+            }
+        }
+    }
+}
+
+fn never_made(model: &Model, rule: &ast::Rule, occurs: &HashMap<KindId, Span>) -> Diagnostic {
+    let head = &rule.predecessor;
+    let name = &*head.name.text;
+    let error = Diagnostic::error("this rule can never be reached")
+        .at(head.span, format!("no string has a module `{}`", print::head_module(head)));
+    let names = if name == "±" { vec!["+", "-"] } else { vec![name] };
+    let other = (occurs.iter())
+        .filter(|(id, _)| names.contains(&model.kinds.get(**id).name.as_str()))
+        .min_by_key(|(_, span)| **span);
+    if let Some((id, span)) = other {
+        let kind = model.kinds.get(*id);
+        return error.at(
+            *span,
+            format!("here `{}` has {}", kind.name, super::scope::plural(kind.arity, "parameter")),
+        );
+    }
+    let known = occurs.keys().map(|id| model.kinds.get(*id).name.as_str());
+    let help = nearest(name, known).map(|near| format!("did you mean `{near}`?"));
+    error.help_opt(help)
+}
+
+/// Domains that can be left without a production.
+pub fn coverage(model: &Model, diagnostics: &mut Vec<Diagnostic>) {
+    for rule in &model.rules {
+        if rule.produces.iter().any(|p| p.guard.is_always()) {
+            continue;
+        }
+        for (i, solve) in rule.solves.iter().enumerate() {
+            let mut said = HashSet::new();
+            for (atom, _) in solve.guard.atoms() {
+                let others = rule.solves.iter().enumerate().filter(|(j, s)| *j != i && !s.guard.is_always());
+                let covered = rule.produces.iter().any(|p| p.guard.atoms().any(|(a, _)| a == atom))
+                    || rule.solves.iter().any(|s| s.guard.is_always())
+                    || others.into_iter().any(|(_, s)| s.guard.atoms().any(|(a, _)| a == atom));
+                if !covered && !solve.unreachable[atom] && said.insert(atom) {
+                    diagnostics.push(
+                        Diagnostic::warning("no production covers this boundary of the domain")
+                            .at(
+                                rule.atoms[atom],
+                                "when this stops being true, there is no equation and no production",
+                            )
+                            .help("add a clause for it, such as `if … = … produce …`"),
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// Modules that mean nothing: no rule, no drawing, no context.
+pub fn inert_modules(model: &Model, occurs: &HashMap<KindId, Span>, diagnostics: &mut Vec<Diagnostic>) {
+    let in_context: HashSet<KindId> = model
+        .rules
+        .iter()
+        .flat_map(|r| r.left.iter().chain(&r.right))
+        .flat_map(|p| p.kinds.iter().copied())
+        .collect();
+    let with_rules: HashSet<&str> = model
+        .kinds
+        .iter()
+        .filter(|(_, k)| !k.rules.is_empty() || k.interpretation.is_some())
+        .map(|(_, k)| k.name.as_str())
+        .collect();
+    let mut all: Vec<(Span, KindId)> = occurs.iter().map(|(kind, span)| (*span, *kind)).collect();
+    all.sort_unstable();
+    let mut said = HashSet::new();
+    for (span, id) in all {
+        let kind = model.kinds.get(id);
+        let name = kind.name.as_str();
+        let known =
+            with_rules.contains(name) || in_context.contains(&id) || DRAWN_WORDS.contains(&kind.base());
+        let first = || Span { end: span.start + name.len() as u32, ..span };
+        if known || !said.insert(name) {
+            continue;
+        }
+        if said.len() > MAX_INERT {
+            break;
+        }
+        match kind.class() {
+            Class::Symbol => {}
+            Class::Surface if BUILT_IN_SURFACES.contains(&name) => {}
+            Class::Surface => diagnostics.push(
+                Diagnostic::warning(format!("there is no surface `{name}`: nothing is drawn for it"))
+                    .at(first(), "built in are @L, a leaf, and @K, a flower"),
+            ),
+            Class::Word => {
+                let names: HashSet<&str> = with_rules.iter().copied().chain(DRAWN_WORDS).collect();
+                if let Some(parts) = split(name, &names) {
+                    diagnostics.push(
+                        Diagnostic::error(format!("unknown module `{name}`"))
+                            .at(first(), "no rule, no drawing")
+                            .help(format!("`{name}` is one name: write `{}`", parts.join(" "))),
+                    );
+                } else if let Some(near) =
+                    nearest(name, with_rules.iter().copied().filter(|n| n.chars().count() > 1))
+                {
+                    diagnostics.push(
+                        Diagnostic::error(format!("unknown module `{name}`"))
+                            .at(first(), "no rule, no drawing")
+                            .help(format!("did you mean `{near}`?"))
+                            .help(format!(
+                                "a module that only marks a place is declared with `interpret {name}: ε`"
+                            )),
+                    );
+                } else {
+                    diagnostics.push(
+                        Diagnostic::warning(format!("module `{name}` does nothing"))
+                            .at(first(), "no rule, no drawing, no context mentions it")
+                            .help(format!("if it only marks a place, say so: `interpret {name}: ε`")),
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// A word as a sequence of known names, two or more.
+fn split<'n>(word: &'n str, names: &HashSet<&str>) -> Option<Vec<&'n str>> {
+    if word.len() > 60 || base_of(word) != word {
+        return None;
+    }
+    // best[i]: a way to write the first i bytes.
+    let mut best: Vec<Option<Vec<&str>>> = vec![None; word.len() + 1];
+    best[0] = Some(Vec::new());
+    for end in 1..=word.len() {
+        for start in 0..end {
+            let Some(part) = word.get(start..end) else { continue };
+            if names.contains(part)
+                && let Some(before) = &best[start]
+            {
+                let mut whole = before.clone();
+                whole.push(part);
+                best[end] = Some(whole);
+                break;
+            }
+        }
+    }
+    best.pop().flatten().filter(|parts| parts.len() > 1)
+}
+
+/// Interpretations that draw themselves.
+pub fn interpretation_cycles(model: &Model, diagnostics: &mut Vec<Diagnostic>) {
+    for (start, kind) in model.kinds.iter() {
+        let Some(index) = kind.interpretation else { continue };
+        let mut seen = HashSet::new();
+        let mut queue = vec![start];
+        while let Some(id) = queue.pop() {
+            let Some(i) = model.kinds.get(id).interpretation else { continue };
+            for &drawn in &model.interpretations[i].drawn.kinds {
+                if drawn == start {
+                    diagnostics.push(
+                        Diagnostic::error(format!("the drawing of `{}` contains itself", kind.name))
+                            .at(model.interpretations[index].span, "this interpretation never ends")
+                            .help("draw it with another name of the same base, such as `F_drawn(…)`"),
+                    );
+                    return;
+                }
+                if seen.insert(drawn) {
+                    queue.push(drawn);
+                }
+            }
+        }
+    }
+}

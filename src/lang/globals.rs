@@ -1,0 +1,243 @@
+//! Constants, `param`s and functions in the order in which they depend on one another.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use super::Setting;
+use super::ast::{Document, Expr, ExprId, Expression, Item, Name};
+use super::scope::{RESERVED, Scope};
+use super::suggest::did_you_mean;
+use crate::diagnostic::{Diagnostic, Span};
+use crate::model::Parameter;
+
+/// What a global name is declared as.
+struct Global<'d> {
+    name: &'d Name,
+    body: Expression,
+    kind: Kind<'d>,
+}
+
+enum Kind<'d> {
+    Const,
+    Param(Option<(Expression, Expression)>),
+    Def(&'d [Name]),
+}
+
+/// Declares all global names in `scope` and returns the `param`s with the values in force.
+pub fn declare(document: &Document, settings: &[Setting], scope: &mut Scope) -> Vec<Parameter> {
+    let globals = collect(document, scope);
+    let index: HashMap<&str, usize> = globals.iter().enumerate().map(|(i, g)| (&*g.name.text, i)).collect();
+    let mut parameters = Vec::new();
+    for i in order(document, &globals, &index, scope) {
+        let Global { name, body, kind } = &globals[i];
+        match kind {
+            Kind::Def(formals) => scope.define_function(name, formals, &document.expressions, *body),
+            Kind::Const => {
+                let value = scope.constant_value(&document.expressions, *body);
+                scope.define_constant(name.text.clone(), value);
+            }
+            Kind::Param(range) => {
+                let value = parameter(document, name, *body, *range, settings, scope);
+                scope.define_constant(name.text.clone(), value.as_ref().map(|p| p.value));
+                parameters.extend(value);
+            }
+        }
+    }
+    parameters.sort_by_key(|p| p.span);
+    for setting in settings {
+        if !parameters.iter().any(|p| p.name == setting.name) {
+            let declared = index.contains_key(&*setting.name);
+            let known = parameters.iter().map(|p| p.name.as_str());
+            let mut error =
+                Diagnostic::error(format!("the model has no param `{}` that could be set", setting.name));
+            error = if declared {
+                error.help(format!(
+                    "`{}` is a constant; declare it with `param` to set it from outside",
+                    setting.name
+                ))
+            } else {
+                error.help_opt(did_you_mean(&setting.name, known))
+            };
+            scope.refused_settings.push(error);
+        }
+    }
+    parameters
+}
+
+fn collect<'d>(document: &'d Document, scope: &mut Scope) -> Vec<Global<'d>> {
+    let mut globals: Vec<Global> = Vec::new();
+    let mut first: HashMap<&str, Span> = HashMap::new();
+    for (item, _) in &document.items {
+        let global = match item {
+            Item::Const { name, value } => Global { name, body: *value, kind: Kind::Const },
+            Item::Param { name, value, range } => Global { name, body: *value, kind: Kind::Param(*range) },
+            Item::Def { name, parameters, body } => Global { name, body: *body, kind: Kind::Def(parameters) },
+            _ => continue,
+        };
+        let Name { text, span } = global.name;
+        if Scope::is_built_in(text) {
+            let what =
+                if RESERVED.contains(&&**text) { "stands for time in every rule" } else { "is built in" };
+            scope.diagnostics.push(
+                Diagnostic::error(format!("`{text}` {what} and cannot be declared"))
+                    .at(*span, "choose another name"),
+            );
+            continue;
+        }
+        if let Some(before) = first.insert(text, *span) {
+            scope.diagnostics.push(
+                Diagnostic::error(format!("`{text}` is declared twice"))
+                    .at(*span, "the second time")
+                    .at(before, "the first time"),
+            );
+            continue;
+        }
+        globals.push(global);
+    }
+    globals
+}
+
+fn parameter(
+    document: &Document,
+    name: &Name,
+    body: Expression,
+    range: Option<(Expression, Expression)>,
+    settings: &[Setting],
+    scope: &mut Scope,
+) -> Option<Parameter> {
+    let all = &document.expressions;
+    let declared = scope.constant_value(all, body)?;
+    let range = match range {
+        Some((from, to)) => {
+            let (low, high) = (scope.constant_value(all, from)?, scope.constant_value(all, to)?);
+            if low > high {
+                scope.diagnostics.push(
+                    Diagnostic::error(format!("the range of `{}` is empty", name.text)).at(
+                        all.span(from.root).to(all.span(to.root)),
+                        format!("{low} is greater than {high}"),
+                    ),
+                );
+                return None;
+            }
+            if !(low..=high).contains(&declared) {
+                scope.diagnostics.push(
+                    Diagnostic::error(format!("the value of `{}` is outside its range", name.text))
+                        .at(all.span(body.root), format!("this is {declared}"))
+                        .at(
+                            all.span(from.root).to(all.span(to.root)),
+                            format!("the range is {low} .. {high}"),
+                        ),
+                );
+                return None;
+            }
+            Some((low, high))
+        }
+        None => None,
+    };
+    let mut value = declared;
+    if let Some(setting) = settings.iter().rev().find(|s| *s.name == *name.text) {
+        if let Some((low, high)) = range
+            && !(low..=high).contains(&setting.value)
+        {
+            scope.refused_settings.push(Diagnostic::error(format!(
+                "{} = {} is outside the range {low} .. {high} of this param",
+                setting.name, setting.value
+            )));
+        }
+        value = setting.value;
+    }
+    Some(Parameter { name: name.text.to_string(), value, range, span: name.span })
+}
+
+/// The global names that an expression mentions, in order.
+fn mentions<'d>(
+    document: &'d Document,
+    expression: Expression,
+) -> impl Iterator<Item = (&'d Arc<str>, Span)> {
+    (expression.first.0..=expression.root.0).filter_map(|id| match document.expressions.get(ExprId(id)) {
+        Expr::Name(name) | Expr::Call(name, _) => Some((name, document.expressions.span(ExprId(id)))),
+        _ => None,
+    })
+}
+
+/// Global names, each after those it depends on; those on a cycle are reported and left out.
+///
+/// Depth-first search with an explicit stack: chains of declarations may be long.
+fn order(
+    document: &Document,
+    globals: &[Global],
+    index: &HashMap<&str, usize>,
+    scope: &mut Scope,
+) -> Vec<usize> {
+    #[derive(Clone, Copy, PartialEq)]
+    enum Mark {
+        New,
+        Open,
+        Done,
+    }
+    let dependencies: Vec<Vec<(usize, Span)>> = globals
+        .iter()
+        .map(|global| {
+            let own: &[Name] = match global.kind {
+                Kind::Def(formals) => formals,
+                _ => &[],
+            };
+            let ranges = match global.kind {
+                Kind::Param(Some((from, to))) => vec![from, to],
+                _ => Vec::new(),
+            };
+            std::iter::once(global.body)
+                .chain(ranges)
+                .flat_map(|e| mentions(document, e))
+                .filter(|(name, _)| !own.iter().any(|formal| formal.text == **name))
+                .filter_map(|(name, span)| Some((*index.get(&**name)?, span)))
+                .collect()
+        })
+        .collect();
+    let mut marks = vec![Mark::New; globals.len()];
+    let mut sorted = Vec::with_capacity(globals.len());
+    for start in 0..globals.len() {
+        if marks[start] != Mark::New {
+            continue;
+        }
+        marks[start] = Mark::Open;
+        let mut stack = vec![(start, 0)];
+        while let Some((node, next)) = stack.last_mut() {
+            let (node, edge) = (*node, *next);
+            *next += 1;
+            match dependencies[node].get(edge) {
+                None => {
+                    marks[node] = Mark::Done;
+                    sorted.push(node);
+                    stack.pop();
+                }
+                Some(&(to, span)) => match marks[to] {
+                    Mark::New => {
+                        marks[to] = Mark::Open;
+                        stack.push((to, 0));
+                    }
+                    Mark::Open => {
+                        let from = stack.iter().position(|(n, _)| *n == to).unwrap_or(0);
+                        let mut path: Vec<&str> =
+                            stack[from..].iter().map(|(n, _)| &*globals[*n].name.text).collect();
+                        path.push(&globals[to].name.text);
+                        if path.len() > 8 {
+                            path.splice(4..path.len() - 3, ["…"]);
+                        }
+                        let what = match globals[to].kind {
+                            Kind::Def(_) => "calls itself",
+                            _ => "depends on itself",
+                        };
+                        scope.diagnostics.push(
+                            Diagnostic::error(format!("`{}` {what}", globals[to].name.text))
+                                .at(span, format!("this closes the circle {}", path.join(" → ")))
+                                .at(globals[to].name.span, "declared here"),
+                        );
+                    }
+                    Mark::Done => {}
+                },
+            }
+        }
+    }
+    sorted
+}

@@ -1,0 +1,445 @@
+//! First pass over the text: where declarations begin, and which line breaks mean something.
+//!
+//! The result has the same bytes at the same places, so every position in it is a position in the
+//! file; comments, and line breaks that end nothing, have become spaces. The text is cut into items
+//! (declarations and rules), so that a mistake in one does not hide those in the others, and so that the
+//! parser's memory is bounded by an item, not by the file. Nesting is bounded here, before anything
+//! recursive sees the text.
+//!
+//! A line break ends an expression or a condition, except inside parentheses, after an operator or a
+//! comma, or before `then` and `else` (LANGUAGE, "Text"). Inside a string of modules it means nothing.
+
+use crate::diagnostic::{Diagnostic, Span};
+
+/// Deepest nesting of parentheses, signs, powers and `if` that an expression may have.
+pub const MAX_DEPTH: usize = 100;
+
+/// Greatest size of one declaration or rule, in bytes; the initial string is not bounded by it.
+const MAX_ITEM: usize = 1 << 20;
+
+/// What an item declares, told by its first word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ItemKind {
+    Title,
+    Const,
+    Param,
+    Def,
+    Angle,
+    Frames,
+    Ignore,
+    Consider,
+    Axiom,
+    Interpret,
+    Rule,
+    /// A line that begins nothing known.
+    Unknown,
+}
+
+/// The words that begin a declaration.
+pub const DECLARATIONS: [(&str, ItemKind); 11] = [
+    ("title", ItemKind::Title),
+    ("const", ItemKind::Const),
+    ("param", ItemKind::Param),
+    ("def", ItemKind::Def),
+    ("angle", ItemKind::Angle),
+    ("frames", ItemKind::Frames),
+    ("ignore", ItemKind::Ignore),
+    ("consider", ItemKind::Consider),
+    ("initial", ItemKind::Axiom),
+    ("axiom", ItemKind::Axiom),
+    ("interpret", ItemKind::Interpret),
+];
+
+/// One declaration or rule.
+#[derive(Clone, Copy, Debug)]
+pub struct RawItem {
+    pub kind: ItemKind,
+    pub start: usize,
+    pub end: usize,
+    /// Byte after the first `:` outside parentheses.
+    pub after_colon: Option<usize>,
+    /// It has already been complained about; do not parse it.
+    pub broken: bool,
+}
+
+/// The text cut into items.
+#[derive(Debug)]
+pub struct Layout {
+    pub text: String,
+    pub items: Vec<RawItem>,
+    pub errors: Vec<Diagnostic>,
+}
+
+/// What the last significant token was, as far as line breaks and signs care.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Last {
+    /// Something that can end an expression.
+    Operand,
+    /// Something that cannot.
+    Operator,
+    /// `<` or `>`: cannot end an expression, and may stand at the end of a line in a rule's head.
+    Angle,
+    Colon,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Token {
+    Word,
+    Number,
+    Text,
+    Open,
+    Close,
+    Comma,
+    Colon,
+    Symbol,
+}
+
+/// A parenthesis that is open, and what recursion is pending inside it.
+#[derive(Clone, Copy, Debug, Default)]
+struct Level {
+    at: usize,
+    /// Signs and powers waiting for their right operand.
+    right: usize,
+    /// `if` without its `else`.
+    ifs: usize,
+}
+
+struct Scanner<'t> {
+    text: &'t str,
+    out: Vec<u8>,
+    items: Vec<RawItem>,
+    errors: Vec<Diagnostic>,
+    /// In a string of modules, where line breaks mean nothing.
+    in_string: bool,
+    last: Last,
+    levels: Vec<Level>,
+    /// Sum over `levels`.
+    pending: usize,
+    /// Line break that is significant unless the next line begins with `then` or `else`.
+    held_break: Option<usize>,
+    /// Start of a run of lines that each end with `<` or `>`.
+    run_of_angles: Option<usize>,
+}
+
+/// Cuts a text into items. Time and memory are linear in the text.
+pub fn layout(text: &str) -> Layout {
+    let mut scanner = Scanner {
+        text,
+        out: text.as_bytes().to_vec(),
+        items: Vec::new(),
+        errors: Vec::new(),
+        in_string: false,
+        last: Last::Operand,
+        levels: vec![Level::default()],
+        pending: 0,
+        held_break: None,
+        run_of_angles: None,
+    };
+    let mut tokens = Vec::new();
+    let mut start = 0;
+    while start < text.len() {
+        let end = memchr_newline(text, start);
+        scanner.tokenize(start, end, &mut tokens);
+        scanner.line(start, end, &tokens);
+        start = end + 1;
+    }
+    scanner.close_item(text.len());
+    let Scanner { out, mut items, mut errors, .. } = scanner;
+    for item in &mut items {
+        if item.end - item.start > MAX_ITEM && item.kind != ItemKind::Axiom && !item.broken {
+            item.broken = true;
+            let message = format!("this declaration is longer than {} KiB", MAX_ITEM >> 10);
+            errors.push(
+                Diagnostic::error(message)
+                    .at(Span::new(item.start, item.start + first_char(text, item.start)), "it begins here"),
+            );
+        }
+    }
+    // Only ASCII bytes were put in place of whole characters.
+    let text = String::from_utf8(out).expect("whole characters were replaced");
+    Layout { text, items, errors }
+}
+
+fn memchr_newline(text: &str, from: usize) -> usize {
+    text[from..].find('\n').map_or(text.len(), |i| from + i)
+}
+
+fn first_char(text: &str, at: usize) -> usize {
+    text[at..].chars().next().map_or(0, char::len_utf8)
+}
+
+impl Scanner<'_> {
+    /// Collects a line's tokens and blanks its comment.
+    fn tokenize(&mut self, start: usize, end: usize, tokens: &mut Vec<(Token, usize, usize)>) {
+        tokens.clear();
+        let line = &self.text[start..end];
+        let mut chars = line.char_indices().peekable();
+        while let Some((i, c)) = chars.next() {
+            let mut take_while = |accept: &dyn Fn(char) -> bool| {
+                while chars.next_if(|(_, c)| accept(*c)).is_some() {}
+                chars.peek().map_or(line.len(), |(j, _)| *j)
+            };
+            let (token, to) = match c {
+                c if c.is_whitespace() => continue,
+                '#' => {
+                    self.out[start + i..end].fill(b' ');
+                    break;
+                }
+                '"' => {
+                    let mut to = take_while(&|c| c != '"');
+                    if chars.next().is_some() {
+                        to += 1;
+                    }
+                    (Token::Text, to)
+                }
+                c if c.is_alphabetic() => (Token::Word, take_while(&|c| c.is_alphanumeric() || c == '_')),
+                c if c.is_ascii_digit() => (Token::Number, take_while(&|c| c.is_ascii_digit())),
+                '(' => (Token::Open, i + 1),
+                ')' => (Token::Close, i + 1),
+                ',' => (Token::Comma, i + 1),
+                ':' => (Token::Colon, i + 1),
+                c => (Token::Symbol, i + c.len_utf8()),
+            };
+            tokens.push((token, start + i, start + to));
+        }
+    }
+
+    fn word(&self, token: (Token, usize, usize)) -> &str {
+        if token.0 == Token::Word { &self.text[token.1..token.2] } else { "" }
+    }
+
+    fn line(&mut self, start: usize, end: usize, tokens: &[(Token, usize, usize)]) {
+        let Some(&first) = tokens.first() else {
+            self.line_break(end);
+            return;
+        };
+        let word = self.word(first).to_owned();
+        let colon = colon_outside_parentheses(tokens);
+        if let Some(kind) = self.starts_item(&word, colon, tokens) {
+            let mut from = first.1;
+            if kind == ItemKind::Rule && self.last == Last::Angle && self.levels.len() == 1 {
+                // The head was broken over lines; take back the lines before.
+                from = self.run_of_angles.unwrap_or(from);
+            }
+            self.close_item(from);
+            self.items.push(RawItem { kind, start: from, end: from, after_colon: None, broken: false });
+            self.in_string = false;
+            self.last = Last::Operator;
+            self.held_break = None;
+        } else if let Some(at) = self.held_break.take()
+            && matches!(word.as_str(), "then" | "else")
+        {
+            // `then` and `else` take back the break before them, and any empty lines.
+            for byte in &mut self.out[at..start] {
+                if *byte == b'\n' {
+                    *byte = b' ';
+                }
+            }
+        }
+        for &token in tokens {
+            self.token(token);
+        }
+        self.run_of_angles = match (self.last, self.run_of_angles) {
+            (Last::Angle, None) => Some(first.1),
+            (Last::Angle, run) => run,
+            _ => None,
+        };
+        self.line_break(end);
+    }
+
+    /// Whether a line begins an item, and which.
+    fn starts_item(&self, word: &str, colon: bool, tokens: &[(Token, usize, usize)]) -> Option<ItemKind> {
+        let declared = DECLARATIONS.iter().find(|(name, _)| *name == word).map(|(_, kind)| *kind);
+        let inside = self.levels.len() > 1;
+        if let Some(kind) = declared {
+            // Inside parentheses that somebody forgot to close, a declaration still begins one; but an
+            // identifier that happens to be called `angle` does not.
+            let next_is_word = matches!(tokens.get(1), Some((Token::Word | Token::Text, ..)));
+            if !inside || next_is_word || colon {
+                return Some(kind);
+            }
+        }
+        if colon {
+            return Some(ItemKind::Rule);
+        }
+        let Some(current) = self.items.last() else { return Some(ItemKind::Unknown) };
+        if inside || self.in_string || self.last != Last::Operand {
+            return None;
+        }
+        let continues = match current.kind {
+            ItemKind::Rule => matches!(word, "if" | "solve" | "produce" | "then" | "else"),
+            ItemKind::Axiom | ItemKind::Interpret => true,
+            _ => matches!(word, "then" | "else"),
+        };
+        (!continues).then_some(ItemKind::Unknown)
+    }
+
+    fn close_item(&mut self, end: usize) {
+        if self.levels.len() > 1 {
+            let at = self.levels.last().expect("two levels").at;
+            self.fault(
+                Diagnostic::error("this `(` is never closed")
+                    .at(Span::new(at, at + 1), "expected `)` for it"),
+            );
+        }
+        self.levels.truncate(1);
+        self.levels[0] = Level::default();
+        self.pending = 0;
+        if let Some(item) = self.items.last_mut() {
+            item.end = end;
+        }
+    }
+
+    fn fault(&mut self, error: Diagnostic) {
+        if let Some(item) = self.items.last_mut() {
+            if !item.broken {
+                self.errors.push(error);
+            }
+            item.broken = true;
+        }
+    }
+
+    fn level(&mut self) -> &mut Level {
+        self.levels.last_mut().expect("never empty")
+    }
+
+    fn token(&mut self, (token, start, end): (Token, usize, usize)) {
+        let in_expression = !self.in_string || self.levels.len() > 1;
+        let mut last = Last::Operand;
+        match token {
+            Token::Word => {
+                last = self.keyword(start, end);
+            }
+            Token::Number | Token::Text => {}
+            Token::Open => {
+                self.levels.push(Level { at: start, ..Level::default() });
+                last = Last::Operator;
+            }
+            Token::Close => {
+                if self.levels.len() > 1 {
+                    let level = self.levels.pop().expect("two levels");
+                    self.pending -= level.right + level.ifs;
+                } else {
+                    self.fault(
+                        Diagnostic::error("this `)` closes nothing")
+                            .at(Span::new(start, end), "there is no `(` before it"),
+                    );
+                }
+            }
+            Token::Comma => {
+                self.forget_pending();
+                last = Last::Operator;
+            }
+            Token::Colon => {
+                last = Last::Colon;
+                if self.levels.len() == 1
+                    && let Some(item) = self.items.last_mut()
+                    && item.after_colon.is_none()
+                {
+                    item.after_colon = Some(end);
+                    self.in_string = matches!(item.kind, ItemKind::Axiom | ItemKind::Interpret);
+                    self.forget_pending();
+                }
+            }
+            Token::Symbol => {
+                let symbol = &self.text[start..end];
+                let binary = self.last == Last::Operand;
+                last = if matches!(symbol, "<" | ">") { Last::Angle } else { Last::Operator };
+                if in_expression {
+                    let level = self.levels.last_mut().expect("never empty");
+                    if symbol == "^" || !binary {
+                        level.right += 1;
+                        self.pending += 1;
+                    } else {
+                        self.pending -= level.right;
+                        level.right = 0;
+                    }
+                }
+            }
+        }
+        self.last = last;
+        let depth = self.levels.len() - 1 + self.pending;
+        if depth > MAX_DEPTH {
+            self.fault(
+                Diagnostic::error(format!("this is nested more than {MAX_DEPTH} deep"))
+                    .at(Span::new(start, end), "one level too many")
+                    .help("name a part of it: `const part = …` or `def part(x) = …`"),
+            );
+        }
+    }
+
+    /// Keywords that begin a string or an expression; returns what the word counts as.
+    fn keyword(&mut self, start: usize, end: usize) -> Last {
+        let inside = self.levels.len() > 1;
+        let in_rule = self.items.last().is_some_and(|i| i.kind == ItemKind::Rule && i.after_colon.is_some());
+        match &self.text[start..end] {
+            "produce" if in_rule && !inside => {
+                self.forget_pending();
+                self.in_string = true;
+                Last::Operator
+            }
+            word @ ("solve" | "if") if in_rule && !inside && (self.in_string || word == "solve") => {
+                self.forget_pending();
+                self.in_string = false;
+                self.count_if(word == "if");
+                Last::Operator
+            }
+            "if" => {
+                self.count_if(true);
+                Last::Operator
+            }
+            "then" | "else" => {
+                let is_else = &self.text[start..end] == "else";
+                let level = self.level();
+                let dropped = level.right + usize::from(is_else && level.ifs > 0);
+                level.right = 0;
+                level.ifs -= usize::from(is_else && level.ifs > 0);
+                self.pending -= dropped;
+                Last::Operator
+            }
+            "step" | "in" | "string" => Last::Operator,
+            _ => Last::Operand,
+        }
+    }
+
+    fn count_if(&mut self, yes: bool) {
+        if yes {
+            self.level().ifs += 1;
+            self.pending += 1;
+        }
+    }
+
+    fn forget_pending(&mut self) {
+        let level = self.levels.last_mut().expect("never empty");
+        self.pending -= level.right + level.ifs;
+        (level.right, level.ifs) = (0, 0);
+    }
+
+    /// Keeps the line break at `at` if it ends an expression, else blanks it.
+    fn line_break(&mut self, at: usize) {
+        if at >= self.out.len() {
+            return;
+        }
+        if self.in_string || self.levels.len() > 1 || self.last != Last::Operand {
+            self.out[at] = b' ';
+            return;
+        }
+        self.forget_pending();
+        // The first break after the expression is the one that `then` or `else` would take back.
+        self.held_break.get_or_insert(at);
+    }
+}
+
+/// Whether a `:` stands on the line outside parentheses opened on it.
+fn colon_outside_parentheses(tokens: &[(Token, usize, usize)]) -> bool {
+    let mut depth = 0i64;
+    for (token, ..) in tokens {
+        match token {
+            Token::Open => depth += 1,
+            Token::Close => depth -= 1,
+            Token::Colon if depth <= 0 => return true,
+            _ => {}
+        }
+    }
+    false
+}

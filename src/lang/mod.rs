@@ -1,0 +1,233 @@
+//! The language front end: text to [`Model`].
+//!
+//! ```text
+//! text ──layout──▶ items ──parse──▶ Document ──scope, rules──▶ Model ──check──▶ remarks
+//! ```
+//!
+//! [`load`] is the whole of it. Mistakes are collected, not thrown: a text with three mistakes gets three
+//! messages. Every pass is linear in the text, and none recurses deeper than a fixed bound.
+
+pub mod ast;
+mod check;
+mod globals;
+mod layout;
+pub mod parse;
+pub mod print;
+mod rules;
+mod scope;
+mod suggest;
+
+use std::sync::Arc;
+
+pub use layout::MAX_DEPTH;
+pub use suggest::did_you_mean;
+
+use crate::diagnostic::{Diagnostic, Severity, Source, Span};
+use crate::model::{Frames, Kinds, Model, Successor};
+use ast::{Action, Document, Item};
+use scope::{Scope, Variables};
+
+/// A value for a `param`, given from outside.
+#[derive(Clone, Debug)]
+pub struct Setting {
+    pub name: String,
+    pub value: f64,
+}
+
+/// What came of a text: a model unless there are errors, and everything there is to say about it.
+#[derive(Debug)]
+pub struct Loaded {
+    pub model: Option<Model>,
+    pub diagnostics: Vec<Diagnostic>,
+    /// What is wrong with the settings; then there is no model either.
+    pub refused_settings: Vec<Diagnostic>,
+}
+
+/// Reads, checks and compiles a model.
+pub fn load(source: &Source, settings: &[Setting]) -> Loaded {
+    let (document, mut diagnostics) = parse::parse(source);
+    let unread = !diagnostics.is_empty();
+    let mut scope = Scope::default();
+    let model = build(&document, settings, &mut scope, unread);
+    diagnostics.append(&mut scope.diagnostics);
+    let failed = diagnostics.iter().any(|d| d.severity == Severity::Error);
+    diagnostics.sort_by_key(|d| (d.severity == Severity::Warning, d.labels.first().map(|l| l.0)));
+    let refused_settings = scope.refused_settings;
+    let model = model.filter(|_| !failed && refused_settings.is_empty());
+    Loaded { model, diagnostics, refused_settings }
+}
+
+/// Builds the model; errors go to the scope. `unread` tells that parts of the text are missing, so that
+/// nothing is said about what may stand in them.
+fn build(document: &Document, settings: &[Setting], scope: &mut Scope, unread: bool) -> Option<Model> {
+    let parameters = globals::declare(document, settings, scope);
+    let mut kinds = Kinds::default();
+    let mut single = Singles::default();
+    let mut builder =
+        rules::RuleBuilder { document, scope, kinds: &mut kinds, occurs: std::collections::HashMap::new() };
+    let (mut rules, mut written, mut interpretations, mut strings) = (vec![], vec![], vec![], vec![]);
+    let (mut axiom, mut ignored, mut considered) = (None, Vec::new(), Vec::new());
+    let (mut title, mut angle, mut frames) = (None, 90.0, None);
+    let mut whole = true;
+    for (item, span) in &document.items {
+        match item {
+            Item::Title(text) => {
+                single.once("title", *span, builder.scope);
+                title = Some(text.clone());
+            }
+            Item::Angle(value) => {
+                single.once("angle", *span, builder.scope);
+                angle = builder.constant(*value).unwrap_or(90.0);
+            }
+            Item::Frames { from, to, step } => {
+                single.once("frames", *span, builder.scope);
+                let all = [*from, *to, *step].map(|e| builder.constant(e));
+                if let [Some(from), Some(to), Some(step)] = all {
+                    frames = Some(Frames { from, to, step });
+                    check_frames(frames.as_ref(), *span, builder.scope);
+                }
+            }
+            Item::Ignore(names) => ignored.extend(names),
+            Item::Consider(names) => considered.extend(names),
+            Item::Axiom(modules) => {
+                single.once("the initial string", *span, builder.scope);
+                strings.push(&modules[..]);
+                let variables = Variables {
+                    no_time: Some("the initial string is made at t = 0"),
+                    ..Variables::default()
+                };
+                axiom = builder.successor(modules, &variables, 0);
+                whole &= axiom.is_some();
+            }
+            Item::Interpret { head, drawn } => match builder.interpretation(head, drawn) {
+                Some(interpretation) => interpretations.push(interpretation),
+                None => whole = false,
+            },
+            Item::Rule(rule) => {
+                for clause in &rule.clauses {
+                    if let Action::Produce(modules) = &clause.action {
+                        strings.push(modules);
+                    }
+                }
+                written.push(rule);
+                match builder.rule(rule) {
+                    Some(compiled) => rules.push(compiled),
+                    None => whole = false,
+                }
+            }
+            Item::Const { .. } | Item::Param { .. } | Item::Def { .. } => {}
+        }
+    }
+    builder.check_arities(&written, &strings);
+    let occurs = builder.occurs;
+    if !single.seen("the initial string") && !unread {
+        scope.diagnostics.push(
+            Diagnostic::error("the model has no initial string")
+                .help("begin with one, such as `initial string: F(1)`"),
+        );
+    }
+    unused(document, scope);
+    if !whole || unread {
+        return None;
+    }
+    let mut model = Model {
+        title,
+        angle,
+        frames,
+        parameters,
+        kinds,
+        axiom: axiom.unwrap_or_else(Successor::default),
+        rules,
+        interpretations: Vec::new(),
+    };
+    for (i, rule) in written.iter().enumerate() {
+        let names: &[&str] = match &*rule.predecessor.name.text {
+            "±" => &["+", "-"],
+            name => &[name],
+        };
+        for name in names {
+            let kind = model.kinds.intern(name, rule.predecessor.parameters.len());
+            model.kinds.get_mut(kind).rules.push(i);
+        }
+    }
+    for (kind, interpretation) in interpretations {
+        if let Some(before) = model.kinds.get(kind).interpretation {
+            scope.diagnostics.push(
+                Diagnostic::error("two interpretations of one module")
+                    .at(interpretation.span, "the second one")
+                    .at(model.interpretations[before].span, "the first one"),
+            );
+        }
+        model.kinds.get_mut(kind).interpretation = Some(model.interpretations.len());
+        model.interpretations.push(interpretation);
+    }
+    let diagnostics = &mut scope.diagnostics;
+    check::filter_contexts(&mut model.kinds, &ignored, &considered, diagnostics);
+    check::resolve_contexts(&mut model, &written, diagnostics);
+    check::reachability(&model, &written, &occurs, diagnostics);
+    check::coverage(&model, diagnostics);
+    check::inert_modules(&model, &occurs, diagnostics);
+    check::interpretation_cycles(&model, diagnostics);
+    Some(model)
+}
+
+/// Declarations that a model has once.
+#[derive(Default)]
+struct Singles(Vec<(&'static str, Span)>);
+
+impl Singles {
+    fn seen(&self, what: &str) -> bool {
+        self.0.iter().any(|(name, _)| *name == what)
+    }
+
+    fn once(&mut self, what: &'static str, span: Span, scope: &mut Scope) {
+        if let Some((_, before)) = self.0.iter().find(|(name, _)| *name == what) {
+            scope.diagnostics.push(
+                Diagnostic::error(format!("{what} is given twice"))
+                    .at(first_line(span), "the second time")
+                    .at(first_line(*before), "the first time"),
+            );
+        }
+        self.0.push((what, span));
+    }
+}
+
+/// The beginning of a declaration, short enough to be underlined.
+fn first_line(span: Span) -> Span {
+    Span { end: span.end.min(span.start + 5), ..span }
+}
+
+fn check_frames(frames: Option<&Frames>, span: Span, scope: &mut Scope) {
+    let Some(&Frames { from, to, step }) = frames else { return };
+    let fault = if from < 0.0 {
+        "time begins at 0".to_owned()
+    } else if to < from {
+        format!("{to} is before {from}")
+    } else if step <= 0.0 {
+        "the step must be greater than 0".to_owned()
+    } else if (to - from) / step >= Frames::LIMIT as f64 {
+        format!("more than {} frames", Frames::LIMIT)
+    } else {
+        return;
+    };
+    scope.diagnostics.push(Diagnostic::error("these frames cannot be").at(span, fault));
+}
+
+/// Constants and functions that nothing uses.
+fn unused(document: &Document, scope: &mut Scope) {
+    for (item, _) in &document.items {
+        let (what, name) = match item {
+            Item::Const { name, .. } => ("constant", name),
+            Item::Param { name, .. } => ("param", name),
+            Item::Def { name, .. } => ("function", name),
+            _ => continue,
+        };
+        let text: &Arc<str> = &name.text;
+        if !scope.used.contains(text) {
+            scope.diagnostics.push(
+                Diagnostic::warning(format!("nobody uses the {what} `{text}`"))
+                    .at(name.span, "declared here"),
+            );
+        }
+    }
+}

@@ -1,0 +1,354 @@
+//! From pest's pairs to the syntax tree.
+
+use std::collections::HashMap;
+use std::sync::{Arc, LazyLock};
+
+use pest::pratt_parser::{Assoc, Op, PrattParser};
+
+use super::{Pair, Rule};
+use crate::diagnostic::{Diagnostic, Span};
+use crate::lang::ast;
+use crate::lang::ast::{
+    Action, Clause, Equation, Expr, ExprId, Expression, Expressions, HeadModule, Item, Module, Name, Operator,
+};
+use crate::model::Comparison;
+
+type Built<T> = Result<T, Box<Diagnostic>>;
+
+/// Loosest first (LANGUAGE, "Text").
+static PRATT: LazyLock<PrattParser<Rule>> = LazyLock::new(|| {
+    PrattParser::new()
+        .op(Op::infix(Rule::or, Assoc::Left))
+        .op(Op::infix(Rule::and, Assoc::Left))
+        .op(Op::prefix(Rule::not))
+        .op(Op::infix(Rule::lt, Assoc::Left)
+            | Op::infix(Rule::le, Assoc::Left)
+            | Op::infix(Rule::eq, Assoc::Left)
+            | Op::infix(Rule::ne, Assoc::Left)
+            | Op::infix(Rule::ge, Assoc::Left)
+            | Op::infix(Rule::gt, Assoc::Left))
+        .op(Op::infix(Rule::add, Assoc::Left) | Op::infix(Rule::sub, Assoc::Left))
+        .op(Op::infix(Rule::mul, Assoc::Left) | Op::infix(Rule::div, Assoc::Left))
+        .op(Op::prefix(Rule::neg))
+        // `2x^2` is 2(x^2), `x/2c` is x/(2c): the number belongs to what it is written against.
+        .op(Op::prefix(Rule::coefficient))
+        .op(Op::infix(Rule::pow, Assoc::Right))
+});
+
+/// Keeps one copy of each name.
+#[derive(Default)]
+pub struct Interner(HashMap<Box<str>, Arc<str>>);
+
+impl Interner {
+    fn get(&mut self, text: &str) -> Arc<str> {
+        if let Some(known) = self.0.get(text) {
+            return known.clone();
+        }
+        let new: Arc<str> = text.into();
+        self.0.insert(text.into(), new.clone());
+        new
+    }
+}
+
+pub struct Builder<'d> {
+    pub expressions: &'d mut Expressions,
+    pub interner: &'d mut Interner,
+    /// Where the parsed piece begins in the file.
+    pub offset: usize,
+}
+
+impl Builder<'_> {
+    fn span(&self, pair: &Pair) -> Span {
+        let span = pair.as_span();
+        // pest's spans of non-atomic rules may end in white space that was skipped in vain.
+        let len = span.as_str().trim_end().len();
+        Span::new(self.offset + span.start(), self.offset + span.start() + len)
+    }
+
+    fn name(&mut self, pair: &Pair) -> Name {
+        Name { text: self.interner.get(pair.as_str()), span: self.span(pair) }
+    }
+
+    pub fn item(&mut self, pair: Pair) -> Built<Item> {
+        let rule = pair.as_rule();
+        let mut inner = pair.into_inner().filter(|p| !is_punctuation(p.as_rule())).peekable();
+        let mut next = || inner.next().expect("the grammar has a part here");
+        Ok(match rule {
+            Rule::title_item => {
+                let text = next().into_inner().next().expect("the grammar has a text here");
+                Item::Title(text.as_str().to_owned())
+            }
+            Rule::const_item => Item::Const { name: self.name(&next()), value: self.expression(next())? },
+            Rule::param_item => {
+                let (name, value) = (self.name(&next()), self.expression(next())?);
+                let range = match inner.next() {
+                    Some(from) => {
+                        let to = inner.next().expect("a range has two ends");
+                        Some((self.expression(from)?, self.expression(to)?))
+                    }
+                    None => None,
+                };
+                Item::Param { name, value, range }
+            }
+            Rule::def_item => Item::Def {
+                name: self.name(&next()),
+                parameters: self.formals(next()),
+                body: self.expression(next())?,
+            },
+            Rule::angle_item => Item::Angle(self.expression(next())?),
+            Rule::frames_item => Item::Frames {
+                from: self.expression(next())?,
+                to: self.expression(next())?,
+                step: self.expression(next())?,
+            },
+            Rule::ignore_item => Item::Ignore(inner.map(|p| self.name(&p)).collect()),
+            Rule::consider_item => Item::Consider(inner.map(|p| self.name(&p)).collect()),
+            Rule::interpret_item => {
+                Item::Interpret { head: self.head_module(next()), drawn: self.successor(next())? }
+            }
+            Rule::rule_item => {
+                let head = next();
+                let mut rule = self.head(head);
+                for clause in inner {
+                    rule.clauses.push(self.clause(clause)?);
+                }
+                Item::Rule(rule)
+            }
+            other => unreachable!("{other:?} is no item"),
+        })
+    }
+
+    fn formals(&mut self, pair: Pair) -> Vec<Name> {
+        pair.into_inner().filter(|p| p.as_rule() == Rule::ident).map(|p| self.name(&p)).collect()
+    }
+
+    fn head_module(&mut self, pair: Pair) -> HeadModule {
+        let span = self.span(&pair);
+        let sign = pair.as_rule() == Rule::plus_minus;
+        let mut inner = pair.into_inner();
+        let name = if sign {
+            Name {
+                text: self.interner.get("±"), span: Span::new(span.range().start, span.range().start + 2)
+            }
+        } else {
+            self.name(&inner.next().expect("a module has a name"))
+        };
+        let parameters = inner.next().map(|formals| self.formals(formals)).unwrap_or_default();
+        HeadModule { name, parameters, span }
+    }
+
+    fn head(&mut self, pair: Pair) -> ast::Rule {
+        let head = self.span(&pair);
+        let (mut left, mut right, mut predecessor) = (Vec::new(), Vec::new(), None);
+        for part in pair.into_inner() {
+            match part.as_rule() {
+                Rule::context => {
+                    let side = if predecessor.is_none() { &mut left } else { &mut right };
+                    for module in part.into_inner() {
+                        side.push(self.head_module(module));
+                    }
+                }
+                Rule::plus_minus | Rule::head_module => predecessor = Some(self.head_module(part)),
+                _ => {}
+            }
+        }
+        let predecessor = predecessor.expect("the grammar has a predecessor here");
+        ast::Rule { left, predecessor, right, head, clauses: Vec::new() }
+    }
+
+    fn clause(&mut self, pair: Pair) -> Built<Clause> {
+        let span = self.span(&pair);
+        let mut guard = None;
+        let mut action = None;
+        for part in pair.into_inner() {
+            match part.as_rule() {
+                Rule::expr => guard = Some(self.expression(part)?),
+                Rule::solve => {
+                    let mut equations = Vec::new();
+                    for equation in part.into_inner().filter(|p| p.as_rule() == Rule::equation) {
+                        equations.push(self.equation(equation)?);
+                    }
+                    action = Some(Action::Solve(equations));
+                }
+                Rule::produce => {
+                    let successor = part.into_inner().find(|p| p.as_rule() == Rule::successor);
+                    action = Some(Action::Produce(self.successor(successor.expect("a successor"))?));
+                }
+                _ => {}
+            }
+        }
+        Ok(Clause { guard, action: action.expect("a clause solves or produces"), span })
+    }
+
+    fn equation(&mut self, pair: Pair) -> Built<Equation> {
+        let mut inner = pair.into_inner().filter(|p| !is_punctuation(p.as_rule()));
+        let derivative = inner.next().expect("an equation has a left side");
+        let rate = derivative.into_inner().next().expect("a derivative has a name");
+        let whole = self.span(&rate);
+        let parameter = Name {
+            text: self.interner.get(&rate.as_str()[1..]),
+            span: Span { start: whole.start + 1, end: whole.end },
+        };
+        Ok(Equation {
+            parameter,
+            rate: self.expression(inner.next().expect("an equation has a right side"))?,
+        })
+    }
+
+    fn successor(&mut self, pair: Pair) -> Built<Vec<Module>> {
+        pair.into_inner().filter(|p| p.as_rule() == Rule::module).map(|p| self.module(p)).collect()
+    }
+
+    pub fn module(&mut self, pair: Pair) -> Built<Module> {
+        let span = self.span(&pair);
+        let mut inner = pair.into_inner();
+        let name = self.interner.get(inner.next().expect("a module has a name").as_str());
+        let mut arguments = Vec::new();
+        if let Some(list) = inner.next() {
+            for argument in list.into_inner().filter(|p| p.as_rule() == Rule::expr) {
+                arguments.push(self.expression(argument)?);
+            }
+        }
+        Ok(Module { name, span, arguments })
+    }
+
+    /// Builds one whole expression.
+    pub fn expression(&mut self, pair: Pair) -> Built<Expression> {
+        let first = self.expressions.next();
+        let root = self.expr(pair)?;
+        Ok(Expression { first, root })
+    }
+
+    /// Recursion is bounded by `layout::MAX_DEPTH`.
+    fn expr(&mut self, pair: Pair) -> Built<ExprId> {
+        let this = std::cell::RefCell::new(self);
+        PRATT
+            .map_primary(|primary| this.borrow_mut().primary(primary))
+            .map_prefix(|op, operand| {
+                let operand = operand?;
+                let this = &mut *this.borrow_mut();
+                let span = this.span(&op).to(this.expressions.span(operand));
+                let node = match op.as_rule() {
+                    Rule::neg => Expr::Negate(operand),
+                    Rule::not => Expr::Not(operand),
+                    _ => Expr::Scale(this.number(&op)?, operand),
+                };
+                Ok(this.expressions.push(node, span))
+            })
+            .map_infix(|a, op, b| {
+                let (a, b) = (a?, b?);
+                let this = &mut *this.borrow_mut();
+                let span = this.expressions.span(a).to(this.expressions.span(b));
+                let operator = match op.as_rule() {
+                    Rule::add => Operator::Add,
+                    Rule::sub => Operator::Sub,
+                    Rule::mul => Operator::Mul,
+                    Rule::div => Operator::Div,
+                    Rule::pow => Operator::Pow,
+                    Rule::and => Operator::And,
+                    Rule::or => Operator::Or,
+                    comparison => return Ok(this.compare(a, comparison, b, span)),
+                };
+                Ok(this.expressions.push(Expr::Binary(operator, a, b), span))
+            })
+            .parse(pair.into_inner().filter(|p| p.as_rule() != Rule::close))
+    }
+
+    /// A comparison, or one more link of a chain.
+    ///
+    /// The chain is built anew after its last operand, so that operands still stand before their users.
+    fn compare(&mut self, a: ExprId, op: Rule, b: ExprId, span: Span) -> ExprId {
+        let comparison = match op {
+            Rule::lt => Comparison::Less,
+            Rule::le => Comparison::LessOrEqual,
+            Rule::eq => Comparison::Equal,
+            Rule::ne => Comparison::NotEqual,
+            Rule::ge => Comparison::GreaterOrEqual,
+            _ => Comparison::Greater,
+        };
+        let chain = match self.expressions.get_mut(a) {
+            // The shorter chain stays behind as a number that nothing reads.
+            Expr::Compare(first, links) => Some((*first, std::mem::take(links))),
+            _ => None,
+        };
+        let node = match chain {
+            Some((first, mut links)) => {
+                *self.expressions.get_mut(a) = Expr::Number(0.0);
+                links.push((comparison, b));
+                Expr::Compare(first, links)
+            }
+            None => Expr::Compare(a, vec![(comparison, b)]),
+        };
+        self.expressions.push(node, span)
+    }
+
+    fn number(&mut self, pair: &Pair) -> Built<f64> {
+        let value: f64 = pair.as_str().parse().expect("the grammar's numbers are Rust's");
+        if value.is_finite() {
+            return Ok(value);
+        }
+        Err(Box::new(
+            Diagnostic::error("this number is too large")
+                .at(self.span(pair), format!("the greatest number is {:e}", f64::MAX)),
+        ))
+    }
+
+    fn primary(&mut self, pair: Pair) -> Built<ExprId> {
+        let span = self.span(&pair);
+        match pair.as_rule() {
+            Rule::number => {
+                let value = self.number(&pair)?;
+                Ok(self.expressions.push(Expr::Number(value), span))
+            }
+            Rule::ident => {
+                let name = self.interner.get(pair.as_str());
+                Ok(self.expressions.push(Expr::Name(name), span))
+            }
+            Rule::call => {
+                let mut inner = pair.into_inner().filter(|p| !is_punctuation(p.as_rule()));
+                let name = self.interner.get(inner.next().expect("a call has a name").as_str());
+                let arguments = inner.map(|p| self.expr(p)).collect::<Built<Vec<_>>>()?;
+                Ok(self.expressions.push(Expr::Call(name, arguments), span))
+            }
+            Rule::if_expr => {
+                let parts = pair.into_inner().filter(|p| p.as_rule() == Rule::expr);
+                let mut parts = parts.map(|p| self.expr(p)).collect::<Built<Vec<_>>>()?;
+                // if c then a else if d then b else e: from the last branch forward.
+                let mut otherwise = parts.pop().expect("an `if` has an else");
+                while let (Some(then), Some(condition)) = (parts.pop(), parts.pop()) {
+                    let span = self.expressions.span(condition).to(self.expressions.span(otherwise));
+                    otherwise = self.expressions.push(Expr::If(condition, then, otherwise), span);
+                }
+                self.expressions.widen(otherwise, span);
+                Ok(otherwise)
+            }
+            // A parenthesis: pest leaves only its inside.
+            Rule::expr => {
+                let inner = self.expr(pair)?;
+                Ok(self.expressions.push(Expr::Parenthesis(inner), span))
+            }
+            other => unreachable!("{other:?} is no operand"),
+        }
+    }
+}
+
+fn is_punctuation(rule: Rule) -> bool {
+    matches!(
+        rule,
+        Rule::equals
+            | Rule::colon
+            | Rule::close
+            | Rule::range
+            | Rule::kw_const
+            | Rule::kw_param
+            | Rule::kw_def
+            | Rule::kw_angle
+            | Rule::kw_frames
+            | Rule::kw_step
+            | Rule::kw_in
+            | Rule::kw_ignore
+            | Rule::kw_consider
+            | Rule::kw_interpret
+            | Rule::EOI
+    )
+}

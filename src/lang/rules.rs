@@ -1,0 +1,452 @@
+//! Rules, strings and interpretations: from the syntax tree to the model.
+
+use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
+
+use super::ast::{self, Action, Document, Expression, HeadModule};
+use super::print;
+use super::scope::{RESERVED, Scope, Variables, plural};
+use super::suggest::did_you_mean;
+use crate::diagnostic::{Diagnostic, Span};
+use crate::expr::{Binary, Node, NodeId, Program, Unary};
+use crate::model::{
+    Class, Comparison, Condition, Interpretation, KindId, Kinds, Pattern, Produce, Rule, Solve, Step,
+    Successor, Switch, class_of, never_reached,
+};
+
+/// Longest condition, in comparisons and connectives, after functions are put in.
+const MAX_CONDITION: usize = 10_000;
+
+/// Builds the parts of a model that are made of modules.
+pub struct RuleBuilder<'b> {
+    pub document: &'b Document,
+    pub scope: &'b mut Scope,
+    pub kinds: &'b mut Kinds,
+    /// Each kind that stands in a string, with the first place where it does.
+    pub occurs: HashMap<KindId, Span>,
+}
+
+/// The pairs of expressions that the conditions of a rule compare.
+#[derive(Default)]
+struct Atoms {
+    sides: Vec<(NodeId, NodeId)>,
+    spans: Vec<Span>,
+    boundaries: Vec<String>,
+    index: HashMap<(NodeId, NodeId), u32>,
+}
+
+impl RuleBuilder<'_> {
+    fn error(&mut self, error: Diagnostic) {
+        self.scope.diagnostics.push(error);
+    }
+
+    /// A string of modules over the given variables.
+    pub fn successor(
+        &mut self,
+        modules: &[ast::Module],
+        variables: &Variables,
+        count: usize,
+    ) -> Option<Successor> {
+        let mut kinds = Vec::with_capacity(modules.len());
+        let mut roots = Vec::new();
+        let mut open: Vec<Span> = Vec::new();
+        let mut good = true;
+        for module in modules {
+            let kind = self.kinds.intern(&module.name, module.arguments.len());
+            match &*module.name {
+                "[" | "]" if !module.arguments.is_empty() => {
+                    self.error(
+                        Diagnostic::error("a bracket has no parameters")
+                            .at(module.span, "a `(` cannot follow a bracket"),
+                    );
+                    good = false;
+                    continue;
+                }
+                "[" => open.push(module.span),
+                "]" if open.pop().is_none() => {
+                    self.error(
+                        Diagnostic::error("this `]` closes no branch")
+                            .at(module.span, "there is no `[` before it in this string")
+                            .help("brackets must match within each string"),
+                    );
+                    good = false;
+                }
+                _ => {}
+            }
+            self.occurs.entry(kind).or_insert(module.span);
+            kinds.push(kind);
+            for &argument in &module.arguments {
+                match self.scope.number(&self.document.expressions, argument, variables) {
+                    Some(node) => roots.push(node),
+                    None => good = false,
+                }
+            }
+        }
+        if let Some(bracket) = open.pop() {
+            self.error(
+                Diagnostic::error("this `[` is never closed")
+                    .at(bracket, "expected a `]` for it in this string")
+                    .help("brackets must match within each string"),
+            );
+            good = false;
+        }
+        if !good {
+            return None;
+        }
+        Some(Successor { kinds, arguments: Program::compile(&self.scope.graph, &roots, count) })
+    }
+
+    /// The variables of a head, and how many there are with `t` and `age`.
+    fn variables(
+        &mut self,
+        own: &HeadModule,
+        left: &[HeadModule],
+        right: &[HeadModule],
+    ) -> (Variables, usize) {
+        let mut names: HashMap<Arc<str>, NodeId> = HashMap::new();
+        let mut spans: HashMap<Arc<str>, Span> = HashMap::new();
+        let mut count = 0;
+        for parameter in std::iter::once(own).chain(left).chain(right).flat_map(|m| &m.parameters) {
+            let node = self.scope.graph.var(count);
+            count += 1;
+            if RESERVED.contains(&&*parameter.text) {
+                self.error(
+                    Diagnostic::error(format!("a parameter cannot be called `{}`", parameter.text))
+                        .at(parameter.span, "this name stands for time in every rule"),
+                );
+            }
+            if let Some(before) = spans.insert(parameter.text.clone(), parameter.span) {
+                self.error(
+                    Diagnostic::error(format!("two parameters of this head are called `{}`", parameter.text))
+                        .at(parameter.span, "the second one")
+                        .at(before, "the first one"),
+                );
+            }
+            names.insert(parameter.text.clone(), node);
+        }
+        for name in RESERVED {
+            let node = self.scope.graph.var(count);
+            names.insert(name.into(), node);
+            count += 1;
+        }
+        (Variables { names, no_time: None }, count as usize)
+    }
+
+    fn not_a_bracket(&mut self, head: &HeadModule) -> bool {
+        let bracket = matches!(&*head.name.text, "[" | "]");
+        if bracket {
+            self.error(
+                Diagnostic::error("a bracket has no rules")
+                    .at(head.name.span, "brackets structure the string; they do not develop"),
+            );
+        }
+        !bracket
+    }
+
+    pub fn interpretation(
+        &mut self,
+        head: &HeadModule,
+        drawn: &[ast::Module],
+    ) -> Option<(KindId, Interpretation)> {
+        if !self.not_a_bracket(head) {
+            return None;
+        }
+        let (variables, count) = self.variables(head, &[], &[]);
+        // What is only drawn does not develop: it makes no rule reachable.
+        let before = std::mem::take(&mut self.occurs);
+        let drawn = self.successor(drawn, &variables, count);
+        self.occurs = before;
+        let kind = self.kinds.intern(&head.name.text, head.parameters.len());
+        Some((kind, Interpretation { span: head.span, drawn: drawn? }))
+    }
+
+    /// A rule, and the kinds it is for. `PatternNames` are matched to kinds once all kinds are known.
+    pub fn rule(&mut self, rule: &ast::Rule) -> Option<Rule> {
+        let mut good = self.not_a_bracket(&rule.predecessor);
+        for context in rule.left.iter().chain(&rule.right) {
+            good &= self.not_a_bracket(context);
+        }
+        let names: &[&str] = match &*rule.predecessor.name.text {
+            "±" => &["+", "-"],
+            name => &[name],
+        };
+        let own = rule.predecessor.parameters.len();
+        for name in names {
+            self.kinds.intern(name, own);
+        }
+        let (variables, count) = self.variables(&rule.predecessor, &rule.left, &rule.right);
+        self.scope.comparisons.clear();
+
+        // All conditions first: they share their atoms.
+        let mut atoms = Atoms::default();
+        let mut guards = Vec::new();
+        for clause in &rule.clauses {
+            let guard = match clause.guard {
+                None => Some(Condition::default()),
+                Some(guard) => {
+                    let node = self.scope.condition(&self.document.expressions, guard, &variables);
+                    node.and_then(|node| self.decompose(node, clause.span, &mut atoms))
+                }
+            };
+            good &= guard.is_some();
+            guards.push(guard.unwrap_or_default());
+        }
+        let mut drafts = Vec::new();
+        let mut produces = Vec::new();
+        for (clause, guard) in rule.clauses.iter().zip(guards) {
+            match &clause.action {
+                Action::Produce(modules) => match self.successor(modules, &variables, count) {
+                    Some(successor) => produces.push(Produce { guard, span: clause.span, successor }),
+                    None => good = false,
+                },
+                Action::Solve(equations) => {
+                    let rates = self.equations(equations, &rule.predecessor, &variables);
+                    let (rates, switches) = match rates {
+                        Some(rates) => self.smooth(rates, count, clause.span, &mut atoms)?,
+                        None => {
+                            good = false;
+                            continue;
+                        }
+                    };
+                    drafts.push((guard, clause.span, rates, switches));
+                }
+            }
+        }
+        if !good {
+            return None;
+        }
+        let context = count - own - 2;
+        let solves = drafts
+            .into_iter()
+            .map(|(guard, span, rates, switches)| {
+                let total = count + switches.len();
+                let unreachable = (atoms.sides.iter())
+                    .map(|&sides| never_reached(&self.scope.graph, sides, &rates, own, context, total))
+                    .collect();
+                let roots: Vec<NodeId> = rates.iter().map(|(_, node)| *node).collect();
+                Solve {
+                    guard,
+                    span,
+                    of: rates.iter().map(|(parameter, _)| *parameter).collect(),
+                    rates: Program::compile(&self.scope.graph, &roots, total),
+                    switches,
+                    unreachable,
+                }
+            })
+            .collect();
+        let sides: Vec<NodeId> = atoms.sides.iter().flat_map(|(a, b)| [*a, *b]).collect();
+        let pattern = |m: &HeadModule| Pattern { kinds: Vec::new(), arity: m.parameters.len() };
+        Some(Rule {
+            label: print::head(rule),
+            span: rule.head,
+            parameters: rule.predecessor.parameters.iter().map(|p| p.text.to_string()).collect(),
+            left: rule.left.iter().map(pattern).collect(),
+            right: rule.right.iter().map(pattern).collect(),
+            variables: count,
+            sides: Program::compile(&self.scope.graph, &sides, count),
+            atoms: atoms.spans,
+            boundaries: atoms.boundaries,
+            solves,
+            produces,
+        })
+    }
+
+    /// The derivatives of a `solve`, by parameter; those that are the constant 0 are left out.
+    fn equations(
+        &mut self,
+        equations: &[ast::Equation],
+        head: &HeadModule,
+        variables: &Variables,
+    ) -> Option<Vec<(usize, NodeId)>> {
+        let mut rates: Vec<(usize, NodeId)> = Vec::new();
+        let mut seen: HashMap<usize, Span> = HashMap::new();
+        let mut good = true;
+        for equation in equations {
+            let name = &equation.parameter;
+            let Some(parameter) = head.parameters.iter().position(|p| p.text == name.text) else {
+                self.error(not_a_parameter(name, head, variables));
+                good = false;
+                continue;
+            };
+            if let Some(before) = seen.insert(parameter, name.span) {
+                self.error(
+                    Diagnostic::error(format!("two equations for `{}` in one `solve`", name.text))
+                        .at(name.span, "the second one")
+                        .at(before, "the first one"),
+                );
+                good = false;
+            }
+            match self.scope.number(&self.document.expressions, equation.rate, variables) {
+                Some(rate) if self.scope.graph.as_constant(rate) == Some(0.0) => {}
+                Some(rate) => rates.push((parameter, rate)),
+                None => good = false,
+            }
+        }
+        good.then_some(rates)
+    }
+
+    /// Takes a condition apart into comparisons of two sides.
+    fn decompose(&mut self, root: NodeId, span: Span, atoms: &mut Atoms) -> Option<Condition> {
+        enum Task {
+            Visit(NodeId),
+            Emit(Step),
+        }
+        let mut steps = Vec::new();
+        let mut tasks = vec![Task::Visit(root)];
+        while let Some(task) = tasks.pop() {
+            if steps.len() > MAX_CONDITION {
+                self.error(
+                    Diagnostic::error("this condition is too long")
+                        .at(span, format!("more than {MAX_CONDITION} comparisons and connectives")),
+                );
+                return None;
+            }
+            let id = match task {
+                Task::Emit(step) => {
+                    steps.push(step);
+                    continue;
+                }
+                Task::Visit(id) => id,
+            };
+            match self.scope.graph.node(id) {
+                Node::Const(bits) => steps.push(Step::Constant(f64::from_bits(bits) != 0.0)),
+                Node::Unary(Unary::Not, a) => tasks.extend([Task::Emit(Step::Not), Task::Visit(a)]),
+                Node::Binary(op @ (Binary::And | Binary::Or), a, b) => {
+                    let step = if op == Binary::And { Step::And } else { Step::Or };
+                    tasks.extend([Task::Emit(step), Task::Visit(b), Task::Visit(a)]);
+                }
+                Node::Binary(op, a, b) => {
+                    let comparison = match op {
+                        Binary::Lt => Comparison::Less,
+                        Binary::Le => Comparison::LessOrEqual,
+                        Binary::Eq => Comparison::Equal,
+                        _ => Comparison::NotEqual,
+                    };
+                    let known = self.scope.comparisons.get(&id);
+                    let (at, boundary) = known.map_or((span, ""), |(at, boundary)| (*at, boundary));
+                    steps.push(atoms.step(a, b, comparison, at, boundary));
+                }
+                node => unreachable!("{node:?} is no condition"),
+            }
+        }
+        Some(Condition(steps))
+    }
+
+    /// Makes equations smooth: conditions inside them become variables, numbered from `count` on.
+    #[allow(clippy::type_complexity)]
+    fn smooth(
+        &mut self,
+        rates: Vec<(usize, NodeId)>,
+        count: usize,
+        span: Span,
+        atoms: &mut Atoms,
+    ) -> Option<(Vec<(usize, NodeId)>, Vec<Switch>)> {
+        let mut conditions: Vec<NodeId> = Vec::new();
+        let mut flag = |graph: &mut crate::expr::Graph, condition: NodeId| {
+            let known = conditions.iter().position(|c| *c == condition);
+            let at = known.unwrap_or_else(|| {
+                conditions.push(condition);
+                conditions.len() - 1
+            });
+            graph.var((count + at) as u32)
+        };
+        let roots: Vec<NodeId> = rates.iter().map(|(_, rate)| *rate).collect();
+        let smoothed = self.scope.graph.rewrite(&roots, |graph, id, rebuilt| {
+            let zero = graph.constant(0.0);
+            // Conditions are asked of the equations as written, so the original operands go into them.
+            match (graph.node(id), rebuilt) {
+                (Node::Select(condition, ..), Node::Select(_, a, b)) => {
+                    let chosen = flag(graph, condition);
+                    Some(graph.select(chosen, a, b))
+                }
+                (Node::Binary(op @ (Binary::Min | Binary::Max), x, y), Node::Binary(_, a, b)) => {
+                    let less = graph.binary(Binary::Lt, x, y);
+                    let chosen = flag(graph, less);
+                    let (a, b) = if op == Binary::Min { (a, b) } else { (b, a) };
+                    Some(graph.select(chosen, a, b))
+                }
+                (Node::Unary(Unary::Abs, x), Node::Unary(_, a)) => {
+                    let negative = graph.binary(Binary::Lt, x, zero);
+                    let chosen = flag(graph, negative);
+                    let minus = graph.unary(Unary::Neg, a);
+                    Some(graph.select(chosen, minus, a))
+                }
+                (Node::Unary(Unary::Sign, x), Node::Unary(..)) => {
+                    let (below, above) =
+                        (graph.binary(Binary::Lt, x, zero), graph.binary(Binary::Lt, zero, x));
+                    let (below, above) = (flag(graph, below), flag(graph, above));
+                    let (minus, one) = (graph.constant(-1.0), graph.constant(1.0));
+                    let rest = graph.select(above, one, zero);
+                    Some(graph.select(below, minus, rest))
+                }
+                _ => None,
+            }
+        });
+        let mut switches = Vec::new();
+        for condition in conditions {
+            switches.push(Switch { condition: self.decompose(condition, span, atoms)? });
+        }
+        let rates = rates.iter().zip(smoothed).map(|((parameter, _), rate)| (*parameter, rate)).collect();
+        Some((rates, switches))
+    }
+
+    /// Wrong numbers of parameters: of words that have rules, wherever they stand in a string.
+    pub fn check_arities(&mut self, rules: &[&ast::Rule], strings: &[&[ast::Module]]) {
+        let mut declared: HashMap<&str, Vec<&HeadModule>> = HashMap::new();
+        for rule in rules {
+            declared.entry(&rule.predecessor.name.text).or_default().push(&rule.predecessor);
+        }
+        let mut reported: HashSet<(&str, usize)> = HashSet::new();
+        for module in strings.iter().copied().flatten() {
+            // A symbol or surface may leave its parameters to the turtle's defaults.
+            if class_of(&module.name) != Class::Word {
+                continue;
+            }
+            let Some(heads) = declared.get(&*module.name) else { continue };
+            let given = module.arguments.len();
+            if heads.iter().any(|h| h.parameters.len() == given) || !reported.insert((&module.name, given)) {
+                continue;
+            }
+            let error = Diagnostic::error(format!(
+                "`{}` has {}, not {given}",
+                module.name,
+                plural(heads[0].parameters.len(), "parameter"),
+            ))
+            .at(module.span, format!("{} here", plural(given, "parameter")))
+            .at(heads[0].span, format!("{} in its rule", plural(heads[0].parameters.len(), "parameter")));
+            self.error(error);
+        }
+    }
+
+    /// The value of an expression of constants, for declarations such as `angle`.
+    pub fn constant(&mut self, expression: Expression) -> Option<f64> {
+        self.scope.constant_value(&self.document.expressions, expression)
+    }
+}
+
+fn not_a_parameter(name: &ast::Name, head: &HeadModule, variables: &Variables) -> Diagnostic {
+    let known = head.parameters.iter().map(|p| &*p.text);
+    let error =
+        Diagnostic::error(format!("`{}` is no parameter of `{}`", name.text, print::head_module(head)))
+            .at(name.span, "only the parameters of the strict predecessor have equations")
+            .at(head.span, "the strict predecessor");
+    if variables.names.contains_key(&name.text) && !RESERVED.contains(&&*name.text) {
+        return error
+            .help("this is a parameter of a neighbour; its equation belongs into the neighbour's rule");
+    }
+    error.help_opt(did_you_mean(&name.text, known))
+}
+
+impl Atoms {
+    /// The step that compares two sides; each pair is kept once, whichever way round it is written.
+    fn step(&mut self, a: NodeId, b: NodeId, comparison: Comparison, span: Span, boundary: &str) -> Step {
+        let (pair, comparison) = if a <= b { ((a, b), comparison) } else { ((b, a), comparison.mirrored()) };
+        let atom = *self.index.entry(pair).or_insert_with(|| {
+            self.sides.push(pair);
+            self.spans.push(span);
+            self.boundaries.push(boundary.to_owned());
+            self.sides.len() as u32 - 1
+        });
+        Step::Atom(atom, comparison)
+    }
+}

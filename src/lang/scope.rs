@@ -1,0 +1,414 @@
+//! Constants, parameters and functions of a model, and the lowering of expressions to the graph.
+
+use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
+
+use super::ast::{Expr, ExprId, Expression, Expressions, Name, Operator};
+use super::print;
+use super::suggest::did_you_mean;
+use crate::diagnostic::{Diagnostic, Span};
+use crate::expr::{Binary, Graph, Node, NodeId, Unary};
+use crate::model::Comparison;
+
+/// Most nodes that the functions of a model may expand to.
+const MAX_WORK: usize = 20_000_000;
+
+/// Variables at and above this number are parameters of functions.
+const FORMAL: u32 = 1 << 24;
+
+/// Names that mean something everywhere in a rule.
+pub const RESERVED: [&str; 2] = ["t", "age"];
+const CONSTANTS: [(&str, f64); 2] = [("pi", std::f64::consts::PI), ("e", std::f64::consts::E)];
+
+/// A lowered expression: a number, or a condition.
+#[derive(Clone, Copy, Debug)]
+pub struct Lowered {
+    pub node: NodeId,
+    pub is_condition: bool,
+}
+
+/// A function, as a graph over its formal parameters.
+#[derive(Clone, Debug)]
+struct Function {
+    parameters: usize,
+    /// None if its own text is at fault, which has been reported.
+    body: Option<Lowered>,
+}
+
+/// Names that an expression can use besides the global ones.
+#[derive(Default)]
+pub struct Variables {
+    pub names: HashMap<Arc<str>, NodeId>,
+    /// What to tell somebody who uses `t` or `age` where they mean nothing; None where they are in `names`.
+    pub no_time: Option<&'static str>,
+}
+
+/// The global names of a model, and the graph that its expressions are built in.
+#[derive(Default)]
+pub struct Scope {
+    pub graph: Graph,
+    /// Values; None if the declaration is at fault, which has been reported.
+    constants: HashMap<Arc<str>, Option<f64>>,
+    functions: HashMap<Arc<str>, Function>,
+    /// Global names that some expression has used.
+    pub used: HashSet<Arc<str>>,
+    /// Where the comparisons of the present rule are written, by their node, and their boundary as in
+    /// `x = s`. Rules number their variables alike, so one rule's nodes mean nothing in another.
+    pub comparisons: HashMap<NodeId, (Span, Arc<str>)>,
+    /// The same for the bodies of functions.
+    function_comparisons: HashMap<NodeId, (Span, Arc<str>)>,
+    pub diagnostics: Vec<Diagnostic>,
+    /// What is wrong with the values given from outside, which is not the text's fault.
+    pub refused_settings: Vec<Diagnostic>,
+    work: usize,
+}
+
+impl Scope {
+    /// True if a name has a meaning that a model cannot change.
+    pub fn is_built_in(name: &str) -> bool {
+        RESERVED.contains(&name)
+            || CONSTANTS.iter().any(|(n, _)| *n == name)
+            || Unary::NAMED.iter().any(|(n, _)| *n == name)
+            || Binary::NAMED.iter().any(|(n, _)| *n == name)
+    }
+
+    pub fn define_constant(&mut self, name: Arc<str>, value: Option<f64>) {
+        self.constants.insert(name, value);
+    }
+
+    /// Whether a suggestion is worth its time: it looks at every known name, and after so many errors
+    /// nobody reads it.
+    fn suggests(&self) -> bool {
+        self.diagnostics.len() < 50
+    }
+
+    /// Lowers the body of a function and makes it known.
+    pub fn define_function(&mut self, name: &Name, parameters: &[Name], all: &Expressions, body: Expression) {
+        let mut variables = Variables {
+            no_time: Some("a function sees only its parameters: pass it on, as in `G(x, age)`"),
+            ..Variables::default()
+        };
+        for (i, parameter) in parameters.iter().enumerate() {
+            let formal = self.graph.var(FORMAL + i as u32);
+            if variables.names.insert(parameter.text.clone(), formal).is_some() {
+                self.diagnostics.push(
+                    Diagnostic::error(format!(
+                        "`{}` has two parameters called `{}`",
+                        name.text, parameter.text
+                    ))
+                    .at(parameter.span, "the second one"),
+                );
+            }
+        }
+        let body = self.lower(all, body, &variables);
+        self.function_comparisons.extend(self.comparisons.drain());
+        self.functions.insert(name.text.clone(), Function { parameters: parameters.len(), body });
+    }
+
+    /// Lowers an expression that must be a number.
+    pub fn number(
+        &mut self,
+        all: &Expressions,
+        expression: Expression,
+        variables: &Variables,
+    ) -> Option<NodeId> {
+        let lowered = self.lower(all, expression, variables)?;
+        self.expect_number(all, expression.root, lowered)
+    }
+
+    /// Lowers an expression that must be a condition.
+    pub fn condition(
+        &mut self,
+        all: &Expressions,
+        expression: Expression,
+        variables: &Variables,
+    ) -> Option<NodeId> {
+        let lowered = self.lower(all, expression, variables)?;
+        self.expect_condition(all, expression.root, lowered)
+    }
+
+    /// The value of an expression that may use constants only.
+    pub fn constant_value(&mut self, all: &Expressions, expression: Expression) -> Option<f64> {
+        let variables = Variables { no_time: Some("only constants can stand here"), ..Variables::default() };
+        let node = self.number(all, expression, &variables)?;
+        let value = self.graph.as_constant(node).expect("without variables everything is folded");
+        if value.is_finite() {
+            return Some(value);
+        }
+        self.diagnostics.push(
+            Diagnostic::error("this has no finite value")
+                .at(all.span(expression.root), format!("it is {value}")),
+        );
+        None
+    }
+
+    fn expect_number(&mut self, all: &Expressions, id: ExprId, lowered: Lowered) -> Option<NodeId> {
+        if !lowered.is_condition {
+            return Some(lowered.node);
+        }
+        self.diagnostics.push(
+            Diagnostic::error("a number is expected here")
+                .at(all.span(id), "this is a condition")
+                .help("a condition becomes a number with `if … then 1 else 0`"),
+        );
+        None
+    }
+
+    fn expect_condition(&mut self, all: &Expressions, id: ExprId, lowered: Lowered) -> Option<NodeId> {
+        if lowered.is_condition {
+            return Some(lowered.node);
+        }
+        self.diagnostics.push(
+            Diagnostic::error("a condition is expected here")
+                .at(all.span(id), "this is a number")
+                .help("compare it with something, as in `x > 0`"),
+        );
+        None
+    }
+
+    /// Lowers an expression. None if it is at fault, which has then been reported.
+    fn lower(&mut self, all: &Expressions, expression: Expression, variables: &Variables) -> Option<Lowered> {
+        let (first, last) = (expression.first.0, expression.root.0);
+        // Operands stand before their users, so this is a loop however deep the expression is.
+        let mut done: Vec<Option<Lowered>> = Vec::with_capacity((last - first + 1) as usize);
+        for id in first..=last {
+            let lowered = self.lower_node(all, ExprId(id), variables, |o| done[(o.0 - first) as usize]);
+            done.push(lowered);
+        }
+        done.pop().flatten()
+    }
+
+    fn lower_node(
+        &mut self,
+        all: &Expressions,
+        id: ExprId,
+        variables: &Variables,
+        done: impl Fn(ExprId) -> Option<Lowered>,
+    ) -> Option<Lowered> {
+        let number = |node| Some(Lowered { node, is_condition: false });
+        let condition = |node| Some(Lowered { node, is_condition: true });
+        let span = all.span(id);
+        match all.get(id) {
+            Expr::Number(x) => number(self.graph.constant(*x)),
+            Expr::Name(name) => number(self.name(name, span, variables)?),
+            Expr::Call(name, arguments) => {
+                let mut nodes = Vec::with_capacity(arguments.len());
+                for &argument in arguments {
+                    nodes.push((argument, done(argument)?));
+                }
+                self.call(all, name, span, &nodes)
+            }
+            Expr::Parenthesis(a) => done(*a),
+            Expr::Negate(a) => {
+                let a = self.expect_number(all, *a, done(*a)?)?;
+                number(self.graph.unary(Unary::Neg, a))
+            }
+            Expr::Not(a) => {
+                let a = self.expect_condition(all, *a, done(*a)?)?;
+                condition(self.graph.unary(Unary::Not, a))
+            }
+            Expr::Scale(factor, a) => {
+                let a = self.expect_number(all, *a, done(*a)?)?;
+                let factor = self.graph.constant(*factor);
+                number(self.graph.binary(Binary::Mul, factor, a))
+            }
+            Expr::Binary(operator @ (Operator::And | Operator::Or), a, b) => {
+                let (left, right) = (done(*a)?, done(*b)?);
+                let left = self.expect_condition(all, *a, left);
+                let right = self.expect_condition(all, *b, right);
+                let op = if *operator == Operator::And { Binary::And } else { Binary::Or };
+                condition(self.graph.binary(op, left?, right?))
+            }
+            Expr::Binary(operator, a, b) => {
+                let (left, right) = (done(*a)?, done(*b)?);
+                let left = self.expect_number(all, *a, left);
+                let right = self.expect_number(all, *b, right);
+                let op = match operator {
+                    Operator::Add => Binary::Add,
+                    Operator::Sub => Binary::Sub,
+                    Operator::Mul => Binary::Mul,
+                    Operator::Div => Binary::Div,
+                    _ => Binary::Pow,
+                };
+                number(self.graph.binary(op, left?, right?))
+            }
+            Expr::Compare(first, links) => {
+                let mut a = self.expect_number(all, *first, done(*first)?);
+                let mut a_id = *first;
+                let mut whole: Option<NodeId> = None;
+                for (comparison, operand) in links {
+                    let b = self.expect_number(all, *operand, done(*operand)?);
+                    let (Some(left), Some(right)) = (a, b) else { return None };
+                    let link = self.compare(*comparison, left, right);
+                    self.comparisons.entry(link).or_insert_with(|| {
+                        let sides = [a_id, *operand].map(|id| print::expression(all, id));
+                        (all.span(a_id).to(all.span(*operand)), sides.join(" = ").into())
+                    });
+                    whole = Some(match whole {
+                        Some(before) => self.graph.binary(Binary::And, before, link),
+                        None => link,
+                    });
+                    (a, a_id) = (b, *operand);
+                }
+                condition(whole?)
+            }
+            Expr::If(c, a, b) => {
+                let (test, then, otherwise) = (done(*c)?, done(*a)?, done(*b)?);
+                let test = self.expect_condition(all, *c, test);
+                let then = self.expect_number(all, *a, then);
+                let otherwise = self.expect_number(all, *b, otherwise);
+                number(self.graph.select(test?, then?, otherwise?))
+            }
+        }
+    }
+
+    fn compare(&mut self, comparison: Comparison, a: NodeId, b: NodeId) -> NodeId {
+        match comparison {
+            Comparison::Less => self.graph.binary(Binary::Lt, a, b),
+            Comparison::LessOrEqual => self.graph.binary(Binary::Le, a, b),
+            Comparison::Equal => self.graph.binary(Binary::Eq, a, b),
+            Comparison::NotEqual => self.graph.binary(Binary::Ne, a, b),
+            Comparison::GreaterOrEqual => self.graph.binary(Binary::Le, b, a),
+            Comparison::Greater => self.graph.binary(Binary::Lt, b, a),
+        }
+    }
+
+    fn name(&mut self, name: &Arc<str>, span: Span, variables: &Variables) -> Option<NodeId> {
+        if let Some(&node) = variables.names.get(name) {
+            return Some(node);
+        }
+        if let Some(value) = self.constants.get(name).copied() {
+            self.used.insert(name.clone());
+            return value.map(|x| self.graph.constant(x));
+        }
+        if let Some((_, value)) = CONSTANTS.iter().find(|(n, _)| **n == **name) {
+            return Some(self.graph.constant(*value));
+        }
+        let error = if RESERVED.contains(&&**name) {
+            Diagnostic::error(format!("`{name}` has no meaning here"))
+                .at(span, "time is known in rules only")
+                .help_opt(variables.no_time.map(str::to_owned))
+        } else if self.functions.contains_key(name) || is_function(name) {
+            Diagnostic::error(format!("`{name}` is a function"))
+                .at(span, format!("expected its arguments, as in `{name}(x)`"))
+        } else {
+            let known = variables
+                .names
+                .keys()
+                .filter(|_| self.suggests())
+                .chain(self.constants.keys().filter(|_| self.suggests()))
+                .map(|n| &**n)
+                .chain(RESERVED.into_iter().filter(|_| variables.no_time.is_none()))
+                .chain(["pi"]);
+            Diagnostic::error(format!("unknown name `{name}`"))
+                .at(span, "this is no parameter of the rule and no constant")
+                .help_opt(
+                    did_you_mean(name, known).or_else(|| Some(format!("declare it: `const {name} = …`"))),
+                )
+        };
+        self.diagnostics.push(error);
+        None
+    }
+
+    fn call(
+        &mut self,
+        all: &Expressions,
+        name: &Arc<str>,
+        span: Span,
+        arguments: &[(ExprId, Lowered)],
+    ) -> Option<Lowered> {
+        let mut nodes = Vec::with_capacity(arguments.len());
+        for &(id, lowered) in arguments {
+            nodes.push(self.expect_number(all, id, lowered)?);
+        }
+        let count = |me: &mut Scope, wanted: usize| {
+            if nodes.len() == wanted {
+                return Some(());
+            }
+            me.diagnostics.push(
+                Diagnostic::error(format!(
+                    "`{name}` has {}, not {}",
+                    plural(wanted, "parameter"),
+                    nodes.len()
+                ))
+                .at(span, format!("{} given", plural(nodes.len(), "argument"))),
+            );
+            None
+        };
+        let number = |node| Some(Lowered { node, is_condition: false });
+        if let Some(function) = self.functions.get(name).cloned() {
+            self.used.insert(name.clone());
+            count(self, function.parameters)?;
+            return self.inline(function.body?, &nodes, span);
+        }
+        if let Some((_, op)) = Unary::NAMED.iter().find(|(n, _)| **n == **name) {
+            count(self, 1)?;
+            return number(self.graph.unary(*op, nodes[0]));
+        }
+        if let Some((_, op)) = Binary::NAMED.iter().find(|(n, _)| **n == **name) {
+            count(self, 2)?;
+            return number(self.graph.binary(*op, nodes[0], nodes[1]));
+        }
+        let built_in = Unary::NAMED.iter().map(|(n, _)| *n).chain(Binary::NAMED.iter().map(|(n, _)| *n));
+        let known = self.functions.keys().filter(|_| self.suggests()).map(|n| &**n).chain(built_in);
+        let mut error =
+            Diagnostic::error(format!("unknown function `{name}`")).at(span, "no function has this name");
+        error = match did_you_mean(name, known) {
+            Some(help) => error.help(help),
+            None if self.constants.contains_key(name) => {
+                error.help(format!("to multiply, write `{name}*(…)`"))
+            }
+            None => error.help(format!("declare it: `def {name}(…) = …`")),
+        };
+        self.diagnostics.push(error);
+        None
+    }
+
+    /// A function's body with the arguments in place of its formal parameters.
+    fn inline(&mut self, body: Lowered, arguments: &[NodeId], span: Span) -> Option<Lowered> {
+        self.work += self.graph.reachable(&[body.node]).len();
+        if self.work > MAX_WORK {
+            if self.work < usize::MAX / 2 {
+                self.work = usize::MAX / 2;
+                self.diagnostics.push(
+                    Diagnostic::error("the functions of this model expand without bound")
+                        .at(span, format!("more than {MAX_WORK} operations"))
+                        .help("a function that calls another twice doubles it; compute a shared part once"),
+                );
+            }
+            return None;
+        }
+        let comparisons = &self.function_comparisons;
+        let mut moved = Vec::new();
+        let node = self.graph.rewrite(&[body.node], |graph, id, node| {
+            let image = match node {
+                Node::Var(v) if v >= FORMAL => return Some(arguments[(v - FORMAL) as usize]),
+                Node::Binary(op @ (Binary::Lt | Binary::Le | Binary::Eq | Binary::Ne), a, b) => {
+                    graph.binary(op, a, b)
+                }
+                _ => return None,
+            };
+            if let Some(at) = comparisons.get(&id) {
+                moved.push((image, at.clone()));
+            }
+            Some(image)
+        })[0];
+        for (image, at) in moved {
+            self.comparisons.entry(image).or_insert(at);
+        }
+        Some(Lowered { node, is_condition: body.is_condition })
+    }
+}
+
+fn is_function(name: &str) -> bool {
+    Unary::NAMED.iter().any(|(n, _)| *n == name) || Binary::NAMED.iter().any(|(n, _)| *n == name)
+}
+
+/// "no parameters", "1 parameter", "2 parameters"
+pub fn plural(n: usize, what: &str) -> String {
+    match n {
+        0 => format!("no {what}s"),
+        1 => format!("1 {what}"),
+        n => format!("{n} {what}s"),
+    }
+}

@@ -1,0 +1,158 @@
+//! Conditions as logic over signs.
+//!
+//! A comparison `a < b` is the question whether `a - b` is negative. The simulation follows the signs of
+//! these differences along the trajectory; at an event it *knows* that a difference is zero, though the
+//! rounded numbers differ in their last place. So conditions are not evaluated on numbers but on signs.
+
+/// The sign of `a - b`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Sign {
+    Minus,
+    Zero,
+    Plus,
+    /// Not yet known: it is zero now, and where it goes depends on equations that are being chosen.
+    Any,
+    /// One side is NaN. Every comparison with it is false, except `!=`.
+    #[default]
+    Undefined,
+}
+
+impl Sign {
+    pub fn of(x: f64) -> Sign {
+        if x < 0.0 {
+            Sign::Minus
+        } else if x > 0.0 {
+            Sign::Plus
+        } else if x == 0.0 {
+            Sign::Zero
+        } else {
+            Sign::Undefined
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Comparison {
+    Less,
+    LessOrEqual,
+    Equal,
+    NotEqual,
+    GreaterOrEqual,
+    Greater,
+}
+
+impl Comparison {
+    /// How the comparison is written.
+    pub fn symbol(self) -> &'static str {
+        match self {
+            Comparison::Less => "<",
+            Comparison::LessOrEqual => "<=",
+            Comparison::Equal => "=",
+            Comparison::NotEqual => "!=",
+            Comparison::GreaterOrEqual => ">=",
+            Comparison::Greater => ">",
+        }
+    }
+
+    /// The comparison with its sides exchanged.
+    pub fn mirrored(self) -> Comparison {
+        match self {
+            Comparison::Less => Comparison::Greater,
+            Comparison::LessOrEqual => Comparison::GreaterOrEqual,
+            Comparison::GreaterOrEqual => Comparison::LessOrEqual,
+            Comparison::Greater => Comparison::Less,
+            same => same,
+        }
+    }
+
+    /// Whether it holds for a difference of this sign.
+    fn judge(self, sign: Sign) -> Truth {
+        use Comparison::*;
+        let holds = match sign {
+            Sign::Any => return Truth::Maybe,
+            Sign::Undefined => self == NotEqual,
+            Sign::Minus => matches!(self, Less | LessOrEqual | NotEqual),
+            Sign::Zero => matches!(self, LessOrEqual | Equal | GreaterOrEqual),
+            Sign::Plus => matches!(self, GreaterOrEqual | Greater | NotEqual),
+        };
+        if holds { Truth::Yes } else { Truth::No }
+    }
+}
+
+/// Three-valued logic (Kleene).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Truth {
+    No,
+    Maybe,
+    Yes,
+}
+
+/// One step of a condition in postfix order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Step {
+    /// Compares the sides of the rule's atom of this number.
+    Atom(u32, Comparison),
+    /// True or false, whatever happens.
+    Constant(bool),
+    And,
+    Or,
+    Not,
+}
+
+/// A condition over the atoms of a rule; empty means always.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Condition(pub Vec<Step>);
+
+impl Condition {
+    /// True if there is no condition.
+    pub fn is_always(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Judges the condition, given the sign of each atom.
+    pub fn judge(&self, sign: impl Fn(usize) -> Sign) -> Truth {
+        let mut stack: Vec<Truth> = Vec::with_capacity(8);
+        for step in &self.0 {
+            let truth = match *step {
+                Step::Atom(atom, comparison) => comparison.judge(sign(atom as usize)),
+                Step::Constant(true) => Truth::Yes,
+                Step::Constant(false) => Truth::No,
+                Step::Not => match stack.pop().expect("well formed") {
+                    Truth::No => Truth::Yes,
+                    Truth::Maybe => Truth::Maybe,
+                    Truth::Yes => Truth::No,
+                },
+                Step::And | Step::Or => {
+                    let (b, a) = (stack.pop().expect("well formed"), stack.pop().expect("well formed"));
+                    if *step == Step::And { a.min(b) } else { a.max(b) }
+                }
+            };
+            stack.push(truth);
+        }
+        stack.pop().unwrap_or(Truth::Yes)
+    }
+
+    /// The atoms it mentions, each with the comparison asked of it.
+    pub fn atoms(&self) -> impl Iterator<Item = (usize, Comparison)> + '_ {
+        self.0.iter().filter_map(|step| match *step {
+            Step::Atom(atom, comparison) => Some((atom as usize, comparison)),
+            _ => None,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn kleene_logic_keeps_what_is_certain() {
+        let either =
+            Condition(vec![Step::Atom(0, Comparison::Less), Step::Atom(1, Comparison::Equal), Step::Or]);
+        let judge = |a, b| either.judge(|i| [a, b][i]);
+        assert_eq!(judge(Sign::Minus, Sign::Any), Truth::Yes);
+        assert_eq!(judge(Sign::Plus, Sign::Any), Truth::Maybe);
+        assert_eq!(judge(Sign::Zero, Sign::Undefined), Truth::No);
+        assert_eq!(Condition::default().judge(|_| Sign::Any), Truth::Yes);
+    }
+}

@@ -1,0 +1,148 @@
+//! Surfaces that a flow cannot reach.
+//!
+//! A value that is only approached is never reached (LANGUAGE, "Events"): logistic growth comes as close
+//! to its limit as one likes, and closer than rounded numbers can tell. That the limit is not an event
+//! cannot be seen on the numbers of a trajectory; it is seen on the equations. The surface `a = b` is
+//! invariant if the rate of `a - b` is zero everywhere on it, and by uniqueness of solutions no trajectory
+//! enters an invariant surface.
+//!
+//! Whether a rate is identically zero is tested at many points (Schwartz 1980, Zippel 1979): an
+//! analytic function that vanishes at all of them vanishes.
+
+use crate::expr::{Dual, Graph, Node, NodeId, Program};
+
+/// Points at which a rate is tested.
+const POINTS: usize = 48;
+/// Fewer defined points than this prove nothing.
+const ENOUGH: usize = 12;
+
+/// True if a flow can never bring `a - b` from another value to zero.
+///
+/// - `own`: the variables `0..own` are the module's parameters; `rates` gives each its derivative.
+/// - `context`: the variables `own..own + context` move in ways that are not known here.
+/// - The next two are `t` and `age`, whose rate is 1; any after them are truth values that stand still.
+pub fn never_reached(
+    graph: &Graph,
+    (a, b): (NodeId, NodeId),
+    rates: &[(usize, NodeId)],
+    own: usize,
+    context: usize,
+    variables: usize,
+) -> bool {
+    // The surface is sampled by solving one side, a bare parameter, for the other.
+    let (pivot, value) = match (parameter(graph, a, own), parameter(graph, b, own)) {
+        (Some(x), _) if !graph.variables(&[b]).contains(&x) => (x as usize, b),
+        (_, Some(x)) if !graph.variables(&[a]).contains(&x) => (x as usize, a),
+        _ => return false,
+    };
+    let known = |v: u32| (v as usize) < own || (v as usize) >= own + context;
+    if !graph.variables(&[a, b]).into_iter().all(known) {
+        return false;
+    }
+    let sides = Program::compile(graph, &[a, b], variables);
+    let target = Program::compile(graph, &[value], variables);
+    let roots: Vec<NodeId> = rates.iter().map(|(_, rate)| *rate).collect();
+    let flow = Program::compile(graph, &roots, variables);
+
+    let mut random = Random(0x5eed);
+    let (mut defined, mut scratch, mut dual_scratch) = (0, Vec::new(), Vec::new());
+    let mut derivative = vec![0.0; roots.len()];
+    let mut difference = |point: &[f64]| {
+        flow.eval(point, &mut scratch, &mut derivative);
+        let mut duals: Vec<Dual<f64>> = point.iter().map(|&value| Dual { value, rate: 0.0 }).collect();
+        duals[own + context].rate = 1.0;
+        duals[own + context + 1].rate = 1.0;
+        for ((parameter, _), &rate) in rates.iter().zip(&derivative) {
+            duals[*parameter].rate = rate;
+        }
+        let mut out = [Dual { value: 0.0, rate: 0.0 }; 2];
+        sides.eval(&duals, &mut dual_scratch, &mut out);
+        out[0].rate - out[1].rate
+    };
+    for _ in 0..POINTS {
+        let mut point: Vec<f64> = (0..variables).map(|_| random.magnitude()).collect();
+        for flag in &mut point[own + context + 2..] {
+            *flag = f64::from(u8::from(random.next() & 1 == 1));
+        }
+        let at = target.eval_one(&point);
+        point[pivot] = at;
+        let here = difference(&point);
+        // How large the rate is off the surface says what counts as zero on it.
+        let mut scale: f64 = 0.0;
+        for step in [0.25, 0.5] {
+            for side in [-step, step] {
+                point[pivot] = at + side * at.abs().max(1e-3);
+                let there = difference(&point);
+                scale = if there.is_finite() { scale.max(there.abs()) } else { scale };
+            }
+        }
+        if !here.is_finite() {
+            continue;
+        }
+        if here.abs() > 1e-11 * scale {
+            return false;
+        }
+        defined += 1;
+    }
+    defined >= ENOUGH
+}
+
+fn parameter(graph: &Graph, id: NodeId, own: usize) -> Option<u32> {
+    match graph.node(id) {
+        Node::Var(v) if (v as usize) < own => Some(v),
+        _ => None,
+    }
+}
+
+/// SplitMix64 (Steele, Lea, Flood 2014): the points are the same in every run.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// A number of either sign, most often positive, between 1/100 and 100.
+    fn magnitude(&mut self) -> f64 {
+        let unit = (self.next() >> 11) as f64 / (1u64 << 53) as f64;
+        let size = 10f64.powf(4.0 * unit - 2.0);
+        if self.next() % 4 == 0 { -size } else { size }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::expr::{Binary, Graph};
+
+    /// x' = r (1 - x/m) x with m = 3; variables x, t, age.
+    fn logistic(g: &mut Graph) -> NodeId {
+        let (x, one, m) = (g.var(0), g.constant(1.0), g.constant(3.0));
+        let q = g.binary(Binary::Div, x, m);
+        let rest = g.binary(Binary::Sub, one, q);
+        g.binary(Binary::Mul, rest, x)
+    }
+
+    #[test]
+    fn the_limit_of_logistic_growth_is_never_reached_but_what_is_below_is() {
+        let mut g = Graph::default();
+        let rate = logistic(&mut g);
+        let (x, limit, below) = (g.var(0), g.constant(3.0), g.constant(2.999_999_999));
+        assert!(never_reached(&g, (x, limit), &[(0, rate)], 1, 0, 3));
+        assert!(!never_reached(&g, (x, below), &[(0, rate)], 1, 0, 3));
+    }
+
+    #[test]
+    fn growth_that_ends_on_its_threshold_arrives() {
+        // x' = (1 - age) age, which is zero at age 1 but not on the whole surface x = 1/6.
+        let mut g = Graph::default();
+        let (x, age, one, sixth) = (g.var(0), g.var(2), g.constant(1.0), g.constant(1.0 / 6.0));
+        let rest = g.binary(Binary::Sub, one, age);
+        let rate = g.binary(Binary::Mul, rest, age);
+        assert!(!never_reached(&g, (x, sixth), &[(0, rate)], 1, 0, 3));
+    }
+}

@@ -1,0 +1,145 @@
+//! Module kinds: a name and a number of parameters.
+
+use std::collections::HashMap;
+
+/// A kind of a [`Model`](super::Model), by number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct KindId(u32);
+
+impl KindId {
+    /// `[`: a branch begins.
+    pub const OPEN: KindId = KindId(0);
+    /// `]`: a branch ends.
+    pub const CLOSE: KindId = KindId(1);
+
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+
+    /// True for `[` and `]`, which structure a string and are no modules themselves.
+    pub fn is_bracket(self) -> bool {
+        self == KindId::OPEN || self == KindId::CLOSE
+    }
+}
+
+/// How a module's name is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Class {
+    /// `F`, `F_h`, `Apex`
+    Word,
+    /// `@L`
+    Surface,
+    /// `+`, `!`, `[`
+    Symbol,
+}
+
+/// A module's name and number of parameters, and what the model says of it.
+#[derive(Clone, Debug)]
+pub struct Kind {
+    pub name: String,
+    /// Number of parameters.
+    pub arity: usize,
+    /// Indices into [`Model::rules`](super::Model::rules) of the rules with this strict predecessor, in
+    /// the order in which they are written.
+    pub rules: Vec<usize>,
+    /// Index into [`Model::interpretations`](super::Model::interpretations).
+    pub interpretation: Option<usize>,
+    /// Passed over in the search for context (LANGUAGE: symbols and surfaces unless a `consider` names
+    /// them; whatever an `ignore` names).
+    pub skipped: bool,
+}
+
+impl Kind {
+    pub fn class(&self) -> Class {
+        class_of(&self.name)
+    }
+
+    /// The part of a word before its first `_`, by which the turtle draws it and by which a context
+    /// without `_` matches it. Surfaces and symbols are their own base.
+    pub fn base(&self) -> &str {
+        base_of(&self.name)
+    }
+}
+
+/// Base names of the words that the turtle draws: a line, and a move without one.
+pub const DRAWN_WORDS: [&str; 2] = ["F", "f"];
+
+/// The surfaces that are built in: a leaf and a flower.
+pub const BUILT_IN_SURFACES: [&str; 2] = ["@L", "@K"];
+
+/// How a name is written.
+pub fn class_of(name: &str) -> Class {
+    match name.chars().next() {
+        Some('@') => Class::Surface,
+        Some(c) if c.is_alphabetic() => Class::Word,
+        _ => Class::Symbol,
+    }
+}
+
+/// See [`Kind::base`].
+pub fn base_of(name: &str) -> &str {
+    match name.find('_') {
+        Some(at) if at > 0 => &name[..at],
+        _ => name,
+    }
+}
+
+/// All kinds of a model; brackets are the first two.
+#[derive(Clone, Debug)]
+pub struct Kinds {
+    all: Vec<Kind>,
+    ids: HashMap<(String, usize), KindId>,
+}
+
+impl Default for Kinds {
+    fn default() -> Kinds {
+        let mut kinds = Kinds { all: Vec::new(), ids: HashMap::new() };
+        assert_eq!(kinds.intern("[", 0), KindId::OPEN);
+        assert_eq!(kinds.intern("]", 0), KindId::CLOSE);
+        kinds
+    }
+}
+
+impl Kinds {
+    /// The kind of this name and number of parameters, made if it is new.
+    pub fn intern(&mut self, name: &str, arity: usize) -> KindId {
+        if let Some(id) = self.find(name, arity) {
+            return id;
+        }
+        let id = KindId(self.all.len() as u32);
+        self.all.push(Kind {
+            name: name.to_owned(),
+            arity,
+            rules: Vec::new(),
+            interpretation: None,
+            skipped: class_of(name) != Class::Word,
+        });
+        self.ids.insert((name.to_owned(), arity), id);
+        id
+    }
+
+    pub fn find(&self, name: &str, arity: usize) -> Option<KindId> {
+        self.ids.get(&(name.to_owned(), arity)).copied()
+    }
+
+    pub fn get(&self, id: KindId) -> &Kind {
+        &self.all[id.index()]
+    }
+
+    pub fn get_mut(&mut self, id: KindId) -> &mut Kind {
+        &mut self.all[id.index()]
+    }
+
+    pub fn len(&self) -> usize {
+        self.all.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.all.is_empty()
+    }
+
+    /// All kinds with their numbers, brackets included.
+    pub fn iter(&self) -> impl Iterator<Item = (KindId, &Kind)> {
+        self.all.iter().enumerate().map(|(i, kind)| (KindId(i as u32), kind))
+    }
+}

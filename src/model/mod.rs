@@ -1,0 +1,74 @@
+//! What a model says: names resolved, expressions compiled, module kinds known.
+//!
+//! A [`Model`] is made by [`lang`](crate::lang) from text and read by everything downstream. It knows
+//! nothing of syntax (only [`Span`]s, so that messages can point at the text), and nothing of time: the
+//! growing tree belongs to [`structure`](crate::structure), the clock to [`sim`](crate::sim).
+//!
+//! - [`Kind`]: a module's name and number of parameters. `F(x)` and `F(x, y)` are two kinds.
+//! - [`Rule`]: what the text writes under one head: context, equations, productions.
+//! - [`Condition`]: the logic of an `if`, over the signs of differences, because the simulation knows
+//!   better than a comparison of two rounded numbers whether two sides have met.
+
+mod condition;
+mod invariance;
+mod kind;
+mod rule;
+
+pub use condition::{Comparison, Condition, Sign, Step, Truth};
+pub use invariance::never_reached;
+pub use kind::{BUILT_IN_SURFACES, Class, DRAWN_WORDS, Kind, KindId, Kinds, base_of, class_of};
+pub use rule::{Interpretation, Pattern, Produce, Rule, Solve, Successor, Switch};
+
+use crate::diagnostic::Span;
+
+/// A checked model, ready to run.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// `title "…"`
+    pub title: Option<String>,
+    /// Angle of a turn without a parameter, in degrees (`angle`; 90 if not given).
+    pub angle: f64,
+    /// Default observation times (`frames`).
+    pub frames: Option<Frames>,
+    /// What can be set from outside (`param`), with the values in force.
+    pub parameters: Vec<Parameter>,
+    pub kinds: Kinds,
+    /// The initial string; its arguments read no variables.
+    pub axiom: Successor,
+    pub rules: Vec<Rule>,
+    pub interpretations: Vec<Interpretation>,
+}
+
+/// Equidistant observation times: `from + i * step` while not beyond `to`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Frames {
+    pub from: f64,
+    pub to: f64,
+    pub step: f64,
+}
+
+impl Frames {
+    /// More frames than this are a mistake, not a wish.
+    pub const LIMIT: usize = 10_000_000;
+
+    /// Number of observation times, both ends included. The last interval may be short of a whole step
+    /// by rounding (a billionth of it): `0 .. 1 step 0.1` has 11 times.
+    pub fn count(&self) -> usize {
+        ((self.to - self.from) / self.step + 1e-9).floor() as usize + 1
+    }
+
+    /// The times. Each is computed from its index, so that errors do not add up.
+    pub fn times(&self) -> impl Iterator<Item = f64> + use<> {
+        let Frames { from, step, .. } = *self;
+        (0..self.count()).map(move |i| from + i as f64 * step)
+    }
+}
+
+/// A `param`: a constant that can be set from outside.
+#[derive(Clone, Debug)]
+pub struct Parameter {
+    pub name: String,
+    pub value: f64,
+    pub range: Option<(f64, f64)>,
+    pub span: Span,
+}

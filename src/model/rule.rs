@@ -1,0 +1,118 @@
+//! Rules: what the text writes under one head.
+//!
+//! # Variables of a rule
+//!
+//! All expressions of a rule read the same variables, in this order: the parameters of the strict
+//! predecessor; the parameters of the context modules, left to right as written; `t`; `age`; then one
+//! truth value for each [`Switch`].
+
+use super::{Condition, KindId};
+use crate::diagnostic::Span;
+use crate::expr::{Program, Scratch, Value};
+
+/// Context, equations and productions of one strict predecessor.
+#[derive(Clone, Debug)]
+pub struct Rule {
+    /// The head as written.
+    pub label: String,
+    pub span: Span,
+    /// Names of the strict predecessor's parameters.
+    pub parameters: Vec<String>,
+    /// Left context in reading order: the last one is the nearest.
+    pub left: Vec<Pattern>,
+    /// Right context in reading order: the first one is the nearest.
+    pub right: Vec<Pattern>,
+    /// Number of variables, switches excluded.
+    pub variables: usize,
+    /// Both sides of every comparison: `a` of atom i is output 2i, `b` is output 2i + 1.
+    pub sides: Program,
+    /// Where each atom is written.
+    pub atoms: Vec<Span>,
+    /// The boundary of each atom, as in `x = s`, for messages.
+    pub boundaries: Vec<String>,
+    /// In the order written: of those that hold, the first is active.
+    pub solves: Vec<Solve>,
+    /// In the order written: of those that hold at one instant, the first wins.
+    pub produces: Vec<Produce>,
+}
+
+impl Rule {
+    /// Index of the variable `t`; `age` is the next one.
+    pub fn time_variable(&self) -> usize {
+        self.variables - 2
+    }
+}
+
+/// A module of a context.
+#[derive(Clone, Debug)]
+pub struct Pattern {
+    /// All kinds that match, ascending.
+    pub kinds: Vec<KindId>,
+    /// Number of parameters.
+    pub arity: usize,
+}
+
+impl Pattern {
+    pub fn matches(&self, kind: KindId) -> bool {
+        self.kinds.binary_search(&kind).is_ok()
+    }
+}
+
+/// A `solve` clause.
+#[derive(Clone, Debug)]
+pub struct Solve {
+    pub guard: Condition,
+    pub span: Span,
+    /// Parameters that have a derivative, in the order of the outputs of `rates`. A parameter that is
+    /// not named, or whose derivative is the constant 0, is not here: it stays as it is.
+    pub of: Vec<usize>,
+    /// The derivatives, smooth in all variables while the switches stand.
+    pub rates: Program,
+    /// Conditions inside the equations (`if`, `min`, `max`, `abs`, `sign`).
+    pub switches: Vec<Switch>,
+    /// Atoms that the flow of these equations cannot bring to zero, because the surface on which they
+    /// are zero is invariant: a logistic growth and its own limit. One per atom of the rule.
+    pub unreachable: Vec<bool>,
+}
+
+/// A condition inside an equation, replaced there by a variable, so that the equation is smooth between
+/// the instants at which the condition changes.
+#[derive(Clone, Debug)]
+pub struct Switch {
+    pub condition: Condition,
+}
+
+/// A `produce` clause.
+#[derive(Clone, Debug)]
+pub struct Produce {
+    pub guard: Condition,
+    pub span: Span,
+    pub successor: Successor,
+}
+
+/// A string of modules whose arguments are computed when it is made.
+#[derive(Clone, Debug, Default)]
+pub struct Successor {
+    /// In string order, with brackets.
+    pub kinds: Vec<KindId>,
+    /// The arguments of all modules, one after another.
+    pub arguments: Program,
+}
+
+impl Successor {
+    /// Computes the arguments of all modules.
+    pub fn evaluate<T: Value>(&self, variables: &[T], scratch: &mut Scratch<T>, out: &mut Vec<T>) {
+        out.clear();
+        out.resize(self.arguments.outputs(), T::constant(0.0));
+        self.arguments.eval(variables, scratch, out);
+    }
+}
+
+/// An `interpret` declaration: what the turtle draws in place of a module.
+///
+/// Its expressions read the module's parameters, then `t`, then `age`.
+#[derive(Clone, Debug)]
+pub struct Interpretation {
+    pub span: Span,
+    pub drawn: Successor,
+}

@@ -1,0 +1,94 @@
+//! The elements of a scene.
+
+use std::sync::Arc;
+
+use super::{MaterialId, Mesh, OwnerId, Point, Vector};
+
+/// The width of a line.
+///
+/// A model that sets no widths should be seen at any scale, and a scene does not know its own: the growing
+/// plant is small at first. So a default width is a *style*, to be resolved when the bounds of the whole
+/// animation are known (see [`Bounds::default_width`](super::Bounds::default_width)).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Width {
+    /// This many times the default width.
+    Default(f64),
+    /// In scene units.
+    Set(f64),
+}
+
+impl Width {
+    /// The width in scene units, given the default width.
+    pub fn resolve(self, default: f64) -> f64 {
+        match self {
+            Width::Default(factor) => factor * default,
+            Width::Set(width) => width,
+        }
+    }
+
+    /// The width times a factor.
+    pub fn scaled(self, by: f64) -> Width {
+        match self {
+            Width::Default(factor) => Width::Default(factor * by),
+            Width::Set(width) => Width::Set(width * by),
+        }
+    }
+}
+
+/// A straight piece of a stem.
+#[derive(Clone, Debug)]
+pub struct Segment {
+    pub start: Point,
+    pub end: Point,
+    /// Unit vector from `start` to `end`; kept, because the difference of two near points has few digits.
+    pub direction: Vector,
+    /// Unit vector across the segment, from which a tube's cross-section is counted.
+    pub across: Vector,
+    /// Widths (diameters) at the start and at the end.
+    pub widths: [Width; 2],
+    pub material: MaterialId,
+    pub owner: OwnerId,
+    /// Index of the segment that this one continues: it precedes this one on the same axis and ends exactly
+    /// where this one starts. No two segments continue the same one.
+    pub follows: Option<usize>,
+}
+
+/// A filled outline, of at least three distinct vertices. It need not be flat or convex.
+#[derive(Clone, Debug)]
+pub struct Polygon {
+    pub vertices: Vec<Point>,
+    pub material: MaterialId,
+    pub owner: OwnerId,
+}
+
+/// A mesh in its place.
+#[derive(Clone, Debug)]
+pub struct Surface {
+    pub mesh: Arc<Mesh>,
+    pub placement: Placement,
+    /// Stands in for the materials of those faces that take a colour.
+    pub tint: Option<MaterialId>,
+    pub owner: OwnerId,
+}
+
+/// Position, orientation and size of a mesh.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placement {
+    pub origin: Point,
+    /// Unit vectors that the mesh's first, second and third axis turn to.
+    pub axes: [Vector; 3],
+    /// Length of one unit of the mesh, in scene units.
+    pub scale: f64,
+}
+
+impl Placement {
+    /// Where a point of the mesh comes to lie.
+    pub fn point(&self, p: Point) -> Point {
+        self.origin + self.scale * self.direction(p.coords)
+    }
+
+    /// Where a direction of the mesh comes to point.
+    pub fn direction(&self, v: Vector) -> Vector {
+        self.axes[0] * v.x + self.axes[1] * v.y + self.axes[2] * v.z
+    }
+}

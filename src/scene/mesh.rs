@@ -1,0 +1,69 @@
+//! Triangle meshes in coordinates of their own.
+
+use super::{MaterialId, Point, Vector};
+
+/// A triangle mesh with smooth normals. Its axes are the turtle's: heading, left, up.
+#[derive(Clone, Debug)]
+pub struct Mesh {
+    pub vertices: Vec<Point>,
+    /// One unit normal for each vertex.
+    pub normals: Vec<Vector>,
+    pub faces: Vec<Face>,
+}
+
+/// A triangle, counter-clockwise seen from the side to which its normals point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Face {
+    pub corners: [u32; 3],
+    pub material: MaterialId,
+    /// Whether a colour that the model chooses replaces the material.
+    pub takes_tint: bool,
+}
+
+impl Mesh {
+    /// A mesh without faces.
+    pub fn new() -> Mesh {
+        Mesh { vertices: Vec::new(), normals: Vec::new(), faces: Vec::new() }
+    }
+
+    /// Adds a grid of vertices, `rows` of equal length, as two triangles to each square. Seen with rows
+    /// going up and columns going right, the front is towards the viewer. Triangles without area, as where
+    /// a row shrinks to a point, are left out.
+    pub fn add_grid(&mut self, rows: &[Vec<Point>], material: MaterialId, takes_tint: bool) {
+        let first = self.vertices.len() as u32;
+        let columns = rows.first().map_or(0, Vec::len) as u32;
+        self.vertices.extend(rows.iter().flatten());
+        self.normals.resize(self.vertices.len(), Vector::zeros());
+        for row in 1..rows.len() as u32 {
+            for column in 1..columns {
+                let b = first + row * columns + column;
+                let a = b - columns;
+                for corners in [[a - 1, a, b], [a - 1, b, b - 1]] {
+                    let [p, q, r] = corners.map(|i| self.vertices[i as usize]);
+                    let area = (q - p).cross(&(r - p));
+                    if area.norm() < 1e-12 {
+                        continue;
+                    }
+                    self.faces.push(Face { corners, material, takes_tint });
+                    for corner in corners {
+                        self.normals[corner as usize] += area;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Brings the normals to unit length, after the last grid.
+    pub fn finish(mut self) -> Mesh {
+        for normal in &mut self.normals {
+            *normal = normal.try_normalize(1e-300).unwrap_or_else(Vector::z);
+        }
+        self
+    }
+}
+
+impl Default for Mesh {
+    fn default() -> Mesh {
+        Mesh::new()
+    }
+}

@@ -1,0 +1,136 @@
+//! The solution within one step, as polynomials in Bernstein form.
+//!
+//! Every method's dense output is a polynomial; in Bernstein form its coefficients bound it (the convex
+//! hull property), so that a step can be searched for events without sampling it (Farouki 2012, sections
+//! 3 and 4). Both ends of the step are coefficients: evaluation there is exact.
+
+use crate::expr::{Dual, Interval, Value};
+use crate::structure::Instant;
+
+/// Highest degree of a dense output.
+pub const MAX_DEGREE: usize = 4;
+type Coefficients = [f64; MAX_DEGREE + 1];
+
+/// All components of the solution from `start` to `start + h`.
+#[derive(Clone, Debug)]
+pub struct Dense {
+    pub start: Instant,
+    /// Length of the step.
+    pub h: f64,
+    degree: usize,
+    /// `degree + 1` coefficients for each component.
+    coefficients: Vec<f64>,
+}
+
+impl Dense {
+    pub fn new(start: Instant, h: f64, degree: usize, coefficients: Vec<f64>) -> Dense {
+        debug_assert!(degree <= MAX_DEGREE);
+        Dense { start, h, degree, coefficients }
+    }
+
+    /// Position of an instant in the step: 0 at its start, 1 at its end.
+    pub fn position(&self, at: Instant) -> f64 {
+        if self.h == 0.0 { 0.0 } else { (at.since(self.start) / self.h).clamp(0.0, 1.0) }
+    }
+
+    fn of(&self, component: usize) -> &[f64] {
+        &self.coefficients[component * (self.degree + 1)..(component + 1) * (self.degree + 1)]
+    }
+
+    /// One component at a position, by de Casteljau's algorithm.
+    pub fn value(&self, component: usize, position: f64) -> f64 {
+        let mut c: Coefficients = [0.0; MAX_DEGREE + 1];
+        c[..=self.degree].copy_from_slice(self.of(component));
+        for level in (1..=self.degree).rev() {
+            for i in 0..level {
+                c[i] = mix(c[i], c[i + 1], position);
+            }
+        }
+        c[0]
+    }
+
+    /// Bounds of one component over the whole step.
+    pub fn bounds(&self, component: usize) -> Interval {
+        hull(self.of(component))
+    }
+
+    /// Bounds of one component and of its rate (per unit of position) from `lo` to `hi`.
+    pub fn piece(&self, component: usize, lo: f64, hi: f64) -> Dual<Interval> {
+        let mut c: Coefficients = [0.0; MAX_DEGREE + 1];
+        c[..=self.degree].copy_from_slice(self.of(component));
+        let c = &mut c[..=self.degree];
+        // Cut off what is after `hi`, then what is before `lo`.
+        if hi < 1.0 {
+            for level in 1..=self.degree {
+                for i in (level..=self.degree).rev() {
+                    c[i] = mix(c[i - 1], c[i], hi);
+                }
+            }
+        }
+        if lo > 0.0 {
+            let cut = lo / hi;
+            for level in (1..=self.degree).rev() {
+                for i in 0..level {
+                    c[i] = mix(c[i], c[i + 1], cut);
+                }
+            }
+        }
+        let width = hi - lo;
+        let mut rate = Interval::constant(0.0);
+        if self.degree > 0 {
+            let mut slopes: Coefficients = [0.0; MAX_DEGREE + 1];
+            for i in 0..self.degree {
+                slopes[i] = self.degree as f64 * (c[i + 1] - c[i]) / width;
+            }
+            rate = hull(&slopes[..self.degree]);
+        }
+        Dual { value: hull(c), rate }
+    }
+}
+
+/// Exact at both ends, unlike `a + s (b - a)`.
+fn mix(a: f64, b: f64, s: f64) -> f64 {
+    a * (1.0 - s) + b * s
+}
+
+fn hull(values: &[f64]) -> Interval {
+    let mut all = Interval::constant(values[0]);
+    for &v in &values[1..] {
+        all.lo = all.lo.min(v);
+        all.hi = all.hi.max(v);
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn pieces_bound_the_polynomial_and_its_rate(
+            c in proptest::collection::vec(-10.0..10.0f64, 5),
+            a in 0.0..1.0f64, w in 0.01..1.0f64, s in 0.0..1.0f64,
+        ) {
+            let (lo, hi) = (a, (a + w).min(1.0));
+            prop_assume!(hi - lo > 1e-3);
+            let dense = Dense::new(Instant::ZERO, 1.0, 4, c);
+            let at = lo + s * (hi - lo);
+            let piece = dense.piece(0, lo, hi);
+            let value = dense.value(0, at);
+            prop_assert!(piece.value.lo - 1e-9 <= value && value <= piece.value.hi + 1e-9);
+            let e = 1e-6;
+            let slope = (dense.value(0, (at + e).min(1.0)) - dense.value(0, (at - e).max(0.0)))
+                / ((at + e).min(1.0) - (at - e).max(0.0));
+            prop_assert!(piece.rate.lo - 1e-3 <= slope && slope <= piece.rate.hi + 1e-3);
+        }
+
+        #[test]
+        fn ends_are_exact(c in proptest::collection::vec(-1e9..1e9f64, 5)) {
+            let dense = Dense::new(Instant::ZERO, 1.0, 4, c.clone());
+            prop_assert_eq!(dense.value(0, 0.0), c[0]);
+            prop_assert_eq!(dense.value(0, 1.0), c[4]);
+        }
+    }
+}

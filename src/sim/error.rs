@@ -1,0 +1,106 @@
+//! What can go wrong while a model runs.
+
+use crate::diagnostic::{Diagnostic, Span};
+use crate::structure::Lineage;
+
+/// A module in trouble: what an error message says of it.
+#[derive(Clone, Debug)]
+pub struct Site {
+    /// The module with its parameters, as in a string.
+    pub module: String,
+    pub lineage: Lineage,
+    /// The head of its rule.
+    pub rule: String,
+    /// The place in the text to point at.
+    pub span: Span,
+    pub time: f64,
+}
+
+/// An error of a run. All name the rule, the module with its lineage, and the time.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum Error {
+    #[error("{} left its domain at t = {} and no production applies", .site.module, .site.time)]
+    OutsideDomain {
+        site: Site,
+        /// The comparisons that fail, with their places and how the production for them would begin.
+        failing: Vec<(Span, String)>,
+    },
+    #[error("the equations of {} push against each other at t = {}", .site.module, .site.time)]
+    Chattering { site: Site },
+    #[error("productions go on without end at t = {}", .site.time)]
+    Cascade { site: Site, rounds: usize },
+    #[error("events pile up before t = {}", .site.time)]
+    Zeno { site: Site },
+    #[error("{what} of {} is not finite at t = {}", .site.module, .site.time)]
+    NotFinite { site: Site, what: String },
+    #[error("the step size fell to nothing at t = {}", .site.time)]
+    StepTooSmall { site: Site },
+    #[error("more than {limit} modules at t = {}", .site.time)]
+    TooManyModules { site: Site, limit: usize },
+}
+
+impl Error {
+    pub fn site(&self) -> &Site {
+        match self {
+            Error::OutsideDomain { site, .. }
+            | Error::Chattering { site }
+            | Error::Cascade { site, .. }
+            | Error::Zeno { site }
+            | Error::NotFinite { site, .. }
+            | Error::StepTooSmall { site }
+            | Error::TooManyModules { site, .. } => site,
+        }
+    }
+
+    /// The message as it is drawn.
+    pub fn diagnostic(&self) -> Diagnostic {
+        let site = self.site();
+        let mut d = Diagnostic::error(self.to_string());
+        if site.span != Span::default() {
+            d = d.at(site.span, self.remark());
+        }
+        if let Error::OutsideDomain { failing, .. } = self {
+            for (span, _) in failing {
+                d = d.at(*span, "this no longer holds");
+            }
+        }
+        d = d.note(format!("module {}, lineage {}, rule {}", site.module, site.lineage, site.rule));
+        match self {
+            Error::OutsideDomain { failing, .. } => {
+                let missing: Vec<String> =
+                    failing.iter().map(|(_, begin)| format!("`{begin} produce …`")).collect();
+                d.help_opt((!missing.is_empty()).then(|| format!("say what happens there: {}", missing.join(" or "))))
+            }
+            Error::Chattering { .. } => d.help(
+                "let one side hold at the boundary with an equation of its own, for example `dx/dt = 0`",
+            ),
+            Error::Cascade { rounds, .. } => d
+                .note(format!("{rounds} productions followed one another without time going on"))
+                .help("a successor that meets the condition again is replaced again at once: change the condition, or the successor's parameters"),
+            Error::Zeno { .. } => {
+                d.help("each life is shorter than the one before, and all of them end before this time: stop the production below some size")
+            }
+            Error::NotFinite { .. } => {
+                d.help("look for a division by zero, a root or logarithm of a negative number, or growth without bound")
+            }
+            Error::StepTooSmall { .. } => d.help(
+                "the solution may become infinite here, or the equations jump in a way that no `if` shows; a fixed step (`--method rk4 --step-size H`) shows how it behaves",
+            ),
+            Error::TooManyModules { limit, .. } => {
+                d.help(format!("if this is meant, allow more: `--max-modules {}`", limit.saturating_mul(10)))
+            }
+        }
+    }
+
+    fn remark(&self) -> &'static str {
+        match self {
+            Error::OutsideDomain { .. } => "no equation of this rule holds any more",
+            Error::Chattering { .. } => "on each side of the boundary the equations lead to the other",
+            Error::Cascade { .. } => "this production applies again and again",
+            Error::Zeno { .. } => "this production comes sooner and sooner",
+            Error::NotFinite { .. } => "computed here",
+            Error::StepTooSmall { .. } => "these equations",
+            Error::TooManyModules { .. } => "this production made the last of them",
+        }
+    }
+}

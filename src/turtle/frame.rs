@@ -1,0 +1,186 @@
+//! Where the turtle looks: heading, left and up, turned without drift.
+//!
+//! A string turns its turtle millions of times, mostly to and fro about one axis. Consecutive turns about
+//! the same axis are therefore kept as one angle in degrees, reduced modulo 360, and applied only when
+//! another axis comes; for angles that are multiples of a binary fraction (45, 137.5, 1) that sum is exact,
+//! and so a plane curve is as good after a million turns as after one.
+
+//!
+//! Turns about changing axes are applied in twice the usual precision ([`Twofold`]).
+
+use super::twofold::Twofold;
+use crate::scene::{Vector, sin_cos_degrees};
+
+/// An axis of the turtle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Axis {
+    Heading,
+    Left,
+    Up,
+}
+
+/// Three orthonormal vectors, `heading × left = up`, and a turn yet to be applied.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Frame {
+    heading: Twofold,
+    left: Twofold,
+    up: Twofold,
+    axis: Axis,
+    /// Degrees about `axis`, in (-360, 360).
+    pending: f64,
+}
+
+impl Frame {
+    /// Looking up (`+Y`), with the front view's viewer (`+Z`) above.
+    pub(super) fn upright() -> Frame {
+        Frame::looking(Vector::y(), -Vector::x(), Vector::z())
+    }
+
+    fn looking(heading: Vector, left: Vector, up: Vector) -> Frame {
+        let [heading, left, up] = [heading, left, up].map(Twofold::new);
+        Frame { heading, left, up, axis: Axis::Up, pending: 0.0 }
+    }
+
+    /// Turns about an axis: left about up, down about left, to the left about heading (the left side goes
+    /// down). `degrees` must be finite.
+    pub(super) fn turn(&mut self, axis: Axis, degrees: f64) {
+        let degrees = degrees % 360.0;
+        if degrees == 0.0 {
+            return;
+        }
+        if axis != self.axis {
+            self.apply();
+            self.axis = axis;
+        }
+        self.pending = (self.pending + degrees) % 360.0;
+    }
+
+    /// Heading, left and up as they are now.
+    pub(super) fn vectors(&self) -> [Vector; 3] {
+        let mut now = *self;
+        now.apply();
+        [now.heading, now.left, now.up].map(|v| v.value())
+    }
+
+    /// Rolls until left is horizontal and up is as far up as it can be (`$`; Prusinkiewicz and Lindenmayer
+    /// 1990, p. 57). A vertical heading is left as it is.
+    pub(super) fn level(&mut self) {
+        let [heading, ..] = self.vectors();
+        if let Some(left) = Vector::y().cross(&heading).try_normalize(1e-9) {
+            *self = Frame::looking(heading, left, heading.cross(&left));
+        }
+    }
+
+    /// Applies the pending turn.
+    fn apply(&mut self) {
+        if self.pending == 0.0 {
+            return;
+        }
+        let angle = sin_cos_degrees(self.pending);
+        match self.axis {
+            Axis::Up => Twofold::turn(&mut self.heading, &mut self.left, angle),
+            Axis::Left => Twofold::turn(&mut self.up, &mut self.heading, angle),
+            Axis::Heading => Twofold::turn(&mut self.left, &mut self.up, (-angle.0, angle.1)),
+        }
+        self.pending = 0.0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn assert_orthonormal(frame: &Frame) {
+        let [h, l, u] = frame.vectors();
+        for (a, b, expected) in [(h, h, 1.0), (l, l, 1.0), (u, u, 1.0), (h, l, 0.0), (l, u, 0.0), (u, h, 0.0)]
+        {
+            assert!((a.dot(&b) - expected).abs() < 1e-12, "{frame:?}");
+        }
+        assert!((h.cross(&l) - u).norm() < 1e-12);
+    }
+
+    #[test]
+    fn turns_go_where_their_names_say() {
+        let turned = |axis| {
+            let mut frame = Frame::upright();
+            frame.turn(axis, 90.0);
+            frame.vectors()
+        };
+        assert_eq!(turned(Axis::Up)[0], -Vector::x(), "turning left on the screen");
+        assert_eq!(turned(Axis::Left)[0], -Vector::z(), "pitching down, away from up");
+        assert_eq!(turned(Axis::Heading)[1], -Vector::z(), "rolling left, the left side goes down");
+    }
+
+    #[test]
+    fn a_million_turns_about_one_axis_come_back_exactly() {
+        for angle in [45.0, 137.5, 1.0, -0.25] {
+            let mut frame = Frame::upright();
+            for _ in 0..720 * 1400 {
+                frame.turn(Axis::Up, angle);
+            }
+            assert_eq!(frame.vectors(), Frame::upright().vectors(), "{angle}");
+        }
+    }
+
+    #[test]
+    fn a_million_turns_about_alternating_axes_stay_orthonormal() {
+        let axes = [Axis::Up, Axis::Heading, Axis::Left];
+        for angle in [45.0, 137.5, 1.0] {
+            let mut frame = Frame::upright();
+            for i in 0..1_000_000 {
+                frame.turn(axes[i % 3], angle);
+                if i % 1000 == 0 {
+                    assert_orthonormal(&frame);
+                }
+            }
+            assert_orthonormal(&frame);
+        }
+    }
+
+    #[test]
+    fn a_long_way_there_and_back_ends_where_it_began() {
+        let axes = [Axis::Up, Axis::Heading, Axis::Left];
+        for angle in [45.0, 137.5, 1.0] {
+            let mut frame = Frame::upright();
+            for i in 0..500_000 {
+                frame.turn(axes[i % 3], angle);
+            }
+            for i in (0..500_000).rev() {
+                frame.turn(axes[i % 3], -angle);
+            }
+            for (a, b) in frame.vectors().iter().zip(Frame::upright().vectors()) {
+                assert!((a - b).norm() < 1e-15, "{angle}: {}", (a - b).norm());
+            }
+        }
+    }
+
+    #[test]
+    fn right_angles_about_all_axes_are_exact() {
+        let mut frame = Frame::upright();
+        // Yaw, then pitch by 90 degrees turns about a diagonal of the cube: three times is nothing.
+        for _ in 0..300_000 {
+            frame.turn(Axis::Up, 90.0);
+            frame.turn(Axis::Left, 90.0);
+        }
+        assert_eq!(frame.vectors(), Frame::upright().vectors());
+    }
+
+    #[test]
+    fn level_makes_left_horizontal() {
+        let mut frame = Frame::upright();
+        frame.turn(Axis::Up, -90.0);
+        frame.level();
+        assert_eq!(frame.vectors(), [Vector::x(), -Vector::z(), Vector::y()]);
+        let mut frame = Frame::upright();
+        frame.turn(Axis::Heading, 30.0);
+        let before = frame.vectors();
+        frame.level();
+        assert_eq!(frame.vectors(), before, "a vertical heading is left as it is");
+        frame.turn(Axis::Left, 77.0);
+        frame.turn(Axis::Heading, 123.0);
+        frame.level();
+        let [_, left, up] = frame.vectors();
+        assert!(left.y.abs() < 1e-15 && up.y > 0.0);
+        assert_orthonormal(&frame);
+    }
+}

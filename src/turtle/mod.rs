@@ -1,0 +1,68 @@
+//! From a string of modules to a scene: the turtle (Prusinkiewicz and Lindenmayer 1990, *The Algorithmic
+//! Beauty of Plants*, sections 1.5 to 1.6, "ABOP").
+//!
+//! The turtle starts at the origin, heading `+Y`, left `-X`, up `+Z`, so that a plant grows upwards in the
+//! front view and `+` turns left on the screen. A module is drawn by the base name of its kind and reads its
+//! leading parameters; one without a meaning draws nothing. Lengths are in scene units, angles in degrees.
+//!
+//! | module | meaning |
+//! |---|---|
+//! | `F(l)` `f(l)` | a step of length `l` (1), drawn or not; a negative length goes backwards |
+//! | `+(a)` `-(a)` | turn left, right about up (the model's `angle`) |
+//! | `&(a)` `^(a)` | pitch down, up about left |
+//! | `\(a)` `/(a)` | roll left, right about heading |
+//! | `\|` `$` | turn round; roll until left is horizontal |
+//! | `!(w)` `!` | line width, 0 drawing nothing; 0.7 times the present one. A segment has the width at its start all along, so cutting it in two cannot be seen |
+//! | `;(n)` `;` | colour `n` of the palette, 0 being the natural one; the next colour |
+//! | `[` `]` | remember and return to position, orientation, width and colour |
+//! | `{` `.` `}` | begin a filled polygon, make the position a vertex, end it; steps between them make vertices, too, and are not drawn |
+//! | `@L(s)` `@K(s)` | a leaf, a flower of size `s` (1); nothing if `s` is not positive |
+//!
+//! A kind with an interpretation is drawn as that says, in place of its own meaning; what the interpretation
+//! does to the turtle stays.
+
+mod command;
+mod frame;
+mod interpret;
+mod shapes;
+mod twofold;
+mod walk;
+
+#[cfg(test)]
+mod tests;
+
+use crate::model::Model;
+use crate::scene::Scene;
+use crate::structure::{Lineage, ModuleString};
+
+/// Most modules that one frame may draw, those that interpretations make included.
+pub const MODULE_LIMIT: usize = 10_000_000;
+/// Deepest nesting of interpretations.
+pub const DEPTH_LIMIT: usize = 100;
+/// Coordinates and sizes beyond this are a mistake of the model.
+pub const COORDINATE_LIMIT: f64 = 1e100;
+
+/// What can go wrong in drawing. Lineages say which module of the string it was.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Error {
+    #[error("cannot draw `{name}` (module {lineage}): its parameter is {value}")]
+    NotFinite { name: String, lineage: Lineage, value: f64 },
+    #[error(
+        "cannot draw `{name}` (module {lineage}): it goes beyond the greatest coordinate, {COORDINATE_LIMIT:e}"
+    )]
+    TooFar { name: String, lineage: Lineage },
+    #[error(
+        "too much to draw: interpreting `{name}` (module {lineage}) brings the frame to more than {MODULE_LIMIT} modules"
+    )]
+    TooMany { name: String, lineage: Lineage },
+    #[error("interpretations of `{name}` (module {lineage}) are nested more than {DEPTH_LIMIT} deep")]
+    TooDeep { name: String, lineage: Lineage },
+}
+
+/// Draws a string of modules of this model, adding to the scene.
+///
+/// # Errors
+/// See [`Error`]. The scene then holds what was drawn before.
+pub fn draw(model: &Model, string: &ModuleString, scene: &mut Scene) -> Result<(), Error> {
+    interpret::draw(model, string, scene)
+}
