@@ -4,6 +4,7 @@
 
 mod args;
 mod common;
+mod render;
 mod run;
 
 use clap::Parser;
@@ -24,7 +25,7 @@ pub fn main() -> u8 {
     let done = match &command.action {
         Action::Check(args) => run::check(args),
         Action::Run(args) => run::run(args),
-        Action::Render(_) => todo!(),
+        Action::Render(args) => render::render(args),
     };
     match done {
         Ok(()) | Err(Failure::ClosedPipe) => 0,

@@ -32,6 +32,9 @@ const LIGHT: Vector = Vector::new(-0.36, 0.58, 0.73);
 /// Strength of light on a surface that faces away from the light, and what facing it adds.
 const AMBIENT: f64 = 0.7;
 const DIFFUSE: f64 = 0.4;
+/// Steps in which the strength of light is rounded, and on surfaces that are small in the picture.
+const SHADES: f64 = 40.0;
+const COARSE_SHADES: f64 = 8.0;
 
 /// The document of one frame.
 pub(super) fn document(scene: &Scene, fit: &Fit, title: &str) -> String {
@@ -179,7 +182,7 @@ impl Painter<'_> {
 
     fn polygon(&self, polygon: &Polygon) -> Element {
         let corners: Vec<Point> = polygon.vertices.iter().map(|&p| self.project(p)).collect();
-        let fill = self.shade(polygon.material, triangulate::normal(&corners));
+        let fill = self.shade(polygon.material, triangulate::normal(&corners), SHADES);
         let mut outline = String::new();
         add_outline(&mut outline, &corners, DECIMALS);
         Path::new().set("d", outline).set("fill", fill.to_string()).into()
@@ -190,6 +193,10 @@ impl Painter<'_> {
     fn surface(&self, surface: &Surface) -> Element {
         let corners: Vec<Point> =
             surface.mesh.vertices.iter().map(|&v| self.project(surface.placement.point(v))).collect();
+        let size = surface.placement.scale * self.fit.picture.scale;
+        // On a flower of a few pixels fine shades cannot be told apart, and they are most of a file.
+        let [_, _, width, height] = self.fit.picture.view_box();
+        let shades = if size < 0.05 * width.max(height) { COARSE_SHADES } else { SHADES };
         let mut faces: Vec<(f64, Color, [Point; 3])> = surface
             .mesh
             .faces
@@ -197,12 +204,11 @@ impl Painter<'_> {
             .map(|face| {
                 let corners = face.corners.map(|i| corners[i as usize]);
                 let tint = surface.tint.filter(|_| face.takes_tint);
-                let color = self.shade(tint.unwrap_or(face.material), triangulate::normal(&corners));
+                let color = self.shade(tint.unwrap_or(face.material), triangulate::normal(&corners), shades);
                 (corners.iter().map(|p| p.z).sum(), color, corners)
             })
             .collect();
         faces.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let size = surface.placement.scale * self.fit.picture.scale;
         let mut group = Group::new().set("stroke-width", text((0.006 * size).clamp(0.01, 0.4)));
         for run in faces.chunk_by(|a, b| a.1 == b.1) {
             let mut outline = String::new();
@@ -217,11 +223,11 @@ impl Painter<'_> {
 
     /// A material's colour on a surface with this normal, in picture coordinates. Both sides are alike: the
     /// side that is seen counts.
-    fn shade(&self, material: MaterialId, normal: Vector) -> Color {
+    fn shade(&self, material: MaterialId, normal: Vector, shades: f64) -> Color {
         let facing = Vector::new(normal.x, -normal.y, normal.z) * if normal.z < 0.0 { -1.0 } else { 1.0 };
         let strength = AMBIENT + DIFFUSE * facing.dot(&LIGHT).max(0.0);
         // Few shades, so that neighbours of nearly the same direction become one path.
-        self.color(material).lit((strength * 40.0).round() / 40.0)
+        self.color(material).lit((strength * shades).round() / shades)
     }
 }
 

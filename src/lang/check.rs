@@ -373,28 +373,3 @@ fn split<'n>(word: &'n str, names: &HashSet<&str>) -> Option<Vec<&'n str>> {
     }
     best.pop().flatten().filter(|parts| parts.len() > 1)
 }
-
-/// Interpretations that draw themselves.
-pub fn interpretation_cycles(model: &Model, diagnostics: &mut Vec<Diagnostic>) {
-    for (start, kind) in model.kinds.iter() {
-        let Some(index) = kind.interpretation else { continue };
-        let mut seen = HashSet::new();
-        let mut queue = vec![start];
-        while let Some(id) = queue.pop() {
-            let Some(i) = model.kinds.get(id).interpretation else { continue };
-            for &drawn in &model.interpretations[i].drawn.kinds {
-                if drawn == start {
-                    diagnostics.push(
-                        Diagnostic::error(format!("the drawing of `{}` contains itself", kind.name))
-                            .at(model.interpretations[index].span, "this interpretation never ends")
-                            .help("draw it with another name of the same base, such as `F_drawn(…)`"),
-                    );
-                    return;
-                }
-                if seen.insert(drawn) {
-                    queue.push(drawn);
-                }
-            }
-        }
-    }
-}

@@ -167,7 +167,6 @@ fn build(document: &Document, settings: &[Setting], scope: &mut Scope, unread: b
     check::reachability(&model, &written, &occurs, diagnostics);
     check::coverage(&model, diagnostics);
     check::inert_modules(&model, &occurs, diagnostics);
-    check::interpretation_cycles(&model, diagnostics);
     Some(model)
 }
 

@@ -33,6 +33,11 @@ impl Dense {
         if self.h == 0.0 { 0.0 } else { (at.since(self.start) / self.h).clamp(0.0, 1.0) }
     }
 
+    /// The last position that is the same instant as this one.
+    pub fn together(&self, position: f64) -> f64 {
+        position + self.start.after(position * self.h).resolution() / self.h
+    }
+
     fn of(&self, component: usize) -> &[f64] {
         &self.coefficients[component * (self.degree + 1)..(component + 1) * (self.degree + 1)]
     }

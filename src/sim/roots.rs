@@ -17,8 +17,10 @@
 use crate::expr::{Dual, Interval};
 use crate::model::Sign;
 
-/// Stretches narrower than this part of the step are not halved.
+/// Stretches narrower than this part of their position are not halved.
 const NARROW: f64 = 1e-13;
+/// Nor are those that end before this.
+const SMALL: f64 = 1e-30;
 const MAX_PIECES: usize = 4096;
 
 /// A function over a step, for positions 0 to 1.
@@ -80,7 +82,7 @@ pub fn first_root(f: &mut impl Function, from: f64, to: f64, start: Sign, tolera
             continue;
         }
         let monotone = !rate.partial && !g.partial && (rate.lo > 0.0 || rate.hi < 0.0);
-        let narrow = hi - lo <= NARROW || pieces > MAX_PIECES;
+        let narrow = hi - lo <= NARROW * hi || hi <= SMALL || pieces > MAX_PIECES;
         if !monotone && !narrow {
             stack.extend([(middle, hi), (lo, middle)]);
             continue;

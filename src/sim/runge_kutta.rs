@@ -45,8 +45,9 @@ pub struct Workspace {
 
 /// What became of a trial step.
 pub enum Trial {
-    /// The largest error of a component, in units of what is tolerated; 0 for methods without estimate.
-    Done { error: f64 },
+    /// The largest error of a component, in units of what is tolerated, by truncation and by rounding;
+    /// 0 for methods without estimate.
+    Done { error: f64, rounding: f64 },
     /// Some rate or value on the way was not finite; the component, if it is known.
     NotFinite(Option<usize>),
 }
@@ -75,7 +76,7 @@ impl Workspace {
                 for (end, (y, k)) in self.end.iter_mut().zip(y.iter().zip(&self.k[0])) {
                     *end = y + h * k;
                 }
-                (self.finite(0.0), 0)
+                (self.finite(0.0, 0.0), 0)
             }
             Method::Rk4 => {
                 for (i, c) in [(1, 0.5), (2, 0.5), (3, 1.0)] {
@@ -89,10 +90,8 @@ impl Workspace {
                     *end = y[i] + h / 6.0 * (a + 2.0 * (b + c) + d);
                 }
                 // The rate at the end gives the Hermite interpolant and is the next step's first.
-                let (head, tail) = self.k.split_at_mut(4);
-                let _ = head;
-                system.rates(h, &self.end, &mut tail[0]);
-                (self.finite(0.0), 4)
+                system.rates(h, &self.end, &mut self.k[4]);
+                (self.finite(0.0, 0.0), 4)
             }
             Method::Dopri5 => {
                 for i in 1..7 {
@@ -107,26 +106,29 @@ impl Workspace {
                 }
                 // The last stage is the end of the step.
                 self.end.copy_from_slice(&self.stage);
-                let mut error: f64 = 0.0;
+                let (mut error, mut rounding): (f64, f64) = (0.0, 0.0);
                 for (j, (a, b)) in y.iter().zip(&self.end).enumerate() {
                     let mut sum = 0.0;
                     for (e, k) in E.iter().zip(&self.k) {
                         sum += e * k[j];
                     }
-                    let scale = tolerance * (1.0 + a.abs().max(b.abs()));
-                    let ratio = (h * sum / scale).abs();
+                    // Relative to where the step begins: beyond an event, equations may lead anywhere,
+                    // and rounding far out there must not spoil the part of the step that counts.
+                    let scale = tolerance * (1.0 + a.abs());
+                    rounding = rounding.max(4.0 * f64::EPSILON * b.abs() / scale);
+                    let ratio = (h * sum).abs() / scale;
                     error = if ratio > error || ratio.is_nan() { ratio } else { error };
                 }
-                (self.finite(error), 6)
+                (self.finite(error, rounding), 6)
             }
         }
     }
 
-    fn finite(&self, error: f64) -> Trial {
+    fn finite(&self, error: f64, rounding: f64) -> Trial {
         let bad = self.end.iter().position(|x| !x.is_finite());
         let last = self.k.last().and_then(|k| k.iter().position(|x| !x.is_finite()));
         match bad.or(last) {
-            None if error.is_finite() => Trial::Done { error },
+            None if error.is_finite() => Trial::Done { error, rounding },
             at => Trial::NotFinite(at),
         }
     }

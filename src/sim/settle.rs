@@ -470,6 +470,12 @@ impl Simulation<'_> {
     fn no_equations(&self, id: ModuleId, rule: usize, chattering: bool, signs: &[Sign]) -> Error {
         let compiled = &self.model.rules[rule];
         let site = self.site_of(id, rule, compiled.span, self.now.to_f64());
+        // A life shorter than the resolution of time, at the end of a line of lives: what comes first at its
+        // end can no longer be told.
+        let age = self.now.since(self.tree.birth(id));
+        if age > 0.0 && age <= self.now.resolution() && self.tree.lineage(id).generation > 16 {
+            return Error::Zeno { site };
+        }
         if chattering {
             return Error::Chattering { site };
         }

@@ -70,6 +70,11 @@ pub struct Simulation<'m> {
     fault: Option<Error>,
 }
 
+/// A step with less than this part of the tolerated error is longer than accuracy asks for.
+const EASY: f64 = 1e-3;
+/// How far ahead, in units of the time to the last event, such steps look.
+const FORESIGHT: f64 = 1e3;
+
 /// Instants in a row without progress of time after which events are said to pile up.
 const MAX_STALLED: usize = 1000;
 
@@ -91,7 +96,7 @@ impl<'m> Simulation<'m> {
             system: System::default(),
             y: Vec::new(),
             step_size: 1.0,
-            last_error: 1e-4,
+            last_error: 1.0,
             workspace: Workspace::default(),
             rate_is_known: false,
             step: None,
@@ -212,6 +217,10 @@ impl<'m> Simulation<'m> {
         self.keep_signs(&found);
         self.stalled = if when.since(self.now) <= when.resolution() { self.stalled + 1 } else { 0 };
         self.now = when;
+        // A step that could be as long as one likes says nothing about the next; life does.
+        if self.last_error <= EASY {
+            self.step_size = self.step_size.min((FORESIGHT * position * dense.h).max(when.resolution()));
+        }
         for (component, &place) in self.system.places.iter().enumerate() {
             self.tree.set_value(place as usize, dense.value(component, position));
         }
@@ -287,16 +296,17 @@ impl<'m> Simulation<'m> {
                     h *= 0.25;
                     rejected = true;
                 }
-                Trial::Done { error } if error > 1.0 => {
+                Trial::Done { error, rounding } if error.max(rounding) > 1.0 => {
+                    let error = error.max(rounding);
                     self.stats.rejected += 1;
                     // Safety and exponents as in DOPRI5 (Hairer, Nørsett and Wanner 1993, II.4).
                     h *= (0.9 * error.powf(-0.2)).clamp(0.1, 0.9);
                     rejected = true;
                 }
-                Trial::Done { error } => {
+                Trial::Done { error, rounding } => {
                     if self.settings.grid().is_none() {
-                        self.step_size = h * self.growth(error, rejected);
-                        self.last_error = error.max(1e-4);
+                        self.step_size = h * self.growth(error.max(rounding), rejected);
+                        self.last_error = error;
                     }
                     break;
                 }
@@ -307,8 +317,7 @@ impl<'m> Simulation<'m> {
         let bounds: Vec<Interval> = (0..self.y.len()).map(|i| dense.bounds(i)).collect();
         let states = &self.states;
         let signs = |id: ModuleId| states[id.slot()].as_ref().map_or(&[][..], |s| &s.signs);
-        let resolution = self.now.after(h).resolution();
-        let found = search(&self.model.rules, &self.system, &dense, &bounds, resolution, signs);
+        let found = search(&self.model.rules, &self.system, &dense, &bounds, signs);
         self.step = Some(Step { dense, found });
         Ok(())
     }
@@ -316,7 +325,7 @@ impl<'m> Simulation<'m> {
     /// PI step control (Gustafsson 1991) with the constants of DOPRI5: beta = 0.04.
     fn growth(&self, error: f64, rejected: bool) -> f64 {
         let error = error.max(1e-10);
-        let factor = 0.9 * error.powf(-0.17) * self.last_error.powf(0.04);
+        let factor = 0.9 * error.powf(-0.17) * self.last_error.max(1e-4).powf(0.04);
         factor.clamp(0.2, if rejected { 1.0 } else { 10.0 })
     }
 

@@ -91,7 +91,6 @@ pub fn search<'s>(
     system: &System,
     dense: &Dense,
     bounds: &[Interval],
-    resolution: f64,
     signs: impl Fn(ModuleId) -> &'s [Sign],
 ) -> Found {
     let mut candidates: Vec<Vec<Change>> = Vec::new();
@@ -119,9 +118,8 @@ pub fn search<'s>(
         if watched.is_empty() {
             continue;
         }
-        let limit = (best + resolution / dense.h).min(1.0);
-        let found =
-            search_member(rule, system, dense, member, signs, &watched, limit, resolution, &mut changes);
+        let limit = dense.together(best.min(1.0)).min(1.0);
+        let found = search_member(rule, system, dense, member, signs, &watched, limit, &mut changes);
         if let Some(event) = found {
             best = best.min(event[0].position);
             candidates.push(event);
@@ -130,7 +128,7 @@ pub fn search<'s>(
     if best.is_infinite() {
         return Found { event: None, touched: Vec::new(), changes };
     }
-    let together = best + resolution / dense.h;
+    let together = dense.together(best);
     candidates.retain(|event| event[0].position <= together);
     changes.retain(|change| change.position <= together);
     Found { event: Some(best), touched: candidates.into_iter().flatten().collect(), changes }
@@ -175,7 +173,6 @@ fn search_member(
     signs: &[Sign],
     watched: &[(usize, f64)],
     limit: f64,
-    resolution: f64,
     changes: &mut Vec<Change>,
 ) -> Option<Vec<Change>> {
     let outputs = rule.sides.outputs();
@@ -203,7 +200,7 @@ fn search_member(
     loop {
         rounds += 1;
         let position = next.iter().flatten().map(|r| r.position).reduce(f64::min)?;
-        let together = position + resolution / dense.h;
+        let together = dense.together(position);
         let mut at = now.clone();
         let mut after = now.clone();
         let mut group = Vec::new();

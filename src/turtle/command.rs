@@ -45,6 +45,11 @@ impl Command {
         if let Some(interpretation) = kind.interpretation {
             return Command::Interpret(interpretation);
         }
+        Command::plain(kind)
+    }
+
+    /// What a kind's name says, whatever its interpretation.
+    pub(super) fn plain(kind: &Kind) -> Command {
         match kind.base() {
             "F" => Command::Draw,
             "f" => Command::Move,

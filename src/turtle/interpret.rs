@@ -12,6 +12,8 @@ use crate::structure::{Module, ModuleString};
 
 /// An interpretation being drawn.
 struct Level<'m> {
+    /// The interpretation.
+    index: usize,
     /// What is still to be drawn.
     kinds: std::slice::Iter<'m, KindId>,
     /// Where in the array of arguments those of this level begin, and those of its next module.
@@ -84,13 +86,18 @@ impl<'a> Expander<'a> {
                 return Err(walk.complain(|name, lineage| Error::TooMany { name, lineage }));
             }
             match self.commands[kind.index()] {
-                Command::Interpret(index) => {
+                Command::Interpret(index) if !self.levels.iter().any(|level| level.index == index) => {
                     if self.levels.len() >= DEPTH_LIMIT {
                         return Err(walk.complain(|name, lineage| Error::TooDeep { name, lineage }));
                     }
                     self.variables.clear();
                     self.variables.extend_from_slice(&self.arguments[from..from + arity]);
                     self.enter(index, module.age);
+                }
+                // Inside its own drawing a module is what its name says: `interpret F(x): !(0.1) F(x)`.
+                Command::Interpret(_) => {
+                    let plain = Command::plain(self.model.kinds.get(kind));
+                    walk.obey(plain, &self.arguments[from..from + arity], kind)?;
                 }
                 command => walk.obey(command, &self.arguments[from..from + arity], kind)?,
             }
@@ -105,6 +112,6 @@ impl<'a> Expander<'a> {
         drawn.evaluate(&self.variables, &mut self.scratch, &mut self.values);
         let first = self.arguments.len();
         self.arguments.extend_from_slice(&self.values);
-        self.levels.push(Level { kinds: drawn.kinds.iter(), first, next: first });
+        self.levels.push(Level { index, kinds: drawn.kinds.iter(), first, next: first });
     }
 }

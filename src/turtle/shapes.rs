@@ -66,7 +66,7 @@ fn make_flower() -> Mesh {
     for petal in 0..PETALS {
         let towards = 360.0 / PETALS as f64 * petal as f64;
         for side in [1.0, -1.0] {
-            let rows: Vec<Vec<Point>> = stations(7)
+            let rows: Vec<Vec<Point>> = stations(5)
                 .map(|s| {
                     // A bell: along the heading first, then outwards, and back a little at the tip.
                     let radius = 0.035 + 0.215 * s.powf(1.6);
@@ -88,12 +88,12 @@ fn make_flower() -> Mesh {
     let ring = |height: f64, radius: f64, columns: usize| -> Vec<Point> {
         (0..=columns).map(|i| place(height, radius, 360.0 / columns as f64 * (columns - i) as f64)).collect()
     };
-    let dome: Vec<Vec<Point>> = [0.0, 30.0, 60.0, 90.0]
+    let dome: Vec<Vec<Point>> = [0.0, 45.0, 90.0]
         .map(sin_cos_degrees)
-        .map(|(sin, cos)| ring(0.09 + 0.05 * sin, 0.052 * cos, 10))
+        .map(|(sin, cos)| ring(0.09 + 0.05 * sin, 0.052 * cos, 8))
         .into();
     mesh.add_grid(&dome, MaterialId::CENTRE, false);
-    let cup = [(0.0, 0.0), (0.012, 0.03), (0.05, 0.05), (0.09, 0.058)].map(|(h, r)| ring(h, r, 10));
+    let cup = [(0.0, 0.0), (0.025, 0.04), (0.09, 0.058)].map(|(h, r)| ring(h, r, 8));
     mesh.add_grid(&cup, MaterialId::SEPAL, false);
     mesh.finish()
 }

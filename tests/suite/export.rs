@@ -3,11 +3,9 @@
 //! The golden files under `tests/golden` are small enough to be read. To renew them after a change that is
 //! meant, run the tests with `DLSYS_RENEW_GOLDEN=1` and look at the difference.
 
-mod common;
-
 use std::collections::HashMap;
 
-use common::scene;
+use crate::common::scene;
 use dlsys::export::{Fit, Format, FrameWriter, Survey, View};
 use dlsys::scene::{Point, Scene, Vector};
 use proptest::prelude::*;

@@ -1,0 +1,204 @@
+//! The program as it is typed: output, files, exit status.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use crate::common::repository;
+
+fn dlsys(arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_dlsys"));
+    command.current_dir(repository("")).args(arguments).output().expect("the program starts")
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).expect("UTF-8")
+}
+
+/// Runs what must succeed in silence on standard error; returns standard output.
+fn good(arguments: &[&str]) -> String {
+    let output = dlsys(arguments);
+    assert_eq!((output.status.code(), text(&output.stderr)), (Some(0), String::new()), "{arguments:?}");
+    text(&output.stdout)
+}
+
+/// Runs what must fail; returns the status and standard error.
+fn bad(arguments: &[&str]) -> (i32, String) {
+    let output = dlsys(arguments);
+    let status = output.status.code().expect("no signal");
+    assert_ne!(status, 0, "{arguments:?}");
+    (status, text(&output.stderr))
+}
+
+fn files(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> = std::fs::read_dir(folder)
+        .expect("a folder")
+        .map(|entry| entry.expect("readable").file_name().into_string().expect("UTF-8"))
+        .collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn run_prints_one_json_object_a_time() {
+    let out = good(&["run", "tests/paper-models/dragon.dls", "--at", "2,0.5,0.5", "--format", "json"]);
+    let lines: Vec<&str> = out.lines().collect();
+    assert_eq!(lines.len(), 2);
+    assert!(
+        lines[0].starts_with(r#"{"t":0.5,"modules":[["-",[]],["-",[]],["-",[]],["F_r",[0.353553390593273"#)
+    );
+    for (line, t) in lines.iter().zip([0.5, 2.0]) {
+        let value: serde_json::Value = serde_json::from_str(line).expect("JSON");
+        assert_eq!(value["t"].as_f64(), Some(t));
+    }
+    let spaced = good(&[
+        "run",
+        "tests/paper-models/dragon.dls",
+        "--from",
+        "0",
+        "--to",
+        "1",
+        "--step",
+        "0.25",
+        "--format",
+        "json",
+    ]);
+    assert_eq!(spaced.lines().count(), 5);
+    let framed = good(&["run", "tests/paper-models/dragon.dls", "--format", "json"]);
+    assert_eq!(framed.lines().count(), 33, "the model's own frames");
+}
+
+#[test]
+fn run_prints_strings_for_people() {
+    let out = good(&["run", "tests/paper-models/leaf.dls", "--at", "0.5"]);
+    assert_eq!(out, "t = 0.5\n  F_a(1.72835, 4)\n");
+}
+
+#[test]
+fn stats_tell_what_was_done() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("stats.json");
+    good(&["run", "tests/paper-models/leaf.dls", "--at", "9", "--stats", file.to_str().expect("UTF-8")]);
+    let stats: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(file).expect("written")).expect("JSON");
+    for key in
+        ["parse_s", "simulate_s", "output_s", "events", "steps", "rhs_evaluations", "modules", "peak_modules"]
+    {
+        assert!(stats[key].is_number(), "{key}");
+    }
+    assert_eq!((stats["events"].as_u64(), stats["modules"].as_u64()), (Some(5), Some(22)));
+}
+
+#[test]
+fn params_are_set_from_outside_within_their_range() {
+    let at = ["--at", "9", "--format", "json"];
+    let plain = good(&[&["run", "models/leaf.dls"], &at[..]].concat());
+    let set = good(&[&["run", "models/leaf.dls", "--set", "n_0=2"], &at[..]].concat());
+    assert!(set.len() < plain.len());
+    let (status, message) = bad(&["run", "models/leaf.dls", "--set", "n_0=13", "--at", "1"]);
+    assert!(status == 2 && message.contains("0 .. 12"), "{message}");
+    let (status, message) = bad(&["run", "models/leaf.dls", "--set", "α_mac=13", "--at", "1"]);
+    assert!(status == 2 && message.contains("did you mean `α_max`"), "{message}");
+    let (status, message) = bad(&["run", "models/leaf.dls", "--set", "x_th=1.5", "--at", "1"]);
+    assert!(status == 2 && message.contains("declare it with `param`"), "{message}");
+}
+
+#[test]
+fn faults_have_their_exit_status() {
+    let model = "tests/paper-models/leaf.dls";
+    for (arguments, status, says) in [
+        (&["run", "nowhere.dls"][..], 1, "nowhere.dls"),
+        (&["check", "tests/errors/unknown_name.dls"], 1, "unknown name"),
+        (&["run", "tests/errors/run_cascade.dls", "--at", "1"], 1, "without end"),
+        (&["run", model, "--at=-1"], 2, "time begins at 0"),
+        (&["run", model, "--at", "soon"], 2, "not a number"),
+        (&["run", model, "--from", "0", "--to", "1"], 2, "--step"),
+        (&["run", model, "--from", "2", "--to", "1", "--step", "1"], 2, "before"),
+        (&["run", model, "--method", "rk4", "--at", "1"], 2, "--step-size"),
+        (&["run", model, "--method", "magic", "--at", "1"], 2, "methods are"),
+        (&["run", model, "--tolerance", "0", "--at", "1"], 2, "between"),
+        (&["run", model, "--scheduler", "local", "--at", "1"], 2, "global"),
+        (&["run", model, "--set", "n_0", "--at", "1"], 2, "NAME=VALUE"),
+        (&["render", model], 2, "--out"),
+        (&["render", model, "-o", "x", "--view", "inside"], 2, "view"),
+        (&["bloom"], 2, "bloom"),
+        (&[], 2, "Usage"),
+    ] {
+        let (code, message) = bad(arguments);
+        assert!(code == status && message.contains(says), "{arguments:?}: {code}, {message}");
+    }
+    assert!(good(&["--help"]).contains("check"));
+    assert!(good(&["--version"]).starts_with("dlsys "));
+}
+
+#[test]
+fn what_was_computed_before_an_error_is_printed() {
+    let output = dlsys(&["run", "tests/errors/run_blow_up.dls", "--at", "0,0.1,10", "--format", "json"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert_eq!(text(&output.stdout).lines().count(), 2);
+}
+
+#[test]
+fn render_writes_whole_frames_and_a_manifest() {
+    for format in ["svg", "obj"] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let out = folder.path().join("out");
+        let path = out.to_str().expect("UTF-8");
+        let arguments =
+            ["render", "tests/paper-models/leaf.dls", "--at", "0,3,9", "-o", path, "--format", format];
+        assert_eq!(good(&arguments), "", "silent in a pipe");
+        let frame = |i| format!("frame-{i:04}.{format}");
+        let mut expected: Vec<String> = (0..3).map(frame).collect();
+        expected.push("manifest.json".to_owned());
+        if format == "obj" {
+            expected.push("materials.mtl".to_owned());
+        }
+        assert_eq!(files(&out), expected);
+        let manifest: serde_json::Value =
+            serde_json::from_str(&std::fs::read_to_string(out.join("manifest.json")).expect("written"))
+                .expect("JSON");
+        let frames = manifest["frames"].as_array().expect("frames");
+        assert_eq!(frames.iter().map(|f| f["modules"].as_u64()).collect::<Vec<_>>(), [1, 21, 22].map(Some));
+        assert_eq!(frames[1]["time"].as_f64(), Some(3.0));
+        assert_eq!(manifest["settings"]["tolerance"].as_f64(), Some(1e-6));
+
+        // The same bytes again; fewer frames leave none of the old ones behind.
+        let before = std::fs::read(out.join(frame(1))).expect("a frame");
+        good(&["render", "tests/paper-models/leaf.dls", "--at", "0,3,9", "-o", path, "--format", format]);
+        assert_eq!(std::fs::read(out.join(frame(1))).expect("a frame"), before);
+        good(&["render", "tests/paper-models/leaf.dls", "--at", "0", "-o", path, "--format", format]);
+        assert!(!files(&out).contains(&frame(1)));
+    }
+}
+
+#[test]
+fn other_peoples_files_are_left_alone() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("thesis.txt"), "years of work").expect("written");
+    let path = folder.path().to_str().expect("UTF-8");
+    let (status, message) = bad(&["render", "tests/paper-models/leaf.dls", "--at", "0", "-o", path]);
+    assert!(status == 2 && message.contains("thesis.txt") && message.contains("--force"), "{message}");
+    assert_eq!(files(folder.path()), ["thesis.txt"]);
+    good(&["render", "tests/paper-models/leaf.dls", "--at", "0", "-o", path, "--force"]);
+    assert_eq!(std::fs::read_to_string(folder.path().join("thesis.txt")).expect("there"), "years of work");
+}
+
+#[test]
+fn a_model_that_fails_later_leaves_no_frames() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("out");
+    let (status, _) =
+        bad(&["render", "tests/errors/run_blow_up.dls", "--at", "0,10", "-o", out.to_str().expect("UTF-8")]);
+    assert_eq!((status, out.exists()), (1, false));
+}
+
+#[test]
+fn all_models_render() {
+    for model in ["dragon", "anabaena", "leaf", "campanula", "lychnis", "hieracium-apex"] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().to_str().expect("UTF-8");
+        let file = format!("models/{model}.dls");
+        good(&["check", &file]);
+        good(&["render", &file, "--at", "0,4", "-o", path]);
+        good(&["render", &file, "--at", "0,4", "-o", path, "--format", "obj"]);
+    }
+}

@@ -1,0 +1,70 @@
+//! The error gallery: one small model per mistake in `tests/errors`, its message beside it.
+//!
+//! `NAME.dls` is a mistake that reading finds; `warn_NAME.dls` gets a warning and passes; `run_NAME.dls`
+//! reads well and fails when it runs. `NAME.txt` is what a user sees. To renew the messages after a
+//! change that is meant, run the tests with `DLSYS_RENEW_GOLDEN=1`, and read every difference.
+
+use dlsys::diagnostic::{Diagnostic, Severity, Source};
+use dlsys::session::Session;
+use dlsys::sim::Settings;
+use dlsys::structure::ModuleString;
+
+use crate::common::repository;
+
+/// What is said about a model, and whether it is refused.
+fn judge(name: &str, text: &[u8]) -> (Vec<Diagnostic>, Source, bool) {
+    let source = match Source::from_bytes(name, text.to_vec()) {
+        Ok(source) => source,
+        Err(bad) => return (vec![bad.1], bad.0, true),
+    };
+    let session = match Session::from_text(name, &source.text, &[]) {
+        Err(refused) => return (refused.diagnostics, source, true),
+        Ok(session) => session,
+    };
+    let mut said = session.warnings.clone();
+    if !name.starts_with("run_") {
+        return (said, source, false);
+    }
+    let settings = Settings { max_modules: 1000, ..Settings::default() };
+    let fault = match session.simulate(settings) {
+        Err(fault) => Some(fault),
+        Ok(mut simulation) => simulation.at(10.0, &mut ModuleString::default()).err(),
+    };
+    let failed = fault.is_some();
+    said.extend(fault.map(|f| f.diagnostic()));
+    (said, source, failed)
+}
+
+#[test]
+fn every_mistake_gets_its_message() {
+    let folder = repository("tests/errors");
+    let renew = std::env::var_os("DLSYS_RENEW_GOLDEN").is_some();
+    let mut names: Vec<String> = std::fs::read_dir(&folder)
+        .expect("the gallery")
+        .filter_map(|entry| entry.expect("readable").file_name().into_string().ok())
+        .filter(|name| name.ends_with(".dls"))
+        .collect();
+    names.sort();
+    assert!(names.len() > 100, "the gallery is there");
+    let mut wrong = Vec::new();
+    for name in &names {
+        let text = std::fs::read(folder.join(name)).expect("readable");
+        let (said, source, failed) = judge(name, &text);
+        let message: String = said.iter().map(|d| d.render(&source, false)).collect();
+        let warns = name.starts_with("warn_");
+        assert_eq!(failed, !warns, "{name} is {}refused:\n{message}", if failed { "" } else { "not " });
+        assert!(!message.is_empty(), "{name} gets no message");
+        if warns {
+            assert!(said.iter().all(|d| d.severity == Severity::Warning), "{name}");
+        }
+        let stored = folder.join(name).with_extension("txt");
+        if renew {
+            std::fs::write(&stored, &message).expect("written");
+        }
+        let expected = std::fs::read_to_string(&stored).unwrap_or_default().replace("\r\n", "\n");
+        if expected != message {
+            wrong.push(format!("--- {name} is to say\n{expected}--- but says\n{message}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}

@@ -1,0 +1,16 @@
+//! The test suite, in one binary, because linking takes longer than running.
+//!
+//! - [`listings`]: the paper's models against results of an independent program.
+//! - [`semantics`]: what happens when (events, contexts, errors of a run), model by small model.
+//! - [`language`]: text to model and back; hostile input.
+//! - [`gallery`]: every mistake in `tests/errors` and the message it gets.
+//! - [`cli`]: the program as it is typed.
+//! - [`export`]: SVG and OBJ, read back by other people's code.
+
+mod cli;
+mod common;
+mod export;
+mod gallery;
+mod language;
+mod listings;
+mod semantics;
