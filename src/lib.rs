@@ -1,4 +1,76 @@
-//! dlsys
+//! A language, interpreter and growth animator for **differential L-systems**: plants as growing strings
+//! of modules, whose parameters follow ordinary differential equations while they stay in a legal domain,
+//! and which productions replace when a trajectory reaches the domain's boundary (Prusinkiewicz, Hammel and
+//! Mjolsness, *Animation of Plant Development*, SIGGRAPH '93).
+//!
+//! # A first model
+//!
+//! ```
+//! use dlsys::session::Session;
+//! use dlsys::sim::Settings;
+//! use dlsys::structure::ModuleString;
+//!
+//! let text = "
+//!     initial string: A(0)
+//!     A(x):
+//!       if x < 1  solve dx/dt = 1
+//!       if x = 1  produce F(x) [ +(30) A(0) ] A(0)
+//! ";
+//! let session = Session::from_text("bush.dls", text, &[]).expect("a good model");
+//! let mut simulation = session.simulate(Settings::default()).expect("a good start");
+//! let mut string = ModuleString::default();
+//! simulation.at(2.5, &mut string).expect("it runs");
+//! let names: Vec<&str> = string.iter().map(|m| session.model.kinds.get(m.kind).name.as_str()).collect();
+//! assert_eq!(names.join(" "), "F [ + F [ + A ] A ] F [ + A ] A");
+//! ```
+//!
+//! and to a picture:
+//!
+//! ```
+//! # let text = "initial string: F(1) [ +(30) @L(1) ] F(1) @K(1)";
+//! # let session = dlsys::session::Session::from_text("twig.dls", text, &[]).expect("a good model");
+//! # let mut simulation = session.simulate(Default::default()).expect("a good start");
+//! # let mut string = Default::default();
+//! # simulation.at(1.0, &mut string).expect("it runs");
+//! use dlsys::export::{Format, FrameWriter, Survey, View};
+//! use dlsys::scene::Scene;
+//!
+//! let mut scene = Scene::default();
+//! dlsys::turtle::draw(&session.model, &string, &mut scene).expect("finite");
+//! let mut survey = Survey::new(View::FRONT);
+//! survey.add(&scene);
+//! let svg = FrameWriter::new(Format::Svg, survey.fit()).write(&scene, "a twig");
+//! assert!(svg.starts_with(b"<svg"));
+//! ```
+//!
+//! # The stages
+//!
+//! ```text
+//! text ──lang──▶ Model ──sim──▶ Tree at any time t ──turtle──▶ Scene ──export──▶ SVG, OBJ
+//! ```
+//!
+//! | module | what it is |
+//! |---|---|
+//! | [`expr`] | pure mathematics: expressions, compiled, evaluated as numbers, bounds or derivatives |
+//! | [`lang`] | text to model; everything that can be said about a text |
+//! | [`model`] | what a model says: kinds of modules, rules, conditions |
+//! | [`structure`] | modules and how they hang together: tree, string, identity, birth |
+//! | [`sim`] | development in time: integration, event location, productions |
+//! | [`turtle`] | strings as geometry |
+//! | [`scene`] | geometry that knows no file format |
+//! | [`export`] | files |
+//! | [`session`] | the pipeline as a whole |
+//! | [`cli`] | the program |
+//! | [`diagnostic`] | messages that point at the text |
+//!
+//! Imports go down this arrow and never back; `lang`, `sim`, `turtle` and `export` do not know one another.
+//! `ARCHITECTURE.md` tells why things are as they are.
+//!
+//! # What it does not do yet
+//!
+//! No closed forms, no stiff solver, no local clocks: one explicit integrator for everything. No random
+//! numbers, no REPL, no viewer. No surfaces but a built-in leaf and flower.
+
 pub mod cli;
 pub mod diagnostic;
 pub mod export;

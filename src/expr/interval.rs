@@ -86,7 +86,9 @@ impl Interval {
 
     /// Cosine: extremes at the ends and at the multiples of π in between.
     fn cos(self) -> Interval {
-        if !(self.hi - self.lo < 2.0 * PI) || self.magnitude() > 1e9 {
+        // An infinite interval has a width that is not a number.
+        let width = self.hi - self.lo;
+        if width.is_nan() || width >= 2.0 * PI || self.magnitude() > 1e9 {
             return Interval { lo: -1.0, hi: 1.0, partial: self.partial };
         }
         let (a, b) = (self.lo.cos(), self.hi.cos());

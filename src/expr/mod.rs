@@ -25,6 +25,8 @@ mod graph;
 mod interval;
 mod ops;
 mod program;
+#[cfg(test)]
+mod tests;
 
 pub use dual::Dual;
 pub use graph::{Graph, Node, NodeId};

@@ -150,10 +150,7 @@ fn parameter(
 }
 
 /// The global names that an expression mentions, in order.
-fn mentions<'d>(
-    document: &'d Document,
-    expression: Expression,
-) -> impl Iterator<Item = (&'d Arc<str>, Span)> {
+fn mentions(document: &Document, expression: Expression) -> impl Iterator<Item = (&Arc<str>, Span)> {
     (expression.first.0..=expression.root.0).filter_map(|id| match document.expressions.get(ExprId(id)) {
         Expr::Name(name) | Expr::Call(name, _) => Some((name, document.expressions.span(ExprId(id)))),
         _ => None,

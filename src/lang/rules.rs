@@ -76,10 +76,18 @@ impl RuleBuilder<'_> {
             self.occurs.entry(kind).or_insert(module.span);
             kinds.push(kind);
             for &argument in &module.arguments {
-                match self.scope.number(&self.document.expressions, argument, variables) {
-                    Some(node) => roots.push(node),
-                    None => good = false,
+                let Some(node) = self.scope.number(&self.document.expressions, argument, variables) else {
+                    good = false;
+                    continue;
+                };
+                if let Some(value) = self.scope.graph.as_constant(node).filter(|x| !x.is_finite()) {
+                    self.error(
+                        Diagnostic::error("this has no finite value")
+                            .at(self.document.expressions.span(argument.root), format!("it is {value}")),
+                    );
+                    good = false;
                 }
+                roots.push(node);
             }
         }
         if let Some(bracket) = open.pop() {

@@ -110,7 +110,7 @@ impl Random {
     fn magnitude(&mut self) -> f64 {
         let unit = (self.next() >> 11) as f64 / (1u64 << 53) as f64;
         let size = 10f64.powf(4.0 * unit - 2.0);
-        if self.next() % 4 == 0 { -size } else { size }
+        if self.next().is_multiple_of(4) { -size } else { size }
     }
 }
 

@@ -132,7 +132,7 @@ fn opposite(sign: Sign) -> Sign {
 fn bracket(f: &mut impl Function, mut lo: f64, mut hi: f64, sign: Sign) -> f64 {
     let (mut g_lo, mut g_hi) = (f.value(lo), f.value(hi));
     for i in 0..200 {
-        if !(hi - lo > f64::EPSILON * hi) {
+        if hi - lo <= f64::EPSILON * hi {
             break;
         }
         let guess = hi - g_hi * (hi - lo) / (g_hi - g_lo);
@@ -163,8 +163,7 @@ fn bracket(f: &mut impl Function, mut lo: f64, mut hi: f64, sign: Sign) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::expr::Value;
-    use crate::expr::{Binary, Unary};
+    use crate::expr::{Binary, Unary, Value};
 
     /// A function given once, for every type of value.
     struct Given<F, G>(F, G);
@@ -181,7 +180,7 @@ mod tests {
     macro_rules! given {
         ($x:ident => $body:expr) => {
             Given(
-                |$x: f64| {
+                move |$x: f64| {
                     type T = f64;
                     #[allow(unused)]
                     fn c(x: f64) -> T {
@@ -189,7 +188,7 @@ mod tests {
                     }
                     $body(c, f64::binary, f64::unary)
                 },
-                |$x: Dual<Interval>| {
+                move |$x: Dual<Interval>| {
                     type T = Dual<Interval>;
                     #[allow(unused)]
                     fn c(x: f64) -> T {

@@ -238,7 +238,7 @@ impl Simulation<'_> {
     /// productions whose conditions become true just after the instant.
     fn choose_equations(
         &mut self,
-        open: &mut Vec<Option<Open>>,
+        open: &mut [Option<Open>],
         hurried: &mut bool,
     ) -> Result<Vec<Firing>, Error> {
         let rules = &self.model.rules;

@@ -155,8 +155,8 @@ fn may_change(
     }
     let (lo, hi) = (a.lo - b.hi, a.hi - b.lo);
     match sign {
-        Sign::Plus => !(lo > tolerance),
-        Sign::Minus => !(hi < -tolerance),
+        Sign::Plus => lo.is_nan() || lo <= tolerance,
+        Sign::Minus => hi.is_nan() || hi >= -tolerance,
         Sign::Zero | Sign::Any => !(lo >= -tolerance && hi <= tolerance),
         Sign::Undefined => true,
     }

@@ -152,7 +152,8 @@ fn deep_brackets_are_no_recursion() {
 /// most forty times as long, and an eternity is a hang.
 #[test]
 fn time_is_linear_in_the_text() {
-    let inputs: [(&str, fn(usize) -> String); 8] = [
+    type Make = fn(usize) -> String;
+    let inputs: [(&str, Make); 8] = [
         ("modules", |n| format!("initial string: {}\n", "F(1, 2) ".repeat(n))),
         ("constants", |n| (0..n).map(|i| format!("const c{i} = 1\n")).collect::<String>() + "axiom: F"),
         ("unknown names", |n| "const a = b\n".repeat(n)),

@@ -1,0 +1,102 @@
+//! One suite for every evaluator: numbers, bounds and derivatives meet the same operations.
+
+use proptest::prelude::*;
+
+use super::*;
+
+/// Every operation once, as an expression of x (variable 0) and y (variable 1).
+fn all() -> (Graph, Vec<(String, NodeId)>) {
+    let mut g = Graph::default();
+    let (x, y) = (g.var(0), g.var(1));
+    let mut list = Vec::new();
+    for (name, op) in Unary::NAMED {
+        list.push((name.to_owned(), g.unary(op, x)));
+    }
+    list.push(("-x".to_owned(), g.unary(Unary::Neg, x)));
+    for (name, op) in Binary::NAMED {
+        list.push((name.to_owned(), g.binary(op, x, y)));
+    }
+    for op in [Binary::Add, Binary::Sub, Binary::Mul, Binary::Div, Binary::Pow] {
+        list.push((format!("{op:?}"), g.binary(op, x, y)));
+    }
+    for exponent in [-2.0, -1.0, 0.0, 2.0, 3.0, 0.5, 1.5] {
+        let e = g.constant(exponent);
+        list.push((format!("x^{exponent}"), g.binary(Binary::Pow, x, e)));
+    }
+    for op in [Binary::Lt, Binary::Le, Binary::Eq, Binary::Ne] {
+        let test = g.binary(op, x, y);
+        let (a, b) = (g.unary(Unary::Exp, x), g.unary(Unary::Neg, y));
+        list.push((format!("if {op:?}"), g.select(test, a, b)));
+        let other = g.binary(Binary::Lt, y, x);
+        let either = g.binary(Binary::Or, test, other);
+        let not = g.unary(Unary::Not, test);
+        let both = g.binary(Binary::And, not, either);
+        list.push((format!("logic {op:?}"), both));
+    }
+    (g, list)
+}
+
+fn eval<T: Value>(graph: &Graph, node: NodeId, variables: &[T]) -> T {
+    let mut out = [T::constant(0.0)];
+    Program::compile(graph, &[node], 2).eval(variables, &mut Vec::new(), &mut out);
+    out[0]
+}
+
+proptest! {
+    #[test]
+    fn bounds_hold_every_value(
+        x in -3.0..3.0f64, y in -3.0..3.0f64, w in 0.0..2.0f64, v in 0.0..2.0f64,
+        s in 0.0..1.0f64, t in 0.0..1.0f64,
+    ) {
+        let (graph, list) = all();
+        let at = [x + s * w, y + t * v];
+        let set = [Interval::spanned(x, x + w), Interval::spanned(y, y + v)];
+        for (name, node) in list {
+            let value = eval(&graph, node, &at);
+            let bounds = eval(&graph, node, &set);
+            if value.is_nan() {
+                prop_assert!(bounds.partial, "{name} is undefined at {at:?} but not partial: {bounds:?}");
+            } else {
+                let slack = 1e-12 * value.abs().max(1.0);
+                prop_assert!(bounds.lo - slack <= value && value <= bounds.hi + slack, "{name} {at:?}: {value} not in {bounds:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn rates_are_the_limit_of_differences(
+        x in -3.0..3.0f64, y in -3.0..3.0f64, u in -2.0..2.0f64, v in -2.0..2.0f64,
+    ) {
+        let (graph, list) = all();
+        for (name, node) in list {
+            let moving = [Dual { value: x, rate: u }, Dual { value: y, rate: v }];
+            let rate = eval(&graph, node, &moving).rate;
+            let h = 1e-6;
+            let [before, after] = [-h, h].map(|h| eval(&graph, node, &[x + h * u, y + h * v]));
+            let difference = (after - before) / (2.0 * h);
+            // Near a jump or a pole the difference means nothing; there are bounds for that.
+            let set = [x, y].into_iter().zip([u, v]).map(|(x, u)| Dual {
+                value: Interval::spanned(x - h * u, x + h * u),
+                rate: Interval::constant(u),
+            });
+            let bounds = eval(&graph, node, &set.collect::<Vec<_>>());
+            if !difference.is_finite() || !rate.is_finite() || bounds.rate.partial || bounds.value.partial {
+                continue;
+            }
+            let spread = (bounds.rate.hi - bounds.rate.lo).abs();
+            let slack = 1e-4 * difference.abs().max(1.0) + spread;
+            prop_assert!((rate - difference).abs() <= slack, "{name} at {x}, {y}: {rate}, but {difference}");
+            prop_assert!(bounds.rate.lo - slack <= rate && rate <= bounds.rate.hi + slack, "{name}: {rate} not in {bounds:?}");
+        }
+    }
+}
+
+#[test]
+fn what_is_undefined_everywhere_is_empty() {
+    let mut g = Graph::default();
+    let x = g.var(0);
+    let root = g.unary(Unary::Sqrt, x);
+    assert!(eval(&g, root, &[Interval::spanned(-2.0, -1.0), Interval::constant(0.0)]).is_empty());
+    let half = eval(&g, root, &[Interval::spanned(-1.0, 4.0), Interval::constant(0.0)]);
+    assert_eq!((half.lo, half.hi, half.partial), (0.0, 2.0, true));
+}
