@@ -103,8 +103,7 @@ impl<'m> Printer<'m> {
         out.push('\n');
         let mut column = 0;
         for module in string.iter() {
-            let rounded: Vec<f64> = module.parameters.iter().map(|x| six_digits(*x)).collect();
-            let shown = describe(self.model, module.kind, &rounded);
+            let shown = describe(self.model, module.kind, module.parameters);
             let width = shown.chars().count() + 1;
             if column > 0 && column + width > 100 {
                 out.push('\n');
@@ -133,10 +132,6 @@ fn number(x: f64, out: &mut String) {
             out.push_str(&exponent);
         }
     }
-}
-
-fn six_digits(x: f64) -> f64 {
-    format!("{x:.5e}").parse().unwrap_or(x)
 }
 
 #[cfg(test)]

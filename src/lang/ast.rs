@@ -160,4 +160,6 @@ pub struct Document {
     /// The declarations and rules in the order written, each with its place.
     pub items: Vec<(Item, Span)>,
     pub expressions: Expressions,
+    /// Names of global declarations that could not be read: whoever uses them is not to blame.
+    pub unread: Vec<Arc<str>>,
 }

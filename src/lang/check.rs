@@ -150,7 +150,7 @@ pub fn reachability(
         shadowed_rule(model, i, own, diagnostics);
         clauses(rule, diagnostics);
         if own.iter().all(|kind| !occurs.contains_key(kind)) {
-            diagnostics.push(never_made(model, rules[i], occurs));
+            diagnostics.extend(never_made(model, rules[i], occurs));
         }
     }
     // What the initial string can grow into.
@@ -234,7 +234,9 @@ fn clauses(rule: &Rule, diagnostics: &mut Vec<Diagnostic>) {
     }
 }
 
-fn never_made(model: &Model, rule: &ast::Rule, occurs: &HashMap<KindId, Span>) -> Diagnostic {
+/// A rule for a module that no string has. None if something else will be said about it: words with a wrong
+/// number of parameters, and misspelt ones, are reported where they stand.
+fn never_made(model: &Model, rule: &ast::Rule, occurs: &HashMap<KindId, Span>) -> Option<Diagnostic> {
     let head = &rule.predecessor;
     let name = &*head.name.text;
     let error = Diagnostic::error("this rule can never be reached")
@@ -245,14 +247,21 @@ fn never_made(model: &Model, rule: &ast::Rule, occurs: &HashMap<KindId, Span>) -
         .min_by_key(|(_, span)| **span);
     if let Some((id, span)) = other {
         let kind = model.kinds.get(*id);
-        return error.at(
+        if kind.class() == Class::Word {
+            return None;
+        }
+        return Some(error.at(
             *span,
             format!("here `{}` has {}", kind.name, super::scope::plural(kind.arity, "parameter")),
-        );
+        ));
     }
     let known = occurs.keys().map(|id| model.kinds.get(*id).name.as_str());
-    let help = nearest(name, known).map(|near| format!("did you mean `{near}`?"));
-    error.help_opt(help)
+    let near = nearest(name, known);
+    let idle = |near: &str| model.kinds.iter().all(|(_, k)| k.name != near || k.rules.is_empty());
+    if class_of(name) == Class::Word && near.is_some_and(idle) {
+        return None;
+    }
+    Some(error.help_opt(near.map(|near| format!("did you mean `{near}`?"))))
 }
 
 /// Domains that can be left without a production.

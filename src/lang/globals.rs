@@ -27,6 +27,11 @@ enum Kind<'d> {
 pub fn declare(document: &Document, settings: &[Setting], scope: &mut Scope) -> Vec<Parameter> {
     let globals = collect(document, scope);
     let index: HashMap<&str, usize> = globals.iter().enumerate().map(|(i, g)| (&*g.name.text, i)).collect();
+    for name in &document.unread {
+        if !index.contains_key(&**name) && !Scope::is_built_in(name) {
+            scope.poison(name.clone());
+        }
+    }
     let mut parameters = Vec::new();
     for i in order(document, &globals, &index, scope) {
         let Global { name, body, kind } = &globals[i];
@@ -82,6 +87,7 @@ fn collect<'d>(document: &'d Document, scope: &mut Scope) -> Vec<Global<'d>> {
                 Diagnostic::error(format!("`{text}` {what} and cannot be declared"))
                     .at(*span, "choose another name"),
             );
+            scope.poison(text.clone());
             continue;
         }
         if let Some(before) = first.insert(text, *span) {
@@ -191,6 +197,7 @@ fn order(
                 .collect()
         })
         .collect();
+    let mut circular = vec![false; globals.len()];
     let mut marks = vec![Mark::New; globals.len()];
     let mut sorted = Vec::with_capacity(globals.len());
     for start in 0..globals.len() {
@@ -213,7 +220,9 @@ fn order(
                         marks[to] = Mark::Open;
                         stack.push((to, 0));
                     }
+                    Mark::Open if std::mem::replace(&mut circular[to], true) => {}
                     Mark::Open => {
+                        scope.poison(globals[to].name.text.clone());
                         let from = stack.iter().position(|(n, _)| *n == to).unwrap_or(0);
                         let mut path: Vec<&str> =
                             stack[from..].iter().map(|(n, _)| &*globals[*n].name.text).collect();

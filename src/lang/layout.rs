@@ -222,6 +222,13 @@ impl Scanner<'_> {
                 from = self.run_of_angles.unwrap_or(from);
             }
             self.close_item(from);
+            if kind == ItemKind::Unknown
+                && first.0 == Token::Symbol
+                && let Some(cut) = self.items.last_mut()
+            {
+                // It goes on here, wrongly; that is said of this line.
+                cut.broken = true;
+            }
             self.items.push(RawItem { kind, start: from, end: from, after_colon: None, broken: false });
             self.in_string = false;
             self.last = Last::Operator;
@@ -267,7 +274,10 @@ impl Scanner<'_> {
             return None;
         }
         let continues = match current.kind {
-            ItemKind::Rule => matches!(word, "if" | "solve" | "produce" | "then" | "else"),
+            // What follows a line that is not understood is not to be complained about again.
+            ItemKind::Rule | ItemKind::Unknown => {
+                matches!(word, "if" | "solve" | "produce" | "then" | "else")
+            }
             ItemKind::Axiom | ItemKind::Interpret => true,
             _ => matches!(word, "then" | "else"),
         };

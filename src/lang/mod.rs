@@ -126,7 +126,9 @@ fn build(document: &Document, settings: &[Setting], scope: &mut Scope, unread: b
                 .help("begin with one, such as `initial string: F(1)`"),
         );
     }
-    unused(document, scope);
+    if scope.diagnostics.is_empty() && !unread {
+        unused(document, scope);
+    }
     if !whole || unread {
         return None;
     }
@@ -164,7 +166,9 @@ fn build(document: &Document, settings: &[Setting], scope: &mut Scope, unread: b
     let diagnostics = &mut scope.diagnostics;
     check::filter_contexts(&mut model.kinds, &ignored, &considered, diagnostics);
     check::resolve_contexts(&mut model, &written, diagnostics);
-    check::reachability(&model, &written, &occurs, diagnostics);
+    if single.seen("the initial string") {
+        check::reachability(&model, &written, &occurs, diagnostics);
+    }
     check::coverage(&model, diagnostics);
     check::inert_modules(&model, &occurs, diagnostics);
     Some(model)

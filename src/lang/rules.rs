@@ -60,6 +60,11 @@ impl RuleBuilder<'_> {
                             .at(module.span, "a `(` cannot follow a bracket"),
                     );
                     good = false;
+                    if &*module.name == "[" {
+                        open.push(module.span);
+                    } else {
+                        open.pop();
+                    }
                     continue;
                 }
                 "[" => open.push(module.span),

@@ -52,6 +52,9 @@ pub struct Scope {
     functions: HashMap<Arc<str>, Function>,
     /// Global names that some expression has used.
     pub used: HashSet<Arc<str>>,
+    poisoned: HashSet<Arc<str>>,
+    /// Names that were already complained about.
+    unknown: HashSet<Arc<str>>,
     /// Where the comparisons of the present rule are written, by their node, and their boundary as in
     /// `x = s`. Rules number their variables alike, so one rule's nodes mean nothing in another.
     pub comparisons: HashMap<NodeId, (Span, Arc<str>)>,
@@ -80,6 +83,11 @@ impl Scope {
     /// nobody reads it.
     fn suggests(&self) -> bool {
         self.diagnostics.len() < 50
+    }
+
+    /// Makes a name known whose declaration is at fault, which has been reported: no use of it is an error.
+    pub fn poison(&mut self, name: Arc<str>) {
+        self.poisoned.insert(name);
     }
 
     /// Lowers the body of a function and makes it known.
@@ -196,7 +204,7 @@ impl Scope {
                 for &argument in arguments {
                     nodes.push((argument, done(argument)?));
                 }
-                self.call(all, name, span, &nodes)
+                self.call(all, name, span, &nodes, variables)
             }
             Expr::Parenthesis(a) => done(*a),
             Expr::Negate(a) => {
@@ -284,6 +292,9 @@ impl Scope {
         if let Some((_, value)) = CONSTANTS.iter().find(|(n, _)| **n == **name) {
             return Some(self.graph.constant(*value));
         }
+        if self.poisoned.contains(name) || !self.unknown.insert(name.clone()) {
+            return None;
+        }
         let error = if RESERVED.contains(&&**name) {
             Diagnostic::error(format!("`{name}` has no meaning here"))
                 .at(span, "time is known in rules only")
@@ -316,6 +327,7 @@ impl Scope {
         name: &Arc<str>,
         span: Span,
         arguments: &[(ExprId, Lowered)],
+        variables: &Variables,
     ) -> Option<Lowered> {
         let mut nodes = Vec::with_capacity(arguments.len());
         for &(id, lowered) in arguments {
@@ -349,13 +361,17 @@ impl Scope {
             count(self, 2)?;
             return number(self.graph.binary(*op, nodes[0], nodes[1]));
         }
+        if self.poisoned.contains(name) || !self.unknown.insert(name.clone()) {
+            return None;
+        }
         let built_in = Unary::NAMED.iter().map(|(n, _)| *n).chain(Binary::NAMED.iter().map(|(n, _)| *n));
         let known = self.functions.keys().filter(|_| self.suggests()).map(|n| &**n).chain(built_in);
         let mut error =
             Diagnostic::error(format!("unknown function `{name}`")).at(span, "no function has this name");
         error = match did_you_mean(name, known) {
+            _ if &**name == "log" => error.help("the natural logarithm is `ln`, the decimal one `log10`"),
             Some(help) => error.help(help),
-            None if self.constants.contains_key(name) => {
+            None if self.constants.contains_key(name) || variables.names.contains_key(name) => {
                 error.help(format!("to multiply, write `{name}*(…)`"))
             }
             None => error.help(format!("declare it: `def {name}(…) = …`")),

@@ -10,11 +10,16 @@ pub fn nearest<'c>(name: &str, candidates: impl IntoIterator<Item = &'c str>) ->
         return None;
     }
     let allowed = (name.len() / 3).max(1);
+    let lower = |text: &mut dyn Iterator<Item = char>| text.flat_map(char::to_lowercase).collect::<String>();
+    let folded = lower(&mut name.iter().copied());
     candidates
         .into_iter()
         .filter(|c| !c.chars().eq(name.iter().copied()))
         .filter_map(|c| {
             let other: Vec<char> = c.chars().collect();
+            if lower(&mut c.chars()) == folded {
+                return Some((0, c));
+            }
             let close = name.len().abs_diff(other.len()) <= allowed;
             let distance = if close { distance(&name, &other) } else { usize::MAX };
             // One letter for another is no likeness.
@@ -56,5 +61,6 @@ mod tests {
         assert_eq!(nearest("paarm", ["const", "param"]), Some("param"));
         assert_eq!(nearest("volume", ["const", "param"]), None);
         assert_eq!(nearest("x", ["y", "z"]), None);
+        assert_eq!(nearest("Sin", ["min", "sin"]), Some("sin"));
     }
 }

@@ -9,7 +9,7 @@
 //! Whether a rate is identically zero is tested at many points (Schwartz 1980, Zippel 1979): an
 //! analytic function that vanishes at all of them vanishes.
 
-use crate::expr::{Dual, Graph, Node, NodeId, Program};
+use crate::expr::{Dual, Graph, NodeId, Program};
 
 /// Points at which a rate is tested.
 const POINTS: usize = 48;
@@ -29,18 +29,14 @@ pub fn never_reached(
     context: usize,
     variables: usize,
 ) -> bool {
-    // The surface is sampled by solving one side, a bare parameter, for the other.
-    let (pivot, value) = match (parameter(graph, a, own), parameter(graph, b, own)) {
-        (Some(x), _) if !graph.variables(&[b]).contains(&x) => (x as usize, b),
-        (_, Some(x)) if !graph.variables(&[a]).contains(&x) => (x as usize, a),
-        _ => return false,
-    };
     let known = |v: u32| (v as usize) < own || (v as usize) >= own + context;
-    if !graph.variables(&[a, b]).into_iter().all(known) {
+    let read = graph.variables(&[a, b]);
+    if !read.iter().all(|v| known(*v)) {
         return false;
     }
+    // The surface is sampled by solving for one parameter.
+    let Some(pivot) = read.into_iter().map(|v| v as usize).find(|v| *v < own) else { return false };
     let sides = Program::compile(graph, &[a, b], variables);
-    let target = Program::compile(graph, &[value], variables);
     let roots: Vec<NodeId> = rates.iter().map(|(_, rate)| *rate).collect();
     let flow = Program::compile(graph, &roots, variables);
 
@@ -64,8 +60,7 @@ pub fn never_reached(
         for flag in &mut point[own + context + 2..] {
             *flag = f64::from(u8::from(random.next() & 1 == 1));
         }
-        let at = target.eval_one(&point);
-        point[pivot] = at;
+        let Some(at) = solve(&sides, &mut point, pivot) else { continue };
         let here = difference(&point);
         // How large the rate is off the surface says what counts as zero on it.
         let mut scale: f64 = 0.0;
@@ -79,19 +74,49 @@ pub fn never_reached(
         if !here.is_finite() {
             continue;
         }
-        if here.abs() > 1e-11 * scale {
+        if here.abs() > 64.0 * f64::EPSILON * scale {
             return false;
+        }
+        // Without a Lipschitz constant solutions are not unique: x' = -sqrt(x) does arrive at 0.
+        let unit = at.abs().max(1e-3);
+        for side in [-1.0, 1.0] {
+            let mut slope = |step: f64| {
+                point[pivot] = at + side * step * unit;
+                difference(&point).abs() / step
+            };
+            let (far, near) = (slope(1e-2), slope(1e-6));
+            if near > 10.0 * far {
+                return false;
+            }
         }
         defined += 1;
     }
     defined >= ENOUGH
 }
 
-fn parameter(graph: &Graph, id: NodeId, own: usize) -> Option<u32> {
-    match graph.node(id) {
-        Node::Var(v) if (v as usize) < own => Some(v),
-        _ => None,
+/// Puts the point on the surface by changing one variable (Newton's method). None if that fails.
+fn solve(sides: &Program, point: &mut [f64], pivot: usize) -> Option<f64> {
+    let mut scratch = Vec::new();
+    for _ in 0..60 {
+        let moving =
+            |(i, value): (usize, &f64)| Dual { value: *value, rate: f64::from(u8::from(i == pivot)) };
+        let duals: Vec<Dual<f64>> = point.iter().enumerate().map(moving).collect();
+        let mut out = [Dual { value: 0.0, rate: 0.0 }; 2];
+        sides.eval(&duals, &mut scratch, &mut out);
+        let (gap, slope) = (out[0].value - out[1].value, out[0].rate - out[1].rate);
+        let step = gap / slope;
+        if gap == 0.0 {
+            return Some(point[pivot]);
+        }
+        if !step.is_finite() {
+            return None;
+        }
+        point[pivot] -= step;
+        if step.abs() <= 2.0 * f64::EPSILON * point[pivot].abs() {
+            return Some(point[pivot]);
+        }
     }
+    None
 }
 
 /// SplitMix64 (Steele, Lea, Flood 2014): the points are the same in every run.
@@ -131,9 +156,21 @@ mod tests {
     fn the_limit_of_logistic_growth_is_never_reached_but_what_is_below_is() {
         let mut g = Graph::default();
         let rate = logistic(&mut g);
-        let (x, limit, below) = (g.var(0), g.constant(3.0), g.constant(2.999_999_999));
+        let (x, limit, below) = (g.var(0), g.constant(3.0), g.constant(3.0 * (1.0 - 2f64.powi(-40))));
         assert!(never_reached(&g, (x, limit), &[(0, rate)], 1, 0, 3));
         assert!(!never_reached(&g, (x, below), &[(0, rate)], 1, 0, 3));
+        // However it is written.
+        let (one, third) = (g.constant(1.0), g.binary(Binary::Div, x, limit));
+        assert!(never_reached(&g, (third, one), &[(0, rate)], 1, 0, 3));
+    }
+
+    #[test]
+    fn what_ends_in_finite_time_arrives() {
+        let mut g = Graph::default();
+        let (x, zero) = (g.var(0), g.constant(0.0));
+        let root = g.unary(crate::expr::Unary::Sqrt, x);
+        let rate = g.unary(crate::expr::Unary::Neg, root);
+        assert!(!never_reached(&g, (x, zero), &[(0, rate)], 1, 0, 3));
     }
 
     #[test]

@@ -38,6 +38,11 @@ impl Dense {
         position + self.start.after(position * self.h).resolution() / self.h
     }
 
+    /// As [`Dense::together`], on a clock that shows `age` at the start of the step.
+    pub fn together_by(&self, position: f64, age: f64) -> f64 {
+        position + Instant::new(age + position * self.h).resolution() / self.h
+    }
+
     fn of(&self, component: usize) -> &[f64] {
         &self.coefficients[component * (self.degree + 1)..(component + 1) * (self.degree + 1)]
     }
@@ -52,6 +57,12 @@ impl Dense {
             }
         }
         c[0]
+    }
+
+    /// One component at the start, and its rate per unit of position.
+    pub fn start_of(&self, component: usize) -> Dual<f64> {
+        let c = self.of(component);
+        Dual { value: c[0], rate: if self.degree > 0 { self.degree as f64 * (c[1] - c[0]) } else { 0.0 } }
     }
 
     /// Bounds of one component over the whole step.

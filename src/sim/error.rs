@@ -16,26 +16,38 @@ pub struct Site {
     pub time: f64,
 }
 
+impl Site {
+    /// The time as people read it; the float is in `time`.
+    fn when(&self) -> String {
+        super::brief(self.time, 12)
+    }
+}
+
 /// An error of a run. All name the rule, the module with its lineage, and the time.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum Error {
-    #[error("{} left its domain at t = {} and no production applies", .site.module, .site.time)]
+    #[error(
+        "{} {} its domain at t = {} and no production applies", .site.module,
+        if *.born { "is born outside" } else { "left" }, .site.when()
+    )]
     OutsideDomain {
         site: Site,
+        /// It never was inside.
+        born: bool,
         /// The comparisons that fail, with their places and how the production for them would begin.
         failing: Vec<(Span, String)>,
     },
-    #[error("the equations of {} push against each other at t = {}", .site.module, .site.time)]
+    #[error("the equations of {} push against each other at t = {}", .site.module, .site.when())]
     Chattering { site: Site },
-    #[error("productions go on without end at t = {}", .site.time)]
+    #[error("productions go on without end at t = {}", .site.when())]
     Cascade { site: Site, rounds: usize },
-    #[error("events pile up before t = {}", .site.time)]
+    #[error("events pile up before t = {}", .site.when())]
     Zeno { site: Site },
-    #[error("{what} of {} is not finite at t = {}", .site.module, .site.time)]
+    #[error("{what} of {} is not finite at t = {}", .site.module, .site.when())]
     NotFinite { site: Site, what: String },
-    #[error("the step size fell to nothing at t = {}", .site.time)]
+    #[error("the step size fell to nothing at t = {}", .site.when())]
     StepTooSmall { site: Site },
-    #[error("more than {limit} modules at t = {}", .site.time)]
+    #[error("more than {limit} modules at t = {}", .site.when())]
     TooManyModules { site: Site, limit: usize },
 }
 

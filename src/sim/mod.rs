@@ -30,7 +30,7 @@ mod watch;
 
 pub use error::{Error, Site};
 pub use settle::MAX_ROUNDS;
-pub use simulation::{Simulation, describe};
+pub use simulation::{Simulation, brief, describe};
 
 /// How equations are integrated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -34,6 +34,8 @@ pub trait Function {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Root {
     pub position: f64,
+    /// The sign at the root: zero, unless the function jumps over it.
+    pub at: Sign,
     /// The sign just after the root; the same as before where zero is only touched.
     pub after: Sign,
 }
@@ -47,7 +49,7 @@ pub fn first_root(f: &mut impl Function, from: f64, to: f64, start: Sign, tolera
         sign = first;
     }
     if first != Sign::Zero && first != sign {
-        return Some(Root { position: from, after: first });
+        return Some(Root { position: from, at: Sign::Zero, after: first });
     }
     // Off zero: a root from here on is one that was not there before.
     let mut armed = first != Sign::Zero;
@@ -58,7 +60,7 @@ pub fn first_root(f: &mut impl Function, from: f64, to: f64, start: Sign, tolera
         let Dual { value: mut g, rate } = f.bounds(lo, hi);
         if g.is_empty() {
             if sign != Sign::Undefined {
-                return Some(Root { position: lo, after: Sign::Undefined });
+                return Some(Root { position: lo, at: Sign::Undefined, after: Sign::Undefined });
             }
             continue;
         }
@@ -94,14 +96,21 @@ pub fn first_root(f: &mut impl Function, from: f64, to: f64, start: Sign, tolera
             let crossed = if monotone { exact != sign } else { end != sign && end != Sign::Zero };
             if crossed {
                 let position = bracket(f, lo, hi, sign);
-                let after = if exact == Sign::Zero { opposite(sign) } else { exact };
-                return Some(Root { position, after });
+                if monotone {
+                    let after = if exact == Sign::Zero { opposite(sign) } else { exact };
+                    return Some(Root { position, at: Sign::Zero, after });
+                }
+                // Too narrow to see how it gets from one side to the other: it jumps, or as good as.
+                let near = [f.value(lo), f.value(position)].into_iter().any(|g| classify(g) == Sign::Zero);
+                let at = if near { Sign::Zero } else { exact };
+                return Some(Root { position, at, after: exact });
             }
             if !monotone {
                 // An extremum on zero, or near enough.
-                for (at, seen) in [(hi, end), (middle, classify(f.value(middle)))] {
+                for (at, seen) in [(middle, classify(f.value(middle))), (hi, end)] {
                     if seen == Sign::Zero {
-                        return Some(Root { position: at, after: sign });
+                        let position = first_zero(lo, at, |x| classify(f.value(x)) == Sign::Zero);
+                        return Some(Root { position, at: Sign::Zero, after: sign });
                     }
                 }
             }
@@ -110,12 +119,28 @@ pub fn first_root(f: &mut impl Function, from: f64, to: f64, start: Sign, tolera
                 sign = end;
             }
             if end != sign {
-                return Some(Root { position: lo, after: end });
+                return Some(Root { position: lo, at: Sign::Zero, after: end });
             }
             armed = true;
         }
     }
     None
+}
+
+/// The first position at which `is_zero` holds, which it does at `hi` and need not at `lo`; by bisection.
+fn first_zero(mut lo: f64, mut hi: f64, mut is_zero: impl FnMut(f64) -> bool) -> f64 {
+    while hi - lo > f64::EPSILON * hi {
+        let middle = 0.5 * (lo + hi);
+        if middle <= lo || middle >= hi {
+            break;
+        }
+        if is_zero(middle) {
+            hi = middle;
+        } else {
+            lo = middle;
+        }
+    }
+    hi
 }
 
 fn opposite(sign: Sign) -> Sign {

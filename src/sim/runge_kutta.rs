@@ -33,6 +33,9 @@ const D: [f64; 7] = [
     69997945.0 / 29380423.0,
 ];
 
+/// Errors below the tolerated part of this are none, whatever they are errors of.
+const FLOOR: f64 = 1e-10;
+
 /// Working memory of a step.
 #[derive(Clone, Debug, Default)]
 pub struct Workspace {
@@ -112,9 +115,10 @@ impl Workspace {
                     for (e, k) in E.iter().zip(&self.k) {
                         sum += e * k[j];
                     }
-                    // Relative to where the step begins: beyond an event, equations may lead anywhere,
-                    // and rounding far out there must not spoil the part of the step that counts.
-                    let scale = tolerance * (1.0 + a.abs());
+                    // Relative to where the step begins, and to how far it goes from there at first: what
+                    // grows from 1e-6 must be known to its own digits. Not to where it ends: beyond an
+                    // event, equations may lead anywhere, and that must not spoil the part that counts.
+                    let scale = tolerance * (a.abs().max((h * self.k[0][j]).abs()) + FLOOR);
                     rounding = rounding.max(4.0 * f64::EPSILON * b.abs() / scale);
                     let ratio = (h * sum).abs() / scale;
                     error = if ratio > error || ratio.is_nan() { ratio } else { error };

@@ -27,6 +27,9 @@ const MAX_CHOICES: usize = 8;
 /// Two numbers are equal if they differ by no more than this part of the larger.
 const EQUAL: f64 = 8.0 * f64::EPSILON;
 
+/// A rate of no more than this part of the value, over the length of a step, is rounding.
+const NOISE: f64 = 16.0 * f64::EPSILON;
+
 /// What is still open about a module at the instant under examination.
 #[derive(Clone, Debug)]
 pub struct Open {
@@ -34,12 +37,20 @@ pub struct Open {
     at: Vec<Sign>,
     /// Where zero signs are expected to go: known if they were followed there.
     guess: Vec<Sign>,
-    /// The signs are computed from values, not followed along a trajectory.
-    fresh: bool,
+    /// The equations that brought the module here. None if it comes from elsewhere: then its signs are
+    /// computed from values, not followed along a trajectory.
+    flow: Option<(Option<usize>, Vec<bool>)>,
     /// Clauses whose equations were tried.
     tried: Vec<usize>,
     /// Times that switches were found the other way.
     flips: usize,
+}
+
+/// A state a little ahead of the present.
+struct Ahead {
+    tau: f64,
+    y: Vec<f64>,
+    rates: Vec<f64>,
 }
 
 /// A production that applies.
@@ -89,14 +100,13 @@ impl Simulation<'_> {
         for id in &self.ruled {
             let Some(state) = &self.states[id.slot()] else { continue };
             if state.signs.contains(&Sign::Zero) {
-                open[id.slot()] = Some(Open::followed(&state.signs));
+                open[id.slot()] = Some(Open::followed(state));
             }
         }
         for change in touched {
             let Some(state) = &self.states[change.id.slot()] else { continue };
-            let entry = open[change.id.slot()].get_or_insert_with(|| Open::followed(&state.signs));
-            entry.at[change.atom] =
-                if change.after == Sign::Undefined { Sign::Undefined } else { Sign::Zero };
+            let entry = open[change.id.slot()].get_or_insert_with(|| Open::followed(state));
+            entry.at[change.atom] = change.at;
             entry.guess[change.atom] = change.after;
         }
     }
@@ -146,7 +156,7 @@ impl Simulation<'_> {
             open[id.slot()] = Some(Open {
                 guess: signs.iter().map(|&s| if s == Sign::Zero { Sign::Any } else { s }).collect(),
                 at: signs.clone(),
-                fresh: true,
+                flow: None,
                 tried: Vec::new(),
                 flips: 0,
             });
@@ -207,8 +217,10 @@ impl Simulation<'_> {
         out.chunks(2)
             .map(|side| {
                 let difference = side[0] - side[1];
-                let equal = difference.abs() <= EQUAL * side[0].abs().max(side[1].abs());
-                if equal || side[0] == side[1] { Sign::Zero } else { Sign::of(difference) }
+                // An infinite side is far from everything.
+                let size = side[0].abs().max(side[1].abs());
+                let equal = size.is_finite() && difference.abs() <= EQUAL * size;
+                if equal { Sign::Zero } else { Sign::of(difference) }
             })
             .collect()
     }
@@ -264,7 +276,9 @@ impl Simulation<'_> {
             let mut probe = None;
             for member in &self.system.members {
                 let Some(entry) = &mut open[member.id.slot()] else { continue };
-                let (signs, snapped) = self.signs_after(member, entry, &rates, &mut probe);
+                let state = self.states[member.id.slot()].as_ref().expect("opened");
+                let smooth = entry.flow.as_ref().is_some_and(|f| f.0 == state.solve && f.1 == state.switches);
+                let (signs, snapped) = self.signs_after(member, entry, smooth, &rates, &mut probe);
                 // A value born within the resolution of time of zero is born on it.
                 if snapped {
                     *hurried = true;
@@ -345,8 +359,9 @@ impl Simulation<'_> {
         &self,
         member: &super::system::Member,
         open: &mut Open,
+        smooth: bool,
         rates: &[f64],
-        probe: &mut Option<(f64, Vec<f64>, Vec<f64>)>,
+        probe: &mut Option<Vec<Ahead>>,
     ) -> (Vec<Sign>, bool) {
         let rule = &self.model.rules[member.rule];
         let mut snapped = false;
@@ -363,7 +378,7 @@ impl Simulation<'_> {
             let (a, b) = (out[2 * atom], out[2 * atom + 1]);
             let slope = a.rate - b.rate;
             let size = a.value.abs().max(b.value.abs());
-            if open.fresh && matches!(open.at[atom], Sign::Plus | Sign::Minus) {
+            if open.flow.is_none() && matches!(open.at[atom], Sign::Plus | Sign::Minus) {
                 let gap = (a.value - b.value).abs();
                 if gap <= slope.abs() * self.now.resolution() && gap <= 1e-9 * self.scale(member) {
                     open.at[atom] = Sign::Zero;
@@ -376,19 +391,24 @@ impl Simulation<'_> {
             let clear = |slope: f64, least: f64| {
                 if slope.abs() * reach > least * size { Sign::of(slope) } else { Sign::Zero }
             };
-            after[atom] = clear(slope, 1e-9);
-            if after[atom] == Sign::Zero {
-                after[atom] = match open.guess[atom] {
-                    Sign::Any | Sign::Zero => {
-                        // Neither moving nor known: look a little ahead.
-                        let (ahead, y, rates) = probe.get_or_insert_with(|| self.look_ahead(rates, reach));
-                        self.system.moving_variables(member, *ahead, y, rates, &mut variables);
-                        rule.sides.eval(&variables, &mut scratch, &mut out);
-                        clear(out[2 * atom].rate - out[2 * atom + 1].rate, 1e-12)
+            after[atom] = match (clear(slope, 1e-9), open.guess[atom]) {
+                (Sign::Zero, guess @ (Sign::Plus | Sign::Minus)) if smooth => guess,
+                (Sign::Zero, _) => match clear(slope, NOISE) {
+                    Sign::Zero => {
+                        // Not moving yet, or at rest: look ahead, first a little, then further.
+                        let probe = probe.get_or_insert_with(|| self.look_ahead(rates, reach));
+                        let seen = probe.iter().map(|ahead| {
+                            let Ahead { tau, y, rates } = ahead;
+                            self.system.moving_variables(member, *tau, y, rates, &mut variables);
+                            rule.sides.eval(&variables, &mut scratch, &mut out);
+                            clear(out[2 * atom].rate - out[2 * atom + 1].rate, 1e-12)
+                        });
+                        { seen }.find(|sign| *sign != Sign::Zero).unwrap_or(Sign::Zero)
                     }
-                    guess => guess,
-                };
-            }
+                    sign => sign,
+                },
+                (sign, _) => sign,
+            };
         }
         (after, snapped)
     }
@@ -398,13 +418,17 @@ impl Simulation<'_> {
         self.tree.parameters(member.id).iter().fold(1.0, |m: f64, x| m.max(x.abs()))
     }
 
-    /// The state and its rates a small part of a step ahead, by Euler's method.
-    fn look_ahead(&self, rates: &[f64], reach: f64) -> (f64, Vec<f64>, Vec<f64>) {
-        let ahead = 1e-3 * reach.min(1e12);
-        let y: Vec<f64> = self.y.iter().zip(rates).map(|(y, f)| y + ahead * f).collect();
-        let mut later = vec![0.0; y.len()];
-        self.system.equations(&self.model.rules).rates(ahead, &y, &mut later);
-        (ahead, y, later)
+    /// The state and its rates small parts of a step ahead, by Euler's method.
+    fn look_ahead(&self, rates: &[f64], reach: f64) -> Vec<Ahead> {
+        let mut equations = self.system.equations(&self.model.rules);
+        let ahead = |part: f64| {
+            let tau = part * reach.min(1e12);
+            let y: Vec<f64> = self.y.iter().zip(rates).map(|(y, f)| y + tau * f).collect();
+            let mut later = vec![0.0; y.len()];
+            equations.rates(tau, &y, &mut later);
+            Ahead { tau, y, rates: later }
+        };
+        [1e-9, 1e-6, 1e-3].map(ahead).into()
     }
 
     /// Builds the system of equations for the present structure.
@@ -470,10 +494,10 @@ impl Simulation<'_> {
     fn no_equations(&self, id: ModuleId, rule: usize, chattering: bool, signs: &[Sign]) -> Error {
         let compiled = &self.model.rules[rule];
         let site = self.site_of(id, rule, compiled.span, self.now.to_f64());
-        // A life shorter than the resolution of time, at the end of a line of lives: what comes first at its
+        // A life about as short as the resolution of time, at the end of a line of lives: what comes first at its
         // end can no longer be told.
         let age = self.now.since(self.tree.birth(id));
-        if age > 0.0 && age <= self.now.resolution() && self.tree.lineage(id).generation > 16 {
+        if age > 0.0 && age <= 8.0 * self.now.resolution() && self.tree.lineage(id).generation > 16 {
             return Error::Zeno { site };
         }
         if chattering {
@@ -490,7 +514,7 @@ impl Simulation<'_> {
                 }
             }
         }
-        Error::OutsideDomain { site, failing }
+        Error::OutsideDomain { site, born: age == 0.0, failing }
     }
 
     /// How the boundary of an atom is written.
@@ -521,8 +545,10 @@ impl Simulation<'_> {
 }
 
 impl Open {
-    fn followed(signs: &[Sign]) -> Open {
-        Open { at: signs.to_vec(), guess: signs.to_vec(), fresh: false, tried: Vec::new(), flips: 0 }
+    fn followed(state: &State) -> Open {
+        let flow = (state.solve, state.switches.clone());
+        let signs = &state.signs;
+        Open { at: signs.clone(), guess: signs.clone(), flow: Some(flow), tried: Vec::new(), flips: 0 }
     }
 }
 

@@ -66,6 +66,8 @@ pub struct Simulation<'m> {
     step: Option<Step>,
     /// Events in a row between which time did not go on.
     stalled: usize,
+    /// Steps in a row by which time went on very little.
+    crawled: usize,
     pub(super) stats: Stats,
     fault: Option<Error>,
 }
@@ -77,6 +79,9 @@ const FORESIGHT: f64 = 1e3;
 
 /// Instants in a row without progress of time after which events are said to pile up.
 const MAX_STALLED: usize = 1000;
+
+/// Steps in a row of less than a billionth of the time after which there is a singularity.
+const MAX_CRAWLED: usize = 10_000;
 
 impl<'m> Simulation<'m> {
     /// Makes the initial string at t = 0 and lets everything happen that happens there.
@@ -101,6 +106,7 @@ impl<'m> Simulation<'m> {
             rate_is_known: false,
             step: None,
             stalled: 0,
+            crawled: 0,
             stats: Stats::default(),
             fault: None,
             settings,
@@ -203,6 +209,10 @@ impl<'m> Simulation<'m> {
         };
         if self.now.since(before) <= 0.0 {
             return Err(self.too_small(0));
+        }
+        self.crawled = if dense.h <= 1e-9 * self.now.to_f64() { self.crawled + 1 } else { 0 };
+        if self.crawled > MAX_CRAWLED && self.settings.grid().is_none() {
+            return Err(self.too_small(self.worst_component()));
         }
         self.rate_is_known = self.workspace.advance(method);
         std::mem::swap(&mut self.y, &mut self.workspace.end);
@@ -418,14 +428,21 @@ impl<'m> Simulation<'m> {
 /// the times of events, which move what comes after them.
 const INNER_TOLERANCE: f64 = 0.1;
 
-/// A module as it is written.
+/// A module as it is written, numbers to six digits: for people.
 pub fn describe(model: &Model, kind: KindId, parameters: &[f64]) -> String {
     let name = &model.kinds.get(kind).name;
     if parameters.is_empty() {
         return name.clone();
     }
-    let shown: Vec<String> = parameters.iter().map(f64::to_string).collect();
+    let shown: Vec<String> = parameters.iter().map(|x| brief(*x, 6)).collect();
     format!("{name}({})", shown.join(", "))
+}
+
+/// A number to some digits, with an exponent where that is shorter: for people.
+pub fn brief(x: f64, digits: usize) -> String {
+    let rounded: f64 = format!("{x:.*e}", digits - 1).parse().unwrap_or(x);
+    let (plain, exponent) = (rounded.to_string(), format!("{rounded:e}"));
+    if plain.len() <= digits + 6 { plain } else { exponent }
 }
 
 impl Method {

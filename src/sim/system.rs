@@ -34,6 +34,17 @@ pub struct Member {
     first_rate: usize,
     /// Age at the start of the system's time.
     age: f64,
+    birth: Instant,
+}
+
+impl Member {
+    pub fn age(&self) -> f64 {
+        self.age
+    }
+
+    pub fn birth(&self) -> Instant {
+        self.birth
+    }
 }
 
 /// What the system has to know of a module.
@@ -101,6 +112,7 @@ impl System {
                 switches: switches.len(),
                 first_rate,
                 age: start.since(tree.birth(id)),
+                birth: tree.birth(id),
             });
             first_rate += solve.map_or(0, |s| rules[rule].solves[s].of.len());
         }

@@ -9,7 +9,7 @@ use super::roots::{Function, Root, first_root};
 use super::system::{Member, System};
 use crate::expr::{Binary, Dual, Interval, Program, Scratch, Value};
 use crate::model::{Rule, Sign, Truth};
-use crate::structure::ModuleId;
+use crate::structure::{Instant, ModuleId};
 
 /// Zero, for a difference of two sides, in units of their rounding.
 const TOUCH: f64 = 256.0 * f64::EPSILON;
@@ -24,6 +24,7 @@ pub struct Change {
     pub atom: usize,
     /// Position in the step.
     pub position: f64,
+    pub at: Sign,
     pub after: Sign,
 }
 
@@ -93,10 +94,14 @@ pub fn search<'s>(
     bounds: &[Interval],
     signs: impl Fn(ModuleId) -> &'s [Sign],
 ) -> Found {
-    let mut candidates: Vec<Vec<Change>> = Vec::new();
+    let mut candidates: Vec<(Vec<Change>, Instant)> = Vec::new();
+    // Of the module of the first event: the last position that is the same instant for its siblings, and
+    // its birth.
+    let mut elder = (0.0, Instant::ZERO);
     let mut changes: Vec<Change> = Vec::new();
     let mut best = f64::INFINITY;
     let (mut variables, mut scratch, mut out) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut moving, mut moving_scratch, mut moving_out) = (Vec::new(), Vec::new(), Vec::new());
     for member in &system.members {
         let rule = &rules[member.rule];
         if rule.atoms.is_empty() {
@@ -107,11 +112,21 @@ pub fn search<'s>(
         system.variables(member, 0.0, |i| bounds[i], |t| Interval::spanned(t, t + h), &mut variables);
         out.resize(rule.sides.outputs(), Interval::EMPTY);
         rule.sides.eval(&variables, &mut scratch, &mut out);
+        // Zero is judged on the scale of the present, not of the far end of the step: a step may be a
+        // thousand lives long.
+        let time = |t: f64| Dual { value: t, rate: h };
+        system.variables(member, 0.0, |i| dense.start_of(i), time, &mut moving);
+        moving_out.resize(rule.sides.outputs(), Dual { value: 0.0, rate: 0.0 });
+        rule.sides.eval(&moving, &mut moving_scratch, &mut moving_out);
+        let instant = dense.start.resolution() / h;
         let signs = signs(member.id);
         let watched: Vec<(usize, f64)> = (0..rule.atoms.len())
             .filter_map(|atom| {
                 let (a, b) = (out[2 * atom], out[2 * atom + 1]);
-                let tolerance = TOUCH * a.magnitude().max(b.magnitude()).min(f64::MAX);
+                let start = [moving_out[2 * atom], moving_out[2 * atom + 1]];
+                let size = start.iter().map(|s| s.value.abs()).filter(|s| s.is_finite()).fold(0.0, f64::max);
+                let slope = Some((start[0].rate - start[1].rate).abs()).filter(|s| s.is_finite());
+                let tolerance = TOUCH * size + slope.unwrap_or(0.0) * instant;
                 may_change(rule, member, atom, signs[atom], a, b, tolerance).then_some((atom, tolerance))
             })
             .collect();
@@ -121,17 +136,28 @@ pub fn search<'s>(
         let limit = dense.together(best.min(1.0)).min(1.0);
         let found = search_member(rule, system, dense, member, signs, &watched, limit, &mut changes);
         if let Some(event) = found {
-            best = best.min(event[0].position);
-            candidates.push(event);
+            if event[0].position < best {
+                best = event[0].position;
+                elder = (dense.together_by(best, member.age()), member.birth());
+            }
+            candidates.push((event, member.birth()));
         }
     }
     if best.is_infinite() {
         return Found { event: None, touched: Vec::new(), changes };
     }
     let together = dense.together(best);
-    candidates.retain(|event| event[0].position <= together);
+    candidates.retain(|(event, birth)| {
+        // Those born together have clocks that are as good as their age is short.
+        let limit = if *birth == elder.1 { elder.0 } else { together };
+        event[0].position <= limit
+    });
     changes.retain(|change| change.position <= together);
-    Found { event: Some(best), touched: candidates.into_iter().flatten().collect(), changes }
+    Found {
+        event: Some(best),
+        touched: candidates.into_iter().flat_map(|(event, _)| event).collect(),
+        changes,
+    }
 }
 
 /// Whether an atom's sign may change, judged by its bounds over the whole step.
@@ -207,18 +233,16 @@ fn search_member(
         for (&(atom, tolerance), root) in watched.iter().zip(&next) {
             f.atom = atom;
             // A touch is known only to about the root of the rounding; one that is zero here is here.
+            let zero = f.value(position).abs() <= tolerance;
             let here = match root {
-                Some(root) if root.position <= together => Some(root.after),
-                Some(root) if root.after == now[atom] && f.value(position).abs() <= tolerance => {
-                    Some(root.after)
-                }
-                None if f.value(position).abs() <= tolerance && now[atom] != Sign::Zero => Some(now[atom]),
+                Some(root) if root.position <= together => Some((root.at, root.after)),
+                Some(root) if root.after == now[atom] && zero => Some((Sign::Zero, root.after)),
+                None if zero && now[atom] != Sign::Zero => Some((Sign::Zero, now[atom])),
                 _ => None,
             };
-            if let Some(sign) = here {
-                at[atom] = if sign == Sign::Undefined { Sign::Undefined } else { Sign::Zero };
-                after[atom] = sign;
-                group.push(Change { id: member.id, atom, position, after: sign });
+            if let Some(signs) = here {
+                (at[atom], after[atom]) = signs;
+                group.push(Change { id: member.id, atom, position, at: signs.0, after: signs.1 });
             }
         }
         // A condition that oscillates without end is cut into short steps, each of bounded work.

@@ -199,7 +199,7 @@ fn equations_that_push_against_each_other_are_an_error() {
 fn a_module_outside_its_domain_is_an_error_with_its_place() {
     let text = "initial string: A(0) B\nA(x):\n if x < 1 solve dx/dt = 1\n if x = 2 produce B\nB: produce ε";
     match fails(text, 5.0) {
-        Error::OutsideDomain { site, failing } => {
+        Error::OutsideDomain { site, failing, .. } => {
             assert!((site.time - 1.0).abs() < 1e-12 && site.module.starts_with("A("), "{site:?}");
             assert_eq!(site.lineage.to_string(), "1");
             assert_eq!(failing.len(), 1);

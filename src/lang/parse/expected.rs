@@ -54,12 +54,20 @@ pub fn explain(item: Rule, error: &Error<Rule>, text: &str, offset: usize) -> Di
     if let ErrorVariant::ParsingError { positives, .. } = &error.variant {
         expected.extend(positives.iter().filter_map(|r| words(*r)));
     }
+    // Wherever an expression can begin, an `if` can: that goes without saying.
+    if expected.contains("an expression") {
+        expected.remove("`if`");
+    }
     // What a name is for depends on where it is asked for.
     if is_item_with_name(item)
         && text[..at].split_whitespace().count() <= 1
         && expected.contains("an expression")
     {
         expected = BTreeSet::from(["a name"]);
+    }
+    // Before its `:` a rule has names where other places have expressions.
+    if item == Rule::rule_item && !text[..at].contains(':') && expected.remove("an expression") {
+        expected.insert("the name of a parameter");
     }
     let shown: Vec<&str> = expected.into_iter().collect();
     let what = match shown.split_last() {
@@ -68,8 +76,8 @@ pub fn explain(item: Rule, error: &Error<Rule>, text: &str, offset: usize) -> Di
         Some((last, rest)) => format!("expected {} or {last}", rest.join(", ")),
     };
     let message = match found {
-        "" => "the text ends too early".to_owned(),
-        "\n" => "the line ends too early".to_owned(),
+        "" if item == Rule::rule_item => "the rule ends too early".to_owned(),
+        "" | "\n" => "the line ends too early".to_owned(),
         token => format!("`{token}` is not expected here"),
     };
     let end = if found == "\n" { at } else { at + found.len() };
@@ -105,58 +113,149 @@ fn token_at(text: &str, at: usize) -> &str {
 
 /// Advice for mistakes that people make.
 fn hint(item: Rule, text: &str, at: usize, found: &str) -> Option<String> {
+    let first = text.split_whitespace().next().unwrap_or_default();
+    let first = first.trim_end_matches(|c: char| !c.is_alphanumeric());
+    if matches!(item, Rule::rule_item)
+        && let Some(word) = nearest(first, DECLARATIONS.iter().map(|(name, _)| *name))
+        && first.len() > 3
+    {
+        return Some(format!("did you mean `{word}`?"));
+    }
+    hint_by_symbol(item, text, at, found).or_else(|| hint_by_word(item, text, at, found))
+}
+
+/// Advice that the symbols around the place give.
+fn hint_by_symbol(item: Rule, text: &str, at: usize, found: &str) -> Option<String> {
     let before = text[..at].trim_end();
     let previous = before.chars().next_back();
     let touching = before.len() == at;
+    let in_rule = item == Rule::rule_item;
     let advice = match (previous, found) {
         (Some('='), "=") if touching => "equality is written with one `=`",
+        (Some('='), "<" | ">") if touching => "“at most” is written `<=`, “at least” `>=`",
+        (Some('<'), ">") if touching => "“not equal” is written `!=`",
         (Some('&'), "&") if touching => "“and” is written with one `&`",
         (Some('|'), "|") if touching => "“or” is written with one `|`",
         (Some('*'), "*") if touching => "a power is written `x^2`",
-        (_, "and") => "“and” is written `&`",
-        (_, "or") => "“or” is written `|`",
-        (_, "not") => "“not” is written `!`",
-        (_, "±") => "`±` stands for both turns in the head of a rule only; write `+` or `-`",
-        (_, "~") => "the language has no `~`; “not” is written `!`",
-        (_, "'") => "a derivative is written `dx/dt`",
-        (_, "→") => "a production is written `produce …`",
         (Some('-'), ">") if touching => {
             "a production is written `produce …`, after an `if` with its condition"
         }
-        (_, ".") if item != Rule::rule_item => "a number begins with a digit: `0.5`",
-        (_, "=") if item == Rule::rule_item && before.ends_with(|c: char| c.is_alphanumeric()) => {
+        (_, "→") => "a production is written `produce …`, after an `if` with its condition",
+        (_, "/") if text[at..].starts_with("//") => "a comment begins with `#`",
+        (_, "−" | "–") => "this is a typographic dash; a minus is written `-`",
+        (_, "“" | "”" | "‘" | "’" | "„") => "quotation marks are straight: `\"…\"`",
+        (_, "\"") if item == Rule::title_item => "the text ends with a second `\"` on the same line",
+        (_, "²" | "³") => "a power is written `x^2`",
+        (_, ";") if item != Rule::modules => "a declaration ends with its line, without a sign",
+        (_, "[") if item != Rule::modules && previous.is_some_and(|c| "+-*/(=,^".contains(c)) => {
+            "in expressions only round parentheses `( )` group"
+        }
+        (_, "±") => "`±` stands for both turns in the head of a rule only; write `+` or `-`",
+        (_, "~") => "“not” is written `!`",
+        (_, "'") => "a derivative is written `dx/dt`",
+        (_, "-") if is_item_with_name(item) && !before.contains('=') => {
+            "a name is made of letters, digits and `_`"
+        }
+        (_, "-" | "=") if item == Rule::frames_item => "frames are written `frames 0 .. 10 step 0.1`",
+        (_, "=") if item == Rule::angle_item => "the angle is written `angle 45`",
+        (_, ":") if matches!(item, Rule::ignore_item | Rule::consider_item) => {
+            "write the names after it: `ignore F_x @L`"
+        }
+        (_, "<" | ">") if item == Rule::interpret_item => {
+            "a drawing does not depend on the context of a module"
+        }
+        (Some(c), ",") if c.is_ascii_digit() && touching && item != Rule::modules => {
+            "the decimal sign is a point: `0.5`"
+        }
+        (_, ",") if item == Rule::modules => "modules stand one after another, with spaces and no commas",
+        (c, ".")
+            if text[at + 1..].starts_with(|c: char| c.is_ascii_digit())
+                || c.is_some_and(|c| c.is_ascii_digit()) =>
+        {
+            "a number begins and ends with a digit: `0.5`, `2`"
+        }
+        (Some(')'), ":") if in_rule && !before.contains(':') => {
+            "a rule has one predecessor; modules around it are its context: `A(x) < B(y) > C(z):`"
+        }
+        (_, "=") if in_rule && before.ends_with(|c: char| c.is_alphanumeric()) => {
             "an equation is written `dx/dt = …`"
         }
-        (_, "solve" | "produce" | "if") if item == Rule::rule_item && !before.contains(':') => {
-            "a rule's head ends with `:`"
-        }
-        (_, "solve" | "produce" | "if" | "then" | "else") if item != Rule::rule_item => {
-            "this word is reserved; a rule begins with its head, such as `F(x):`"
-        }
-        (_, ":") if item == Rule::rule_item && before.contains(':') => {
-            "a new rule begins on a line of its own"
-        }
-        (_, "\n" | "") if matches!(item, Rule::rule_item) && before.ends_with(':') => {
-            "under its head a rule has clauses: `solve dx/dt = …`, `if x = 1 produce …`"
-        }
-        (_, "\n" | "") if before.ends_with("produce") => "to produce nothing, write `produce ε`",
-        _ if item == Rule::rule_item
-            && !before.contains(':')
-            && found.starts_with(|c: char| c.is_ascii_digit()) =>
-        {
-            "a head names its parameters; values belong to the initial string and to successors"
-        }
-        _ if item == Rule::rule_item && found.starts_with(|c: char| c.is_alphabetic()) => {
-            return keyword_hint(found, &["if", "solve", "produce"]);
-        }
-        _ if is_number_before(before) && touching => "write the multiplication out: `2*x`",
+        (_, ":") if in_rule && before.contains(':') => "a new rule begins on a line of its own",
         _ => return None,
     };
     Some(advice.to_owned())
 }
 
-fn is_number_before(before: &str) -> bool {
-    before.ends_with(|c: char| c.is_ascii_digit())
+/// Advice that the words around the place give.
+fn hint_by_word(item: Rule, text: &str, at: usize, found: &str) -> Option<String> {
+    let before = text[..at].trim_end();
+    let rest = &text[at..];
+    let in_rule = item == Rule::rule_item;
+    let has_head = before.contains(':');
+    let is_word = found.starts_with(|c: char| c.is_alphabetic());
+    let ended = matches!(found, "\n" | "");
+    // The line, up to the place.
+    let line = before.rsplit('\n').next().unwrap_or(before).trim();
+    let last_word = line.rsplit(|c: char| !(c.is_alphanumeric() || c == '_')).next().unwrap_or_default();
+    let advice = match found {
+        _ if last_word == "not" => "“not” is written `!`",
+        "if" | "then" | "else" | "solve" | "produce" if is_item_with_name(item) && !before.contains('=') => {
+            "this word is reserved: choose another name"
+        }
+        "then" if in_rule => "a clause has no `then`: `if x < 2 solve …`",
+        "in" if item == Rule::const_item => "only a `param` has a range",
+        "and" => "“and” is written `&`",
+        "or" => "“or” is written `|`",
+        "not" => "“not” is written `!`",
+        "to" if item == Rule::frames_item => "frames are written `frames 0 .. 10 step 0.1`",
+        "solve" | "produce" | "if" if in_rule && !has_head => "a rule's head ends with `:`",
+        "solve" | "produce" | "if" if !in_rule => {
+            "this word begins a clause of a rule; if the line before it is the head of a rule, it ends with `:`"
+        }
+        "else" if in_rule => "every clause has a condition of its own: `if … solve …`, `if … produce …`",
+        "if" if in_rule => "after its condition a clause has `solve` or `produce`",
+        _ if ended && before.ends_with("produce") => "to produce nothing, write `produce ε`",
+        _ if ended && in_rule && before.ends_with(':') => {
+            "under its head a rule has clauses: `solve dx/dt = …`, `if x = 1 produce …`"
+        }
+        _ if in_rule && !has_head && found.starts_with(|c: char| c.is_ascii_digit()) => {
+            "a head names its parameters; values belong to the initial string and to successors"
+        }
+        _ if in_rule && !has_head && before.ends_with(|c: char| c.is_alphanumeric()) && is_word => {
+            "the names of parameters are separated by commas"
+        }
+        _ if in_rule && line.ends_with("solve") => "a `solve` gives derivatives: `solve dx/dt = …`",
+        _ if in_rule && is_word && is_derivative(rest) => {
+            if line.contains("solve") {
+                "equations are separated by commas: `solve dx/dt = …, dy/dt = …`"
+            } else {
+                "equations stand behind `solve`: `solve dx/dt = …`"
+            }
+        }
+        _ if is_word || found == "(" => {
+            if let Some(help) = keyword_hint(found, &["if", "then", "else", "solve", "produce"]) {
+                return Some(help);
+            }
+            if last_word.starts_with(|c: char| c.is_alphanumeric()) && line.contains(['=', '<', '>']) {
+                "to multiply, write `*`: `2*x`, `r*x`"
+            } else if in_rule
+                && rest.lines().next().is_some_and(|l| l.contains("solve") || l.contains("produce"))
+            {
+                "a condition begins with `if`"
+            } else {
+                return None;
+            }
+        }
+        _ => return None,
+    };
+    Some(advice.to_owned())
+}
+
+/// Whether a text begins with something like `dx/dt`.
+fn is_derivative(text: &str) -> bool {
+    let name = text.find(|c: char| !(c.is_alphanumeric() || c == '_')).map_or("", |end| &text[..end]);
+    name.starts_with('d')
+        && text[name.len()..].trim_start().strip_prefix('/').is_some_and(|r| r.trim_start().starts_with("dt"))
 }
 
 fn keyword_hint(found: &str, known: &[&'static str]) -> Option<String> {
@@ -174,21 +273,26 @@ pub fn unknown_line(text: &str, item: &RawItem) -> Diagnostic {
             .at(span, "this begins a new line")
             .help("to go on with an expression, put the operator at the end of the line before, or parentheses around it");
     }
-    let names: Vec<&'static str> =
-        DECLARATIONS.iter().map(|(name, _)| *name).chain(["if", "solve", "produce"]).collect();
-    let mut diagnostic = Diagnostic::error(format!("`{first}` begins no declaration and no rule"))
+    let whole = &text[item.start..item.end];
+    let mut names: Vec<&'static str> = DECLARATIONS.iter().map(|(name, _)| *name).collect();
+    names.extend(["if", "solve", "produce"]);
+    let diagnostic = Diagnostic::error(format!("`{first}` begins no declaration and no rule"))
         .at(span, "expected a declaration, or the head of a rule such as `F(x):`");
-    if let Some(help) = keyword_hint(first, &names) {
-        diagnostic = diagnostic.help(help);
-    } else if line.contains("solve") || line.contains("produce") {
-        diagnostic = diagnostic.help("a rule's head ends with `:`");
-    } else if line.contains('=') {
-        diagnostic = diagnostic.help("a constant is declared with `const NAME = VALUE`");
-    } else if matches!(first, "if" | "solve" | "produce") {
-        diagnostic = diagnostic.help("a clause stands under the head of its rule, such as `F(x):`");
-    } else {
-        let known: Vec<&str> = DECLARATIONS.iter().map(|(name, _)| *name).collect();
-        diagnostic = diagnostic.note(format!("declarations begin with {}", known.join(", ")));
+    if matches!(first, "if" | "solve" | "produce") {
+        return diagnostic.help("a clause stands under the head of its rule, such as `F(x):`");
     }
-    diagnostic
+    if let Some(help) = keyword_hint(first, &names) {
+        return diagnostic.help(help);
+    }
+    if is_derivative(line) {
+        return diagnostic.help("equations stand in a rule, behind `solve`: `solve dx/dt = …`");
+    }
+    if whole.contains("solve") || whole.contains("produce") {
+        return diagnostic.help("a rule's head ends with `:`");
+    }
+    if line.contains('=') {
+        return diagnostic.help("a constant is declared with `const NAME = VALUE`");
+    }
+    let known: Vec<&str> = DECLARATIONS.iter().map(|(name, _)| *name).collect();
+    diagnostic.note(format!("declarations begin with {}", known.join(", ")))
 }

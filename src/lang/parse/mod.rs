@@ -11,7 +11,7 @@ mod expected;
 
 use pest::Parser;
 
-use super::ast::{Action, Document, Expression, Item, Module};
+use super::ast::{Document, Expression, Item, Module};
 use super::layout::{ItemKind, RawItem, layout};
 use crate::diagnostic::{Diagnostic, Source, Span};
 
@@ -28,27 +28,46 @@ const MAX_ERRORS: usize = 50;
 /// Most modules that an initial string can have.
 const MAX_AXIOM: usize = 10_000_000;
 
-/// Reads a model's text. What could be read is returned even if there are errors.
+/// Reads a model's text. What could be read is returned even if there are errors; of global declarations
+/// that could not be read, the names are in [`Document::unread`].
 pub fn parse(source: &Source) -> (Document, Vec<Diagnostic>) {
     let cut = layout(&source.text);
     let mut errors = cut.errors;
     let mut document = Document::default();
     let mut interner = build::Interner::default();
     for item in &cut.items {
-        if item.broken {
-            continue;
-        }
         if errors.len() >= MAX_ERRORS {
             break;
+        }
+        if item.broken {
+            document.unread.extend(declared_name(&cut.text, item));
+            continue;
         }
         let mut builder =
             build::Builder { expressions: &mut document.expressions, interner: &mut interner, offset: 0 };
         match read_item(&cut.text, item, &mut builder) {
             Ok(read) => document.items.push((read, trimmed(&cut.text, item))),
-            Err(error) => errors.push(*error),
+            Err(error) => {
+                errors.push(*error);
+                document.unread.extend(declared_name(&cut.text, item));
+            }
         }
     }
     (document, errors)
+}
+
+/// The name that an item declares, or seems to: `const k …`, but also `cosnt k …` and `k = …`.
+fn declared_name(text: &str, item: &RawItem) -> Option<std::sync::Arc<str>> {
+    let line = text[item.start..item.end].lines().next()?;
+    let mut words = line.split(|c: char| !(c.is_alphanumeric() || c == '_')).filter(|w| !w.is_empty());
+    let first = words.next()?;
+    let name = match item.kind {
+        ItemKind::Const | ItemKind::Param | ItemKind::Def => words.next()?,
+        ItemKind::Unknown if line.strip_prefix(first)?.trim_start().starts_with('=') => first,
+        ItemKind::Unknown => words.next()?,
+        _ => return None,
+    };
+    Some(name.into())
 }
 
 /// Reads one expression.
@@ -157,9 +176,4 @@ fn piece_end(text: &str, from: usize, size: usize) -> usize {
         }
     }
     text.len()
-}
-
-/// True if a clause produces.
-pub fn is_produce(action: &Action) -> bool {
-    matches!(action, Action::Produce(_))
 }
