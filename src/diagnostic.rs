@@ -193,7 +193,8 @@ impl Diagnostic {
             }
             let mut snippet =
                 Snippet::source(&source.text[range.clone()]).line_start(first).path(&source.name);
-            let mut kind = AnnotationKind::Primary;
+            let first_label = std::ptr::eq(*labels.first().expect("not empty"), &self.labels[0]);
+            let mut kind = if first_label { AnnotationKind::Primary } else { AnnotationKind::Context };
             labels.retain(|(other, remark)| {
                 let inside = range.start <= other.range().start && other.range().end <= range.end;
                 if inside {
@@ -219,6 +220,7 @@ impl Diagnostic {
             group = group.element(Level::HELP.message(help));
         }
         let renderer = if coloured { Renderer::styled() } else { Renderer::plain() };
-        renderer.render(&[group]) + "\n"
+        // An empty line sets messages apart.
+        renderer.render(&[group]) + "\n\n"
     }
 }

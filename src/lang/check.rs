@@ -81,7 +81,11 @@ fn resolve(
         diagnostics.push(
             Diagnostic::error(format!("`{name}` is passed over in the search for context"))
                 .at(head.span, "this context is never there")
-                .help(format!("declare `consider {name}` (with all other modules that count), or take it out of `ignore`")),
+                .help(if class_of(name) == Class::Word {
+                    format!("take `{name}` out of `ignore`, or name it in `consider`")
+                } else {
+                    format!("symbols and surfaces count as context only if a `consider` names them: `consider {name} …`, with all other modules that count")
+                }),
         );
     }
 }
@@ -188,6 +192,18 @@ fn shadowed_rule(model: &Model, index: usize, own: &[KindId], diagnostics: &mut 
             && before.right.iter().zip(&rule.right).all(|(a, b)| wider(a, b))
     });
     if let Some((_, before)) = shadow {
+        if before.left.len() == rule.left.len()
+            && before.right.len() == rule.right.len()
+            && before.label == rule.label
+        {
+            diagnostics.push(
+                Diagnostic::error("two rules have the same head")
+                    .at(rule.span, "this one never has its turn")
+                    .at(before.span, "this one comes first")
+                    .help("write all clauses under one head"),
+            );
+            return;
+        }
         diagnostics.push(
             Diagnostic::error("this rule can never be reached")
                 .at(rule.span, "whenever its context is there, so is that of the rule before it")

@@ -66,6 +66,7 @@ fn build(document: &Document, settings: &[Setting], scope: &mut Scope, unread: b
     let mut builder =
         rules::RuleBuilder { document, scope, kinds: &mut kinds, occurs: std::collections::HashMap::new() };
     let (mut rules, mut written, mut interpretations, mut strings) = (vec![], vec![], vec![], vec![]);
+    let mut heads = Vec::new();
     let (mut axiom, mut ignored, mut considered) = (None, Vec::new(), Vec::new());
     let (mut title, mut angle, mut frames) = (None, 90.0, None);
     let mut whole = true;
@@ -99,10 +100,13 @@ fn build(document: &Document, settings: &[Setting], scope: &mut Scope, unread: b
                 axiom = builder.successor(modules, &variables, 0);
                 whole &= axiom.is_some();
             }
-            Item::Interpret { head, drawn } => match builder.interpretation(head, drawn) {
-                Some(interpretation) => interpretations.push(interpretation),
-                None => whole = false,
-            },
+            Item::Interpret { head, drawn } => {
+                heads.push(head);
+                match builder.interpretation(head, drawn) {
+                    Some(interpretation) => interpretations.push(interpretation),
+                    None => whole = false,
+                }
+            }
             Item::Rule(rule) => {
                 for clause in &rule.clauses {
                     if let Action::Produce(modules) = &clause.action {
@@ -119,6 +123,9 @@ fn build(document: &Document, settings: &[Setting], scope: &mut Scope, unread: b
         }
     }
     builder.check_arities(&written, &strings);
+    if !unread {
+        builder.check_interpretations(&heads);
+    }
     let occurs = builder.occurs;
     if !single.seen("the initial string") && !unread {
         scope.diagnostics.push(

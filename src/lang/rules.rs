@@ -81,8 +81,16 @@ impl RuleBuilder<'_> {
             self.occurs.entry(kind).or_insert(module.span);
             kinds.push(kind);
             for &argument in &module.arguments {
+                let known = self.scope.diagnostics.len();
                 let Some(node) = self.scope.number(&self.document.expressions, argument, variables) else {
                     good = false;
+                    if count > 0
+                        && known < self.scope.diagnostics.len()
+                        && let Some(head) = self.looks_like_a_head(module)
+                    {
+                        let error = self.scope.diagnostics.last_mut().expect("one was added");
+                        error.help.push(format!("if `{head}` is the head of a rule, end it with `:`"));
+                    }
                     continue;
                 };
                 if let Some(value) = self.scope.graph.as_constant(node).filter(|x| !x.is_finite()) {
@@ -107,6 +115,17 @@ impl RuleBuilder<'_> {
             return None;
         }
         Some(Successor { kinds, arguments: Program::compile(&self.scope.graph, &roots, count) })
+    }
+
+    /// A module whose arguments are bare names, as a rule's head has them.
+    fn looks_like_a_head(&self, module: &ast::Module) -> Option<String> {
+        let names: Vec<&str> = (module.arguments.iter())
+            .map(|argument| match self.document.expressions.get(argument.root) {
+                ast::Expr::Name(name) => Some(&**name),
+                _ => None,
+            })
+            .collect::<Option<_>>()?;
+        Some(format!("{}({})", module.name, names.join(", ")))
     }
 
     /// The variables of a head, and how many there are with `t` and `age`.
@@ -427,6 +446,28 @@ impl RuleBuilder<'_> {
             ))
             .at(module.span, format!("{} here", plural(given, "parameter")))
             .at(heads[0].span, format!("{} in its rule", plural(heads[0].parameters.len(), "parameter")));
+            self.error(error);
+        }
+    }
+
+    /// Drawings of modules that the strings never have.
+    pub fn check_interpretations(&mut self, heads: &[&HeadModule]) {
+        for head in heads {
+            let name = &*head.name.text;
+            let given = head.parameters.len();
+            if self.kinds.find(name, given).is_some_and(|kind| self.occurs.contains_key(&kind)) {
+                continue;
+            }
+            let mut error =
+                Diagnostic::warning(format!("nothing is drawn as `{}`", print::head_module(head)))
+                    .at(head.span, "no string has this module");
+            let other = (self.occurs.iter())
+                .filter(|(kind, _)| self.kinds.get(**kind).name == name)
+                .min_by_key(|(_, span)| **span);
+            if let Some((kind, span)) = other {
+                let arity = self.kinds.get(*kind).arity;
+                error = error.at(*span, format!("here it has {}", plural(arity, "parameter")));
+            }
             self.error(error);
         }
     }

@@ -311,11 +311,13 @@ impl Scope {
                 .map(|n| &**n)
                 .chain(RESERVED.into_iter().filter(|_| variables.no_time.is_none()))
                 .chain(["pi"]);
-            Diagnostic::error(format!("unknown name `{name}`"))
-                .at(span, "this is no parameter of the rule and no constant")
-                .help_opt(
-                    did_you_mean(name, known).or_else(|| Some(format!("declare it: `const {name} = …`"))),
-                )
+            let what = match variables.no_time {
+                None => "this is no parameter of the rule and no constant",
+                Some(_) => "this is no constant",
+            };
+            Diagnostic::error(format!("unknown name `{name}`")).at(span, what).help_opt(
+                did_you_mean(name, known).or_else(|| Some(format!("declare it: `const {name} = …`"))),
+            )
         };
         self.diagnostics.push(error);
         None

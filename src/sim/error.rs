@@ -48,7 +48,12 @@ pub enum Error {
     #[error("the step size fell to nothing at t = {}", .site.when())]
     StepTooSmall { site: Site },
     #[error("more than {limit} modules at t = {}", .site.when())]
-    TooManyModules { site: Site, limit: usize },
+    TooManyModules {
+        site: Site,
+        limit: usize,
+        /// Productions that had followed one another at this instant.
+        rounds: usize,
+    },
 }
 
 impl Error {
@@ -76,7 +81,11 @@ impl Error {
                 d = d.at(*span, "this no longer holds");
             }
         }
-        d = d.note(format!("module {}, lineage {}, rule {}", site.module, site.lineage, site.rule));
+        let descent = match site.lineage.generation {
+            0 => format!("module {} of the initial string", site.lineage),
+            n => format!("lineage {}, {n} productions after the initial string", site.lineage),
+        };
+        d = d.note(format!("{} is {descent}; its rule is {}", site.module, site.rule));
         match self {
             Error::OutsideDomain { failing, .. } => {
                 let missing: Vec<String> =
@@ -98,6 +107,9 @@ impl Error {
             Error::StepTooSmall { .. } => d.help(
                 "the solution may become infinite here, or the equations jump in a way that no `if` shows; a fixed step (`--method rk4 --step-size H`) shows how it behaves",
             ),
+            Error::TooManyModules { rounds, .. } if *rounds > 8 => d
+                .note(format!("{rounds} productions followed one another without time going on"))
+                .help("a successor that meets the condition again is replaced again at once: change the condition, or the successor's parameters"),
             Error::TooManyModules { limit, .. } => {
                 d.help(format!("if this is meant, allow more: `--max-modules {}`", limit.saturating_mul(10)))
             }

@@ -83,6 +83,7 @@ impl Simulation<'_> {
                 break;
             }
             rounds += 1;
+            self.rounds = rounds;
             if rounds > MAX_ROUNDS {
                 let site = self.site(&firing[0], self.now.to_f64());
                 return Err(if hurried { Error::Zeno { site } } else { Error::Cascade { site, rounds } });
@@ -473,7 +474,8 @@ impl Simulation<'_> {
             let number = fire.rule << 16 | fire.produce;
             let successor = &rules[fire.rule].produces[fire.produce].successor;
             if self.tree.len() + successor.kinds.len() > self.settings.max_modules {
-                return Err(Error::TooManyModules { site: site(self), limit: self.settings.max_modules });
+                let limit = self.settings.max_modules;
+                return Err(Error::TooManyModules { site: site(self), limit, rounds: self.rounds });
             }
             self.states[fire.id.slot()] = None;
             let birth = self.now;

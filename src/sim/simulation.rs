@@ -66,8 +66,11 @@ pub struct Simulation<'m> {
     step: Option<Step>,
     /// Events in a row between which time did not go on.
     stalled: usize,
-    /// Steps in a row by which time went on very little.
-    crawled: usize,
+    /// Rounds of productions at the present instant.
+    pub(super) rounds: usize,
+    /// A time in the past, and the number of steps made since then.
+    mark: Instant,
+    since_mark: usize,
     pub(super) stats: Stats,
     fault: Option<Error>,
 }
@@ -80,8 +83,9 @@ const FORESIGHT: f64 = 1e3;
 /// Instants in a row without progress of time after which events are said to pile up.
 const MAX_STALLED: usize = 1000;
 
-/// Steps in a row of less than a billionth of the time after which there is a singularity.
-const MAX_CRAWLED: usize = 10_000;
+/// So many steps must bring time on by more than this part of it, or there is a singularity.
+const MANY_STEPS: usize = 10_000;
+const CRAWL: f64 = 1e-5;
 
 impl<'m> Simulation<'m> {
     /// Makes the initial string at t = 0 and lets everything happen that happens there.
@@ -106,7 +110,9 @@ impl<'m> Simulation<'m> {
             rate_is_known: false,
             step: None,
             stalled: 0,
-            crawled: 0,
+            mark: Instant::ZERO,
+            since_mark: 0,
+            rounds: 0,
             stats: Stats::default(),
             fault: None,
             settings,
@@ -133,7 +139,7 @@ impl<'m> Simulation<'m> {
                 span: Default::default(),
                 time: 0.0,
             };
-            return Err(Error::TooManyModules { site, limit });
+            return Err(Error::TooManyModules { site, limit, rounds: 0 });
         }
         simulation.settle(&[])?;
         simulation.begin_phase()?;
@@ -210,9 +216,12 @@ impl<'m> Simulation<'m> {
         if self.now.since(before) <= 0.0 {
             return Err(self.too_small(0));
         }
-        self.crawled = if dense.h <= 1e-9 * self.now.to_f64() { self.crawled + 1 } else { 0 };
-        if self.crawled > MAX_CRAWLED && self.settings.grid().is_none() {
-            return Err(self.too_small(self.worst_component()));
+        self.since_mark += 1;
+        if self.since_mark >= MANY_STEPS && self.settings.grid().is_none() {
+            if self.now.since(self.mark) <= CRAWL * self.now.to_f64() {
+                return Err(self.too_small(self.worst_component()));
+            }
+            (self.since_mark, self.mark) = (0, self.now);
         }
         self.rate_is_known = self.workspace.advance(method);
         std::mem::swap(&mut self.y, &mut self.workspace.end);
@@ -240,6 +249,7 @@ impl<'m> Simulation<'m> {
             let site = self.site_of(change.id, rule, self.model.rules[rule].span, when.to_f64());
             return Err(Error::Zeno { site });
         }
+        (self.since_mark, self.mark) = (0, when);
         self.settle(&found.touched)?;
         self.begin_phase()
     }
@@ -315,7 +325,8 @@ impl<'m> Simulation<'m> {
                 }
                 Trial::Done { error, rounding } => {
                     if self.settings.grid().is_none() {
-                        self.step_size = h * self.growth(error.max(rounding), rejected);
+                        // Rounding is no reason to shorten a step that is good, only not to lengthen it.
+                        self.step_size = h * self.growth(error, rejected || rounding > 0.5);
                         self.last_error = error;
                     }
                     break;

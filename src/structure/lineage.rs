@@ -66,9 +66,6 @@ impl fmt::Display for Lineage {
             let place = self.trail >> (8 * i) & 255;
             write!(f, "{}{place}", if i + 1 == shown && self.generation < 8 { "" } else { "." })?;
         }
-        if self.generation >= 8 {
-            write!(f, " (generation {})", self.generation)?;
-        }
         Ok(())
     }
 }
@@ -86,7 +83,7 @@ mod tests {
         for _ in 0..9 {
             lineage = lineage.child(0, 0);
         }
-        assert_eq!(lineage.to_string(), "….1.1.1.1.1.1.1.1 (generation 11)");
+        assert_eq!(lineage.to_string(), "….1.1.1.1.1.1.1.1");
         assert_eq!(lineage.name().len(), 13);
     }
 

@@ -198,6 +198,7 @@ fn hint_by_word(item: Rule, text: &str, at: usize, found: &str) -> Option<String
     let line = before.rsplit('\n').next().unwrap_or(before).trim();
     let last_word = line.rsplit(|c: char| !(c.is_alphanumeric() || c == '_')).next().unwrap_or_default();
     let advice = match found {
+        "ignore" | "consider" => "brackets cannot be chosen: they are no modules",
         _ if last_word == "not" => "“not” is written `!`",
         "if" | "then" | "else" | "solve" | "produce" if is_item_with_name(item) && !before.contains('=') => {
             "this word is reserved: choose another name"
