@@ -37,18 +37,26 @@ fn coloured() -> bool {
     std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none()
 }
 
+/// Most messages that are printed of one model.
+const MOST_SHOWN: usize = 50;
+
 /// Reads a model, prints its warnings.
 pub fn open(path: &Path, settings: &[Setting]) -> Result<Session, Failure> {
     match Session::open(path, settings) {
         Ok(session) => {
-            for warning in &session.warnings {
+            for warning in session.warnings.iter().take(MOST_SHOWN) {
                 eprint!("{}", warning.render(&session.source, coloured()));
             }
             Ok(session)
         }
         Err(refused) => {
             let draw = |all: &[Diagnostic]| -> String {
-                all.iter().map(|d| d.render(&refused.source, coloured())).collect()
+                let shown = all.iter().take(MOST_SHOWN).map(|d| d.render(&refused.source, coloured()));
+                let mut text: String = shown.collect();
+                if all.len() > MOST_SHOWN {
+                    text += &format!("… and {} more\n", all.len() - MOST_SHOWN);
+                }
+                text
             };
             if refused.diagnostics.iter().any(|d| d.severity == crate::diagnostic::Severity::Error) {
                 return Err(Failure::Model(draw(&refused.diagnostics)));

@@ -205,8 +205,17 @@ impl Builder<'_> {
         let name = self.interner.get(inner.next().expect("a module has a name").as_str());
         let mut arguments = Vec::new();
         if let Some(list) = inner.next() {
-            for argument in list.into_inner().filter(|p| p.as_rule() == Rule::expr) {
-                arguments.push(self.expression(argument)?);
+            for argument in list.into_inner() {
+                match argument.as_rule() {
+                    Rule::literal => {
+                        let span = self.span(&argument);
+                        let value = self.number(&argument)?;
+                        let root = self.expressions.push(Expr::Number(value), span);
+                        arguments.push(Expression { first: root, root });
+                    }
+                    Rule::expr => arguments.push(self.expression(argument)?),
+                    _ => {}
+                }
             }
         }
         Ok(Module { name, span, arguments })

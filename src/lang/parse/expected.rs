@@ -13,11 +13,9 @@ use crate::lang::suggest::nearest;
 fn words(rule: Rule) -> Option<&'static str> {
     use Rule::*;
     Some(match rule {
-        expr | primary | prefix | number | ident | call | if_expr | neg | not | coefficient => {
-            "an expression"
-        }
-        infix | or | and | le | ge | ne | lt | gt | eq | add | sub | mul | div | pow => "an operator",
-        module | modules | successor | name | word | symbol => "a module",
+        expr | number | literal | ident | call | if_expr | neg | not | coefficient => "an expression",
+        or | and | le | ge | ne | lt | gt | eq | add | sub | mul | div | pow => "an operator",
+        module | modules | successor | name => "a module",
         epsilon => "`ε` for nothing",
         arguments => "`(` and parameters",
         formals => "`(` and the names of parameters",
