@@ -10,7 +10,7 @@
 //! ```
 //!
 //! - [`simulation`]: the clock; what a caller uses is [`Simulation`].
-//! - [`settle`]: what happens at one instant.
+//! - [`settle`]: what happens at one instant; [`lookup`]: rules and contexts.
 //! - [`system`]: the equations between two instants.
 //! - [`runge_kutta`], [`dense`]: one step, and the solution inside it.
 //! - [`watch`], [`roots`]: the search of a step for the first event.
@@ -21,6 +21,7 @@
 
 mod dense;
 mod error;
+mod lookup;
 mod roots;
 mod runge_kutta;
 mod settle;

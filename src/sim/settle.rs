@@ -18,14 +18,12 @@ use super::system::{Joining, System};
 use super::watch::Change;
 use crate::expr::Dual;
 use crate::model::{Rule, Sign, Truth};
-use crate::structure::{ModuleId, Visit};
+use crate::structure::ModuleId;
 
 /// Most rounds of productions at one instant.
 pub const MAX_ROUNDS: usize = 10_000;
 /// Most times that the equations at one instant are chosen anew before the choice is called chattering.
 const MAX_CHOICES: usize = 8;
-/// Two numbers are equal if they differ by no more than this part of the larger.
-const EQUAL: f64 = 8.0 * f64::EPSILON;
 
 /// A rate of no more than this part of the value, over the length of a step, is rounding.
 const NOISE: f64 = 16.0 * f64::EPSILON;
@@ -110,120 +108,6 @@ impl Simulation<'_> {
             entry.at[change.atom] = change.at;
             entry.guess[change.atom] = change.after;
         }
-    }
-
-    /// Finds each module's rule and context; opens those for which they are new.
-    fn look_up(&mut self, open: &mut [Option<Open>]) {
-        let rules = &self.model.rules;
-        let kinds = &self.model.kinds;
-        self.ruled.clear();
-        self.ruled.extend(self.tree.walk().filter_map(|visit| match visit {
-            Visit::Module(id) if !kinds.get(self.tree.kind(id)).rules.is_empty() => Some(id),
-            _ => None,
-        }));
-        self.ruled_is_stale = false;
-        self.states.resize(self.tree.slots(), None);
-        let mut context = Vec::new();
-        for &id in &self.ruled {
-            let applies = kinds
-                .get(self.tree.kind(id))
-                .rules
-                .iter()
-                .copied()
-                .find(|&rule| self.context(id, &rules[rule], &mut context));
-            let state = self.states[id.slot()].as_ref().filter(|s| s.id == id);
-            let Some(rule) = applies else {
-                if state.is_none_or(|s| s.rule.is_some()) {
-                    self.states[id.slot()] = Some(State::idle(id));
-                    open[id.slot()] = None;
-                }
-                continue;
-            };
-            let same = state.is_some_and(|s| s.rule == Some(rule) && s.context == context);
-            if same {
-                continue;
-            }
-            let mut signs = self.signs_of_values(id, rule, &context);
-            // A limit that is only approached may have been reached by rounding.
-            if let Some(State { rule: Some(before), solve: Some(solve), signs: known, .. }) = state
-                && *before == rule
-            {
-                for (atom, &unreachable) in rules[rule].solves[*solve].unreachable.iter().enumerate() {
-                    if unreachable {
-                        signs[atom] = known[atom];
-                    }
-                }
-            }
-            open[id.slot()] = Some(Open {
-                guess: signs.iter().map(|&s| if s == Sign::Zero { Sign::Any } else { s }).collect(),
-                at: signs.clone(),
-                flow: None,
-                tried: Vec::new(),
-                flips: 0,
-            });
-            self.states[id.slot()] = Some(State {
-                id,
-                rule: Some(rule),
-                context: context.clone(),
-                solve: None,
-                signs,
-                switches: Vec::new(),
-            });
-        }
-    }
-
-    /// Collects the context that a rule asks for, in the order of the rule's variables; false if it is
-    /// not there.
-    fn context(&self, id: ModuleId, rule: &Rule, out: &mut Vec<ModuleId>) -> bool {
-        out.clear();
-        let skipped = |kind| self.model.kinds.get(kind).skipped;
-        let mut at = id;
-        for pattern in rule.left.iter().rev() {
-            match self.tree.left(at, skipped) {
-                Some(found) if pattern.matches(self.tree.kind(found)) => {
-                    out.push(found);
-                    at = found;
-                }
-                _ => return false,
-            }
-        }
-        out.reverse();
-        at = id;
-        for pattern in &rule.right {
-            match self.tree.right(at, skipped) {
-                Some(found) if pattern.matches(self.tree.kind(found)) => {
-                    out.push(found);
-                    at = found;
-                }
-                _ => return false,
-            }
-        }
-        true
-    }
-
-    /// A rule's variables at the present instant, from the values in the tree.
-    fn values(&self, id: ModuleId, context: &[ModuleId]) -> Vec<f64> {
-        let mut variables: Vec<f64> = self.tree.parameters(id).to_vec();
-        for module in context {
-            variables.extend_from_slice(self.tree.parameters(*module));
-        }
-        variables.extend([self.now.to_f64(), self.now.since(self.tree.birth(id))]);
-        variables
-    }
-
-    fn signs_of_values(&self, id: ModuleId, rule: usize, context: &[ModuleId]) -> Vec<Sign> {
-        let sides = &self.model.rules[rule].sides;
-        let mut out = vec![0.0; sides.outputs()];
-        sides.eval(&self.values(id, context), &mut Vec::new(), &mut out);
-        out.chunks(2)
-            .map(|side| {
-                let difference = side[0] - side[1];
-                // An infinite side is far from everything.
-                let size = side[0].abs().max(side[1].abs());
-                let equal = size.is_finite() && difference.abs() <= EQUAL * size;
-                if equal { Sign::Zero } else { Sign::of(difference) }
-            })
-            .collect()
     }
 
     /// Open modules in string order.
@@ -547,6 +431,13 @@ impl Simulation<'_> {
 }
 
 impl Open {
+    /// A module whose signs are known from its values only.
+    pub(super) fn elsewhere(signs: &[Sign]) -> Open {
+        let guess = signs.iter().map(|&s| if s == Sign::Zero { Sign::Any } else { s }).collect();
+        Open { at: signs.to_vec(), guess, flow: None, tried: Vec::new(), flips: 0 }
+    }
+
+    /// A module that was followed along its trajectory.
     fn followed(state: &State) -> Open {
         let flow = (state.solve, state.switches.clone());
         let signs = &state.signs;
