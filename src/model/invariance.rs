@@ -60,7 +60,15 @@ pub fn never_reached(
         for flag in &mut point[own + context + 2..] {
             *flag = f64::from(u8::from(random.next() & 1 == 1));
         }
-        let Some(at) = solve(&sides, &mut point, pivot) else { continue };
+        let Some((at, slope)) = solve(&sides, &mut point, pivot) else { continue };
+        // Where the difference has a double root its rate vanishes whatever the flow does.
+        let aside = 0.25 * at.abs().max(1e-3);
+        point[pivot] = at + aside;
+        let rise = gap(&sides, &point).abs();
+        point[pivot] = at;
+        if slope.abs() * aside < 1e-3 * rise {
+            return false;
+        }
         let here = difference(&point);
         // How large the rate is off the surface says what counts as zero on it.
         let mut scale: f64 = 0.0;
@@ -94,8 +102,16 @@ pub fn never_reached(
     defined >= ENOUGH
 }
 
-/// Puts the point on the surface by changing one variable (Newton's method). None if that fails.
-fn solve(sides: &Program, point: &mut [f64], pivot: usize) -> Option<f64> {
+/// The difference of the two sides.
+fn gap(sides: &Program, point: &[f64]) -> f64 {
+    let mut out = [0.0; 2];
+    sides.eval(point, &mut Vec::new(), &mut out);
+    out[0] - out[1]
+}
+
+/// Puts the point on the surface by changing one variable (Newton's method). Returns that variable and the
+/// slope of the difference in it; None if that fails.
+fn solve(sides: &Program, point: &mut [f64], pivot: usize) -> Option<(f64, f64)> {
     let mut scratch = Vec::new();
     for _ in 0..60 {
         let moving =
@@ -106,14 +122,14 @@ fn solve(sides: &Program, point: &mut [f64], pivot: usize) -> Option<f64> {
         let (gap, slope) = (out[0].value - out[1].value, out[0].rate - out[1].rate);
         let step = gap / slope;
         if gap == 0.0 {
-            return Some(point[pivot]);
+            return Some((point[pivot], slope));
         }
         if !step.is_finite() {
             return None;
         }
         point[pivot] -= step;
         if step.abs() <= 2.0 * f64::EPSILON * point[pivot].abs() {
-            return Some(point[pivot]);
+            return Some((point[pivot], slope));
         }
     }
     None

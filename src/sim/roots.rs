@@ -21,7 +21,7 @@ use crate::model::Sign;
 const NARROW: f64 = 1e-13;
 /// Nor are those that end before this.
 const SMALL: f64 = 1e-30;
-const MAX_PIECES: usize = 4096;
+const MAX_PIECES: usize = 1024;
 
 /// A function over a step, for positions 0 to 1.
 pub trait Function {

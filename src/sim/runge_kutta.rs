@@ -34,7 +34,7 @@ const D: [f64; 7] = [
 ];
 
 /// Errors below the tolerated part of this are none, whatever they are errors of.
-const FLOOR: f64 = 1e-10;
+const FLOOR: f64 = 1e-18;
 
 /// Working memory of a step.
 #[derive(Clone, Debug, Default)]

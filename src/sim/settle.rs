@@ -13,7 +13,7 @@
 
 use super::error::{Error, Site};
 use super::runge_kutta::Rates;
-use super::simulation::{Simulation, State};
+use super::simulation::{SHORT_LIFE, Simulation, State};
 use super::system::{Joining, System};
 use super::watch::Change;
 use crate::expr::Dual;
@@ -383,7 +383,7 @@ impl Simulation<'_> {
         // A life about as short as the resolution of time, at the end of a line of lives: what comes first at its
         // end can no longer be told.
         let age = self.now.since(self.tree.birth(id));
-        if age > 0.0 && age <= 8.0 * self.now.resolution() && self.tree.lineage(id).generation > 16 {
+        if age > 0.0 && age <= SHORT_LIFE * self.now.resolution() && self.tree.lineage(id).generation > 4 {
             return Error::Zeno { site };
         }
         if chattering {

@@ -64,7 +64,7 @@ pub struct Simulation<'m> {
     /// The first stage of the next step is known.
     rate_is_known: bool,
     step: Option<Step>,
-    /// Events in a row between which time did not go on.
+    /// Events in a row of modules that hardly lived.
     stalled: usize,
     /// Rounds of productions at the present instant.
     pub(super) rounds: usize,
@@ -80,8 +80,10 @@ const EASY: f64 = 1e-3;
 /// How far ahead, in units of the time to the last event, such steps look.
 const FORESIGHT: f64 = 1e3;
 
-/// Instants in a row without progress of time after which events are said to pile up.
-const MAX_STALLED: usize = 1000;
+/// Events in a row of modules that lived no longer than this many resolutions of time, after which events
+/// are said to pile up.
+const MAX_STALLED: usize = 100;
+pub(super) const SHORT_LIFE: f64 = 64.0;
 
 /// So many steps must bring time on by more than this part of it, or there is a singularity.
 const MANY_STEPS: usize = 10_000;
@@ -234,7 +236,9 @@ impl<'m> Simulation<'m> {
     fn pass_event(&mut self, position: f64, when: Instant) -> Result<(), Error> {
         let Step { dense, found } = self.step.take().expect("a step was made");
         self.keep_signs(&found);
-        self.stalled = if when.since(self.now) <= when.resolution() { self.stalled + 1 } else { 0 };
+        // A life about as short as the resolution of time, after a life as short, after another …
+        let age = when.since(self.tree.birth(found.touched[0].id));
+        self.stalled = if age <= SHORT_LIFE * when.resolution() { self.stalled + 1 } else { 0 };
         self.now = when;
         // A step that could be as long as one likes says nothing about the next; life does.
         if self.last_error <= EASY {

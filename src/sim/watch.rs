@@ -15,7 +15,7 @@ use crate::structure::{Instant, ModuleId};
 const TOUCH: f64 = 256.0 * f64::EPSILON;
 
 /// Most changes of a module's signs that are followed within one step.
-const MAX_ROUNDS: usize = 1000;
+const MAX_ROUNDS: usize = 50;
 
 /// A sign that changes during the step.
 #[derive(Clone, Copy, Debug)]

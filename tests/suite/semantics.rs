@@ -66,6 +66,14 @@ fn touching_counts_once_and_nearly_touching_does_not() {
     assert_eq!(show(&touched[0]), "A(0.99, 0.2) N(0.9)");
     let (name, parameters) = &touched[1][0];
     assert!(name == "B" && (parameters[0] - 2.0).abs() < 1e-6, "{touched:?}");
+    // However the double root is written.
+    for condition in
+        ["(x - 1)^2 = 0", "(x - 1)*(x - 1) = 0", "-(x - 1)^2 >= 0", "x*x - 2x + 1 = 0", "x*(2 - x) = 1"]
+    {
+        let text = format!("initial string: A(0)\nA(x):\n solve dx/dt = 1\n if {condition} produce B(t)");
+        let t = time_of_event(&text, 2.0).unwrap_or_else(|| panic!("{condition}"));
+        assert!((t - 1.0).abs() < 1e-6, "{condition}: {t}");
+    }
     // B03: a gap of 2^-40 is a gap.
     assert_eq!(
         show(&run(&graze("1 + 2^-40"), Settings::default(), &[2.0]).expect("runs")[0]),
@@ -159,6 +167,13 @@ fn events_that_pile_up_are_an_error_at_the_right_time() {
     }
     // F02: a ball that loses half its speed at each bounce.
     let ball = "initial string: B(10, 0)\nB(x, v):\n if x > 0 solve dx/dt = v, dv/dt = -9.81\n if x = 0 & v < 0 produce B(0, -v/2)";
+    for (restitution, end) in [(0.05, 1.578_142_399_0), (0.9, 27.129_019_335_6), (0.99, 284.140_781_461)] {
+        let text = ball.replace("-v/2", &format!("-{restitution}*v"));
+        match fails(&text, 400.0) {
+            Error::Zeno { site } => assert!((site.time - end).abs() < 1e-8, "{site:?}"),
+            other => panic!("{other}"),
+        }
+    }
     match fails(ball, 5.0) {
         Error::Zeno { site } => assert!((site.time - 4.283_529_368_781_193).abs() < 1e-6, "{site:?}"),
         other => panic!("{other}"),
@@ -353,7 +368,7 @@ fn a_limit_is_one_however_it_is_written_and_what_is_just_below_is_none() {
 
 #[test]
 fn growth_from_very_little_is_known_to_its_own_digits() {
-    for (start, t) in [(1e-6, 13.8155), (1e-9, 20.723)] {
+    for (start, t) in [(1e-6, 13.8155), (1e-9, 20.723), (1e-15, 34.538)] {
         for tolerance in [1e-4, 1e-6, 1e-10] {
             let text = format!("initial string: A({start})\nA(x): solve dx/dt = x");
             let settings = Settings { tolerance, ..Settings::default() };
