@@ -9,11 +9,11 @@
 //!                    at(t): the dense output, written out in string order
 //! ```
 //!
-//! - [`simulation`]: the clock; what a caller uses is [`Simulation`].
-//! - [`settle`]: what happens at one instant; [`lookup`]: rules and contexts.
-//! - [`system`]: the equations between two instants.
-//! - [`runge_kutta`], [`dense`]: one step, and the solution inside it.
-//! - [`watch`], [`roots`]: the search of a step for the first event.
+//! - `simulation`: the clock; what a caller uses is [`Simulation`].
+//! - `settle`: what happens at one instant; `lookup`: rules and contexts.
+//! - `system`: the equations between two instants.
+//! - `runge_kutta`, `dense`: one step, and the solution inside it.
+//! - `watch`, `roots`: the search of a step for the first event.
 //!
 //! Equations are integrated as if their `if`s did not exist: within a step every condition inside them is
 //! frozen, and its change is an event that cuts the step. So the methods keep their order at the end of a
