@@ -29,6 +29,8 @@ pub enum Error {
          choose another directory, or --force to write beside them", .directory.display()
     )]
     Foreign { directory: PathBuf, file: String },
+    #[error("{} is not of an earlier render and is not overwritten; choose another directory", .0.display())]
+    Taken(PathBuf),
     #[error("{} is not a directory; choose another name", .0.display())]
     NotADirectory(PathBuf),
     #[error("`{0}` cannot be the name of a file of a render")]
@@ -47,6 +49,8 @@ pub struct FrameDirectory {
     path: PathBuf,
     /// Files of earlier renders that are still there.
     earlier: BTreeSet<String>,
+    /// Files that are not ours and stay as they are.
+    foreign: BTreeSet<String>,
     /// Files of this render, in the order of writing.
     written: Vec<String>,
     journal: fs::File,
@@ -54,7 +58,7 @@ pub struct FrameDirectory {
 
 impl FrameDirectory {
     /// Makes the directory, or takes over that of an earlier render. With `force`, also one that holds
-    /// other files, which stay unless a frame has the same name.
+    /// other files, which stay as they are: a frame that would have the name of one is an error.
     ///
     /// # Errors
     /// If the directory holds files that no earlier render made, or cannot be written to.
@@ -89,7 +93,8 @@ impl FrameDirectory {
         let journal = path.join(JOURNAL);
         let journal =
             fs::OpenOptions::new().append(true).open(&journal).map_err(io_error("open", &journal))?;
-        Ok(FrameDirectory { path: path.to_owned(), earlier, written: Vec::new(), journal })
+        let foreign = present.iter().filter(foreign).cloned().collect();
+        Ok(FrameDirectory { path: path.to_owned(), earlier, foreign, written: Vec::new(), journal })
     }
 
     /// Name of a frame: `frame-0000.svg`. All frames of a render of `count` have the same number of digits,
@@ -106,6 +111,9 @@ impl FrameDirectory {
     pub fn write(&mut self, name: &str, bytes: &[u8]) -> Result<(), Error> {
         if !is_plain(name) || name == MANIFEST {
             return Err(Error::Name(name.to_owned()));
+        }
+        if self.foreign.contains(name) {
+            return Err(Error::Taken(self.path.join(name)));
         }
         let journal = self.path.join(JOURNAL);
         self.journal.write_all(format!("{name}\n").as_bytes()).map_err(io_error("write", &journal))?;

@@ -266,7 +266,9 @@ impl Scanner<'_> {
                 return Some(kind);
             }
         }
-        if colon {
+        // A clause with a colon too many is still a clause.
+        let clause = matches!(word, "if" | "solve" | "produce") && !self.items.is_empty();
+        if colon && !clause {
             return Some(ItemKind::Rule);
         }
         let Some(current) = self.items.last() else { return Some(ItemKind::Unknown) };

@@ -180,6 +180,14 @@ fn other_peoples_files_are_left_alone() {
     assert_eq!(files(folder.path()), ["thesis.txt"]);
     good(&["render", "tests/paper-models/leaf.dls", "--at", "0", "-o", path, "--force"]);
     assert_eq!(std::fs::read_to_string(folder.path().join("thesis.txt")).expect("there"), "years of work");
+
+    // Not even one that has the name of a frame.
+    let folder = tempfile::tempdir().expect("a folder");
+    let drawing = folder.path().join("frame-0000.svg");
+    std::fs::write(&drawing, "my own").expect("written");
+    let path = folder.path().to_str().expect("UTF-8");
+    let (status, _) = bad(&["render", "tests/paper-models/leaf.dls", "--at", "0", "-o", path, "--force"]);
+    assert_eq!((status, std::fs::read_to_string(&drawing).expect("there").as_str()), (2, "my own"));
 }
 
 #[test]

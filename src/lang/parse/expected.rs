@@ -178,6 +178,9 @@ fn hint_by_symbol(item: Rule, text: &str, at: usize, found: &str) -> Option<Stri
         (_, "=") if in_rule && before.ends_with(|c: char| c.is_alphanumeric()) => {
             "an equation is written `dx/dt = …`"
         }
+        (_, ":") if in_rule && last_keyword(before) == Some("if") => {
+            "a condition has no `:` behind it: `if x < 1 solve …`"
+        }
         (_, ":") if in_rule && before.contains(':') => "a new rule begins on a line of its own",
         _ => return None,
     };
@@ -248,6 +251,12 @@ fn hint_by_word(item: Rule, text: &str, at: usize, found: &str) -> Option<String
         _ => return None,
     };
     Some(advice.to_owned())
+}
+
+/// The clause keyword that stands last in a text.
+fn last_keyword(text: &str) -> Option<&str> {
+    let words = text.rsplit(|c: char| !(c.is_alphanumeric() || c == '_'));
+    words.into_iter().find(|word| matches!(*word, "if" | "solve" | "produce"))
 }
 
 /// Whether a text begins with something like `dx/dt`.
