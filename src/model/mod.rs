@@ -39,6 +39,22 @@ pub struct Model {
     pub interpretations: Vec<Interpretation>,
 }
 
+impl Default for Model {
+    /// The empty model: no modules, turns of 90 degrees.
+    fn default() -> Model {
+        Model {
+            title: None,
+            angle: 90.0,
+            frames: None,
+            parameters: Vec::new(),
+            kinds: Kinds::default(),
+            axiom: Successor::default(),
+            rules: Vec::new(),
+            interpretations: Vec::new(),
+        }
+    }
+}
+
 /// Equidistant observation times: `from + i * step` while not beyond `to`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frames {

@@ -3,21 +3,8 @@
 use super::*;
 use crate::diagnostic::Span;
 use crate::expr::{Binary, Graph, NodeId, Program};
-use crate::model::{Interpretation, Kinds, Successor};
+use crate::model::{Interpretation, Successor};
 use crate::scene::{MaterialId, Point, Vector, Width};
-
-fn empty_model() -> Model {
-    Model {
-        title: None,
-        angle: 90.0,
-        frames: None,
-        parameters: Vec::new(),
-        kinds: Kinds::default(),
-        axiom: Successor::default(),
-        rules: Vec::new(),
-        interpretations: Vec::new(),
-    }
-}
 
 /// Modules by name and parameters.
 fn string(model: &mut Model, modules: &[(&str, &[f64])]) -> ModuleString {
@@ -30,7 +17,7 @@ fn string(model: &mut Model, modules: &[(&str, &[f64])]) -> ModuleString {
 }
 
 fn drawn(modules: &[(&str, &[f64])]) -> Scene {
-    let mut model = empty_model();
+    let mut model = Model::default();
     let string = string(&mut model, modules);
     let mut scene = Scene::default();
     draw(&model, &string, &mut scene).expect("drawable");
@@ -110,7 +97,7 @@ fn surfaces_stand_where_the_turtle_is() {
 
 #[test]
 fn parameters_that_are_no_numbers_are_errors() {
-    let mut model = empty_model();
+    let mut model = Model::default();
     let bad = string(&mut model, &[("F", &[1.0]), ("+_a", &[f64::NAN])]);
     let error = draw(&model, &bad, &mut Scene::default()).unwrap_err();
     assert_eq!(error.to_string(), "cannot draw `+_a` (module 2): its parameter is NaN");
@@ -139,7 +126,7 @@ fn interpret(
 
 #[test]
 fn interpretations_replace_and_nest() {
-    let mut model = empty_model();
+    let mut model = Model::default();
     // A(x): + B(2x) ;  B(x): F(x + t + age)
     interpret(&mut model, "A", &[("+", 0), ("B", 1), (".", 0)], |g, [x, _, _]| {
         let two = g.constant(2.0);
@@ -162,7 +149,7 @@ fn interpretations_replace_and_nest() {
 
 #[test]
 fn interpretations_that_explode_are_stopped() {
-    let mut model = empty_model();
+    let mut model = Model::default();
     // 40 levels, each twice the next: 2^40 modules.
     for level in 0..40 {
         let (name, next) = (format!("A{level}"), format!("A{}", level + 1));
@@ -170,7 +157,7 @@ fn interpretations_that_explode_are_stopped() {
     }
     let wide = string(&mut model, &[("A0", &[1.0])]);
     assert!(matches!(draw(&model, &wide, &mut Scene::default()), Err(Error::TooMany { .. })));
-    let mut model = empty_model();
+    let mut model = Model::default();
     for level in 0..101 {
         let (name, next) = (format!("A{level}"), format!("A{}", level + 1));
         interpret(&mut model, &name, &[(&next, 1)], |_, [x, _, _]| vec![x]);
@@ -183,8 +170,7 @@ fn interpretations_that_explode_are_stopped() {
 /// and the distance from end to end stays 1.
 #[test]
 fn a_dragon_keeps_its_ends_one_apart() {
-    let mut model = empty_model();
-    model.angle = 45.0;
+    let mut model = Model { angle: 45.0, ..Model::default() };
     let [plus, minus] = ["+", "-"].map(|name| model.kinds.intern(name, 0));
     let [right, left] = ["F_r", "F_l"].map(|name| model.kinds.intern(name, 1));
     let mut kinds = vec![minus, minus, right];
@@ -211,7 +197,7 @@ fn a_dragon_keeps_its_ends_one_apart() {
 
 #[test]
 fn a_million_small_steps_end_where_one_large_step_does() {
-    let mut model = empty_model();
+    let mut model = Model::default();
     let modules = vec![("F", &[0.1][..]); 1_000_000];
     let string = string(&mut model, &modules);
     let mut scene = Scene::default();

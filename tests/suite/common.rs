@@ -1,22 +1,13 @@
 //! What several tests need: scenes from strings written by hand, and models that are run.
 
-use dlsys::model::{Kinds, Model, Successor};
+use dlsys::model::Model;
 use dlsys::scene::Scene;
 use dlsys::structure::{Lineage, ModuleString};
 use dlsys::turtle;
 
 /// What the turtle draws for a string; the angle of a turn without a parameter is 45 degrees.
 pub fn scene(text: &str) -> Scene {
-    let mut model = Model {
-        title: None,
-        angle: 45.0,
-        frames: None,
-        parameters: Vec::new(),
-        kinds: Kinds::default(),
-        axiom: Successor::default(),
-        rules: Vec::new(),
-        interpretations: Vec::new(),
-    };
+    let mut model = Model { angle: 45.0, ..Model::default() };
     let string = modules(&mut model, text);
     let mut scene = Scene::default();
     turtle::draw(&model, &string, &mut scene).expect("drawable");
