@@ -21,6 +21,7 @@
 
 mod dense;
 mod error;
+mod event;
 mod lookup;
 mod roots;
 mod runge_kutta;
@@ -30,12 +31,15 @@ mod system;
 mod watch;
 
 pub use error::{Error, Site};
+pub use event::Event;
 pub use settle::MAX_ROUNDS;
 pub use simulation::{Simulation, brief, describe};
 
 /// How equations are integrated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
+    /// The exact solution where there is one, otherwise the method that suits the equations.
+    Auto,
     /// Forward Euler with a fixed step: order 1. What the paper's authors used (section 8).
     Euler,
     /// The classical Runge-Kutta method with a fixed step: order 4.
@@ -47,7 +51,7 @@ pub enum Method {
 impl Method {
     /// Methods by the names they have on the command line.
     pub const NAMED: [(&'static str, Method); 4] = [
-        ("auto", Method::Dopri5),
+        ("auto", Method::Auto),
         ("dopri5", Method::Dopri5),
         ("rk4", Method::Rk4),
         ("euler", Method::Euler),
@@ -55,7 +59,7 @@ impl Method {
 
     /// True if the method needs a step size and ignores the tolerance.
     pub fn is_fixed_step(self) -> bool {
-        self != Method::Dopri5
+        matches!(self, Method::Euler | Method::Rk4)
     }
 }
 
@@ -73,7 +77,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Settings {
-        Settings { method: Method::Dopri5, tolerance: 1e-6, step_size: 0.01, max_modules: 10_000_000 }
+        Settings { method: Method::Auto, tolerance: 1e-6, step_size: 0.01, max_modules: 10_000_000 }
     }
 }
 

@@ -96,7 +96,7 @@ impl Workspace {
                 system.rates(h, &self.end, &mut self.k[4]);
                 (self.finite(0.0, 0.0), 4)
             }
-            Method::Dopri5 => {
+            Method::Dopri5 | Method::Auto => {
                 for i in 1..7 {
                     for (j, s) in self.stage.iter_mut().enumerate() {
                         let mut sum = 0.0;
@@ -147,7 +147,7 @@ impl Workspace {
                 Method::Rk4 => {
                     c.extend([a, a + h / 3.0 * self.k[0][j], b - h / 3.0 * self.k[4][j], b]);
                 }
-                Method::Dopri5 => {
+                Method::Dopri5 | Method::Auto => {
                     // y(s) = a + s r2 + s(1-s) r3 + s²(1-s) r4 + s²(1-s)² r5, turned into Bernstein form.
                     let r2 = b - a;
                     let r3 = h * self.k[0][j] - r2;

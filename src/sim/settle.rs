@@ -12,6 +12,7 @@
 //! any was replaced; then the string is examined again at the same instant, until nothing holds.
 
 use super::error::{Error, Site};
+use super::event::Event;
 use super::runge_kutta::Rates;
 use super::simulation::{SHORT_LIFE, Simulation, State};
 use super::system::{Joining, System};
@@ -69,6 +70,7 @@ impl Simulation<'_> {
         let mut rounds = 0;
         let mut grown = self.ruled_is_stale;
         let mut hurried = false;
+        self.group += 1;
         loop {
             if std::mem::take(&mut grown) {
                 self.look_up(&mut open);
@@ -351,6 +353,7 @@ impl Simulation<'_> {
             }
             arguments.push(out);
         }
+        self.record(firing);
         let mut made = Vec::new();
         for (fire, arguments) in firing.iter().zip(&arguments) {
             let site = |me: &Self| me.site(fire, me.now.to_f64());
@@ -375,6 +378,33 @@ impl Simulation<'_> {
         self.stats.events += firing.len() as u64;
         self.stats.peak_modules = self.stats.peak_modules.max(self.tree.len() as u64);
         Ok(())
+    }
+
+    /// Writes productions that are about to take place into the log.
+    fn record(&mut self, firing: &[Firing]) {
+        let Some(mut log) = self.log.take() else { return };
+        for fire in firing {
+            let state = self.states[fire.id.slot()].as_ref().expect("fires");
+            let rule = &self.model.rules[fire.rule];
+            let mut sides = vec![0.0; rule.sides.outputs()];
+            rule.sides.eval(&self.values(fire.id, &state.context), &mut Vec::new(), &mut sides);
+            let residual = (rule.produces[fire.produce].guard.atoms())
+                .filter(|(atom, comparison)| {
+                    *comparison == crate::model::Comparison::Equal || state.signs[*atom] == Sign::Zero
+                })
+                .map(|(atom, _)| (sides[2 * atom] - sides[2 * atom + 1]).abs())
+                .fold(0.0, f64::max);
+            log.push(Event {
+                time: self.now.to_f64(),
+                lineage: self.tree.lineage(fire.id),
+                kind: self.tree.kind(fire.id),
+                rule: fire.rule,
+                clause: fire.produce,
+                residual,
+                group: self.group,
+            });
+        }
+        self.log = Some(log);
     }
 
     fn no_equations(&self, id: ModuleId, rule: usize, chattering: bool, signs: &[Sign]) -> Error {

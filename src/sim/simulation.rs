@@ -2,6 +2,7 @@
 
 use super::dense::Dense;
 use super::error::{Error, Site};
+use super::event::Event;
 use super::runge_kutta::{Rates, Trial, Workspace};
 use super::settle::Open;
 use super::system::System;
@@ -72,6 +73,10 @@ pub struct Simulation<'m> {
     mark: Instant,
     since_mark: usize,
     pub(super) stats: Stats,
+    /// Productions since they were last taken, if they are recorded.
+    pub(super) log: Option<Vec<Event>>,
+    /// Number of the present instant in the log.
+    pub(super) group: u64,
     fault: Option<Error>,
 }
 
@@ -116,6 +121,8 @@ impl<'m> Simulation<'m> {
             since_mark: 0,
             rounds: 0,
             stats: Stats::default(),
+            log: Some(Vec::new()),
+            group: 0,
             fault: None,
             settings,
         };
@@ -152,6 +159,17 @@ impl<'m> Simulation<'m> {
     /// Work done so far.
     pub fn stats(&self) -> Stats {
         Stats { modules: self.tree.len() as u64, ..self.stats }
+    }
+
+    /// Forgets the productions so far and records none from now on: they take memory.
+    pub fn without_log(mut self) -> Simulation<'m> {
+        self.log = None;
+        self
+    }
+
+    /// The productions since the last call, in the order of time.
+    pub fn take_events(&mut self) -> Vec<Event> {
+        self.log.as_mut().map(std::mem::take).unwrap_or_default()
     }
 
     /// Writes the structure at time `t` into `out`. Times must not decrease from call to call.
@@ -465,7 +483,7 @@ impl Method {
         match self {
             Method::Euler => 1,
             Method::Rk4 => 5,
-            Method::Dopri5 => 7,
+            Method::Dopri5 | Method::Auto => 7,
         }
     }
 
@@ -473,7 +491,7 @@ impl Method {
         match self {
             Method::Euler => 1,
             Method::Rk4 => 3,
-            Method::Dopri5 => 4,
+            Method::Dopri5 | Method::Auto => 4,
         }
     }
 }
