@@ -110,6 +110,7 @@ impl Run {
             tolerance: args.tolerance,
             step_size: args.step_size.unwrap_or(defaults.step_size),
             max_modules: args.max_modules,
+            ..defaults
         };
         let clock = Clock { parse: before.elapsed(), ..Clock::default() };
         Ok(Run { session, times, settings, clock })

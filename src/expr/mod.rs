@@ -20,10 +20,12 @@
 //! assert_eq!(program.eval_one(&[3.0]), 1.5);
 //! ```
 
+mod derivative;
 mod dual;
 mod graph;
 mod interval;
 mod ops;
+mod polynomial;
 mod program;
 #[cfg(test)]
 mod tests;
@@ -32,4 +34,5 @@ pub use dual::Dual;
 pub use graph::{Graph, Node, NodeId};
 pub use interval::Interval;
 pub use ops::{Binary, Unary, Value};
+pub use polynomial::{Monomial, Polynomial};
 pub use program::{Program, Scratch};

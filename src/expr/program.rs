@@ -91,6 +91,25 @@ impl Program {
         self.outputs.len()
     }
 
+    /// The variables that it reads, ascending.
+    pub fn reads(&self) -> Vec<usize> {
+        let mut all: Vec<usize> = (self.code.iter())
+            .flat_map(|instruction| match *instruction {
+                Instruction::Const(..) => [None; 3],
+                Instruction::Unary(_, _, a) => [Some(a), None, None],
+                Instruction::Binary(_, _, a, b) => [Some(a), Some(b), None],
+                Instruction::Select(_, c, a, b) => [Some(c), Some(a), Some(b)],
+            })
+            .flatten()
+            .chain(self.outputs.iter().copied())
+            .map(|register| register as usize)
+            .filter(|register| *register < self.variables)
+            .collect();
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
+
     /// Evaluates all roots, in the order in which they were compiled.
     ///
     /// `variables` gives the variables from 0 on; `out` takes as many values as there are roots.

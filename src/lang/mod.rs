@@ -23,7 +23,7 @@ pub use layout::MAX_DEPTH;
 pub use suggest::did_you_mean;
 
 use crate::diagnostic::{Diagnostic, Severity, Source, Span};
-use crate::model::{Frames, Kinds, Model, Successor};
+use crate::model::{Frames, Kinds, Model, Successor, analyse};
 use ast::{Action, Document, Item};
 use scope::{Scope, Variables};
 
@@ -65,7 +65,8 @@ fn build(document: &Document, settings: &[Setting], scope: &mut Scope, unread: b
     let mut single = Singles::default();
     let mut builder =
         rules::RuleBuilder { document, scope, kinds: &mut kinds, occurs: std::collections::HashMap::new() };
-    let (mut rules, mut written, mut interpretations, mut strings) = (vec![], vec![], vec![], vec![]);
+    let (mut rules, mut drafts, mut written) = (vec![], vec![], vec![]);
+    let (mut interpretations, mut strings) = (vec![], vec![]);
     let mut heads = Vec::new();
     let (mut axiom, mut ignored, mut considered) = (None, Vec::new(), Vec::new());
     let (mut title, mut angle, mut frames) = (None, 90.0, None);
@@ -115,7 +116,10 @@ fn build(document: &Document, settings: &[Setting], scope: &mut Scope, unread: b
                 }
                 written.push(rule);
                 match builder.rule(rule) {
-                    Some(compiled) => rules.push(compiled),
+                    Some((compiled, draft)) => {
+                        rules.push(compiled);
+                        drafts.push(draft);
+                    }
                     None => whole = false,
                 }
             }
@@ -148,6 +152,7 @@ fn build(document: &Document, settings: &[Setting], scope: &mut Scope, unread: b
         axiom: axiom.unwrap_or_else(Successor::default),
         rules,
         interpretations: Vec::new(),
+        drawn_only: Vec::new(),
     };
     for (i, rule) in written.iter().enumerate() {
         let names: &[&str] = match &*rule.predecessor.name.text {
@@ -178,6 +183,7 @@ fn build(document: &Document, settings: &[Setting], scope: &mut Scope, unread: b
     }
     check::coverage(&model, diagnostics);
     check::inert_modules(&model, &occurs, diagnostics);
+    analyse(&mut scope.graph, &mut model, &drafts);
     Some(model)
 }
 

@@ -10,8 +10,8 @@ use super::suggest::did_you_mean;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::expr::{Binary, Node, NodeId, Program, Unary};
 use crate::model::{
-    Class, Comparison, Condition, Interpretation, KindId, Kinds, Pattern, Produce, Rule, Solve, Step,
-    Successor, Switch, class_of, never_reached,
+    Class, Comparison, Condition, Draft, Interpretation, Jacobian, KindId, Kinds, Pattern, Produce, Rule,
+    Solve, Step, Successor, Switch, class_of, never_reached,
 };
 
 /// Longest condition, in comparisons and connectives, after functions are put in.
@@ -193,7 +193,7 @@ impl RuleBuilder<'_> {
     }
 
     /// A rule, and the kinds it is for. `PatternNames` are matched to kinds once all kinds are known.
-    pub fn rule(&mut self, rule: &ast::Rule) -> Option<Rule> {
+    pub fn rule(&mut self, rule: &ast::Rule) -> Option<(Rule, Draft)> {
         let mut good = self.not_a_bracket(&rule.predecessor);
         for context in rule.left.iter().chain(&rule.right) {
             good &= self.not_a_bracket(context);
@@ -248,6 +248,7 @@ impl RuleBuilder<'_> {
             return None;
         }
         let context = count - own - 2;
+        let mut draft = Draft { rates: Vec::new(), sides: atoms.sides.clone() };
         let solves = drafts
             .into_iter()
             .map(|(guard, span, rates, switches)| {
@@ -256,6 +257,7 @@ impl RuleBuilder<'_> {
                     .map(|&sides| never_reached(&self.scope.graph, sides, &rates, own, context, total))
                     .collect();
                 let roots: Vec<NodeId> = rates.iter().map(|(_, node)| *node).collect();
+                draft.rates.push(rates.clone());
                 Solve {
                     guard,
                     span,
@@ -263,15 +265,24 @@ impl RuleBuilder<'_> {
                     rates: Program::compile(&self.scope.graph, &roots, total),
                     switches,
                     unreachable,
+                    // The analysis of the whole model fills in the rest.
+                    laws: Vec::new(),
+                    numeric: Vec::new(),
+                    numeric_rates: Program::default(),
+                    linear: None,
+                    jacobian: Jacobian::default(),
+                    watch: Vec::new(),
                 }
             })
             .collect();
         let sides: Vec<NodeId> = atoms.sides.iter().flat_map(|(a, b)| [*a, *b]).collect();
         let pattern = |m: &HeadModule| Pattern { kinds: Vec::new(), arity: m.parameters.len() };
-        Some(Rule {
+        let names = |m: &HeadModule| m.parameters.iter().map(|p| p.text.to_string()).collect::<Vec<_>>();
+        let compiled = Rule {
             label: print::head(rule),
             span: rule.head,
-            parameters: rule.predecessor.parameters.iter().map(|p| p.text.to_string()).collect(),
+            parameters: names(&rule.predecessor),
+            context_names: rule.left.iter().chain(&rule.right).flat_map(names).collect(),
             left: rule.left.iter().map(pattern).collect(),
             right: rule.right.iter().map(pattern).collect(),
             variables: count,
@@ -280,7 +291,11 @@ impl RuleBuilder<'_> {
             boundaries: atoms.boundaries,
             solves,
             produces,
-        })
+            moving_context: Vec::new(),
+            reads_context: false,
+            watch_at_rest: Vec::new(),
+        };
+        Some((compiled, draft))
     }
 
     /// The derivatives of a `solve`, by parameter; those that are the constant 0 are left out.

@@ -6,17 +6,22 @@
 //!
 //! - [`Kind`]: a module's name and number of parameters. `F(x)` and `F(x, y)` are two kinds.
 //! - [`Rule`]: what the text writes under one head: context, equations, productions.
+//! - [`Law`], [`Watch`]: how much work an equation or a comparison is; found by [`analyse`].
 //! - [`Condition`]: the logic of an `if`, over the signs of differences, because the simulation knows
 //!   better than a comparison of two rounded numbers whether two sides have met.
 
+mod analysis;
 mod condition;
 mod invariance;
 mod kind;
+mod law;
 mod rule;
 
+pub use analysis::{Draft, analyse};
 pub use condition::{Comparison, Condition, Sign, Step, Truth};
 pub use invariance::never_reached;
 pub use kind::{BUILT_IN_SURFACES, Class, DRAWN_WORDS, Kind, KindId, Kinds, base_of, class_of};
+pub use law::{Jacobian, Law, Linear, Numeric, Watch};
 pub use rule::{Interpretation, Pattern, Produce, Rule, Solve, Successor, Switch};
 
 use crate::diagnostic::Span;
@@ -37,6 +42,15 @@ pub struct Model {
     pub axiom: Successor,
     pub rules: Vec<Rule>,
     pub interpretations: Vec<Interpretation>,
+    /// Per kind and parameter: no rule reads it, so that only drawing and output do.
+    pub drawn_only: Vec<Vec<bool>>,
+}
+
+impl Model {
+    /// True if every parameter of every rule follows a formula: nothing is ever integrated numerically.
+    pub fn is_closed_form(&self) -> bool {
+        self.rules.iter().flat_map(|r| &r.solves).flat_map(|s| &s.laws).all(Law::is_closed)
+    }
 }
 
 impl Default for Model {
@@ -51,6 +65,7 @@ impl Default for Model {
             axiom: Successor::default(),
             rules: Vec::new(),
             interpretations: Vec::new(),
+            drawn_only: Vec::new(),
         }
     }
 }

@@ -6,7 +6,7 @@
 //! predecessor; the parameters of the context modules, left to right as written; `t`; `age`; then one
 //! truth value for each [`Switch`].
 
-use super::{Condition, KindId};
+use super::{Condition, Jacobian, KindId, Law, Linear, Watch};
 use crate::diagnostic::Span;
 use crate::expr::{Program, Scratch, Value};
 
@@ -18,6 +18,8 @@ pub struct Rule {
     pub span: Span,
     /// Names of the strict predecessor's parameters.
     pub parameters: Vec<String>,
+    /// Names of the context's parameters, in the order of the variables.
+    pub context_names: Vec<String>,
     /// Left context in reading order: the last one is the nearest.
     pub left: Vec<Pattern>,
     /// Right context in reading order: the first one is the nearest.
@@ -34,9 +36,20 @@ pub struct Rule {
     pub solves: Vec<Solve>,
     /// In the order written: of those that hold at one instant, the first wins.
     pub produces: Vec<Produce>,
+    /// Variables of the context for which some rule has an equation.
+    pub moving_context: Vec<usize>,
+    /// Rates or conditions read some of them.
+    pub reads_context: bool,
+    /// How each atom is watched while no clause is active; the clauses say it for themselves.
+    pub watch_at_rest: Vec<Watch>,
 }
 
 impl Rule {
+    /// How each atom is watched under a clause.
+    pub fn watch(&self, solve: Option<usize>) -> &[Watch] {
+        solve.map_or(&self.watch_at_rest, |s| &self.solves[s].watch)
+    }
+
     /// Index of the variable `t`; `age` is the next one.
     pub fn time_variable(&self) -> usize {
         self.variables - 2
@@ -73,6 +86,17 @@ pub struct Solve {
     /// Atoms that the flow of these equations cannot bring to zero, because the surface on which they
     /// are zero is invariant: a logistic growth and its own limit. One per atom of the rule.
     pub unreachable: Vec<bool>,
+    /// How each equation is solved, in the order of `of`.
+    pub laws: Vec<Law>,
+    /// Positions in `of` of the equations that are integrated numerically.
+    pub numeric: Vec<usize>,
+    /// Their rates.
+    pub numeric_rates: Program,
+    /// Their rates once more, if all are linear.
+    pub linear: Option<Linear>,
+    /// Derivatives of all rates.
+    pub jacobian: Jacobian,
+    pub watch: Vec<Watch>,
 }
 
 /// A condition inside an equation, replaced there by a variable, so that the equation is smooth between

@@ -8,13 +8,14 @@ use crate::expr::{Dual, Interval, Value};
 use crate::structure::Instant;
 
 /// Highest degree of a dense output.
-pub const MAX_DEGREE: usize = 4;
+pub const MAX_DEGREE: usize = 8;
 type Coefficients = [f64; MAX_DEGREE + 1];
 
 /// All components of the solution from `start` to `start + h`.
 #[derive(Clone, Debug)]
 pub struct Dense {
     pub start: Instant,
+    pub end: Instant,
     /// Length of the step.
     pub h: f64,
     degree: usize,
@@ -23,24 +24,15 @@ pub struct Dense {
 }
 
 impl Dense {
-    pub fn new(start: Instant, h: f64, degree: usize, coefficients: Vec<f64>) -> Dense {
+    /// A step to `end`, if that is known better than as `start` and `h`.
+    pub fn new(start: Instant, end: Option<Instant>, h: f64, degree: usize, coefficients: Vec<f64>) -> Dense {
         debug_assert!(degree <= MAX_DEGREE);
-        Dense { start, h, degree, coefficients }
+        Dense { start, end: end.unwrap_or_else(|| start.after(h)), h, degree, coefficients }
     }
 
     /// Position of an instant in the step: 0 at its start, 1 at its end.
     pub fn position(&self, at: Instant) -> f64 {
         if self.h == 0.0 { 0.0 } else { (at.since(self.start) / self.h).clamp(0.0, 1.0) }
-    }
-
-    /// The last position that is the same instant as this one.
-    pub fn together(&self, position: f64) -> f64 {
-        position + self.start.after(position * self.h).resolution() / self.h
-    }
-
-    /// As [`Dense::together`], on a clock that shows `age` at the start of the step.
-    pub fn together_by(&self, position: f64, age: f64) -> f64 {
-        position + Instant::new(age + position * self.h).resolution() / self.h
     }
 
     fn of(&self, component: usize) -> &[f64] {
@@ -131,7 +123,7 @@ mod tests {
         ) {
             let (lo, hi) = (a, (a + w).min(1.0));
             prop_assume!(hi - lo > 1e-3);
-            let dense = Dense::new(Instant::ZERO, 1.0, 4, c);
+            let dense = Dense::new(Instant::ZERO, None, 1.0, 4, c);
             let at = lo + s * (hi - lo);
             let piece = dense.piece(0, lo, hi);
             let value = dense.value(0, at);
@@ -144,7 +136,7 @@ mod tests {
 
         #[test]
         fn ends_are_exact(c in proptest::collection::vec(-1e9..1e9f64, 5)) {
-            let dense = Dense::new(Instant::ZERO, 1.0, 4, c.clone());
+            let dense = Dense::new(Instant::ZERO, None, 1.0, 4, c.clone());
             prop_assert_eq!(dense.value(0, 0.0), c[0]);
             prop_assert_eq!(dense.value(0, 1.0), c[4]);
         }

@@ -3,8 +3,10 @@
 //! The first rule whose context is present applies, looked up again whenever the structure has changed
 //! (LANGUAGE, "Rules").
 
-use super::settle::Open;
-use super::simulation::{Simulation, State};
+use smallvec::SmallVec;
+
+use super::simulation::Simulation;
+use super::state::{Signs, State};
 use crate::model::{Rule, Sign};
 use crate::structure::{ModuleId, Visit};
 
@@ -12,69 +14,108 @@ use crate::structure::{ModuleId, Visit};
 const EQUAL: f64 = 8.0 * f64::EPSILON;
 
 impl Simulation<'_> {
-    /// Finds each module's rule and context; opens those for which they are new.
-    pub(super) fn look_up(&mut self, open: &mut [Option<Open>]) {
-        let rules = &self.model.rules;
-        let kinds = &self.model.kinds;
-        self.ruled.clear();
-        self.ruled.extend(self.tree.walk().filter_map(|visit| match visit {
-            Visit::Module(id) if !kinds.get(self.tree.kind(id)).rules.is_empty() => Some(id),
+    /// Finds the rule and context of every module for which they may be new, and opens it if they are.
+    pub(super) fn look_up(&mut self) {
+        let model = self.model;
+        let slots = self.plant.tree.slots();
+        if self.plant.states.len() < slots {
+            self.plant.states.resize(slots, None);
+        }
+        let mut fresh = std::mem::take(&mut self.fresh);
+        for id in fresh.drain(..) {
+            // It may have been replaced already, within the same instant.
+            if !self.plant.tree.is_alive(id) {
+                continue;
+            }
+            let kind = self.plant.tree.kind(id);
+            if self.kinds_with_context[kind.index()] {
+                self.changed = true;
+            } else if let Some(&rule) = model.kinds.get(kind).rules.first() {
+                self.take_up(id, rule, &[]);
+            }
+        }
+        self.fresh = fresh;
+        self.changed = false;
+        if self.looks_around {
+            self.look_around();
+        }
+    }
+
+    /// Looks up all modules whose rules have contexts.
+    fn look_around(&mut self) {
+        let model = self.model;
+        let mut contextual = std::mem::take(&mut self.contextual);
+        contextual.clear();
+        contextual.extend(self.plant.tree.walk().filter_map(|visit| match visit {
+            Visit::Module(id) if self.kinds_with_context[self.plant.tree.kind(id).index()] => Some(id),
             _ => None,
         }));
-        self.ruled_is_stale = false;
-        self.states.resize(self.tree.slots(), None);
-        let mut context = Vec::new();
-        for &id in &self.ruled {
-            let applies = kinds
-                .get(self.tree.kind(id))
-                .rules
-                .iter()
-                .copied()
-                .find(|&rule| self.context(id, &rules[rule], &mut context));
-            let state = self.states[id.slot()].as_ref().filter(|s| s.id == id);
+        let mut context = SmallVec::new();
+        for &id in &contextual {
+            let rules = &model.kinds.get(self.plant.tree.kind(id)).rules;
+            let applies =
+                rules.iter().copied().find(|&rule| self.context(id, &model.rules[rule], &mut context));
+            let state = self.plant.state(id);
             let Some(rule) = applies else {
                 if state.is_none_or(|s| s.rule.is_some()) {
-                    self.states[id.slot()] = Some(State::idle(id));
-                    open[id.slot()] = None;
+                    self.forget(id);
+                    self.plant.states[id.slot()] = Some(State::new(id));
                 }
                 continue;
             };
-            let same = state.is_some_and(|s| s.rule == Some(rule) && s.context == context);
-            if same {
-                continue;
+            if state.is_none_or(|s| s.rule != Some(rule) || s.context != context) {
+                self.take_up(id, rule, &context);
             }
-            let mut signs = self.signs_of_values(id, rule, &context);
-            // A limit that is only approached may have been reached by rounding.
-            if let Some(State { rule: Some(before), solve: Some(solve), signs: known, .. }) = state
-                && *before == rule
-            {
-                for (atom, &unreachable) in rules[rule].solves[*solve].unreachable.iter().enumerate() {
-                    if unreachable {
-                        signs[atom] = known[atom];
-                    }
+        }
+        let plant = &self.plant;
+        self.opened.retain(|id| plant.state(*id).is_some_and(|s| s.rule.is_some()));
+        self.contextual = contextual;
+    }
+
+    /// Gives a module its rule and opens it.
+    fn take_up(&mut self, id: ModuleId, rule: usize, context: &[ModuleId]) {
+        let compiled = &self.model.rules[rule];
+        self.plant.materialise(id, self.now);
+        let mut signs = self.signs_of_values(id, compiled, context);
+        let before = self.plant.state(id);
+        // A limit that is only approached may have been reached by rounding.
+        if let Some(State { rule: Some(last), solve: Some(solve), signs: known, .. }) = before
+            && *last == rule
+        {
+            for (atom, &unreachable) in compiled.solves[*solve].unreachable.iter().enumerate() {
+                if unreachable {
+                    signs[atom] = known[atom];
                 }
             }
-            open[id.slot()] = Some(Open::elsewhere(&signs));
-            self.states[id.slot()] = Some(State {
-                id,
-                rule: Some(rule),
-                context: context.clone(),
-                solve: None,
-                signs,
-                switches: Vec::new(),
-            });
+        }
+        let was_open = before.is_some_and(|s| s.open.is_some());
+        if before.is_none() {
+            self.plant.states[id.slot()] = Some(State::new(id));
+        }
+        let state = self.plant.states[id.slot()].as_mut().expect("just made");
+        state.rule = Some(rule);
+        state.context = SmallVec::from_slice(context);
+        state.solve = None;
+        state.signs = signs;
+        state.switches.clear();
+        state.next = Default::default();
+        state.since = self.now;
+        state.place();
+        if !was_open {
+            self.opened.push(id);
         }
     }
 
     /// Collects the context that a rule asks for, in the order of the rule's variables; false if it is
     /// not there.
-    fn context(&self, id: ModuleId, rule: &Rule, out: &mut Vec<ModuleId>) -> bool {
+    fn context(&self, id: ModuleId, rule: &Rule, out: &mut SmallVec<[ModuleId; 2]>) -> bool {
         out.clear();
         let skipped = |kind| self.model.kinds.get(kind).skipped;
+        let tree = &self.plant.tree;
         let mut at = id;
         for pattern in rule.left.iter().rev() {
-            match self.tree.left(at, skipped) {
-                Some(found) if pattern.matches(self.tree.kind(found)) => {
+            match tree.left(at, skipped) {
+                Some(found) if pattern.matches(tree.kind(found)) => {
                     out.push(found);
                     at = found;
                 }
@@ -84,8 +125,8 @@ impl Simulation<'_> {
         out.reverse();
         at = id;
         for pattern in &rule.right {
-            match self.tree.right(at, skipped) {
-                Some(found) if pattern.matches(self.tree.kind(found)) => {
+            match tree.right(at, skipped) {
+                Some(found) if pattern.matches(tree.kind(found)) => {
                     out.push(found);
                     at = found;
                 }
@@ -95,20 +136,13 @@ impl Simulation<'_> {
         true
     }
 
-    /// A rule's variables at the present instant, from the values in the tree.
-    pub(super) fn values(&self, id: ModuleId, context: &[ModuleId]) -> Vec<f64> {
-        let mut variables: Vec<f64> = self.tree.parameters(id).to_vec();
-        for module in context {
-            variables.extend_from_slice(self.tree.parameters(*module));
+    fn signs_of_values(&mut self, id: ModuleId, rule: &Rule, context: &[ModuleId]) -> Signs {
+        if rule.atoms.is_empty() {
+            return Signs::new();
         }
-        variables.extend([self.now.to_f64(), self.now.since(self.tree.birth(id))]);
-        variables
-    }
-
-    fn signs_of_values(&self, id: ModuleId, rule: usize, context: &[ModuleId]) -> Vec<Sign> {
-        let sides = &self.model.rules[rule].sides;
-        let mut out = vec![0.0; sides.outputs()];
-        sides.eval(&self.values(id, context), &mut Vec::new(), &mut out);
+        self.plant.variables(id, context, self.now, &mut self.variables);
+        let mut out: SmallVec<[f64; 16]> = smallvec::smallvec![0.0; rule.sides.outputs()];
+        rule.sides.eval(&self.variables, &mut self.scratch, &mut out);
         out.chunks(2)
             .map(|side| {
                 let difference = side[0] - side[1];

@@ -1,33 +1,44 @@
 //! Development in time: the combined discrete and continuous scheduler.
 //!
 //! ```text
-//!          ┌─────────── make_step: integrate, search the step ───────────┐
-//!          ▼                                                             │
-//! [System: equations of all modules] ──event──▶ settle: productions ─────┤
-//!          │                                                             │
-//!          └──no event──▶ next step ─────────────────────────────────────┘
-//!                    at(t): the dense output, written out in string order
+//!  queue: what comes next, per module ──event──▶ settle: productions, choice of equations
+//!     ▲                                                    │
+//!     │                                                    ▼
+//!  watch: the first event on a stretch ◀── phase: how each parameter moves from here on
+//!                                            formula │ own steps (local) │ common steps (coupled)
+//!  at(t): every parameter's motion, evaluated and written out in string order
 //! ```
 //!
-//! - `simulation`: the clock; what a caller uses is [`Simulation`].
-//! - `settle`: what happens at one instant; `lookup`: rules and contexts.
-//! - `system`: the equations between two instants.
-//! - `runge_kutta`, `dense`: one step, and the solution inside it.
-//! - `watch`, `roots`: the search of a step for the first event.
+//! - `simulation`: the clock; what a caller uses is [`Simulation`]. `queue`: the order of time.
+//! - `settle`, `choose`, `lookup`: what happens at one instant.
+//! - `phase`: from an instant to the next; `motion`: formulas; `local`, `coupled`: numeric integration.
+//! - `plant`, `state`: the modules and how they move; `watch`, `roots`: the search for events.
+//! - `integrator`, `runge_kutta`, `tableau`, `dense`: one step, and the solution inside it.
 //!
-//! Equations are integrated as if their `if`s did not exist: within a step every condition inside them is
-//! frozen, and its change is an event that cuts the step. So the methods keep their order at the end of a
+//! A parameter whose equation has a formula is evaluated, never stepped, and a module that reads none of its
+//! neighbours keeps a clock of its own. Equations are integrated as if their `if`s did not exist: within a step every
+//! condition inside them is frozen, and its change is an event. So the methods keep their order at the end of a
 //! growth function, and a discontinuous rate costs no accuracy.
 
+mod choose;
+mod coupled;
 mod dense;
 mod error;
 mod event;
+mod integrator;
+mod local;
 mod lookup;
+mod motion;
+mod phase;
+mod plant;
+mod queue;
+mod rational;
 mod roots;
 mod runge_kutta;
 mod settle;
 mod simulation;
-mod system;
+mod state;
+mod tableau;
 mod watch;
 
 pub use error::{Error, Site};
@@ -36,9 +47,10 @@ pub use settle::MAX_ROUNDS;
 pub use simulation::{Simulation, brief, describe};
 
 /// How equations are integrated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
     /// The exact solution where there is one, otherwise the method that suits the equations.
+    #[default]
     Auto,
     /// Forward Euler with a fixed step: order 1. What the paper's authors used (section 8).
     Euler,
@@ -46,13 +58,16 @@ pub enum Method {
     Rk4,
     /// Dormand and Prince's pair of orders 5 and 4 with step control.
     Dopri5,
+    /// Dormand and Prince's pair of orders 8, 5 and 3, for tight tolerances (Hairer's DOP853).
+    Dop853,
 }
 
 impl Method {
     /// Methods by the names they have on the command line.
-    pub const NAMED: [(&'static str, Method); 4] = [
+    pub const NAMED: [(&'static str, Method); 5] = [
         ("auto", Method::Auto),
         ("dopri5", Method::Dopri5),
+        ("dop853", Method::Dop853),
         ("rk4", Method::Rk4),
         ("euler", Method::Euler),
     ];
@@ -73,11 +88,19 @@ pub struct Settings {
     pub step_size: f64,
     /// More modules than this are an error.
     pub max_modules: usize,
+    /// Productions are recorded for [`Simulation::take_events`].
+    pub log: bool,
 }
 
 impl Default for Settings {
     fn default() -> Settings {
-        Settings { method: Method::Auto, tolerance: 1e-6, step_size: 0.01, max_modules: 10_000_000 }
+        Settings {
+            method: Method::Auto,
+            tolerance: 1e-6,
+            step_size: 0.01,
+            max_modules: 10_000_000,
+            log: false,
+        }
     }
 }
 
@@ -97,7 +120,7 @@ pub struct Stats {
     pub steps: u64,
     /// Steps tried again with a smaller size.
     pub rejected: u64,
-    /// Evaluations of the equations of the whole structure.
+    /// Evaluations of the equations of one module.
     pub rhs_evaluations: u64,
     /// Modules alive, brackets not counted.
     pub modules: u64,

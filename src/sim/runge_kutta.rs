@@ -1,37 +1,17 @@
-//! One step of a Runge-Kutta method, with its dense output.
+//! One step of an explicit Runge-Kutta method, with its dense output.
 
 use super::Method;
 use super::dense::Dense;
+use super::tableau::{DOP853, DOPRI5, Tableau, dop853_dense, dop853_error, dopri5_dense};
 use crate::structure::Instant;
 
 /// A system of equations `y' = f(tau, y)`, `tau` counted from the start of the step.
 pub trait Rates {
     fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]);
-}
 
-/// Dormand and Prince (1980), RK5(4)7M: nodes, coefficients, and the weights of the error.
-const C: [f64; 7] = [0.0, 1.0 / 5.0, 3.0 / 10.0, 4.0 / 5.0, 8.0 / 9.0, 1.0, 1.0];
-const A: [&[f64]; 7] = [
-    &[],
-    &[1.0 / 5.0],
-    &[3.0 / 40.0, 9.0 / 40.0],
-    &[44.0 / 45.0, -56.0 / 15.0, 32.0 / 9.0],
-    &[19372.0 / 6561.0, -25360.0 / 2187.0, 64448.0 / 6561.0, -212.0 / 729.0],
-    &[9017.0 / 3168.0, -355.0 / 33.0, 46732.0 / 5247.0, 49.0 / 176.0, -5103.0 / 18656.0],
-    &[35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0],
-];
-const E: [f64; 7] =
-    [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0];
-/// Continuous extension of order 4 (Hairer, Nørsett and Wanner 1993, II.6; the code DOPRI5).
-const D: [f64; 7] = [
-    -12715105075.0 / 11282082432.0,
-    0.0,
-    87487479700.0 / 32700410799.0,
-    -10690763975.0 / 1880347072.0,
-    701980252875.0 / 199316789632.0,
-    -1453857185.0 / 822651844.0,
-    69997945.0 / 29380423.0,
-];
+    /// Number of modules whose equations one evaluation evaluates.
+    fn modules(&self) -> u64;
+}
 
 /// Errors below the tolerated part of this are none, whatever they are errors of.
 const FLOOR: f64 = 1e-18;
@@ -40,10 +20,11 @@ const FLOOR: f64 = 1e-18;
 #[derive(Clone, Debug, Default)]
 pub struct Workspace {
     /// Rates at the stages; the first is that of the start of the step.
-    pub k: Vec<Vec<f64>>,
+    k: Vec<Vec<f64>>,
     stage: Vec<f64>,
     /// The state at the end of the step.
     pub end: Vec<f64>,
+    pub evaluations: u64,
 }
 
 /// What became of a trial step.
@@ -51,13 +32,38 @@ pub enum Trial {
     /// The largest error of a component, in units of what is tolerated, by truncation and by rounding;
     /// 0 for methods without estimate.
     Done { error: f64, rounding: f64 },
-    /// Some rate or value on the way was not finite; the component, if it is known.
-    NotFinite(Option<usize>),
+    /// Some rate or value on the way was not finite; the component.
+    NotFinite(usize),
+}
+
+impl Method {
+    fn tableau(self) -> Option<&'static Tableau> {
+        match self {
+            Method::Euler | Method::Rk4 => None,
+            Method::Dop853 => Some(&DOP853),
+            _ => Some(&DOPRI5),
+        }
+    }
+
+    /// Order of the error estimate.
+    pub(super) fn error_order(self) -> u32 {
+        self.tableau().map_or(1, |t| t.error_order)
+    }
+
+    /// Stage whose rate is that of the end of the step.
+    fn last_stage(self) -> usize {
+        match self {
+            Method::Euler => 1,
+            Method::Rk4 => 4,
+            _ => self.tableau().map_or(0, |t| t.stages - 1),
+        }
+    }
 }
 
 impl Workspace {
-    pub fn resize(&mut self, method: Method, n: usize) {
-        self.k.resize(method.stages(), Vec::new());
+    pub fn resize(&mut self, n: usize) {
+        let stages = DOP853.a.len();
+        self.k.resize(stages, Vec::new());
         for k in &mut self.k {
             k.resize(n, 0.0);
         }
@@ -65,7 +71,19 @@ impl Workspace {
         self.end.resize(n, 0.0);
     }
 
-    /// Tries a step from `y`, whose rates are in `k[0]`. Returns also the number of evaluations.
+    fn evaluate(&mut self, system: &mut impl Rates, tau: f64, stage: usize) {
+        self.evaluations += 1;
+        system.rates(tau, &self.stage, &mut self.k[stage]);
+    }
+
+    /// Computes the rates at the start of a step; the component whose rate is not finite is an error.
+    pub fn start(&mut self, system: &mut impl Rates, y: &[f64]) -> Result<(), usize> {
+        self.stage.copy_from_slice(y);
+        self.evaluate(system, 0.0, 0);
+        self.k[0].iter().position(|x| !x.is_finite()).map_or(Ok(()), Err)
+    }
+
+    /// Tries a step from `y`, whose rates are known.
     pub fn attempt(
         &mut self,
         method: Method,
@@ -73,110 +91,153 @@ impl Workspace {
         y: &[f64],
         h: f64,
         tolerance: f64,
-    ) -> (Trial, u64) {
-        match method {
-            Method::Euler => {
+    ) -> Trial {
+        match method.tableau() {
+            None if method == Method::Euler => {
                 for (end, (y, k)) in self.end.iter_mut().zip(y.iter().zip(&self.k[0])) {
                     *end = y + h * k;
                 }
-                (self.finite(0.0, 0.0), 0)
+                self.finite(0.0, 0.0, 0)
             }
-            Method::Rk4 => {
+            None => {
                 for (i, c) in [(1, 0.5), (2, 0.5), (3, 1.0)] {
                     for (s, (y, k)) in self.stage.iter_mut().zip(y.iter().zip(&self.k[i - 1])) {
                         *s = y + h * c * k;
                     }
-                    system.rates(c * h, &self.stage, &mut self.k[i]);
+                    self.evaluate(system, c * h, i);
                 }
                 for (i, end) in self.end.iter_mut().enumerate() {
                     let [a, b, c, d] = [0, 1, 2, 3].map(|s| self.k[s][i]);
                     *end = y[i] + h / 6.0 * (a + 2.0 * (b + c) + d);
                 }
                 // The rate at the end gives the Hermite interpolant and is the next step's first.
-                system.rates(h, &self.end, &mut self.k[4]);
-                (self.finite(0.0, 0.0), 4)
+                self.stage.copy_from_slice(&self.end);
+                self.evaluate(system, h, 4);
+                self.finite(0.0, 0.0, 4)
             }
-            Method::Dopri5 | Method::Auto => {
-                for i in 1..7 {
-                    for (j, s) in self.stage.iter_mut().enumerate() {
-                        let mut sum = 0.0;
-                        for (a, k) in A[i].iter().zip(&self.k) {
-                            sum += a * k[j];
-                        }
-                        *s = y[j] + h * sum;
+            Some(tableau) => {
+                for i in 1..tableau.stages {
+                    self.combine(tableau, i, y, h);
+                    self.evaluate(system, tableau.c[i] * h, i);
+                    if i + 1 == tableau.stages {
+                        // The last stage is the end of the step.
+                        self.end.copy_from_slice(&self.stage);
                     }
-                    system.rates(C[i] * h, &self.stage, &mut self.k[i]);
                 }
-                // The last stage is the end of the step.
-                self.end.copy_from_slice(&self.stage);
-                let (mut error, mut rounding): (f64, f64) = (0.0, 0.0);
-                for (j, (a, b)) in y.iter().zip(&self.end).enumerate() {
-                    let mut sum = 0.0;
-                    for (e, k) in E.iter().zip(&self.k) {
-                        sum += e * k[j];
-                    }
-                    // Relative to where the step begins, and to how far it goes from there at first: what
-                    // grows from 1e-6 must be known to its own digits. Not to where it ends: beyond an
-                    // event, equations may lead anywhere, and that must not spoil the part that counts.
-                    let scale = tolerance * (a.abs().max((h * self.k[0][j]).abs()) + FLOOR);
-                    rounding = rounding.max(4.0 * f64::EPSILON * b.abs() / scale);
-                    let ratio = (h * sum).abs() / scale;
-                    error = if ratio > error || ratio.is_nan() { ratio } else { error };
-                }
-                (self.finite(error, rounding), 6)
+                let (error, rounding) = self.error(tableau, y, h, tolerance);
+                self.finite(error, rounding, tableau.stages - 1)
             }
         }
     }
 
-    fn finite(&self, error: f64, rounding: f64) -> Trial {
+    /// The state at which a stage's rate is taken.
+    fn combine(&mut self, tableau: &Tableau, i: usize, y: &[f64], h: f64) {
+        let row = tableau.a[i];
+        for (j, s) in self.stage.iter_mut().enumerate() {
+            let mut sum = 0.0;
+            for (a, k) in row.iter().zip(&self.k) {
+                if *a != 0.0 {
+                    sum += a * k[j];
+                }
+            }
+            *s = y[j] + h * sum;
+        }
+    }
+
+    /// The largest error of a component, in units of what is tolerated, by truncation and by rounding.
+    fn error(&self, tableau: &Tableau, y: &[f64], h: f64, tolerance: f64) -> (f64, f64) {
+        let (mut error, mut rounding): (f64, f64) = (0.0, 0.0);
+        for (j, (a, b)) in y.iter().zip(&self.end).enumerate() {
+            let sum = |row: &[f64]| -> f64 { row.iter().zip(&self.k).map(|(e, k)| e * k[j]).sum() };
+            let estimate = match tableau.e {
+                [e] => (h * sum(e)).abs(),
+                [e5, e3, ..] => dop853_error(h * sum(e5), h * sum(e3)),
+                [] => 0.0,
+            };
+            // Relative to where the step begins, and to how far it goes from there at first: what
+            // grows from 1e-6 must be known to its own digits. Not to where it ends: beyond an
+            // event, equations may lead anywhere, and that must not spoil the part that counts.
+            let scale = tolerance * (a.abs().max((h * self.k[0][j]).abs()) + FLOOR);
+            rounding = rounding.max(4.0 * f64::EPSILON * b.abs() / scale);
+            let ratio = estimate / scale;
+            error = if ratio > error || ratio.is_nan() { ratio } else { error };
+        }
+        (error, rounding)
+    }
+
+    fn finite(&self, error: f64, rounding: f64, last: usize) -> Trial {
         let bad = self.end.iter().position(|x| !x.is_finite());
-        let last = self.k.last().and_then(|k| k.iter().position(|x| !x.is_finite()));
-        match bad.or(last) {
+        match bad.or_else(|| self.k[last].iter().position(|x| !x.is_finite())) {
             None if error.is_finite() => Trial::Done { error, rounding },
-            at => Trial::NotFinite(at),
+            at => Trial::NotFinite(at.unwrap_or(0)),
         }
     }
 
-    /// The dense output of the step just tried.
-    pub fn dense(&self, method: Method, start: Instant, y: &[f64], h: f64) -> Dense {
-        let degree = method.dense_degree();
-        let mut c = Vec::with_capacity(y.len() * (degree + 1));
+    /// Computes what the dense output of a good step needs besides.
+    pub fn finish(&mut self, method: Method, system: &mut impl Rates, y: &[f64], h: f64) {
+        if let Some(tableau) = method.tableau() {
+            for i in tableau.stages..tableau.a.len() {
+                self.combine(tableau, i, y, h);
+                self.evaluate(system, tableau.c[i] * h, i);
+            }
+        }
+    }
+
+    /// The dense output of the step just tried, up to `end` if that is known better than as `start` and `h`.
+    pub fn dense(&self, method: Method, start: Instant, end: Option<Instant>, y: &[f64], h: f64) -> Dense {
+        let mut c = Vec::new();
+        let hk = |stage: usize, j: usize| h * self.k[stage][j];
+        let degree = match method {
+            Method::Euler => 1,
+            Method::Rk4 => 3,
+            Method::Dop853 => 7,
+            _ => 4,
+        };
+        c.reserve(y.len() * (degree + 1));
         for (j, (&a, &b)) in y.iter().zip(&self.end).enumerate() {
             match method {
                 Method::Euler => c.extend([a, b]),
-                Method::Rk4 => {
-                    c.extend([a, a + h / 3.0 * self.k[0][j], b - h / 3.0 * self.k[4][j], b]);
-                }
-                Method::Dopri5 | Method::Auto => {
-                    // y(s) = a + s r2 + s(1-s) r3 + s²(1-s) r4 + s²(1-s)² r5, turned into Bernstein form.
-                    let r2 = b - a;
-                    let r3 = h * self.k[0][j] - r2;
-                    let r4 = r2 - h * self.k[6][j] - r3;
-                    let mut r5 = 0.0;
-                    for (d, k) in D.iter().zip(&self.k) {
-                        r5 += d * k[j];
-                    }
-                    r5 *= h;
-                    c.extend([
-                        a,
-                        a + 0.25 * h * self.k[0][j],
-                        0.5 * (a + b) + r3 / 3.0 + (r4 + r5) / 6.0,
-                        b - 0.25 * h * self.k[6][j],
-                        b,
-                    ]);
-                }
+                Method::Rk4 => c.extend([a, a + hk(0, j) / 3.0, b - hk(4, j) / 3.0, b]),
+                Method::Dop853 => c.extend(dop853_dense(a, b, &std::array::from_fn(|i| hk(i, j)))),
+                _ => c.extend(dopri5_dense(a, b, std::array::from_fn(|i| hk(i, j)))),
             }
         }
-        Dense::new(start, h, degree, c)
+        Dense::new(start, end, h, degree, c)
     }
 
-    /// Makes the end of the step the start of the next: its rate is known.
+    /// Makes the end of the step the start of the next: true if its rate is known.
     pub fn advance(&mut self, method: Method) -> bool {
-        let last = self.k.len() - 1;
-        if last > 0 {
-            self.k.swap(0, last);
-        }
+        self.k.swap(0, method.last_stage());
         method != Method::Euler
+    }
+
+    /// A step over which the solution changes little (Hairer, Nørsett and Wanner 1993, II.4).
+    pub fn first_size(&mut self, method: Method, system: &mut impl Rates, y: &[f64], tolerance: f64) -> f64 {
+        let f = &self.k[0];
+        let norm = |v: &[f64]| {
+            v.iter().zip(y).fold(0.0f64, |m, (v, y)| m.max((v / (tolerance * (1.0 + y.abs()))).abs()))
+        };
+        let (d0, d1) = (norm(y), norm(f));
+        if y.is_empty() || d1 == 0.0 {
+            return 1e-3;
+        }
+        let guess = if d0 < 1e-5 || d1 < 1e-5 { 1e-6 } else { 0.01 * d0 / d1 };
+        for (s, (y, f)) in self.stage.iter_mut().zip(y.iter().zip(f)) {
+            *s = y + guess * f;
+        }
+        self.evaluate(system, guess, 1);
+        let bend: Vec<f64> = self.k[1].iter().zip(&self.k[0]).map(|(a, b)| a - b).collect();
+        let most = d1.max(norm(&bend) / guess);
+        let order = f64::from(method.error_order() + 1);
+        let next = if most <= 1e-15 { (guess * 1e-3).max(1e-6) } else { (0.01 / most).powf(1.0 / order) };
+        let size = next.min(100.0 * guess);
+        if size.is_finite() && size > 0.0 { size } else { 1e-6 }
+    }
+
+    /// The component that changes most, for its size.
+    pub fn worst(&self, y: &[f64]) -> usize {
+        let size = |i: usize| (self.k[0][i] / (1.0 + y[i].abs())).abs();
+        (0..y.len()).max_by(|a, b| size(*a).total_cmp(&size(*b))).unwrap_or(0)
     }
 }
 
@@ -193,20 +254,25 @@ mod tests {
         fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]) {
             out[0] = y[0] * (self.t + tau).cos();
         }
+
+        fn modules(&self) -> u64 {
+            1
+        }
     }
 
     /// Largest error at step ends, and in the middle of steps, on [0, 2].
     fn errors(method: Method, steps: usize) -> (f64, f64) {
         let h = 2.0 / steps as f64;
         let mut workspace = Workspace::default();
-        workspace.resize(method, 1);
+        workspace.resize(1);
         let mut y = vec![1.0];
         let (mut end, mut inside): (f64, f64) = (0.0, 0.0);
         for i in 0..steps {
             let mut system = Growth { t: i as f64 * h };
-            system.rates(0.0, &y, &mut workspace.k[0]);
+            workspace.start(&mut system, &y).expect("finite");
             workspace.attempt(method, &mut system, &y, h, 1.0);
-            let dense = workspace.dense(method, Instant::ZERO, &y, h);
+            workspace.finish(method, &mut system, &y, h);
+            let dense = workspace.dense(method, Instant::ZERO, None, &y, h);
             y.copy_from_slice(&workspace.end);
             let exact = |s: f64| (system.t + s * h).sin().exp();
             end = end.max((y[0] - exact(1.0)).abs());
@@ -219,15 +285,18 @@ mod tests {
 
     #[test]
     fn methods_and_their_dense_outputs_have_their_order() {
-        for (method, order, dense_order) in
-            [(Method::Euler, 1.0, 1.0), (Method::Rk4, 4.0, 4.0), (Method::Dopri5, 5.0, 5.0)]
-        {
-            let (coarse, fine) = (errors(method, 20), errors(method, 80));
-            let slope = |a: f64, b: f64| (a / b).ln() / 4f64.ln();
+        for (method, order, steps) in [
+            (Method::Euler, 1.0, [20, 80]),
+            (Method::Rk4, 4.0, [20, 80]),
+            (Method::Dopri5, 5.0, [20, 80]),
+            (Method::Dop853, 8.0, [8, 16]),
+        ] {
+            let (coarse, fine) = (errors(method, steps[0]), errors(method, steps[1]));
+            let slope = |a: f64, b: f64| (a / b).ln() / (steps[1] as f64 / steps[0] as f64).ln();
             let (ends, inside) = (slope(coarse.0, fine.0), slope(coarse.1, fine.1));
-            assert!((ends - order).abs() < 0.25, "{method:?}: order {ends}");
+            assert!((ends - order).abs() < 0.7, "{method:?}: order {ends}");
             // A dense output of degree p over one step errs like h^(p+1), as the ends do after many.
-            assert!((inside - dense_order).abs() < 0.35, "{method:?}: dense order {inside}");
+            assert!((inside - order).abs() < 0.7, "{method:?}: dense order {inside}");
         }
     }
 }

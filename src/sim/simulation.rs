@@ -1,170 +1,150 @@
-//! The clock: steps, events, observation.
+//! The clock: events in their order, observation.
 
-use super::dense::Dense;
+use super::coupled::Coupled;
 use super::error::{Error, Site};
 use super::event::Event;
-use super::runge_kutta::{Rates, Trial, Workspace};
-use super::settle::Open;
-use super::system::System;
-use super::watch::{Found, search};
+use super::integrator::Integrator;
+use super::motion::Motion;
+use super::plant::Plant;
+use super::queue::{Entry, Queue, Who};
+use super::settle::Firing;
+use super::state::{Control, What};
+use super::watch::Watcher;
 use super::{Method, Settings, Stats};
-use crate::expr::Interval;
-use crate::model::{KindId, Model, Sign};
+use crate::diagnostic::Span;
+use crate::expr::Scratch;
+use crate::model::{KindId, Model};
 use crate::structure::{Instant, Lineage, ModuleId, ModuleString, Tree};
-
-/// What the simulation keeps of a module with rules.
-#[derive(Clone, Debug)]
-pub(super) struct State {
-    pub id: ModuleId,
-    /// The rule that applies; None where no rule's context is there.
-    pub rule: Option<usize>,
-    pub context: Vec<ModuleId>,
-    pub solve: Option<usize>,
-    /// The sign of each atom of the rule, just after the last instant at which it was examined.
-    pub signs: Vec<Sign>,
-    /// Conditions inside the active equations.
-    pub switches: Vec<bool>,
-}
-
-impl State {
-    pub fn idle(id: ModuleId) -> State {
-        State { id, rule: None, context: Vec::new(), solve: None, signs: Vec::new(), switches: Vec::new() }
-    }
-}
-
-/// A step that has been made: the solution up to its end, or up to the event in it.
-struct Step {
-    dense: Dense,
-    found: Found,
-}
 
 /// A model developing in time; observe it with [`Simulation::at`].
 ///
-/// The `global` scheduler: one clock for all modules, time is cut at every event. Steps and events do not
-/// depend on what is observed, so the state at a time is the same bits whichever other times are asked for.
+/// Every module has a clock of its own unless it reads a neighbour that is integrated numerically; those share
+/// one. Steps and events do not depend on what is observed, so the state at a time is the same bits whichever other
+/// times are asked for.
 pub struct Simulation<'m> {
     pub(super) model: &'m Model,
     pub(super) settings: Settings,
-    pub(super) tree: Tree,
-    /// By slot of the tree.
-    pub(super) states: Vec<Option<State>>,
-    /// Modules whose kind has rules, in string order.
-    pub(super) ruled: Vec<ModuleId>,
-    pub(super) ruled_is_stale: bool,
-    pub(super) open: Vec<Option<Open>>,
-    /// Start of the present step.
+    /// Formulas are not used.
+    pub(super) forced: bool,
+    pub(super) plant: Plant,
+    pub(super) queue: Queue,
+    /// Time of the last event.
     pub(super) now: Instant,
-    pub(super) system: System,
-    /// State vector at `now`.
-    pub(super) y: Vec<f64>,
-    /// Length of the next step to be tried.
-    pub(super) step_size: f64,
-    /// Error of the last step, for the step control.
-    last_error: f64,
-    workspace: Workspace,
-    /// The first stage of the next step is known.
-    rate_is_known: bool,
-    step: Option<Step>,
+    /// Number of the last instant at which something happened.
+    pub(super) group: u64,
+    /// Modules that the instant concerns.
+    pub(super) opened: Vec<ModuleId>,
+    /// Modules that were made at the instant and are not looked up yet.
+    pub(super) fresh: Vec<ModuleId>,
+    /// The structure has changed since contexts were looked up.
+    pub(super) changed: bool,
+    /// Some rule has a context.
+    pub(super) looks_around: bool,
+    pub(super) kinds_with_context: Vec<bool>,
+    /// Modules of such kinds, in string order.
+    pub(super) contextual: Vec<ModuleId>,
+    pub(super) coupled: Coupled,
+    /// A coupled module has been replaced.
+    pub(super) coupled_changed: bool,
+    pub(super) alone: Integrator,
+    /// What step control has learnt, per rule and clause.
+    pub(super) hints: Vec<Vec<Control>>,
+    pub(super) watcher: Watcher,
     /// Events in a row of modules that hardly lived.
     stalled: usize,
-    /// Rounds of productions at the present instant.
-    pub(super) rounds: usize,
-    /// A time in the past, and the number of steps made since then.
-    mark: Instant,
-    since_mark: usize,
     pub(super) stats: Stats,
     /// Productions since they were last taken, if they are recorded.
     pub(super) log: Option<Vec<Event>>,
-    /// Number of the present instant in the log.
-    pub(super) group: u64,
     fault: Option<Error>,
+    // Memory that is used again and again.
+    pub(super) variables: Vec<f64>,
+    pub(super) scratch: Scratch<f64>,
+    pub(super) arguments: Vec<f64>,
+    pub(super) argument_ends: Vec<usize>,
+    pub(super) spare: Vec<Firing>,
+    pub(super) motions: Vec<Motion>,
+    pub(super) y: Vec<f64>,
+    group_entries: Vec<Entry>,
 }
-
-/// A step with less than this part of the tolerated error is longer than accuracy asks for.
-const EASY: f64 = 1e-3;
-/// How far ahead, in units of the time to the last event, such steps look.
-const FORESIGHT: f64 = 1e3;
 
 /// Events in a row of modules that lived no longer than this many resolutions of time, after which events
 /// are said to pile up.
 const MAX_STALLED: usize = 100;
 pub(super) const SHORT_LIFE: f64 = 64.0;
 
-/// So many steps must bring time on by more than this part of it, or there is a singularity.
-const MANY_STEPS: usize = 10_000;
-const CRAWL: f64 = 1e-5;
-
 impl<'m> Simulation<'m> {
     /// Makes the initial string at t = 0 and lets everything happen that happens there.
     pub fn new(model: &'m Model, settings: Settings) -> Result<Simulation<'m>, Error> {
-        let mut tree = Tree::new(model.kinds.iter().map(|(_, kind)| kind.arity as u32).collect());
-        let mut arguments = Vec::new();
-        model.axiom.evaluate::<f64>(&[], &mut Vec::new(), &mut arguments);
-        tree.append(&model.axiom, &arguments, Instant::ZERO, Lineage::of_axiom, &mut Vec::new());
+        let tree = Tree::new(model.kinds.iter().map(|(_, kind)| kind.arity as u32).collect());
+        let has_context = |rule: &usize| {
+            let rule = &model.rules[*rule];
+            !rule.left.is_empty() || !rule.right.is_empty()
+        };
+        let kinds_with_context: Vec<bool> =
+            model.kinds.iter().map(|(_, kind)| kind.rules.iter().any(has_context)).collect();
         let mut simulation = Simulation {
             model,
-            tree,
-            states: Vec::new(),
-            ruled: Vec::new(),
-            ruled_is_stale: true,
-            open: Vec::new(),
-            now: Instant::ZERO,
-            system: System::default(),
-            y: Vec::new(),
-            step_size: 1.0,
-            last_error: 1.0,
-            workspace: Workspace::default(),
-            rate_is_known: false,
-            step: None,
-            stalled: 0,
-            mark: Instant::ZERO,
-            since_mark: 0,
-            rounds: 0,
-            stats: Stats::default(),
-            log: Some(Vec::new()),
-            group: 0,
-            fault: None,
             settings,
+            forced: settings.method != Method::Auto,
+            plant: Plant { tree, states: Vec::new(), coupled: None },
+            queue: Queue::default(),
+            now: Instant::ZERO,
+            group: 0,
+            opened: Vec::new(),
+            fresh: Vec::new(),
+            changed: true,
+            looks_around: kinds_with_context.contains(&true),
+            kinds_with_context,
+            contextual: Vec::new(),
+            coupled: Coupled::default(),
+            coupled_changed: false,
+            alone: Integrator::default(),
+            hints: model.rules.iter().map(|r| vec![Control::default(); r.solves.len()]).collect(),
+            watcher: Watcher::default(),
+            stalled: 0,
+            stats: Stats::default(),
+            log: settings.log.then(Vec::new),
+            fault: None,
+            variables: Vec::new(),
+            scratch: Vec::new(),
+            arguments: Vec::new(),
+            argument_ends: Vec::new(),
+            spare: Vec::new(),
+            motions: Vec::new(),
+            y: Vec::new(),
+            group_entries: Vec::new(),
         };
-        simulation.stats.peak_modules = simulation.tree.len() as u64;
-        if let Some(at) = arguments.iter().position(|x| !x.is_finite()) {
-            return Err(Error::NotFinite {
-                site: Site {
-                    module: "the initial string".to_owned(),
-                    lineage: Lineage::of_axiom(0),
-                    rule: "initial string".to_owned(),
-                    span: Default::default(),
-                    time: 0.0,
-                },
-                what: format!("parameter {}", at + 1),
-            });
-        }
-        if simulation.tree.len() > settings.max_modules {
-            let limit = settings.max_modules;
-            let site = Site {
-                module: "the initial string".to_owned(),
-                lineage: Lineage::of_axiom(0),
-                rule: "initial string".to_owned(),
-                span: Default::default(),
-                time: 0.0,
-            };
-            return Err(Error::TooManyModules { site, limit, rounds: 0 });
-        }
-        simulation.settle(&[])?;
-        simulation.begin_phase()?;
-        simulation.step_size = simulation.first_step_size();
+        simulation.plant_axiom()?;
+        simulation.settle()?;
         Ok(simulation)
+    }
+
+    fn plant_axiom(&mut self) -> Result<(), Error> {
+        let site = || Site {
+            module: "the initial string".to_owned(),
+            lineage: Lineage::of_axiom(0),
+            rule: "initial string".to_owned(),
+            span: Span::default(),
+            time: 0.0,
+        };
+        let mut arguments = Vec::new();
+        self.model.axiom.evaluate::<f64>(&[], &mut Vec::new(), &mut arguments);
+        if let Some(at) = arguments.iter().position(|x| !x.is_finite()) {
+            return Err(Error::NotFinite { site: site(), what: format!("parameter {}", at + 1) });
+        }
+        let tree = &mut self.plant.tree;
+        tree.append(&self.model.axiom, &arguments, Instant::ZERO, Lineage::of_axiom, &mut self.fresh);
+        self.stats.peak_modules = tree.len() as u64;
+        if tree.len() > self.settings.max_modules {
+            let limit = self.settings.max_modules;
+            return Err(Error::TooManyModules { site: site(), limit, rounds: 0 });
+        }
+        Ok(())
     }
 
     /// Work done so far.
     pub fn stats(&self) -> Stats {
-        Stats { modules: self.tree.len() as u64, ..self.stats }
-    }
-
-    /// Forgets the productions so far and records none from now on: they take memory.
-    pub fn without_log(mut self) -> Simulation<'m> {
-        self.log = None;
-        self
+        Stats { modules: self.plant.tree.len() as u64, ..self.stats }
     }
 
     /// The productions since the last call, in the order of time.
@@ -184,282 +164,191 @@ impl<'m> Simulation<'m> {
             self.fault = Some(fault.clone());
             return Err(fault);
         }
-        let step = self.step.as_ref().expect("advance leaves a step");
         let at = Instant::new(t);
         // An event within the resolution of time of `t` may have taken place a little after it.
-        let position = step.dense.position(at);
         let now = if at.since(self.now) < 0.0 { self.now } else { at };
-        let value = |place: usize| match self.system.component(place) {
-            Some(component) => step.dense.value(component, position),
-            None => self.tree.values()[place],
-        };
-        self.tree.write(now, t, value, out);
-        Ok(())
-    }
-
-    /// Makes steps until one covers `t` and every event up to `t` has taken place.
-    fn advance(&mut self, t: f64) -> Result<(), Error> {
-        let until = Instant::new(t);
-        loop {
-            if self.step.is_none() {
-                self.make_step()?;
+        let plant = &self.plant;
+        let mut bad = None;
+        plant.tree.write(now, t, out, |id, values| {
+            plant.values(id, now, values);
+            if let Some(parameter) = values.iter().position(|x| !x.is_finite()) {
+                bad.get_or_insert((id, parameter));
             }
-            let step = self.step.as_ref().expect("just made");
-            match step.found.event {
-                Some(position) => {
-                    let when = self.now.after(position * step.dense.h);
-                    if when.since(until) > until.resolution() {
-                        return Ok(());
-                    }
-                    self.pass_event(position, when)?;
-                }
-                None => {
-                    if self.now.after(step.dense.h).since(until) >= 0.0 {
-                        return Ok(());
-                    }
-                    self.pass_step()?;
-                }
-            }
-        }
-    }
-
-    /// Goes to the end of a step in which nothing happens.
-    fn pass_step(&mut self) -> Result<(), Error> {
-        let Step { dense, found } = self.step.take().expect("a step was made");
-        self.keep_signs(&found);
-        let method = self.settings.method;
-        let before = self.now;
-        self.now = match self.settings.grid() {
-            Some(grid) => Instant::new(self.next_grid_time(grid)),
-            None => self.now.after(dense.h),
-        };
-        if self.now.since(before) <= 0.0 {
-            return Err(self.too_small(0));
-        }
-        self.since_mark += 1;
-        if self.since_mark >= MANY_STEPS && self.settings.grid().is_none() {
-            if self.now.since(self.mark) <= CRAWL * self.now.to_f64() {
-                return Err(self.too_small(self.worst_component()));
-            }
-            (self.since_mark, self.mark) = (0, self.now);
-        }
-        self.rate_is_known = self.workspace.advance(method);
-        std::mem::swap(&mut self.y, &mut self.workspace.end);
-        self.system.advance(&self.tree, self.now);
-        self.stalled = 0;
-        Ok(())
-    }
-
-    /// Goes to an event and through it.
-    fn pass_event(&mut self, position: f64, when: Instant) -> Result<(), Error> {
-        let Step { dense, found } = self.step.take().expect("a step was made");
-        self.keep_signs(&found);
-        // A life about as short as the resolution of time, after a life as short, after another …
-        let age = when.since(self.tree.birth(found.touched[0].id));
-        self.stalled = if age <= SHORT_LIFE * when.resolution() { self.stalled + 1 } else { 0 };
-        self.now = when;
-        // A step that could be as long as one likes says nothing about the next; life does.
-        if self.last_error <= EASY {
-            self.step_size = self.step_size.min((FORESIGHT * position * dense.h).max(when.resolution()));
-        }
-        for (component, &place) in self.system.places.iter().enumerate() {
-            self.tree.set_value(place as usize, dense.value(component, position));
-        }
-        if self.stalled > MAX_STALLED {
-            let change = &found.touched[0];
-            let rule = self.states[change.id.slot()].as_ref().and_then(|s| s.rule).unwrap_or(0);
-            let site = self.site_of(change.id, rule, self.model.rules[rule].span, when.to_f64());
-            return Err(Error::Zeno { site });
-        }
-        (self.since_mark, self.mark) = (0, when);
-        self.settle(&found.touched)?;
-        self.begin_phase()
-    }
-
-    fn keep_signs(&mut self, found: &Found) {
-        for change in &found.changes {
-            if let Some(state) = &mut self.states[change.id.slot()]
-                && state.id == change.id
-            {
-                state.signs[change.atom] = change.after;
-            }
-        }
-    }
-
-    /// After a change of structure: new system, new first rates.
-    fn begin_phase(&mut self) -> Result<(), Error> {
-        self.rebuild();
-        self.workspace.resize(self.settings.method, self.y.len());
-        self.rate_is_known = false;
-        self.first_rate()
-    }
-
-    fn first_rate(&mut self) -> Result<(), Error> {
-        if self.rate_is_known {
-            return Ok(());
-        }
-        let mut first = std::mem::take(&mut self.workspace.k[0]);
-        self.system.equations(&self.model.rules).rates(0.0, &self.y, &mut first);
-        self.stats.rhs_evaluations += 1;
-        let bad = first.iter().position(|x| !x.is_finite());
-        self.workspace.k[0] = first;
-        self.rate_is_known = true;
+        });
         match bad {
-            Some(component) => Err(self.not_finite(component, "the rate of")),
+            Some((id, parameter)) => {
+                let fault = self.not_finite(id, parameter, now);
+                self.fault = Some(fault.clone());
+                Err(fault)
+            }
             None => Ok(()),
         }
     }
 
-    /// Makes the next step and searches it for events.
-    fn make_step(&mut self) -> Result<(), Error> {
-        self.first_rate()?;
-        let method = self.settings.method;
-        let tolerance = self.settings.tolerance * INNER_TOLERANCE;
-        let h = match self.settings.grid() {
-            Some(grid) => Instant::new(self.next_grid_time(grid)).since(self.now),
-            None => self.step_size,
-        };
-        let (mut h, mut rejected) = (h, false);
-        loop {
-            if self.settings.grid().is_none() && h <= 4.0 * self.now.resolution() / 8.0 && !self.y.is_empty()
-            {
-                return Err(self.too_small(self.worst_component()));
-            }
-            let mut system = self.system.equations(&self.model.rules);
-            let (trial, evaluations) = self.workspace.attempt(method, &mut system, &self.y, h, tolerance);
-            self.stats.rhs_evaluations += evaluations;
-            match trial {
-                Trial::NotFinite(component) => {
-                    let component = component.unwrap_or(0);
-                    // A stage may have left the region where the equations are defined: go nearer.
-                    if self.settings.grid().is_some() || h <= 1e-12 * self.now.to_f64().max(1e-3) {
-                        return Err(self.not_finite(component, ""));
-                    }
-                    h *= 0.25;
-                    rejected = true;
-                }
-                Trial::Done { error, rounding } if error.max(rounding) > 1.0 => {
-                    let error = error.max(rounding);
-                    self.stats.rejected += 1;
-                    // Safety and exponents as in DOPRI5 (Hairer, Nørsett and Wanner 1993, II.4).
-                    h *= (0.9 * error.powf(-0.2)).clamp(0.1, 0.9);
-                    rejected = true;
-                }
-                Trial::Done { error, rounding } => {
-                    if self.settings.grid().is_none() {
-                        // Rounding is no reason to shorten a step that is good, only not to lengthen it.
-                        self.step_size = h * self.growth(error, rejected || rounding > 0.5);
-                        self.last_error = error;
-                    }
+    /// Lets every event up to `t` take place, and finds out what every module does until then.
+    fn advance(&mut self, t: f64) -> Result<(), Error> {
+        let until = Instant::new(t);
+        while let Some(entry) = self.queue.peek() {
+            let ahead = entry.at.since(until);
+            if self.is_event(entry.who) {
+                if ahead > until.resolution() {
                     break;
                 }
+                self.pass_event(entry.at)?;
+            } else {
+                if ahead >= 0.0 {
+                    break;
+                }
+                self.queue.pop();
+                self.pass_end(entry)?;
             }
         }
-        self.stats.steps += 1;
-        let dense = self.workspace.dense(method, self.now, &self.y, h);
-        let bounds: Vec<Interval> = (0..self.y.len()).map(|i| dense.bounds(i)).collect();
-        let states = &self.states;
-        let signs = |id: ModuleId| states[id.slot()].as_ref().map_or(&[][..], |s| &s.signs);
-        let found = search(&self.model.rules, &self.system, &dense, &bounds, signs);
-        self.step = Some(Step { dense, found });
         Ok(())
     }
 
-    /// PI step control (Gustafsson 1991) with the constants of DOPRI5: beta = 0.04.
-    fn growth(&self, error: f64, rejected: bool) -> f64 {
-        let error = error.max(1e-10);
-        let factor = 0.9 * error.powf(-0.17) * self.last_error.max(1e-4).powf(0.04);
-        factor.clamp(0.2, if rejected { 1.0 } else { 10.0 })
-    }
-
-    /// The first multiple of the step size after the present.
-    fn next_grid_time(&self, grid: f64) -> f64 {
-        let now = self.now.to_f64();
-        let mut n = (now / grid).floor() + 1.0;
-        if n * grid - now <= self.now.resolution() {
-            n += 1.0;
-        }
-        n * grid
-    }
-
-    /// A step over which the solution changes little (Hairer, Nørsett and Wanner 1993, II.4).
-    fn first_step_size(&mut self) -> f64 {
-        let tolerance = self.settings.tolerance * INNER_TOLERANCE;
-        let f = &self.workspace.k.first().cloned().unwrap_or_default();
-        let norm = |v: &[f64]| {
-            v.iter().zip(&self.y).fold(0.0f64, |m, (v, y)| m.max((v / (tolerance * (1.0 + y.abs()))).abs()))
-        };
-        let (d0, d1) = (norm(&self.y), norm(f));
-        if self.y.is_empty() || d1 == 0.0 {
-            return 1e-3;
-        }
-        let guess = if d0 < 1e-5 || d1 < 1e-5 { 1e-6 } else { 0.01 * d0 / d1 };
-        let ahead: Vec<f64> = self.y.iter().zip(f).map(|(y, f)| y + guess * f).collect();
-        let mut later = vec![0.0; ahead.len()];
-        self.system.equations(&self.model.rules).rates(guess, &ahead, &mut later);
-        self.stats.rhs_evaluations += 1;
-        let bend: Vec<f64> = later.iter().zip(f).map(|(a, b)| a - b).collect();
-        let d2 = norm(&bend) / guess;
-        let most = d1.max(d2);
-        let next = if most <= 1e-15 { (guess * 1e-3).max(1e-6) } else { (0.01 / most).powf(0.2) };
-        let size = next.min(100.0 * guess);
-        if size.is_finite() && size > 0.0 { size } else { 1e-6 }
-    }
-
-    fn worst_component(&self) -> usize {
-        let size = |i: usize| (self.workspace.k[0][i] / (1.0 + self.y[i].abs())).abs();
-        (0..self.y.len()).max_by(|a, b| size(*a).total_cmp(&size(*b))).unwrap_or(0)
-    }
-
-    fn too_small(&self, component: usize) -> Error {
-        Error::StepTooSmall { site: self.site_of_component(component).0 }
-    }
-
-    fn not_finite(&self, component: usize, what: &str) -> Error {
-        let (site, parameter) = self.site_of_component(component);
-        Error::NotFinite { site, what: format!("{what} {parameter}").trim().to_owned() }
-    }
-
-    /// The module that a component belongs to, and the name of its parameter.
-    fn site_of_component(&self, component: usize) -> (Site, String) {
-        let rules = &self.model.rules;
-        match self.system.owner(rules, component) {
-            Some((member, parameter)) => {
-                let rule = &rules[member.rule];
-                let span = member.solve.map_or(rule.span, |s| rule.solves[s].span);
-                let mut site = self.site_of(member.id, member.rule, span, self.now.to_f64());
-                site.module = self.describe_now(member.id);
-                (site, rule.parameters[parameter].clone())
-            }
-            None => {
-                let site = Site {
-                    module: "the structure".to_owned(),
-                    lineage: Lineage::of_axiom(0),
-                    rule: String::new(),
-                    span: Default::default(),
-                    time: self.now.to_f64(),
-                };
-                (site, "a value".to_owned())
+    /// True if the entry is an event, not the end of what is known.
+    fn is_event(&self, who: Who) -> bool {
+        match who {
+            Who::Coupled => self.coupled_event(),
+            Who::Module(slot) => {
+                let state = self.plant.states[slot as usize].as_ref();
+                state.is_some_and(|s| s.next.what != What::Window)
             }
         }
     }
 
-    /// A module with its parameters as they stand in the tree.
-    pub(super) fn describe(&self, id: ModuleId) -> String {
-        describe(self.model, self.tree.kind(id), self.tree.parameters(id))
+    /// Goes on from the end of what is known.
+    fn pass_end(&mut self, entry: Entry) -> Result<(), Error> {
+        self.stalled = 0;
+        match entry.who {
+            Who::Coupled => self.pass_coupled_step(entry.at),
+            Who::Module(slot) => {
+                let id = self.plant.states[slot as usize].as_ref().expect("scheduled").id;
+                self.pass_window(id, entry.at)
+            }
+        }
     }
 
-    fn describe_now(&self, id: ModuleId) -> String {
-        let values: Vec<f64> = (self.tree.places(id))
-            .map(|place| self.system.component(place).map_or(self.tree.values()[place], |c| self.y[c]))
-            .collect();
-        describe(self.model, self.tree.kind(id), &values)
+    /// Goes to an event and through it, with all that happens at the same instant.
+    fn pass_event(&mut self, at: Instant) -> Result<(), Error> {
+        let mut group = std::mem::take(&mut self.group_entries);
+        group.clear();
+        let mut first: Option<(Instant, f64)> = None;
+        let mut later = Vec::new();
+        while let Some(entry) = self.queue.peek() {
+            if entry.at.since(at) > at.resolution() {
+                break;
+            }
+            self.queue.pop();
+            if !self.is_event(entry.who) {
+                self.pass_end(entry)?;
+                continue;
+            }
+            if let Who::Module(slot) = entry.who {
+                let id = self.plant.states[slot as usize].as_ref().expect("scheduled").id;
+                let birth = self.plant.tree.birth(id);
+                match first {
+                    None => first = Some((birth, at.since(birth))),
+                    // Those born together have clocks that are as good as their age is short.
+                    Some((elder, age)) if elder == birth => {
+                        if entry.at.since(birth) - age > Instant::new(age).resolution() {
+                            later.push(entry);
+                            continue;
+                        }
+                    }
+                    Some(_) => {}
+                }
+            }
+            group.push(entry);
+        }
+        for entry in later {
+            self.queue.schedule(entry.who, entry.at);
+        }
+        self.now = at;
+        let mut oldest = None;
+        for entry in &group {
+            let first = match entry.who {
+                Who::Coupled => self.touch_coupled(),
+                Who::Module(slot) => Some(self.touch_alone(slot as usize)?),
+            };
+            oldest = oldest.or(first);
+        }
+        self.group_entries = group;
+        if let Some(id) = oldest {
+            self.watch_for_piling_up(id)?;
+        }
+        self.settle()
+    }
+
+    /// Opens a module whose event it is.
+    fn touch_alone(&mut self, slot: usize) -> Result<ModuleId, Error> {
+        let state = self.plant.states[slot].as_mut().expect("scheduled");
+        let id = state.id;
+        if state.next.what == What::Fault {
+            let ends: Vec<Option<f64>> = state.motions.iter().map(Motion::end).collect();
+            let first = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1);
+            let parameter = ends.iter().enumerate().filter_map(|(i, e)| Some((i, (*e)?))).min_by(first);
+            return Err(self.not_finite(id, parameter.map_or(0, |p| p.0), self.now));
+        }
+        let touched = std::mem::take(&mut state.next.touched);
+        self.learn(id);
+        self.touch(id, &touched);
+        Ok(id)
+    }
+
+    /// A life about as short as the resolution of time, after a life as short, after another …
+    fn watch_for_piling_up(&mut self, id: ModuleId) -> Result<(), Error> {
+        let age = self.now.since(self.plant.tree.birth(id));
+        self.stalled = if age <= SHORT_LIFE * self.now.resolution() { self.stalled + 1 } else { 0 };
+        if self.stalled <= MAX_STALLED {
+            return Ok(());
+        }
+        let rule = self.plant.state(id).and_then(|s| s.rule).unwrap_or(0);
+        let site = self.site_of(id, rule, self.model.rules[rule].span, self.now.to_f64());
+        Err(Error::Zeno { site })
+    }
+
+    /// The time scale of a module's equations, as far as it is known.
+    pub(super) fn reach_of(&self, id: ModuleId) -> f64 {
+        let Some(state) = self.plant.state(id) else { return 1.0 };
+        if state.coupled && self.coupled.control.size > 0.0 {
+            return self.coupled.control.size;
+        }
+        let hint = state.rule.zip(state.solve).map_or(0.0, |(rule, solve)| self.hints[rule][solve].size);
+        if hint > 0.0 { hint } else { 1.0 }
+    }
+
+    fn not_finite(&self, id: ModuleId, parameter: usize, at: Instant) -> Error {
+        let rule = self.plant.state(id).and_then(|s| s.rule).unwrap_or(0);
+        let solve = self.plant.state(id).and_then(|s| s.solve);
+        let compiled = &self.model.rules[rule];
+        let span = solve.map_or(compiled.span, |s| compiled.solves[s].span);
+        let site = self.site_of(id, rule, span, at.to_f64());
+        Error::NotFinite { site, what: compiled.parameters.get(parameter).cloned().unwrap_or_default() }
+    }
+
+    /// Some module, to name where nothing more is known.
+    pub(super) fn anyone(&self) -> ModuleId {
+        let named = self.coupled.members.first().copied();
+        named.or_else(|| self.plant.states.iter().flatten().map(|s| s.id).next()).expect("there are modules")
+    }
+
+    pub(super) fn site(&self, fire: &Firing) -> Site {
+        let span = self.model.rules[fire.rule].produces[fire.produce].span;
+        self.site_of(fire.id, fire.rule, span, self.now.to_f64())
+    }
+
+    pub(super) fn site_of(&self, id: ModuleId, rule: usize, span: Span, time: f64) -> Site {
+        let tree = &self.plant.tree;
+        Site {
+            module: describe(self.model, tree.kind(id), tree.parameters(id)),
+            lineage: tree.lineage(id),
+            rule: self.model.rules[rule].label.clone(),
+            span,
+            time,
+        }
     }
 }
-
-/// The tolerance of a single step, as a part of the tolerance asked for: errors of steps add up, and move
-/// the times of events, which move what comes after them.
-const INNER_TOLERANCE: f64 = 0.1;
 
 /// A module as it is written, numbers to six digits: for people.
 pub fn describe(model: &Model, kind: KindId, parameters: &[f64]) -> String {
@@ -476,22 +365,4 @@ pub fn brief(x: f64, digits: usize) -> String {
     let rounded: f64 = format!("{x:.*e}", digits - 1).parse().unwrap_or(x);
     let (plain, exponent) = (rounded.to_string(), format!("{rounded:e}"));
     if plain.len() <= digits + 6 { plain } else { exponent }
-}
-
-impl Method {
-    pub(super) fn stages(self) -> usize {
-        match self {
-            Method::Euler => 1,
-            Method::Rk4 => 5,
-            Method::Dopri5 | Method::Auto => 7,
-        }
-    }
-
-    pub(super) fn dense_degree(self) -> usize {
-        match self {
-            Method::Euler => 1,
-            Method::Rk4 => 3,
-            Method::Dopri5 | Method::Auto => 4,
-        }
-    }
 }

@@ -1,281 +1,341 @@
-//! The search of a step for the next event.
+//! The search of a stretch of time for a module's next event.
 //!
-//! For each module the signs of its rule's atoms are known at the start of the step. Here the step is
-//! searched for the first instant at which a change of signs matters: a production's condition becomes
-//! true, the active equations' condition ends, or a condition inside them changes.
+//! The signs of the rule's atoms are known at the start. What is looked for is the first instant at which a change of
+//! signs matters: a production's condition becomes true, the active equations' condition ends, or a condition inside
+//! them changes. Where a formula gives the instant it is taken; elsewhere the stretch is searched.
 
-use super::dense::Dense;
+use smallvec::SmallVec;
+
+use super::plant::Path;
 use super::roots::{Function, Root, first_root};
-use super::system::{Member, System};
+use super::state::{Change, State};
 use crate::expr::{Binary, Dual, Interval, Program, Scratch, Value};
-use crate::model::{Rule, Sign, Truth};
-use crate::structure::{Instant, ModuleId};
+use crate::model::{Condition, Rule, Sign, Truth, Watch};
+use crate::structure::Instant;
 
 /// Zero, for a difference of two sides, in units of their rounding.
 const TOUCH: f64 = 256.0 * f64::EPSILON;
 
-/// Most changes of a module's signs that are followed within one step.
+/// Most changes of a module's signs that are followed within one stretch.
 const MAX_ROUNDS: usize = 50;
-
-/// A sign that changes during the step.
-#[derive(Clone, Copy, Debug)]
-pub struct Change {
-    pub id: ModuleId,
-    pub atom: usize,
-    /// Position in the step.
-    pub position: f64,
-    pub at: Sign,
-    pub after: Sign,
-}
 
 /// What a search found.
 #[derive(Clone, Debug, Default)]
 pub struct Found {
-    /// Position of the first event, if there is one in the step.
+    /// Position of the event, if there is one.
     pub event: Option<f64>,
-    /// Signs that are zero at the event.
-    pub touched: Vec<Change>,
-    /// Signs that change without consequence, up to the event or the end of the step.
-    pub changes: Vec<Change>,
+    /// Signs that are zero at the event, the first one first.
+    pub touched: SmallVec<[Change; 2]>,
+    /// Signs that change without consequence before it, or before the end.
+    pub changes: SmallVec<[Change; 2]>,
 }
 
-/// The difference of two sides of an atom along a step.
-struct Difference<'w> {
-    system: &'w System,
-    dense: &'w Dense,
-    member: &'w Member,
+/// Working memory of searches.
+#[derive(Clone, Debug, Default)]
+pub struct Watcher {
+    values: Vec<f64>,
+    departure: Vec<Dual<f64>>,
+    whole: Vec<Interval>,
+    bounds: Vec<Dual<Interval>>,
+    scratch: Scratch<f64>,
+    departure_scratch: Scratch<Dual<f64>>,
+    whole_scratch: Scratch<Interval>,
+    bounds_scratch: Scratch<Dual<Interval>>,
+    out: Vec<f64>,
+    departure_out: Vec<Dual<f64>>,
+    whole_out: Vec<Interval>,
+    bounds_out: Vec<Dual<Interval>>,
+    rates: Vec<f64>,
+}
+
+/// An atom under watch.
+struct Watched {
+    atom: usize,
+    /// What counts as zero; NaN for those whose instant is a formula.
+    tolerance: f64,
+    next: Option<Meeting>,
+}
+
+#[derive(Clone, Copy)]
+struct Meeting {
+    position: f64,
+    time: Instant,
+    at: Sign,
+    after: Sign,
+    level: Option<(usize, f64)>,
+}
+
+/// The difference of two sides of an atom along a path.
+struct Difference<'w, 'p> {
+    path: &'w Path<'p>,
     sides: &'w Program,
     atom: usize,
-    bounds: Vec<Dual<Interval>>,
-    bounds_scratch: Scratch<Dual<Interval>>,
-    bounds_out: Vec<Dual<Interval>>,
-    values: Vec<f64>,
-    scratch: Scratch<f64>,
-    out: Vec<f64>,
+    memory: &'w mut Watcher,
 }
 
-impl Function for Difference<'_> {
+impl Function for Difference<'_, '_> {
     fn bounds(&mut self, lo: f64, hi: f64) -> Dual<Interval> {
-        let h = self.dense.h;
-        let width = hi - lo;
-        self.system.variables(
-            self.member,
-            lo * h,
-            |i| self.dense.piece(i, lo, hi),
-            |t| Dual { value: Interval::spanned(t, t + width * h), rate: Interval::constant(h) },
-            &mut self.bounds,
-        );
-        self.sides.eval(&self.bounds, &mut self.bounds_scratch, &mut self.bounds_out);
-        difference(self.bounds_out[2 * self.atom], self.bounds_out[2 * self.atom + 1])
+        let m = &mut *self.memory;
+        self.path.over(lo, hi, &mut m.bounds);
+        m.bounds_out.resize(self.sides.outputs(), Dual::constant(0.0));
+        self.sides.eval(&m.bounds, &mut m.bounds_scratch, &mut m.bounds_out);
+        Dual::binary(Binary::Sub, m.bounds_out[2 * self.atom], m.bounds_out[2 * self.atom + 1])
     }
 
     fn value(&mut self, at: f64) -> f64 {
-        self.system.variables(
-            self.member,
-            at * self.dense.h,
-            |i| self.dense.value(i, at),
-            |t| t,
-            &mut self.values,
-        );
-        self.sides.eval(&self.values, &mut self.scratch, &mut self.out);
-        self.out[2 * self.atom] - self.out[2 * self.atom + 1]
+        let m = &mut *self.memory;
+        self.path.at(at, &mut m.values);
+        m.out.resize(self.sides.outputs(), 0.0);
+        self.sides.eval(&m.values, &mut m.scratch, &mut m.out);
+        m.out[2 * self.atom] - m.out[2 * self.atom + 1]
     }
 }
 
-fn difference(a: Dual<Interval>, b: Dual<Interval>) -> Dual<Interval> {
-    Dual::binary(Binary::Sub, a, b)
+/// True if some atom of a module can only be found by search, so that the stretch must have an end.
+pub fn needs_search(state: &State, rule: &Rule) -> bool {
+    rule.watch(state.solve)
+        .iter()
+        .enumerate()
+        .any(|(atom, watch)| !is_unreachable(rule, state, atom) && matches!(how(watch, state), How::Search))
 }
 
-/// Searches a step. `signs` gives the signs of a module's atoms at its start.
-pub fn search<'s>(
-    rules: &[Rule],
-    system: &System,
-    dense: &Dense,
-    bounds: &[Interval],
-    signs: impl Fn(ModuleId) -> &'s [Sign],
-) -> Found {
-    let mut candidates: Vec<(Vec<Change>, Instant)> = Vec::new();
-    // Of the module of the first event: the last position that is the same instant for its siblings, and
-    // its birth.
-    let mut elder = (0.0, Instant::ZERO);
-    let mut changes: Vec<Change> = Vec::new();
-    let mut best = f64::INFINITY;
-    let (mut variables, mut scratch, mut out) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut moving, mut moving_scratch, mut moving_out) = (Vec::new(), Vec::new(), Vec::new());
-    for member in &system.members {
-        let rule = &rules[member.rule];
+fn is_unreachable(rule: &Rule, state: &State, atom: usize) -> bool {
+    state.solve.is_some_and(|s| rule.solves[s].unreachable[atom])
+}
+
+enum How<'w> {
+    Not,
+    Formula(usize, &'w Program),
+    Search,
+}
+
+/// How an atom is watched, given how the parameters move.
+fn how<'w>(watch: &'w Watch, state: &State) -> How<'w> {
+    match watch {
+        Watch::Still => How::Not,
+        Watch::Crossing { variable, level } => match state.motions.get(*variable) {
+            Some(motion) if !motion.is_formula() => How::Search,
+            _ => How::Formula(*variable, level),
+        },
+        Watch::Root => How::Search,
+    }
+}
+
+impl Watcher {
+    /// Searches the path up to the position `limit`.
+    pub fn search(&mut self, path: &Path, limit: f64) -> Found {
+        let (rule, state) = (path.rule, path.state);
+        let mut found = Found::default();
         if rule.atoms.is_empty() {
-            continue;
+            return found;
         }
-        // First over the whole step at once: most atoms keep their sign in most steps.
-        let h = dense.h;
-        system.variables(member, 0.0, |i| bounds[i], |t| Interval::spanned(t, t + h), &mut variables);
-        out.resize(rule.sides.outputs(), Interval::EMPTY);
-        rule.sides.eval(&variables, &mut scratch, &mut out);
-        // Zero is judged on the scale of the present, not of the far end of the step: a step may be a
-        // thousand lives long.
-        let time = |t: f64| Dual { value: t, rate: h };
-        system.variables(member, 0.0, |i| dense.start_of(i), time, &mut moving);
-        moving_out.resize(rule.sides.outputs(), Dual { value: 0.0, rate: 0.0 });
-        rule.sides.eval(&moving, &mut moving_scratch, &mut moving_out);
-        let instant = dense.start.resolution() / h;
-        let signs = signs(member.id);
-        let watched: Vec<(usize, f64)> = (0..rule.atoms.len())
-            .filter_map(|atom| {
-                let (a, b) = (out[2 * atom], out[2 * atom + 1]);
-                let start = [moving_out[2 * atom], moving_out[2 * atom + 1]];
-                let size = start.iter().map(|s| s.value.abs()).filter(|s| s.is_finite()).fold(0.0, f64::max);
-                let slope = Some((start[0].rate - start[1].rate).abs()).filter(|s| s.is_finite());
-                let tolerance = TOUCH * size + slope.unwrap_or(0.0) * instant;
-                may_change(rule, member, atom, signs[atom], a, b, tolerance).then_some((atom, tolerance))
-            })
-            .collect();
-        if watched.is_empty() {
-            continue;
+        let mut now = state.signs.clone();
+        for change in &state.next.changes {
+            now[change.atom] = change.after;
         }
-        let limit = dense.together(best.min(1.0)).min(1.0);
-        let found = search_member(rule, system, dense, member, signs, &watched, limit, &mut changes);
-        if let Some(event) = found {
-            if event[0].position < best {
-                best = event[0].position;
-                elder = (dense.together_by(best, member.age()), member.birth());
+        let mut watched: SmallVec<[Watched; 4]> = SmallVec::new();
+        let mut measured = false;
+        for (atom, watch) in rule.watch(state.solve).iter().enumerate() {
+            if is_unreachable(rule, state, atom) {
+                continue;
             }
-            candidates.push((event, member.birth()));
+            match how(watch, state) {
+                How::Not => {}
+                How::Formula(variable, level) => {
+                    let next = self.meet(path, variable, level, now[atom]).filter(|m| m.position <= limit);
+                    if next.is_some() {
+                        watched.push(Watched { atom, tolerance: f64::NAN, next });
+                    }
+                }
+                How::Search => {
+                    if !std::mem::replace(&mut measured, true) {
+                        self.measure(path);
+                    }
+                    if let Some(tolerance) = self.may_change(path, atom, now[atom]) {
+                        let next = self.root(path, atom, 0.0, limit, now[atom], tolerance);
+                        watched.push(Watched { atom, tolerance, next });
+                    }
+                }
+            }
         }
+        let mut rounds = 0;
+        while let Some(first) =
+            watched.iter().filter_map(|w| w.next).min_by(|a, b| a.position.total_cmp(&b.position))
+        {
+            rounds += 1;
+            let together = path_together(path, first.position);
+            let (mut at, mut after) = (now.clone(), now.clone());
+            let mut group: SmallVec<[Change; 2]> = SmallVec::new();
+            for w in &watched {
+                // A touch is known only to about the root of the rounding; one that is zero here is here.
+                let mut zero = || self.difference(path, w.atom).value(first.position).abs() <= w.tolerance;
+                let here = match &w.next {
+                    Some(meeting) if meeting.position <= together => Some(*meeting),
+                    _ if w.tolerance.is_nan() => None,
+                    Some(meeting) if meeting.after == now[w.atom] && zero() => {
+                        Some(Meeting { at: Sign::Zero, time: first.time, ..*meeting })
+                    }
+                    None if now[w.atom] != Sign::Zero && zero() => {
+                        Some(Meeting { at: Sign::Zero, after: now[w.atom], level: None, ..first })
+                    }
+                    _ => None,
+                };
+                if let Some(m) = here {
+                    (at[w.atom], after[w.atom]) = (m.at, m.after);
+                    let time = if m.position <= first.position { first.time } else { m.time };
+                    group.push(Change { atom: w.atom, time, at: m.at, after: m.after, level: m.level });
+                }
+            }
+            // A condition that oscillates without end is cut into short stretches, each of bounded work.
+            if matters(rule, state, &at, &after) || rounds > MAX_ROUNDS {
+                found.event = Some(first.position);
+                group.sort_by(|a, b| a.time.since(b.time).total_cmp(&0.0));
+                found.touched = group;
+                return found;
+            }
+            now = after;
+            for w in &mut watched {
+                if group.iter().any(|change| change.atom == w.atom) {
+                    let from = w.next.map_or(first.position, |m| m.position.max(first.position));
+                    // One that moves one way only meets its level once.
+                    w.next = if w.tolerance.is_nan() {
+                        None
+                    } else {
+                        self.root(path, w.atom, from, limit, now[w.atom], w.tolerance)
+                    };
+                }
+            }
+            found.changes.extend(group);
+        }
+        found
     }
-    if best.is_infinite() {
-        return Found { event: None, touched: Vec::new(), changes };
+
+    fn difference<'w, 'p>(&'w mut self, path: &'w Path<'p>, atom: usize) -> Difference<'w, 'p> {
+        Difference { path, sides: &path.rule.sides, atom, memory: self }
     }
-    let together = dense.together(best);
-    candidates.retain(|(event, birth)| {
-        // Those born together have clocks that are as good as their age is short.
-        let limit = if *birth == elder.1 { elder.0 } else { together };
-        event[0].position <= limit
-    });
-    changes.retain(|change| change.position <= together);
-    Found {
-        event: Some(best),
-        touched: candidates.into_iter().flat_map(|(event, _)| event).collect(),
-        changes,
+
+    fn root(
+        &mut self,
+        path: &Path,
+        atom: usize,
+        from: f64,
+        limit: f64,
+        sign: Sign,
+        tolerance: f64,
+    ) -> Option<Meeting> {
+        let Root { position, at, after } =
+            first_root(&mut self.difference(path, atom), from, limit, sign, tolerance)?;
+        Some(Meeting { position, time: path.start.after(position * path.h), at, after, level: None })
+    }
+
+    /// When a variable that moves one way only takes the value at which its atom's sides meet.
+    fn meet(&mut self, path: &Path, variable: usize, level: &Program, sign: Sign) -> Option<Meeting> {
+        if !matches!(sign, Sign::Plus | Sign::Minus) {
+            return None;
+        }
+        path.at(0.0, &mut self.values);
+        let mut out = [0.0];
+        level.eval(&self.values, &mut self.scratch, &mut out);
+        let [level] = out;
+        if !level.is_finite() {
+            return None;
+        }
+        let t = path.rule.time_variable();
+        let time = if variable == t {
+            Instant::new(level)
+        } else if variable == t + 1 {
+            path.plant.tree.birth(path.state.id).after(level)
+        } else {
+            let motion = path.state.motions.get(variable)?;
+            let start = path.plant.tree.parameters(path.state.id)[variable];
+            let tau = motion.reach(level - start, || self.rate_at(path, variable, level))?;
+            path.state.since.after(tau)
+        };
+        let position = time.since(path.start) / path.h;
+        let level = (variable < t).then_some((variable, level));
+        (position > 0.0).then_some(Meeting { position, time, at: Sign::Zero, after: opposite(sign), level })
+    }
+
+    /// The rate of a parameter where it has a value, as the equation is written; 0 where that is no more than the
+    /// rounding of it.
+    fn rate_at(&mut self, path: &Path, parameter: usize, value: f64) -> f64 {
+        let Some(solve) = path.state.solve.map(|s| &path.rule.solves[s]) else { return 0.0 };
+        let Some(index) = solve.of.iter().position(|p| *p == parameter) else { return 0.0 };
+        self.values.truncate(path.rule.variables);
+        self.values.extend(path.state.switches.iter().map(|&on| f64::from(u8::from(on))));
+        let mut rate = |x: f64| {
+            self.values[parameter] = x;
+            self.rates.resize(solve.rates.outputs(), 0.0);
+            solve.rates.eval(&self.values, &mut self.scratch, &mut self.rates);
+            self.rates[index]
+        };
+        let here = rate(value);
+        // The rate changes by this much over the rounding of the value.
+        let nearby = rate(value * (1.0 + 8.0 * f64::EPSILON));
+        if here.abs() <= (nearby - here).abs() { 0.0 } else { here }
+    }
+
+    /// Values at the start and bounds over the whole path: most atoms keep their sign on most paths.
+    fn measure(&mut self, path: &Path) {
+        let sides = &path.rule.sides;
+        path.whole(&mut self.whole);
+        self.whole_out.resize(sides.outputs(), Interval::EMPTY);
+        sides.eval(&self.whole, &mut self.whole_scratch, &mut self.whole_out);
+        path.departure(&mut self.departure);
+        self.departure_out.resize(sides.outputs(), Dual::constant(0.0));
+        sides.eval(&self.departure, &mut self.departure_scratch, &mut self.departure_out);
+    }
+
+    /// Whether an atom's sign may change, judged by its bounds over the whole path; and what counts as zero, on the
+    /// scale of the start, not of the far end: a stretch may be a thousand lives long.
+    fn may_change(&self, path: &Path, atom: usize, sign: Sign) -> Option<f64> {
+        let instant = path.start.resolution() / path.h;
+        let start = [self.departure_out[2 * atom], self.departure_out[2 * atom + 1]];
+        let size = start.iter().map(|s| s.value.abs()).filter(|s| s.is_finite()).fold(0.0, f64::max);
+        let slope = Some((start[0].rate - start[1].rate).abs()).filter(|s| s.is_finite());
+        let tolerance = TOUCH * size + slope.unwrap_or(0.0) * instant;
+        let (a, b) = (self.whole_out[2 * atom], self.whole_out[2 * atom + 1]);
+        let may = if a.is_empty() || b.is_empty() {
+            sign != Sign::Undefined
+        } else if a.partial || b.partial {
+            true
+        } else {
+            let (lo, hi) = (a.lo - b.hi, a.hi - b.lo);
+            match sign {
+                Sign::Plus => lo.is_nan() || lo <= tolerance,
+                Sign::Minus => hi.is_nan() || hi >= -tolerance,
+                Sign::Zero | Sign::Any => !(lo >= -tolerance && hi <= tolerance),
+                Sign::Undefined => true,
+            }
+        };
+        may.then_some(tolerance)
     }
 }
 
-/// Whether an atom's sign may change, judged by its bounds over the whole step.
-fn may_change(
-    rule: &Rule,
-    member: &Member,
-    atom: usize,
-    sign: Sign,
-    a: Interval,
-    b: Interval,
-    tolerance: f64,
-) -> bool {
-    if member.solve.is_some_and(|s| rule.solves[s].unreachable[atom]) {
-        return false;
-    }
-    if a.is_empty() || b.is_empty() {
-        return sign != Sign::Undefined;
-    }
-    if a.partial || b.partial {
-        return true;
-    }
-    let (lo, hi) = (a.lo - b.hi, a.hi - b.lo);
+/// The last position that is the same instant as this one.
+pub fn path_together(path: &Path, position: f64) -> f64 {
+    position + path.start.after(position * path.h).resolution() / path.h
+}
+
+fn opposite(sign: Sign) -> Sign {
     match sign {
-        Sign::Plus => lo.is_nan() || lo <= tolerance,
-        Sign::Minus => hi.is_nan() || hi >= -tolerance,
-        Sign::Zero | Sign::Any => !(lo >= -tolerance && hi <= tolerance),
-        Sign::Undefined => true,
-    }
-}
-
-/// Follows one module's signs until something happens, at most to `limit`. Changes without consequence
-/// are added to `changes`; an event is returned as the signs that are zero at it, the first one first.
-#[allow(clippy::too_many_arguments)]
-fn search_member(
-    rule: &Rule,
-    system: &System,
-    dense: &Dense,
-    member: &Member,
-    signs: &[Sign],
-    watched: &[(usize, f64)],
-    limit: f64,
-    changes: &mut Vec<Change>,
-) -> Option<Vec<Change>> {
-    let outputs = rule.sides.outputs();
-    let constant = Dual::<Interval>::constant(0.0);
-    let mut f = Difference {
-        system,
-        dense,
-        member,
-        sides: &rule.sides,
-        atom: 0,
-        bounds: Vec::new(),
-        bounds_scratch: Vec::new(),
-        bounds_out: vec![constant; outputs],
-        values: Vec::new(),
-        scratch: Vec::new(),
-        out: vec![0.0; outputs],
-    };
-    let mut now = signs.to_vec();
-    let mut next: Vec<Option<Root>> = Vec::new();
-    for &(atom, tolerance) in watched {
-        f.atom = atom;
-        next.push(first_root(&mut f, 0.0, limit, now[atom], tolerance));
-    }
-    let mut rounds = 0;
-    loop {
-        rounds += 1;
-        let position = next.iter().flatten().map(|r| r.position).reduce(f64::min)?;
-        let together = dense.together(position);
-        let mut at = now.clone();
-        let mut after = now.clone();
-        let mut group = Vec::new();
-        for (&(atom, tolerance), root) in watched.iter().zip(&next) {
-            f.atom = atom;
-            // A touch is known only to about the root of the rounding; one that is zero here is here.
-            let zero = f.value(position).abs() <= tolerance;
-            let here = match root {
-                Some(root) if root.position <= together => Some((root.at, root.after)),
-                Some(root) if root.after == now[atom] && zero => Some((Sign::Zero, root.after)),
-                None if zero && now[atom] != Sign::Zero => Some((Sign::Zero, now[atom])),
-                _ => None,
-            };
-            if let Some(signs) = here {
-                (at[atom], after[atom]) = signs;
-                group.push(Change { id: member.id, atom, position, at: signs.0, after: signs.1 });
-            }
-        }
-        // A condition that oscillates without end is cut into short steps, each of bounded work.
-        if matters(rule, system, member, &at, &after) || rounds > MAX_ROUNDS {
-            return Some(group);
-        }
-        changes.extend(&group);
-        now = after;
-        for (&(atom, tolerance), root) in watched.iter().zip(&mut next) {
-            if group.iter().any(|change| change.atom == atom) {
-                f.atom = atom;
-                let from = root.map_or(position, |r| r.position.max(position));
-                *root = first_root(&mut f, from, limit, now[atom], tolerance);
-            }
-        }
+        Sign::Plus => Sign::Minus,
+        Sign::Minus => Sign::Plus,
+        other => other,
     }
 }
 
 /// Whether anything follows from the signs at an instant and just after it.
-fn matters(rule: &Rule, system: &System, member: &Member, at: &[Sign], after: &[Sign]) -> bool {
-    let holds =
-        |condition: &crate::model::Condition, signs: &[Sign]| condition.judge(|i| signs[i]) == Truth::Yes;
+fn matters(rule: &Rule, state: &State, at: &[Sign], after: &[Sign]) -> bool {
+    let holds = |condition: &Condition, signs: &[Sign]| condition.judge(|i| signs[i]) == Truth::Yes;
     if rule.produces.iter().any(|p| holds(&p.guard, at) || holds(&p.guard, after)) {
         return true;
     }
     // The first `solve` that holds is active.
-    if rule.solves.iter().position(|s| holds(&s.guard, after)) != member.solve {
+    if rule.solves.iter().position(|s| holds(&s.guard, after)) != state.solve {
         return true;
     }
-    let Some(solve) = member.solve else { return false };
-    rule.solves[solve]
-        .switches
-        .iter()
-        .zip(system.switches(member))
-        .any(|(switch, &on)| holds(&switch.condition, after) != (on != 0.0))
+    let Some(solve) = state.solve else { return false };
+    (rule.solves[solve].switches.iter().zip(&state.switches))
+        .any(|(switch, &on)| holds(&switch.condition, after) != on)
 }

@@ -326,9 +326,16 @@ impl Tree {
         Walk { tree: self, next: self.nodes[TRUNK as usize].first, inside: TRUNK }
     }
 
-    /// Writes the structure out; `value` gives the parameter at a place of [`Tree::values`].
-    pub fn write(&self, now: Instant, time: f64, value: impl Fn(usize) -> f64, out: &mut ModuleString) {
+    /// Writes the structure out; `values` appends the parameters of a module.
+    pub fn write(
+        &self,
+        now: Instant,
+        time: f64,
+        out: &mut ModuleString,
+        mut values: impl FnMut(ModuleId, &mut Vec<f64>),
+    ) {
         out.reset(time);
+        let mut parameters = Vec::new();
         // Brackets are no modules and have no identity.
         let nobody = Lineage::of_axiom(0);
         for visit in self.walk() {
@@ -338,7 +345,9 @@ impl Tree {
                 Visit::Module(id) => {
                     let node = self.node(id);
                     let age = now.since(node.birth).max(0.0);
-                    out.push(node.kind, self.places(id).map(&value), age, node.lineage);
+                    parameters.clear();
+                    values(id, &mut parameters);
+                    out.push(node.kind, parameters.iter().copied(), age, node.lineage);
                 }
             }
         }

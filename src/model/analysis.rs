@@ -1,0 +1,342 @@
+//! Finds out how much work each equation and each condition is (see [`Law`] and [`Watch`]).
+//!
+//! The analysis works on the expression graph. Whether a rate is affine, quadratic or polynomial is asked of its
+//! coefficients, so spelling does not matter. Everything that a module's own equation of the moment leaves alone is
+//! a constant to it, and so is a neighbour's parameter for which no rule has an equation.
+
+use std::collections::HashSet;
+
+use super::{Jacobian, Law, Linear, Model, Numeric, Rule, Watch};
+use crate::expr::{Binary, Graph, Monomial, Node, NodeId, Polynomial, Program, Unary};
+
+/// The expressions of a rule, before they are code.
+#[derive(Clone, Debug, Default)]
+pub struct Draft {
+    /// Per `solve`: its parameters with their rates.
+    pub rates: Vec<Vec<(usize, NodeId)>>,
+    /// Per atom.
+    pub sides: Vec<(NodeId, NodeId)>,
+}
+
+/// Highest degree in `age` of a rate that is integrated as a polynomial.
+const MAX_AGE_DEGREE: u32 = 3;
+
+/// Classifies everything in the model. `drafts` stand in the order of its rules.
+pub fn analyse(graph: &mut Graph, model: &mut Model, drafts: &[Draft]) {
+    let kinds = moving_parameters(model);
+    let moving: Vec<Vec<bool>> = model.rules.iter().map(|rule| moving_context(&kinds, rule)).collect();
+    for ((rule, draft), moving) in model.rules.iter_mut().zip(drafts).zip(&moving) {
+        let own = rule.parameters.len();
+        let all = 0..rule.variables;
+        rule.moving_context = (0..moving.len()).filter(|i| moving[*i]).map(|i| own + i).collect();
+        let still = Constants { own, of: HashSet::new(), moving, time: rule.variables - 2 };
+        rule.watch_at_rest =
+            draft.sides.iter().map(|&s| watch(graph, s, &still, &|_| true, all.len())).collect();
+        let mut reads_context = draft.sides.iter().any(|(a, b)| still.reads_context(graph, &[*a, *b]));
+        for (solve, rates) in rule.solves.iter_mut().zip(&draft.rates) {
+            let total = rule.variables + solve.switches.len();
+            let constants =
+                Constants { of: rates.iter().map(|(parameter, _)| *parameter).collect(), ..still.clone() };
+            let laws = laws(graph, rates, &constants, total);
+            let monotone = |variable: usize| {
+                let position = rates.iter().position(|(p, _)| *p == variable);
+                position.is_none_or(|i| match &laws[i] {
+                    Law::Polynomial(coefficients) => coefficients.outputs() == 1,
+                    Law::Quadratic(_) => true,
+                    _ => false,
+                })
+            };
+            solve.watch =
+                draft.sides.iter().map(|&s| watch(graph, s, &constants, &monotone, all.len())).collect();
+            let nodes: Vec<NodeId> = rates.iter().map(|r| r.1).collect();
+            reads_context |= constants.reads_context(graph, &nodes);
+            solve.jacobian = jacobian(graph, rates, &constants, total);
+            let numeric: Vec<usize> = (0..rates.len()).filter(|i| !laws[*i].is_closed()).collect();
+            let roots: Vec<NodeId> = numeric.iter().map(|i| rates[*i].1).collect();
+            solve.numeric_rates = Program::compile(graph, &roots, total);
+            solve.linear = linear(graph, &roots, &constants, total);
+            solve.laws = laws;
+            solve.numeric = numeric;
+        }
+        rule.reads_context = reads_context;
+    }
+    mark_drawn_only(graph, model, drafts);
+}
+
+/// Per kind and parameter: whether some rule has an equation for it.
+fn moving_parameters(model: &Model) -> Vec<Vec<bool>> {
+    let mut all: Vec<Vec<bool>> = model.kinds.iter().map(|(_, kind)| vec![false; kind.arity]).collect();
+    for (id, kind) in model.kinds.iter() {
+        for solve in kind.rules.iter().flat_map(|r| &model.rules[*r].solves) {
+            for &parameter in &solve.of {
+                all[id.index()][parameter] = true;
+            }
+        }
+    }
+    all
+}
+
+/// For each parameter of the context: whether it moves in any kind that matches.
+fn moving_context(kinds: &[Vec<bool>], rule: &Rule) -> Vec<bool> {
+    (rule.left.iter().chain(&rule.right))
+        .flat_map(|pattern| {
+            (0..pattern.arity).map(|p| pattern.kinds.iter().any(|kind| kinds[kind.index()][p]))
+        })
+        .collect()
+}
+
+/// Which variables stand still while one clause is active.
+#[derive(Clone)]
+struct Constants<'a> {
+    own: usize,
+    /// Own parameters with an equation.
+    of: HashSet<usize>,
+    /// Of the context.
+    moving: &'a [bool],
+    /// Index of `t`; `age` is the next.
+    time: usize,
+}
+
+impl Constants<'_> {
+    fn is_constant(&self, variable: u32) -> bool {
+        let v = variable as usize;
+        if v < self.own {
+            !self.of.contains(&v)
+        } else if v < self.time {
+            !self.moving[v - self.own]
+        } else {
+            v > self.time + 1
+        }
+    }
+
+    fn all_constant(&self, graph: &Graph, roots: &[NodeId]) -> bool {
+        graph.variables(roots).into_iter().all(|v| self.is_constant(v))
+    }
+
+    fn reads_context(&self, graph: &Graph, roots: &[NodeId]) -> bool {
+        let context = |v: u32| (v as usize) >= self.own && (v as usize) < self.time;
+        graph.variables(roots).into_iter().any(|v| context(v) && !self.is_constant(v))
+    }
+}
+
+/// Classifies the equations of a clause. Those that others depend on come first, whatever their order.
+fn laws(graph: &mut Graph, rates: &[(usize, NodeId)], constants: &Constants, total: usize) -> Vec<Law> {
+    let mut laws: Vec<Option<Law>> = vec![None; rates.len()];
+    // Parameters known to be sums of exponentials and polynomials.
+    let mut sums: HashSet<u32> = HashSet::new();
+    loop {
+        let mut progress = false;
+        for (i, &(parameter, rate)) in rates.iter().enumerate() {
+            if laws[i].is_some() {
+                continue;
+            }
+            if let Some((law, is_sum)) = closed(graph, parameter as u32, rate, constants, &sums, total) {
+                laws[i] = Some(law);
+                if is_sum {
+                    sums.insert(parameter as u32);
+                }
+                progress = true;
+            }
+        }
+        if !progress {
+            break;
+        }
+    }
+    let numeric = |graph: &mut Graph, rate: NodeId| Numeric {
+        coupled: constants.reads_context(graph, &[rate]),
+        linear: affine(graph, rate, constants).is_some(),
+    };
+    laws.into_iter()
+        .zip(rates)
+        .map(|(law, &(_, rate))| law.unwrap_or_else(|| Law::Numeric(numeric(graph, rate))))
+        .collect()
+}
+
+/// The law of a parameter, if it is one with a formula, and whether that is a sum of exponentials and polynomials.
+fn closed(
+    graph: &mut Graph,
+    parameter: u32,
+    rate: NodeId,
+    constants: &Constants,
+    sums: &HashSet<u32>,
+    total: usize,
+) -> Option<(Law, bool)> {
+    let zero = graph.constant(0.0);
+    let by_self = graph.polynomial(rate, |v| v == parameter)?;
+    if by_self.degree() > 2 {
+        return None;
+    }
+    let coefficients: Vec<NodeId> =
+        (0..3).map(|power| by_self.coefficient(parameter, power).unwrap_or(zero)).collect();
+    let [inflow, factor, square] = coefficients[..] else { unreachable!("three of them") };
+    if constants.all_constant(graph, &coefficients) {
+        if by_self.degree() == 0 {
+            return Some((Law::Polynomial(Program::compile(graph, &[inflow], total)), true));
+        }
+        let is_sum = by_self.degree() == 1;
+        return Some((Law::Quadratic(Program::compile(graph, &coefficients, total)), is_sum));
+    }
+    if square != zero || !constants.all_constant(graph, &[factor]) {
+        return None;
+    }
+    let age = constants.time as u32 + 1;
+    if factor == zero
+        && let Some(by_age) = graph.polynomial(inflow, |v| v == age)
+        && by_age.degree() <= MAX_AGE_DEGREE
+    {
+        let powers: Vec<NodeId> =
+            (0..=by_age.degree()).map(|power| by_age.coefficient(age, power).unwrap_or(zero)).collect();
+        if constants.all_constant(graph, &powers) {
+            return Some((Law::Polynomial(Program::compile(graph, &powers, total)), true));
+        }
+    }
+    is_sum(graph, inflow, constants, sums).then(|| {
+        let factor = Program::compile(graph, &[factor], total);
+        (Law::Sum { factor, inflow: Program::compile(graph, &[inflow], total) }, true)
+    })
+}
+
+/// True if an expression is made of constants, time, exponentials, sines and cosines of time, and parameters that are
+/// such themselves, by addition and multiplication.
+fn is_sum(graph: &mut Graph, root: NodeId, constants: &Constants, sums: &HashSet<u32>) -> bool {
+    let is_time = |v: u32| v as usize == constants.time || v as usize == constants.time + 1;
+    for id in graph.reachable(&[root]) {
+        if constants.all_constant(graph, &[id]) {
+            continue;
+        }
+        let good = match graph.node(id) {
+            Node::Const(_) => true,
+            Node::Var(v) => is_time(v) || sums.contains(&v),
+            Node::Unary(Unary::Neg, _) | Node::Binary(Binary::Add | Binary::Sub | Binary::Mul, ..) => true,
+            Node::Unary(Unary::Exp | Unary::Sin | Unary::Cos, a) => {
+                let by_time = graph.polynomial(a, is_time);
+                by_time.is_some_and(|p| {
+                    let coefficients: Vec<NodeId> = p.terms.values().copied().collect();
+                    p.degree() <= 1 && constants.all_constant(graph, &coefficients)
+                })
+            }
+            Node::Binary(Binary::Div, _, b) => constants.all_constant(graph, &[b]),
+            Node::Binary(Binary::Pow, _, b) => {
+                graph.as_constant(b).is_some_and(|n| (0.0..=4.0).contains(&n) && n == n.trunc())
+            }
+            Node::Select(c, ..) => constants.all_constant(graph, &[c]),
+            _ => false,
+        };
+        if !good {
+            return false;
+        }
+    }
+    true
+}
+
+/// A rate as `constant + Σ coefficient · variable`, if it is that, with constant coefficients.
+fn affine(graph: &mut Graph, rate: NodeId, constants: &Constants) -> Option<Polynomial> {
+    let polynomial = graph.polynomial(rate, |v| !constants.is_constant(v))?;
+    let time = |m: &Monomial| m.iter().any(|(v, _)| *v as usize >= constants.time);
+    (polynomial.degree() <= 1 && !polynomial.terms.keys().any(time)).then_some(polynomial)
+}
+
+fn linear(graph: &mut Graph, rates: &[NodeId], constants: &Constants, total: usize) -> Option<Linear> {
+    let zero = graph.constant(0.0);
+    let (mut variables, mut roots) = (Vec::new(), Vec::new());
+    for &rate in rates {
+        let polynomial = affine(graph, rate, constants)?;
+        roots.push(polynomial.terms.get(&Monomial::new()).copied().unwrap_or(zero));
+        let mut row = Vec::new();
+        for (monomial, &coefficient) in &polynomial.terms {
+            if let [(variable, 1)] = monomial[..] {
+                row.push(variable as usize);
+                roots.push(coefficient);
+            }
+        }
+        variables.push(row);
+    }
+    Some(Linear { variables, coefficients: Program::compile(graph, &roots, total) })
+}
+
+fn jacobian(graph: &mut Graph, rates: &[(usize, NodeId)], constants: &Constants, total: usize) -> Jacobian {
+    let (mut entries, mut roots) = (Vec::new(), Vec::new());
+    for (row, &(_, rate)) in rates.iter().enumerate() {
+        for variable in graph.variables(&[rate]) {
+            if (variable as usize) < constants.time && !constants.is_constant(variable) {
+                entries.push((row, variable as usize));
+                roots.push(graph.derivative(rate, variable));
+            }
+        }
+    }
+    Jacobian { entries, values: Program::compile(graph, &roots, total) }
+}
+
+/// How the meeting of two sides is found. `monotone` tells of an own parameter that it moves one way only.
+fn watch(
+    graph: &mut Graph,
+    (a, b): (NodeId, NodeId),
+    constants: &Constants,
+    monotone: &dyn Fn(usize) -> bool,
+    total: usize,
+) -> Watch {
+    if constants.all_constant(graph, &[a, b]) {
+        return Watch::Still;
+    }
+    let difference = graph.binary(Binary::Sub, a, b);
+    let Some(p) = graph.polynomial(difference, |v| !constants.is_constant(v)) else { return Watch::Root };
+    let moving: Vec<(&[(u32, u32)], NodeId)> =
+        p.terms.iter().filter(|(m, _)| !m.is_empty()).map(|(m, c)| (&m[..], *c)).collect();
+    match moving[..] {
+        [] => Watch::Still,
+        [(&[(variable, 1)], slope)] => {
+            let v = variable as usize;
+            if v >= constants.own && v < constants.time || v < constants.own && !monotone(v) {
+                return Watch::Root;
+            }
+            let level = match p.terms.get(&Monomial::new()) {
+                None => graph.constant(0.0),
+                Some(&rest) => {
+                    let minus = graph.unary(Unary::Neg, rest);
+                    graph.binary(Binary::Div, minus, slope)
+                }
+            };
+            Watch::Crossing { variable: v, level: Program::compile(graph, &[level], total) }
+        }
+        _ => Watch::Root,
+    }
+}
+
+/// Finds the parameters that nothing but the drawing reads.
+fn mark_drawn_only(graph: &Graph, model: &mut Model, drafts: &[Draft]) {
+    let mut read: HashSet<(usize, usize)> = HashSet::new();
+    let mut kinds_of: Vec<Vec<usize>> = vec![Vec::new(); model.rules.len()];
+    for (id, kind) in model.kinds.iter() {
+        for &rule in &kind.rules {
+            kinds_of[rule].push(id.index());
+        }
+    }
+    for (index, (rule, draft)) in model.rules.iter().zip(drafts).enumerate() {
+        let own = rule.parameters.len();
+        let sides: Vec<NodeId> = draft.sides.iter().flat_map(|(a, b)| [*a, *b]).collect();
+        let mut variables: Vec<usize> = graph.variables(&sides).into_iter().map(|v| v as usize).collect();
+        for (parameter, rate) in draft.rates.iter().flatten() {
+            let others = graph.variables(&[*rate]).into_iter().map(|v| v as usize);
+            variables.extend(others.filter(|v| v != parameter));
+        }
+        variables.extend(rule.produces.iter().flat_map(|p| p.successor.arguments.reads()));
+        for v in variables {
+            if v < own {
+                read.extend(kinds_of[index].iter().map(|kind| (*kind, v)));
+            } else if v < rule.time_variable() {
+                let mut first = own;
+                for pattern in rule.left.iter().chain(&rule.right) {
+                    if v < first + pattern.arity {
+                        read.extend(pattern.kinds.iter().map(|k| (k.index(), v - first)));
+                        break;
+                    }
+                    first += pattern.arity;
+                }
+            }
+        }
+    }
+    let drawn_only: Vec<Vec<bool>> = (model.kinds.iter())
+        .map(|(id, kind)| (0..kind.arity).map(|p| !read.contains(&(id.index(), p))).collect())
+        .collect();
+    model.drawn_only = drawn_only;
+}

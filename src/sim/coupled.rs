@@ -1,0 +1,412 @@
+//! Modules whose equations read one another, integrated together.
+//!
+//! Only those are coupled that read something of a neighbour which is integrated itself; a neighbour that follows a
+//! formula is an input. Whatever happens to one of them, or to what they read, ends their common step.
+
+use super::error::Error;
+use super::integrator::{Integrator, StepError};
+use super::motion::Motion;
+use super::plant::{Path, Plant};
+use super::queue::Who;
+use super::runge_kutta::Rates;
+use super::simulation::Simulation;
+use super::state::{Change, Control, Next};
+use super::watch::path_together;
+use crate::expr::{Program, Scratch};
+use crate::model::Rule;
+use crate::structure::{Instant, ModuleId, Visit};
+use smallvec::SmallVec;
+
+/// The coupled modules and their step.
+#[derive(Clone, Debug, Default)]
+pub struct Coupled {
+    /// In string order.
+    pub members: Vec<ModuleId>,
+    pub system: System,
+    y: Vec<f64>,
+    integrator: Integrator,
+    pub control: Control,
+    /// Signs that are zero at the event in the present step.
+    touched: Vec<(ModuleId, SmallVec<[Change; 2]>)>,
+    mark: Instant,
+    since_mark: usize,
+}
+
+/// Where a variable of a rule comes from.
+#[derive(Clone, Copy, Debug)]
+enum Source {
+    /// It does not change before the next event.
+    Fixed(f64),
+    /// A component of the state vector.
+    State(u32),
+    /// A formula.
+    Formula(u32),
+}
+
+/// The equations of the coupled modules.
+#[derive(Clone, Debug, Default)]
+pub struct System {
+    rows: Vec<Row>,
+    sources: Vec<Source>,
+    formulas: Vec<Formula>,
+    switches: Vec<f64>,
+    /// Place in the tree's values, and owner with its parameter, of each component.
+    places: Vec<(usize, ModuleId, usize)>,
+    start: Instant,
+}
+
+#[derive(Clone, Debug)]
+struct Formula {
+    motion: Motion,
+    x: f64,
+    since: Instant,
+    /// Time since then, at the start of the step.
+    offset: f64,
+}
+
+/// The equations of one module.
+#[derive(Clone, Copy, Debug)]
+struct Row {
+    rule: usize,
+    solve: usize,
+    forced: bool,
+    first_source: usize,
+    sources: usize,
+    first_switch: usize,
+    switches: usize,
+    first_rate: usize,
+    birth: Instant,
+    age: f64,
+}
+
+impl System {
+    /// The equations of some modules of the plant, whose numeric parameters have their components.
+    fn new(rules: &[Rule], plant: &Plant, members: &[ModuleId], start: Instant) -> System {
+        let mut system = System { start, ..System::default() };
+        for &id in members {
+            let state = plant.state(id).expect("members have states");
+            let first = plant.tree.places(id).start;
+            let mut own: Vec<(u32, usize)> = (state.motions.iter().enumerate())
+                .filter_map(|(parameter, m)| match m {
+                    Motion::Coupled(c) => Some((*c, parameter)),
+                    _ => None,
+                })
+                .collect();
+            own.sort_unstable();
+            let (Some(rule), Some(solve)) = (state.rule, state.solve) else { continue };
+            if own.is_empty() {
+                continue;
+            }
+            let first_rate = system.places.len();
+            system.places.extend(own.iter().map(|&(_, parameter)| (first + parameter, id, parameter)));
+            let first_source = system.sources.len();
+            for &module in std::iter::once(&id).chain(&state.context) {
+                let values = plant.tree.parameters(module);
+                let neighbour = plant.state(module).filter(|s| !s.motions.is_empty());
+                for (i, &x) in values.iter().enumerate() {
+                    system.sources.push(match neighbour.map(|s| (&s.motions[i], s.since)) {
+                        None | Some((Motion::Rest | Motion::Step(_), _)) => Source::Fixed(x),
+                        Some((Motion::Coupled(c), _)) => Source::State(*c),
+                        Some((motion, since)) => {
+                            let offset = start.since(since);
+                            system.formulas.push(Formula { motion: motion.clone(), x, since, offset });
+                            Source::Formula(system.formulas.len() as u32 - 1)
+                        }
+                    });
+                }
+            }
+            let first_switch = system.switches.len();
+            system.switches.extend(state.switches.iter().map(|&on| f64::from(u8::from(on))));
+            let birth = plant.tree.birth(id);
+            system.rows.push(Row {
+                rule,
+                solve,
+                forced: state.forced,
+                first_source,
+                sources: system.sources.len() - first_source,
+                first_switch,
+                switches: system.switches.len() - first_switch,
+                first_rate,
+                birth,
+                age: start.since(birth),
+            });
+        }
+        debug_assert!(
+            rules.len() > system.rows.iter().map(|r| r.rule).max().unwrap_or(0) || rules.is_empty()
+        );
+        system
+    }
+
+    /// Moves the start of the step.
+    fn advance(&mut self, start: Instant) {
+        self.start = start;
+        for row in &mut self.rows {
+            row.age = start.since(row.birth);
+        }
+        for formula in &mut self.formulas {
+            formula.offset = start.since(formula.since);
+        }
+    }
+
+    fn variables(&self, row: &Row, tau: f64, y: &[f64], out: &mut Vec<f64>) {
+        out.clear();
+        for source in &self.sources[row.first_source..row.first_source + row.sources] {
+            out.push(match *source {
+                Source::Fixed(x) => x,
+                Source::State(component) => y[component as usize],
+                Source::Formula(i) => {
+                    let Formula { motion, x, offset, .. } = &self.formulas[i as usize];
+                    x + motion.value(offset + tau)
+                }
+            });
+        }
+        out.extend([self.start.to_f64() + tau, row.age + tau]);
+        out.extend_from_slice(&self.switches[row.first_switch..row.first_switch + row.switches]);
+    }
+
+    /// The module, and its parameter, that a component belongs to.
+    pub fn owner(&self, component: usize) -> Option<(ModuleId, usize)> {
+        self.places.get(component).map(|&(_, id, parameter)| (id, parameter))
+    }
+}
+
+/// The right-hand side of a [`System`].
+struct Equations<'s> {
+    system: &'s System,
+    rules: &'s [Rule],
+    variables: Vec<f64>,
+    scratch: Scratch<f64>,
+}
+
+impl Equations<'_> {
+    fn program(&self, row: &Row) -> &Program {
+        let solve = &self.rules[row.rule].solves[row.solve];
+        if row.forced { &solve.rates } else { &solve.numeric_rates }
+    }
+}
+
+impl Rates for Equations<'_> {
+    fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]) {
+        let mut variables = std::mem::take(&mut self.variables);
+        let mut scratch = std::mem::take(&mut self.scratch);
+        for row in &self.system.rows {
+            self.system.variables(row, tau, y, &mut variables);
+            let program = self.program(row);
+            let first = row.first_rate;
+            program.eval(&variables, &mut scratch, &mut out[first..first + program.outputs()]);
+        }
+        self.variables = variables;
+        self.scratch = scratch;
+    }
+
+    fn modules(&self) -> u64 {
+        self.system.rows.len() as u64
+    }
+}
+
+impl Simulation<'_> {
+    /// Finds out who is coupled now, and begins their motion anew if anything about it has changed.
+    pub(super) fn couple(&mut self) -> Result<(), Error> {
+        let model = self.model;
+        let group = self.group;
+        let mut wanted: Vec<ModuleId> = Vec::new();
+        let mut dependent: Vec<ModuleId> = Vec::new();
+        let mut affected = std::mem::take(&mut self.coupled_changed);
+        for &id in &self.contextual {
+            let Some(state) = self.plant.state(id) else { continue };
+            let Some(rule) = state.rule.map(|r| &model.rules[r]) else { continue };
+            if !rule.reads_context {
+                continue;
+            }
+            let numeric = |m: &ModuleId| self.plant.state(*m).is_some_and(|s| s.is_numeric());
+            let restarted = |m: &ModuleId| self.plant.state(*m).is_some_and(|s| s.restarted == group);
+            let moved = restarted(&id) || state.context.iter().any(restarted);
+            if state.context.iter().any(numeric) || numeric(&id) {
+                affected |= moved;
+                wanted.push(id);
+                wanted.extend(state.context.iter().filter(|m| numeric(m)));
+            } else if moved && !restarted(&id) {
+                dependent.push(id);
+            }
+        }
+        wanted.sort_unstable();
+        wanted.dedup();
+        let mut freed = Vec::new();
+        for &id in &self.coupled.members {
+            let Some(state) = self.plant.state(id) else { continue };
+            if wanted.binary_search(&id).is_err() {
+                affected = true;
+                freed.push((id, state.restarted == group));
+            }
+        }
+        affected |=
+            wanted.iter().any(|id| self.plant.state(*id).is_some_and(|s| !s.coupled || s.restarted == group));
+        for &id in &dependent {
+            if let Some(state) = self.plant.state_mut(id) {
+                state.pass_changes(self.now);
+            }
+            self.look_ahead(id, self.now)?;
+        }
+        if !affected {
+            return Ok(());
+        }
+        for (id, restarted) in freed {
+            self.plant.state_mut(id).expect("seen above").coupled = false;
+            if !restarted {
+                self.touch_quietly(id);
+                self.start_motions(id, self.forced);
+                self.look_ahead(id, self.now)?;
+            }
+        }
+        for id in wanted {
+            self.plant.state_mut(id).expect("seen above").coupled = true;
+        }
+        self.restart_coupled()
+    }
+
+    /// Brings a module's values and signs to the present without opening it.
+    fn touch_quietly(&mut self, id: ModuleId) {
+        let now = self.now;
+        if let Some(state) = self.plant.state_mut(id) {
+            state.pass_changes(now);
+        }
+        self.plant.materialise(id, now);
+    }
+
+    /// Begins the common motion of the coupled modules at the present instant.
+    fn restart_coupled(&mut self) -> Result<(), Error> {
+        let now = self.now;
+        let plant = &self.plant;
+        let coupled = |visit| match visit {
+            Visit::Module(id) if plant.state(id).is_some_and(|s| s.coupled) => Some(id),
+            _ => None,
+        };
+        let members: Vec<ModuleId> = plant.tree.walk().filter_map(coupled).collect();
+        let mut values = Vec::new();
+        for &id in &members {
+            values.clear();
+            self.plant.values(id, now, &mut values);
+            let first = self.plant.tree.places(id).start;
+            let state = self.plant.state_mut(id).expect("a member");
+            state.pass_changes(now);
+            state.next = Next::default();
+            let numeric: SmallVec<[usize; 4]> =
+                (0..state.motions.len()).filter(|i| !state.motions[*i].is_formula()).collect();
+            for i in numeric {
+                self.plant.tree.set_value(first + i, values[i]);
+            }
+            self.queue.cancel(Who::Module(id.slot() as u32));
+        }
+        self.plant.coupled = None;
+        let mut component = 0;
+        self.coupled.y.clear();
+        for &id in &members {
+            let model = self.model;
+            let first = self.plant.tree.places(id).start;
+            let state = self.plant.state_mut(id).expect("a member");
+            let Some((rule, solve)) = state.rule.zip(state.solve) else { continue };
+            let solve = &model.rules[rule].solves[solve];
+            let forced = state.forced;
+            let positions = (0..solve.of.len()).filter(|i| forced || solve.numeric.contains(i));
+            let parameters: SmallVec<[usize; 4]> = positions.map(|i| solve.of[i]).collect();
+            for &parameter in &parameters {
+                state.motions[parameter] = Motion::Coupled(component);
+                component += 1;
+            }
+            let values = self.plant.tree.values();
+            self.coupled.y.extend(parameters.iter().map(|p| values[first + p]));
+        }
+        self.coupled.system = System::new(&self.model.rules, &self.plant, &members, now);
+        self.coupled.members = members;
+        self.coupled.integrator.restart(self.settings.method, self.coupled.y.len());
+        (self.coupled.mark, self.coupled.since_mark) = (now, 0);
+        if self.coupled.members.is_empty() {
+            self.queue.cancel(Who::Coupled);
+            return Ok(());
+        }
+        self.step_coupled(now)
+    }
+
+    /// Makes a step of the coupled modules and searches it.
+    fn step_coupled(&mut self, from: Instant) -> Result<(), Error> {
+        let rules = &self.model.rules;
+        let Coupled { system, y, integrator, control, .. } = &mut self.coupled;
+        let mut equations = Equations { system, rules, variables: Vec::new(), scratch: Vec::new() };
+        let step = integrator.step(&self.settings, control, &mut equations, y, from, &mut self.stats);
+        let dense = step.map_err(|error| self.coupled_error(error, from))?;
+        let h = dense.h;
+        self.plant.coupled = Some(dense);
+        self.coupled.touched.clear();
+        let mut best: Option<(f64, Instant)> = None;
+        let mut elder = (0.0, Instant::ZERO);
+        let mut candidates = Vec::new();
+        let members = std::mem::take(&mut self.coupled.members);
+        for &id in &members {
+            let state = self.plant.state(id).expect("a member");
+            let Some(rule) = state.rule.map(|r| &rules[r]).filter(|rule| !rule.atoms.is_empty()) else {
+                continue;
+            };
+            let path = Path::new(&self.plant, state, rule, from, h);
+            let limit = best.map_or(1.0, |(b, _)| path_together(&path, b).min(1.0));
+            let found = self.watcher.search(&path, limit);
+            if let Some(position) = found.event {
+                let birth = self.plant.tree.birth(id);
+                if best.is_none_or(|(b, _)| position < b) {
+                    best = Some((position, found.touched[0].time));
+                    let age = path.age();
+                    elder = (position + Instant::new(age + position * h).resolution() / h, birth);
+                }
+                candidates.push((position, birth, id, found.touched));
+            }
+            self.plant.state_mut(id).expect("a member").next.changes.extend(found.changes);
+        }
+        self.coupled.members = members;
+        let Some((position, time)) = best else {
+            let end = self.plant.coupled.as_ref().map_or(from, |d| d.end);
+            self.queue.schedule(Who::Coupled, end);
+            return Ok(());
+        };
+        let together = position + time.resolution() / h;
+        // Those born together have clocks that are as good as their age is short.
+        candidates.retain(|(at, birth, ..)| *at <= if *birth == elder.1 { elder.0 } else { together });
+        self.coupled.touched.extend(candidates.into_iter().map(|(_, _, id, touched)| (id, touched)));
+        self.queue.schedule(Who::Coupled, time);
+        Ok(())
+    }
+
+    /// True if the coupled modules' next entry is an event, not the end of their step.
+    pub(super) fn coupled_event(&self) -> bool {
+        !self.coupled.touched.is_empty()
+    }
+
+    /// Opens the coupled modules whose event it is; tells the first.
+    pub(super) fn touch_coupled(&mut self) -> Option<ModuleId> {
+        let touched = std::mem::take(&mut self.coupled.touched);
+        for (id, changes) in &touched {
+            self.touch(*id, changes);
+        }
+        touched.first().map(|(id, _)| *id)
+    }
+
+    /// Goes to the end of a step of the coupled modules, and on.
+    pub(super) fn pass_coupled_step(&mut self, at: Instant) -> Result<(), Error> {
+        let Coupled { members, system, y, integrator, mark, since_mark, .. } = &mut self.coupled;
+        for id in members {
+            self.plant.state_mut(*id).expect("a member").pass_changes(at);
+        }
+        integrator.advance(y);
+        for (&(place, ..), &value) in system.places.iter().zip(y.iter()) {
+            self.plant.tree.set_value(place, value);
+        }
+        system.advance(at);
+        if super::local::crawls(mark, since_mark, at) && !self.settings.method.is_fixed_step() {
+            return Err(self.coupled_error(StepError::TooSmall(0), at));
+        }
+        self.step_coupled(at)
+    }
+
+    fn coupled_error(&self, error: StepError, at: Instant) -> Error {
+        let owner = |component: usize| self.coupled.system.owner(component);
+        self.step_error(error, at, owner)
+    }
+}

@@ -1,0 +1,165 @@
+//! Steps of controlled error.
+
+use super::dense::Dense;
+use super::runge_kutta::{Rates, Trial, Workspace};
+use super::state::Control;
+use super::{Method, Settings, Stats};
+use crate::structure::Instant;
+
+/// Makes the steps of one system of equations after another.
+#[derive(Clone, Debug, Default)]
+pub struct Integrator {
+    workspace: Workspace,
+    /// The rates at the start of the next step are known.
+    rate_is_known: bool,
+    method: Method,
+}
+
+/// Why there is no step. The component that is to blame, if it is known.
+#[derive(Clone, Copy, Debug)]
+pub enum StepError {
+    TooSmall(usize),
+    /// A rate at the start of a step.
+    Rate(usize),
+    NotFinite(usize),
+}
+
+/// The tolerance of a single step, as a part of the tolerance asked for: errors of steps add up, and move
+/// the times of events, which move what comes after them.
+const INNER_TOLERANCE: f64 = 0.1;
+
+/// Looser than this, many small steps of low order are cheaper than few of high order.
+const HIGH_ORDER_BELOW: f64 = 1e-7;
+
+/// A step with less than this part of the tolerated error is longer than accuracy asks for.
+const EASY: f64 = 1e-3;
+/// How far ahead, in units of the time to the last event, such steps look.
+const FORESIGHT: f64 = 1e3;
+
+impl Integrator {
+    /// Prepares for another system of `n` equations, or for a start elsewhere.
+    pub fn restart(&mut self, method: Method, n: usize) {
+        self.rate_is_known = false;
+        self.workspace.resize(n);
+        self.method = method;
+    }
+
+    /// The method for a step.
+    fn choose(&self, settings: &Settings) -> Method {
+        match settings.method {
+            Method::Auto if settings.tolerance < HIGH_ORDER_BELOW => Method::Dop853,
+            Method::Auto => Method::Dopri5,
+            method => method,
+        }
+    }
+
+    /// Makes a step from `y` at `start`.
+    pub fn step(
+        &mut self,
+        settings: &Settings,
+        control: &mut Control,
+        system: &mut impl Rates,
+        y: &[f64],
+        start: Instant,
+        stats: &mut Stats,
+    ) -> Result<Dense, StepError> {
+        let before = self.workspace.evaluations;
+        self.method = self.choose(settings);
+        let result = self.attempts(settings, control, system, y, start, stats);
+        stats.rhs_evaluations += (self.workspace.evaluations - before) * system.modules();
+        result
+    }
+
+    fn attempts(
+        &mut self,
+        settings: &Settings,
+        control: &mut Control,
+        system: &mut impl Rates,
+        y: &[f64],
+        start: Instant,
+        stats: &mut Stats,
+    ) -> Result<Dense, StepError> {
+        let method = self.method;
+        let tolerance = settings.tolerance * INNER_TOLERANCE;
+        let order = method.error_order();
+        if !self.rate_is_known {
+            self.workspace.start(system, y).map_err(StepError::Rate)?;
+            self.rate_is_known = true;
+        }
+        let grid = settings.grid();
+        let mut h = match grid {
+            Some(grid) => Instant::new(next_grid_time(start, grid)).since(start),
+            None if control.size > 0.0 => control.size,
+            None => self.workspace.first_size(method, system, y, tolerance),
+        };
+        let mut rejected = false;
+        loop {
+            if grid.is_none() && h <= 0.5 * start.resolution() {
+                return Err(StepError::TooSmall(self.workspace.worst(y)));
+            }
+            match self.workspace.attempt(method, system, y, h, tolerance) {
+                Trial::NotFinite(component) => {
+                    // A stage may have left the region where the equations are defined: go nearer.
+                    if grid.is_some() || h <= 1e-12 * start.to_f64().max(1e-3) {
+                        return Err(StepError::NotFinite(component));
+                    }
+                    h *= 0.25;
+                    rejected = true;
+                }
+                Trial::Done { error, rounding } if error.max(rounding) > 1.0 => {
+                    stats.rejected += 1;
+                    // Safety and limits as in DOPRI5 (Hairer, Nørsett and Wanner 1993, II.4).
+                    h *= (0.9 * error.max(rounding).powf(-1.0 / f64::from(order + 1))).clamp(0.1, 0.9);
+                    rejected = true;
+                }
+                Trial::Done { error, rounding } => {
+                    if grid.is_none() {
+                        // Rounding is no reason to shorten a step that is good, only not to lengthen it.
+                        let most = if rejected || rounding > 0.5 { 1.0 } else { 10.0 };
+                        control.size = h * growth(error, control.last_error, order).clamp(0.2, most);
+                        control.last_error = error;
+                    }
+                    break;
+                }
+            }
+        }
+        stats.steps += 1;
+        let end = match grid {
+            Some(grid) => Some(Instant::new(next_grid_time(start, grid))),
+            None => None,
+        };
+        self.workspace.finish(method, system, y, h);
+        Ok(self.workspace.dense(method, start, end, y, h))
+    }
+
+    /// Makes the end of the step just made the start of the next.
+    pub fn advance(&mut self, y: &mut Vec<f64>) {
+        self.rate_is_known = self.workspace.advance(self.method);
+        std::mem::swap(y, &mut self.workspace.end);
+        self.workspace.end.resize(y.len(), 0.0);
+    }
+}
+
+/// After an event at some time into a step: one that could be as long as one likes says nothing about the next, but
+/// life does.
+pub fn foresee(control: &mut Control, lived: f64, resolution: f64) {
+    if control.last_error <= EASY {
+        control.size = control.size.min((FORESIGHT * lived).max(resolution));
+    }
+}
+
+/// PI step control (Gustafsson 1991) with the constants of DOPRI5: beta = 0.04.
+fn growth(error: f64, last: f64, order: u32) -> f64 {
+    let exponent = 1.0 / f64::from(order + 1) - 0.03;
+    0.9 * error.max(1e-10).powf(-exponent) * last.max(1e-4).powf(0.04)
+}
+
+/// The first multiple of the step size after an instant.
+fn next_grid_time(now: Instant, grid: f64) -> f64 {
+    let t = now.to_f64();
+    let mut n = (t / grid).floor() + 1.0;
+    if n * grid - t <= now.resolution() {
+        n += 1.0;
+    }
+    n * grid
+}

@@ -1,0 +1,201 @@
+//! The modules and how they move: values at any instant, and along a stretch of time.
+
+use super::dense::Dense;
+use super::motion::Motion;
+use super::state::State;
+use crate::expr::{Dual, Interval, Value};
+use crate::model::Rule;
+use crate::structure::{Instant, ModuleId, Tree};
+
+/// The growing structure with the motions of its parameters.
+#[derive(Clone, Debug)]
+pub struct Plant {
+    /// Its values are those at the start of each motion.
+    pub tree: Tree,
+    /// By slot of the tree; None for modules without rules.
+    pub states: Vec<Option<State>>,
+    /// The present step of the coupled modules.
+    pub coupled: Option<Dense>,
+}
+
+impl Plant {
+    pub fn state(&self, id: ModuleId) -> Option<&State> {
+        self.states.get(id.slot())?.as_ref().filter(|s| s.id == id)
+    }
+
+    pub fn state_mut(&mut self, id: ModuleId) -> Option<&mut State> {
+        self.states.get_mut(id.slot())?.as_mut().filter(|s| s.id == id)
+    }
+
+    /// A parameter, moving since `state.since` from the value `x`, at an instant.
+    #[inline]
+    fn moved(&self, state: &State, motion: &Motion, x: f64, at: Instant) -> f64 {
+        match motion {
+            Motion::Rest => x,
+            Motion::Step(component) => match state.step.as_ref().filter(|s| s.live) {
+                Some(step) => step.dense.value(*component as usize, step.dense.position(at)),
+                None => x,
+            },
+            Motion::Coupled(component) => match &self.coupled {
+                Some(dense) => dense.value(*component as usize, dense.position(at)),
+                None => x,
+            },
+            formula => x + formula.value(at.since(state.since).max(0.0)),
+        }
+    }
+
+    /// The parameters of a module at an instant, appended to `out`.
+    pub fn values(&self, id: ModuleId, at: Instant, out: &mut Vec<f64>) {
+        let values = self.tree.parameters(id);
+        match self.state(id).filter(|s| !s.motions.is_empty()) {
+            None => out.extend_from_slice(values),
+            Some(state) => {
+                out.extend(values.iter().zip(&state.motions).map(|(x, m)| self.moved(state, m, *x, at)));
+            }
+        }
+    }
+
+    /// Makes the values at an instant those of the tree, and the motions begin there, all at rest.
+    pub fn materialise(&mut self, id: ModuleId, at: Instant) {
+        for (i, place) in self.tree.places(id).enumerate() {
+            let Some(state) = self.state(id) else { return };
+            let Some(motion) = state.motions.get(i) else { break };
+            if !matches!(motion, Motion::Rest) {
+                let value = self.moved(state, motion, self.tree.values()[place], at);
+                self.tree.set_value(place, value);
+            }
+        }
+        let Some(state) = self.state_mut(id) else { return };
+        state.since = at;
+        for motion in &mut state.motions {
+            *motion = Motion::Rest;
+        }
+    }
+
+    /// The variables of a rule at an instant: parameters, those of the context, `t` and `age`.
+    pub fn variables(&self, id: ModuleId, context: &[ModuleId], at: Instant, out: &mut Vec<f64>) {
+        out.clear();
+        self.values(id, at, out);
+        for module in context {
+            self.values(*module, at, out);
+        }
+        out.extend([at.to_f64(), at.since(self.tree.birth(id))]);
+    }
+}
+
+/// The variables of a module's rule along a stretch of time: positions 0 to 1 of `h` from `start`.
+pub struct Path<'p> {
+    pub plant: &'p Plant,
+    pub state: &'p State,
+    pub rule: &'p Rule,
+    pub start: Instant,
+    pub h: f64,
+    age: f64,
+}
+
+impl<'p> Path<'p> {
+    pub fn new(plant: &'p Plant, state: &'p State, rule: &'p Rule, start: Instant, h: f64) -> Path<'p> {
+        Path { plant, state, rule, start, h, age: start.since(plant.tree.birth(state.id)) }
+    }
+
+    /// The module's age at the start.
+    pub fn age(&self) -> f64 {
+        self.age
+    }
+
+    /// The step that numeric motions follow: it is this stretch.
+    fn dense<'s>(&'s self, state: &'s State, motion: &Motion) -> Option<(&'s Dense, usize)> {
+        match motion {
+            Motion::Step(c) => Some((&state.step.as_ref()?.dense, *c as usize)),
+            Motion::Coupled(c) => Some((self.plant.coupled.as_ref()?, *c as usize)),
+            _ => None,
+        }
+    }
+
+    /// Gives each variable to one of three functions: values that rest, components of dense output, and formulas
+    /// with their start value and the time since it.
+    fn each<T>(
+        &self,
+        out: &mut Vec<T>,
+        rest: impl Fn(f64) -> T,
+        dense: impl Fn(&Dense, usize) -> T,
+        formula: impl Fn(&Motion, f64, f64) -> T,
+        time: impl Fn(f64) -> T,
+    ) {
+        out.clear();
+        for &id in std::iter::once(&self.state.id).chain(&self.state.context) {
+            let values = self.plant.tree.parameters(id);
+            let Some(state) = self.plant.state(id).filter(|s| !s.motions.is_empty()) else {
+                out.extend(values.iter().map(|x| rest(*x)));
+                continue;
+            };
+            let offset = self.start.since(state.since);
+            for (&x, motion) in values.iter().zip(&state.motions) {
+                out.push(match motion {
+                    Motion::Rest => rest(x),
+                    Motion::Step(_) | Motion::Coupled(_) => match self.dense(state, motion) {
+                        Some((d, component)) => dense(d, component),
+                        None => rest(x),
+                    },
+                    motion => formula(motion, x, offset),
+                });
+            }
+        }
+        out.push(time(self.start.to_f64()));
+        out.push(time(self.age));
+    }
+
+    pub fn at(&self, position: f64, out: &mut Vec<f64>) {
+        let tau = position * self.h;
+        self.each(
+            out,
+            |x| x,
+            |dense, c| dense.value(c, position),
+            |motion, x, offset| x + motion.value(offset + tau),
+            |t| t + tau,
+        );
+    }
+
+    /// Values at the start with their rates, per unit of position.
+    pub fn departure(&self, out: &mut Vec<Dual<f64>>) {
+        let h = self.h;
+        self.each(
+            out,
+            Dual::constant,
+            |dense, c| dense.start_of(c),
+            |motion, x, offset| Dual { value: x + motion.value(offset), rate: h * motion.rate(offset) },
+            |t| Dual { value: t, rate: h },
+        );
+    }
+
+    /// Bounds of values and rates from one position to another.
+    pub fn over(&self, lo: f64, hi: f64, out: &mut Vec<Dual<Interval>>) {
+        let h = self.h;
+        self.each(
+            out,
+            Dual::constant,
+            |dense, c| dense.piece(c, lo, hi),
+            |motion, x, offset| {
+                let Dual { value, rate } = motion.over(offset + lo * h, offset + hi * h);
+                let shifted = Interval { lo: x + value.lo, hi: x + value.hi, ..value };
+                Dual { value: shifted, rate: Interval { lo: h * rate.lo, hi: h * rate.hi, ..rate } }
+            },
+            |t| Dual { value: Interval::spanned(t + lo * h, t + hi * h), rate: Interval::constant(h) },
+        );
+    }
+
+    /// Bounds of values over the whole stretch.
+    pub fn whole(&self, out: &mut Vec<Interval>) {
+        let h = self.h;
+        self.each(
+            out,
+            Interval::constant,
+            |dense, c| dense.bounds(c),
+            |motion, x, offset| {
+                let value = motion.over(offset, offset + h).value;
+                Interval { lo: x + value.lo, hi: x + value.hi, ..value }
+            },
+            |t| Interval::spanned(t, t + h),
+        );
+    }
+}
