@@ -8,7 +8,7 @@ use super::print;
 use super::scope::{RESERVED, Scope, Variables, plural};
 use super::suggest::did_you_mean;
 use crate::diagnostic::{Diagnostic, Span};
-use crate::expr::{Binary, Node, NodeId, Program, Unary};
+use crate::expr::{Binary, Graph, Node, NodeId, Program, Unary};
 use crate::model::{
     Class, Comparison, Condition, Draft, Interpretation, Jacobian, KindId, Kinds, Pattern, Produce, Rule,
     Solve, Step, Successor, Switch, class_of, never_reached,
@@ -425,6 +425,30 @@ impl RuleBuilder<'_> {
                     let (minus, one) = (graph.constant(-1.0), graph.constant(1.0));
                     let rest = graph.select(above, one, zero);
                     Some(graph.select(below, minus, rest))
+                }
+                // A jump at every whole number: where the sine of π x changes sign. Between two of them the even
+                // or odd one of the two nearest whole numbers is meant, however x is rounded at the jump itself.
+                (Node::Unary(op @ (Unary::Floor | Unary::Ceil), x), Node::Unary(_, a)) => {
+                    let up = op == Unary::Ceil;
+                    let negated = |graph: &mut Graph, x| if up { graph.unary(Unary::Neg, x) } else { x };
+                    let (x, a) = (negated(graph, x), negated(graph, a));
+                    let (pi, half, two) =
+                        (graph.constant(std::f64::consts::PI), graph.constant(0.5), graph.constant(2.0));
+                    let phase = graph.binary(Binary::Mul, pi, x);
+                    let sine = graph.unary(Unary::Sin, phase);
+                    let even = graph.binary(Binary::Lt, zero, sine);
+                    let even = flag(graph, even);
+                    let shifted = graph.binary(Binary::Add, a, half);
+                    let nearest = graph.unary(Unary::Floor, shifted);
+                    let pairs = graph.binary(Binary::Div, nearest, two);
+                    let pairs = graph.unary(Unary::Floor, pairs);
+                    let pairs = graph.binary(Binary::Mul, two, pairs);
+                    let odd = graph.binary(Binary::Sub, nearest, pairs);
+                    let one = graph.constant(1.0);
+                    let other = graph.binary(Binary::Sub, one, odd);
+                    let over = graph.select(even, odd, other);
+                    let level = graph.binary(Binary::Sub, nearest, over);
+                    Some(negated(graph, level))
                 }
                 _ => None,
             }

@@ -4,7 +4,7 @@
 //! formula is an input. Whatever happens to one of them, or to what they read, ends their common step.
 
 use super::error::Error;
-use super::integrator::{Integrator, StepError};
+use super::integrator::{Integrator, StepError, foresee};
 use super::motion::Motion;
 use super::plant::{Path, Plant};
 use super::queue::Who;
@@ -18,7 +18,7 @@ use crate::structure::{Instant, ModuleId, Visit};
 use smallvec::SmallVec;
 
 /// The coupled modules and their step.
-#[derive(Clone, Debug, Default)]
+#[derive(Default)]
 pub struct Coupled {
     /// In string order.
     pub members: Vec<ModuleId>,
@@ -164,6 +164,26 @@ impl System {
         out.extend_from_slice(&self.switches[row.first_switch..row.first_switch + row.switches]);
     }
 
+    /// Row, column and entry in the clause's Jacobian, of each partial derivative of one module's rates.
+    fn row_partials<'s>(
+        &'s self,
+        rules: &'s [Rule],
+        row: &'s Row,
+    ) -> impl Iterator<Item = (u32, u32, usize)> + 's {
+        let solve = &rules[row.rule].solves[row.solve];
+        (solve.jacobian.entries.iter().enumerate()).filter_map(move |(entry, &(position, variable))| {
+            let rate = if row.forced { Some(position) } else { solve.numeric.iter().position(|p| *p == position) };
+            match self.sources[row.first_source + variable] {
+                Source::State(column) => Some(((row.first_rate + rate?) as u32, column, entry)),
+                _ => None,
+            }
+        })
+    }
+
+    fn partials<'s>(&'s self, rules: &'s [Rule]) -> impl Iterator<Item = (u32, u32, usize)> + 's {
+        self.rows.iter().flat_map(|row| self.row_partials(rules, row))
+    }
+
     /// The module, and its parameter, that a component belongs to.
     pub fn owner(&self, component: usize) -> Option<(ModuleId, usize)> {
         self.places.get(component).map(|&(_, id, parameter)| (id, parameter))
@@ -194,6 +214,26 @@ impl Rates for Equations<'_> {
             let program = self.program(row);
             let first = row.first_rate;
             program.eval(&variables, &mut scratch, &mut out[first..first + program.outputs()]);
+        }
+        self.variables = variables;
+        self.scratch = scratch;
+    }
+
+    fn couplings(&self) -> Vec<(u32, u32)> {
+        self.system.partials(self.rules).map(|(row, column, _)| (row, column)).collect()
+    }
+
+    fn partials(&mut self, tau: f64, y: &[f64], out: &mut Vec<f64>) {
+        let mut variables = std::mem::take(&mut self.variables);
+        let mut scratch = std::mem::take(&mut self.scratch);
+        let mut values = Vec::new();
+        out.clear();
+        for row in &self.system.rows {
+            let jacobian = &self.rules[row.rule].solves[row.solve].jacobian;
+            self.system.variables(row, tau, y, &mut variables);
+            values.resize(jacobian.values.outputs(), 0.0);
+            jacobian.values.eval(&variables, &mut scratch, &mut values);
+            out.extend(self.system.row_partials(self.rules, row).map(|(.., entry)| values[entry]));
         }
         self.variables = variables;
         self.scratch = scratch;
@@ -233,7 +273,10 @@ impl Simulation<'_> {
         wanted.dedup();
         let mut freed = Vec::new();
         for &id in &self.coupled.members {
-            let Some(state) = self.plant.state(id) else { continue };
+            let Some(state) = self.plant.state(id).filter(|s| s.coupled) else {
+                affected = true;
+                continue;
+            };
             if wanted.binary_search(&id).is_err() {
                 affected = true;
                 freed.push((id, state.restarted == group));
@@ -382,6 +425,10 @@ impl Simulation<'_> {
     /// Opens the coupled modules whose event it is; tells the first.
     pub(super) fn touch_coupled(&mut self) -> Option<ModuleId> {
         let touched = std::mem::take(&mut self.coupled.touched);
+        if let Some(dense) = &self.plant.coupled {
+            let control = &mut self.coupled.control;
+            foresee(control, control.last_error, self.now.since(dense.start), self.now.resolution());
+        }
         for (id, changes) in &touched {
             self.touch(*id, changes);
         }

@@ -8,7 +8,7 @@ use super::runge_kutta::Rates;
 use super::simulation::Simulation;
 use super::state::{Control, State, Step};
 use crate::expr::{Program, Scratch};
-use crate::model::Rule;
+use crate::model::{Jacobian, Rule};
 use crate::structure::{Instant, ModuleId};
 use smallvec::SmallVec;
 
@@ -30,6 +30,9 @@ pub fn crawls(mark: &mut Instant, since_mark: &mut usize, at: Instant) -> bool {
 /// The equations of one module whose neighbours rest or follow formulas that it does not read.
 struct Alone<'a> {
     program: &'a Program,
+    jacobian: &'a Jacobian,
+    /// Row, column and entry in the clause's Jacobian.
+    partials: SmallVec<[(u32, u32, usize); 4]>,
     /// All variables; those that move are filled in.
     variables: Vec<f64>,
     /// Where each component stands among the variables.
@@ -79,12 +82,20 @@ impl<'a> Alone<'a> {
             }
         }
         let (offset, time) = (from.since(state.since), rule.time_variable());
-        Alone { program, variables, numeric, formulas, offset, time, t, age, scratch }
+        let component = |variable: usize| numeric.iter().position(|v| *v == variable).map(|c| c as u32);
+        let partials = (solve.jacobian.entries.iter().enumerate())
+            .filter_map(|(entry, &(row, variable))| {
+                Some((component(solve.of[row])?, component(variable)?, entry))
+            })
+            .collect();
+        let jacobian = &solve.jacobian;
+        Alone { program, jacobian, partials, variables, numeric, formulas, offset, time, t, age, scratch }
     }
 }
 
-impl Rates for Alone<'_> {
-    fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]) {
+impl Alone<'_> {
+    /// Fills in the variables that move.
+    fn move_to(&mut self, tau: f64, y: &[f64]) {
         for (&variable, &value) in self.numeric.iter().zip(y) {
             self.variables[variable] = value;
         }
@@ -93,7 +104,25 @@ impl Rates for Alone<'_> {
         }
         self.variables[self.time] = self.t + tau;
         self.variables[self.time + 1] = self.age + tau;
+    }
+}
+
+impl Rates for Alone<'_> {
+    fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]) {
+        self.move_to(tau, y);
         self.program.eval(&self.variables, &mut self.scratch, out);
+    }
+
+    fn couplings(&self) -> Vec<(u32, u32)> {
+        self.partials.iter().map(|&(row, column, _)| (row, column)).collect()
+    }
+
+    fn partials(&mut self, tau: f64, y: &[f64], out: &mut Vec<f64>) {
+        self.move_to(tau, y);
+        let mut all: SmallVec<[f64; 16]> = smallvec::smallvec![0.0; self.jacobian.values.outputs()];
+        self.jacobian.values.eval(&self.variables, &mut self.scratch, &mut all);
+        out.clear();
+        out.extend(self.partials.iter().map(|&(.., entry)| all[entry]));
     }
 
     fn modules(&self) -> u64 {
@@ -122,8 +151,9 @@ impl Simulation<'_> {
             step
         };
         self.y = y;
-        // What comes next begins with what was learnt here.
-        *hint = Control { last_error: 1.0, ..control };
+        if hint.size == 0.0 {
+            *hint = Control { last_error: 1.0, ..control };
+        }
         let dense = step.map_err(|error| {
             let own = |component: usize| {
                 let state = self.plant.state(id)?;
@@ -160,7 +190,11 @@ impl Simulation<'_> {
         let Some(state) = self.plant.state(id) else { return };
         let (Some(rule), Some(solve), Some(step)) = (state.rule, state.solve, &state.step) else { return };
         if step.live {
-            foresee(&mut self.hints[rule][solve], now.since(step.dense.start), now.resolution());
+            // What comes next begins with what was learnt here.
+            let mut control = step.control;
+            let (lived, error) = (now.since(step.dense.start), control.last_error);
+            foresee(&mut control, error, lived, now.resolution());
+            self.hints[rule][solve] = Control { last_error: 1.0, ..control };
         }
     }
 

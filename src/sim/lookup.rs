@@ -58,6 +58,7 @@ impl Simulation<'_> {
             let state = self.plant.state(id);
             let Some(rule) = applies else {
                 if state.is_none_or(|s| s.rule.is_some()) {
+                    self.plant.materialise(id, self.now);
                     self.forget(id);
                     self.plant.states[id.slot()] = Some(State::new(id));
                 }

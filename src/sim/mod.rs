@@ -25,6 +25,7 @@ mod coupled;
 mod dense;
 mod error;
 mod event;
+mod implicit;
 mod integrator;
 mod local;
 mod lookup;
@@ -32,11 +33,13 @@ mod motion;
 mod phase;
 mod plant;
 mod queue;
+mod radau;
 mod rational;
 mod roots;
 mod runge_kutta;
 mod settle;
 mod simulation;
+mod sparse;
 mod state;
 mod tableau;
 mod watch;
@@ -60,14 +63,17 @@ pub enum Method {
     Dopri5,
     /// Dormand and Prince's pair of orders 8, 5 and 3, for tight tolerances (Hairer's DOP853).
     Dop853,
+    /// Radau IIA collocation with step control: implicit and L-stable, for stiff equations.
+    Radau,
 }
 
 impl Method {
     /// Methods by the names they have on the command line.
-    pub const NAMED: [(&'static str, Method); 5] = [
+    pub const NAMED: [(&'static str, Method); 6] = [
         ("auto", Method::Auto),
         ("dopri5", Method::Dopri5),
         ("dop853", Method::Dop853),
+        ("radau", Method::Radau),
         ("rk4", Method::Rk4),
         ("euler", Method::Euler),
     ];

@@ -162,7 +162,13 @@ fn bracket(f: &mut impl Function, mut lo: f64, mut hi: f64, sign: Sign) -> f64 {
         }
         let guess = hi - g_hi * (hi - lo) / (g_hi - g_lo);
         let bisect = i % 4 == 3 || !(guess > lo && guess < hi);
-        let at = if bisect { 0.5 * (lo + hi) } else { guess };
+        // A stretch may be longer than the way to the root by any number of decades.
+        let at = match bisect {
+            true if lo == 0.0 => 1e-3 * hi,
+            true if hi > 16.0 * lo => (lo * hi).sqrt(),
+            true => 0.5 * (lo + hi),
+            false => guess,
+        };
         if at <= lo || at >= hi {
             break;
         }

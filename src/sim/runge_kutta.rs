@@ -9,6 +9,12 @@ use crate::structure::Instant;
 pub trait Rates {
     fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]);
 
+    /// Which rates depend on which components: pairs of them.
+    fn couplings(&self) -> Vec<(u32, u32)>;
+
+    /// The partial derivatives of the rates, for each of the couplings in their order.
+    fn partials(&mut self, tau: f64, y: &[f64], out: &mut Vec<f64>);
+
     /// Number of modules whose equations one evaluation evaluates.
     fn modules(&self) -> u64;
 }
@@ -22,6 +28,8 @@ pub struct Workspace {
     /// Rates at the stages; the first is that of the start of the step.
     k: Vec<Vec<f64>>,
     stage: Vec<f64>,
+    /// The stage before the last, which is also at the end of the step.
+    other_end: Vec<f64>,
     /// The state at the end of the step.
     pub end: Vec<f64>,
     pub evaluations: u64,
@@ -34,6 +42,8 @@ pub enum Trial {
     Done { error: f64, rounding: f64 },
     /// Some rate or value on the way was not finite; the component.
     NotFinite(usize),
+    /// The equations of the stages could not be solved.
+    Diverged,
 }
 
 impl Method {
@@ -68,6 +78,7 @@ impl Workspace {
             k.resize(n, 0.0);
         }
         self.stage.resize(n, 0.0);
+        self.other_end.resize(n, 0.0);
         self.end.resize(n, 0.0);
     }
 
@@ -119,6 +130,9 @@ impl Workspace {
                 for i in 1..tableau.stages {
                     self.combine(tableau, i, y, h);
                     self.evaluate(system, tableau.c[i] * h, i);
+                    if i + 2 == tableau.stages {
+                        self.other_end.copy_from_slice(&self.stage);
+                    }
                     if i + 1 == tableau.stages {
                         // The last stage is the end of the step.
                         self.end.copy_from_slice(&self.stage);
@@ -144,6 +158,21 @@ impl Workspace {
         }
     }
 
+    /// An estimate of the step times the largest rate of decay: two states at the end of the step and the
+    /// difference of their rates (Hairer and Wanner 1996, IV.2).
+    pub fn stiffness(&self, method: Method, h: f64) -> f64 {
+        let Some(tableau) = method.tableau() else { return 0.0 };
+        let (a, b) = (&self.k[tableau.stages - 1], &self.k[tableau.stages - 2]);
+        let square = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| (x - y) * (x - y)).sum::<f64>();
+        let distance = square(&self.end, &self.other_end);
+        if distance > 0.0 { h * (square(a, b) / distance).sqrt() } else { 0.0 }
+    }
+
+    /// The rates at the start of the step.
+    pub fn rates_at_start(&self) -> &[f64] {
+        &self.k[0]
+    }
+
     /// The largest error of a component, in units of what is tolerated, by truncation and by rounding.
     fn error(&self, tableau: &Tableau, y: &[f64], h: f64, tolerance: f64) -> (f64, f64) {
         let (mut error, mut rounding): (f64, f64) = (0.0, 0.0);
@@ -157,7 +186,9 @@ impl Workspace {
             // Relative to where the step begins, and to how far it goes from there at first: what
             // grows from 1e-6 must be known to its own digits. Not to where it ends: beyond an
             // event, equations may lead anywhere, and that must not spoil the part that counts.
-            let scale = tolerance * (a.abs().max((h * self.k[0][j]).abs()) + FLOOR);
+            // What begins from rest goes somewhere only after that: the second stage shows it.
+            let first = self.k[0][j].abs().max(self.k[1][j].abs());
+            let scale = tolerance * (a.abs().max(h.abs() * first) + FLOOR);
             rounding = rounding.max(4.0 * f64::EPSILON * b.abs() / scale);
             let ratio = estimate / scale;
             error = if ratio > error || ratio.is_nan() { ratio } else { error };
@@ -208,7 +239,7 @@ impl Workspace {
     /// Makes the end of the step the start of the next: true if its rate is known.
     pub fn advance(&mut self, method: Method) -> bool {
         self.k.swap(0, method.last_stage());
-        method != Method::Euler
+        !matches!(method, Method::Euler | Method::Radau)
     }
 
     /// A step over which the solution changes little (Hairer, Nørsett and Wanner 1993, II.4).
@@ -253,6 +284,14 @@ mod tests {
     impl Rates for Growth {
         fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]) {
             out[0] = y[0] * (self.t + tau).cos();
+        }
+
+        fn couplings(&self) -> Vec<(u32, u32)> {
+            vec![(0, 0)]
+        }
+
+        fn partials(&mut self, tau: f64, _: &[f64], out: &mut Vec<f64>) {
+            out.push((self.t + tau).cos());
         }
 
         fn modules(&self) -> u64 {
