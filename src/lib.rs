@@ -60,6 +60,7 @@
 //! | [`scene`] | geometry that knows no file format |
 //! | [`export`] | files |
 //! | [`session`] | the pipeline as a whole |
+//! | [`report`] | how good the answers are, and what they cost |
 //! | [`cli`] | the program |
 //! | [`diagnostic`] | messages that point at the text |
 //!
@@ -77,6 +78,7 @@ pub mod export;
 pub mod expr;
 pub mod lang;
 pub mod model;
+pub mod report;
 pub mod scene;
 pub mod session;
 pub mod sim;

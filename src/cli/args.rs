@@ -24,6 +24,18 @@ pub enum Action {
     Run(RunArgs),
     /// Run a model and draw it, a file for each frame
     Render(RenderArgs),
+    /// Compare methods on models: errors, wall times, counts of work; or run the hard cases
+    ///
+    /// Each model is run by each method at each tolerance or step size. The error is the largest over all
+    /// times and parameters, relative to max(1, |value|), against the closed form where there is one, or the
+    /// tightest run of another method, whose own error is shown. Productions in another order and other
+    /// modules are reported as such, with the first that differs; the error is then that before it. Wall
+    /// times are medians of several runs, one at a time; the spread is half the distance from the fastest to
+    /// the slowest. The order observed is the slope of error against step size or, for methods with step
+    /// control, against evaluations of the right-hand side.
+    ///
+    /// With --hard, models are run that state their exact answers in their first lines, and checked.
+    Report(ReportArgs),
 }
 
 #[derive(Debug, Args)]
@@ -60,6 +72,59 @@ pub struct RenderArgs {
     /// Write into a directory that holds other files
     #[arg(long)]
     pub force: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct ReportArgs {
+    /// Model files (*.dls)
+    #[arg(value_name = "MODEL", required_unless_present = "hard", conflicts_with = "hard")]
+    pub models: Vec<PathBuf>,
+    /// Directory for NAME.csv, NAME.json and the plot NAME.svg (with --hard: hard.csv, hard.json); made if it
+    /// is not there
+    #[arg(short, long = "out", value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Methods to compare, in this order [default: all; with --hard those that each case names]
+    #[arg(long, value_name = "M1,M2,…", value_delimiter = ',', value_parser = method)]
+    pub methods: Option<Vec<Method>>,
+    /// Tolerances of methods with step control [default: each decade from 1e-3 to 1e-11; with --hard those
+    /// that each case names]
+    #[arg(long, value_name = "TOL1,TOL2,…", value_delimiter = ',', value_parser = tolerance)]
+    pub tolerances: Option<Vec<f64>>,
+    /// Step sizes of methods with a fixed step [default: ten powers of two, from about 1/64 of the last time;
+    /// fourteen for euler]
+    #[arg(long, value_name = "H1,H2,…", value_delimiter = ',', value_parser = positive, conflicts_with = "hard")]
+    pub step_sizes: Option<Vec<f64>>,
+    /// Times at which to compare [default: the model's `frames`, at most 50 of them]
+    #[arg(long, value_name = "T1,T2,…", value_delimiter = ',', value_parser = time, conflicts_with_all = ["from", "to", "step", "hard"])]
+    pub at: Option<Vec<f64>>,
+    /// First of equidistant times at which to compare
+    #[arg(long, value_name = "A", value_parser = time, requires = "to", requires = "step", conflicts_with = "hard")]
+    pub from: Option<f64>,
+    /// Last of them
+    #[arg(long, value_name = "B", value_parser = time, requires = "from")]
+    pub to: Option<f64>,
+    /// Time between them
+    #[arg(long, value_name = "S", value_parser = positive, requires = "from")]
+    pub step: Option<f64>,
+    /// Set a `param` of every model; can be repeated
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting, conflicts_with = "hard")]
+    pub settings: Vec<Setting>,
+    /// Timed runs of each point, of which the median is shown; fewer where they take more than 3 seconds
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = runs)]
+    pub runs: usize,
+    /// Seconds that a run may take; a point that would take longer, judged from the one before, is left out
+    #[arg(long, value_name = "S", default_value = "10", value_parser = positive)]
+    pub time_limit: f64,
+    /// More modules than this are an error
+    #[arg(long, value_name = "N", default_value_t = 10_000_000)]
+    pub max_modules: usize,
+    /// Run the hard cases: all *.dls files of a directory, or, without one, those that are built in. Exit
+    /// status 1 if any fails
+    #[arg(long, value_name = "DIR", num_args = 0..=1)]
+    pub hard: Option<Option<PathBuf>>,
+    /// With --hard, run only the case of this name; can be repeated
+    #[arg(long = "case", value_name = "ID")]
+    pub cases: Vec<String>,
 }
 
 /// Flags of everything that runs a model.
@@ -154,6 +219,13 @@ fn tolerance(text: &str) -> Result<f64, String> {
     match number(text)? {
         x if (1e-13..=0.1).contains(&x) => Ok(x),
         _ => Err("must be between 1e-13 and 0.1".to_owned()),
+    }
+}
+
+fn runs(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(n) if (1..=1000).contains(&n) => Ok(n),
+        _ => Err("must be between 1 and 1000".to_owned()),
     }
 }
 

@@ -1,10 +1,11 @@
-//! The command line: `dlsys check`, `dlsys run`, `dlsys render`.
+//! The command line: `dlsys check`, `dlsys run`, `dlsys render`, `dlsys report`.
 //!
 //! Exit status: 0 done; 1 the model or the run is at fault; 2 the command line is.
 
 mod args;
 mod common;
 mod render;
+mod report;
 mod run;
 
 use clap::Parser;
@@ -26,6 +27,7 @@ pub fn main() -> u8 {
         Action::Check(args) => run::check(args),
         Action::Run(args) => run::run(args),
         Action::Render(args) => render::render(args),
+        Action::Report(args) => report::report(args),
     };
     match done {
         Ok(()) | Err(Failure::ClosedPipe) => 0,

@@ -6,6 +6,7 @@
 //! - [`gallery`]: every mistake in `tests/errors` and the message it gets.
 //! - [`cli`]: the program as it is typed.
 //! - [`export`]: SVG and OBJ, read back by other people's code.
+//! - [`report`]: studies of methods, and hard cases with exact answers.
 
 mod cli;
 mod common;
@@ -13,4 +14,5 @@ mod export;
 mod gallery;
 mod language;
 mod listings;
+mod report;
 mod semantics;

@@ -1,0 +1,224 @@
+//! `dlsys report`: work-precision studies of models, and the hard cases.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::args::ReportArgs;
+use super::common::{Failure, open, out_error};
+use crate::model::Frames;
+use crate::report::{self, CASES, Case, HardPlan, Plan, Row};
+use crate::session::Session;
+use crate::sim::Method;
+
+/// Studies models, or runs the hard cases.
+pub fn report(args: &ReportArgs) -> Result<(), Failure> {
+    if let Some(folder) = &args.hard {
+        return hard(args, folder.as_deref());
+    }
+    // A conflict would lift clap's own requirement.
+    if !args.cases.is_empty() {
+        return Err(Failure::Usage("error: --case is for --hard\n".to_owned()));
+    }
+    let mut names: BTreeMap<String, usize> = BTreeMap::new();
+    for model in &args.models {
+        let session = open(model, &args.settings)?;
+        let stem = model.file_stem().map_or("model".to_owned(), |s| s.to_string_lossy().into_owned());
+        // Two models of the same name have two sets of files.
+        let count = names.entry(stem.clone()).or_insert(0);
+        *count += 1;
+        let name = if *count == 1 { stem } else { format!("{stem}-{count}") };
+        study(args, &session, &name)?;
+    }
+    Ok(())
+}
+
+fn study(args: &ReportArgs, session: &Session, name: &str) -> Result<(), Failure> {
+    let plan = Plan {
+        methods: args.methods.clone().unwrap_or_else(|| Method::NAMED.iter().map(|(_, m)| *m).collect()),
+        tolerances: args.tolerances.clone().unwrap_or_else(Plan::default_tolerances),
+        step_sizes: args.step_sizes.clone(),
+        times: times(args, session)?,
+        runs: args.runs,
+        time_limit: args.time_limit,
+        max_modules: args.max_modules,
+    };
+    let progress = spinner();
+    // Each method's block is printed when it is there.
+    let mut printed = Ok(());
+    let study = report::study(
+        session,
+        name,
+        &plan,
+        &mut |what| progress.set_message(format!("{name}: {what}")),
+        &mut |study| {
+            let head = if study.series.len() == 1 { report::study_head(study) } else { String::new() };
+            let block = study.series.last().map(report::series_table).unwrap_or_default();
+            if printed.is_ok() {
+                printed = progress.suspend(|| print(&format!("{head}{block}")));
+            }
+        },
+    );
+    progress.finish_and_clear();
+    printed?;
+    let study = study.map_err(|why| {
+        Failure::Model(format!(
+            "error: {}: there is nothing to compare with, because no reference comes to the last time\n  {why}\n",
+            session.source.name
+        ))
+    })?;
+    print("\n")?;
+    let Some(out) = &args.out else { return Ok(()) };
+    write(out, &format!("{name}.csv"), &report::csv(&study))?;
+    write(out, &format!("{name}.json"), &report::json(&study))?;
+    write(out, &format!("{name}.svg"), &report::svg(&study))
+}
+
+/// Runs hard cases: those of a folder, or those that are built in.
+fn hard(args: &ReportArgs, folder: Option<&Path>) -> Result<(), Failure> {
+    let texts = match folder {
+        Some(folder) => read_folder(folder)?,
+        None => {
+            CASES.iter().map(|(name, text)| (format!("models/hard/{name}"), (*text).to_owned())).collect()
+        }
+    };
+    let fault = |error: report::CaseError| Failure::Model(format!("error: {error}\n"));
+    let mut cases = Vec::new();
+    for (file, text) in &texts {
+        cases.push(Case::parse(file, text).map_err(fault)?);
+    }
+    if let Some(unknown) = args.cases.iter().find(|id| !cases.iter().any(|case| case.id == **id)) {
+        let all: Vec<&str> = cases.iter().map(|case| case.id.as_str()).collect();
+        return Err(Failure::Usage(format!(
+            "error: there is no case `{unknown}`; there are {}\n",
+            all.join(", ")
+        )));
+    }
+    if !args.cases.is_empty() {
+        cases.retain(|case| args.cases.contains(&case.id));
+    }
+    if let Some(methods) = &args.methods
+        && let Some(fixed) = methods.iter().find(|m| m.is_fixed_step())
+    {
+        let name = report::method_name(*fixed);
+        return Err(Failure::Usage(format!(
+            "error: hard cases have tolerances, and `{name}` has a fixed step\n"
+        )));
+    }
+    let plan = HardPlan {
+        methods: args.methods.clone(),
+        tolerances: args.tolerances.clone(),
+        time_limit: args.time_limit,
+    };
+    let progress = spinner();
+    let mut rows: Vec<Row> = Vec::new();
+    for case in &cases {
+        let run = report::run_case(case, &plan, &mut |what| progress.set_message(what.to_owned()));
+        rows.extend(run.map_err(fault)?);
+    }
+    progress.finish_and_clear();
+    print(&report::hard_table(&rows))?;
+    if let Some(out) = &args.out {
+        write(out, "hard.csv", &report::hard_csv(&rows))?;
+        write(out, "hard.json", &report::hard_json(&rows))?;
+    }
+    let failed = rows.iter().filter(|row| !row.passes()).count();
+    if failed > 0 {
+        let text = report::mismatches(&rows);
+        return Err(Failure::Model(format!("{text}\nerror: {failed} of {} runs failed\n", rows.len())));
+    }
+    print(&format!("{} runs of {} cases, all passed\n", rows.len(), cases.len()))
+}
+
+/// The model files of a folder, in the order of their names.
+fn read_folder(folder: &Path) -> Result<Vec<(String, String)>, Failure> {
+    let fault = |path: &Path, error: std::io::Error| {
+        Failure::Model(format!("error: cannot read {}: {error}\n", path.display()))
+    };
+    let mut paths: Vec<PathBuf> = Vec::new();
+    for entry in fs::read_dir(folder).map_err(|e| fault(folder, e))? {
+        let path = entry.map_err(|e| fault(folder, e))?.path();
+        if path.extension().is_some_and(|e| e == "dls") {
+            paths.push(path);
+        }
+    }
+    paths.sort();
+    if paths.is_empty() {
+        return Err(Failure::Usage(format!("error: there are no *.dls files in {}\n", folder.display())));
+    }
+    let read = |path: PathBuf| match fs::read_to_string(&path) {
+        Ok(text) => Ok((path.display().to_string(), text)),
+        Err(error) => Err(fault(&path, error)),
+    };
+    paths.into_iter().map(read).collect()
+}
+
+/// The times to observe, in order, each once.
+fn times(args: &ReportArgs, session: &Session) -> Result<Vec<f64>, Failure> {
+    let mut times = match (&args.at, args.from, args.to, args.step) {
+        (Some(at), ..) => at.clone(),
+        (None, Some(from), Some(to), Some(step)) => {
+            let frames = Frames { from, to, step };
+            if to < from {
+                return Err(Failure::Usage(format!("error: --to {to} is before --from {from}\n")));
+            }
+            if (to - from) / step >= MOST_TIMES as f64 {
+                return Err(Failure::Usage(format!("error: more than {MOST_TIMES} times to compare at\n")));
+            }
+            frames.times().collect()
+        }
+        _ => report::default_times(session).ok_or_else(|| {
+            Failure::Usage(format!(
+                "error: {} has no `frames`: say where to compare with `--at T1,T2,…` or `--from A --to B --step S`\n",
+                session.source.name
+            ))
+        })?,
+    };
+    times.sort_by(f64::total_cmp);
+    times.dedup();
+    Ok(times)
+}
+
+/// The strings of all of them are kept for comparison.
+const MOST_TIMES: usize = 10_000;
+
+fn print(text: &str) -> Result<(), Failure> {
+    let mut out = std::io::stdout().lock();
+    out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(out_error)
+}
+
+/// What is being done, on a terminal; nothing in a pipe.
+fn spinner() -> ProgressBar {
+    let progress = ProgressBar::new_spinner();
+    if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}") {
+        progress.set_style(style);
+    }
+    progress.enable_steady_tick(std::time::Duration::from_millis(200));
+    progress
+}
+
+/// Writes a file of the report, aside and then renamed, so that it is there as a whole or not at all. An
+/// earlier report of the same name is replaced.
+fn write(folder: &Path, name: &str, text: &str) -> Result<(), Failure> {
+    let target = folder.join(name);
+    let done = (|| {
+        fs::create_dir_all(folder)?;
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".dlsys-tmp-");
+        #[cfg(unix)]
+        let builder = {
+            use std::os::unix::fs::PermissionsExt;
+            builder.permissions(fs::Permissions::from_mode(0o666))
+        };
+        let mut file = builder.tempfile_in(folder)?;
+        file.write_all(text.as_bytes())?;
+        file.persist(&target).map_err(|error| error.error)?;
+        Ok(())
+    })();
+    done.map_err(|error: std::io::Error| {
+        Failure::Model(format!("error: cannot write {}: {error}\n", target.display()))
+    })
+}
