@@ -272,6 +272,7 @@ impl RuleBuilder<'_> {
                     linear: None,
                     jacobian: Jacobian::default(),
                     watch: Vec::new(),
+                    flashes: false,
                 }
             })
             .collect();

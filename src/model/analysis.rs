@@ -55,6 +55,7 @@ pub fn analyse(graph: &mut Graph, model: &mut Model, drafts: &[Draft]) {
             let roots: Vec<NodeId> = numeric.iter().map(|i| rates[*i].1).collect();
             solve.numeric_rates = Program::compile(graph, &roots, total);
             solve.linear = linear(graph, &roots, &constants, total);
+            solve.flashes = nodes.iter().any(|&rate| flashes(graph, rate, rule.variables - 2));
             solve.laws = laws;
             solve.numeric = numeric;
         }
@@ -227,6 +228,11 @@ fn is_sum(graph: &mut Graph, root: NodeId, constants: &Constants, sums: &HashSet
         }
     }
     true
+}
+
+fn flashes(graph: &mut Graph, rate: NodeId, time: usize) -> bool {
+    let is_time = |v: u32| v as usize == time || v as usize == time + 1;
+    graph.variables(&[rate]).into_iter().any(is_time) && graph.polynomial(rate, is_time).is_none()
 }
 
 /// A rate as `constant + Σ coefficient · variable`, if it is that, with constant coefficients.

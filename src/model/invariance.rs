@@ -79,7 +79,8 @@ pub fn never_reached(
                 scale = if there.is_finite() { scale.max(there.abs()) } else { scale };
             }
         }
-        if !here.is_finite() {
+        // A rate that is zero all around, by underflow perhaps, shows nothing.
+        if !here.is_finite() || scale == 0.0 {
             continue;
         }
         if here.abs() > 64.0 * f64::EPSILON * scale {

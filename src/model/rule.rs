@@ -97,6 +97,8 @@ pub struct Solve {
     /// Derivatives of all rates.
     pub jacobian: Jacobian,
     pub watch: Vec<Watch>,
+    /// Rates depend on time in a way that may be over before a step notices: not as polynomials.
+    pub flashes: bool,
 }
 
 /// A condition inside an equation, replaced there by a variable, so that the equation is smooth between

@@ -1,5 +1,6 @@
 //! Modules that are integrated alone, each with steps of its own.
 
+use super::dense::Dense;
 use super::error::Error;
 use super::integrator::{StepError, foresee};
 use super::motion::Motion;
@@ -7,7 +8,7 @@ use super::plant::Plant;
 use super::runge_kutta::Rates;
 use super::simulation::Simulation;
 use super::state::{Control, State, Step};
-use crate::expr::{Program, Scratch};
+use crate::expr::{Interval, Program, Scratch, Value};
 use crate::model::{Jacobian, Rule};
 use crate::structure::{Instant, ModuleId};
 use smallvec::SmallVec;
@@ -107,6 +108,69 @@ impl Alone<'_> {
     }
 }
 
+/// Most times that a step is cut because of what it may have overlooked.
+const MAX_TRIES: usize = 100;
+
+/// Rates so many times larger than all that were seen are a surprise.
+const SURPRISE: f64 = 8.0;
+/// Pieces of a step narrower than this are not halved any more, and no more of them are looked at.
+const NARROW: f64 = 1.0 / 256.0;
+const MAX_PIECES: usize = 512;
+
+impl Alone<'_> {
+    /// The first position in a step near which rates may be far larger than they are wherever they were evaluated: a
+    /// short flash of light between two stages. By bounds over pieces of the step, so that none is missed.
+    fn overlooked(&mut self, dense: &Dense, tolerance: f64) -> Option<f64> {
+        let n = self.numeric.len();
+        let (mut y, mut rates) = (vec![0.0; n], vec![0.0; n]);
+        let mut seen = vec![0.0f64; n];
+        for position in [0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0] {
+            for (c, y) in y.iter_mut().enumerate() {
+                *y = dense.value(c, position);
+            }
+            self.rates(position * dense.h, &y, &mut rates);
+            for (seen, rate) in seen.iter_mut().zip(&rates) {
+                *seen = seen.max(rate.abs());
+            }
+        }
+        let mut variables: Vec<Interval> = self.variables.iter().map(|x| Interval::constant(*x)).collect();
+        let mut out = vec![Interval::EMPTY; n];
+        let mut scratch = Vec::new();
+        let mut stack = vec![(0.0, 1.0)];
+        let mut pieces = 0;
+        while let Some((lo, hi)) = stack.pop() {
+            pieces += 1;
+            let (from, to) = (lo * dense.h, hi * dense.h);
+            for (c, &variable) in self.numeric.iter().enumerate() {
+                variables[variable] = dense.piece(c, lo, hi).value;
+            }
+            for &(variable, motion, x) in &self.formulas {
+                let value = motion.over(self.offset + from, self.offset + to).value;
+                variables[variable] = Interval { lo: x + value.lo, hi: x + value.hi, ..value };
+            }
+            variables[self.time] = Interval::spanned(self.t + from, self.t + to);
+            variables[self.time + 1] = Interval::spanned(self.age + from, self.age + to);
+            self.program.eval(&variables, &mut scratch, &mut out);
+            let surprising = |(rate, seen): (&Interval, &f64)| {
+                let size = rate.magnitude();
+                size > SURPRISE * seen && size * (to - from) > tolerance
+            };
+            if !out.iter().zip(&seen).any(surprising) {
+                continue;
+            }
+            if hi - lo <= NARROW {
+                return Some(lo);
+            }
+            if pieces >= MAX_PIECES {
+                return None;
+            }
+            let middle = 0.5 * (lo + hi);
+            stack.extend([(middle, hi), (lo, middle)]);
+        }
+        None
+    }
+}
+
 impl Rates for Alone<'_> {
     fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]) {
         self.move_to(tau, y);
@@ -139,21 +203,38 @@ impl Simulation<'_> {
         let rule = &model.rules[index];
         let mut y = std::mem::take(&mut self.y);
         let variables = std::mem::take(&mut self.variables);
-        let hint = &mut self.hints[index][solve];
+        let hint = self.hints[self.plant.tree.kind(id).index()][solve];
         let going_on = state.step.as_ref().filter(|s| s.live);
-        let mut control = going_on.map_or(*hint, |s| s.control);
+        let mut control = going_on.map_or(hint, |s| s.control);
         let step = {
             let scratch = std::mem::take(&mut self.scratch);
             let mut system = Alone::new(&self.plant, state, rule, from, variables, scratch, &mut y);
             self.alone.restart(self.settings.method, y.len());
-            let step = self.alone.step(&self.settings, &mut control, &mut system, &y, from, &mut self.stats);
+            let fixed = self.settings.method.is_fixed_step();
+            let flashes = rule.solves[solve].flashes && !fixed;
+            let mut tries = 0;
+            let step = loop {
+                let stats = &mut self.stats;
+                let step = self.alone.step(&self.settings, &mut control, &mut system, &y, from, stats);
+                let Ok(dense) = &step else { break step };
+                tries += 1;
+                let least = 64.0 * from.resolution();
+                if !flashes || tries > MAX_TRIES {
+                    break step;
+                }
+                match system.overlooked(dense, self.settings.tolerance) {
+                    Some(at) if dense.h > least => {
+                        stats.rejected += 1;
+                        let part = if at > 0.0 { at } else { 0.25 };
+                        control.size = (part * dense.h).max(least);
+                    }
+                    _ => break step,
+                }
+            };
             (self.variables, self.scratch) = (system.variables, system.scratch);
             step
         };
         self.y = y;
-        if hint.size == 0.0 {
-            *hint = Control { last_error: 1.0, ..control };
-        }
         let dense = step.map_err(|error| {
             let own = |component: usize| {
                 let state = self.plant.state(id)?;
@@ -188,13 +269,14 @@ impl Simulation<'_> {
     pub(super) fn learn(&mut self, id: ModuleId) {
         let now = self.now;
         let Some(state) = self.plant.state(id) else { return };
-        let (Some(rule), Some(solve), Some(step)) = (state.rule, state.solve, &state.step) else { return };
+        let (Some(solve), Some(step)) = (state.solve, &state.step) else { return };
+        let kind = self.plant.tree.kind(id).index();
         if step.live {
             // What comes next begins with what was learnt here.
             let mut control = step.control;
             let (lived, error) = (now.since(step.dense.start), control.last_error);
             foresee(&mut control, error, lived, now.resolution());
-            self.hints[rule][solve] = Control { last_error: 1.0, ..control };
+            self.hints[kind][solve] = Control { last_error: 1.0, ..control };
         }
     }
 

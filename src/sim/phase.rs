@@ -6,14 +6,17 @@ use super::motion::{Motion, Riccati, Terms};
 use super::plant::{Path, Plant};
 use super::queue::Who;
 use super::simulation::Simulation;
-use super::state::{Next, What};
+use super::state::{Change, Next, What};
 use super::watch::needs_search;
 use crate::expr::Value;
-use crate::model::{Law, Solve};
+use crate::model::{Law, Sign, Solve};
 use crate::structure::{Instant, ModuleId};
+use smallvec::SmallVec;
 
 /// The first stretch that is searched on formulas, if nothing is known of their pace, in units of time.
 const FIRST_WINDOW: f64 = 1.0;
+/// Two sides that differ by less than this part of the tolerance have met, where the equations end.
+const ARRIVED: f64 = 0.01;
 /// Growth of the stretches that are searched on formulas.
 const WIDENING: f64 = 4.0;
 
@@ -165,8 +168,10 @@ impl Simulation<'_> {
         let numeric = state.is_numeric();
         state.next = Next::default();
         let (h, limit) = if numeric {
-            let h = self.step_alone(id, from)?;
-            (h, 1.0)
+            match self.step_alone(id, from) {
+                Ok(h) => (h, 1.0),
+                Err(error) => return self.arrest(id, from).ok_or(error),
+            }
         } else if needs_search(state, rule) {
             let h = if state.window > 0.0 { WIDENING * state.window } else { pace(state, tree) };
             // Not shorter than time itself can tell.
@@ -199,6 +204,33 @@ impl Simulation<'_> {
             self.queue.schedule(who, at);
         }
         Ok(())
+    }
+
+    /// Where no step leads on because the equations end there: if a boundary is there too, it has been reached.
+    fn arrest(&mut self, id: ModuleId, at: Instant) -> Option<()> {
+        let model = self.model;
+        let state = self.plant.state(id)?;
+        let rule = &model.rules[state.rule?];
+        self.plant.variables(id, &state.context, at, &mut self.variables);
+        let mut sides = vec![0.0; rule.sides.outputs()];
+        rule.sides.eval(&self.variables, &mut self.scratch, &mut sides);
+        let near = |atom: &usize| {
+            let (a, b) = (sides[2 * atom], sides[2 * atom + 1]);
+            (a - b).abs() <= ARRIVED * self.settings.tolerance * a.abs().max(b.abs()).max(1.0)
+        };
+        let signed = |atom: &usize| matches!(state.signs[*atom], Sign::Plus | Sign::Minus);
+        let touched: SmallVec<[Change; 2]> = (0..rule.atoms.len())
+            .filter(signed)
+            .filter(near)
+            .map(|atom| Change { atom, time: at, at: Sign::Zero, after: state.signs[atom], level: None })
+            .collect();
+        if touched.is_empty() {
+            return None;
+        }
+        let state = self.plant.state_mut(id)?;
+        state.next = Next { what: What::Event, touched, changes: SmallVec::new() };
+        self.queue.schedule(Who::Module(id.slot() as u32), at);
+        Some(())
     }
 
     /// Goes on to the next stretch of a module.

@@ -47,7 +47,8 @@ pub struct Simulation<'m> {
     /// A coupled module has been replaced.
     pub(super) coupled_changed: bool,
     pub(super) alone: Integrator,
-    /// What step control has learnt, per rule and clause.
+    /// What step control has learnt, per kind and number of the clause: modules of one kind that live through the
+    /// same under different rules take the same steps.
     pub(super) hints: Vec<Vec<Control>>,
     pub(super) watcher: Watcher,
     /// Events in a row of modules that hardly lived.
@@ -99,7 +100,12 @@ impl<'m> Simulation<'m> {
             coupled: Coupled::default(),
             coupled_changed: false,
             alone: Integrator::default(),
-            hints: model.rules.iter().map(|r| vec![Control::default(); r.solves.len()]).collect(),
+            hints: (model.kinds.iter())
+                .map(|(_, kind)| {
+                    let clauses = kind.rules.iter().map(|r| model.rules[*r].solves.len()).max();
+                    vec![Control::default(); clauses.unwrap_or(0)]
+                })
+                .collect(),
             watcher: Watcher::default(),
             stalled: 0,
             stats: Stats::default(),
@@ -314,7 +320,7 @@ impl<'m> Simulation<'m> {
         if state.coupled && self.coupled.control.size > 0.0 {
             return self.coupled.control.size;
         }
-        let hint = state.rule.zip(state.solve).map_or(0.0, |(rule, solve)| self.hints[rule][solve].size);
+        let hint = state.solve.map_or(0.0, |solve| self.hints[self.plant.tree.kind(id).index()][solve].size);
         if hint > 0.0 { hint } else { 1.0 }
     }
 
