@@ -4,6 +4,8 @@
 //! these differences along the trajectory; at an event it *knows* that a difference is zero, though the
 //! rounded numbers differ in their last place. So conditions are not evaluated on numbers but on signs.
 
+use smallvec::SmallVec;
+
 /// The sign of `a - b`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Sign {
@@ -111,7 +113,11 @@ impl Condition {
 
     /// Judges the condition, given the sign of each atom.
     pub fn judge(&self, sign: impl Fn(usize) -> Sign) -> Truth {
-        let mut stack: Vec<Truth> = Vec::with_capacity(8);
+        // Most conditions are one comparison, or two.
+        if let [Step::Atom(atom, comparison)] = self.0[..] {
+            return comparison.judge(sign(atom as usize));
+        }
+        let mut stack: SmallVec<[Truth; 16]> = SmallVec::new();
         for step in &self.0 {
             let truth = match *step {
                 Step::Atom(atom, comparison) => comparison.judge(sign(atom as usize)),

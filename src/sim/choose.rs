@@ -6,6 +6,7 @@
 use smallvec::SmallVec;
 
 use super::error::Error;
+use super::lookup::NEAR;
 use super::settle::{Firing, open};
 use super::simulation::{SHORT_LIFE, Simulation};
 use super::state::{Signs, Switches};
@@ -127,19 +128,21 @@ impl Simulation<'_> {
     fn signs_after(&mut self, id: ModuleId) -> (Signs, bool) {
         let state = self.plant.state(id).expect("open modules have a state");
         let rule = &self.model.rules[state.rule.expect("open modules have a rule")];
-        let mut entry = state.open.clone().expect("open");
+        let known = state.open.as_ref().expect("open");
+        let elsewhere = known.flow.is_none();
+        if rule.atoms.is_empty() || (known.clear || !elsewhere) && !known.at.contains(&Sign::Zero) {
+            return (known.at.clone(), false);
+        }
+        let mut entry = known.clone();
         let mut snapped = false;
         let mut after = entry.at.clone();
-        let elsewhere = entry.flow.is_none();
-        if rule.atoms.is_empty() || (!elsewhere && !entry.at.contains(&Sign::Zero)) {
-            return (after, false);
-        }
         let smooth = entry.flow.as_ref().is_some_and(|f| f.0 == state.solve && f.1 == state.switches);
         let mut moving = Vec::new();
         self.moving_variables(id, 0.0, &mut moving);
         let mut scratch = Vec::new();
         let mut out = vec![Dual { value: 0.0, rate: 0.0 }; rule.sides.outputs()];
         rule.sides.eval(&moving, &mut scratch, &mut out);
+        let mut probed = false;
         let reach = self.reach_of(id).clamp(f64::MIN_POSITIVE, 1e300);
         for atom in 0..rule.atoms.len() {
             let (a, b) = (out[2 * atom], out[2 * atom + 1]);
@@ -147,7 +150,7 @@ impl Simulation<'_> {
             let size = a.value.abs().max(b.value.abs());
             if elsewhere && matches!(entry.at[atom], Sign::Plus | Sign::Minus) {
                 let gap = (a.value - b.value).abs();
-                if gap <= slope.abs() * self.now.resolution() && gap <= 1e-9 * self.scale(id) {
+                if gap <= slope.abs() * self.now.resolution() && gap <= NEAR * self.scale(id) {
                     entry.at[atom] = Sign::Zero;
                     snapped = true;
                 }
@@ -162,6 +165,7 @@ impl Simulation<'_> {
                 (Sign::Zero, guess @ (Sign::Plus | Sign::Minus)) if smooth => guess,
                 (Sign::Zero, _) => match clear(slope, NOISE) {
                     Sign::Zero => {
+                        probed = true;
                         // Not moving yet, or at rest: look ahead, first a little, then further.
                         let seen = [1e-9, 1e-6, 1e-3].into_iter().map(|part| {
                             self.moving_variables(id, part * reach.min(1e12), &mut moving);
@@ -174,9 +178,11 @@ impl Simulation<'_> {
                 },
                 (sign, _) => sign,
             };
-            // The probes have written over it.
-            self.moving_variables(id, 0.0, &mut moving);
-            rule.sides.eval(&moving, &mut scratch, &mut out);
+            if std::mem::take(&mut probed) {
+                // The probes have written over it.
+                self.moving_variables(id, 0.0, &mut moving);
+                rule.sides.eval(&moving, &mut scratch, &mut out);
+            }
         }
         self.plant.state_mut(id).expect("seen above").open = Some(entry);
         (after, snapped)

@@ -4,7 +4,9 @@
 //! formula is an input. Whatever happens to one of them, or to what they read, ends their common step.
 
 use super::error::Error;
+use super::Method;
 use super::integrator::{Integrator, StepError, foresee};
+use super::linear::Linear;
 use super::motion::Motion;
 use super::plant::{Path, Plant};
 use super::queue::Who;
@@ -26,15 +28,26 @@ pub struct Coupled {
     y: Vec<f64>,
     integrator: Integrator,
     pub control: Control,
+    /// The equations once more, if they are linear.
+    linear: Option<Linear>,
+    /// Nothing about the linear equations is watched: no steps are made.
+    direct: bool,
     /// Signs that are zero at the event in the present step.
-    touched: Vec<(ModuleId, SmallVec<[Change; 2]>)>,
+    touched: Vec<(ModuleId, SmallVec<[Change; 1]>)>,
     mark: Instant,
     since_mark: usize,
 }
 
+/// Taylor's series is cheap: its error may be a small part of what is tolerated.
+const LINEAR_TOLERANCE: f64 = 1e-3;
+/// Its steps go so many times as far as to the next event that is known.
+const BEYOND: f64 = 1.25;
+/// After so many of its steps without an event, the equations are called stiff.
+const MANY_TAYLOR_STEPS: usize = 200;
+
 /// Where a variable of a rule comes from.
 #[derive(Clone, Copy, Debug)]
-enum Source {
+pub enum Source {
     /// It does not change before the next event.
     Fixed(f64),
     /// A component of the state vector.
@@ -46,35 +59,36 @@ enum Source {
 /// The equations of the coupled modules.
 #[derive(Clone, Debug, Default)]
 pub struct System {
-    rows: Vec<Row>,
-    sources: Vec<Source>,
-    formulas: Vec<Formula>,
+    pub rows: Vec<Row>,
+    pub sources: Vec<Source>,
+    pub formulas: Vec<Formula>,
     switches: Vec<f64>,
     /// Place in the tree's values, and owner with its parameter, of each component.
     places: Vec<(usize, ModuleId, usize)>,
-    start: Instant,
+    pub start: Instant,
 }
 
+/// A parameter that follows a formula, as an input.
 #[derive(Clone, Debug)]
-struct Formula {
-    motion: Motion,
-    x: f64,
+pub struct Formula {
+    pub motion: Motion,
+    pub x: f64,
     since: Instant,
     /// Time since then, at the start of the step.
-    offset: f64,
+    pub offset: f64,
 }
 
 /// The equations of one module.
 #[derive(Clone, Copy, Debug)]
-struct Row {
-    rule: usize,
-    solve: usize,
-    forced: bool,
-    first_source: usize,
-    sources: usize,
+pub struct Row {
+    pub rule: usize,
+    pub solve: usize,
+    pub forced: bool,
+    pub first_source: usize,
+    pub sources: usize,
     first_switch: usize,
     switches: usize,
-    first_rate: usize,
+    pub first_rate: usize,
     birth: Instant,
     age: f64,
 }
@@ -148,7 +162,7 @@ impl System {
         }
     }
 
-    fn variables(&self, row: &Row, tau: f64, y: &[f64], out: &mut Vec<f64>) {
+    pub fn variables(&self, row: &Row, tau: f64, y: &[f64], out: &mut Vec<f64>) {
         out.clear();
         for source in &self.sources[row.first_source..row.first_source + row.sources] {
             out.push(match *source {
@@ -341,6 +355,7 @@ impl Simulation<'_> {
             self.queue.cancel(Who::Module(id.slot() as u32));
         }
         self.plant.coupled = None;
+        self.queue.cancel(Who::Coupled);
         let mut component = 0;
         self.coupled.y.clear();
         for &id in &members {
@@ -361,22 +376,63 @@ impl Simulation<'_> {
         }
         self.coupled.system = System::new(&self.model.rules, &self.plant, &members, now);
         self.coupled.members = members;
+        self.coupled.linear = match self.settings.method {
+            Method::Auto if !self.coupled.control.stiff => {
+                Linear::new(&self.coupled.system, &self.model.rules, &self.coupled.y)
+            }
+            _ => None,
+        };
+        self.coupled.direct = self.coupled.linear.as_ref().is_some_and(Linear::is_direct) && !self.watches_coupled();
         self.coupled.integrator.restart(self.settings.method, self.coupled.y.len());
         (self.coupled.mark, self.coupled.since_mark) = (now, 0);
         if self.coupled.members.is_empty() {
             self.queue.cancel(Who::Coupled);
             return Ok(());
         }
+        if self.coupled.direct {
+            self.queue.cancel(Who::Coupled);
+            self.coupled.touched.clear();
+            self.show_coupled(now);
+            return Ok(());
+        }
         self.step_coupled(now)
+    }
+
+    /// True if some condition of the coupled modules can only be found by searching their common motion.
+    fn watches_coupled(&self) -> bool {
+        self.coupled.members.iter().any(|id| {
+            let state = self.plant.state(*id).expect("a member");
+            state.rule.is_some_and(|r| !self.model.rules[r].atoms.is_empty())
+        })
+    }
+
+    /// Computes the linear motion at an instant, if it goes without steps.
+    pub(super) fn show_coupled(&mut self, at: Instant) {
+        if self.coupled.direct
+            && let Some(linear) = &mut self.coupled.linear
+            && self.plant.coupled.as_ref().is_none_or(|d| d.start != at)
+        {
+            self.plant.coupled = linear.at(at);
+        }
     }
 
     /// Makes a step of the coupled modules and searches it.
     fn step_coupled(&mut self, from: Instant) -> Result<(), Error> {
         let rules = &self.model.rules;
-        let Coupled { system, y, integrator, control, .. } = &mut self.coupled;
-        let mut equations = Equations { system, rules, variables: Vec::new(), scratch: Vec::new() };
-        let step = integrator.step(&self.settings, control, &mut equations, y, from, &mut self.stats);
-        let dense = step.map_err(|error| self.coupled_error(error, from))?;
+        let known = self.queue.peek().map_or(f64::INFINITY, |entry| entry.at.since(from));
+        let Coupled { system, y, integrator, control, linear, .. } = &mut self.coupled;
+        let dense = match linear {
+            Some(linear) => {
+                self.stats.steps += 1;
+                self.stats.rhs_evaluations += linear.evaluations();
+                linear.step(self.settings.tolerance * LINEAR_TOLERANCE, BEYOND * known.max(from.resolution()))
+            }
+            None => {
+                let mut equations = Equations { system, rules, variables: Vec::new(), scratch: Vec::new() };
+                let step = integrator.step(&self.settings, control, &mut equations, y, from, &mut self.stats);
+                step.map_err(|error| self.coupled_error(error, from))?
+            }
+        };
         let h = dense.h;
         self.plant.coupled = Some(dense);
         self.coupled.touched.clear();
@@ -437,15 +493,27 @@ impl Simulation<'_> {
 
     /// Goes to the end of a step of the coupled modules, and on.
     pub(super) fn pass_coupled_step(&mut self, at: Instant) -> Result<(), Error> {
-        let Coupled { members, system, y, integrator, mark, since_mark, .. } = &mut self.coupled;
+        let Coupled { members, system, y, integrator, control, mark, since_mark, linear, .. } = &mut self.coupled;
         for id in members {
             self.plant.state_mut(*id).expect("a member").pass_changes(at);
         }
-        integrator.advance(y);
+        match linear {
+            Some(_) => {
+                if let Some(dense) = &self.plant.coupled {
+                    y.iter_mut().enumerate().for_each(|(c, y)| *y = dense.value(c, 1.0));
+                }
+            }
+            None => integrator.advance(y),
+        }
         for (&(place, ..), &value) in system.places.iter().zip(y.iter()) {
             self.plant.tree.set_value(place, value);
         }
         system.advance(at);
+        // Many steps in a row, and nothing happens: they are short for stability's sake.
+        if linear.is_some() && *since_mark >= MANY_TAYLOR_STEPS {
+            *linear = None;
+            *control = Control { stiff: true, ..Control::default() };
+        }
         if super::local::crawls(mark, since_mark, at) && !self.settings.method.is_fixed_step() {
             return Err(self.coupled_error(StepError::TooSmall(0), at));
         }

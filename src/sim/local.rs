@@ -1,5 +1,6 @@
 //! Modules that are integrated alone, each with steps of its own.
 
+use super::Method;
 use super::dense::Dense;
 use super::error::Error;
 use super::integrator::{StepError, foresee};
@@ -211,7 +212,9 @@ impl Simulation<'_> {
             let mut system = Alone::new(&self.plant, state, rule, from, variables, scratch, &mut y);
             self.alone.restart(self.settings.method, y.len());
             let fixed = self.settings.method.is_fixed_step();
-            let flashes = rule.solves[solve].flashes && !fixed;
+            // For stiff equations, bounds of rates say nothing.
+            let stiff = control.stiff || self.settings.method == Method::Radau;
+            let flashes = rule.solves[solve].flashes && !fixed && !stiff;
             let mut tries = 0;
             let step = loop {
                 let stats = &mut self.stats;

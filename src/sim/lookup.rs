@@ -13,6 +13,9 @@ use crate::structure::{ModuleId, Visit};
 /// Two numbers are equal if they differ by no more than this part of the larger.
 const EQUAL: f64 = 8.0 * f64::EPSILON;
 
+/// Sides closer together than this part of the module's size may be equal but for the resolution of time.
+pub(super) const NEAR: f64 = 1e-9;
+
 impl Simulation<'_> {
     /// Finds the rule and context of every module for which they may be new, and opens it if they are.
     pub(super) fn look_up(&mut self) {
@@ -31,7 +34,9 @@ impl Simulation<'_> {
             if self.kinds_with_context[kind.index()] {
                 self.changed = true;
             } else if let Some(&rule) = model.kinds.get(kind).rules.first() {
-                self.take_up(id, rule, &[]);
+                if !self.begin_quickly(id, rule) {
+                    self.take_up(id, rule, &[]);
+                }
             }
         }
         self.fresh = fresh;
@@ -77,7 +82,7 @@ impl Simulation<'_> {
     fn take_up(&mut self, id: ModuleId, rule: usize, context: &[ModuleId]) {
         let compiled = &self.model.rules[rule];
         self.plant.materialise(id, self.now);
-        let mut signs = self.signs_of_values(id, compiled, context);
+        let (mut signs, clear) = self.signs_of_values(id, compiled, context);
         let before = self.plant.state(id);
         // A limit that is only approached may have been reached by rounding.
         if let Some(State { rule: Some(last), solve: Some(solve), signs: known, .. }) = before
@@ -101,7 +106,7 @@ impl Simulation<'_> {
         state.switches.clear();
         state.next = Default::default();
         state.since = self.now;
-        state.place();
+        state.place(clear);
         if !was_open {
             self.opened.push(id);
         }
@@ -137,21 +142,25 @@ impl Simulation<'_> {
         true
     }
 
-    fn signs_of_values(&mut self, id: ModuleId, rule: &Rule, context: &[ModuleId]) -> Signs {
+    fn signs_of_values(&mut self, id: ModuleId, rule: &Rule, context: &[ModuleId]) -> (Signs, bool) {
         if rule.atoms.is_empty() {
-            return Signs::new();
+            return (Signs::new(), true);
         }
         self.plant.variables(id, context, self.now, &mut self.variables);
         let mut out: SmallVec<[f64; 16]> = smallvec::smallvec![0.0; rule.sides.outputs()];
         rule.sides.eval(&self.variables, &mut self.scratch, &mut out);
-        out.chunks(2)
+        let scale = self.plant.tree.parameters(id).iter().fold(1.0, |m: f64, x| m.max(x.abs()));
+        let mut clear = true;
+        let signs = (out.chunks(2))
             .map(|side| {
                 let difference = side[0] - side[1];
                 // An infinite side is far from everything.
                 let size = side[0].abs().max(side[1].abs());
                 let equal = size.is_finite() && difference.abs() <= EQUAL * size;
+                clear &= !equal && difference.abs() > NEAR * scale;
                 if equal { Sign::Zero } else { Sign::of(difference) }
             })
-            .collect()
+            .collect();
+        (signs, clear)
     }
 }

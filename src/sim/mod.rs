@@ -27,11 +27,13 @@ mod error;
 mod event;
 mod implicit;
 mod integrator;
+mod linear;
 mod local;
 mod lookup;
 mod motion;
 mod phase;
 mod plant;
+mod quick;
 mod queue;
 mod radau;
 mod rational;
@@ -96,6 +98,9 @@ pub struct Settings {
     pub max_modules: usize,
     /// Productions are recorded for [`Simulation::take_events`].
     pub log: bool,
+    /// Everything is done the general way; for tests of the quick one.
+    #[doc(hidden)]
+    pub slow: bool,
 }
 
 impl Default for Settings {
@@ -106,6 +111,7 @@ impl Default for Settings {
             step_size: 0.01,
             max_modules: 10_000_000,
             log: false,
+            slow: false,
         }
     }
 }

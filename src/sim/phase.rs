@@ -96,7 +96,7 @@ impl Simulation<'_> {
     }
 
     /// The motions of a clause from `self.variables`; false if a formula refuses these numbers.
-    fn formulas(&mut self, solve: &Solve, time: usize, motions: &mut [Motion]) -> bool {
+    pub(super) fn formulas(&mut self, solve: &Solve, time: usize, motions: &mut [Motion]) -> bool {
         let mut out = [0.0; 4];
         // For the algebra: the coefficients f and d of exponential motions.
         let mut sums_follow = false;
@@ -219,7 +219,7 @@ impl Simulation<'_> {
             (a - b).abs() <= ARRIVED * self.settings.tolerance * a.abs().max(b.abs()).max(1.0)
         };
         let signed = |atom: &usize| matches!(state.signs[*atom], Sign::Plus | Sign::Minus);
-        let touched: SmallVec<[Change; 2]> = (0..rule.atoms.len())
+        let touched: SmallVec<[Change; 1]> = (0..rule.atoms.len())
             .filter(signed)
             .filter(near)
             .map(|atom| Change { atom, time: at, at: Sign::Zero, after: state.signs[atom], level: None })
@@ -228,7 +228,7 @@ impl Simulation<'_> {
             return None;
         }
         let state = self.plant.state_mut(id)?;
-        state.next = Next { what: What::Event, touched, changes: SmallVec::new() };
+        state.next = Next { what: What::Event, touched, changes: Vec::new() };
         self.queue.schedule(Who::Module(id.slot() as u32), at);
         Some(())
     }
@@ -264,11 +264,10 @@ impl Simulation<'_> {
 
     /// Forgets all about a module that has been replaced, or has lost its rule.
     pub(super) fn forget(&mut self, id: ModuleId) {
-        if let Some(entry) = self.plant.states.get_mut(id.slot())
-            && entry.as_ref().is_some_and(|s| s.id == id)
-        {
-            self.coupled_changed |= entry.as_ref().is_some_and(|s| s.coupled);
-            *entry = None;
+        // What was kept of it stays as memory for the next that lives there.
+        if let Some(state) = self.plant.state_mut(id) {
+            state.is_alive = false;
+            self.coupled_changed |= state.coupled;
             self.queue.cancel(Who::Module(id.slot() as u32));
         }
     }

@@ -20,11 +20,11 @@ pub struct Plant {
 
 impl Plant {
     pub fn state(&self, id: ModuleId) -> Option<&State> {
-        self.states.get(id.slot())?.as_ref().filter(|s| s.id == id)
+        self.states.get(id.slot())?.as_ref().filter(|s| s.id == id && s.is_alive)
     }
 
     pub fn state_mut(&mut self, id: ModuleId) -> Option<&mut State> {
-        self.states.get_mut(id.slot())?.as_mut().filter(|s| s.id == id)
+        self.states.get_mut(id.slot())?.as_mut().filter(|s| s.id == id && s.is_alive)
     }
 
     /// A parameter, moving since `state.since` from the value `x`, at an instant.
@@ -57,10 +57,17 @@ impl Plant {
 
     /// Makes the values at an instant those of the tree, and the motions begin there, all at rest.
     pub fn materialise(&mut self, id: ModuleId, at: Instant) {
+        self.materialise_except(id, at, &[]);
+    }
+
+    /// The same, but for parameters whose values then are given.
+    pub fn materialise_except(&mut self, id: ModuleId, at: Instant, given: &[(usize, f64)]) {
         for (i, place) in self.tree.places(id).enumerate() {
             let Some(state) = self.state(id) else { return };
             let Some(motion) = state.motions.get(i) else { break };
-            if !matches!(motion, Motion::Rest) {
+            if let Some(&(_, value)) = given.iter().find(|(parameter, _)| *parameter == i) {
+                self.tree.set_value(place, value);
+            } else if !matches!(motion, Motion::Rest) {
                 let value = self.moved(state, motion, self.tree.values()[place], at);
                 self.tree.set_value(place, value);
             }

@@ -98,7 +98,7 @@ impl Simulation<'_> {
 
     /// The production of each open module whose condition holds at the instant.
     fn judge(&mut self) -> Vec<Firing> {
-        let mut firing = std::mem::take(&mut self.spare);
+        let mut firing = std::mem::take(&mut self.firing);
         let plant = &self.plant;
         firing.extend(self.opened.iter().filter_map(|&id| {
             let state = plant.state(id)?;
@@ -112,7 +112,7 @@ impl Simulation<'_> {
 
     fn recycle(&mut self, mut firing: Vec<Firing>) {
         firing.clear();
-        self.spare = firing;
+        self.firing = firing;
     }
 
     /// Replaces all modules in parallel: every successor is computed before any is put in.
@@ -191,5 +191,5 @@ impl Simulation<'_> {
 
 /// What is open about a module, which must be.
 pub(super) fn open(state: &mut super::state::State) -> &mut Open {
-    state.open.get_or_insert_with(Open::default)
+    state.open.get_or_insert_with(Box::default)
 }

@@ -26,6 +26,8 @@ pub struct Simulation<'m> {
     pub(super) settings: Settings,
     /// Formulas are not used.
     pub(super) forced: bool,
+    /// The common case is done quickly.
+    pub(super) quick: bool,
     pub(super) plant: Plant,
     pub(super) queue: Queue,
     /// Time of the last event.
@@ -62,9 +64,11 @@ pub struct Simulation<'m> {
     pub(super) scratch: Scratch<f64>,
     pub(super) arguments: Vec<f64>,
     pub(super) argument_ends: Vec<usize>,
-    pub(super) spare: Vec<Firing>,
+    /// Productions that are known to apply at the instant.
+    pub(super) firing: Vec<Firing>,
     pub(super) motions: Vec<Motion>,
     pub(super) y: Vec<f64>,
+    pub(super) rates: Vec<f64>,
     group_entries: Vec<Entry>,
 }
 
@@ -87,6 +91,7 @@ impl<'m> Simulation<'m> {
             model,
             settings,
             forced: settings.method != Method::Auto,
+            quick: !settings.log && !settings.slow,
             plant: Plant { tree, states: Vec::new(), coupled: None },
             queue: Queue::default(),
             now: Instant::ZERO,
@@ -115,9 +120,10 @@ impl<'m> Simulation<'m> {
             scratch: Vec::new(),
             arguments: Vec::new(),
             argument_ends: Vec::new(),
-            spare: Vec::new(),
+            firing: Vec::new(),
             motions: Vec::new(),
             y: Vec::new(),
+            rates: Vec::new(),
             group_entries: Vec::new(),
         };
         simulation.plant_axiom()?;
@@ -173,6 +179,7 @@ impl<'m> Simulation<'m> {
         let at = Instant::new(t);
         // An event within the resolution of time of `t` may have taken place a little after it.
         let now = if at.since(self.now) < 0.0 { self.now } else { at };
+        self.show_coupled(now);
         let plant = &self.plant;
         let mut bad = None;
         plant.tree.write(now, t, out, |id, values| {
@@ -271,11 +278,19 @@ impl<'m> Simulation<'m> {
             self.queue.schedule(entry.who, entry.at);
         }
         self.now = at;
+        self.show_coupled(at);
         let mut oldest = None;
         for entry in &group {
             let first = match entry.who {
                 Who::Coupled => self.touch_coupled(),
-                Who::Module(slot) => Some(self.touch_alone(slot as usize)?),
+                Who::Module(slot) => match self.fire_quickly(slot as usize) {
+                    Some(firing) => {
+                        let id = firing.id;
+                        self.firing.push(firing);
+                        Some(id)
+                    }
+                    None => Some(self.touch_alone(slot as usize)?),
+                },
             };
             oldest = oldest.or(first);
         }
@@ -336,7 +351,7 @@ impl<'m> Simulation<'m> {
     /// Some module, to name where nothing more is known.
     pub(super) fn anyone(&self) -> ModuleId {
         let named = self.coupled.members.first().copied();
-        named.or_else(|| self.plant.states.iter().flatten().map(|s| s.id).next()).expect("there are modules")
+        named.or_else(|| self.plant.states.iter().flatten().find(|s| s.is_alive).map(|s| s.id)).expect("there are modules")
     }
 
     pub(super) fn site(&self, fire: &Firing) -> Site {

@@ -14,6 +14,8 @@ pub type Switches = SmallVec<[bool; 8]>;
 #[derive(Clone, Debug)]
 pub struct State {
     pub id: ModuleId,
+    /// False when the module has been replaced, and its memory waits for another.
+    pub is_alive: bool,
     /// The rule that applies; None where no rule's context is there.
     pub rule: Option<usize>,
     pub context: SmallVec<[ModuleId; 2]>,
@@ -36,7 +38,7 @@ pub struct State {
     pub coupled: bool,
     pub next: Next,
     /// Set while an instant is examined that concerns the module.
-    pub open: Option<Open>,
+    pub open: Option<Box<Open>>,
     /// Number of the instant at which its motions last began.
     pub restarted: u64,
 }
@@ -75,9 +77,9 @@ impl Default for Control {
 pub struct Next {
     pub what: What,
     /// Signs that are zero then.
-    pub touched: SmallVec<[Change; 2]>,
+    pub touched: SmallVec<[Change; 1]>,
     /// Signs that change before then, without consequence.
-    pub changes: SmallVec<[Change; 2]>,
+    pub changes: Vec<Change>,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -118,12 +120,15 @@ pub struct Open {
     pub tried: SmallVec<[usize; 4]>,
     /// Times that switches were found the other way.
     pub flips: usize,
+    /// No side is near the other: signs are what they are.
+    pub clear: bool,
 }
 
 impl State {
     pub fn new(id: ModuleId) -> State {
         State {
             id,
+            is_alive: true,
             rule: None,
             context: SmallVec::new(),
             solve: None,
@@ -141,6 +146,16 @@ impl State {
         }
     }
 
+    /// Makes the memory of a dead module that of a new one.
+    pub fn renew(&mut self, id: ModuleId) {
+        (self.id, self.is_alive) = (id, true);
+        self.context.clear();
+        self.switches.clear();
+        (self.step, self.open) = (None, None);
+        self.next.changes.clear();
+        (self.window, self.forced, self.coupled) = (0.0, false, false);
+    }
+
     /// True if some parameter is integrated by the module's own steps.
     pub fn is_numeric(&self) -> bool {
         self.motions.iter().any(|m| !m.is_formula())
@@ -151,15 +166,15 @@ impl State {
         if self.open.is_none() {
             let flow = Some((self.solve, self.switches.clone()));
             let (at, guess) = (self.signs.clone(), self.signs.clone());
-            self.open = Some(Open { at, guess, flow, ..Open::default() });
+            self.open = Some(Box::new(Open { at, guess, flow, ..Open::default() }));
         }
         self.open.as_mut().expect("just opened")
     }
 
     /// Opens the module as one whose signs are known from its values only.
-    pub fn place(&mut self) {
+    pub fn place(&mut self, clear: bool) {
         let guess = self.signs.iter().map(|&s| if s == Sign::Zero { Sign::Any } else { s }).collect();
-        self.open = Some(Open { at: self.signs.clone(), guess, ..Open::default() });
+        self.open = Some(Box::new(Open { at: self.signs.clone(), guess, clear, ..Open::default() }));
     }
 
     /// Takes over the signs that have changed without consequence up to an instant.

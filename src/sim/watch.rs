@@ -10,7 +10,7 @@ use super::plant::Path;
 use super::roots::{Function, Root, first_root};
 use super::state::{Change, State};
 use crate::expr::{Binary, Dual, Interval, Program, Scratch, Value};
-use crate::model::{Condition, Rule, Sign, Truth, Watch};
+use crate::model::{Condition, Rule, Sign, Solve, Truth, Watch};
 use crate::structure::Instant;
 
 /// Zero, for a difference of two sides, in units of their rounding.
@@ -25,9 +25,9 @@ pub struct Found {
     /// Position of the event, if there is one.
     pub event: Option<f64>,
     /// Signs that are zero at the event, the first one first.
-    pub touched: SmallVec<[Change; 2]>,
+    pub touched: SmallVec<[Change; 1]>,
     /// Signs that change without consequence before it, or before the end.
-    pub changes: SmallVec<[Change; 2]>,
+    pub changes: Vec<Change>,
 }
 
 /// Working memory of searches.
@@ -165,7 +165,7 @@ impl Watcher {
             rounds += 1;
             let together = path_together(path, first.position);
             let (mut at, mut after) = (now.clone(), now.clone());
-            let mut group: SmallVec<[Change; 2]> = SmallVec::new();
+            let mut group: SmallVec<[Change; 1]> = SmallVec::new();
             for w in &watched {
                 // A touch is known only to about the root of the rounding; one that is zero here is here.
                 let mut zero = || self.difference(path, w.atom).value(first.position).abs() <= w.tolerance;
@@ -248,31 +248,17 @@ impl Watcher {
         } else {
             let motion = path.state.motions.get(variable)?;
             let start = path.plant.tree.parameters(path.state.id)[variable];
-            let tau = motion.reach(level - start, || self.rate_at(path, variable, level))?;
+            let clause = path.state.solve.map(|s| &path.rule.solves[s]);
+            let switches = path.state.switches.iter().map(|&on| f64::from(u8::from(on)));
+            self.values.extend(switches);
+            let (values, scratch, rates) = (&self.values, &mut self.scratch, &mut self.rates);
+            let exact = || rate_at(clause, values, variable, level, scratch, rates);
+            let tau = motion.reach(level - start, exact)?;
             path.state.since.after(tau)
         };
         let position = time.since(path.start) / path.h;
         let level = (variable < t).then_some((variable, level));
         (position > 0.0).then_some(Meeting { position, time, at: Sign::Zero, after: opposite(sign), level })
-    }
-
-    /// The rate of a parameter where it has a value, as the equation is written; 0 where that is no more than the
-    /// rounding of it.
-    fn rate_at(&mut self, path: &Path, parameter: usize, value: f64) -> f64 {
-        let Some(solve) = path.state.solve.map(|s| &path.rule.solves[s]) else { return 0.0 };
-        let Some(index) = solve.of.iter().position(|p| *p == parameter) else { return 0.0 };
-        self.values.truncate(path.rule.variables);
-        self.values.extend(path.state.switches.iter().map(|&on| f64::from(u8::from(on))));
-        let mut rate = |x: f64| {
-            self.values[parameter] = x;
-            self.rates.resize(solve.rates.outputs(), 0.0);
-            solve.rates.eval(&self.values, &mut self.scratch, &mut self.rates);
-            self.rates[index]
-        };
-        let here = rate(value);
-        // The rate changes by this much over the rounding of the value.
-        let nearby = rate(value * (1.0 + 8.0 * f64::EPSILON));
-        if here.abs() <= (nearby - here).abs() { 0.0 } else { here }
     }
 
     /// Values at the start and bounds over the whole path: most atoms keep their sign on most paths.
@@ -317,12 +303,37 @@ pub fn path_together(path: &Path, position: f64) -> f64 {
     position + path.start.after(position * path.h).resolution() / path.h
 }
 
-fn opposite(sign: Sign) -> Sign {
+pub fn opposite(sign: Sign) -> Sign {
     match sign {
         Sign::Plus => Sign::Minus,
         Sign::Minus => Sign::Plus,
         other => other,
     }
+}
+
+/// The rate of a parameter where it has a value, as the equation is written; 0 where that is no more than the
+/// rounding of it. `variables` are those of the rule with the switches.
+pub fn rate_at(
+    clause: Option<&Solve>,
+    variables: &[f64],
+    parameter: usize,
+    value: f64,
+    scratch: &mut Scratch<f64>,
+    rates: &mut Vec<f64>,
+) -> f64 {
+    let Some(clause) = clause else { return 0.0 };
+    let Some(index) = clause.of.iter().position(|p| *p == parameter) else { return 0.0 };
+    let mut variables: SmallVec<[f64; 16]> = SmallVec::from_slice(variables);
+    rates.resize(clause.rates.outputs(), 0.0);
+    let mut rate = |x: f64| {
+        variables[parameter] = x;
+        clause.rates.eval(&variables, scratch, rates);
+        rates[index]
+    };
+    let here = rate(value);
+    // The rate changes by this much over the rounding of the value.
+    let nearby = rate(value * (1.0 + 8.0 * f64::EPSILON));
+    if here.abs() <= (nearby - here).abs() { 0.0 } else { here }
 }
 
 /// Whether anything follows from the signs at an instant and just after it.

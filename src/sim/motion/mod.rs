@@ -73,7 +73,7 @@ impl Motion {
                 let tau = u / c;
                 (tau > 0.0 && tau.is_finite()).then_some(tau)
             }
-            Motion::Riccati(law) => law.reach(u, rate()),
+            Motion::Riccati(law) => law.reach(u, rate),
             _ => None,
         }
     }
