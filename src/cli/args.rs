@@ -20,6 +20,9 @@ pub struct Command {
 pub enum Action {
     /// Read a model and say what is wrong with it, without running it
     Check(CheckArgs),
+    /// Say how much work each equation and each condition of a model is (with the method `auto`), and why
+    #[command(after_long_help = EXPLAIN_JSON)]
+    Explain(ExplainArgs),
     /// Run a model and print its strings of modules
     Run(RunArgs),
     /// Run a model and draw it, a file for each frame
@@ -38,6 +41,27 @@ pub enum Action {
     Report(ReportArgs),
 }
 
+/// The fields of `explain --format json`.
+const EXPLAIN_JSON: &str = "\
+JSON fields:
+  kinds       a list of
+    name, arity
+    work        no rules | at rest | formulas | alone | coupled
+    rules       positions in the list `rules`
+    drawn_only  parameters that only drawing reads
+  rules       a list of
+    head, line, kinds
+    solves      a list of line, condition, parameters; of these
+      name, reads (what its rate depends on), why
+      class       constant | closed form | local | coupled and linear | coupled
+      law         form of the solution, or null
+    produces    a list of line, condition
+    conditions  a list of boundary, line, decides (clause, line), and
+      found       for each `solve`: its line, why, and
+        class       nothing to find | never met | closed-form time
+                    | root on a closed form | root on dense output
+  summary     kinds by work; closed_form: nothing is ever integrated";
+
 #[derive(Debug, Args)]
 pub struct CheckArgs {
     /// Model file (*.dls)
@@ -45,6 +69,47 @@ pub struct CheckArgs {
     /// Set a `param` of the model; can be repeated
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     pub settings: Vec<Setting>,
+    /// Run the model, too, and say which productions make what is drawn jump (C0), or its speed (C1)
+    ///
+    /// At every production that fires, the predecessor just before is drawn against all that stands in its place just
+    /// after, from the same turtle. Compared are the position and the direction (heading, and roll) with which the
+    /// turtle leaves, the total drawn length, and the speeds of all three. Surfaces count with their size as length;
+    /// widths and colours do not count. Direction counts only where something drawn follows. What several productions
+    /// do at one instant, one upon the other, is taken together. Jumps are relative to the larger of both sides, or to
+    /// a thousandth of the largest in the whole run. A production of the initial string at t = 0 has no speed before it.
+    #[arg(long)]
+    pub continuity: bool,
+    /// With --continuity: up to when the model is run [default: the end of its `frames`]
+    #[arg(long, value_name = "T", value_parser = time, requires = "continuity")]
+    pub to: Option<f64>,
+    /// With --continuity: relative jumps up to this are none (of angles: in radians)
+    #[arg(long, value_name = "TOL", default_value = "1e-6", value_parser = tolerance, requires = "continuity")]
+    pub tolerance: f64,
+    /// With --continuity: exit with status 1 if a production makes a jump of this order or lower. Without this flag
+    /// a jump is a finding, not a fault
+    #[arg(long, value_enum, requires = "continuity")]
+    pub deny: Option<Order>,
+}
+
+/// Orders of continuity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
+pub enum Order {
+    /// Of positions, directions and lengths
+    C0,
+    /// Of these and of their speeds
+    C1,
+}
+
+#[derive(Debug, Args)]
+pub struct ExplainArgs {
+    /// Model file (*.dls)
+    pub model: PathBuf,
+    /// Set a `param` of the model; can be repeated
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
+    pub settings: Vec<Setting>,
+    /// How it is printed; JSON is one object, with `kinds`, `rules` and `summary`
+    #[arg(long, value_enum, default_value_t = TextFormat::Text)]
+    pub format: TextFormat,
 }
 
 #[derive(Debug, Args)]
@@ -168,6 +233,14 @@ pub struct SharedArgs {
     /// Write times and counts of work as JSON
     #[arg(long, value_name = "FILE")]
     pub stats: Option<PathBuf>,
+    /// Write every production that takes place, up to the last observed time, as a line of JSON
+    ///
+    /// In the order of time. Fields: t; group, the same number for simultaneous events; lineage and id of the module
+    /// that was replaced, and its name, module; rule, its head; clause, which `produce` of the rule, from 1; line of
+    /// that clause in the model; residual, by how much the two sides of an `=` differ at the located instant (null if
+    /// that is not finite). An error at t = 0 leaves the file empty, a later one leaves what happened before it.
+    #[arg(long, value_name = "FILE")]
+    pub events: Option<PathBuf>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -182,7 +255,7 @@ pub enum Scheduler {
 pub enum TextFormat {
     /// For people
     Text,
-    /// One JSON object a line and a time
+    /// One JSON object; of `run` one a line and a time
     Json,
 }
 

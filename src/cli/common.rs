@@ -33,7 +33,7 @@ pub fn out_error(error: std::io::Error) -> Failure {
 }
 
 /// True if messages may be coloured.
-fn coloured() -> bool {
+pub fn coloured() -> bool {
     std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none()
 }
 
@@ -110,6 +110,7 @@ impl Run {
             tolerance: args.tolerance,
             step_size: args.step_size.unwrap_or(defaults.step_size),
             max_modules: args.max_modules,
+            log: args.events.is_some(),
             ..defaults
         };
         let clock = Clock { parse: before.elapsed(), ..Clock::default() };

@@ -1,9 +1,12 @@
-//! The command line: `dlsys check`, `dlsys run`, `dlsys render`, `dlsys report`.
+//! The command line: `dlsys check`, `explain`, `run`, `render` and `report`.
 //!
 //! Exit status: 0 done; 1 the model or the run is at fault; 2 the command line is.
 
 mod args;
 mod common;
+mod continuity;
+mod events;
+mod explain;
 mod render;
 mod report;
 mod run;
@@ -25,6 +28,7 @@ pub fn main() -> u8 {
     };
     let done = match &command.action {
         Action::Check(args) => run::check(args),
+        Action::Explain(args) => explain::explain(args),
         Action::Run(args) => run::run(args),
         Action::Render(args) => render::render(args),
         Action::Report(args) => report::report(args),

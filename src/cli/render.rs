@@ -11,9 +11,10 @@ use serde_json::json;
 
 use super::args::{FrameFormat, RenderArgs};
 use super::common::{Failure, Run};
+use super::events::EventLog;
 use crate::export::{self, Format, FrameDirectory, FrameRecord, FrameWriter, Manifest, Survey, View};
 use crate::scene::Scene;
-use crate::sim::{Method, Simulation};
+use crate::sim::{Method, Settings, Simulation};
 use crate::structure::ModuleString;
 use crate::turtle;
 
@@ -30,15 +31,25 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
 
     let progress = bar("measuring", count);
     let mut survey = Survey::new(view);
-    let mut reel = Reel::start(&run)?;
-    for &t in &run.times {
-        let before = Instant::now();
-        reel.wind(t)?;
-        clock.simulate += before.elapsed();
-        survey.add(&reel.scene);
-        progress.inc(1);
-    }
+    let mut events = EventLog::create(args.shared.events.as_deref(), &run)?;
+    let measured = (|| {
+        let mut reel = Reel::start(&run, run.settings)?;
+        for &t in &run.times {
+            let before = Instant::now();
+            let wound = reel.wind(t);
+            clock.simulate += before.elapsed();
+            if let Some(log) = &mut events {
+                log.write(&mut reel.simulation)?;
+            }
+            wound?;
+            survey.add(&reel.scene);
+            progress.inc(1);
+        }
+        Ok(())
+    })();
     progress.finish_and_clear();
+    events.map_or(Ok(()), EventLog::finish)?;
+    measured?;
 
     // Only now that the run is known to be good, the directory is touched.
     let mut directory = FrameDirectory::create(&args.out, args.force).map_err(out_of_directory)?;
@@ -46,7 +57,7 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     let mut manifest = manifest(args, &run, view, &writer);
     let progress = bar("writing", count);
     let title = run.session.model.title.clone().unwrap_or_else(|| run.session.source.name.clone());
-    let mut reel = Reel::start(&run)?;
+    let mut reel = Reel::start(&run, Settings { log: false, ..run.settings })?;
     for (index, &t) in run.times.iter().enumerate() {
         let before = Instant::now();
         reel.wind(t)?;
@@ -83,8 +94,8 @@ struct Reel<'r> {
 }
 
 impl<'r> Reel<'r> {
-    fn start(run: &'r Run) -> Result<Reel<'r>, Failure> {
-        let simulation = run.simulate()?;
+    fn start(run: &'r Run, settings: Settings) -> Result<Reel<'r>, Failure> {
+        let simulation = run.session.simulate(settings).map_err(|error| run.fault(&error))?;
         Ok(Reel { run, simulation, string: ModuleString::default(), scene: Scene::default() })
     }
 

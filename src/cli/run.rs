@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use super::args::{CheckArgs, RunArgs, TextFormat};
 use super::common::{Failure, Run, out_error};
+use super::events::EventLog;
 use crate::model::Model;
 use crate::sim::describe;
 use crate::structure::ModuleString;
@@ -27,7 +28,8 @@ pub fn check(args: &CheckArgs) -> Result<(), Failure> {
             n => format!("{n} warnings"),
         }
     );
-    writeln!(std::io::stdout(), "{summary}").map_err(out_error)
+    writeln!(std::io::stdout(), "{summary}").map_err(out_error)?;
+    if args.continuity { super::continuity::check(args, &session) } else { Ok(()) }
 }
 
 /// Runs a model and prints its strings.
@@ -36,6 +38,7 @@ pub fn run(args: &RunArgs) -> Result<(), Failure> {
     let mut clock = run.clock;
     let mut out = std::io::BufWriter::with_capacity(1 << 16, std::io::stdout().lock());
     let printer = Printer::new(&run.session.model);
+    let mut events = EventLog::create(args.shared.events.as_deref(), &run)?;
     let result = (|| {
         let mut simulation = run.simulate()?;
         let mut string = ModuleString::default();
@@ -44,6 +47,9 @@ pub fn run(args: &RunArgs) -> Result<(), Failure> {
             let before = Instant::now();
             let done = simulation.at(t, &mut string);
             clock.simulate += before.elapsed();
+            if let Some(log) = &mut events {
+                log.write(&mut simulation)?;
+            }
             done.map_err(|error| run.fault(&error))?;
             let before = Instant::now();
             text.clear();
@@ -56,7 +62,8 @@ pub fn run(args: &RunArgs) -> Result<(), Failure> {
         }
         Ok(simulation.stats())
     })();
-    // What was computed before an error is printed before the error.
+    // What was computed before an error is written before the error is reported.
+    events.map_or(Ok(()), EventLog::finish)?;
     out.flush().map_err(out_error)?;
     drop(out);
     run.write_stats(&args.shared, clock, result?)
@@ -118,7 +125,7 @@ impl<'m> Printer<'m> {
 }
 
 /// The shortest decimal that reads back as the same float.
-fn number(x: f64, out: &mut String) {
+pub fn number(x: f64, out: &mut String) {
     use std::fmt::Write;
     let start = out.len();
     // Writing to a string does not fail. Both forms have the fewest digits; large and small numbers

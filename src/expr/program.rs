@@ -1,6 +1,6 @@
 //! Straight-line code for expressions.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 use super::{Binary, Graph, Node, NodeId, Unary, Value};
 
@@ -14,6 +14,26 @@ enum Instruction {
     Unary(Unary, Register, Register),
     Binary(Binary, Register, Register, Register),
     Select(Register, Register, Register, Register),
+}
+
+impl Instruction {
+    fn destination(self) -> Register {
+        match self {
+            Instruction::Const(to, _)
+            | Instruction::Unary(_, to, _)
+            | Instruction::Binary(_, to, ..)
+            | Instruction::Select(to, ..) => to,
+        }
+    }
+
+    fn operands(self) -> [Option<Register>; 3] {
+        match self {
+            Instruction::Const(..) => [None; 3],
+            Instruction::Unary(_, _, a) => [Some(a), None, None],
+            Instruction::Binary(_, _, a, b) => [Some(a), Some(b), None],
+            Instruction::Select(_, c, a, b) => [Some(c), Some(a), Some(b)],
+        }
+    }
 }
 
 /// Registers of an evaluation, kept from one to the next so that nothing is allocated.
@@ -94,12 +114,7 @@ impl Program {
     /// The variables that it reads, ascending.
     pub fn reads(&self) -> Vec<usize> {
         let mut all: Vec<usize> = (self.code.iter())
-            .flat_map(|instruction| match *instruction {
-                Instruction::Const(..) => [None; 3],
-                Instruction::Unary(_, _, a) => [Some(a), None, None],
-                Instruction::Binary(_, _, a, b) => [Some(a), Some(b), None],
-                Instruction::Select(_, c, a, b) => [Some(c), Some(a), Some(b)],
-            })
+            .flat_map(|instruction| instruction.operands())
             .flatten()
             .chain(self.outputs.iter().copied())
             .map(|register| register as usize)
@@ -108,6 +123,28 @@ impl Program {
         all.sort_unstable();
         all.dedup();
         all
+    }
+
+    /// The value of one output, if it is a number that the code contains.
+    pub fn constant_output(&self, output: usize) -> Option<f64> {
+        let register = *self.outputs.get(output)?;
+        // Registers are used again, but not that of an output.
+        self.code.iter().rev().find(|i| i.destination() == register).and_then(|i| match *i {
+            Instruction::Const(_, x) => Some(x),
+            _ => None,
+        })
+    }
+
+    /// The variables that one output depends on, ascending.
+    pub fn output_reads(&self, output: usize) -> Vec<usize> {
+        let Some(&register) = self.outputs.get(output) else { return Vec::new() };
+        let mut wanted: BTreeSet<Register> = BTreeSet::from([register]);
+        for instruction in self.code.iter().rev() {
+            if wanted.remove(&instruction.destination()) {
+                wanted.extend(instruction.operands().into_iter().flatten());
+            }
+        }
+        wanted.into_iter().map(|register| register as usize).filter(|r| *r < self.variables).collect()
     }
 
     /// Evaluates all roots, in the order in which they were compiled.

@@ -42,6 +42,21 @@ fn eval<T: Value>(graph: &Graph, node: NodeId, variables: &[T]) -> T {
     out[0]
 }
 
+#[test]
+fn outputs_know_what_they_read_and_whether_they_are_numbers() {
+    let mut g = Graph::default();
+    let (x, y, two) = (g.var(0), g.var(1), g.constant(2.0));
+    let square = g.binary(Binary::Mul, x, x);
+    let sum = g.binary(Binary::Add, square, y);
+    let sine = g.unary(Unary::Sin, y);
+    // Registers are shared between the outputs, and used again within each.
+    let program = Program::compile(&g, &[sum, two, sine, square, x], 3);
+    let reads: Vec<Vec<usize>> = (0..5).map(|i| program.output_reads(i)).collect();
+    assert_eq!(reads, [vec![0, 1], vec![], vec![1], vec![0], vec![0]]);
+    let numbers: Vec<Option<f64>> = (0..5).map(|i| program.constant_output(i)).collect();
+    assert_eq!(numbers, [None, Some(2.0), None, None, None]);
+}
+
 proptest! {
     #[test]
     fn bounds_hold_every_value(

@@ -6,7 +6,7 @@
 
 use std::collections::HashSet;
 
-use super::{Jacobian, Law, Linear, Model, Numeric, Rule, Watch};
+use super::{Jacobian, Law, Linear, Model, Numeric, Obstacle, Rule, Watch};
 use crate::expr::{Binary, Graph, Monomial, Node, NodeId, Polynomial, Program, Unary};
 
 /// The expressions of a rule, before they are code.
@@ -143,14 +143,29 @@ fn laws(graph: &mut Graph, rates: &[(usize, NodeId)], constants: &Constants, tot
             break;
         }
     }
-    let numeric = |graph: &mut Graph, rate: NodeId| Numeric {
+    let numeric = |graph: &mut Graph, parameter: usize, rate: NodeId| Numeric {
         coupled: constants.reads_context(graph, &[rate]),
         linear: affine(graph, rate, constants).is_some(),
+        obstacle: obstacle(graph, parameter as u32, rate, constants),
     };
     laws.into_iter()
         .zip(rates)
-        .map(|(law, &(_, rate))| law.unwrap_or_else(|| Law::Numeric(numeric(graph, rate))))
+        .map(|(law, &(parameter, rate))| law.unwrap_or_else(|| Law::Numeric(numeric(graph, parameter, rate))))
         .collect()
+}
+
+/// Why [`closed`] finds no formula.
+fn obstacle(graph: &mut Graph, parameter: u32, rate: NodeId, constants: &Constants) -> Obstacle {
+    if constants.reads_context(graph, &[rate]) {
+        return Obstacle::Neighbours;
+    }
+    let Some(by_self) = graph.polynomial(rate, |v| v == parameter) else { return Obstacle::NotPolynomial };
+    if by_self.degree() > 2 {
+        return Obstacle::Degree(by_self.degree());
+    }
+    let factors: Vec<NodeId> = (1..3).filter_map(|power| by_self.coefficient(parameter, power)).collect();
+    // A square with a coefficient that stands still has no formula beside an inflow that moves.
+    if constants.all_constant(graph, &factors) { Obstacle::Inflow } else { Obstacle::Factor }
 }
 
 /// The law of a parameter, if it is one with a formula, and whether that is a sum of exponentials and polynomials.

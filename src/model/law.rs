@@ -33,6 +33,23 @@ pub struct Numeric {
     pub coupled: bool,
     /// Its rate is linear, with constant coefficients, in everything that changes.
     pub linear: bool,
+    pub obstacle: Obstacle,
+}
+
+/// What stands in the way of a formula.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Obstacle {
+    /// The rate reads something of neighbours that changes.
+    Neighbours,
+    /// The rate is no polynomial in the parameter itself.
+    NotPolynomial,
+    /// It is one of this degree, greater than 2.
+    Degree(u32),
+    /// The parameter is multiplied by something that changes.
+    Factor,
+    /// What is added to it is no sum of products of polynomials, exponentials, sines and cosines of time, or reads a
+    /// parameter that is none.
+    Inflow,
 }
 
 impl Law {

@@ -21,7 +21,7 @@ pub use analysis::{Draft, analyse};
 pub use condition::{Comparison, Condition, Sign, Step, Truth};
 pub use invariance::never_reached;
 pub use kind::{BUILT_IN_SURFACES, Class, DRAWN_WORDS, Kind, KindId, Kinds, base_of, class_of};
-pub use law::{Jacobian, Law, Linear, Numeric, Watch};
+pub use law::{Jacobian, Law, Linear, Numeric, Obstacle, Watch};
 pub use rule::{Interpretation, Pattern, Produce, Rule, Solve, Successor, Switch};
 
 use crate::diagnostic::Span;

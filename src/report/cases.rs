@@ -55,7 +55,10 @@ pub const CASES: &[(&str, &str)] = &[
     ("n03-event-on-a-neighbour.dls", include_str!("../../models/hard/n03-event-on-a-neighbour.dls")),
     ("n04-resonant-chain.dls", include_str!("../../models/hard/n04-resonant-chain.dls")),
     ("n05-approach-to-within-2p-40.dls", include_str!("../../models/hard/n05-approach-to-within-2p-40.dls")),
-    ("n06-crossings-that-do-not-count.dls", include_str!("../../models/hard/n06-crossings-that-do-not-count.dls")),
+    (
+        "n06-crossings-that-do-not-count.dls",
+        include_str!("../../models/hard/n06-crossings-that-do-not-count.dls"),
+    ),
     ("n07-staircase.dls", include_str!("../../models/hard/n07-staircase.dls")),
     ("n08-min-max-abs.dls", include_str!("../../models/hard/n08-min-max-abs.dls")),
     ("n09-tangent-to-a-million.dls", include_str!("../../models/hard/n09-tangent-to-a-million.dls")),
@@ -64,7 +67,10 @@ pub const CASES: &[(&str, &str)] = &[
     ("n12-hat-of-light.dls", include_str!("../../models/hard/n12-hat-of-light.dls")),
     ("n13-released-resource.dls", include_str!("../../models/hard/n13-released-resource.dls")),
     ("n14-births-in-a-chain.dls", include_str!("../../models/hard/n14-births-in-a-chain.dls")),
-    ("n15-short-lives-far-from-zero.dls", include_str!("../../models/hard/n15-short-lives-far-from-zero.dls")),
+    (
+        "n15-short-lives-far-from-zero.dls",
+        include_str!("../../models/hard/n15-short-lives-far-from-zero.dls"),
+    ),
     ("n16-square-root-decay.dls", include_str!("../../models/hard/n16-square-root-decay.dls")),
     ("n17-limit-in-a-neighbour.dls", include_str!("../../models/hard/n17-limit-in-a-neighbour.dls")),
     ("n18-gompertz.dls", include_str!("../../models/hard/n18-gompertz.dls")),
@@ -72,14 +78,23 @@ pub const CASES: &[(&str, &str)] = &[
     ("n20-arrival-and-rest.dls", include_str!("../../models/hard/n20-arrival-and-rest.dls")),
     ("n21-outside-the-domain.dls", include_str!("../../models/hard/n21-outside-the-domain.dls")),
     ("n22-gaussian-of-light.dls", include_str!("../../models/hard/n22-gaussian-of-light.dls")),
-    ("n23-stiff-filament-with-events.dls", include_str!("../../models/hard/n23-stiff-filament-with-events.dls")),
+    (
+        "n23-stiff-filament-with-events.dls",
+        include_str!("../../models/hard/n23-stiff-filament-with-events.dls"),
+    ),
     ("n24-stiff-tree.dls", include_str!("../../models/hard/n24-stiff-tree.dls")),
     ("n25-robertson-late.dls", include_str!("../../models/hard/n25-robertson-late.dls")),
     ("n26-van-der-pol.dls", include_str!("../../models/hard/n26-van-der-pol.dls")),
     ("n27-jumped-over.dls", include_str!("../../models/hard/n27-jumped-over.dls")),
     ("n28-exchange-of-neighbours.dls", include_str!("../../models/hard/n28-exchange-of-neighbours.dls")),
-    ("n29-lives-over-twelve-decades.dls", include_str!("../../models/hard/n29-lives-over-twelve-decades.dls")),
-    ("n30-decimal-ties-for-generations.dls", include_str!("../../models/hard/n30-decimal-ties-for-generations.dls")),
+    (
+        "n29-lives-over-twelve-decades.dls",
+        include_str!("../../models/hard/n29-lives-over-twelve-decades.dls"),
+    ),
+    (
+        "n30-decimal-ties-for-generations.dls",
+        include_str!("../../models/hard/n30-decimal-ties-for-generations.dls"),
+    ),
 ];
 
 #[cfg(test)]

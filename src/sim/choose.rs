@@ -225,7 +225,7 @@ impl Simulation<'_> {
     }
 
     /// The rates of a module's parameters a little ahead, by its present equations.
-    fn rates_ahead(&mut self, id: ModuleId, tau: f64, out: &mut Vec<f64>) {
+    pub(super) fn rates_ahead(&mut self, id: ModuleId, tau: f64, out: &mut Vec<f64>) {
         out.clear();
         out.resize(self.plant.tree.parameters(id).len(), 0.0);
         let model = self.model;

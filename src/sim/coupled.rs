@@ -3,8 +3,8 @@
 //! Only those are coupled that read something of a neighbour which is integrated itself; a neighbour that follows a
 //! formula is an input. Whatever happens to one of them, or to what they read, ends their common step.
 
-use super::error::Error;
 use super::Method;
+use super::error::Error;
 use super::integrator::{Integrator, StepError, foresee};
 use super::linear::Linear;
 use super::motion::Motion;
@@ -186,7 +186,8 @@ impl System {
     ) -> impl Iterator<Item = (u32, u32, usize)> + 's {
         let solve = &rules[row.rule].solves[row.solve];
         (solve.jacobian.entries.iter().enumerate()).filter_map(move |(entry, &(position, variable))| {
-            let rate = if row.forced { Some(position) } else { solve.numeric.iter().position(|p| *p == position) };
+            let rate =
+                if row.forced { Some(position) } else { solve.numeric.iter().position(|p| *p == position) };
             match self.sources[row.first_source + variable] {
                 Source::State(column) => Some(((row.first_rate + rate?) as u32, column, entry)),
                 _ => None,
@@ -382,7 +383,8 @@ impl Simulation<'_> {
             }
             _ => None,
         };
-        self.coupled.direct = self.coupled.linear.as_ref().is_some_and(Linear::is_direct) && !self.watches_coupled();
+        self.coupled.direct =
+            self.coupled.linear.as_ref().is_some_and(Linear::is_direct) && !self.watches_coupled();
         self.coupled.integrator.restart(self.settings.method, self.coupled.y.len());
         (self.coupled.mark, self.coupled.since_mark) = (now, 0);
         if self.coupled.members.is_empty() {
@@ -493,7 +495,8 @@ impl Simulation<'_> {
 
     /// Goes to the end of a step of the coupled modules, and on.
     pub(super) fn pass_coupled_step(&mut self, at: Instant) -> Result<(), Error> {
-        let Coupled { members, system, y, integrator, control, mark, since_mark, linear, .. } = &mut self.coupled;
+        let Coupled { members, system, y, integrator, control, mark, since_mark, linear, .. } =
+            &mut self.coupled;
         for id in members {
             self.plant.state_mut(*id).expect("a member").pass_changes(at);
         }

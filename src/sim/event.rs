@@ -1,5 +1,6 @@
 //! The log of productions.
 
+use super::transition::Transition;
 use crate::model::KindId;
 use crate::structure::Lineage;
 
@@ -19,4 +20,7 @@ pub struct Event {
     pub residual: f64,
     /// Events of one instant have one number; it grows by one from instant to instant.
     pub group: u64,
+    /// What it changes, if that is recorded. None where the predecessor was itself made at this instant: the
+    /// transition of the first of the cascade tells all.
+    pub transition: Option<Box<Transition>>,
 }

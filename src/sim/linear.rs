@@ -79,7 +79,9 @@ impl Linear {
                 }
                 Some(())
             };
-            let read = |v: usize| solve.linear.as_ref().is_some_and(|l| l.variables.iter().flatten().any(|r| *r == v));
+            let read = |v: usize| {
+                solve.linear.as_ref().is_some_and(|l| l.variables.iter().flatten().any(|r| *r == v))
+            };
             for (v, source) in sources.iter().enumerate().take(own + left) {
                 if read(v) {
                     number(source, &mut state, &mut b)?;
@@ -110,7 +112,9 @@ impl Linear {
                     let coefficient = *next.next()?;
                     match system.sources[row.first_source + v] {
                         Source::Fixed(x) => b[n as usize] += coefficient * x,
-                        Source::State(component) => entries.push((n, unknown[component as usize], coefficient)),
+                        Source::State(component) => {
+                            entries.push((n, unknown[component as usize], coefficient))
+                        }
                         Source::Formula(input) => entries.push((n, inputs[input as usize], coefficient)),
                     }
                 }

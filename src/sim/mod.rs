@@ -33,8 +33,8 @@ mod lookup;
 mod motion;
 mod phase;
 mod plant;
-mod quick;
 mod queue;
+mod quick;
 mod radau;
 mod rational;
 mod roots;
@@ -44,12 +44,14 @@ mod simulation;
 mod sparse;
 mod state;
 mod tableau;
+mod transition;
 mod watch;
 
 pub use error::{Error, Site};
 pub use event::Event;
 pub use settle::MAX_ROUNDS;
 pub use simulation::{Simulation, brief, describe};
+pub use transition::{Stand, Transition};
 
 /// How equations are integrated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -101,6 +103,9 @@ pub struct Settings {
     /// Everything is done the general way; for tests of the quick one.
     #[doc(hidden)]
     pub slow: bool,
+    /// With `log`: what each production changes is recorded, too ([`Event::transition`]). Every event then costs work
+    /// for all modules whose rules have a context.
+    pub transitions: bool,
 }
 
 impl Default for Settings {
@@ -112,6 +117,7 @@ impl Default for Settings {
             max_modules: 10_000_000,
             log: false,
             slow: false,
+            transitions: false,
         }
     }
 }

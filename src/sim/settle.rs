@@ -12,6 +12,8 @@
 //! any was replaced; then the string is examined again at the same instant, until nothing holds. Only the modules
 //! that the instant concerns are *open*; the rest go on as they were.
 
+use smallvec::SmallVec;
+
 use super::error::Error;
 use super::event::Event;
 use super::simulation::Simulation;
@@ -34,6 +36,7 @@ impl Simulation<'_> {
     /// has its equations. The modules in `self.opened` are open already.
     pub(super) fn settle(&mut self) -> Result<(), Error> {
         self.group += 1;
+        self.note_arrivals();
         self.open_resting();
         let mut rounds = 0;
         let mut hurried = false;
@@ -56,6 +59,7 @@ impl Simulation<'_> {
             self.replace(&firing, rounds)?;
             self.recycle(firing);
         }
+        self.finish_transitions();
         self.begin_phases()
     }
 
@@ -147,8 +151,11 @@ impl Simulation<'_> {
             }
             self.forget(fire.id);
             let child = |place| lineage.child(number, place);
-            let (tree, made) = (&mut self.plant.tree, &mut self.fresh);
-            tree.replace(fire.id, successor, &all[first..end], self.now, child, made);
+            let mut made = std::mem::take(&mut self.fresh);
+            let known = made.len();
+            self.plant.tree.replace(fire.id, successor, &all[first..end], self.now, child, &mut made);
+            self.note_successor(fire.id, successor, &made[known..]);
+            self.fresh = made;
             first = end;
         }
         self.arguments = all;
@@ -164,13 +171,17 @@ impl Simulation<'_> {
     /// Writes productions that are about to take place into the log.
     fn record(&mut self, firing: &[Firing]) {
         let Some(mut log) = self.log.take() else { return };
+        self.note_predecessors(firing, log.len());
         for fire in firing {
             let state = self.plant.state(fire.id).expect("fires");
             let rule = &self.model.rules[fire.rule];
             self.plant.variables(fire.id, &state.context, self.now, &mut self.variables);
-            let mut sides = vec![0.0; rule.sides.outputs()];
+            let mut sides: SmallVec<[f64; 16]> = smallvec::smallvec![0.0; rule.sides.outputs()];
             rule.sides.eval(&self.variables, &mut self.scratch, &mut sides);
-            let zero = |atom: usize| state.open.as_ref().is_some_and(|open| open.at[atom] == Sign::Zero);
+            let zero = |atom: usize| match &state.open {
+                Some(open) => open.at[atom] == Sign::Zero,
+                None => state.next.touched.iter().any(|change| change.atom == atom),
+            };
             let residual = (rule.produces[fire.produce].guard.atoms())
                 .filter(|(atom, comparison)| *comparison == Comparison::Equal || zero(*atom))
                 .map(|(atom, _)| (sides[2 * atom] - sides[2 * atom + 1]).abs())
@@ -183,6 +194,7 @@ impl Simulation<'_> {
                 clause: fire.produce,
                 residual,
                 group: self.group,
+                transition: None,
             });
         }
         self.log = Some(log);

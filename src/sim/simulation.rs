@@ -9,6 +9,7 @@ use super::plant::Plant;
 use super::queue::{Entry, Queue, Who};
 use super::settle::Firing;
 use super::state::{Control, What};
+use super::transition::Recorder;
 use super::watch::Watcher;
 use super::{Method, Settings, Stats};
 use crate::diagnostic::Span;
@@ -58,6 +59,7 @@ pub struct Simulation<'m> {
     pub(super) stats: Stats,
     /// Productions since they were last taken, if they are recorded.
     pub(super) log: Option<Vec<Event>>,
+    pub(super) recorder: Option<Recorder>,
     fault: Option<Error>,
     // Memory that is used again and again.
     pub(super) variables: Vec<f64>,
@@ -91,7 +93,7 @@ impl<'m> Simulation<'m> {
             model,
             settings,
             forced: settings.method != Method::Auto,
-            quick: !settings.log && !settings.slow,
+            quick: !settings.transitions && !settings.slow,
             plant: Plant { tree, states: Vec::new(), coupled: None },
             queue: Queue::default(),
             now: Instant::ZERO,
@@ -115,6 +117,7 @@ impl<'m> Simulation<'m> {
             stalled: 0,
             stats: Stats::default(),
             log: settings.log.then(Vec::new),
+            recorder: (settings.log && settings.transitions).then(Recorder::default),
             fault: None,
             variables: Vec::new(),
             scratch: Vec::new(),
@@ -351,7 +354,9 @@ impl<'m> Simulation<'m> {
     /// Some module, to name where nothing more is known.
     pub(super) fn anyone(&self) -> ModuleId {
         let named = self.coupled.members.first().copied();
-        named.or_else(|| self.plant.states.iter().flatten().find(|s| s.is_alive).map(|s| s.id)).expect("there are modules")
+        named
+            .or_else(|| self.plant.states.iter().flatten().find(|s| s.is_alive).map(|s| s.id))
+            .expect("there are modules")
     }
 
     pub(super) fn site(&self, fire: &Firing) -> Site {

@@ -321,6 +321,22 @@ impl Tree {
         None
     }
 
+    /// True if a module of a certain kind stands after this one on its axis, or on a branch of that.
+    pub fn is_followed(&self, id: ModuleId, wanted: impl Fn(KindId) -> bool) -> bool {
+        let node = self.node(id);
+        let mut depth = 0usize;
+        for visit in (Walk { tree: self, next: node.after, inside: node.parent }) {
+            match visit {
+                Visit::Module(id) if wanted(self.kind(id)) => return true,
+                Visit::Module(_) => {}
+                Visit::Open => depth += 1,
+                Visit::Close if depth == 0 => return false,
+                Visit::Close => depth -= 1,
+            }
+        }
+        false
+    }
+
     /// All modules and brackets in string order.
     pub fn walk(&self) -> Walk<'_> {
         Walk { tree: self, next: self.nodes[TRUNK as usize].first, inside: TRUNK }

@@ -5,7 +5,7 @@
 
 use super::command::Command;
 use super::walk::{Source, Walk};
-use super::{DEPTH_LIMIT, Error, MODULE_LIMIT};
+use super::{DEPTH_LIMIT, Error, MODULE_LIMIT, Pose};
 use crate::model::{KindId, Model};
 use crate::scene::Scene;
 use crate::structure::{Module, ModuleString};
@@ -21,8 +21,8 @@ struct Level<'m> {
     next: usize,
 }
 
-/// See [`super::draw`].
-pub(super) fn draw(model: &Model, string: &ModuleString, scene: &mut Scene) -> Result<(), Error> {
+/// See [`super::trace`].
+pub(super) fn trace(model: &Model, string: &ModuleString, scene: &mut Scene) -> Result<Pose, Error> {
     let commands = Command::table(model);
     let mut walk = Walk::new(model, scene);
     let mut expander = Expander::new(model, &commands, string);
@@ -34,7 +34,7 @@ pub(super) fn draw(model: &Model, string: &ModuleString, scene: &mut Scene) -> R
             command => walk.obey(command, module.parameters, module.kind)?,
         }
     }
-    Ok(())
+    Ok(walk.pose())
 }
 
 struct Expander<'a> {

@@ -32,7 +32,7 @@ mod walk;
 mod tests;
 
 use crate::model::Model;
-use crate::scene::Scene;
+use crate::scene::{Point, Scene, Vector};
 use crate::structure::{Lineage, ModuleString};
 
 /// Most modules that one frame may draw, those that interpretations make included.
@@ -59,10 +59,26 @@ pub enum Error {
     TooDeep { name: String, lineage: Lineage },
 }
 
+/// Where a turtle stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    pub position: Point,
+    /// Heading, left and up: unit vectors.
+    pub axes: [Vector; 3],
+}
+
 /// Draws a string of modules of this model, adding to the scene.
 ///
 /// # Errors
 /// See [`Error`]. The scene then holds what was drawn before.
 pub fn draw(model: &Model, string: &ModuleString, scene: &mut Scene) -> Result<(), Error> {
-    interpret::draw(model, string, scene)
+    trace(model, string, scene).map(|_| ())
+}
+
+/// Draws, and tells where the turtle comes to stand.
+///
+/// # Errors
+/// As of [`draw`].
+pub fn trace(model: &Model, string: &ModuleString, scene: &mut Scene) -> Result<Pose, Error> {
+    interpret::trace(model, string, scene)
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::command::Command;
 use super::frame::{Axis, Frame};
-use super::{COORDINATE_LIMIT, Error, shapes};
+use super::{COORDINATE_LIMIT, Error, Pose, shapes};
 use crate::model::{KindId, Model};
 use crate::scene::{
     MaterialId, Mesh, Owner, OwnerId, Placement, Point, Polygon, Scene, Segment, Surface, Vector, Width,
@@ -70,6 +70,10 @@ impl<'a> Walk<'a> {
             owner: None,
             names: vec![None; model.kinds.len()],
         }
+    }
+
+    pub(super) fn pose(&self) -> Pose {
+        Pose { position: self.state.position, axes: self.state.frame.vectors() }
     }
 
     /// Says on whose behalf the next commands are.

@@ -5,7 +5,7 @@ use std::process::{Command, Output};
 
 use crate::common::repository;
 
-fn dlsys(arguments: &[&str]) -> Output {
+pub fn dlsys(arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_dlsys"));
     command.current_dir(repository("")).args(arguments).output().expect("the program starts")
 }
@@ -15,14 +15,14 @@ fn text(bytes: &[u8]) -> String {
 }
 
 /// Runs what must succeed in silence on standard error; returns standard output.
-fn good(arguments: &[&str]) -> String {
+pub fn good(arguments: &[&str]) -> String {
     let output = dlsys(arguments);
     assert_eq!((output.status.code(), text(&output.stderr)), (Some(0), String::new()), "{arguments:?}");
     text(&output.stdout)
 }
 
 /// Runs what must fail; returns the status and standard error.
-fn bad(arguments: &[&str]) -> (i32, String) {
+pub fn bad(arguments: &[&str]) -> (i32, String) {
     let output = dlsys(arguments);
     let status = output.status.code().expect("no signal");
     assert_ne!(status, 0, "{arguments:?}");

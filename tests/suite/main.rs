@@ -5,6 +5,7 @@
 //! - [`language`]: text to model and back; hostile input.
 //! - [`gallery`]: every mistake in `tests/errors` and the message it gets.
 //! - [`cli`]: the program as it is typed.
+//! - [`inspect`]: what `explain`, `--events` and `check --continuity` say.
 //! - [`export`]: SVG and OBJ, read back by other people's code.
 //! - [`report`]: studies of methods, and hard cases with exact answers.
 
@@ -12,6 +13,7 @@ mod cli;
 mod common;
 mod export;
 mod gallery;
+mod inspect;
 mod language;
 mod listings;
 mod report;

@@ -193,7 +193,11 @@ mod tests {
         let rate = |x: f64| 2.0 * (1.0 - x / 3.0) * x;
         assert!(close(apex.reach(1.0, || rate(2.0)).expect("reached"), std::f64::consts::LN_2, 4e-16));
         let near = 3.0 * (1.0 - 2f64.powi(-40));
-        assert!(close(apex.reach(near - 1.0, || rate(near)).expect("reached"), 14.209_517_201_478_424, 1e-14));
+        assert!(close(
+            apex.reach(near - 1.0, || rate(near)).expect("reached"),
+            14.209_517_201_478_424,
+            1e-14
+        ));
         assert_eq!(apex.reach(2.0, || rate(3.0)), None);
         assert!(close(1.0 + apex.value(20.0), 3.0, 1e-15));
         // G05: a life of 7e-13.

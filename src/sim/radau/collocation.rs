@@ -50,14 +50,8 @@ impl<const S: usize, const L: usize> Collocation<S, L> {
         // Unit size of each vector's largest part, so that transformed and plain increments are comparable.
         for l in 0..L {
             let columns = if l == 0 { 0..1 } else { 2 * l - 1..2 * l + 1 };
-            let size = vectors
-                .iter()
-                .flat_map(|r| &r[columns.clone()])
-                .fold(0.0f64, |m, v| m.max(v.abs()));
-            vectors
-                .iter_mut()
-                .flat_map(|r| &mut r[columns.clone()])
-                .for_each(|v| *v /= size);
+            let size = vectors.iter().flat_map(|r| &r[columns.clone()]).fold(0.0f64, |m, v| m.max(v.abs()));
+            vectors.iter_mut().flat_map(|r| &mut r[columns.clone()]).for_each(|v| *v /= size);
         }
         let mut bernstein = [[0.0; S]; S];
         let mut error = [0.0; S];
@@ -71,14 +65,7 @@ impl<const S: usize, const L: usize> Collocation<S, L> {
         // At the end only the last stage counts.
         bernstein[S - 1] = [0.0; S];
         bernstein[S - 1][S - 1] = 1.0;
-        Collocation {
-            nodes,
-            lambda,
-            inverse: invert(&vectors),
-            vectors,
-            error,
-            bernstein,
-        }
+        Collocation { nodes, lambda, inverse: invert(&vectors), vectors, error, bernstein }
     }
 
     /// Values at `x` of the Lagrange polynomials `L_1 .. L_s` (those that vanish at 0).
@@ -146,26 +133,15 @@ fn eigenvalues<const S: usize, const L: usize>() -> [Complex; L] {
     }
     for _ in 0..200 {
         for i in 0..S {
-            let p = (0..S).rev().fold(Complex::from_f64(c[S]), |p, l| {
-                p.mul(z[i]).add(Complex::from_f64(c[l]))
-            });
+            let p =
+                (0..S).rev().fold(Complex::from_f64(c[S]), |p, l| p.mul(z[i]).add(Complex::from_f64(c[l])));
             let others = (0..S).filter(|&j| j != i);
             let d = others.fold(Complex::from_f64(c[S]), |d, j| d.mul(z[i].sub(z[j])));
             z[i] = z[i].sub(p.mul(d.reciprocal()));
         }
     }
-    z.sort_by(|a, b| {
-        (a.im.abs() > 1e-9)
-            .cmp(&(b.im.abs() > 1e-9))
-            .then(a.im.total_cmp(&b.im))
-    });
-    std::array::from_fn(|l| {
-        if l == 0 {
-            Complex::from_f64(z[0].re)
-        } else {
-            z[S - L + l]
-        }
-    })
+    z.sort_by(|a, b| (a.im.abs() > 1e-9).cmp(&(b.im.abs() > 1e-9)).then(a.im.total_cmp(&b.im)));
+    std::array::from_fn(|l| if l == 0 { Complex::from_f64(z[0].re) } else { z[S - L + l] })
 }
 
 /// Component at node `x` of the eigenvector for `lambda`.
@@ -198,9 +174,7 @@ fn lagrange_derivative(nodes: &[f64], j: usize, i: usize) -> f64 {
     if i == j {
         return others(j).map(|m| 1.0 / (own - nodes[m])).sum();
     }
-    others(i).fold(1.0 / (own - nodes[i]), |p, m| {
-        p * (nodes[i] - nodes[m]) / (own - nodes[m])
-    })
+    others(i).fold(1.0 / (own - nodes[i]), |p, m| p * (nodes[i] - nodes[m]) / (own - nodes[m]))
 }
 
 /// Bernstein coefficients of the Lagrange polynomial of node `j`, multiplied up from its linear factors
@@ -255,10 +229,7 @@ mod tests {
     fn three_stages_as_published() {
         let c = Collocation::<3, 2>::compute();
         let r = 6f64.sqrt();
-        [(4.0 - r) / 10.0, (4.0 + r) / 10.0, 1.0]
-            .iter()
-            .zip(c.nodes)
-            .for_each(|(p, c)| close(c, *p, 1e-15));
+        [(4.0 - r) / 10.0, (4.0 + r) / 10.0, 1.0].iter().zip(c.nodes).for_each(|(p, c)| close(c, *p, 1e-15));
         let (a, b) = (81f64.cbrt(), 9f64.cbrt());
         let (re, im) = ((12.0 - a + b) / 60.0, (a + b) * 3f64.sqrt() / 60.0);
         let size = re * re + im * im;
@@ -268,27 +239,15 @@ mod tests {
         let error = [-(13.0 + 7.0 * r) / 3.0, (-13.0 + 7.0 * r) / 3.0, -1.0 / 3.0];
         error.iter().zip(c.error).for_each(|(p, e)| close(e, *p, 1e-14));
         let published = [
-            [
-                (88.0 - 7.0 * r) / 360.0,
-                (296.0 - 169.0 * r) / 1800.0,
-                (-2.0 + 3.0 * r) / 225.0,
-            ],
-            [
-                (296.0 + 169.0 * r) / 1800.0,
-                (88.0 + 7.0 * r) / 360.0,
-                (-2.0 - 3.0 * r) / 225.0,
-            ],
+            [(88.0 - 7.0 * r) / 360.0, (296.0 - 169.0 * r) / 1800.0, (-2.0 + 3.0 * r) / 225.0],
+            [(296.0 + 169.0 * r) / 1800.0, (88.0 + 7.0 * r) / 360.0, (-2.0 - 3.0 * r) / 225.0],
             [(16.0 - r) / 36.0, (16.0 + r) / 36.0, 1.0 / 9.0],
         ];
         let all = [0.0, c.nodes[0], c.nodes[1], c.nodes[2]];
         let derivative =
             std::array::from_fn(|i| std::array::from_fn(|j| lagrange_derivative(&all, j + 1, i + 1)));
         let matrix = invert::<3>(&derivative);
-        matrix
-            .iter()
-            .flatten()
-            .zip(published.iter().flatten())
-            .for_each(|(m, p)| close(*m, *p, 1e-14));
+        matrix.iter().flatten().zip(published.iter().flatten()).for_each(|(m, p)| close(*m, *p, 1e-14));
     }
 
     fn check<const S: usize, const L: usize>() {
@@ -336,11 +295,7 @@ mod tests {
         let d = std::array::from_fn(|i| std::array::from_fn(|j| lagrange_derivative(&all, j + 1, i + 1)));
         let weights = invert::<5>(&d)[4];
         for q in 0..=8 {
-            close(
-                (0..5).map(|j| weights[j] * c.nodes[j].powi(q)).sum(),
-                1.0 / f64::from(q + 1),
-                1e-13,
-            );
+            close((0..5).map(|j| weights[j] * c.nodes[j].powi(q)).sum(), 1.0 / f64::from(q + 1), 1e-13);
         }
     }
 }

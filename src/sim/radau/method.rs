@@ -64,10 +64,7 @@ pub(super) struct Method<const S: usize, const L: usize> {
 impl<const S: usize, const L: usize> Method<S, L> {
     pub(super) fn new() -> Self {
         let table = Collocation::compute();
-        let lambda = Wide {
-            re: table.lambda.map(|l| l.re),
-            im: table.lambda.map(|l| l.im),
-        };
+        let lambda = Wide { re: table.lambda.map(|l| l.re), im: table.lambda.map(|l| l.im) };
         Method {
             table,
             lambda,
@@ -127,10 +124,7 @@ impl<const S: usize, const L: usize> Method<S, L> {
         }
         self.begin(n, pattern.entries());
         if n == 0 {
-            return Attempt::Done {
-                error: 0.0,
-                newton: 0,
-            };
+            return Attempt::Done { error: 0.0, newton: 0 };
         }
         let again = std::mem::replace(&mut self.tried, true);
         self.h = h;
@@ -271,12 +265,7 @@ impl<const S: usize, const L: usize> Method<S, L> {
         self.eta = self.eta.max(f64::EPSILON).powf(0.8);
         self.slow = false;
         for iteration in 1..=most {
-            for (j, (rates, z)) in self
-                .rates
-                .chunks_exact_mut(n)
-                .zip(self.z.chunks_exact(n))
-                .enumerate()
-            {
+            for (j, (rates, z)) in self.rates.chunks_exact_mut(n).zip(self.z.chunks_exact(n)).enumerate() {
                 for (p, (y, z)) in self.point.iter_mut().zip(y.iter().zip(z)) {
                     *p = y + z;
                 }
@@ -311,11 +300,7 @@ impl<const S: usize, const L: usize> Method<S, L> {
             }
             if iteration > 1 {
                 let ratio: f64 = norm / last;
-                let theta = if iteration == 2 {
-                    ratio
-                } else {
-                    (ratio * last_ratio).sqrt()
-                };
+                let theta = if iteration == 2 { ratio } else { (ratio * last_ratio).sqrt() };
                 last_ratio = ratio;
                 if norm > rounding {
                     self.slow = theta > FAST;
@@ -372,11 +357,7 @@ impl<const S: usize, const L: usize> Method<S, L> {
             self.rhs[i] = Wide::from_f64(v);
         }
         pattern.solve(&self.factors, &mut self.rhs);
-        let shares = self
-            .rhs
-            .iter()
-            .zip(&self.weight)
-            .map(|(e, w)| (e.re[0] * w).abs());
+        let shares = self.rhs.iter().zip(&self.weight).map(|(e, w)| (e.re[0] * w).abs());
         shares.fold(0.0, |m, v| if v > m || v.is_nan() { v } else { m })
     }
 

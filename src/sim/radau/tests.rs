@@ -44,10 +44,7 @@ fn integrate<R: Fn(f64, &[f64], &mut [f64]), J: Fn(f64, &[f64], &mut [f64])>(
     while case.time < until {
         let last = case.time + h * (1.0 + 1e-9) >= until;
         let step = if last { until - case.time } else { h };
-        scale
-            .iter_mut()
-            .zip(&*y)
-            .for_each(|(s, y)| *s = relative * y.abs() + absolute);
+        scale.iter_mut().zip(&*y).for_each(|(s, y)| *s = relative * y.abs() + absolute);
         let mut factor = 0.5;
         let mut good = false;
         if let Attempt::Done { error, newton } = radau.attempt(case, pattern, y, &rate, step, &scale) {
@@ -75,12 +72,7 @@ fn integrate<R: Fn(f64, &[f64], &mut [f64]), J: Fn(f64, &[f64], &mut [f64])>(
         }
         h = step * factor;
     }
-    Cost {
-        steps,
-        failed,
-        rates: radau.rates_used(),
-        factorisations: radau.factorisations(),
-    }
+    Cost { steps, failed, rates: radau.rates_used(), factorisations: radau.factorisations() }
 }
 
 /// Rotation at speed (1 + r^2) / 2, r the radius: y = (cos t, sin t), nonlinear.
@@ -96,11 +88,7 @@ fn rotation() -> Case<fn(f64, &[f64], &mut [f64]), fn(f64, &[f64], &mut [f64])> 
         (out[0], out[1]) = (-y[0] * y[1], y[0] * y[1]);
         (out[2], out[3]) = (0.5 + 1.5 * a + 0.5 * b, -0.5 - 0.5 * a - 1.5 * b);
     };
-    Case {
-        time: 0.0,
-        rates,
-        jacobian,
-    }
+    Case { time: 0.0, rates, jacobian }
 }
 
 #[test]
@@ -139,19 +127,13 @@ fn prothero_robinson() {
     let pattern = Pattern::new(1, &[]).unwrap();
     for (stages, tolerance, most) in [(3, 1e-6, 40), (3, 1e-10, 400), (5, 1e-6, 20), (5, 1e-10, 100)] {
         let rates = |t: f64, y: &[f64], out: &mut [f64]| out[0] = -1e6 * (y[0] - t.cos()) - t.sin();
-        let mut case = Case {
-            time: 0.0,
-            rates,
-            jacobian: |_: f64, _: &[f64], out: &mut [f64]| out[0] = -1e6,
-        };
+        let mut case =
+            Case { time: 0.0, rates, jacobian: |_: f64, _: &[f64], out: &mut [f64]| out[0] = -1e6 };
         let mut y = vec![1.0];
         let cost = integrate(&mut case, stages, &pattern, &mut y, 10.0, (0.0, tolerance, 1e-3));
         let error = (y[0] - 10f64.cos()).abs();
         println!("Prothero-Robinson, {stages} stages, {tolerance:e}: error {error:.1e}, {cost:?}");
-        assert!(
-            error < 10.0 * tolerance && cost.steps <= most,
-            "{error:e} {cost:?}"
-        );
+        assert!(error < 10.0 * tolerance && cost.steps <= most, "{error:e} {cost:?}");
     }
 }
 
@@ -173,23 +155,12 @@ fn robertson() {
             (out[at(1, 0)], out[at(1, 1)], out[at(1, 2)]) = (0.04, -b1 - c, -b2);
             out[at(2, 1)] = c;
         };
-        let mut case = Case {
-            time: 0.0,
-            rates,
-            jacobian,
-        };
+        let mut case = Case { time: 0.0, rates, jacobian };
         let mut y = vec![1.0, 0.0, 0.0];
         let cost = integrate(&mut case, stages, &pattern, &mut y, 40.0, (1e-8, 1e-14, 1e-6));
-        let error = reference
-            .iter()
-            .zip(&y)
-            .map(|(r, y)| (y / r - 1.0).abs())
-            .fold(0.0, f64::max);
+        let error = reference.iter().zip(&y).map(|(r, y)| (y / r - 1.0).abs()).fold(0.0, f64::max);
         println!("Robertson, {stages} stages: relative error {error:.1e}, {cost:?}");
-        assert!(
-            error < 1e-7 && (y.iter().sum::<f64>() - 1.0).abs() < 1e-12,
-            "{error:e}"
-        );
+        assert!(error < 1e-7 && (y.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{error:e}");
     }
 }
 
@@ -207,22 +178,17 @@ fn stiff_diffusion_chain() {
             out[i] = diffusion * (y[i - 1] + y[i + 1] - 2.0 * y[i]) - decay * y[i];
         }
     };
-    let places: Vec<[usize; 2]> = (1..n - 1)
-        .map(|i| [pattern.entry(i, i - 1).unwrap(), pattern.entry(i, i + 1).unwrap()])
-        .collect();
+    let places: Vec<[usize; 2]> =
+        (1..n - 1).map(|i| [pattern.entry(i, i - 1).unwrap(), pattern.entry(i, i + 1).unwrap()]).collect();
     let jacobian = |_: f64, _: &[f64], out: &mut [f64]| {
         for i in 1..n - 1 {
             out[i] = -2.0 * diffusion - decay;
             places[i - 1].iter().for_each(|&p| out[p] = diffusion);
         }
     };
-    let (mu, middle) = (
-        2.0 * (0.25 * decay / diffusion).sqrt().asinh(),
-        0.5 * (n - 1) as f64,
-    );
-    let mut exact: Vec<f64> = (0..n)
-        .map(|i| 255.0 * (mu * (i as f64 - middle)).cosh() / (mu * middle).cosh())
-        .collect();
+    let (mu, middle) = (2.0 * (0.25 * decay / diffusion).sqrt().asinh(), 0.5 * (n - 1) as f64);
+    let mut exact: Vec<f64> =
+        (0..n).map(|i| 255.0 * (mu * (i as f64 - middle)).cosh() / (mu * middle).cosh()).collect();
     let steady = exact.clone();
     for k in 1..40 {
         let wave = f64::from(k) * std::f64::consts::PI / (n - 1) as f64;
@@ -230,40 +196,18 @@ fn stiff_diffusion_chain() {
         let left = (-4.0 * diffusion * (0.5 * wave).sin().powi(2) - decay).exp() * 2.0 / (n - 1) as f64;
         (0..n).for_each(|i| exact[i] -= part * left * (wave * i as f64).sin());
     }
-    for (stages, tolerance, most) in [
-        (3, 1e-4, 60),
-        (5, 1e-4, 35),
-        (3, 1e-7, 280),
-        (5, 1e-7, 75),
-        (5, 1e-10, 220),
-    ] {
-        let mut case = Case {
-            time: 0.0,
-            rates,
-            jacobian,
-        };
+    for (stages, tolerance, most) in
+        [(3, 1e-4, 60), (5, 1e-4, 35), (3, 1e-7, 280), (5, 1e-7, 75), (5, 1e-10, 220)]
+    {
+        let mut case = Case { time: 0.0, rates, jacobian };
         let mut y = vec![0.0; n];
         (y[0], y[n - 1]) = (255.0, 255.0);
         let start = std::time::Instant::now();
-        let cost = integrate(
-            &mut case,
-            stages,
-            &pattern,
-            &mut y,
-            1.0,
-            (tolerance, 255.0 * tolerance, 1e-7),
-        );
+        let cost = integrate(&mut case, stages, &pattern, &mut y, 1.0, (tolerance, 255.0 * tolerance, 1e-7));
         let time = start.elapsed().as_secs_f64() * 1e6;
-        let error = y
-            .iter()
-            .zip(&exact)
-            .map(|(a, b)| (a - b).abs())
-            .fold(0.0, f64::max);
+        let error = y.iter().zip(&exact).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         println!("chain of {n}, {stages} stages, {tolerance:e}: error {error:.1e}, {time:.0} us, {cost:?}");
-        assert!(
-            error < 255.0 * tolerance.max(1e-13) && cost.steps <= most,
-            "{error:e} {cost:?}"
-        );
+        assert!(error < 255.0 * tolerance.max(1e-13) && cost.steps <= most, "{error:e} {cost:?}");
     }
 }
 
@@ -295,11 +239,8 @@ fn bad_input_is_reported_and_factors_are_reused() {
     let pattern = Pattern::new(1, &[]).unwrap();
     let mut radau = Radau::new(5).unwrap();
     let decay = |_: f64, y: &[f64], out: &mut [f64]| out[0] = if y[0] < 2.0 { -y[0] } else { f64::NAN };
-    let mut case = Case {
-        time: 0.0,
-        rates: decay,
-        jacobian: |_: f64, _: &[f64], out: &mut [f64]| out[0] = -1.0,
-    };
+    let mut case =
+        Case { time: 0.0, rates: decay, jacobian: |_: f64, _: &[f64], out: &mut [f64]| out[0] = -1.0 };
     let mut tried = |y: &[f64], rate: f64, h: f64| radau.attempt(&mut case, &pattern, y, &[rate], h, &[1e-9]);
     assert_eq!(tried(&[1.0], f64::NAN, 0.1), Attempt::NotFinite(Some(0)));
     assert_eq!(tried(&[1.0], -1.0, 0.0), Attempt::NotFinite(None));
@@ -308,10 +249,7 @@ fn bad_input_is_reported_and_factors_are_reused() {
     let mut y = [1.0];
     for _ in 0..10 {
         let outcome = radau.attempt(&mut case, &pattern, &y, &[-y[0]], 0.1, &[1e-9]);
-        assert!(
-            matches!(outcome, Attempt::Done { error, .. } if error < 1.0),
-            "{outcome:?}"
-        );
+        assert!(matches!(outcome, Attempt::Done { error, .. } if error < 1.0), "{outcome:?}");
         radau.accept();
         y[0] = radau.end()[0];
     }
@@ -319,16 +257,8 @@ fn bad_input_is_reported_and_factors_are_reused() {
     assert!(Radau::new(4).is_none());
     // Growth without bound inside the step: blow-up of y' = y^2 at tau = 1.
     let square = |_: f64, y: &[f64], out: &mut [f64]| out[0] = y[0] * y[0];
-    let mut case = Case {
-        time: 0.0,
-        rates: square,
-        jacobian: |_: f64, y: &[f64], out: &mut [f64]| out[0] = 2.0 * y[0],
-    };
-    let outcome = Radau::new(3)
-        .unwrap()
-        .attempt(&mut case, &pattern, &[1.0], &[1.0], 3.0, &[1e-9]);
-    assert!(
-        !matches!(outcome, Attempt::Done { error, .. } if error < 1.0),
-        "{outcome:?}"
-    );
+    let mut case =
+        Case { time: 0.0, rates: square, jacobian: |_: f64, y: &[f64], out: &mut [f64]| out[0] = 2.0 * y[0] };
+    let outcome = Radau::new(3).unwrap().attempt(&mut case, &pattern, &[1.0], &[1.0], 3.0, &[1e-9]);
+    assert!(!matches!(outcome, Attempt::Done { error, .. } if error < 1.0), "{outcome:?}");
 }

@@ -92,39 +92,24 @@ impl Field for Complex {
     }
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        Complex {
-            re: self.re + other.re,
-            im: self.im + other.im,
-        }
+        Complex { re: self.re + other.re, im: self.im + other.im }
     }
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
-        Complex {
-            re: self.re - other.re,
-            im: self.im - other.im,
-        }
+        Complex { re: self.re - other.re, im: self.im - other.im }
     }
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
-        Complex {
-            re: self.re * other.re - self.im * other.im,
-            im: self.re * other.im + self.im * other.re,
-        }
+        Complex { re: self.re * other.re - self.im * other.im, im: self.re * other.im + self.im * other.re }
     }
     #[inline(always)]
     fn scale(self, factor: f64) -> Self {
-        Complex {
-            re: self.re * factor,
-            im: self.im * factor,
-        }
+        Complex { re: self.re * factor, im: self.im * factor }
     }
     #[inline(always)]
     fn reciprocal(self) -> Self {
         let d = 1.0 / (self.re * self.re + self.im * self.im);
-        Complex {
-            re: self.re * d,
-            im: -self.im * d,
-        }
+        Complex { re: self.re * d, im: -self.im * d }
     }
     #[inline(always)]
     fn usable(self) -> bool {
@@ -155,17 +140,11 @@ impl<const N: usize> Field for Wide<N> {
     const REALS: usize = 2 * N;
     #[inline(always)]
     fn zero() -> Self {
-        Wide {
-            re: [0.0; N],
-            im: [0.0; N],
-        }
+        Wide { re: [0.0; N], im: [0.0; N] }
     }
     #[inline(always)]
     fn from_f64(x: f64) -> Self {
-        Wide {
-            re: [x; N],
-            im: [0.0; N],
-        }
+        Wide { re: [x; N], im: [0.0; N] }
     }
     #[inline(always)]
     fn add(mut self, other: Self) -> Self {
@@ -211,9 +190,7 @@ impl<const N: usize> Field for Wide<N> {
     }
     #[inline(always)]
     fn usable(self) -> bool {
-        (0..N).fold(true, |good, l| {
-            good & (self.re[l].abs() + self.im[l].abs()).usable()
-        })
+        (0..N).fold(true, |good, l| good & (self.re[l].abs() + self.im[l].abs()).usable())
     }
     #[inline(always)]
     fn put(slice: &mut [Self], i: usize, x: f64) {

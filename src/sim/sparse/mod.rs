@@ -92,15 +92,9 @@ impl Pattern {
                 child[parent] = k as u32;
             }
         }
-        let mut pattern = Pattern {
-            first,
-            neighbour,
-            parent: Vec::new(),
-        };
+        let mut pattern = Pattern { first, neighbour, parent: Vec::new() };
         if (0..n).all(|k| pattern.row(k).len() <= 1) {
-            pattern.parent = (0..n)
-                .map(|k| pattern.row(k).first().copied().unwrap_or(ROOT))
-                .collect();
+            pattern.parent = (0..n).map(|k| pattern.row(k).first().copied().unwrap_or(ROOT)).collect();
         }
         Some(pattern)
     }

@@ -22,19 +22,10 @@ fn patterns(n: usize, random: &mut Random) -> Vec<Vec<(u32, u32)>> {
     vec![
         (1..n).flat_map(|k| both(k - 1, k)).collect(),
         (1..n).flat_map(|k| both(random.below(k), k)).collect(),
-        (1..n)
-            .filter(|k| k % 7 != 0)
-            .flat_map(|k| both(random.below(k), k))
-            .collect(),
-        (0..n)
-            .flat_map(|k| (k.saturating_sub(2)..k).flat_map(move |j| both(j, k)))
-            .collect(),
-        (0..2 * n)
-            .map(|_| (random.below(n) as u32, random.below(n) as u32))
-            .collect(),
-        (1..n)
-            .flat_map(|k| both(0, k).into_iter().chain(both(n - 1, k)))
-            .collect(),
+        (1..n).filter(|k| k % 7 != 0).flat_map(|k| both(random.below(k), k)).collect(),
+        (0..n).flat_map(|k| (k.saturating_sub(2)..k).flat_map(move |j| both(j, k))).collect(),
+        (0..2 * n).map(|_| (random.below(n) as u32, random.below(n) as u32)).collect(),
+        (1..n).flat_map(|k| both(0, k).into_iter().chain(both(n - 1, k))).collect(),
     ]
 }
 
@@ -48,11 +39,7 @@ fn fill(pattern: &Pattern, couplings: &[(u32, u32)], random: &mut Random) -> (Ve
         dense[r * n + c] = v;
     }
     for k in 0..n {
-        let d = -0.1
-            - dense[k * n..(k + 1) * n]
-                .iter()
-                .map(|v: &f64| v.abs())
-                .sum::<f64>();
+        let d = -0.1 - dense[k * n..(k + 1) * n].iter().map(|v: &f64| v.abs()).sum::<f64>();
         values[pattern.entry(k, k).unwrap()] = d;
         dense[k * n + k] = d;
     }
@@ -63,9 +50,7 @@ fn fill(pattern: &Pattern, couplings: &[(u32, u32)], random: &mut Random) -> (Ve
 fn gauss<F: Field>(a: &mut [F], b: &mut [F], measure: fn(F) -> f64) {
     let n = b.len();
     for k in 0..n {
-        let p = (k..n)
-            .max_by(|&i, &j| measure(a[i * n + k]).total_cmp(&measure(a[j * n + k])))
-            .unwrap();
+        let p = (k..n).max_by(|&i, &j| measure(a[i * n + k]).total_cmp(&measure(a[j * n + k]))).unwrap();
         (0..n).for_each(|j| a.swap(k * n + j, p * n + j));
         b.swap(k, p);
         for i in k + 1..n {
@@ -88,10 +73,7 @@ fn agrees_with_dense_elimination() {
             let pattern = Pattern::new(n, &couplings).unwrap();
             let (values, dense) = fill(&pattern, &couplings, &mut random);
             let scale = 0.7;
-            let shifts = [1.3, 0.4, 2.0].map(|re| Complex {
-                re,
-                im: 3.0 * random.next(),
-            });
+            let shifts = [1.3, 0.4, 2.0].map(|re| Complex { re, im: 3.0 * random.next() });
             let rhs: Vec<f64> = (0..n).map(|_| random.next() - 0.5).collect();
             let reference = |shift: Complex| {
                 let mut a: Vec<Complex> = dense.iter().map(|v| Complex::from_f64(-scale * v)).collect();
@@ -105,10 +87,7 @@ fn agrees_with_dense_elimination() {
             let (mut factors, mut x) = (Vec::new(), rhs.clone());
             assert!(pattern.factor(&values, 1.3, scale, &mut factors));
             pattern.solve(&factors, &mut x);
-            reference(Complex::from_f64(1.3))
-                .iter()
-                .zip(&x)
-                .for_each(|(r, &x)| close(x, r.re));
+            reference(Complex::from_f64(1.3)).iter().zip(&x).for_each(|(r, &x)| close(x, r.re));
 
             let (mut factors, mut x) = (Vec::new(), Vec::new());
             x.extend(rhs.iter().map(|&v| Complex::from_f64(v)));
@@ -121,10 +100,7 @@ fn agrees_with_dense_elimination() {
 
             let (mut factors, mut x) = (Vec::new(), Vec::new());
             x.extend(rhs.iter().map(|&v| Wide::<3>::from_f64(v)));
-            let shift = Wide {
-                re: shifts.map(|s| s.re),
-                im: shifts.map(|s| s.im),
-            };
+            let shift = Wide { re: shifts.map(|s| s.re), im: shifts.map(|s| s.im) };
             assert!(pattern.factor(&values, shift, scale, &mut factors));
             pattern.solve(&factors, &mut x);
             for (l, &shift) in shifts.iter().enumerate() {
@@ -151,20 +127,14 @@ fn trees_take_linear_space_and_fill_is_bounded() {
         assert_eq!(Pattern::new(n, &tree).unwrap().entries(), 3 * n - 2);
     }
     let band: Vec<_> = (2..1_000).flat_map(|k| [(k, k - 1), (k, k - 2)]).collect();
-    assert_eq!(
-        Pattern::new(1_000, &band).unwrap().entries(),
-        1_000 + 2 * (999 + 998)
-    );
+    assert_eq!(Pattern::new(1_000, &band).unwrap().entries(), 1_000 + 2 * (999 + 998));
     // Eliminating the hub first couples everything with everything: 9e6 entries.
     let star: Vec<_> = (0..2_999).map(|k| (2_999, k)).collect();
     assert!(Pattern::new(3_000, &star).is_none());
     assert_eq!(Pattern::new(100, &star[..0]).unwrap().entries(), 100);
     assert!(Pattern::new(3, &[(0, 3)]).is_none());
     let missing = Pattern::new(3, &[(0, 1), (1, 0), (2, 2), (1, 0)]).unwrap();
-    assert_eq!(
-        (missing.entries(), missing.entry(2, 0), missing.entry(9, 9)),
-        (5, None, None)
-    );
+    assert_eq!((missing.entries(), missing.entry(2, 0), missing.entry(9, 9)), (5, None, None));
 }
 
 #[test]
@@ -178,10 +148,7 @@ fn bad_pivots_are_refused() {
         values[0] = f64::NAN;
         assert!(!pattern.factor(&values, 1.0, 1.0, &mut factors));
         values[0] = 1.0;
-        let shift = Wide {
-            re: [2.0, 1.0],
-            im: [1.0, 0.0],
-        };
+        let shift = Wide { re: [2.0, 1.0], im: [1.0, 0.0] };
         assert!(!pattern.factor(&values, shift, 1.0, &mut Vec::new()));
         assert!(!pattern.factor(&values[1..], 1.0, 1.0, &mut factors));
     }

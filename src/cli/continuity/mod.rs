@@ -1,0 +1,87 @@
+//! `dlsys check --continuity`: productions that can be seen.
+//!
+//! "Correctly specified productions satisfy continuity criteria, which means that they conserve physical entities
+//! such as shape, mass, and velocity of modules" (paper, section 4.1; Prusinkiewicz and Lindenmayer 1990, chapter 6).
+//! A model is run, and every production that fires is judged by what it does to the drawing.
+//!
+//! ```text
+//! Simulation ──Transition──▶ measure (turtle before, turtle after, speeds) ──Jump──▶ report (worst of each production)
+//! ```
+
+mod measure;
+mod report;
+
+use std::io::Write;
+
+use super::args::{CheckArgs, Order};
+use super::common::{Failure, coloured, out_error};
+use crate::session::Session;
+use crate::sim::{Settings, Simulation};
+use crate::structure::ModuleString;
+use measure::Draughtsman;
+use report::{Report, Verdict};
+
+/// Pieces of the time range after which the log of events is emptied.
+const PIECES: usize = 256;
+/// More modules than this are an error: each that is made leaves a record until the end of a piece.
+const MAX_MODULES: usize = 1_000_000;
+
+/// Runs a model and reports on the continuity of its productions.
+pub fn check(args: &CheckArgs, session: &Session) -> Result<(), Failure> {
+    let model = &session.model;
+    let end = args.to.or(model.frames.map(|frames| frames.to)).ok_or_else(|| {
+        Failure::Usage("error: the model has no `frames`: say how far to run it with `--to T`\n".to_owned())
+    })?;
+    // What is located or integrated must be known better than jumps are told from none.
+    let tolerance = (args.tolerance / 100.0).clamp(1e-12, 1e-4);
+    let settings =
+        Settings { tolerance, max_modules: MAX_MODULES, log: true, transitions: true, ..Settings::default() };
+    let fault =
+        |error: &crate::sim::Error| Failure::Model(error.diagnostic().render(&session.source, coloured()));
+    let mut simulation = session.simulate(settings).map_err(|error| fault(&error))?;
+    let mut report = Report::new(session, end, args.tolerance);
+    let result = observe(&mut simulation, session, end, &mut report);
+    // What happened before an error is reported before the error.
+    let (text, worst) = report.show();
+    std::io::stdout().write_all(text.as_bytes()).map_err(out_error)?;
+    result.map_err(|error| match error {
+        Trouble::Run(error) => fault(&error),
+        Trouble::Drawing(message) => Failure::Model(message),
+    })?;
+    match args.deny {
+        Some(Order::C0) if worst == Verdict::Discontinuous => denied("C0"),
+        Some(Order::C1) if worst != Verdict::C1 => denied("C1"),
+        _ => Ok(()),
+    }
+}
+
+fn denied(order: &str) -> Result<(), Failure> {
+    Err(Failure::Model(format!("error: not every production is {order}, which `--deny` asks for\n")))
+}
+
+enum Trouble {
+    Run(crate::sim::Error),
+    Drawing(String),
+}
+
+fn observe(
+    simulation: &mut Simulation,
+    session: &Session,
+    end: f64,
+    report: &mut Report,
+) -> Result<(), Trouble> {
+    let mut draughtsman = Draughtsman::new(&session.model);
+    let mut string = ModuleString::default();
+    for piece in 0..=PIECES {
+        let done = simulation.at(end * piece as f64 / PIECES as f64, &mut string);
+        for event in simulation.take_events() {
+            let jump = event.transition.as_ref().map(|transition| draughtsman.jump(event.time, transition));
+            let jump = jump
+                .transpose()
+                .map_err(|error| Trouble::Drawing(format!("error: at t = {}: {error}\n", event.time)))?;
+            report.add(&event, jump);
+        }
+        done.map_err(Trouble::Run)?;
+    }
+    Ok(())
+}

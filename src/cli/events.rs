@@ -1,0 +1,109 @@
+//! `--events FILE`: the productions of a run, one JSON object a line.
+//!
+//! ```text
+//! {"t":1,"group":1,"lineage":"3","id":"2x0…","module":"F_r","rule":"F_r(x, s)","clause":1,"line":22,"residual":0}
+//! ```
+//!
+//! | field | |
+//! |---|---|
+//! | `t` | time, in the model's unit |
+//! | `group` | number of the instant, from 1: productions with the same number are simultaneous |
+//! | `lineage` | the module that was replaced: its place in the initial string, then in each successor |
+//! | `id` | its name: 13 characters, the same that exported frames use |
+//! | `module` | the name of its kind |
+//! | `rule` | the head of the rule |
+//! | `clause` | which of the rule's `produce` clauses, from 1 |
+//! | `line` | the clause's line in the model file |
+//! | `residual` | difference of the two sides of the condition at the located instant; `null` if not finite |
+
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use super::common::{Failure, Run};
+use super::run::number;
+use crate::sim::{Event, Simulation};
+
+/// An event log that is being written.
+pub struct EventLog {
+    path: PathBuf,
+    file: BufWriter<File>,
+    /// Per rule: its head as a JSON string, and the lines of its `produce` clauses.
+    rules: Vec<(String, Vec<usize>)>,
+    /// Per kind: its name as a JSON string.
+    kinds: Vec<String>,
+    /// The engine's number of the last instant, which counts changes of equations too, and ours.
+    group: (u64, u64),
+    text: String,
+}
+
+fn json(text: &str) -> String {
+    serde_json::Value::from(text).to_string()
+}
+
+impl EventLog {
+    /// Makes the file that was asked for.
+    pub fn create(path: Option<&Path>, run: &Run) -> Result<Option<EventLog>, Failure> {
+        let Some(path) = path else { return Ok(None) };
+        let (model, source) = (&run.session.model, &run.session.source);
+        let file = File::create(path).map_err(|error| cannot_write(path, &error))?;
+        let lines = |rule: &crate::model::Rule| {
+            rule.produces.iter().map(|p| source.position(p.span.start).0).collect::<Vec<_>>()
+        };
+        Ok(Some(EventLog {
+            path: path.to_owned(),
+            file: BufWriter::with_capacity(1 << 16, file),
+            rules: model.rules.iter().map(|r| (json(&r.label), lines(r))).collect(),
+            kinds: model.kinds.iter().map(|(_, kind)| json(&kind.name)).collect(),
+            group: (0, 0),
+            text: String::new(),
+        }))
+    }
+
+    /// Writes what has happened since the last time.
+    pub fn write(&mut self, simulation: &mut Simulation) -> Result<(), Failure> {
+        for event in simulation.take_events() {
+            self.line(&event);
+            self.file.write_all(self.text.as_bytes()).map_err(|e| cannot_write(&self.path, &e))?;
+        }
+        Ok(())
+    }
+
+    /// Brings everything to the disk.
+    pub fn finish(mut self) -> Result<(), Failure> {
+        self.file.flush().map_err(|error| cannot_write(&self.path, &error))
+    }
+
+    fn line(&mut self, event: &Event) {
+        if event.group != self.group.0 {
+            self.group = (event.group, self.group.1 + 1);
+        }
+        let (rule, lines) = &self.rules[event.rule];
+        let out = &mut self.text;
+        out.clear();
+        out.push_str("{\"t\":");
+        number(event.time, out);
+        // Writing to a string does not fail.
+        let _ = write!(
+            out,
+            ",\"group\":{},\"lineage\":\"{}\",\"id\":\"{}\",\"module\":{},\"rule\":{rule},\"clause\":{},\"line\":{},\"residual\":",
+            self.group.1,
+            event.lineage,
+            event.lineage.name(),
+            self.kinds[event.kind.index()],
+            event.clause + 1,
+            lines[event.clause],
+        );
+        if event.residual.is_finite() {
+            number(event.residual, out);
+        } else {
+            out.push_str("null");
+        }
+        out.push_str("}\n");
+    }
+}
+
+fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {
+    Failure::Model(format!("error: cannot write {}: {error}\n", path.display()))
+}

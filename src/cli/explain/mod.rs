@@ -1,0 +1,43 @@
+//! `dlsys explain`: how much work each equation and each condition of a model is, and why; as a database explains
+//! the plan of a query.
+//!
+//! ```text
+//! Model (classes found by model::analyse) ──plan──▶ Plan ──▶ text, for people
+//!                                            words             JSON, for programs
+//! ```
+//!
+//! # JSON
+//!
+//! One object. `model`, `title`;
+//! - `kinds`: a list of `{name, arity, work, rules, drawn_only}`; `work` is `no rules`, `at rest`, `formulas`, `alone`
+//!   or `coupled`; `rules` are positions in the list `rules`; `drawn_only` the parameters that only drawing reads.
+//! - `rules`: `{head, line, kinds, solves, produces, conditions}`;
+//!   - a solve is `{line, condition, parameters}`, a parameter `{name, class, law, why, reads}`; `class` is `constant`,
+//!     `closed form`, `local`, `coupled and linear` or `coupled`; `law` is the form of the solution, or null;
+//!   - a produce is `{line, condition}`;
+//!   - a condition is `{boundary, line, decides, found}`: `decides` says of which clauses (`{clause, line}`), `found`
+//!     how its instant is found under each `solve`: `{line, class, why}`, line null if the rule has none; `class` is
+//!     `nothing to find`, `never met`, `closed-form time`, `root on a closed form` or `root on dense output`.
+//! - `summary`: names of kinds by `work`, and `closed_form`: true if nothing is ever integrated numerically.
+
+mod plan;
+#[cfg(test)]
+mod tests;
+mod text;
+mod words;
+
+use std::io::Write;
+
+use super::args::{ExplainArgs, TextFormat};
+use super::common::{Failure, open, out_error};
+
+/// Prints the classes of work of a model.
+pub fn explain(args: &ExplainArgs) -> Result<(), Failure> {
+    let session = open(&args.model, &args.settings)?;
+    let plan = plan::Plan::new(&session);
+    let shown = match args.format {
+        TextFormat::Text => text::show(&plan),
+        TextFormat::Json => serde_json::to_string(&plan).expect("text becomes JSON") + "\n",
+    };
+    std::io::stdout().write_all(shown.as_bytes()).map_err(out_error)
+}

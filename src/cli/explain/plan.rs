@@ -1,0 +1,354 @@
+//! The classes of a model, collected for printing.
+
+use serde::Serialize;
+
+use super::words;
+use crate::diagnostic::Source;
+use crate::model::{Condition, Kind, Law, Model, Rule, Solve, Watch};
+use crate::session::Session;
+
+/// Everything that is said about a model. Field names are those of the JSON.
+#[derive(Serialize)]
+pub struct Plan {
+    pub model: String,
+    pub title: Option<String>,
+    pub kinds: Vec<KindPlan>,
+    pub rules: Vec<RulePlan>,
+    pub summary: Summary,
+}
+
+#[derive(Serialize)]
+pub struct KindPlan {
+    pub name: String,
+    pub arity: usize,
+    pub work: Work,
+    pub rules: Vec<usize>,
+    pub drawn_only: Vec<String>,
+}
+
+/// How the modules of a kind go through time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub enum Work {
+    /// It never changes.
+    #[serde(rename = "no rules")]
+    NoRules,
+    /// Productions, but no equations.
+    #[serde(rename = "at rest")]
+    AtRest,
+    /// Never stepped.
+    #[serde(rename = "formulas")]
+    Formulas,
+    #[serde(rename = "alone")]
+    Alone,
+    #[serde(rename = "coupled")]
+    Coupled,
+}
+
+#[derive(Serialize)]
+pub struct RulePlan {
+    pub head: String,
+    pub line: usize,
+    pub kinds: Vec<String>,
+    pub solves: Vec<SolvePlan>,
+    pub produces: Vec<ClausePlan>,
+    pub conditions: Vec<ConditionPlan>,
+}
+
+#[derive(Serialize)]
+pub struct ClausePlan {
+    pub line: usize,
+    /// As it is written, on one line; empty for always.
+    pub condition: String,
+}
+
+#[derive(Serialize)]
+pub struct SolvePlan {
+    #[serde(flatten)]
+    pub clause: ClausePlan,
+    pub parameters: Vec<ParameterPlan>,
+}
+
+#[derive(Serialize)]
+pub struct ParameterPlan {
+    pub name: String,
+    pub class: &'static str,
+    /// The form of the solution, if it has one.
+    pub law: Option<String>,
+    pub why: String,
+    /// What its rate reads: parameters, `t`, `age`.
+    pub reads: Vec<String>,
+}
+
+#[derive(Serialize)]
+pub struct ConditionPlan {
+    pub boundary: String,
+    pub line: usize,
+    pub decides: Vec<Use>,
+    pub found: Vec<FoundPlan>,
+}
+
+/// A clause that a condition decides on.
+#[derive(Clone, PartialEq, Serialize)]
+pub struct Use {
+    pub clause: &'static str,
+    pub line: usize,
+}
+
+#[derive(Serialize)]
+pub struct FoundPlan {
+    /// Of the `solve` that is active.
+    pub line: Option<usize>,
+    pub class: &'static str,
+    pub why: String,
+}
+
+#[derive(Default, Serialize)]
+pub struct Summary {
+    pub formulas: Vec<String>,
+    pub alone: Vec<String>,
+    pub coupled: Vec<String>,
+    pub at_rest: Vec<String>,
+    pub no_rules: Vec<String>,
+    pub closed_form: bool,
+}
+
+/// What the plan is made from.
+pub struct Facts<'m> {
+    pub model: &'m Model,
+    source: &'m Source,
+    /// Per kind.
+    work: Vec<Work>,
+}
+
+impl Plan {
+    pub fn new(session: &Session) -> Plan {
+        let model = &session.model;
+        let facts = Facts { model, source: &session.source, work: works(model) };
+        let mut summary = Summary { closed_form: model.is_closed_form(), ..Summary::default() };
+        let mut kinds = Vec::new();
+        for (id, kind) in model.kinds.iter().filter(|(id, _)| !id.is_bracket()) {
+            let work = facts.work[id.index()];
+            let names = parameter_names(model, kind);
+            let drawn = model.drawn_only.get(id.index()).map_or(&[][..], Vec::as_slice);
+            let drawn_only = names.into_iter().zip(drawn).filter(|(_, only)| **only).map(|(name, _)| name);
+            let list = match work {
+                Work::NoRules => &mut summary.no_rules,
+                Work::AtRest => &mut summary.at_rest,
+                Work::Formulas => &mut summary.formulas,
+                Work::Alone => &mut summary.alone,
+                Work::Coupled => &mut summary.coupled,
+            };
+            if !list.contains(&kind.name) {
+                list.push(kind.name.clone());
+            }
+            kinds.push(KindPlan {
+                name: kind.name.clone(),
+                arity: kind.arity,
+                work,
+                rules: kind.rules.clone(),
+                // Of a kind without rules nothing is evaluated, drawn or not.
+                drawn_only: if kind.rules.is_empty() { Vec::new() } else { drawn_only.collect() },
+            });
+        }
+        Plan {
+            model: session.source.name.clone(),
+            title: model.title.clone(),
+            kinds,
+            rules: (0..model.rules.len()).map(|rule| facts.rule(rule)).collect(),
+            summary,
+        }
+    }
+}
+
+/// Names of a kind's parameters as its first rule has them.
+fn parameter_names(model: &Model, kind: &Kind) -> Vec<String> {
+    kind.rules.first().map_or_else(Vec::new, |rule| model.rules[*rule].parameters.clone())
+}
+
+/// True if some equation for a parameter of a kind is integrated numerically.
+fn is_numeric(model: &Model, kind: &Kind, parameter: Option<usize>) -> bool {
+    kind.rules.iter().flat_map(|rule| &model.rules[*rule].solves).any(|solve| {
+        let mut laws = solve.of.iter().zip(&solve.laws);
+        laws.any(|(p, law)| parameter.is_none_or(|wanted| wanted == *p) && !law.is_closed())
+    })
+}
+
+/// The work of each kind. A rule that reads what changes of its neighbours shares a clock with them as soon as it or
+/// one of them is integrated numerically; this is the simulation's own criterion.
+fn works(model: &Model) -> Vec<Work> {
+    let numeric: Vec<bool> = model.kinds.iter().map(|(_, kind)| is_numeric(model, kind, None)).collect();
+    let mut works: Vec<Work> = (model.kinds.iter())
+        .map(|(id, kind)| {
+            let mut solves = kind.rules.iter().flat_map(|rule| &model.rules[*rule].solves);
+            match () {
+                () if kind.rules.is_empty() => Work::NoRules,
+                () if numeric[id.index()] => Work::Alone,
+                () if solves.all(|solve| solve.of.is_empty()) => Work::AtRest,
+                () => Work::Formulas,
+            }
+        })
+        .collect();
+    for (id, kind) in model.kinds.iter() {
+        for rule in kind.rules.iter().map(|rule| &model.rules[*rule]).filter(|rule| rule.reads_context) {
+            let neighbours: Vec<usize> = (rule.left.iter().chain(&rule.right))
+                .flat_map(|pattern| &pattern.kinds)
+                .map(|kind| kind.index())
+                .filter(|kind| numeric[*kind])
+                .collect();
+            if numeric[id.index()] || !neighbours.is_empty() {
+                works[id.index()] = Work::Coupled;
+            }
+            for neighbour in neighbours {
+                works[neighbour] = Work::Coupled;
+            }
+        }
+    }
+    works
+}
+
+impl Facts<'_> {
+    fn line(&self, byte: u32) -> usize {
+        self.source.position(byte).0
+    }
+
+    fn rule(&self, index: usize) -> RulePlan {
+        let rule = &self.model.rules[index];
+        let kinds = self.model.kinds.iter().filter(|(_, kind)| kind.rules.contains(&index));
+        let clause = |guard: &Condition, span: crate::diagnostic::Span| ClausePlan {
+            line: self.line(span.start),
+            condition: if guard.is_always() { String::new() } else { self.guard(span) },
+        };
+        RulePlan {
+            head: rule.label.clone(),
+            line: self.line(rule.span.start),
+            kinds: kinds.map(|(_, kind)| kind.name.clone()).collect(),
+            solves: (rule.solves.iter())
+                .map(|solve| SolvePlan {
+                    clause: clause(&solve.guard, solve.span),
+                    parameters: self.parameters(index, solve),
+                })
+                .collect(),
+            produces: rule.produces.iter().map(|p| clause(&p.guard, p.span)).collect(),
+            conditions: (0..rule.atoms.len()).map(|atom| self.condition(rule, atom)).collect(),
+        }
+    }
+
+    /// The condition of a clause as it is written, on one line.
+    fn guard(&self, clause: crate::diagnostic::Span) -> String {
+        let lines = self.source.slice(clause).lines().map(|line| line.split('#').next().unwrap_or(""));
+        let text = lines.collect::<Vec<_>>().join(" ");
+        let in_word = |c: char| c.is_alphanumeric() || c == '_';
+        let action = |word: &'static str| {
+            let alone =
+                |at: usize| !text[..at].ends_with(in_word) && !text[at + word.len()..].starts_with(in_word);
+            text.match_indices(word).map(|(at, _)| at).find(|at| alone(*at))
+        };
+        let end = ["solve", "produce"].into_iter().filter_map(action).min();
+        let before = text[..end.unwrap_or(text.len())].trim();
+        let words: Vec<&str> = before.strip_prefix("if").unwrap_or(before).split_whitespace().collect();
+        words.join(" ")
+    }
+
+    /// How each parameter moves under a clause.
+    fn parameters(&self, rule: usize, solve: &Solve) -> Vec<ParameterPlan> {
+        let model = self.model;
+        let compiled = &model.rules[rule];
+        let mut kinds = model.kinds.iter().filter(|(_, kind)| kind.rules.contains(&rule));
+        let coupled = kinds.any(|(id, _)| self.work[id.index()] == Work::Coupled);
+        (compiled.parameters.iter().enumerate())
+            .map(|(parameter, name)| {
+                let name = name.clone();
+                let Some(position) = solve.of.iter().position(|p| *p == parameter) else {
+                    let why = "its rate here is 0".to_owned();
+                    return ParameterPlan { name, class: "constant", law: None, why, reads: Vec::new() };
+                };
+                let law = &solve.laws[position];
+                let class = match law {
+                    Law::Numeric(numeric) if coupled && numeric.linear => "coupled and linear",
+                    Law::Numeric(_) if coupled => "coupled",
+                    Law::Numeric(_) => "local",
+                    _ => "closed form",
+                };
+                let reads = solve.rates.output_reads(position);
+                let reads = reads.into_iter().filter_map(|v| words::variable(compiled, v)).collect();
+                let (law, why) = words::law(self, compiled, solve, position, coupled);
+                ParameterPlan { name, class, law, why, reads }
+            })
+            .collect()
+    }
+
+    /// What an atom decides, and how its instant is found.
+    fn condition(&self, rule: &Rule, atom: usize) -> ConditionPlan {
+        let mentions = |condition: &Condition| condition.atoms().any(|(a, _)| a == atom);
+        let mut decides = Vec::new();
+        for solve in &rule.solves {
+            let line = self.line(solve.span.start);
+            if mentions(&solve.guard) {
+                decides.push(Use { clause: "solve", line });
+            }
+            if solve.switches.iter().any(|switch| mentions(&switch.condition)) {
+                decides.push(Use { clause: "if in the equations", line });
+            }
+        }
+        let produces = rule.produces.iter().filter(|p| mentions(&p.guard));
+        decides.extend(produces.map(|p| Use { clause: "produce", line: self.line(p.span.start) }));
+        let found = |solve: Option<usize>| {
+            let (class, why) = self.watch(rule, solve, atom);
+            FoundPlan { line: solve.map(|s| self.line(rule.solves[s].span.start)), class, why }
+        };
+        // A module without an active clause is an error where there are clauses.
+        let found = match rule.solves.len() {
+            0 => vec![found(None)],
+            n => (0..n).map(|solve| found(Some(solve))).collect(),
+        };
+        let line = self.line(rule.atoms[atom].start);
+        ConditionPlan { boundary: rule.boundaries[atom].clone(), line, decides, found }
+    }
+
+    fn watch(&self, rule: &Rule, solve: Option<usize>, atom: usize) -> (&'static str, String) {
+        let watch = &rule.watch(solve)[atom];
+        let solve = solve.map(|s| &rule.solves[s]);
+        if matches!(watch, Watch::Still) {
+            return ("nothing to find", "nothing in it changes from one event to the next".to_owned());
+        }
+        if solve.is_some_and(|s| s.unreachable[atom]) {
+            return ("never met", "the equations approach it and never arrive".to_owned());
+        }
+        if let Watch::Crossing { variable, level } = watch {
+            return ("closed-form time", words::crossing(rule, *variable, level));
+        }
+        let mut reads = rule.sides.output_reads(2 * atom);
+        reads.extend(rule.sides.output_reads(2 * atom + 1));
+        let integrated = reads.iter().filter(|v| self.is_integrated(rule, solve, **v));
+        let mut integrated: Vec<String> = integrated.filter_map(|v| words::variable(rule, *v)).collect();
+        integrated.dedup();
+        if integrated.is_empty() {
+            (
+                "root on a closed form",
+                "everything in it follows a formula; the first root is searched".to_owned(),
+            )
+        } else {
+            let verb = if integrated.len() == 1 { "is" } else { "are" };
+            let why =
+                format!("{} {verb} integrated; the root is searched in each step", words::list(&integrated));
+            ("root on dense output", why)
+        }
+    }
+
+    /// True if a variable of a rule is, or may be, integrated numerically.
+    pub fn is_integrated(&self, rule: &Rule, solve: Option<&Solve>, variable: usize) -> bool {
+        if variable < rule.parameters.len() {
+            let position = solve.and_then(|s| s.of.iter().position(|p| *p == variable));
+            return position.is_some_and(|i| solve.is_some_and(|s| !s.laws[i].is_closed()));
+        }
+        let mut first = rule.parameters.len();
+        for pattern in rule.left.iter().chain(&rule.right) {
+            if variable < first + pattern.arity {
+                let kinds = pattern.kinds.iter().map(|kind| self.model.kinds.get(*kind));
+                return { kinds }.any(|kind| is_numeric(self.model, kind, Some(variable - first)));
+            }
+            first += pattern.arity;
+        }
+        false
+    }
+}
