@@ -35,4 +35,4 @@ pub use graph::{Graph, Node, NodeId};
 pub use interval::Interval;
 pub use ops::{Binary, Unary, Value};
 pub use polynomial::{Monomial, Polynomial};
-pub use program::{Program, Scratch};
+pub use program::{LANES, Lanes, Program, Scratch};

@@ -36,6 +36,19 @@ impl Instruction {
     }
 }
 
+/// Rows that are evaluated at once by [`Program::eval_lanes`].
+pub const LANES: usize = 32;
+
+/// One value of each row.
+pub type Lanes = [f64; LANES];
+
+#[inline(always)]
+fn each(out: &mut Lanes, a: &Lanes, b: &Lanes, f: impl Fn(f64, f64) -> f64) {
+    for (out, (a, b)) in out.iter_mut().zip(a.iter().zip(b)) {
+        *out = f(*a, *b);
+    }
+}
+
 /// Registers of an evaluation, kept from one to the next so that nothing is allocated.
 pub type Scratch<T> = Vec<T>;
 
@@ -171,6 +184,39 @@ impl Program {
         for (value, &register) in out.iter_mut().zip(&self.outputs) {
             *value = scratch[register as usize];
         }
+    }
+
+    /// Evaluates all roots for many rows at once: register v of `registers` holds variable v of every row. Every
+    /// operation runs over all rows before the next, and gives each the same bits as [`Program::eval`]. Returns the
+    /// register of each output.
+    pub fn eval_lanes(&self, registers: &mut Vec<Lanes>) -> impl ExactSizeIterator<Item = usize> + '_ {
+        registers.resize(self.registers, [0.0; LANES]);
+        for &instruction in &self.code {
+            match instruction {
+                Instruction::Const(to, x) => registers[to as usize] = [x; LANES],
+                Instruction::Unary(op, to, a) => {
+                    let a = registers[a as usize];
+                    registers[to as usize] = a.map(|x| f64::unary(op, x));
+                }
+                Instruction::Binary(op, to, a, b) => {
+                    let (a, b) = (registers[a as usize], registers[b as usize]);
+                    let out = &mut registers[to as usize];
+                    // The choice of the operation is made once, not for every row.
+                    match op {
+                        Binary::Add => each(out, &a, &b, |x, y| x + y),
+                        Binary::Sub => each(out, &a, &b, |x, y| x - y),
+                        Binary::Mul => each(out, &a, &b, |x, y| x * y),
+                        Binary::Div => each(out, &a, &b, |x, y| x / y),
+                        _ => each(out, &a, &b, |x, y| f64::binary(op, x, y)),
+                    }
+                }
+                Instruction::Select(to, c, a, b) => {
+                    let (c, a, b) = (registers[c as usize], registers[a as usize], registers[b as usize]);
+                    registers[to as usize] = std::array::from_fn(|i| f64::select(c[i], a[i], b[i]));
+                }
+            }
+        }
+        self.outputs.iter().map(|&register| register as usize)
     }
 
     /// Evaluates a program of one root; convenient where speed does not matter.

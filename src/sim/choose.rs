@@ -28,9 +28,13 @@ struct Trouble {
 }
 
 impl Simulation<'_> {
-    /// Chooses the equations of the open modules; returns productions whose conditions become true just after the
+    /// Chooses the equations of the open modules; finds productions whose conditions become true just after the
     /// instant.
-    pub(super) fn choose_equations(&mut self, hurried: &mut bool) -> Result<Vec<Firing>, Error> {
+    pub(super) fn choose_equations(
+        &mut self,
+        hurried: &mut bool,
+        firing: &mut Vec<Firing>,
+    ) -> Result<(), Error> {
         let rules = &self.model.rules;
         let opened = std::mem::take(&mut self.opened);
         // First choice: the first clause that can hold where the signs are expected to go.
@@ -44,7 +48,6 @@ impl Simulation<'_> {
             state.solve = next_clause(rule, &guess, &[]);
             state.switches = switches(rule, state.solve, &guess);
         }
-        let mut firing = Vec::new();
         let mut outcome = Ok(());
         for choice in 0.. {
             let mut changed = false;
@@ -120,7 +123,7 @@ impl Simulation<'_> {
             }
         }
         self.opened = opened;
-        outcome.map(|()| firing)
+        outcome
     }
 
     /// Where a module's signs go under the present equations. Also tells whether a sign turned out to be

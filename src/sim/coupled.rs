@@ -14,7 +14,7 @@ use super::runge_kutta::Rates;
 use super::simulation::Simulation;
 use super::state::{Change, Control, Next};
 use super::watch::path_together;
-use crate::expr::{Program, Scratch};
+use crate::expr::{LANES, Lanes, Program, Scratch};
 use crate::model::Rule;
 use crate::structure::{Instant, ModuleId, Visit};
 use smallvec::SmallVec;
@@ -62,6 +62,10 @@ pub struct System {
     pub rows: Vec<Row>,
     pub sources: Vec<Source>,
     pub formulas: Vec<Formula>,
+    /// Rows with the same program.
+    batches: Vec<Vec<u32>>,
+    /// The variables that the programs of each rule's clauses read.
+    reads: Vec<Vec<Vec<usize>>>,
     switches: Vec<f64>,
     /// Place in the tree's values, and owner with its parameter, of each component.
     places: Vec<(usize, ModuleId, usize)>,
@@ -145,10 +149,46 @@ impl System {
                 age: start.since(birth),
             });
         }
-        debug_assert!(
-            rules.len() > system.rows.iter().map(|r| r.rule).max().unwrap_or(0) || rules.is_empty()
-        );
+        system.batch(rules);
         system
+    }
+
+    /// Puts rows with the same program together.
+    fn batch(&mut self, rules: &[Rule]) {
+        self.reads = vec![Vec::new(); rules.len()];
+        let mut keys: Vec<(usize, usize, bool)> = Vec::new();
+        for (n, row) in self.rows.iter().enumerate() {
+            let key = (row.rule, row.solve, row.forced);
+            let batch = keys.iter().position(|k| *k == key).unwrap_or_else(|| {
+                keys.push(key);
+                self.batches.push(Vec::new());
+                keys.len() - 1
+            });
+            self.batches[batch].push(n as u32);
+        }
+        for (rule, solve, _) in keys {
+            self.reads[rule].resize(rules[rule].solves.len(), Vec::new());
+            self.reads[rule][solve] = rules[rule].solves[solve].rates.reads();
+        }
+    }
+
+    /// One variable of a row's rule.
+    fn variable(&self, row: &Row, variable: usize, tau: f64, y: &[f64]) -> f64 {
+        if variable < row.sources {
+            return match self.sources[row.first_source + variable] {
+                Source::Fixed(x) => x,
+                Source::State(component) => y[component as usize],
+                Source::Formula(i) => {
+                    let Formula { motion, x, offset, .. } = &self.formulas[i as usize];
+                    x + motion.value(offset + tau)
+                }
+            };
+        }
+        match variable - row.sources {
+            0 => self.start.to_f64() + tau,
+            1 => row.age + tau,
+            switch => self.switches[row.first_switch + switch - 2],
+        }
     }
 
     /// Moves the start of the step.
@@ -205,33 +245,54 @@ impl System {
     }
 }
 
+/// The code of a row's rates.
+fn program<'s>(rules: &'s [Rule], row: &Row) -> &'s Program {
+    let solve = &rules[row.rule].solves[row.solve];
+    if row.forced { &solve.rates } else { &solve.numeric_rates }
+}
+
 /// The right-hand side of a [`System`].
 struct Equations<'s> {
     system: &'s System,
     rules: &'s [Rule],
     variables: Vec<f64>,
     scratch: Scratch<f64>,
+    registers: Vec<Lanes>,
 }
 
 impl Equations<'_> {
-    fn program(&self, row: &Row) -> &Program {
-        let solve = &self.rules[row.rule].solves[row.solve];
-        if row.forced { &solve.rates } else { &solve.numeric_rates }
+    /// The rates of a few rows that have the same program.
+    fn lanes(&mut self, rows: &[u32], tau: f64, y: &[f64], out: &mut [f64]) {
+        let system = self.system;
+        let first = &system.rows[rows[0] as usize];
+        let program = program(self.rules, first);
+        let mut registers = std::mem::take(&mut self.registers);
+        registers.resize(first.sources + 2 + first.switches, [0.0; LANES]);
+        for &variable in &system.reads[first.rule][first.solve] {
+            let register = &mut registers[variable];
+            for (lane, &row) in rows.iter().enumerate() {
+                let row = &system.rows[row as usize];
+                register[lane] = system.variable(row, variable, tau, y);
+            }
+        }
+        for (output, register) in program.eval_lanes(&mut registers).enumerate() {
+            for (lane, &row) in rows.iter().enumerate() {
+                out[system.rows[row as usize].first_rate + output] = registers[register][lane];
+            }
+        }
+        self.registers = registers;
     }
+
 }
 
 impl Rates for Equations<'_> {
     fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]) {
-        let mut variables = std::mem::take(&mut self.variables);
-        let mut scratch = std::mem::take(&mut self.scratch);
-        for row in &self.system.rows {
-            self.system.variables(row, tau, y, &mut variables);
-            let program = self.program(row);
-            let first = row.first_rate;
-            program.eval(&variables, &mut scratch, &mut out[first..first + program.outputs()]);
+        let system = self.system;
+        for batch in &system.batches {
+            for rows in batch.chunks(LANES) {
+                self.lanes(rows, tau, y, out);
+            }
         }
-        self.variables = variables;
-        self.scratch = scratch;
     }
 
     fn couplings(&self) -> Vec<(u32, u32)> {
@@ -430,7 +491,7 @@ impl Simulation<'_> {
                 linear.step(self.settings.tolerance * LINEAR_TOLERANCE, BEYOND * known.max(from.resolution()))
             }
             None => {
-                let mut equations = Equations { system, rules, variables: Vec::new(), scratch: Vec::new() };
+                let mut equations = Equations { system, rules, variables: Vec::new(), scratch: Vec::new(), registers: Vec::new() };
                 let step = integrator.step(&self.settings, control, &mut equations, y, from, &mut self.stats);
                 step.map_err(|error| self.coupled_error(error, from))?
             }

@@ -119,6 +119,13 @@ impl<'p> Path<'p> {
         }
     }
 
+    /// Bounds of an own parameter over the whole stretch, if it follows dense output.
+    pub fn dense_bounds(&self, parameter: usize) -> Option<Interval> {
+        let motion = self.state.motions.get(parameter)?;
+        let (dense, component) = self.dense(self.state, motion)?;
+        Some(dense.bounds(component))
+    }
+
     /// Gives each variable to one of three functions: values that rest, components of dense output, and formulas
     /// with their start value and the time since it.
     fn each<T>(

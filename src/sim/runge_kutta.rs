@@ -72,6 +72,9 @@ impl Method {
 
 impl Workspace {
     pub fn resize(&mut self, n: usize) {
+        if self.end.len() == n && !self.k.is_empty() {
+            return;
+        }
         let stages = DOP853.a.len();
         self.k.resize(stages, Vec::new());
         for k in &mut self.k {

@@ -45,10 +45,11 @@ impl Simulation<'_> {
                 self.look_up();
             }
             let mut firing = self.judge();
-            if firing.is_empty() {
-                firing = self.choose_equations(&mut hurried)?;
+            if firing.is_empty() && !self.opened.is_empty() {
+                self.choose_equations(&mut hurried, &mut firing)?;
             }
             if firing.is_empty() {
+                self.recycle(firing);
                 break;
             }
             rounds += 1;

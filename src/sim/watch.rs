@@ -148,6 +148,9 @@ impl Watcher {
                     }
                 }
                 How::Search => {
+                    if self.keeps_clear(path, watch, now[atom]) {
+                        continue;
+                    }
                     if !std::mem::replace(&mut measured, true) {
                         self.measure(path);
                     }
@@ -208,6 +211,21 @@ impl Watcher {
             found.changes.extend(group);
         }
         found
+    }
+
+    /// True if a parameter that is integrated stays away from the one value at which its atom's sides meet: most steps
+    /// need no more than a look at its bounds.
+    fn keeps_clear(&mut self, path: &Path, watch: &Watch, sign: Sign) -> bool {
+        let Watch::Crossing { variable, level } = watch else { return false };
+        if !matches!(sign, Sign::Plus | Sign::Minus) {
+            return false;
+        }
+        let Some(bounds) = path.dense_bounds(*variable) else { return false };
+        path.at(0.0, &mut self.values);
+        let mut out = [0.0];
+        level.eval(&self.values, &mut self.scratch, &mut out);
+        let margin = 1e-9 * (out[0].abs() + bounds.magnitude());
+        out[0] < bounds.lo - margin || out[0] > bounds.hi + margin
     }
 
     fn difference<'w, 'p>(&'w mut self, path: &'w Path<'p>, atom: usize) -> Difference<'w, 'p> {
