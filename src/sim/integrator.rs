@@ -52,6 +52,11 @@ impl Integrator {
         }
     }
 
+    /// Number of components.
+    pub fn size(&self) -> usize {
+        self.workspace.end.len()
+    }
+
     /// The method for a step.
     fn choose(&self, settings: &Settings, control: &Control) -> Method {
         match settings.method {

@@ -50,6 +50,8 @@ pub struct Simulation<'m> {
     /// A coupled module has been replaced.
     pub(super) coupled_changed: bool,
     pub(super) alone: Integrator,
+    /// Whose step it made last, and to when.
+    pub(super) alone_last: Option<(ModuleId, Instant)>,
     /// What step control has learnt, per kind and number of the clause: modules of one kind that live through the
     /// same under different rules take the same steps.
     pub(super) hints: Vec<Vec<Control>>,
@@ -107,6 +109,7 @@ impl<'m> Simulation<'m> {
             coupled: Coupled::default(),
             coupled_changed: false,
             alone: Integrator::default(),
+            alone_last: None,
             hints: (model.kinds.iter())
                 .map(|(_, kind)| {
                     let clauses = kind.rules.iter().map(|r| model.rules[*r].solves.len()).max();
