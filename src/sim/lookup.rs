@@ -7,6 +7,7 @@ use smallvec::SmallVec;
 
 use super::simulation::Simulation;
 use super::state::{Signs, State};
+use super::watch::{TOUCH, opposite};
 use crate::model::{Rule, Sign};
 use crate::structure::{ModuleId, Visit};
 
@@ -82,7 +83,12 @@ impl Simulation<'_> {
     fn take_up(&mut self, id: ModuleId, rule: usize, context: &[ModuleId]) {
         let compiled = &self.model.rules[rule];
         self.plant.materialise(id, self.now);
-        let (mut signs, clear) = self.signs_of_values(id, compiled, context);
+        let now = self.now;
+        if let Some(state) = self.plant.state_mut(id) {
+            state.pass_changes(now);
+        }
+        let followed = self.plant.state(id).filter(|s| s.rule == Some(rule)).map(|s| s.signs.clone());
+        let (mut signs, clear) = self.signs_of_values(id, compiled, context, followed);
         let before = self.plant.state(id);
         // A limit that is only approached may have been reached by rounding.
         if let Some(State { rule: Some(last), solve: Some(solve), signs: known, .. }) = before
@@ -142,7 +148,15 @@ impl Simulation<'_> {
         true
     }
 
-    fn signs_of_values(&mut self, id: ModuleId, rule: &Rule, context: &[ModuleId]) -> (Signs, bool) {
+    /// The signs of a rule's atoms by the values of now, and whether all are far from zero. `followed` are the signs
+    /// that the module was followed with.
+    fn signs_of_values(
+        &mut self,
+        id: ModuleId,
+        rule: &Rule,
+        context: &[ModuleId],
+        followed: Option<Signs>,
+    ) -> (Signs, bool) {
         if rule.atoms.is_empty() {
             return (Signs::new(), true);
         }
@@ -151,12 +165,15 @@ impl Simulation<'_> {
         rule.sides.eval(&self.variables, &mut self.scratch, &mut out);
         let scale = self.plant.tree.parameters(id).iter().fold(1.0, |m: f64, x| m.max(x.abs()));
         let mut clear = true;
-        let signs = (out.chunks(2))
-            .map(|side| {
+        let signs = (out.chunks(2).enumerate())
+            .map(|(atom, side)| {
                 let difference = side[0] - side[1];
                 // An infinite side is far from everything.
                 let size = side[0].abs().max(side[1].abs());
-                let equal = size.is_finite() && difference.abs() <= EQUAL * size;
+                // A sign that has just turned, by no more than rounding, turns at this instant.
+                let turned = followed.as_ref().is_some_and(|f| f[atom] == opposite(Sign::of(difference)));
+                let tolerance = if turned { TOUCH } else { EQUAL };
+                let equal = size.is_finite() && difference.abs() <= tolerance * size;
                 clear &= !equal && difference.abs() > NEAR * scale;
                 if equal { Sign::Zero } else { Sign::of(difference) }
             })

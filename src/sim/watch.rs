@@ -14,7 +14,7 @@ use crate::model::{Condition, Rule, Sign, Solve, Truth, Watch};
 use crate::structure::Instant;
 
 /// Zero, for a difference of two sides, in units of their rounding.
-const TOUCH: f64 = 256.0 * f64::EPSILON;
+pub const TOUCH: f64 = 256.0 * f64::EPSILON;
 
 /// Most changes of a module's signs that are followed within one stretch.
 const MAX_ROUNDS: usize = 50;
