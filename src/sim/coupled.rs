@@ -282,7 +282,6 @@ impl Equations<'_> {
         }
         self.registers = registers;
     }
-
 }
 
 impl Rates for Equations<'_> {
@@ -491,7 +490,13 @@ impl Simulation<'_> {
                 linear.step(self.settings.tolerance * LINEAR_TOLERANCE, BEYOND * known.max(from.resolution()))
             }
             None => {
-                let mut equations = Equations { system, rules, variables: Vec::new(), scratch: Vec::new(), registers: Vec::new() };
+                let mut equations = Equations {
+                    system,
+                    rules,
+                    variables: Vec::new(),
+                    scratch: Vec::new(),
+                    registers: Vec::new(),
+                };
                 let step = integrator.step(&self.settings, control, &mut equations, y, from, &mut self.stats);
                 step.map_err(|error| self.coupled_error(error, from))?
             }

@@ -83,6 +83,7 @@ impl Implicit {
         let largest = y.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
         self.scale.clear();
         // As for explicit methods; but the rate at the start of a fast transient says nothing about its size.
+        let largest = if largest > 0.0 { largest } else { f64::INFINITY };
         let scale = |(y, f): (&f64, &f64)| tolerance * (y.abs().max((h * f).abs().min(largest)) + FLOOR);
         self.scale.extend(y.iter().zip(rates).map(scale));
         let (pattern, places) = match &mut self.pattern {

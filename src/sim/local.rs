@@ -211,7 +211,9 @@ impl Simulation<'_> {
             let scratch = std::mem::take(&mut self.scratch);
             let mut system = Alone::new(&self.plant, state, rule, from, variables, scratch, &mut y);
             // One that goes on from its own last step need not evaluate its rates again.
-            if going_on.is_some_and(|s| self.alone_last == Some((id, s.dense.end))) && y.len() == self.alone.size() {
+            if going_on.is_some_and(|s| self.alone_last == Some((id, s.dense.end)))
+                && y.len() == self.alone.size()
+            {
                 self.alone.advance(&mut y);
             } else {
                 self.alone.restart(self.settings.method, y.len());

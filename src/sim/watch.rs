@@ -142,7 +142,8 @@ impl Watcher {
             match how(watch, state) {
                 How::Not => {}
                 How::Formula(variable, level) => {
-                    let next = self.meet(path, variable, level, now[atom]).filter(|m| m.position <= limit);
+                    let next =
+                        self.meet(path, atom, variable, level, now[atom]).filter(|m| m.position <= limit);
                     if next.is_some() {
                         watched.push(Watched { atom, tolerance: f64::NAN, next });
                     }
@@ -247,7 +248,14 @@ impl Watcher {
     }
 
     /// When a variable that moves one way only takes the value at which its atom's sides meet.
-    fn meet(&mut self, path: &Path, variable: usize, level: &Program, sign: Sign) -> Option<Meeting> {
+    fn meet(
+        &mut self,
+        path: &Path,
+        atom: usize,
+        variable: usize,
+        level: &Program,
+        sign: Sign,
+    ) -> Option<Meeting> {
         if !matches!(sign, Sign::Plus | Sign::Minus) {
             return None;
         }
@@ -276,7 +284,21 @@ impl Watcher {
         };
         let position = time.since(path.start) / path.h;
         let level = (variable < t).then_some((variable, level));
-        (position > 0.0).then_some(Meeting { position, time, at: Sign::Zero, after: opposite(sign), level })
+        let meeting = Meeting { position, time, at: Sign::Zero, after: opposite(sign), level };
+        if position > path.start.resolution() / path.h {
+            return Some(meeting);
+        }
+        // Here, but for rounding, or already behind: an instant that has been passed, or one that fell on the very end
+        // of the stretch before this one and was not seen? The difference goes towards zero, or away from it.
+        path.departure(&mut self.departure);
+        self.departure_out.resize(path.rule.sides.outputs(), Dual::constant(0.0));
+        path.rule.sides.eval(&self.departure, &mut self.departure_scratch, &mut self.departure_out);
+        let slope = self.departure_out[2 * atom].rate - self.departure_out[2 * atom + 1].rate;
+        if Sign::of(slope) != meeting.after {
+            return None;
+        }
+        let time = if position > 0.0 { time } else { path.start };
+        Some(Meeting { position: position.max(0.0), time, ..meeting })
     }
 
     /// Values at the start and bounds over the whole path: most atoms keep their sign on most paths.

@@ -67,7 +67,7 @@ fn a_report_is_a_table_and_three_files() {
         "Pinnate leaf, at 50 times",
         "5 productions, 22 modules",
         "order 4, observed ",
-        "reference: rk4 at step",
+        "reference: closed form (auto)",
     ] {
         assert!(table.contains(part), "{part}: {table}");
     }
@@ -247,4 +247,13 @@ fn the_built_in_cases_run() {
         let message = text(&output.stderr);
         assert!(output.status.code() == Some(status) && message.contains(says), "{arguments:?}: {message}");
     }
+}
+
+#[test]
+fn the_hard_cases_hold() {
+    // Every case with every method and tolerance that its file names; the table is what `report --hard` prints.
+    let table = good(&["--hard"]);
+    println!("{table}");
+    let verdicts = table.lines().filter(|line| line.ends_with("  pass")).count();
+    assert!(verdicts >= 250, "{table}");
 }
