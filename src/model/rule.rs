@@ -45,6 +45,15 @@ pub struct Rule {
 }
 
 impl Rule {
+    /// True if modules under this rule do the same from their first instant to their last: no conditions, no
+    /// productions, at most one clause of equations.
+    pub fn is_plain(&self) -> bool {
+        self.atoms.is_empty()
+            && self.produces.is_empty()
+            && self.solves.len() <= 1
+            && self.solves.iter().all(|s| s.guard.is_always() && s.switches.is_empty())
+    }
+
     /// How each atom is watched under a clause.
     pub fn watch(&self, solve: Option<usize>) -> &[Watch] {
         solve.map_or(&self.watch_at_rest, |s| &self.solves[s].watch)

@@ -333,32 +333,42 @@ impl Simulation<'_> {
             if !rule.reads_context {
                 continue;
             }
-            let numeric = |m: &ModuleId| self.plant.state(*m).is_some_and(|s| s.is_numeric());
-            let restarted = |m: &ModuleId| self.plant.state(*m).is_some_and(|s| s.restarted == group);
-            let moved = restarted(&id) || state.context.iter().any(restarted);
-            if state.context.iter().any(numeric) || numeric(&id) {
-                affected |= moved;
-                wanted.push(id);
-                wanted.extend(state.context.iter().filter(|m| numeric(m)));
-            } else if moved && !restarted(&id) {
-                dependent.push(id);
+            let (mut numeric, mut moved) = (false, false);
+            let concerned: SmallVec<[ModuleId; 4]> = std::iter::once(id)
+                .chain(state.context.iter().copied())
+                .filter(|m| {
+                    let Some(state) = self.plant.state(*m) else { return false };
+                    moved |= state.restarted == group;
+                    numeric |= state.is_numeric();
+                    *m == id || state.is_numeric()
+                })
+                .collect();
+            if !numeric {
+                if moved && state.restarted != group {
+                    dependent.push(id);
+                }
+                continue;
+            }
+            affected |= moved;
+            for module in concerned {
+                let state = self.plant.state_mut(module).expect("seen above");
+                affected |= !state.coupled || state.restarted == group;
+                if std::mem::replace(&mut state.wanted, group) != group {
+                    wanted.push(module);
+                }
             }
         }
-        wanted.sort_unstable();
-        wanted.dedup();
         let mut freed = Vec::new();
         for &id in &self.coupled.members {
-            let Some(state) = self.plant.state(id).filter(|s| s.coupled) else {
-                affected = true;
-                continue;
-            };
-            if wanted.binary_search(&id).is_err() {
-                affected = true;
-                freed.push((id, state.restarted == group));
+            match self.plant.state(id).filter(|s| s.coupled) {
+                None => affected = true,
+                Some(state) if state.wanted != group => {
+                    affected = true;
+                    freed.push((id, state.restarted == group));
+                }
+                Some(_) => {}
             }
         }
-        affected |=
-            wanted.iter().any(|id| self.plant.state(*id).is_some_and(|s| !s.coupled || s.restarted == group));
         for &id in &dependent {
             if let Some(state) = self.plant.state_mut(id) {
                 state.pass_changes(self.now);

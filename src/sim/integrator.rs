@@ -159,10 +159,7 @@ impl Integrator {
         if settings.method == Method::Auto && method != Method::Radau {
             suspect(control, self.workspace.stiffness(method, h), method);
         }
-        let end = match grid {
-            Some(grid) => Some(Instant::new(next_grid_time(start, grid))),
-            None => None,
-        };
+        let end = grid.map(|grid| Instant::new(next_grid_time(start, grid)));
         if let Some(implicit) = self.implicit.as_mut().filter(|_| method == Method::Radau) {
             return Ok(implicit.dense(start, y, h));
         }

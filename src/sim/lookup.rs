@@ -34,10 +34,10 @@ impl Simulation<'_> {
             let kind = self.plant.tree.kind(id);
             if self.kinds_with_context[kind.index()] {
                 self.changed = true;
-            } else if let Some(&rule) = model.kinds.get(kind).rules.first() {
-                if !self.begin_quickly(id, rule) {
-                    self.take_up(id, rule, &[]);
-                }
+            } else if let Some(&rule) = model.kinds.get(kind).rules.first()
+                && !self.begin_quickly(id, rule)
+            {
+                self.take_up(id, rule, &[]);
             }
         }
         self.fresh = fresh;
@@ -112,6 +112,13 @@ impl Simulation<'_> {
         state.switches.clear();
         state.next = Default::default();
         state.since = self.now;
+        if compiled.is_plain() {
+            // Nothing to judge and nothing to choose.
+            state.solve = (!compiled.solves.is_empty()).then_some(0);
+            state.open = None;
+            self.ready.push(id);
+            return;
+        }
         state.place(clear);
         if !was_open {
             self.opened.push(id);

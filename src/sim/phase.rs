@@ -23,7 +23,8 @@ const WIDENING: f64 = 4.0;
 impl Simulation<'_> {
     /// Starts the motions of the modules that were open, and of those that depend on them.
     pub(super) fn begin_phases(&mut self) -> Result<(), Error> {
-        let opened = std::mem::take(&mut self.opened);
+        let mut opened = std::mem::take(&mut self.opened);
+        opened.append(&mut self.ready);
         for &id in &opened {
             let Some(state) = self.plant.state_mut(id) else { continue };
             state.open = None;

@@ -37,6 +37,8 @@ pub struct Simulation<'m> {
     pub(super) group: u64,
     /// Modules that the instant concerns.
     pub(super) opened: Vec<ModuleId>,
+    /// Modules that it concerns, and that have their equations already.
+    pub(super) ready: Vec<ModuleId>,
     /// Modules that were made at the instant and are not looked up yet.
     pub(super) fresh: Vec<ModuleId>,
     /// The structure has changed since contexts were looked up.
@@ -101,6 +103,7 @@ impl<'m> Simulation<'m> {
             now: Instant::ZERO,
             group: 0,
             opened: Vec::new(),
+            ready: Vec::new(),
             fresh: Vec::new(),
             changed: true,
             looks_around: kinds_with_context.contains(&true),

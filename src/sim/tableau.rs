@@ -16,6 +16,7 @@
 #[derive(Debug, Clone, Copy)]
 pub struct Tableau {
     /// Order of the solution that is carried on.
+    #[cfg(test)]
     pub order: u32,
     /// Order `q` of the error estimate for step control: the estimate falls like `h^(q+1)`.
     pub error_order: u32,
@@ -33,6 +34,7 @@ pub struct Tableau {
     pub d: &'static [&'static [f64]],
 }
 
+#[cfg(test)]
 impl Tableau {
     /// Weights of the solution at the end of the step: `y1 = y0 + h sum_i b_i k_i`, over `stages - 1` stages.
     pub fn weights(&self) -> &'static [f64] {
@@ -46,6 +48,7 @@ impl Tableau {
 /// "Some practical Runge-Kutta formulas", Math. Comp. 46, 135-150).
 #[rustfmt::skip]
 pub static DOPRI5: Tableau = Tableau {
+    #[cfg(test)]
     order: 5,
     error_order: 4,
     stages: 7,
@@ -75,6 +78,7 @@ pub static DOPRI5: Tableau = Tableau {
 /// Hairer controls the step with the exponent 1/8, hence the error order 7.
 #[rustfmt::skip]
 pub static DOP853: Tableau = Tableau {
+    #[cfg(test)]
     order: 8,
     error_order: 7,
     stages: 13,

@@ -129,7 +129,7 @@ impl Riccati {
             rate = exact_rate();
         }
         // Between here and there the rate has one sign, or there is no way.
-        if !ahead || !(rate * self.f > 0.0) {
+        if !ahead || rate.is_nan() || rate * self.f <= 0.0 {
             return None;
         }
         let ratio = rate / self.f;

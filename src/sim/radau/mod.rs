@@ -73,14 +73,6 @@ impl Radau {
         }
     }
 
-    /// Number of stages.
-    pub fn stages(&self) -> usize {
-        match self.0 {
-            Kind::Three(_) => 3,
-            Kind::Five(_) => 5,
-        }
-    }
-
     /// Tries a step of length `h` (not 0) from `y`, where `rate` = f(0, y). `scale` > 0 is the error allowed
     /// in each component. An attempt after one that was not accepted must start from the same `y`, else call
     /// `forget`.
@@ -121,11 +113,13 @@ impl Radau {
     }
 
     /// Evaluations of the rates so far, those by the caller not counted.
+    #[cfg(test)]
     pub fn rates_used(&self) -> u64 {
         each!(self, m => m.rates_used)
     }
 
     /// Factorisations so far (all lanes together count once).
+    #[cfg(test)]
     pub fn factorisations(&self) -> u64 {
         each!(self, m => m.factorisations)
     }
