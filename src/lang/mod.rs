@@ -15,6 +15,7 @@ pub mod parse;
 pub mod print;
 mod rules;
 mod scope;
+mod smooth;
 mod suggest;
 
 use std::sync::Arc;

@@ -8,10 +8,10 @@ use super::print;
 use super::scope::{RESERVED, Scope, Variables, plural};
 use super::suggest::did_you_mean;
 use crate::diagnostic::{Diagnostic, Span};
-use crate::expr::{Binary, Graph, Node, NodeId, Program, Unary};
+use crate::expr::{Binary, Node, NodeId, Program, Unary};
 use crate::model::{
     Class, Comparison, Condition, Draft, Interpretation, Jacobian, KindId, Kinds, Pattern, Produce, Rule,
-    Solve, Step, Successor, Switch, class_of, never_reached,
+    Solve, Step, Successor, class_of, never_reached,
 };
 
 /// Longest condition, in comparisons and connectives, after functions are put in.
@@ -28,7 +28,7 @@ pub struct RuleBuilder<'b> {
 
 /// The pairs of expressions that the conditions of a rule compare.
 #[derive(Default)]
-struct Atoms {
+pub(super) struct Atoms {
     sides: Vec<(NodeId, NodeId)>,
     spans: Vec<Span>,
     boundaries: Vec<String>,
@@ -334,7 +334,7 @@ impl RuleBuilder<'_> {
     }
 
     /// Takes a condition apart into comparisons of two sides.
-    fn decompose(&mut self, root: NodeId, span: Span, atoms: &mut Atoms) -> Option<Condition> {
+    pub(super) fn decompose(&mut self, root: NodeId, span: Span, atoms: &mut Atoms) -> Option<Condition> {
         enum Task {
             Visit(NodeId),
             Emit(Step),
@@ -378,88 +378,6 @@ impl RuleBuilder<'_> {
             }
         }
         Some(Condition(steps))
-    }
-
-    /// Makes equations smooth: conditions inside them become variables, numbered from `count` on.
-    #[allow(clippy::type_complexity)]
-    fn smooth(
-        &mut self,
-        rates: Vec<(usize, NodeId)>,
-        count: usize,
-        span: Span,
-        atoms: &mut Atoms,
-    ) -> Option<(Vec<(usize, NodeId)>, Vec<Switch>)> {
-        let mut conditions: Vec<NodeId> = Vec::new();
-        let mut flag = |graph: &mut crate::expr::Graph, condition: NodeId| {
-            let known = conditions.iter().position(|c| *c == condition);
-            let at = known.unwrap_or_else(|| {
-                conditions.push(condition);
-                conditions.len() - 1
-            });
-            graph.var((count + at) as u32)
-        };
-        let roots: Vec<NodeId> = rates.iter().map(|(_, rate)| *rate).collect();
-        let smoothed = self.scope.graph.rewrite(&roots, |graph, id, rebuilt| {
-            let zero = graph.constant(0.0);
-            // Conditions are asked of the equations as written, so the original operands go into them.
-            match (graph.node(id), rebuilt) {
-                (Node::Select(condition, ..), Node::Select(_, a, b)) => {
-                    let chosen = flag(graph, condition);
-                    Some(graph.select(chosen, a, b))
-                }
-                (Node::Binary(op @ (Binary::Min | Binary::Max), x, y), Node::Binary(_, a, b)) => {
-                    let less = graph.binary(Binary::Lt, x, y);
-                    let chosen = flag(graph, less);
-                    let (a, b) = if op == Binary::Min { (a, b) } else { (b, a) };
-                    Some(graph.select(chosen, a, b))
-                }
-                (Node::Unary(Unary::Abs, x), Node::Unary(_, a)) => {
-                    let negative = graph.binary(Binary::Lt, x, zero);
-                    let chosen = flag(graph, negative);
-                    let minus = graph.unary(Unary::Neg, a);
-                    Some(graph.select(chosen, minus, a))
-                }
-                (Node::Unary(Unary::Sign, x), Node::Unary(..)) => {
-                    let (below, above) =
-                        (graph.binary(Binary::Lt, x, zero), graph.binary(Binary::Lt, zero, x));
-                    let (below, above) = (flag(graph, below), flag(graph, above));
-                    let (minus, one) = (graph.constant(-1.0), graph.constant(1.0));
-                    let rest = graph.select(above, one, zero);
-                    Some(graph.select(below, minus, rest))
-                }
-                // A jump at every whole number: where the sine of π x changes sign. Between two of them the even
-                // or odd one of the two nearest whole numbers is meant, however x is rounded at the jump itself.
-                (Node::Unary(op @ (Unary::Floor | Unary::Ceil), x), Node::Unary(_, a)) => {
-                    let up = op == Unary::Ceil;
-                    let negated = |graph: &mut Graph, x| if up { graph.unary(Unary::Neg, x) } else { x };
-                    let (x, a) = (negated(graph, x), negated(graph, a));
-                    let (pi, half, two) =
-                        (graph.constant(std::f64::consts::PI), graph.constant(0.5), graph.constant(2.0));
-                    let phase = graph.binary(Binary::Mul, pi, x);
-                    let sine = graph.unary(Unary::Sin, phase);
-                    let even = graph.binary(Binary::Lt, zero, sine);
-                    let even = flag(graph, even);
-                    let shifted = graph.binary(Binary::Add, a, half);
-                    let nearest = graph.unary(Unary::Floor, shifted);
-                    let pairs = graph.binary(Binary::Div, nearest, two);
-                    let pairs = graph.unary(Unary::Floor, pairs);
-                    let pairs = graph.binary(Binary::Mul, two, pairs);
-                    let odd = graph.binary(Binary::Sub, nearest, pairs);
-                    let one = graph.constant(1.0);
-                    let other = graph.binary(Binary::Sub, one, odd);
-                    let over = graph.select(even, odd, other);
-                    let level = graph.binary(Binary::Sub, nearest, over);
-                    Some(negated(graph, level))
-                }
-                _ => None,
-            }
-        });
-        let mut switches = Vec::new();
-        for condition in conditions {
-            switches.push(Switch { condition: self.decompose(condition, span, atoms)? });
-        }
-        let rates = rates.iter().zip(smoothed).map(|((parameter, _), rate)| (*parameter, rate)).collect();
-        Some((rates, switches))
     }
 
     /// Wrong numbers of parameters: of words that have rules, wherever they stand in a string.

@@ -110,7 +110,8 @@ impl Integrator {
         let grid = settings.grid();
         let mut h = match grid {
             Some(grid) => Instant::new(next_grid_time(start, grid)).since(start),
-            None if control.size > 0.0 => control.size,
+            // What was learnt at another time may be less than time can tell here.
+            None if control.size > 0.0 => control.size.max(64.0 * start.resolution()),
             None => self.workspace.first_size(method, system, y, tolerance),
         };
         let mut rejected = false;
@@ -194,7 +195,8 @@ fn suspect(control: &mut Control, stiffness: f64, method: Method) {
 /// After an event at some time into a step: one that could be as long as one likes says nothing about the next, but
 /// life does.
 pub fn foresee(control: &mut Control, last_error: f64, lived: f64, resolution: f64) {
-    if last_error <= EASY {
+    // An event at the very start of a step says nothing.
+    if last_error <= EASY && lived > 64.0 * resolution {
         control.size = control.size.min((FORESIGHT * lived).max(resolution));
     }
 }

@@ -5,11 +5,11 @@
 //! every pole costs one elimination from the tips to the root: stiffness costs nothing (Trefethen, Weideman and
 //! Schmelzer 2006). Where conditions have to be watched, Taylor's series gives dense output.
 
-use super::coupled::{Source, System};
 use super::dense::Dense;
 use super::motion::Motion;
 use super::rational::{ALPHA_0, POLES, RESIDUES};
 use super::sparse::{Pattern, Wide};
+use super::system::{Source, System};
 use crate::expr::Scratch;
 use crate::model::Rule;
 use crate::structure::Instant;

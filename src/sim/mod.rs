@@ -11,9 +11,10 @@
 //!
 //! - `simulation`: the clock; what a caller uses is [`Simulation`]. `queue`: the order of time.
 //! - `settle`, `choose`, `lookup`: what happens at one instant.
-//! - `phase`: from an instant to the next; `motion`: formulas; `local`, `coupled`: numeric integration.
+//! - `phase`: from an instant to the next; `motion`: formulas; `local`, `coupled`, `system`, `linear`:
+//!   numeric integration.
 //! - `plant`, `state`: the modules and how they move; `watch`, `roots`: the search for events.
-//! - `integrator`, `runge_kutta`, `tableau`, `dense`: one step, and the solution inside it.
+//! - `integrator`, `runge_kutta`, `tableau`, `implicit`, `radau`, `sparse`, `dense`: one step, and the solution inside it.
 //!
 //! A parameter whose equation has a formula is evaluated, never stepped, and a module that reads none of its
 //! neighbours keeps a clock of its own. Equations are integrated as if their `if`s did not exist: within a step every
@@ -43,6 +44,7 @@ mod settle;
 mod simulation;
 mod sparse;
 mod state;
+mod system;
 mod tableau;
 mod transition;
 mod watch;

@@ -512,3 +512,18 @@ fn an_instant_that_is_shared_is_passed_once() {
         assert_eq!(grown, 7, "{method:?}: {}", show(&strings[0]));
     }
 }
+
+#[test]
+fn an_event_at_birth_says_nothing_about_the_steps_to_come() {
+    // `floor` jumps where A is born; once the next steps were taken to be as short as that life of nothing.
+    let text = "initial string: A(0.2, 0) B(0.3) A(0.5, 0.1) B(0.1)\nB(z) < A(x, y):\n if x < 1.11 solve dx/dt = 1.04*(0.65 - x), dy/dt = 1.49*floor(age + 1)*0.3\n if x = 1.11 produce A(0.33*x, 0) B(0) A(0.1, 0.2)\nA(x, y):\n if x < 1.11 solve dx/dt = 1.51*age*(2 - age/5), dy/dt = 0.26*sin(age)+0.3\n if x = 1.11 produce A(0.33*x, 0) B(0) A(0.1, 0.2)\nA(x, y) < B(z):\n solve dz/dt = 1.96\n if z = 1.65 & age > 0.3 produce B(0.33*z) C(z)\nB(z):\n solve dz/dt = 1.48*cos(z)+1.2\n if z = 1.65 & age > 0.3 produce B(0.33*z) C(z)\nC(q): solve dq/dt = if age < 1.16 then 0.57 else 0.1";
+    let state = |method| {
+        let settings = Settings { method, tolerance: 1e-9, ..Settings::default() };
+        run(text, settings, &[2.7]).expect("runs").remove(0)
+    };
+    let (auto, dop853) = (state(Method::Auto), state(Method::Dop853));
+    for ((name, a), (other, b)) in auto.iter().zip(&dop853) {
+        assert_eq!((name, a.len()), (other, b.len()));
+        assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6), "{name}: {a:?} {b:?}");
+    }
+}
