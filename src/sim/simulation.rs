@@ -318,7 +318,13 @@ impl<'m> Simulation<'m> {
             let ends: Vec<Option<f64>> = state.motions.iter().map(Motion::end).collect();
             let first = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1);
             let parameter = ends.iter().enumerate().filter_map(|(i, e)| Some((i, (*e)?))).min_by(first);
-            return Err(self.not_finite(id, parameter.map_or(0, |p| p.0), self.now));
+            let since = state.since;
+            let mut error = self.not_finite(id, parameter.map_or(0, |p| p.0), self.now);
+            if let Error::NotFinite { site, .. } = &mut error {
+                // The values that the formula began with; at its end there are none.
+                site.module += &format!(" (as of t = {})", brief(since.to_f64(), 6));
+            }
+            return Err(error);
         }
         let touched = std::mem::take(&mut state.next.touched);
         self.learn(id);
