@@ -215,7 +215,7 @@ pub struct SharedArgs {
     /// Error aimed at in every parameter, relative to max(1, |value|)
     #[arg(long, value_name = "TOL", default_value = "1e-6", value_parser = tolerance)]
     pub tolerance: f64,
-    /// How equations are integrated: auto, dopri5, rk4, euler
+    /// How equations are integrated: auto, dopri5, dop853, radau, rk4, euler; all but auto integrate what has formulas, too
     #[arg(long, default_value = "auto", value_parser = method)]
     pub method: Method,
     /// Step of the methods with a fixed one (rk4, euler)

@@ -32,6 +32,12 @@ pub fn out_error(error: std::io::Error) -> Failure {
     }
 }
 
+/// Writes a message. If nobody reads it, that is no reason to fail in another way than one does.
+pub fn tell(message: &str) {
+    use std::io::Write;
+    let _ = std::io::stderr().write_all(message.as_bytes());
+}
+
 /// True if messages may be coloured.
 pub fn coloured() -> bool {
     std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none()
@@ -45,7 +51,7 @@ pub fn open(path: &Path, settings: &[Setting]) -> Result<Session, Failure> {
     match Session::open(path, settings) {
         Ok(session) => {
             for warning in session.warnings.iter().take(MOST_SHOWN) {
-                eprint!("{}", warning.render(&session.source, coloured()));
+                tell(&warning.render(&session.source, coloured()));
             }
             Ok(session)
         }

@@ -14,7 +14,7 @@ mod run;
 use clap::Parser;
 
 use args::{Action, Command};
-use common::Failure;
+use common::{Failure, tell};
 
 /// Runs the command line of this process; returns its exit status.
 pub fn main() -> u8 {
@@ -36,11 +36,11 @@ pub fn main() -> u8 {
     match done {
         Ok(()) | Err(Failure::ClosedPipe) => 0,
         Err(Failure::Model(message)) => {
-            eprint!("{message}");
+            tell(&message);
             1
         }
         Err(Failure::Usage(message)) => {
-            eprint!("{message}");
+            tell(&message);
             2
         }
     }

@@ -9,6 +9,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::args::ReportArgs;
 use super::common::{Failure, open, out_error};
+use crate::export;
 use crate::model::Frames;
 use crate::report::{self, CASES, Case, HardPlan, Plan, Row};
 use crate::session::Session;
@@ -200,25 +201,10 @@ fn spinner() -> ProgressBar {
     progress
 }
 
-/// Writes a file of the report, aside and then renamed, so that it is there as a whole or not at all. An
-/// earlier report of the same name is replaced.
+/// Writes a file of the report; an earlier report of the same name is replaced.
 fn write(folder: &Path, name: &str, text: &str) -> Result<(), Failure> {
-    let target = folder.join(name);
-    let done = (|| {
-        fs::create_dir_all(folder)?;
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".dlsys-tmp-");
-        #[cfg(unix)]
-        let builder = {
-            use std::os::unix::fs::PermissionsExt;
-            builder.permissions(fs::Permissions::from_mode(0o666))
-        };
-        let mut file = builder.tempfile_in(folder)?;
-        file.write_all(text.as_bytes())?;
-        file.persist(&target).map_err(|error| error.error)?;
-        Ok(())
-    })();
-    done.map_err(|error: std::io::Error| {
-        Failure::Model(format!("error: cannot write {}: {error}\n", target.display()))
-    })
+    fs::create_dir_all(folder)
+        .map_err(|error| Failure::Model(format!("error: cannot make {}: {error}\n", folder.display())))?;
+    export::replace(folder, name, text.as_bytes())
+        .map_err(|error| Failure::Model(format!("error: {error}\n")))
 }

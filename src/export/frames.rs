@@ -149,7 +149,7 @@ impl FrameDirectory {
 }
 
 /// Writes a file aside and renames it.
-fn replace(directory: &Path, name: &str, bytes: &[u8]) -> Result<(), Error> {
+pub fn replace(directory: &Path, name: &str, bytes: &[u8]) -> Result<(), Error> {
     let target = directory.join(name);
     let mut builder = tempfile::Builder::new();
     builder.prefix(TEMPORARY);

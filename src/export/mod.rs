@@ -20,7 +20,7 @@ mod triangulate;
 mod tube;
 mod view;
 
-pub use frames::{Error, FrameDirectory, MANIFEST};
+pub use frames::{Error, FrameDirectory, MANIFEST, replace};
 pub use manifest::{FrameRecord, Manifest};
 pub use view::{View, ViewError};
 

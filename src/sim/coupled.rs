@@ -171,23 +171,20 @@ impl Simulation<'_> {
         }
         self.coupled.system = System::new(&self.model.rules, &self.plant, &members, now);
         self.coupled.members = members;
-        self.coupled.linear = match self.settings.method {
-            Method::Auto if !self.coupled.control.stiff => {
-                Linear::new(&self.coupled.system, &self.model.rules, &self.coupled.y)
-            }
+        let linear = match self.settings.method {
+            Method::Auto => Linear::new(&self.coupled.system, &self.model.rules, &self.coupled.y),
             _ => None,
         };
-        self.coupled.direct =
-            self.coupled.linear.as_ref().is_some_and(Linear::is_direct) && !self.watches_coupled();
+        self.coupled.direct = linear.as_ref().is_some_and(Linear::is_direct) && !self.watches_coupled();
+        // Where conditions are watched, stiff equations are for the implicit method.
+        self.coupled.linear = linear.filter(|_| self.coupled.direct || !self.coupled.control.stiff);
         self.coupled.integrator.restart(self.settings.method, self.coupled.y.len());
         (self.coupled.mark, self.coupled.since_mark) = (now, 0);
+        self.coupled.touched.clear();
         if self.coupled.members.is_empty() {
-            self.queue.cancel(Who::Coupled);
             return Ok(());
         }
         if self.coupled.direct {
-            self.queue.cancel(Who::Coupled);
-            self.coupled.touched.clear();
             self.show_coupled(now);
             return Ok(());
         }

@@ -145,16 +145,24 @@ impl Linear {
         self.bound.is_some()
     }
 
+    fn unknowns(&self) -> usize {
+        self.pattern.unknowns()
+    }
+
     /// Evaluations of one module's equations that a step takes.
     pub fn evaluations(&self) -> u64 {
         (DEGREE * self.unknown.len()) as u64
     }
 
-    /// The components at an instant, as the dense output of a step that stays where it is.
+    /// The components at an instant, as the dense output of a step that stays where it is. Not numbers if there are
+    /// none: growth beyond all bounds.
     pub fn at(&mut self, at: Instant) -> Option<Dense> {
         let tau = at.since(self.start).max(0.0);
         let sigma = self.bound?.max(0.0);
-        let y = if tau == 0.0 { self.y.clone() } else { self.propagate(tau, sigma)? };
+        let y = match tau {
+            0.0 => self.y.clone(),
+            _ => self.propagate(tau, sigma).unwrap_or_else(|| vec![f64::NAN; self.unknowns()]),
+        };
         let components = self.unknown.iter().map(|n| y[*n as usize]).collect();
         Some(Dense::new(at, Some(at), 0.0, 0, components))
     }
