@@ -24,7 +24,7 @@ pub struct Coupled {
     pub members: Vec<ModuleId>,
     pub system: System,
     y: Vec<f64>,
-    integrator: Integrator,
+    pub integrator: Integrator,
     pub control: Control,
     /// The equations once more, if they are linear.
     linear: Option<Linear>,

@@ -96,9 +96,10 @@ impl Implicit {
                 unknown.insert((pattern, places))
             }
         };
+        let modules = system.modules();
         let mut placed = Placed { system, places, values: Vec::new(), evaluations: 0 };
         let attempt = self.radau.attempt(&mut placed, pattern, y, rates, h, &self.scale);
-        workspace.evaluations += placed.evaluations;
+        workspace.evaluations += placed.evaluations * modules;
         match attempt {
             Attempt::Done { error, .. } => {
                 workspace.end.copy_from_slice(self.radau.end());

@@ -52,6 +52,11 @@ impl Integrator {
         }
     }
 
+    /// Evaluations of one module's equations so far.
+    pub fn evaluations(&self) -> u64 {
+        self.workspace.evaluations
+    }
+
     /// Number of components.
     pub fn size(&self) -> usize {
         self.workspace.end.len()
@@ -77,22 +82,7 @@ impl Integrator {
         start: Instant,
         stats: &mut Stats,
     ) -> Result<Dense, StepError> {
-        let before = self.workspace.evaluations;
         self.method = self.choose(settings, control);
-        let result = self.attempts(settings, control, system, y, start, stats);
-        stats.rhs_evaluations += (self.workspace.evaluations - before) * system.modules();
-        result
-    }
-
-    fn attempts(
-        &mut self,
-        settings: &Settings,
-        control: &mut Control,
-        system: &mut impl Rates,
-        y: &[f64],
-        start: Instant,
-        stats: &mut Stats,
-    ) -> Result<Dense, StepError> {
         let method = self.method;
         let inner = if method == Method::Radau { INNER_TOLERANCE_IMPLICIT } else { INNER_TOLERANCE };
         let tolerance = settings.tolerance * inner;

@@ -32,6 +32,7 @@ pub struct Workspace {
     other_end: Vec<f64>,
     /// The state at the end of the step.
     pub end: Vec<f64>,
+    /// Of the equations of one module.
     pub evaluations: u64,
 }
 
@@ -86,7 +87,7 @@ impl Workspace {
     }
 
     fn evaluate(&mut self, system: &mut impl Rates, tau: f64, stage: usize) {
-        self.evaluations += 1;
+        self.evaluations += system.modules();
         system.rates(tau, &self.stage, &mut self.k[stage]);
     }
 

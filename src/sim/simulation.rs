@@ -165,7 +165,9 @@ impl<'m> Simulation<'m> {
 
     /// Work done so far.
     pub fn stats(&self) -> Stats {
-        Stats { modules: self.plant.tree.len() as u64, ..self.stats }
+        let rhs_evaluations =
+            self.stats.rhs_evaluations + self.alone.evaluations() + self.coupled.integrator.evaluations();
+        Stats { modules: self.plant.tree.len() as u64, rhs_evaluations, ..self.stats }
     }
 
     /// The productions since the last call, in the order of time.
