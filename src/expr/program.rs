@@ -42,10 +42,21 @@ pub const LANES: usize = 32;
 /// One value of each row.
 pub type Lanes = [f64; LANES];
 
+/// Lanes that fit into the processor's registers together: no operand need be copied aside, though the result may take
+/// its place.
+const PART: usize = 8;
+
 #[inline(always)]
-fn each(out: &mut Lanes, a: &Lanes, b: &Lanes, f: impl Fn(f64, f64) -> f64) {
-    for (out, (a, b)) in out.iter_mut().zip(a.iter().zip(b)) {
-        *out = f(*a, *b);
+fn each(registers: &mut [Lanes], [to, a, b]: [Register; 3], f: impl Fn(f64, f64) -> f64) {
+    let part = |of: Register, registers: &[Lanes], i: usize| -> [f64; PART] {
+        registers[of as usize].as_chunks::<PART>().0[i]
+    };
+    for i in 0..LANES / PART {
+        let (mut x, y) = (part(a, registers, i), part(b, registers, i));
+        for (x, y) in x.iter_mut().zip(y) {
+            *x = f(*x, y);
+        }
+        registers[to as usize].as_chunks_mut::<PART>().0[i] = x;
     }
 }
 
@@ -204,22 +215,16 @@ impl Program {
         for &instruction in &self.code {
             match instruction {
                 Instruction::Const(to, x) => registers[to as usize] = [x; LANES],
-                Instruction::Unary(op, to, a) => {
-                    let a = registers[a as usize];
-                    registers[to as usize] = a.map(|x| f64::unary(op, x));
-                }
-                Instruction::Binary(op, to, a, b) => {
-                    let (a, b) = (registers[a as usize], registers[b as usize]);
-                    let out = &mut registers[to as usize];
-                    // The choice of the operation is made once, not for every row.
-                    match op {
-                        Binary::Add => each(out, &a, &b, |x, y| x + y),
-                        Binary::Sub => each(out, &a, &b, |x, y| x - y),
-                        Binary::Mul => each(out, &a, &b, |x, y| x * y),
-                        Binary::Div => each(out, &a, &b, |x, y| x / y),
-                        _ => each(out, &a, &b, |x, y| f64::binary(op, x, y)),
-                    }
-                }
+                Instruction::Unary(Unary::Neg, to, a) => each(registers, [to, a, a], |x, _| -x),
+                Instruction::Unary(op, to, a) => each(registers, [to, a, a], |x, _| f64::unary(op, x)),
+                // The choice of the operation is made once, not for every row.
+                Instruction::Binary(op, to, a, b) => match op {
+                    Binary::Add => each(registers, [to, a, b], |x, y| x + y),
+                    Binary::Sub => each(registers, [to, a, b], |x, y| x - y),
+                    Binary::Mul => each(registers, [to, a, b], |x, y| x * y),
+                    Binary::Div => each(registers, [to, a, b], |x, y| x / y),
+                    _ => each(registers, [to, a, b], |x, y| f64::binary(op, x, y)),
+                },
                 Instruction::Select(to, c, a, b) => {
                     let (c, a, b) = (registers[c as usize], registers[a as usize], registers[b as usize]);
                     registers[to as usize] = std::array::from_fn(|i| f64::select(c[i], a[i], b[i]));

@@ -22,6 +22,20 @@ pub trait Rates {
 /// Errors below the tolerated part of this are none, whatever they are errors of.
 const FLOOR: f64 = 1e-18;
 
+/// Components that are worked on together: one read of each stage's rates serves many of them.
+const BLOCK: usize = 64;
+
+/// Adds the sum of the stages' rates with these weights, from component `first` on.
+fn weigh(weights: &[f64], k: &[Vec<f64>], first: usize, sums: &mut [f64]) {
+    for (weight, k) in weights.iter().zip(k) {
+        if *weight != 0.0 {
+            for (sum, k) in sums.iter_mut().zip(&k[first..]) {
+                *sum += weight * k;
+            }
+        }
+    }
+}
+
 /// Working memory of a step.
 #[derive(Clone, Debug, Default)]
 pub struct Workspace {
@@ -150,15 +164,15 @@ impl Workspace {
 
     /// The state at which a stage's rate is taken.
     fn combine(&mut self, tableau: &Tableau, i: usize, y: &[f64], h: f64) {
-        let row = tableau.a[i];
-        for (j, s) in self.stage.iter_mut().enumerate() {
-            let mut sum = 0.0;
-            for (a, k) in row.iter().zip(&self.k) {
-                if *a != 0.0 {
-                    sum += a * k[j];
-                }
+        let mut first = 0;
+        for (y, stage) in y.chunks(BLOCK).zip(self.stage.chunks_mut(BLOCK)) {
+            let mut sums = [0.0; BLOCK];
+            let sums = &mut sums[..y.len()];
+            weigh(tableau.a[i], &self.k, first, sums);
+            for (s, (y, sum)) in stage.iter_mut().zip(y.iter().zip(sums)) {
+                *s = y + h * *sum;
             }
-            *s = y[j] + h * sum;
+            first += y.len();
         }
     }
 
@@ -180,22 +194,30 @@ impl Workspace {
     /// The largest error of a component, in units of what is tolerated, by truncation and by rounding.
     fn error(&self, tableau: &Tableau, y: &[f64], h: f64, tolerance: f64) -> (f64, f64) {
         let (mut error, mut rounding): (f64, f64) = (0.0, 0.0);
-        for (j, (a, b)) in y.iter().zip(&self.end).enumerate() {
-            let sum = |row: &[f64]| -> f64 { row.iter().zip(&self.k).map(|(e, k)| e * k[j]).sum() };
-            let estimate = match tableau.e {
-                [e] => (h * sum(e)).abs(),
-                [e5, e3, ..] => dop853_error(h * sum(e5), h * sum(e3)),
-                [] => 0.0,
-            };
-            // Relative to where the step begins, and to how far it goes from there at first: what
-            // grows from 1e-6 must be known to its own digits. Not to where it ends: beyond an
-            // event, equations may lead anywhere, and that must not spoil the part that counts.
-            // What begins from rest goes somewhere only after that: the second stage shows it.
-            let first = self.k[0][j].abs().max(self.k[1][j].abs());
-            let scale = tolerance * (a.abs().max(h.abs() * first) + FLOOR);
-            rounding = rounding.max(4.0 * f64::EPSILON * b.abs() / scale);
-            let ratio = estimate / scale;
-            error = if ratio > error || ratio.is_nan() { ratio } else { error };
+        let mut sums = [[0.0; BLOCK]; 2];
+        for first in (0..y.len()).step_by(BLOCK) {
+            let count = BLOCK.min(y.len() - first);
+            for (row, sums) in tableau.e.iter().zip(&mut sums) {
+                sums[..count].fill(0.0);
+                weigh(row, &self.k, first, &mut sums[..count]);
+            }
+            for lane in 0..count {
+                let j = first + lane;
+                let (a, b) = (y[j], self.end[j]);
+                let estimate = match tableau.e.len() {
+                    1 => (h * sums[0][lane]).abs(),
+                    _ => dop853_error(h * sums[0][lane], h * sums[1][lane]),
+                };
+                // Relative to where the step begins, and to how far it goes from there at first: what
+                // grows from 1e-6 must be known to its own digits. Not to where it ends: beyond an
+                // event, equations may lead anywhere, and that must not spoil the part that counts.
+                // What begins from rest goes somewhere only after that: the second stage shows it.
+                let speed = self.k[0][j].abs().max(self.k[1][j].abs());
+                let scale = tolerance * (a.abs().max(h.abs() * speed) + FLOOR);
+                rounding = rounding.max(4.0 * f64::EPSILON * b.abs() / scale);
+                let ratio = estimate / scale;
+                error = if ratio > error || ratio.is_nan() { ratio } else { error };
+            }
         }
         (error, rounding)
     }

@@ -24,10 +24,7 @@ pub struct System {
     pub rows: Vec<Row>,
     pub sources: Vec<Source>,
     pub formulas: Vec<Formula>,
-    /// Rows with the same program.
-    batches: Vec<Vec<u32>>,
-    /// The variables that the programs of each rule's clauses read.
-    reads: Vec<Vec<Vec<usize>>>,
+    chunks: Vec<Chunk>,
     switches: Vec<f64>,
     /// Place in the tree's values, and owner with its parameter, of each component.
     pub places: Vec<(usize, ModuleId, usize)>,
@@ -57,6 +54,70 @@ pub struct Row {
     pub first_rate: usize,
     birth: Instant,
     age: f64,
+}
+
+/// Rows that are evaluated at once: at most [`LANES`], with the same program.
+#[derive(Clone, Debug)]
+struct Chunk {
+    rows: Vec<u32>,
+    /// Registers of the rule's variables.
+    registers: usize,
+    /// What the program reads, and from where.
+    columns: Vec<(usize, Column)>,
+    /// Places of the first rate of each row.
+    rates: Places,
+}
+
+/// One variable of all rows of a chunk.
+#[derive(Clone, Debug)]
+enum Column {
+    Time,
+    Age,
+    Fixed(Vec<f64>),
+    State(Places),
+    Mixed(Vec<Source>),
+}
+
+/// Places in a vector; mostly one after another, because rows stand in string order.
+#[derive(Clone, Debug)]
+enum Places {
+    Run { first: usize, count: usize },
+    Any(Vec<u32>),
+}
+
+impl Places {
+    fn new(all: Vec<u32>) -> Places {
+        let first = all[0];
+        match all.iter().zip(first..).all(|(a, b)| *a == b) {
+            true => Places::Run { first: first as usize, count: all.len() },
+            false => Places::Any(all),
+        }
+    }
+
+    fn gather(&self, from: &[f64], to: &mut Lanes) {
+        match self {
+            &Places::Run { first, count } => to[..count].copy_from_slice(&from[first..first + count]),
+            Places::Any(all) => {
+                for (lane, place) in to.iter_mut().zip(all) {
+                    *lane = from[*place as usize];
+                }
+            }
+        }
+    }
+
+    /// Writes to the places, all moved by `offset`.
+    fn scatter(&self, from: &Lanes, offset: usize, to: &mut [f64]) {
+        match self {
+            &Places::Run { first, count } => {
+                to[first + offset..first + offset + count].copy_from_slice(&from[..count])
+            }
+            Places::Any(all) => {
+                for (lane, place) in from.iter().zip(all) {
+                    to[*place as usize + offset] = *lane;
+                }
+            }
+        }
+    }
 }
 
 impl System {
@@ -115,41 +176,72 @@ impl System {
         system
     }
 
-    /// Puts rows with the same program together.
+    /// Puts rows with the same program together, a chunk of them for each evaluation.
     fn batch(&mut self, rules: &[Rule]) {
-        self.reads = vec![Vec::new(); rules.len()];
-        let mut keys: Vec<(usize, usize, bool)> = Vec::new();
+        let mut batches: Vec<((usize, usize, bool), Vec<u32>)> = Vec::new();
         for (n, row) in self.rows.iter().enumerate() {
             let key = (row.rule, row.solve, row.forced);
-            let batch = keys.iter().position(|k| *k == key).unwrap_or_else(|| {
-                keys.push(key);
-                self.batches.push(Vec::new());
-                keys.len() - 1
-            });
-            self.batches[batch].push(n as u32);
+            match batches.iter_mut().find(|(k, _)| *k == key) {
+                Some((_, rows)) => rows.push(n as u32),
+                None => batches.push((key, vec![n as u32])),
+            }
         }
-        for (rule, solve, _) in keys {
-            self.reads[rule].resize(rules[rule].solves.len(), Vec::new());
-            self.reads[rule][solve] = rules[rule].solves[solve].rates.reads();
+        let mut chunks = Vec::new();
+        for (_, rows) in &batches {
+            let first = &self.rows[rows[0] as usize];
+            let program = program(rules, first);
+            let reads = program.reads();
+            for rows in rows.chunks(LANES) {
+                let columns = reads.iter().map(|&variable| (variable, self.column(rows, variable))).collect();
+                let rates = rows.iter().map(|row| self.rows[*row as usize].first_rate as u32).collect();
+                let registers = first.sources + 2 + first.switches;
+                let rows = rows.to_vec();
+                chunks.push(Chunk { rows, registers, columns, rates: Places::new(rates) });
+            }
+        }
+        self.chunks = chunks;
+    }
+
+    /// Where one variable of some rows with the same program comes from.
+    fn column(&self, rows: &[u32], variable: usize) -> Column {
+        let rows = || rows.iter().map(|row| &self.rows[*row as usize]);
+        let sources = rows().next().map_or(0, |row| row.sources);
+        if variable == sources {
+            return Column::Time;
+        }
+        if variable == sources + 1 {
+            return Column::Age;
+        }
+        if variable > sources {
+            let switch = |row: &Row| self.switches[row.first_switch + variable - sources - 2];
+            return Column::Fixed(rows().map(switch).collect());
+        }
+        let all: Vec<Source> = rows().map(|row| self.sources[row.first_source + variable]).collect();
+        let state = |source: &Source| match source {
+            Source::State(component) => Some(*component),
+            _ => None,
+        };
+        let fixed = |source: &Source| match source {
+            Source::Fixed(x) => Some(*x),
+            _ => None,
+        };
+        if let Some(components) = all.iter().map(state).collect() {
+            return Column::State(Places::new(components));
+        }
+        match all.iter().map(fixed).collect() {
+            Some(values) => Column::Fixed(values),
+            None => Column::Mixed(all),
         }
     }
 
-    /// One variable of a row's rule.
-    fn variable(&self, row: &Row, variable: usize, tau: f64, y: &[f64]) -> f64 {
-        if variable < row.sources {
-            return match self.sources[row.first_source + variable] {
-                Source::Fixed(x) => x,
-                Source::State(component) => y[component as usize],
-                Source::Formula(i) => {
-                    let Formula { motion, x, offset, .. } = &self.formulas[i as usize];
-                    x + motion.value(offset + tau)
-                }
-            };
-        }
-        match variable - row.sources {
-            0 => self.start.to_f64() + tau,
-            1 => row.age + tau,
-            switch => self.switches[row.first_switch + switch - 2],
+    fn value(&self, source: Source, tau: f64, y: &[f64]) -> f64 {
+        match source {
+            Source::Fixed(x) => x,
+            Source::State(component) => y[component as usize],
+            Source::Formula(i) => {
+                let Formula { motion, x, offset, .. } = &self.formulas[i as usize];
+                x + motion.value(offset + tau)
+            }
         }
     }
 
@@ -166,16 +258,8 @@ impl System {
 
     pub fn variables(&self, row: &Row, tau: f64, y: &[f64], out: &mut Vec<f64>) {
         out.clear();
-        for source in &self.sources[row.first_source..row.first_source + row.sources] {
-            out.push(match *source {
-                Source::Fixed(x) => x,
-                Source::State(component) => y[component as usize],
-                Source::Formula(i) => {
-                    let Formula { motion, x, offset, .. } = &self.formulas[i as usize];
-                    x + motion.value(offset + tau)
-                }
-            });
-        }
+        let sources = &self.sources[row.first_source..row.first_source + row.sources];
+        out.extend(sources.iter().map(|source| self.value(*source, tau, y)));
         out.extend([self.start.to_f64() + tau, row.age + tau]);
         out.extend_from_slice(&self.switches[row.first_switch..row.first_switch + row.switches]);
     }
@@ -229,35 +313,39 @@ impl<'s> Equations<'s> {
     }
 
     /// The rates of a few rows that have the same program.
-    fn lanes(&mut self, rows: &[u32], tau: f64, y: &[f64], out: &mut [f64]) {
+    fn lanes(&mut self, chunk: &Chunk, tau: f64, y: &[f64], out: &mut [f64]) {
         let system = self.system;
-        let first = &system.rows[rows[0] as usize];
-        let program = program(self.rules, first);
-        let mut registers = std::mem::take(&mut self.registers);
-        registers.resize(first.sources + 2 + first.switches, [0.0; LANES]);
-        for &variable in &system.reads[first.rule][first.solve] {
-            let register = &mut registers[variable];
-            for (lane, &row) in rows.iter().enumerate() {
-                let row = &system.rows[row as usize];
-                register[lane] = system.variable(row, variable, tau, y);
+        let program = program(self.rules, &system.rows[chunk.rows[0] as usize]);
+        self.registers.resize(chunk.registers, [0.0; LANES]);
+        for (variable, column) in &chunk.columns {
+            let register = &mut self.registers[*variable];
+            match column {
+                Column::Time => *register = [system.start.to_f64() + tau; LANES],
+                Column::Age => {
+                    for (lane, row) in register.iter_mut().zip(&chunk.rows) {
+                        *lane = system.rows[*row as usize].age + tau;
+                    }
+                }
+                Column::Fixed(values) => register[..values.len()].copy_from_slice(values),
+                Column::State(places) => places.gather(y, register),
+                Column::Mixed(sources) => {
+                    for (lane, source) in register.iter_mut().zip(sources) {
+                        *lane = system.value(*source, tau, y);
+                    }
+                }
             }
         }
-        for (output, register) in program.eval_lanes(&mut registers).enumerate() {
-            for (lane, &row) in rows.iter().enumerate() {
-                out[system.rows[row as usize].first_rate + output] = registers[register][lane];
-            }
+        for (output, register) in program.eval_lanes(&mut self.registers).enumerate() {
+            chunk.rates.scatter(&self.registers[register], output, out);
         }
-        self.registers = registers;
     }
 }
 
 impl Rates for Equations<'_> {
     fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]) {
         let system = self.system;
-        for batch in &system.batches {
-            for rows in batch.chunks(LANES) {
-                self.lanes(rows, tau, y, out);
-            }
+        for chunk in &system.chunks {
+            self.lanes(chunk, tau, y, out);
         }
     }
 
