@@ -153,6 +153,11 @@ impl Program {
         all
     }
 
+    /// The outputs, if they depend on nothing.
+    pub fn constants(&self) -> Option<&[f64]> {
+        self.constants.as_deref()
+    }
+
     /// The value of one output, if it is a number that the code contains.
     pub fn constant_output(&self, output: usize) -> Option<f64> {
         let register = *self.outputs.get(output)?;

@@ -277,6 +277,7 @@ impl RuleBuilder<'_> {
             })
             .collect();
         let sides: Vec<NodeId> = atoms.sides.iter().flat_map(|(a, b)| [*a, *b]).collect();
+        let sides = Program::compile(&self.scope.graph, &sides, count);
         let pattern = |m: &HeadModule| Pattern { kinds: Vec::new(), arity: m.parameters.len() };
         let names = |m: &HeadModule| m.parameters.iter().map(|p| p.text.to_string()).collect::<Vec<_>>();
         let compiled = Rule {
@@ -287,7 +288,8 @@ impl RuleBuilder<'_> {
             left: rule.left.iter().map(pattern).collect(),
             right: rule.right.iter().map(pattern).collect(),
             variables: count,
-            sides: Program::compile(&self.scope.graph, &sides, count),
+            watched: (0..count).map(|v| sides.reads().binary_search(&v).is_ok()).collect(),
+            sides,
             atoms: atoms.spans,
             boundaries: atoms.boundaries,
             solves,

@@ -28,6 +28,8 @@ pub struct Rule {
     pub variables: usize,
     /// Both sides of every comparison: `a` of atom i is output 2i, `b` is output 2i + 1.
     pub sides: Program,
+    /// Which variables they read.
+    pub watched: Vec<bool>,
     /// Where each atom is written.
     pub atoms: Vec<Span>,
     /// The boundary of each atom, as in `x = s`, for messages.

@@ -1,133 +1,164 @@
-//! Modules whose equations read one another, integrated together.
+//! Modules whose equations read one another: who they are, and their common step.
 //!
 //! Only those are coupled that read something of a neighbour which is integrated itself; a neighbour that follows a
-//! formula is an input. Whatever happens to one of them, or to what they read, ends their common step.
+//! formula is an input. All of them are integrated together over a common step. What happens to some of them within
+//! it is repaired there (`repair`), or ends it for all.
 
-use super::Method;
+use super::course::Course;
 use super::error::Error;
 use super::integrator::{Integrator, StepError, foresee};
 use super::linear::Linear;
 use super::motion::Motion;
 use super::plant::Path;
 use super::queue::Who;
+use super::repair::Repairer;
 use super::simulation::Simulation;
-use super::state::{Change, Control, Next};
+use super::state::{Control, Next, What};
 use super::system::{Equations, System};
-use super::watch::path_together;
+use super::{Method, Scheduler};
 use crate::structure::{Instant, ModuleId, Visit};
 use smallvec::SmallVec;
 
-/// The coupled modules and their step.
+/// The coupled modules and their common step.
 #[derive(Default)]
 pub struct Coupled {
-    /// In string order.
+    /// Those of the common step in string order, then those that have come since; some may have gone.
     pub members: Vec<ModuleId>,
     pub system: System,
     y: Vec<f64>,
     pub integrator: Integrator,
     pub control: Control,
-    /// The equations once more, if they are linear.
+    /// The equations once more, if they are solved without steps.
     linear: Option<Linear>,
-    /// Nothing about the linear equations is watched: no steps are made.
-    direct: bool,
-    /// Signs that are zero at the event in the present step.
-    touched: Vec<(ModuleId, SmallVec<[Change; 1]>)>,
+    /// A step has been made whose dense output nobody has asked for yet.
+    pending: bool,
+    /// Repairs have changed the members or their motion since the common step was made.
+    pub repaired: bool,
+    /// Modules that have lost a neighbour who reads them.
+    pub loosened: Vec<ModuleId>,
+    pub repairer: Repairer,
+    /// A solution without steps was looked for.
+    tried: bool,
+    /// Times that an event cut a motion without steps.
+    cuts: u32,
     mark: Instant,
     since_mark: usize,
 }
 
-/// Taylor's series is cheap: its error may be a small part of what is tolerated.
-const LINEAR_TOLERANCE: f64 = 1e-3;
-/// Its steps go so many times as far as to the next event that is known.
-const BEYOND: f64 = 1.25;
-/// After so many of its steps without an event, the equations are called stiff.
-const MANY_TAYLOR_STEPS: usize = 200;
+/// Solving without steps begins anew, for all modules, at every event: after so many of them steps are made.
+const MAX_CUTS: u32 = 2;
+
+/// What an instant means for the coupled modules.
+#[derive(Default)]
+struct Affected {
+    /// Coupled modules whose equations or inputs have changed.
+    seeds: Vec<ModuleId>,
+    /// Of these, those that were not coupled before.
+    joined: Vec<ModuleId>,
+    /// Modules that need no longer be coupled.
+    freed: Vec<ModuleId>,
+    /// Modules that follow formulas, but watch a neighbour that has changed.
+    dependent: Vec<ModuleId>,
+}
 
 impl Simulation<'_> {
-    /// Finds out who is coupled now, and begins their motion anew if anything about it has changed.
-    pub(super) fn couple(&mut self) -> Result<(), Error> {
-        let model = self.model;
-        let group = self.group;
-        let mut wanted: Vec<ModuleId> = Vec::new();
-        let mut dependent: Vec<ModuleId> = Vec::new();
-        let mut affected = std::mem::take(&mut self.coupled_changed);
-        for &id in &self.contextual {
-            let Some(state) = self.plant.state(id) else { continue };
-            let Some(rule) = state.rule.map(|r| &model.rules[r]) else { continue };
-            if !rule.reads_context {
-                continue;
-            }
-            let (mut numeric, mut moved) = (false, false);
-            let concerned: SmallVec<[ModuleId; 4]> = std::iter::once(id)
-                .chain(state.context.iter().copied())
-                .filter(|m| {
-                    let Some(state) = self.plant.state(*m) else { return false };
-                    moved |= state.restarted == group;
-                    numeric |= state.is_numeric();
-                    *m == id || state.is_numeric()
-                })
-                .collect();
-            if !numeric {
-                if moved && state.restarted != group {
-                    dependent.push(id);
-                }
-                continue;
-            }
-            affected |= moved;
-            for module in concerned {
-                let state = self.plant.state_mut(module).expect("seen above");
-                affected |= !state.coupled || state.restarted == group;
-                if std::mem::replace(&mut state.wanted, group) != group {
-                    wanted.push(module);
-                }
-            }
-        }
-        let mut freed = Vec::new();
-        for &id in &self.coupled.members {
-            match self.plant.state(id).filter(|s| s.coupled) {
-                None => affected = true,
-                Some(state) if state.wanted != group => {
-                    affected = true;
-                    freed.push((id, state.restarted == group));
-                }
-                Some(_) => {}
-            }
-        }
+    /// Finds out who is coupled now, given the modules that have begun new motions, and lets the coupled ones go on.
+    pub(super) fn couple(&mut self, begun: &[ModuleId]) -> Result<(), Error> {
+        let Affected { seeds, joined, freed, dependent } = self.affected(begun);
         for &id in &dependent {
             if let Some(state) = self.plant.state_mut(id) {
                 state.pass_changes(self.now);
             }
             self.look_ahead(id, self.now)?;
         }
-        if !affected {
-            return Ok(());
-        }
-        for (id, restarted) in freed {
-            self.plant.state_mut(id).expect("seen above").coupled = false;
-            if !restarted {
-                self.touch_quietly(id);
+        for &id in &freed {
+            let now = self.now;
+            let state = self.plant.state_mut(id).expect("seen above");
+            state.coupled = false;
+            state.pass_changes(now);
+            if state.restarted != self.group {
+                self.plant.materialise(id, now);
                 self.start_motions(id, self.forced);
-                self.look_ahead(id, self.now)?;
+                self.look_ahead(id, now)?;
             }
         }
-        for id in wanted {
+        self.coupled.repaired |= !freed.is_empty();
+        for &id in &joined {
             self.plant.state_mut(id).expect("seen above").coupled = true;
         }
-        self.restart_coupled()
-    }
-
-    /// Brings a module's values and signs to the present without opening it.
-    fn touch_quietly(&mut self, id: ModuleId) {
-        let now = self.now;
-        if let Some(state) = self.plant.state_mut(id) {
-            state.pass_changes(now);
+        if seeds.is_empty() || self.repair(&seeds, &joined) {
+            return Ok(());
         }
-        self.plant.materialise(id, now);
+        if self.coupled.linear.is_some() {
+            self.coupled.cuts += 1;
+        }
+        let now = self.now;
+        if let Some(course) = &self.plant.coupled {
+            let control = &mut self.coupled.control;
+            foresee(control, control.last_error, now.since(course.start()), now.resolution());
+        }
+        (self.coupled.mark, self.coupled.since_mark) = (now, 0);
+        self.restart_coupled(now)
     }
 
-    /// Begins the common motion of the coupled modules at the present instant.
-    fn restart_coupled(&mut self) -> Result<(), Error> {
-        let now = self.now;
+    /// Looks at the modules that have begun new motions, and at their neighbours.
+    fn affected(&mut self, begun: &[ModuleId]) -> Affected {
+        let mut near = std::mem::take(&mut self.coupled.loosened);
+        for &id in begun {
+            near.push(id);
+            self.readers(id, |reader, context| {
+                near.push(reader);
+                near.extend_from_slice(context);
+            });
+            if let Some(state) = self.plant.state(id) {
+                near.extend_from_slice(&state.context);
+            }
+        }
+        near.sort_unstable();
+        near.dedup();
+        let mut affected = Affected::default();
+        let moved = |id: &ModuleId| self.plant.state(*id).is_some_and(|s| s.restarted == self.group);
+        for &id in &near {
+            let Some(state) = self.plant.state(id) else { continue };
+            let wanted = self.is_coupled(id);
+            let reads = state.rule.is_some_and(|r| self.model.rules[r].reads_context);
+            let new_input = reads && state.context.iter().any(moved);
+            if wanted {
+                if !state.coupled {
+                    affected.joined.push(id);
+                }
+                if !state.coupled || moved(&id) || new_input {
+                    affected.seeds.push(id);
+                }
+            } else if state.coupled {
+                affected.freed.push(id);
+            } else if new_input && !moved(&id) {
+                affected.dependent.push(id);
+            }
+        }
+        near.clear();
+        self.coupled.loosened = near;
+        affected
+    }
+
+    /// True if a module must be integrated together with neighbours: because it reads one that is integrated, or reads
+    /// any and is integrated itself, or is integrated and read by one that reads.
+    fn is_coupled(&self, id: ModuleId) -> bool {
+        let Some(state) = self.plant.state(id) else { return false };
+        let Some(rule) = state.rule else { return false };
+        let numeric = |id: &ModuleId| self.plant.state(*id).is_some_and(|s| s.is_numeric());
+        if self.model.rules[rule].reads_context && (state.is_numeric() || state.context.iter().any(numeric)) {
+            return true;
+        }
+        let mut read = false;
+        if state.is_numeric() {
+            self.readers(id, |_, _| read = true);
+        }
+        read
+    }
+
+    /// Begins the common motion of the coupled modules at an instant.
+    fn restart_coupled(&mut self, at: Instant) -> Result<(), Error> {
         let plant = &self.plant;
         let coupled = |visit| match visit {
             Visit::Module(id) if plant.state(id).is_some_and(|s| s.coupled) => Some(id),
@@ -137,10 +168,10 @@ impl Simulation<'_> {
         let mut values = Vec::new();
         for &id in &members {
             values.clear();
-            self.plant.values(id, now, &mut values);
+            self.plant.values(id, at, &mut values);
             let first = self.plant.tree.places(id).start;
             let state = self.plant.state_mut(id).expect("a member");
-            state.pass_changes(now);
+            state.pass_changes(at);
             state.next = Next::default();
             let numeric: SmallVec<[usize; 4]> =
                 (0..state.motions.len()).filter(|i| !state.motions[*i].is_formula()).collect();
@@ -154,164 +185,168 @@ impl Simulation<'_> {
         let mut component = 0;
         self.coupled.y.clear();
         for &id in &members {
-            let model = self.model;
             let first = self.plant.tree.places(id).start;
-            let state = self.plant.state_mut(id).expect("a member");
-            let Some((rule, solve)) = state.rule.zip(state.solve) else { continue };
-            let solve = &model.rules[rule].solves[solve];
-            let forced = state.forced;
-            let positions = (0..solve.of.len()).filter(|i| forced || solve.numeric.contains(i));
-            let parameters: SmallVec<[usize; 4]> = positions.map(|i| solve.of[i]).collect();
-            for &parameter in &parameters {
+            for parameter in self.integrated(id) {
+                let state = self.plant.state_mut(id).expect("a member");
                 state.motions[parameter] = Motion::Coupled(component);
                 component += 1;
+                self.coupled.y.push(self.plant.tree.values()[first + parameter]);
             }
-            let values = self.plant.tree.values();
-            self.coupled.y.extend(parameters.iter().map(|p| values[first + p]));
         }
-        self.coupled.system = System::new(&self.model.rules, &self.plant, &members, now);
+        self.coupled.system = System::new(&self.model.rules, &self.plant, &members, at, Some);
         self.coupled.members = members;
-        let linear = match self.settings.method {
-            Method::Auto => Linear::new(&self.coupled.system, &self.model.rules, &self.coupled.y),
-            _ => None,
-        };
-        self.coupled.direct = linear.as_ref().is_some_and(Linear::is_direct) && !self.watches_coupled();
-        // Where conditions are watched, stiff equations are for the implicit method.
-        self.coupled.linear = linear.filter(|_| self.coupled.direct || !self.coupled.control.stiff);
+        (self.coupled.repaired, self.coupled.pending) = (false, false);
+        let without_steps = self.settings.method == Method::Auto
+            && (self.coupled.control.stiff || self.coupled.cuts < MAX_CUTS)
+            && !self.watches_coupled();
+        self.coupled.tried = without_steps;
+        self.coupled.linear = (without_steps)
+            .then(|| Linear::new(&self.coupled.system, &self.model.rules, &self.coupled.y))
+            .flatten();
         self.coupled.integrator.restart(self.settings.method, self.coupled.y.len());
-        (self.coupled.mark, self.coupled.since_mark) = (now, 0);
-        self.coupled.touched.clear();
         if self.coupled.members.is_empty() {
             return Ok(());
         }
-        if self.coupled.direct {
-            self.show_coupled(now);
+        if self.coupled.linear.is_some() {
+            self.show_coupled(at);
             return Ok(());
         }
-        self.step_coupled(now)
+        self.step_coupled(at)
+    }
+
+    /// The parameters of a coupled module that are integrated, in the order of their components.
+    pub(super) fn integrated(&self, id: ModuleId) -> SmallVec<[usize; 4]> {
+        let Some(state) = self.plant.state(id) else { return SmallVec::new() };
+        let Some((rule, solve)) = state.rule.zip(state.solve) else { return SmallVec::new() };
+        let solve = &self.model.rules[rule].solves[solve];
+        let numeric = |i: &usize| state.forced || solve.numeric.contains(i);
+        (0..solve.of.len()).filter(numeric).map(|i| solve.of[i]).collect()
     }
 
     /// True if some condition of the coupled modules can only be found by searching their common motion.
     fn watches_coupled(&self) -> bool {
-        self.coupled.members.iter().any(|id| {
-            let state = self.plant.state(*id).expect("a member");
-            state.rule.is_some_and(|r| !self.model.rules[r].atoms.is_empty())
-        })
+        self.coupled.members.iter().any(|id| self.is_watched(*id))
     }
 
-    /// Computes the linear motion at an instant, if it goes without steps.
+    fn is_watched(&self, id: ModuleId) -> bool {
+        let rule = self.plant.state(id).and_then(|s| s.rule);
+        rule.is_some_and(|r| !self.model.rules[r].atoms.is_empty())
+    }
+
+    /// Sees to it that the coupled modules' motion is known at an instant.
     pub(super) fn show_coupled(&mut self, at: Instant) {
-        if self.coupled.direct
-            && let Some(linear) = &mut self.coupled.linear
-            && self.plant.coupled.as_ref().is_none_or(|d| d.start != at)
-        {
-            self.plant.coupled = linear.at(at);
+        let Coupled { system, y, integrator, linear, pending, .. } = &mut self.coupled;
+        match linear {
+            Some(linear) => {
+                if self.plant.coupled.as_ref().is_none_or(|course| course.start() != at) {
+                    self.plant.coupled = Some(Course::new(linear.at(at)));
+                }
+            }
+            None => {
+                if std::mem::take(pending) {
+                    let mut equations = Equations::new(system, &self.model.rules, None);
+                    self.plant.coupled = Some(Course::new(integrator.dense(&mut equations, y)));
+                }
+            }
         }
     }
 
     /// Makes a step of the coupled modules and searches it.
     fn step_coupled(&mut self, from: Instant) -> Result<(), Error> {
         let rules = &self.model.rules;
-        let known = self.queue.peek().map_or(f64::INFINITY, |entry| entry.at.since(from));
-        let Coupled { system, y, integrator, control, linear, .. } = &mut self.coupled;
-        let dense = match linear {
-            Some(linear) => {
-                self.stats.steps += 1;
-                self.stats.rhs_evaluations += linear.evaluations();
-                linear.step(self.settings.tolerance * LINEAR_TOLERANCE, BEYOND * known.max(from.resolution()))
+        let Coupled { system, y, integrator, control, .. } = &mut self.coupled;
+        let mut equations = Equations::new(system, rules, None);
+        let step = integrator.step(&self.settings, control, &mut equations, y, from, None, &mut self.stats);
+        let end = step.map_err(|error| self.coupled_error(error, from))?;
+        self.coupled.pending = true;
+        self.plant.coupled = None;
+        if self.watches_coupled() {
+            self.show_coupled(from);
+            let members = std::mem::take(&mut self.coupled.members);
+            for &id in &members {
+                self.search_member(id, from);
             }
-            None => {
-                let mut equations = Equations::new(system, rules);
-                let step = integrator.step(&self.settings, control, &mut equations, y, from, &mut self.stats);
-                step.map_err(|error| self.coupled_error(error, from))?
-            }
-        };
-        let h = dense.h;
-        self.plant.coupled = Some(dense);
-        self.coupled.touched.clear();
-        let mut best: Option<(f64, Instant)> = None;
-        let mut elder = (0.0, Instant::ZERO);
-        let mut candidates = Vec::new();
-        let members = std::mem::take(&mut self.coupled.members);
-        for &id in &members {
-            let state = self.plant.state(id).expect("a member");
-            let Some(rule) = state.rule.map(|r| &rules[r]).filter(|rule| !rule.atoms.is_empty()) else {
-                continue;
-            };
-            let path = Path::new(&self.plant, state, rule, from, h);
-            let limit = best.map_or(1.0, |(b, _)| path_together(&path, b).min(1.0));
-            let found = self.watcher.search(&path, limit);
-            if let Some(position) = found.event {
-                let birth = self.plant.tree.birth(id);
-                if best.is_none_or(|(b, _)| position < b) {
-                    best = Some((position, found.touched[0].time));
-                    let age = path.age();
-                    elder = (position + Instant::new(age + position * h).resolution() / h, birth);
-                }
-                candidates.push((position, birth, id, found.touched));
-            }
-            self.plant.state_mut(id).expect("a member").next.changes.extend(found.changes);
+            self.coupled.members = members;
         }
-        self.coupled.members = members;
-        let Some((position, time)) = best else {
-            let end = self.plant.coupled.as_ref().map_or(from, |d| d.end);
-            self.queue.schedule(Who::Coupled, end);
-            return Ok(());
-        };
-        let together = position + time.resolution() / h;
-        // Those born together have clocks that are as good as their age is short.
-        candidates.retain(|(at, birth, ..)| *at <= if *birth == elder.1 { elder.0 } else { together });
-        self.coupled.touched.extend(candidates.into_iter().map(|(_, _, id, touched)| (id, touched)));
-        self.queue.schedule(Who::Coupled, time);
+        self.queue.schedule(Who::Coupled, end);
         Ok(())
     }
 
-    /// True if the coupled modules' next entry is an event, not the end of their step.
-    pub(super) fn coupled_event(&self) -> bool {
-        !self.coupled.touched.is_empty()
-    }
-
-    /// Opens the coupled modules whose event it is; tells the first.
-    pub(super) fn touch_coupled(&mut self) -> Option<ModuleId> {
-        let touched = std::mem::take(&mut self.coupled.touched);
-        if let Some(dense) = &self.plant.coupled {
-            let control = &mut self.coupled.control;
-            foresee(control, control.last_error, self.now.since(dense.start), self.now.resolution());
+    /// Finds a coupled module's next event before the end of the common step.
+    pub(super) fn search_member(&mut self, id: ModuleId, from: Instant) {
+        if !self.is_watched(id) {
+            return;
         }
-        for (id, changes) in &touched {
-            self.touch(*id, changes);
+        let who = Who::Module(id.slot() as u32);
+        let mut start = from;
+        loop {
+            let (Some(course), Some(state)) = (&self.plant.coupled, self.plant.state(id)) else { return };
+            let Some(rule) = state.rule.map(|r| &self.model.rules[r]) else { return };
+            // Everything that the module reads follows one polynomial up to there.
+            let mut knot = course.end;
+            for id in std::iter::once(&id).chain(&state.context) {
+                for motion in self.plant.state(*id).map_or(&[][..], |s| &s.motions) {
+                    if let Motion::Coupled(component) = motion {
+                        let end = course.knot(*component as usize, start);
+                        if end.since(knot) < 0.0 {
+                            knot = end;
+                        }
+                    }
+                }
+            }
+            let h = knot.since(start);
+            if h <= 0.0 {
+                return self.queue.cancel(who);
+            }
+            let path = Path::new(&self.plant, state, rule, start, h);
+            let found = self.watcher.search(&path, 1.0);
+            let last = knot.since(course.end) >= 0.0;
+            let state = self.plant.state_mut(id).expect("seen above");
+            state.next.changes.extend(found.changes);
+            if found.event.is_some() {
+                let time = found.touched[0].time;
+                (state.next.what, state.next.touched) = (What::Event, found.touched);
+                return self.queue.schedule(who, time);
+            }
+            if last {
+                return self.queue.cancel(who);
+            }
+            start = knot;
         }
-        touched.first().map(|(id, _)| *id)
     }
 
     /// Goes to the end of a step of the coupled modules, and on.
     pub(super) fn pass_coupled_step(&mut self, at: Instant) -> Result<(), Error> {
-        let Coupled { members, system, y, integrator, control, mark, since_mark, linear, .. } =
-            &mut self.coupled;
+        let Coupled { mark, since_mark, .. } = &mut self.coupled;
+        if super::local::crawls(mark, since_mark, at) && !self.settings.method.is_fixed_step() {
+            return Err(self.coupled_error(StepError::TooSmall(0), at));
+        }
+        if self.coupled.repaired {
+            return self.restart_coupled(at);
+        }
+        let Coupled { members, system, y, integrator, control, .. } = &mut self.coupled;
         for id in members {
             self.plant.state_mut(*id).expect("a member").pass_changes(at);
         }
-        match linear {
-            Some(_) => {
-                if let Some(dense) = &self.plant.coupled {
-                    y.iter_mut().enumerate().for_each(|(c, y)| *y = dense.value(c, 1.0));
-                }
-            }
-            None => integrator.advance(y),
-        }
+        integrator.advance(y);
         for (&(place, ..), &value) in system.places.iter().zip(y.iter()) {
             self.plant.tree.set_value(place, value);
         }
         system.advance(at);
-        // Many steps in a row, and nothing happens: they are short for stability's sake.
-        if linear.is_some() && *since_mark >= MANY_TAYLOR_STEPS {
-            *linear = None;
-            *control = Control { stiff: true, ..Control::default() };
-        }
-        if super::local::crawls(mark, since_mark, at) && !self.settings.method.is_fixed_step() {
-            return Err(self.coupled_error(StepError::TooSmall(0), at));
+        let stiff = control.stiff && self.settings.method == Method::Auto;
+        if stiff && !self.coupled.tried && !self.watches_coupled() {
+            return self.restart_coupled(at);
         }
         self.step_coupled(at)
+    }
+
+    /// True if events end the common step for all.
+    pub(super) fn is_cut_by_events(&self) -> bool {
+        self.settings.scheduler == Scheduler::Global
+            || self.settings.method.is_fixed_step()
+            || self.settings.method == Method::Radau
+            || self.coupled.control.stiff
+            || self.coupled.linear.is_some()
     }
 
     fn coupled_error(&self, error: StepError, at: Instant) -> Error {

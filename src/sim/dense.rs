@@ -8,7 +8,7 @@ use crate::expr::{Dual, Interval, Value};
 use crate::structure::Instant;
 
 /// Highest degree of a dense output.
-pub const MAX_DEGREE: usize = 8;
+pub const MAX_DEGREE: usize = 7;
 type Coefficients = [f64; MAX_DEGREE + 1];
 
 /// All components of the solution from `start` to `start + h`.
@@ -51,10 +51,19 @@ impl Dense {
         c[0]
     }
 
-    /// One component at the start, and its rate per unit of position.
-    pub fn start_of(&self, component: usize) -> Dual<f64> {
-        let c = self.of(component);
-        Dual { value: c[0], rate: if self.degree > 0 { self.degree as f64 * (c[1] - c[0]) } else { 0.0 } }
+    /// One component at a position, and its rate there per unit of position.
+    pub fn departure(&self, component: usize, position: f64) -> Dual<f64> {
+        let mut c: Coefficients = [0.0; MAX_DEGREE + 1];
+        c[..=self.degree].copy_from_slice(self.of(component));
+        if self.degree == 0 {
+            return Dual { value: c[0], rate: 0.0 };
+        }
+        for level in (2..=self.degree).rev() {
+            for i in 0..level {
+                c[i] = mix(c[i], c[i + 1], position);
+            }
+        }
+        Dual { value: mix(c[0], c[1], position), rate: self.degree as f64 * (c[1] - c[0]) }
     }
 
     /// Bounds of one component over the whole step.

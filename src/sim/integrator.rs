@@ -15,6 +15,8 @@ pub struct Integrator {
     /// The rates at the start of the next step are known.
     rate_is_known: bool,
     method: Method,
+    /// Start, length and end of the step just made.
+    step: (Instant, f64, Instant),
 }
 
 /// Why there is no step. The component that is to blame, if it is known.
@@ -28,7 +30,7 @@ pub enum StepError {
 
 /// The tolerance of a single step, as a part of the tolerance asked for: errors of steps add up, and move
 /// the times of events, which move what comes after them.
-const INNER_TOLERANCE: f64 = 0.1;
+pub const INNER_TOLERANCE: f64 = 0.1;
 
 /// The same for the implicit method: between the ends of its long steps the solution is known less well than there.
 const INNER_TOLERANCE_IMPLICIT: f64 = 0.01;
@@ -72,7 +74,8 @@ impl Integrator {
         }
     }
 
-    /// Makes a step from `y` at `start`.
+    /// Makes a step from `y` at `start`, no further than `limit`; tells its end.
+    #[allow(clippy::too_many_arguments)]
     pub fn step(
         &mut self,
         settings: &Settings,
@@ -80,8 +83,9 @@ impl Integrator {
         system: &mut impl Rates,
         y: &[f64],
         start: Instant,
+        limit: Option<Instant>,
         stats: &mut Stats,
-    ) -> Result<Dense, StepError> {
+    ) -> Result<Instant, StepError> {
         self.method = self.choose(settings, control);
         let method = self.method;
         let inner = if method == Method::Radau { INNER_TOLERANCE_IMPLICIT } else { INNER_TOLERANCE };
@@ -104,8 +108,17 @@ impl Integrator {
             None if control.size > 0.0 => control.size.max(64.0 * start.resolution()),
             None => self.workspace.first_size(method, system, y, tolerance),
         };
+        let room = limit.map_or(f64::INFINITY, |limit| limit.since(start));
         let mut rejected = false;
         loop {
+            // Two steps of the same length rather than a long one and a short one.
+            h = if h >= room {
+                room
+            } else if 2.0 * h > room {
+                0.5 * room
+            } else {
+                h
+            };
             if grid.is_none() && h <= 0.5 * start.resolution() {
                 return Err(StepError::TooSmall(self.workspace.worst(y)));
             }
@@ -139,7 +152,9 @@ impl Integrator {
                     if grid.is_none() {
                         // Rounding is no reason to shorten a step that is good, only not to lengthen it.
                         let most = if rejected || rounding > 0.5 { 1.0 } else { 10.0 };
-                        control.size = h * growth(error, control.last_error, order).clamp(0.2, most);
+                        let next = h * growth(error, control.last_error, order).clamp(0.2, most);
+                        // A step that had to end early says nothing against longer ones.
+                        control.size = if 2.0 * h > room { next.max(control.size) } else { next };
                         control.last_error = error;
                     }
                     break;
@@ -150,12 +165,24 @@ impl Integrator {
         if settings.method == Method::Auto && method != Method::Radau {
             suspect(control, self.workspace.stiffness(method, h), method);
         }
-        let end = grid.map(|grid| Instant::new(next_grid_time(start, grid)));
-        if let Some(implicit) = self.implicit.as_mut().filter(|_| method == Method::Radau) {
-            return Ok(implicit.dense(start, y, h));
+        let end = match (grid, limit) {
+            (Some(grid), _) => Instant::new(next_grid_time(start, grid)),
+            (None, Some(limit)) if h == room => limit,
+            _ => start.after(h),
+        };
+        self.step = (start, h, end);
+        Ok(end)
+    }
+
+    /// The dense output of the step just made from `y`. Nobody need ask for it: a method may have to evaluate rates for
+    /// it.
+    pub fn dense(&mut self, system: &mut impl Rates, y: &[f64]) -> Dense {
+        let (start, h, end) = self.step;
+        if let Some(implicit) = self.implicit.as_mut().filter(|_| self.method == Method::Radau) {
+            return implicit.dense(start, y, h);
         }
-        self.workspace.finish(method, system, y, h);
-        Ok(self.workspace.dense(method, start, end, y, h))
+        self.workspace.finish(self.method, system, y, h);
+        self.workspace.dense(self.method, start, Some(end), y, h)
     }
 
     /// Makes the end of the step just made the start of the next.

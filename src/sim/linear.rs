@@ -1,9 +1,9 @@
 //! Coupled modules whose equations are linear with constant coefficients: `y' = A y + b`.
 //!
 //! The exact flow is the exponential of a matrix with the structure of the tree. Where nobody watches the components,
-//! it is applied directly, from the start of the phase to each time that is looked at, by a rational approximation whose
-//! every pole costs one elimination from the tips to the root: stiffness costs nothing (Trefethen, Weideman and
-//! Schmelzer 2006). Where conditions have to be watched, Taylor's series gives dense output.
+//! there are no steps: it is applied from the start of the phase to each time that is looked at, by a rational
+//! approximation whose every pole costs one elimination from the tips to the root: stiffness costs nothing (Trefethen,
+//! Weideman and Schmelzer 2006).
 
 use super::dense::Dense;
 use super::motion::Motion;
@@ -16,9 +16,6 @@ use crate::structure::Instant;
 
 /// Lanes of an elimination: the seven poles and one that does nothing.
 const LANES: usize = 8;
-
-/// Degree of Taylor's series.
-const DEGREE: usize = 8;
 
 /// Neighbours may weigh on each other by factors that differ; along the whole tree, weights may spread by no more than
 /// this, or the matrix is too far from a symmetric one for the approximation to be safe.
@@ -34,16 +31,15 @@ pub struct Linear {
     /// The unknown of each component of the coupled modules.
     unknown: Vec<u32>,
     start: Instant,
-    /// Largest sum of a row's magnitudes.
-    norm: f64,
-    /// No eigenvalue is larger; None if eigenvalues may not be real.
-    bound: Option<f64>,
+    /// No eigenvalue is larger.
+    bound: f64,
     factors: Vec<Wide<LANES>>,
     rhs: Vec<Wide<LANES>>,
 }
 
 impl Linear {
-    /// The equations of coupled modules, if they are linear and so is everything that they read.
+    /// The equations of coupled modules, if they are linear and so is everything that they read, and if all eigenvalues
+    /// are certainly real.
     pub fn new(system: &System, rules: &[Rule], y: &[f64]) -> Option<Linear> {
         let mut unknown = vec![u32::MAX; y.len()];
         let mut inputs = vec![u32::MAX; system.formulas.len()];
@@ -101,7 +97,7 @@ impl Linear {
         let (mut variables, mut scratch, mut out): (Vec<f64>, Scratch<f64>, Vec<f64>) = Default::default();
         for row in &system.rows {
             let linear = rules[row.rule].solves[row.solve].linear.as_ref()?;
-            system.variables(row, 0.0, y, &mut variables);
+            system.variables(row, 0.0, y, &[], &mut variables);
             out.resize(linear.coefficients.outputs(), 0.0);
             linear.coefficients.eval(&variables, &mut scratch, &mut out);
             let mut next = out.iter();
@@ -115,6 +111,7 @@ impl Linear {
                         Source::State(component) => {
                             entries.push((n, unknown[component as usize], coefficient))
                         }
+                        Source::Input(_) => return None,
                         Source::Formula(input) => entries.push((n, inputs[input as usize], coefficient)),
                     }
                 }
@@ -129,42 +126,23 @@ impl Linear {
         for &(row, column, value) in &entries {
             a[pattern.entry(row as usize, column as usize)?] += value;
         }
-        let mut sums = vec![0.0; state.len()];
-        for &(row, _, value) in &entries {
-            sums[row as usize] += value.abs();
-        }
-        let norm = sums.into_iter().fold(0.0, f64::max);
-        let bound = real_bound(&pattern, &a, &entries, state.len());
+        let bound = real_bound(&pattern, &a, &entries, state.len())?;
         let start = system.start;
         let (factors, rhs) = (Vec::new(), Vec::new());
-        Some(Linear { pattern, a, b, y: state, unknown, start, norm, bound, factors, rhs })
-    }
-
-    /// True if the state can be had at any time without steps.
-    pub fn is_direct(&self) -> bool {
-        self.bound.is_some()
-    }
-
-    fn unknowns(&self) -> usize {
-        self.pattern.unknowns()
-    }
-
-    /// Evaluations of one module's equations that a step takes.
-    pub fn evaluations(&self) -> u64 {
-        (DEGREE * self.unknown.len()) as u64
+        Some(Linear { pattern, a, b, y: state, unknown, start, bound, factors, rhs })
     }
 
     /// The components at an instant, as the dense output of a step that stays where it is. Not numbers if there are
     /// none: growth beyond all bounds.
-    pub fn at(&mut self, at: Instant) -> Option<Dense> {
+    pub fn at(&mut self, at: Instant) -> Dense {
         let tau = at.since(self.start).max(0.0);
-        let sigma = self.bound?.max(0.0);
+        let sigma = self.bound.max(0.0);
         let y = match tau {
             0.0 => self.y.clone(),
-            _ => self.propagate(tau, sigma).unwrap_or_else(|| vec![f64::NAN; self.unknowns()]),
+            _ => self.propagate(tau, sigma).unwrap_or_else(|| vec![f64::NAN; self.y.len()]),
         };
         let components = self.unknown.iter().map(|n| y[*n as usize]).collect();
-        Some(Dense::new(at, Some(at), 0.0, 0, components))
+        Dense::new(at, Some(at), 0.0, 0, components)
     }
 
     /// `exp(τ A) y + τ φ(τ A) b`: the exponential of the matrix with b as a further column, shifted by σ so that no
@@ -197,50 +175,6 @@ impl Linear {
         let sum = |(x, y): (&Wide<LANES>, &f64)| growth * (ALPHA_0 * y + 2.0 * x.re.iter().sum::<f64>());
         Some(self.rhs.iter().zip(&self.y).map(sum).collect())
     }
-
-    /// A step by Taylor's series, no longer than `longest`, with an error of at most `tolerance` in each component
-    /// relative to the largest.
-    pub fn step(&mut self, tolerance: f64, longest: f64) -> Dense {
-        let n = self.y.len();
-        let factorial: f64 = (1..=DEGREE + 1).map(|k| k as f64).product();
-        let reach = (tolerance * factorial).powf(1.0 / (DEGREE + 1) as f64);
-        let h = if self.norm > 0.0 { (reach / self.norm).min(longest) } else { longest.min(1e9) };
-        // c_k = h^k / k! (A^k y + A^(k-1) b)
-        let mut terms: Vec<Vec<f64>> = Vec::with_capacity(DEGREE + 1);
-        terms.push(self.y.clone());
-        for k in 1..=DEGREE {
-            let mut next = vec![0.0; n];
-            self.pattern.multiply(&self.a, &terms[k - 1], &mut next);
-            for (i, x) in next.iter_mut().enumerate() {
-                let inflow = if k == 1 { self.b[i] } else { 0.0 };
-                *x = (*x + inflow) * h / k as f64;
-            }
-            terms.push(next);
-        }
-        let basis = bernstein();
-        let mut coefficients = Vec::with_capacity(self.unknown.len() * (DEGREE + 1));
-        for &u in &self.unknown {
-            let u = u as usize;
-            for row in &basis {
-                coefficients.push(row.iter().zip(&terms).map(|(m, c)| m * c[u]).sum());
-            }
-        }
-        let end = self.start.after(h);
-        for (i, y) in self.y.iter_mut().enumerate() {
-            *y = terms.iter().rev().map(|c| c[i]).sum();
-        }
-        let dense = Dense::new(self.start, Some(end), h, DEGREE, coefficients);
-        self.start = end;
-        dense
-    }
-}
-
-/// Bernstein coefficients from powers: `b_j = Σ_i C(j,i)/C(n,i) c_i`.
-fn bernstein() -> [[f64; DEGREE + 1]; DEGREE + 1] {
-    let choose = |n: usize, k: usize| (0..k).fold(1.0, |c, i| c * (n - i) as f64 / (i + 1) as f64);
-    std::array::from_fn(|j| {
-        std::array::from_fn(|i| if i <= j { choose(j, i) / choose(DEGREE, i) } else { 0.0 })
-    })
 }
 
 /// An upper bound of the eigenvalues, if they are certainly real: neighbours that weigh on each other with one sign make

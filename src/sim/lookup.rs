@@ -8,7 +8,7 @@ use smallvec::SmallVec;
 use super::simulation::Simulation;
 use super::state::{Signs, State};
 use super::watch::{TOUCH, opposite};
-use crate::model::{Rule, Sign};
+use crate::model::{Pattern, Rule, Sign};
 use crate::structure::{ModuleId, Visit};
 
 /// Two numbers are equal if they differ by no more than this part of the larger.
@@ -33,7 +33,7 @@ impl Simulation<'_> {
             }
             let kind = self.plant.tree.kind(id);
             if self.kinds_with_context[kind.index()] {
-                self.changed = true;
+                self.to_look.push(id);
             } else if let Some(&rule) = model.kinds.get(kind).rules.first()
                 && !self.begin_quickly(id, rule)
             {
@@ -41,23 +41,33 @@ impl Simulation<'_> {
             }
         }
         self.fresh = fresh;
-        self.changed = false;
-        if self.looks_around {
+        if std::mem::take(&mut self.lost) {
+            self.neighbours.forget();
+            self.to_look = self.contextual();
+        }
+        if !self.to_look.is_empty() {
             self.look_around();
         }
     }
 
-    /// Looks up all modules whose rules have contexts.
-    fn look_around(&mut self) {
-        let model = self.model;
-        let mut contextual = std::mem::take(&mut self.contextual);
-        contextual.clear();
-        contextual.extend(self.plant.tree.walk().filter_map(|visit| match visit {
+    /// The modules whose rules have contexts, in string order.
+    pub(super) fn contextual(&self) -> Vec<ModuleId> {
+        let has_context = |visit| match visit {
             Visit::Module(id) if self.kinds_with_context[self.plant.tree.kind(id).index()] => Some(id),
             _ => None,
-        }));
+        };
+        if self.looks_around { self.plant.tree.walk().filter_map(has_context).collect() } else { Vec::new() }
+    }
+
+    /// Looks up the modules whose neighbours have changed.
+    fn look_around(&mut self) {
+        let model = self.model;
+        let mut to_look = std::mem::take(&mut self.to_look);
         let mut context = SmallVec::new();
-        for &id in &contextual {
+        for id in to_look.drain(..) {
+            if !self.plant.tree.is_alive(id) {
+                continue;
+            }
             let rules = &model.kinds.get(self.plant.tree.kind(id)).rules;
             let applies =
                 rules.iter().copied().find(|&rule| self.context(id, &model.rules[rule], &mut context));
@@ -66,7 +76,9 @@ impl Simulation<'_> {
                 if state.is_none_or(|s| s.rule.is_some()) {
                     self.plant.materialise(id, self.now);
                     self.forget(id);
-                    self.plant.states[id.slot()] = Some(State::new(id));
+                    let state = State { restarted: self.group, ..State::new(id) };
+                    self.plant.states[id.slot()] = Some(state);
+                    self.ready.push(id);
                 }
                 continue;
             };
@@ -74,9 +86,9 @@ impl Simulation<'_> {
                 self.take_up(id, rule, &context);
             }
         }
+        self.to_look = to_look;
         let plant = &self.plant;
         self.opened.retain(|id| plant.state(*id).is_some_and(|s| s.rule.is_some()));
-        self.contextual = contextual;
     }
 
     /// Gives a module its rule and opens it.
@@ -105,6 +117,9 @@ impl Simulation<'_> {
             self.plant.states[id.slot()] = Some(State::new(id));
         }
         let state = self.plant.states[id.slot()].as_mut().expect("just made");
+        if state.coupled {
+            self.coupled.loosened.extend_from_slice(&state.context);
+        }
         state.rule = Some(rule);
         state.context = SmallVec::from_slice(context);
         state.solve = None;
@@ -127,31 +142,30 @@ impl Simulation<'_> {
 
     /// Collects the context that a rule asks for, in the order of the rule's variables; false if it is
     /// not there.
-    fn context(&self, id: ModuleId, rule: &Rule, out: &mut SmallVec<[ModuleId; 2]>) -> bool {
+    fn context(&mut self, id: ModuleId, rule: &Rule, out: &mut SmallVec<[ModuleId; 2]>) -> bool {
         out.clear();
         let skipped = |kind| self.model.kinds.get(kind).skipped;
-        let tree = &self.plant.tree;
+        let (tree, neighbours) = (&self.plant.tree, &mut self.neighbours);
+        let mut look = |at: &mut ModuleId, pattern: &Pattern, left: bool| {
+            let found = match left {
+                true => neighbours.left(tree, *at, skipped),
+                false => neighbours.right(tree, *at, skipped),
+            };
+            let Some(found) = found else { return false };
+            neighbours.note(tree, id, found);
+            *at = found;
+            out.push(found);
+            pattern.matches(tree.kind(found))
+        };
         let mut at = id;
-        for pattern in rule.left.iter().rev() {
-            match tree.left(at, skipped) {
-                Some(found) if pattern.matches(tree.kind(found)) => {
-                    out.push(found);
-                    at = found;
-                }
-                _ => return false,
-            }
+        if !rule.left.iter().rev().all(|pattern| look(&mut at, pattern, true)) {
+            return false;
         }
-        out.reverse();
         at = id;
-        for pattern in &rule.right {
-            match tree.right(at, skipped) {
-                Some(found) if pattern.matches(tree.kind(found)) => {
-                    out.push(found);
-                    at = found;
-                }
-                _ => return false,
-            }
+        if !rule.right.iter().all(|pattern| look(&mut at, pattern, false)) {
+            return false;
         }
+        out[..rule.left.len()].reverse();
         true
     }
 

@@ -23,6 +23,7 @@
 
 mod choose;
 mod coupled;
+mod course;
 mod dense;
 mod error;
 mod event;
@@ -32,12 +33,14 @@ mod linear;
 mod local;
 mod lookup;
 mod motion;
+mod neighbours;
 mod phase;
 mod plant;
 mod queue;
 mod quick;
 mod radau;
 mod rational;
+mod repair;
 mod roots;
 mod runge_kutta;
 mod settle;
@@ -90,10 +93,21 @@ impl Method {
     }
 }
 
+/// Who is solved again after an event, among modules that are integrated together.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Scheduler {
+    /// As many of the neighbours as the tolerance asks for.
+    #[default]
+    Auto,
+    /// All: one clock, and time is cut at every event. The reference.
+    Global,
+}
+
 /// How a simulation is run.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
     pub method: Method,
+    pub scheduler: Scheduler,
     /// Error aimed at in every parameter at every time, relative to max(1, |value|).
     pub tolerance: f64,
     /// Step of the methods that have a fixed one, in units of time. Steps end at its multiples.
@@ -114,6 +128,7 @@ impl Default for Settings {
     fn default() -> Settings {
         Settings {
             method: Method::Auto,
+            scheduler: Scheduler::Auto,
             tolerance: 1e-6,
             step_size: 0.01,
             max_modules: 10_000_000,

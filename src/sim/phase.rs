@@ -34,7 +34,8 @@ impl Simulation<'_> {
             }
         }
         if self.looks_around {
-            self.couple()?;
+            self.note_resting(&opened);
+            self.couple(&opened)?;
         }
         for &id in &opened {
             let state = self.plant.state(id).filter(|s| s.rule.is_some() && !s.coupled);
@@ -268,7 +269,10 @@ impl Simulation<'_> {
         // What was kept of it stays as memory for the next that lives there.
         if let Some(state) = self.plant.state_mut(id) {
             state.is_alive = false;
-            self.coupled_changed |= state.coupled;
+            if state.coupled {
+                self.coupled.repaired = true;
+                self.coupled.loosened.extend_from_slice(&state.context);
+            }
             self.queue.cancel(Who::Module(id.slot() as u32));
         }
     }

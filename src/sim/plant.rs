@@ -1,6 +1,6 @@
 //! The modules and how they move: values at any instant, and along a stretch of time.
 
-use super::dense::Dense;
+use super::course::{Course, Piece};
 use super::motion::Motion;
 use super::state::State;
 use crate::expr::{Dual, Interval, Value};
@@ -14,8 +14,8 @@ pub struct Plant {
     pub tree: Tree,
     /// By slot of the tree; None for modules without rules.
     pub states: Vec<Option<State>>,
-    /// The present step of the coupled modules.
-    pub coupled: Option<Dense>,
+    /// How the coupled modules move.
+    pub coupled: Option<Course>,
 }
 
 impl Plant {
@@ -37,7 +37,7 @@ impl Plant {
                 None => x,
             },
             Motion::Coupled(component) => match &self.coupled {
-                Some(dense) => dense.value(*component as usize, dense.position(at)),
+                Some(course) => course.value(*component as usize, at).unwrap_or(x),
                 None => x,
             },
             formula => x + formula.value(at.since(state.since).max(0.0)),
@@ -105,16 +105,13 @@ impl<'p> Path<'p> {
         Path { plant, state, rule, start, h, age: start.since(plant.tree.birth(state.id)) }
     }
 
-    /// The module's age at the start.
-    pub fn age(&self) -> f64 {
-        self.age
-    }
-
-    /// The step that numeric motions follow: it is this stretch.
-    fn dense<'s>(&'s self, state: &'s State, motion: &Motion) -> Option<(&'s Dense, usize)> {
+    /// What numeric motions follow along this stretch.
+    fn piece<'s>(&'s self, state: &'s State, motion: &Motion) -> Option<Piece<'s>> {
         match motion {
-            Motion::Step(c) => Some((&state.step.as_ref()?.dense, *c as usize)),
-            Motion::Coupled(c) => Some((self.plant.coupled.as_ref()?, *c as usize)),
+            Motion::Step(c) => {
+                Some(Piece::new(&state.step.as_ref()?.dense, *c as usize, self.start, self.h))
+            }
+            Motion::Coupled(c) => self.plant.coupled.as_ref()?.piece(*c as usize, self.start, self.h),
             _ => None,
         }
     }
@@ -122,33 +119,41 @@ impl<'p> Path<'p> {
     /// Bounds of an own parameter over the whole stretch, if it follows dense output.
     pub fn dense_bounds(&self, parameter: usize) -> Option<Interval> {
         let motion = self.state.motions.get(parameter)?;
-        let (dense, component) = self.dense(self.state, motion)?;
-        Some(dense.bounds(component))
+        Some(self.piece(self.state, motion)?.bounds())
     }
 
-    /// Gives each variable to one of three functions: values that rest, components of dense output, and formulas
+    /// Gives each variable that conditions read to one of three functions: values that rest, pieces of dense output, and formulas
     /// with their start value and the time since it.
     fn each<T>(
         &self,
         out: &mut Vec<T>,
         rest: impl Fn(f64) -> T,
-        dense: impl Fn(&Dense, usize) -> T,
+        piece: impl Fn(&Piece) -> T,
         formula: impl Fn(&Motion, f64, f64) -> T,
         time: impl Fn(f64) -> T,
     ) {
         out.clear();
+        let watched = &self.rule.watched;
         for &id in std::iter::once(&self.state.id).chain(&self.state.context) {
             let values = self.plant.tree.parameters(id);
+            let reads = |i: usize| watched[i];
+            if !(out.len()..out.len() + values.len()).any(reads) {
+                // Any value will do.
+                out.extend(values.iter().map(|x| rest(*x)));
+                continue;
+            }
             let Some(state) = self.plant.state(id).filter(|s| !s.motions.is_empty()) else {
                 out.extend(values.iter().map(|x| rest(*x)));
                 continue;
             };
             let offset = self.start.since(state.since);
             for (&x, motion) in values.iter().zip(&state.motions) {
+                let reads = reads(out.len());
                 out.push(match motion {
+                    _ if !reads => rest(x),
                     Motion::Rest => rest(x),
-                    Motion::Step(_) | Motion::Coupled(_) => match self.dense(state, motion) {
-                        Some((d, component)) => dense(d, component),
+                    Motion::Step(_) | Motion::Coupled(_) => match self.piece(state, motion) {
+                        Some(along) => piece(&along),
                         None => rest(x),
                     },
                     motion => formula(motion, x, offset),
@@ -159,12 +164,17 @@ impl<'p> Path<'p> {
         out.push(time(self.age));
     }
 
+    /// All variables at the start.
+    pub fn start(&self, out: &mut Vec<f64>) {
+        self.plant.variables(self.state.id, &self.state.context, self.start, out);
+    }
+
     pub fn at(&self, position: f64, out: &mut Vec<f64>) {
         let tau = position * self.h;
         self.each(
             out,
             |x| x,
-            |dense, c| dense.value(c, position),
+            |piece| piece.value(position),
             |motion, x, offset| x + motion.value(offset + tau),
             |t| t + tau,
         );
@@ -176,7 +186,7 @@ impl<'p> Path<'p> {
         self.each(
             out,
             Dual::constant,
-            |dense, c| dense.start_of(c),
+            |piece| piece.departure(),
             |motion, x, offset| Dual { value: x + motion.value(offset), rate: h * motion.rate(offset) },
             |t| Dual { value: t, rate: h },
         );
@@ -188,7 +198,7 @@ impl<'p> Path<'p> {
         self.each(
             out,
             Dual::constant,
-            |dense, c| dense.piece(c, lo, hi),
+            |piece| piece.over(lo, hi),
             |motion, x, offset| {
                 let Dual { value, rate } = motion.over(offset + lo * h, offset + hi * h);
                 let shifted = Interval { lo: x + value.lo, hi: x + value.hi, ..value };
@@ -204,7 +214,7 @@ impl<'p> Path<'p> {
         self.each(
             out,
             Interval::constant,
-            |dense, c| dense.bounds(c),
+            |piece| piece.bounds(),
             |motion, x, offset| {
                 let value = motion.over(offset, offset + h).value;
                 Interval { lo: x + value.lo, hi: x + value.hi, ..value }

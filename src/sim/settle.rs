@@ -16,6 +16,7 @@ use smallvec::SmallVec;
 
 use super::error::Error;
 use super::event::Event;
+use super::neighbours::comes_between;
 use super::simulation::Simulation;
 use super::state::{Change, Open};
 use crate::model::{Comparison, Sign, Truth};
@@ -88,16 +89,23 @@ impl Simulation<'_> {
 
     /// Opens the modules that rest on a boundary and look at their neighbours: it may be that those move now.
     fn open_resting(&mut self) {
-        if self.contextual.is_empty() {
-            return;
+        let mut resting = std::mem::take(&mut self.resting);
+        for id in resting.drain(..) {
+            let state = self.plant.state(id);
+            if state.is_some_and(|s| s.rule.is_some() && s.open.is_none() && s.signs.contains(&Sign::Zero)) {
+                self.touch(id, &[]);
+            }
         }
-        let resting = |me: &Self, id: &ModuleId| {
-            let state = me.plant.state(*id);
-            state.is_some_and(|s| s.rule.is_some() && s.open.is_none() && s.signs.contains(&Sign::Zero))
-        };
-        let found: Vec<ModuleId> = self.contextual.iter().filter(|id| resting(self, id)).copied().collect();
-        for id in found {
-            self.touch(id, &[]);
+        self.resting = resting;
+    }
+
+    /// Remembers those of the modules that rest on a boundary and have a context.
+    pub(super) fn note_resting(&mut self, modules: &[ModuleId]) {
+        for &id in modules {
+            let state = self.plant.state(id);
+            if state.is_some_and(|s| !s.context.is_empty() && s.signs.contains(&Sign::Zero)) {
+                self.resting.push(id);
+            }
         }
     }
 
@@ -150,12 +158,20 @@ impl Simulation<'_> {
                 let limit = self.settings.max_modules;
                 return Err(Error::TooManyModules { site: self.site(fire), limit, rounds });
             }
+            let kind = self.plant.tree.kind(fire.id);
             self.forget(fire.id);
             let child = |place| lineage.child(number, place);
             let mut made = std::mem::take(&mut self.fresh);
             let known = made.len();
             self.plant.tree.replace(fire.id, successor, &all[first..end], self.now, child, &mut made);
             self.note_successor(fire.id, successor, &made[known..]);
+            if self.looks_around {
+                let skipped = |kind| model.kinds.get(kind).skipped;
+                self.to_look.extend_from_slice(self.neighbours.lookers(fire.id));
+                self.neighbours.bury(fire.id);
+                self.neighbours.hand_on(Some(fire.id), &successor.kinds, &made[known..], skipped);
+                self.lost |= skipped(kind) && comes_between(&successor.kinds, skipped);
+            }
             self.fresh = made;
             first = end;
         }

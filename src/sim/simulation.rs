@@ -5,6 +5,7 @@ use super::error::{Error, Site};
 use super::event::Event;
 use super::integrator::Integrator;
 use super::motion::Motion;
+use super::neighbours::Neighbours;
 use super::plant::Plant;
 use super::queue::{Entry, Queue, Who};
 use super::settle::Firing;
@@ -46,11 +47,14 @@ pub struct Simulation<'m> {
     /// Some rule has a context.
     pub(super) looks_around: bool,
     pub(super) kinds_with_context: Vec<bool>,
-    /// Modules of such kinds, in string order.
-    pub(super) contextual: Vec<ModuleId>,
+    pub(super) neighbours: Neighbours,
+    /// Modules whose neighbours have changed.
+    pub(super) to_look: Vec<ModuleId>,
+    /// What is known of neighbours may be wrong.
+    pub(super) lost: bool,
+    /// Modules that rest on a boundary and have a context: neighbours may move it.
+    pub(super) resting: Vec<ModuleId>,
     pub(super) coupled: Coupled,
-    /// A coupled module has been replaced.
-    pub(super) coupled_changed: bool,
     pub(super) alone: Integrator,
     /// Whose step it made last, and to when.
     pub(super) alone_last: Option<(ModuleId, Instant)>,
@@ -108,9 +112,11 @@ impl<'m> Simulation<'m> {
             changed: true,
             looks_around: kinds_with_context.contains(&true),
             kinds_with_context,
-            contextual: Vec::new(),
+            neighbours: Neighbours::default(),
+            to_look: Vec::new(),
+            lost: false,
+            resting: Vec::new(),
             coupled: Coupled::default(),
-            coupled_changed: false,
             alone: Integrator::default(),
             alone_last: None,
             hints: (model.kinds.iter())
@@ -155,6 +161,10 @@ impl<'m> Simulation<'m> {
         }
         let tree = &mut self.plant.tree;
         tree.append(&self.model.axiom, &arguments, Instant::ZERO, Lineage::of_axiom, &mut self.fresh);
+        if self.looks_around {
+            let skipped = |kind| self.model.kinds.get(kind).skipped;
+            self.neighbours.hand_on(None, &self.model.axiom.kinds, &self.fresh, skipped);
+        }
         self.stats.peak_modules = tree.len() as u64;
         if tree.len() > self.settings.max_modules {
             let limit = self.settings.max_modules;
@@ -165,8 +175,8 @@ impl<'m> Simulation<'m> {
 
     /// Work done so far.
     pub fn stats(&self) -> Stats {
-        let rhs_evaluations =
-            self.stats.rhs_evaluations + self.alone.evaluations() + self.coupled.integrator.evaluations();
+        let coupled = self.coupled.integrator.evaluations() + self.repair_evaluations();
+        let rhs_evaluations = self.stats.rhs_evaluations + self.alone.evaluations() + coupled;
         Stats { modules: self.plant.tree.len() as u64, rhs_evaluations, ..self.stats }
     }
 
@@ -233,7 +243,7 @@ impl<'m> Simulation<'m> {
     /// True if the entry is an event, not the end of what is known.
     fn is_event(&self, who: Who) -> bool {
         match who {
-            Who::Coupled => self.coupled_event(),
+            Who::Coupled => false,
             Who::Module(slot) => {
                 let state = self.plant.states[slot as usize].as_ref();
                 state.is_some_and(|s| s.next.what != What::Window)
@@ -265,7 +275,11 @@ impl<'m> Simulation<'m> {
             }
             self.queue.pop();
             if !self.is_event(entry.who) {
-                self.pass_end(entry)?;
+                match entry.who {
+                    // Not before what happens at this instant.
+                    Who::Coupled if !group.is_empty() => later.push(entry),
+                    _ => self.pass_end(entry)?,
+                }
                 continue;
             }
             if let Who::Module(slot) = entry.who {
@@ -293,7 +307,7 @@ impl<'m> Simulation<'m> {
         let mut oldest = None;
         for entry in &group {
             let first = match entry.who {
-                Who::Coupled => self.touch_coupled(),
+                Who::Coupled => None,
                 Who::Module(slot) => match self.fire_quickly(slot as usize) {
                     Some(firing) => {
                         let id = firing.id;
@@ -367,7 +381,7 @@ impl<'m> Simulation<'m> {
 
     /// Some module, to name where nothing more is known.
     pub(super) fn anyone(&self) -> ModuleId {
-        let named = self.coupled.members.first().copied();
+        let named = self.coupled.members.iter().copied().find(|id| self.plant.state(*id).is_some());
         named
             .or_else(|| self.plant.states.iter().flatten().find(|s| s.is_alive).map(|s| s.id))
             .expect("there are modules")

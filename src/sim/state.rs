@@ -36,8 +36,8 @@ pub struct State {
     pub forced: bool,
     /// It is integrated together with others.
     pub coupled: bool,
-    /// Number of the last instant at which it was found that it should be.
-    pub wanted: u64,
+    /// Number of the last walk through neighbours that came by.
+    pub visited: u64,
     pub next: Next,
     /// Set while an instant is examined that concerns the module.
     pub open: Option<Box<Open>>,
@@ -142,7 +142,7 @@ impl State {
             window: 0.0,
             forced: false,
             coupled: false,
-            wanted: 0,
+            visited: 0,
             next: Next::default(),
             open: None,
             restarted: 0,

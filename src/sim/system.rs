@@ -1,5 +1,6 @@
 //! The equations of the coupled modules between two changes of structure.
 
+use super::course::Course;
 use super::motion::Motion;
 use super::plant::Plant;
 use super::runge_kutta::Rates;
@@ -16,6 +17,8 @@ pub enum Source {
     State(u32),
     /// A formula.
     Formula(u32),
+    /// A component of the coupled modules that is no unknown here: it is known already how it moves.
+    Input(u32),
 }
 
 /// The equations of the coupled modules.
@@ -24,6 +27,8 @@ pub struct System {
     pub rows: Vec<Row>,
     pub sources: Vec<Source>,
     pub formulas: Vec<Formula>,
+    /// Components of the coupled modules that are read.
+    inputs: Vec<u32>,
     chunks: Vec<Chunk>,
     switches: Vec<f64>,
     /// Place in the tree's values, and owner with its parameter, of each component.
@@ -121,8 +126,15 @@ impl Places {
 }
 
 impl System {
-    /// The equations of some modules of the plant, whose numeric parameters have their components.
-    pub fn new(rules: &[Rule], plant: &Plant, members: &[ModuleId], start: Instant) -> System {
+    /// The equations of some of the coupled modules. `unknown` gives the number here of a component, in the order of
+    /// the members; None if it is not integrated here.
+    pub fn new(
+        rules: &[Rule],
+        plant: &Plant,
+        members: &[ModuleId],
+        start: Instant,
+        unknown: impl Fn(u32) -> Option<u32>,
+    ) -> System {
         let mut system = System { start, ..System::default() };
         for &id in members {
             let state = plant.state(id).expect("members have states");
@@ -147,7 +159,13 @@ impl System {
                 for (i, &x) in values.iter().enumerate() {
                     system.sources.push(match neighbour.map(|s| (&s.motions[i], s.since)) {
                         None | Some((Motion::Rest | Motion::Step(_), _)) => Source::Fixed(x),
-                        Some((Motion::Coupled(c), _)) => Source::State(*c),
+                        Some((Motion::Coupled(c), _)) => match unknown(*c) {
+                            Some(number) => Source::State(number),
+                            None => {
+                                system.inputs.push(*c);
+                                Source::Input(system.inputs.len() as u32 - 1)
+                            }
+                        },
                         Some((motion, since)) => {
                             let offset = start.since(since);
                             system.formulas.push(Formula { motion: motion.clone(), x, since, offset });
@@ -234,8 +252,19 @@ impl System {
         }
     }
 
-    fn value(&self, source: Source, tau: f64, y: &[f64]) -> f64 {
+    /// What the components that are read are at a time after the start; NaN where that is not known.
+    fn read(&self, course: Option<&Course>, tau: f64, out: &mut Vec<f64>) {
+        out.clear();
+        if !self.inputs.is_empty() {
+            let at = self.start.after(tau);
+            let value = |component: &u32| course.and_then(|c| c.value(*component as usize, at));
+            out.extend(self.inputs.iter().map(|component| value(component).unwrap_or(f64::NAN)));
+        }
+    }
+
+    fn value(&self, source: Source, tau: f64, y: &[f64], inputs: &[f64]) -> f64 {
         match source {
+            Source::Input(i) => inputs[i as usize],
             Source::Fixed(x) => x,
             Source::State(component) => y[component as usize],
             Source::Formula(i) => {
@@ -256,10 +285,11 @@ impl System {
         }
     }
 
-    pub fn variables(&self, row: &Row, tau: f64, y: &[f64], out: &mut Vec<f64>) {
+    /// The variables of a row's rule, `inputs` being what it reads besides.
+    pub fn variables(&self, row: &Row, tau: f64, y: &[f64], inputs: &[f64], out: &mut Vec<f64>) {
         out.clear();
         let sources = &self.sources[row.first_source..row.first_source + row.sources];
-        out.extend(sources.iter().map(|source| self.value(*source, tau, y)));
+        out.extend(sources.iter().map(|source| self.value(*source, tau, y, inputs)));
         out.extend([self.start.to_f64() + tau, row.age + tau]);
         out.extend_from_slice(&self.switches[row.first_switch..row.first_switch + row.switches]);
     }
@@ -301,15 +331,18 @@ fn program<'s>(rules: &'s [Rule], row: &Row) -> &'s Program {
 pub struct Equations<'s> {
     system: &'s System,
     rules: &'s [Rule],
+    /// How the components move that are inputs.
+    course: Option<&'s Course>,
+    inputs: Vec<f64>,
     variables: Vec<f64>,
     scratch: Scratch<f64>,
     registers: Vec<Lanes>,
 }
 
 impl<'s> Equations<'s> {
-    pub fn new(system: &'s System, rules: &'s [Rule]) -> Equations<'s> {
-        let (variables, scratch, registers) = Default::default();
-        Equations { system, rules, variables, scratch, registers }
+    pub fn new(system: &'s System, rules: &'s [Rule], course: Option<&'s Course>) -> Equations<'s> {
+        let (inputs, variables, scratch, registers) = Default::default();
+        Equations { system, rules, course, inputs, variables, scratch, registers }
     }
 
     /// The rates of a few rows that have the same program.
@@ -330,7 +363,7 @@ impl<'s> Equations<'s> {
                 Column::State(places) => places.gather(y, register),
                 Column::Mixed(sources) => {
                     for (lane, source) in register.iter_mut().zip(sources) {
-                        *lane = system.value(*source, tau, y);
+                        *lane = system.value(*source, tau, y, &self.inputs);
                     }
                 }
             }
@@ -344,6 +377,7 @@ impl<'s> Equations<'s> {
 impl Rates for Equations<'_> {
     fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]) {
         let system = self.system;
+        system.read(self.course, tau, &mut self.inputs);
         for chunk in &system.chunks {
             self.lanes(chunk, tau, y, out);
         }
@@ -358,9 +392,10 @@ impl Rates for Equations<'_> {
         let mut scratch = std::mem::take(&mut self.scratch);
         let mut values = Vec::new();
         out.clear();
+        self.system.read(self.course, tau, &mut self.inputs);
         for row in &self.system.rows {
             let jacobian = &self.rules[row.rule].solves[row.solve].jacobian;
-            self.system.variables(row, tau, y, &mut variables);
+            self.system.variables(row, tau, y, &self.inputs, &mut variables);
             values.resize(jacobian.values.outputs(), 0.0);
             jacobian.values.eval(&variables, &mut scratch, &mut values);
             out.extend(self.system.row_partials(self.rules, row).map(|(.., entry)| values[entry]));

@@ -63,7 +63,10 @@ impl Simulation<'_> {
         let Some(mut recorder) = self.recorder.take() else { return };
         recorder.arrivals.clear();
         recorder.fired.clear();
-        let concerned: Vec<ModuleId> = self.opened.iter().chain(&self.contextual).copied().collect();
+        // Those of the initial string have not come from anywhere.
+        let known = |id: &ModuleId| self.plant.state(*id).is_some();
+        let all = self.opened.iter().copied().chain(self.contextual());
+        let concerned: Vec<ModuleId> = all.filter(known).collect();
         for id in concerned {
             if !recorder.arrivals.contains_key(&id) && self.plant.tree.is_alive(id) {
                 let mut rates = Vec::new();

@@ -222,11 +222,20 @@ impl Watcher {
             return false;
         }
         let Some(bounds) = path.dense_bounds(*variable) else { return false };
+        let level = self.level(path, level);
+        let margin = 1e-9 * (level.abs() + bounds.magnitude());
+        level < bounds.lo - margin || level > bounds.hi + margin
+    }
+
+    /// The value at which the sides of an atom meet.
+    fn level(&mut self, path: &Path, level: &Program) -> f64 {
+        if let Some(&[level]) = level.constants() {
+            return level;
+        }
         path.at(0.0, &mut self.values);
         let mut out = [0.0];
         level.eval(&self.values, &mut self.scratch, &mut out);
-        let margin = 1e-9 * (out[0].abs() + bounds.magnitude());
-        out[0] < bounds.lo - margin || out[0] > bounds.hi + margin
+        out[0]
     }
 
     fn difference<'w, 'p>(&'w mut self, path: &'w Path<'p>, atom: usize) -> Difference<'w, 'p> {
@@ -259,10 +268,7 @@ impl Watcher {
         if !matches!(sign, Sign::Plus | Sign::Minus) {
             return None;
         }
-        path.at(0.0, &mut self.values);
-        let mut out = [0.0];
-        level.eval(&self.values, &mut self.scratch, &mut out);
-        let [level] = out;
+        let level = self.level(path, level);
         if !level.is_finite() {
             return None;
         }
@@ -275,10 +281,12 @@ impl Watcher {
             let motion = path.state.motions.get(variable)?;
             let start = path.plant.tree.parameters(path.state.id)[variable];
             let clause = path.state.solve.map(|s| &path.rule.solves[s]);
-            let switches = path.state.switches.iter().map(|&on| f64::from(u8::from(on)));
-            self.values.extend(switches);
-            let (values, scratch, rates) = (&self.values, &mut self.scratch, &mut self.rates);
-            let exact = || rate_at(clause, values, variable, level, scratch, rates);
+            let (values, scratch, rates) = (&mut self.values, &mut self.scratch, &mut self.rates);
+            let exact = || {
+                path.start(values);
+                values.extend(path.state.switches.iter().map(|&on| f64::from(u8::from(on))));
+                rate_at(clause, values, variable, level, scratch, rates)
+            };
             let tau = motion.reach(level - start, exact)?;
             path.state.since.after(tau)
         };
