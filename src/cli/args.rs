@@ -221,9 +221,12 @@ pub struct SharedArgs {
     /// Step of the methods with a fixed one (rk4, euler)
     #[arg(long, value_name = "H", value_parser = positive)]
     pub step_size: Option<f64>,
-    /// How time is advanced
+    /// How time is advanced for modules that read their neighbours
     #[arg(long, value_enum, default_value_t = Scheduler::Auto)]
     pub scheduler: Scheduler,
+    /// Length of the slices of time of the scheduler `local`; its error is of that order
+    #[arg(long, value_name = "DT", value_parser = positive)]
+    pub slice: Option<f64>,
     /// Seed of random numbers, for models that draw them (none does yet)
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
@@ -245,10 +248,12 @@ pub struct SharedArgs {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Scheduler {
-    /// The default; at present the same as `global`
+    /// After an event, only as many neighbours as the tolerance asks for are solved again
     Auto,
-    /// One clock for all modules: the reference
+    /// One clock for all modules, cut at every event: the reference
     Global,
+    /// Neighbours are seen as they were at the start of a slice of time (--slice): the paper's approximation
+    Local,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

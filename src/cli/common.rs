@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use super::args::SharedArgs;
+use super::args::{Scheduler, SharedArgs};
 use crate::diagnostic::Diagnostic;
 use crate::lang::Setting;
 use crate::model::Frames;
@@ -100,6 +100,23 @@ struct StatsFile {
     counts: Stats,
 }
 
+/// The scheduler that the flags say.
+fn scheduler(args: &SharedArgs) -> Result<sim::Scheduler, Failure> {
+    let usage = |message: &str| Err(Failure::Usage(format!("error: {message}\n")));
+    match (args.scheduler, args.slice) {
+        (Scheduler::Local, Some(_)) if args.method.is_fixed_step() => {
+            usage("the scheduler `local` has slices of its own: choose a method with step control")
+        }
+        (Scheduler::Local, Some(slice)) => Ok(sim::Scheduler::Local { slice }),
+        (Scheduler::Local, None) => {
+            usage("the scheduler `local` goes by slices of time: give their length with `--slice DT`")
+        }
+        (_, Some(_)) => usage("`--slice` is for `--scheduler local`"),
+        (Scheduler::Auto, None) => Ok(sim::Scheduler::Auto),
+        (Scheduler::Global, None) => Ok(sim::Scheduler::Global),
+    }
+}
+
 impl Run {
     pub fn start(args: &SharedArgs) -> Result<Run, Failure> {
         let before = Instant::now();
@@ -108,11 +125,13 @@ impl Run {
                 "error: this method has a fixed step: give it with `--step-size H`\n".to_owned(),
             ));
         }
+        let scheduler = scheduler(args)?;
         let session = open(&args.model, &args.settings)?;
         let times = times(args, &session)?;
         let defaults = Settings::default();
         let settings = Settings {
             method: args.method,
+            scheduler,
             tolerance: args.tolerance,
             step_size: args.step_size.unwrap_or(defaults.step_size),
             max_modules: args.max_modules,

@@ -9,13 +9,14 @@ use super::error::Error;
 use super::integrator::{Integrator, StepError, foresee};
 use super::linear::Linear;
 use super::motion::Motion;
-use super::plant::Path;
+use super::plant::{Path, Plant};
 use super::queue::Who;
 use super::repair::Repairer;
 use super::simulation::Simulation;
-use super::state::{Control, Next, What};
+use super::state::{Control, Next, State, What};
 use super::system::{Equations, System};
 use super::{Method, Scheduler};
+use crate::model::Model;
 use crate::structure::{Instant, ModuleId, Visit};
 use smallvec::SmallVec;
 
@@ -159,50 +160,57 @@ impl Simulation<'_> {
 
     /// Begins the common motion of the coupled modules at an instant.
     fn restart_coupled(&mut self, at: Instant) -> Result<(), Error> {
-        let plant = &self.plant;
-        let coupled = |visit| match visit {
+        let coupled = |plant: &Plant, visit| match visit {
             Visit::Module(id) if plant.state(id).is_some_and(|s| s.coupled) => Some(id),
             _ => None,
         };
-        let members: Vec<ModuleId> = plant.tree.walk().filter_map(coupled).collect();
-        let mut values = Vec::new();
-        for &id in &members {
-            values.clear();
-            self.plant.values(id, at, &mut values);
-            let first = self.plant.tree.places(id).start;
-            let state = self.plant.state_mut(id).expect("a member");
-            state.pass_changes(at);
-            state.next = Next::default();
-            let numeric: SmallVec<[usize; 4]> =
-                (0..state.motions.len()).filter(|i| !state.motions[*i].is_formula()).collect();
-            for i in numeric {
-                self.plant.tree.set_value(first + i, values[i]);
-            }
-            self.queue.cancel(Who::Module(id.slot() as u32));
-        }
-        self.plant.coupled = None;
-        self.queue.cancel(Who::Coupled);
-        let mut component = 0;
+        let mut members = std::mem::take(&mut self.coupled.members);
+        members.clear();
+        members.extend(self.plant.tree.walk().filter_map(|visit| coupled(&self.plant, visit)));
+        let course = self.plant.coupled.take();
         self.coupled.y.clear();
         for &id in &members {
-            let first = self.plant.tree.places(id).start;
-            for parameter in self.integrated(id) {
-                let state = self.plant.state_mut(id).expect("a member");
-                state.motions[parameter] = Motion::Coupled(component);
-                component += 1;
-                self.coupled.y.push(self.plant.tree.values()[first + parameter]);
+            let Plant { tree, states, .. } = &mut self.plant;
+            let state = states[id.slot()].as_mut().expect("a member");
+            let first = tree.places(id).start;
+            for parameter in integrated(self.model, state) {
+                let motion = &mut state.motions[parameter];
+                let value = match *motion {
+                    Motion::Coupled(component) => {
+                        course.as_ref().and_then(|c| c.value(component as usize, at))
+                    }
+                    Motion::Step(component) => state
+                        .step
+                        .as_ref()
+                        .filter(|step| step.live)
+                        .map(|step| step.dense.value(component as usize, step.dense.position(at))),
+                    _ => None,
+                };
+                let place = first + parameter;
+                let value = value.unwrap_or(tree.values()[place]);
+                tree.set_value(place, value);
+                *motion = Motion::Coupled(self.coupled.y.len() as u32);
+                self.coupled.y.push(value);
             }
+            state.pass_changes(at);
+            state.next = Next::default();
+            self.queue.cancel(Who::Module(id.slot() as u32));
         }
-        self.coupled.system = System::new(&self.model.rules, &self.plant, &members, at, Some);
+        self.queue.cancel(Who::Coupled);
+        self.coupled.system =
+            System::new(&self.model.rules, &self.plant, &members, at, Some, self.settings.is_sliced());
         self.coupled.members = members;
         (self.coupled.repaired, self.coupled.pending) = (false, false);
         let without_steps = self.settings.method == Method::Auto
             && (self.coupled.control.stiff || self.coupled.cuts < MAX_CUTS)
+            && !self.settings.is_sliced()
             && !self.watches_coupled();
         self.coupled.tried = without_steps;
         self.coupled.linear = (without_steps)
             .then(|| Linear::new(&self.coupled.system, &self.model.rules, &self.coupled.y))
             .flatten();
+        // After each, all members are searched.
+        self.coupled.integrator.dear = true;
         self.coupled.integrator.restart(self.settings.method, self.coupled.y.len());
         if self.coupled.members.is_empty() {
             return Ok(());
@@ -212,15 +220,6 @@ impl Simulation<'_> {
             return Ok(());
         }
         self.step_coupled(at)
-    }
-
-    /// The parameters of a coupled module that are integrated, in the order of their components.
-    pub(super) fn integrated(&self, id: ModuleId) -> SmallVec<[usize; 4]> {
-        let Some(state) = self.plant.state(id) else { return SmallVec::new() };
-        let Some((rule, solve)) = state.rule.zip(state.solve) else { return SmallVec::new() };
-        let solve = &self.model.rules[rule].solves[solve];
-        let numeric = |i: &usize| state.forced || solve.numeric.contains(i);
-        (0..solve.of.len()).filter(numeric).map(|i| solve.of[i]).collect()
     }
 
     /// True if some condition of the coupled modules can only be found by searching their common motion.
@@ -256,7 +255,8 @@ impl Simulation<'_> {
         let rules = &self.model.rules;
         let Coupled { system, y, integrator, control, .. } = &mut self.coupled;
         let mut equations = Equations::new(system, rules, None);
-        let step = integrator.step(&self.settings, control, &mut equations, y, from, None, &mut self.stats);
+        let limit = self.settings.slice_end(from);
+        let step = integrator.step(&self.settings, control, &mut equations, y, from, limit, &mut self.stats);
         let end = step.map_err(|error| self.coupled_error(error, from))?;
         self.coupled.pending = true;
         self.plant.coupled = None;
@@ -321,7 +321,8 @@ impl Simulation<'_> {
         if super::local::crawls(mark, since_mark, at) && !self.settings.method.is_fixed_step() {
             return Err(self.coupled_error(StepError::TooSmall(0), at));
         }
-        if self.coupled.repaired {
+        let slice_ends = |from| self.settings.slice_end(from).is_some_and(|end| end == at);
+        if self.coupled.repaired || slice_ends(self.coupled.system.start) {
             return self.restart_coupled(at);
         }
         let Coupled { members, system, y, integrator, control, .. } = &mut self.coupled;
@@ -342,6 +343,9 @@ impl Simulation<'_> {
 
     /// True if events end the common step for all.
     pub(super) fn is_cut_by_events(&self) -> bool {
+        if self.settings.is_sliced() {
+            return false;
+        }
         self.settings.scheduler == Scheduler::Global
             || self.settings.method.is_fixed_step()
             || self.settings.method == Method::Radau
@@ -353,4 +357,12 @@ impl Simulation<'_> {
         let owner = |component: usize| self.coupled.system.owner(component);
         self.step_error(error, at, owner)
     }
+}
+
+/// The parameters of a coupled module that are integrated, in the order of their components.
+pub(super) fn integrated(model: &Model, state: &State) -> SmallVec<[usize; 4]> {
+    let Some((rule, solve)) = state.rule.zip(state.solve) else { return SmallVec::new() };
+    let solve = &model.rules[rule].solves[solve];
+    let numeric = |i: &usize| state.forced || solve.numeric.contains(i);
+    (0..solve.of.len()).filter(numeric).map(|i| solve.of[i]).collect()
 }

@@ -15,6 +15,8 @@ pub struct Integrator {
     /// The rates at the start of the next step are known.
     rate_is_known: bool,
     method: Method,
+    /// Steps cost much besides the rates.
+    pub dear: bool,
     /// Start, length and end of the step just made.
     step: (Instant, f64, Instant),
 }
@@ -37,6 +39,8 @@ const INNER_TOLERANCE_IMPLICIT: f64 = 0.01;
 
 /// Looser than this, many small steps of low order are cheaper than few of high order.
 const HIGH_ORDER_BELOW: f64 = 1e-7;
+/// The same where each step costs much besides the rates.
+const HIGH_ORDER_BELOW_IF_STEPS_ARE_DEAR: f64 = 1e-5;
 
 /// A step with less than this part of the tolerated error is longer than accuracy asks for.
 const EASY: f64 = 1e-3;
@@ -69,6 +73,9 @@ impl Integrator {
         match settings.method {
             Method::Auto if control.stiff => Method::Radau,
             Method::Auto if settings.tolerance < HIGH_ORDER_BELOW => Method::Dop853,
+            Method::Auto if self.dear && settings.tolerance < HIGH_ORDER_BELOW_IF_STEPS_ARE_DEAR => {
+                Method::Dop853
+            }
             Method::Auto => Method::Dopri5,
             method => method,
         }
@@ -225,7 +232,7 @@ fn growth(error: f64, last: f64, order: u32) -> f64 {
 }
 
 /// The first multiple of the step size after an instant.
-fn next_grid_time(now: Instant, grid: f64) -> f64 {
+pub fn next_grid_time(now: Instant, grid: f64) -> f64 {
     let t = now.to_f64();
     let mut n = (t / grid).floor() + 1.0;
     if n * grid - t <= now.resolution() {

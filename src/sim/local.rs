@@ -225,8 +225,7 @@ impl Simulation<'_> {
             let mut tries = 0;
             let step = loop {
                 let stats = &mut self.stats;
-                let step =
-                    self.alone.step(&self.settings, &mut control, &mut system, &y, from, None, stats);
+                let step = self.alone.step(&self.settings, &mut control, &mut system, &y, from, None, stats);
                 let step = step.map(|_| self.alone.dense(&mut system, &y));
                 let Ok(dense) = &step else { break step };
                 tries += 1;

@@ -101,6 +101,13 @@ pub enum Scheduler {
     Auto,
     /// All: one clock, and time is cut at every event. The reference.
     Global,
+    /// Nobody: equations see their neighbours as they were at the start of the slice of time, or at the module's last
+    /// event in it. The approximation that the paper makes for speed (section 5); its error is of the order of the
+    /// slice.
+    Local {
+        /// Length of a slice, in units of time; slices end at its multiples.
+        slice: f64,
+    },
 }
 
 /// How a simulation is run.
@@ -143,6 +150,21 @@ impl Settings {
     /// The grid on which steps of fixed size end.
     fn grid(&self) -> Option<f64> {
         self.method.is_fixed_step().then_some(self.step_size)
+    }
+
+    /// True if neighbours are seen as they were at the start of a slice of time.
+    fn is_sliced(&self) -> bool {
+        matches!(self.scheduler, Scheduler::Local { .. })
+    }
+
+    /// The end of the slice of time after an instant, if there are slices.
+    fn slice_end(&self, after: crate::structure::Instant) -> Option<crate::structure::Instant> {
+        match self.scheduler {
+            Scheduler::Local { slice } => {
+                Some(crate::structure::Instant::new(integrator::next_grid_time(after, slice)))
+            }
+            _ => None,
+        }
     }
 }
 

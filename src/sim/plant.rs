@@ -108,9 +108,7 @@ impl<'p> Path<'p> {
     /// What numeric motions follow along this stretch.
     fn piece<'s>(&'s self, state: &'s State, motion: &Motion) -> Option<Piece<'s>> {
         match motion {
-            Motion::Step(c) => {
-                Some(Piece::new(&state.step.as_ref()?.dense, *c as usize, self.start, self.h))
-            }
+            Motion::Step(c) => Some(Piece::new(&state.step.as_ref()?.dense, *c as usize, self.start, self.h)),
             Motion::Coupled(c) => self.plant.coupled.as_ref()?.piece(*c as usize, self.start, self.h),
             _ => None,
         }

@@ -127,15 +127,18 @@ impl Places {
 
 impl System {
     /// The equations of some of the coupled modules. `unknown` gives the number here of a component, in the order of
-    /// the members; None if it is not integrated here.
+    /// the members; None if it is not integrated here. If `frozen`, neighbours are
+    /// taken as they are at the start.
     pub fn new(
         rules: &[Rule],
         plant: &Plant,
         members: &[ModuleId],
         start: Instant,
         unknown: impl Fn(u32) -> Option<u32>,
+        frozen: bool,
     ) -> System {
         let mut system = System { start, ..System::default() };
+        let mut values_then = Vec::new();
         for &id in members {
             let state = plant.state(id).expect("members have states");
             let first = plant.tree.places(id).start;
@@ -154,6 +157,12 @@ impl System {
             system.places.extend(own.iter().map(|&(_, parameter)| (first + parameter, id, parameter)));
             let first_source = system.sources.len();
             for &module in std::iter::once(&id).chain(&state.context) {
+                if frozen && module != id {
+                    values_then.clear();
+                    plant.values(module, start, &mut values_then);
+                    system.sources.extend(values_then.iter().map(|x| Source::Fixed(*x)));
+                    continue;
+                }
                 let values = plant.tree.parameters(module);
                 let neighbour = plant.state(module).filter(|s| !s.motions.is_empty());
                 for (i, &x) in values.iter().enumerate() {

@@ -1,0 +1,198 @@
+//! Who stands next to whom, and who has looked.
+//!
+//! The nearest module that is not skipped, on either side, is remembered once it has been found, and handed on from a
+//! module to its successor. So finding a context costs the same however many finished branches stand between: they are
+//! not passed again. What is remembered stays right until the neighbour dies, because nothing else can come between;
+//! only where a skipped module turns into one that counts is everything forgotten.
+//!
+//! Whoever was looked at, matching or not, knows who looked: when it dies, those look again, and nobody else.
+
+use smallvec::SmallVec;
+
+use super::simulation::Simulation;
+use crate::model::KindId;
+use crate::structure::{ModuleId, Tree};
+
+/// A neighbour, as far as it is known.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Link {
+    #[default]
+    Unknown,
+    /// There is none.
+    End,
+    Module(ModuleId),
+}
+
+impl From<Option<ModuleId>> for Link {
+    fn from(found: Option<ModuleId>) -> Link {
+        found.map_or(Link::End, Link::Module)
+    }
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Near {
+    /// Whose neighbours these are; of another, nothing is known.
+    of: Option<ModuleId>,
+    left: Link,
+    right: Link,
+}
+
+/// What is remembered, by slot of the tree.
+#[derive(Clone, Debug, Default)]
+pub struct Neighbours {
+    near: Vec<Near>,
+    lookers: Vec<SmallVec<[ModuleId; 4]>>,
+}
+
+impl Neighbours {
+    fn near(&mut self, id: ModuleId) -> &mut Near {
+        let slot = id.slot();
+        if self.near.len() <= slot {
+            self.near.resize(slot + 1, Near::default());
+        }
+        let near = &mut self.near[slot];
+        if near.of != Some(id) {
+            *near = Near { of: Some(id), ..Near::default() };
+        }
+        near
+    }
+
+    /// The left neighbour, as [`Tree::left`] finds it.
+    pub fn left(&mut self, tree: &Tree, id: ModuleId, skipped: impl Fn(KindId) -> bool) -> Option<ModuleId> {
+        match self.near(id).left {
+            Link::End => None,
+            Link::Module(found) if tree.is_alive(found) => Some(found),
+            _ => {
+                let found = tree.left(id, skipped);
+                self.near(id).left = found.into();
+                found
+            }
+        }
+    }
+
+    /// The right neighbour, as [`Tree::right`] finds it.
+    pub fn right(&mut self, tree: &Tree, id: ModuleId, skipped: impl Fn(KindId) -> bool) -> Option<ModuleId> {
+        match self.near(id).right {
+            Link::End => None,
+            Link::Module(found) if tree.is_alive(found) => Some(found),
+            _ => {
+                let found = tree.right(id, skipped);
+                self.near(id).right = found.into();
+                found
+            }
+        }
+    }
+
+    /// Remembers that a module looked at another.
+    pub fn note(&mut self, tree: &Tree, looker: ModuleId, seen: ModuleId) {
+        let slot = seen.slot();
+        if self.lookers.len() <= slot {
+            self.lookers.resize(slot + 1, SmallVec::new());
+        }
+        let lookers = &mut self.lookers[slot];
+        if lookers.last() == Some(&looker) {
+            return;
+        }
+        if lookers.len() == lookers.capacity() {
+            // Those who have gone, and who have looked twice.
+            lookers.sort_unstable();
+            lookers.dedup();
+            lookers.retain(|id| tree.is_alive(*id));
+        }
+        lookers.push(looker);
+    }
+
+    /// Those who have looked at a slot's module, living and dead; some maybe at an earlier one.
+    pub fn lookers(&self, id: ModuleId) -> &[ModuleId] {
+        self.lookers.get(id.slot()).map_or(&[], |all| all)
+    }
+
+    /// Forgets who looked at a module that has died.
+    pub fn bury(&mut self, id: ModuleId) {
+        if let Some(lookers) = self.lookers.get_mut(id.slot()) {
+            lookers.clear();
+        }
+    }
+
+    /// Forgets all neighbours.
+    pub fn forget(&mut self) {
+        self.near.clear();
+    }
+
+    /// Hands the neighbours of a module on to what has taken its place: `made` are the modules of a string of `kinds`.
+    /// Without a module, the string is the initial one.
+    pub fn hand_on(
+        &mut self,
+        dead: Option<ModuleId>,
+        kinds: &[KindId],
+        made: &[ModuleId],
+        skipped: impl Fn(KindId) -> bool,
+    ) {
+        let (left, right) = match dead {
+            Some(id) => {
+                let near = *self.near(id);
+                (near.left, near.right)
+            }
+            None => (Link::End, Link::End),
+        };
+        let mut made = made.iter().copied();
+        // What stands left of the next module, and the last on the same axis.
+        let (mut before, mut last): (Link, Option<ModuleId>) = (left, None);
+        let mut outer = Vec::new();
+        let mut first = None;
+        for &kind in kinds {
+            if kind == KindId::OPEN {
+                outer.push((before, last.take()));
+            } else if kind == KindId::CLOSE {
+                if let Some(last) = last {
+                    self.near(last).right = Link::End;
+                }
+                (before, last) = outer.pop().expect("brackets match: the front end saw to it");
+            } else if let Some(id) = made.next() {
+                *self.near(id) = Near { of: Some(id), left: before, right: Link::Unknown };
+                if !skipped(kind) {
+                    if let Some(last) = last {
+                        self.near(last).right = Link::Module(id);
+                    }
+                    if outer.is_empty() {
+                        first.get_or_insert(id);
+                    }
+                    (before, last) = (Link::Module(id), Some(id));
+                }
+            }
+        }
+        if let Some(last) = last {
+            self.near(last).right = right;
+        }
+        let Some(dead) = dead else { return };
+        if let Link::Module(id) = right
+            && self.near(id).left == Link::Module(dead)
+        {
+            self.near(id).left = before;
+        }
+        if let Link::Module(id) = left
+            && self.near(id).right == Link::Module(dead)
+        {
+            self.near(id).right = first.map_or(right, Link::Module);
+        }
+    }
+}
+
+impl Simulation<'_> {
+    /// Calls a function with each module whose equations or conditions read something of this one that may change, and
+    /// with its context; with some twice.
+    pub(super) fn readers(&self, id: ModuleId, mut each: impl FnMut(ModuleId, &[ModuleId])) {
+        for &looker in self.neighbours.lookers(id) {
+            let Some(state) = self.plant.state(looker) else { continue };
+            let reads = |rule: usize| self.model.rules[rule].reads_context;
+            if state.context.contains(&id) && state.rule.is_some_and(reads) {
+                each(looker, &state.context);
+            }
+        }
+    }
+}
+
+/// True if some module of a string that takes a skipped module's place is not skipped: it may come between others.
+pub fn comes_between(kinds: &[KindId], skipped: impl Fn(KindId) -> bool) -> bool {
+    kinds.iter().any(|kind| !kind.is_bracket() && !skipped(*kind))
+}

@@ -1,0 +1,270 @@
+//! What an event does to the coupled modules around it, without ending the common step of the others.
+//!
+//! After an event at t' within the common step, the modules whose equations or inputs have changed (the *seeds*) and some
+//! rings of neighbours around them are integrated again from t' to the end of the step, with the motion of everybody
+//! else as an input. What a ring is: who reads a module is one ring further out, since influence goes to those who read.
+//!
+//! # Why the error stays under the tolerance
+//!
+//! Let ε be the error that a step may have ([`INNER_TOLERANCE`] times the tolerance). The repair is integrated with the
+//! step control of any other step. What it leaves out is the change of the modules outside. They read the region only
+//! through its outermost ring, and the change of that ring, old motion against new, is measured along the whole
+//! rest of the step: if it is more than ε anywhere, the repair is done again with twice as many rings. So what is
+//! left out enters the rates outside as a disturbance of at most ε times the Lipschitz constant L of the coupling, and
+//! over the rest of a step of length h changes their values by at most ε (exp(L h) - 1). Explicit methods keep L h
+//! to a few units (beyond that their stability ends, the equations count as stiff, and every event ends the step), and
+//! steps are repaired where events happen: the neglected change is one more local error, and adds up as those do. Where
+//! neighbours' influence is weak (diffusion between cells), it falls by a factor of about L h / k from ring k - 1 to
+//! ring k, and a handful of rings is enough.
+
+use super::coupled::integrated;
+use super::course::Course;
+use super::dense::Dense;
+use super::integrator::{INNER_TOLERANCE, Integrator};
+use super::motion::Motion;
+use super::queue::Who;
+use super::simulation::Simulation;
+use super::state::{Control, Next};
+use super::system::{Equations, System};
+use crate::structure::{Instant, ModuleId};
+
+/// What repairs have learnt, and their memory.
+pub struct Repairer {
+    integrator: Integrator,
+    control: Control,
+    /// Rings to begin with.
+    rings: usize,
+    /// By component: its number in the system of the region.
+    numbers: Vec<u32>,
+    /// Number of the last visit to modules.
+    visit: u64,
+}
+
+impl Default for Repairer {
+    fn default() -> Repairer {
+        let (integrator, control, numbers) = Default::default();
+        Repairer { integrator, control, rings: 3, numbers, visit: 0 }
+    }
+}
+
+/// Most rings that are tried.
+const MAX_RINGS: usize = 64;
+/// Most steps of a repair.
+const MAX_STEPS: usize = 64;
+/// A region of more than this part of all modules is no region.
+const MOST: f64 = 0.5;
+
+const NOT_HERE: u32 = u32::MAX;
+
+/// Modules that are integrated again, the seeds first, then ring after ring.
+struct Region {
+    members: Vec<ModuleId>,
+    /// Where each ring begins.
+    rings: Vec<usize>,
+}
+
+/// The motion of a region.
+struct Trial {
+    stretches: Vec<Dense>,
+    /// Its components, by their number in the stretches.
+    components: Vec<u32>,
+}
+
+impl Simulation<'_> {
+    /// Evaluations of one module's equations in repairs.
+    pub(super) fn repair_evaluations(&self) -> u64 {
+        self.coupled.repairer.integrator.evaluations()
+    }
+
+    /// Lets some coupled modules, of which some have just joined, go on with new equations; false if that is better
+    /// done by a new common step.
+    pub(super) fn repair(&mut self, seeds: &[ModuleId], joined: &[ModuleId]) -> bool {
+        let Some(course) = &self.plant.coupled else { return false };
+        let room = course.end.since(self.now);
+        if self.is_cut_by_events() || room <= 64.0 * self.now.resolution() {
+            return false;
+        }
+        self.number_newcomers(seeds);
+        // Within a slice of time nobody sees what happens to others.
+        let sliced = self.settings.is_sliced();
+        let mut rings = if sliced { 0 } else { self.coupled.repairer.rings };
+        loop {
+            let region = self.region(seeds, rings);
+            if !sliced && region.members.len() as f64 > MOST * self.coupled.members.len() as f64 {
+                return false;
+            }
+            let Some(trial) = self.integrate(&region) else { return false };
+            if sliced {
+                self.coupled.members.extend_from_slice(joined);
+                self.take_over(&region, trial);
+                return true;
+            }
+            let reach = self.reach(&region, &trial);
+            let closed = region.rings.len() <= rings;
+            if reach < region.rings.len() || closed {
+                // One ring beyond the last that changed.
+                self.coupled.repairer.rings = (reach + 1).clamp(1, MAX_RINGS);
+                self.coupled.members.extend_from_slice(joined);
+                self.take_over(&region, trial);
+                return true;
+            }
+            rings *= 2;
+            if rings > MAX_RINGS {
+                return false;
+            }
+        }
+    }
+
+    /// Gives components to the parameters of modules that have begun new motions.
+    fn number_newcomers(&mut self, seeds: &[ModuleId]) {
+        let known = self.coupled.system.places.len();
+        for &id in seeds {
+            let fresh = |s: &super::state::State| s.motions.iter().any(|m| matches!(m, Motion::Step(_)));
+            if !self.plant.state(id).is_some_and(fresh) {
+                continue;
+            }
+            self.settle_values(id);
+            let state = self.plant.state(id).expect("a seed");
+            for parameter in integrated(self.model, state) {
+                let course = self.plant.coupled.as_mut().expect("seen above");
+                let component = course.add(known) as u32;
+                self.plant.state_mut(id).expect("a seed").motions[parameter] = Motion::Coupled(component);
+            }
+        }
+    }
+
+    /// Makes the present values of a module's integrated parameters those of the tree.
+    fn settle_values(&mut self, id: ModuleId) {
+        let mut values = Vec::new();
+        self.plant.values(id, self.now, &mut values);
+        let first = self.plant.tree.places(id).start;
+        let state = self.plant.state(id).expect("a seed");
+        for parameter in integrated(self.model, state) {
+            self.plant.tree.set_value(first + parameter, values[parameter]);
+        }
+    }
+
+    /// The seeds and so many rings around them.
+    fn region(&mut self, seeds: &[ModuleId], rings: usize) -> Region {
+        self.coupled.repairer.visit += 1;
+        let visit = self.coupled.repairer.visit;
+        let mut region = Region { members: Vec::new(), rings: vec![0] };
+        for &id in seeds {
+            self.plant.state_mut(id).expect("a seed").visited = visit;
+            region.members.push(id);
+        }
+        let mut next = Vec::new();
+        for _ in 0..rings {
+            let from = *region.rings.last().expect("the seeds");
+            for &id in &region.members[from..] {
+                self.readers(id, |reader, _| next.push(reader));
+            }
+            region.rings.push(region.members.len());
+            for id in next.drain(..) {
+                let state = self.plant.state_mut(id).expect("a reader");
+                if state.coupled && std::mem::replace(&mut state.visited, visit) != visit {
+                    region.members.push(id);
+                }
+            }
+            if region.rings.last() == Some(&region.members.len()) {
+                region.rings.pop();
+                break;
+            }
+        }
+        region
+    }
+
+    /// The motion of a region from now to the end of the common step.
+    fn integrate(&mut self, region: &Region) -> Option<Trial> {
+        let course = self.plant.coupled.as_ref()?;
+        let mut components = Vec::new();
+        let mut y = Vec::new();
+        for &id in &region.members {
+            let (state, values) = (self.plant.state(id)?, self.plant.tree.parameters(id));
+            for parameter in integrated(self.model, state) {
+                if let Motion::Coupled(component) = state.motions[parameter] {
+                    components.push(component);
+                    y.push(course.value(component as usize, self.now).unwrap_or(values[parameter]));
+                }
+            }
+        }
+        let Repairer { integrator, control, numbers, .. } = &mut self.coupled.repairer;
+        for (number, &component) in components.iter().enumerate() {
+            if numbers.len() <= component as usize {
+                numbers.resize(component as usize + 1, NOT_HERE);
+            }
+            numbers[component as usize] = number as u32;
+        }
+        let number = |component: u32| numbers.get(component as usize).copied().filter(|n| *n != NOT_HERE);
+        let rules = &self.model.rules;
+        let mut system =
+            System::new(rules, &self.plant, &region.members, self.now, number, self.settings.is_sliced());
+        for &component in &components {
+            numbers[component as usize] = NOT_HERE;
+        }
+        integrator.restart(self.settings.method, y.len());
+        let (mut from, mut stretches) = (self.now, Vec::new());
+        while course.end.since(from) > 0.0 {
+            if stretches.len() >= MAX_STEPS {
+                return None;
+            }
+            let mut equations = Equations::new(&system, rules, Some(course));
+            let end = Some(course.end);
+            let stats = &mut self.stats;
+            let step = integrator.step(&self.settings, control, &mut equations, &y, from, end, stats);
+            from = step.ok()?;
+            stretches.push(integrator.dense(&mut equations, &y));
+            integrator.advance(&mut y);
+            system.advance(from);
+        }
+        Some(Trial { stretches, components })
+    }
+
+    /// The number of rings that a trial changes by more than may be neglected.
+    fn reach(&self, region: &Region, trial: &Trial) -> usize {
+        let Some(course) = &self.plant.coupled else { return 0 };
+        let tolerance = INNER_TOLERANCE * self.settings.tolerance;
+        let changes = |component: u32, number: usize| {
+            trial.stretches.iter().any(|dense| {
+                [0.5, 1.0].into_iter().any(|position| {
+                    let at = if position == 1.0 { dense.end } else { dense.start.after(position * dense.h) };
+                    let new = dense.value(number, position);
+                    let old = course.value(component as usize, at);
+                    old.is_none_or(|old| (new - old).abs() > tolerance * new.abs().max(old.abs()))
+                })
+            })
+        };
+        let mut number = trial.components.len();
+        for (ring, &from) in region.rings.iter().enumerate().rev() {
+            let to = region.rings.get(ring + 1).copied().unwrap_or(region.members.len());
+            for id in region.members[from..to].iter().rev() {
+                let state = self.plant.state(*id).expect("a member");
+                for parameter in integrated(self.model, state).into_iter().rev() {
+                    if let Motion::Coupled(component) = state.motions[parameter] {
+                        number -= 1;
+                        if changes(component, number) {
+                            return ring + 1;
+                        }
+                    }
+                }
+            }
+        }
+        0
+    }
+
+    /// Makes a trial the motion of its region, and finds the region's next events.
+    fn take_over(&mut self, region: &Region, trial: Trial) {
+        let all = self.coupled.system.places.len();
+        let course: &mut Course = self.plant.coupled.as_mut().expect("seen above");
+        course.replace(trial.stretches, &trial.components, all);
+        self.coupled.repaired = true;
+        let now: Instant = self.now;
+        for &id in &region.members {
+            let state = self.plant.state_mut(id).expect("a member");
+            state.pass_changes(now);
+            state.next = Next::default();
+            self.queue.cancel(Who::Module(id.slot() as u32));
+            self.search_member(id, now);
+        }
+    }
+}
