@@ -7,6 +7,7 @@
 //! - [`cli`]: the program as it is typed.
 //! - [`inspect`]: what `explain`, `--events` and `check --continuity` say.
 //! - [`export`]: SVG and OBJ, read back by other people's code.
+//! - [`schedulers`]: local repair against one clock, remembered neighbours against the whole string.
 //! - [`report`]: studies of methods, and hard cases with exact answers.
 
 mod cli;
@@ -17,4 +18,5 @@ mod inspect;
 mod language;
 mod listings;
 mod report;
+mod schedulers;
 mod semantics;
