@@ -212,7 +212,7 @@ impl Simulation<'_> {
     /// Makes a step of the coupled modules and searches it.
     fn step_coupled(&mut self, from: Instant) -> Result<(), Error> {
         let rules = &self.model.rules;
-        let known = self.queue.peek().map_or(f64::INFINITY, |entry| entry.at.since(from));
+        let known = self.coming().map_or(f64::INFINITY, |coming| coming.at().since(from));
         let Coupled { system, y, integrator, control, linear, .. } = &mut self.coupled;
         let dense = match linear {
             Some(linear) => {

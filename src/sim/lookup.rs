@@ -17,14 +17,17 @@ const EQUAL: f64 = 8.0 * f64::EPSILON;
 /// Sides closer together than this part of the module's size may be equal but for the resolution of time.
 pub(super) const NEAR: f64 = 1e-9;
 
+/// The sign of an atom of a module that comes from nowhere, by its two sides.
+pub(super) fn sign_at_birth(a: f64, b: f64) -> Sign {
+    let (difference, size) = (a - b, a.abs().max(b.abs()));
+    let equal = size.is_finite() && difference.abs() <= EQUAL * size;
+    if equal { Sign::Zero } else { Sign::of(difference) }
+}
+
 impl Simulation<'_> {
     /// Finds the rule and context of every module for which they may be new, and opens it if they are.
     pub(super) fn look_up(&mut self) {
         let model = self.model;
-        let slots = self.plant.tree.slots();
-        if self.plant.states.len() < slots {
-            self.plant.states.resize(slots, None);
-        }
         let mut fresh = std::mem::take(&mut self.fresh);
         for id in fresh.drain(..) {
             // It may have been replaced already, within the same instant.
@@ -66,7 +69,7 @@ impl Simulation<'_> {
                 if state.is_none_or(|s| s.rule.is_some()) {
                     self.plant.materialise(id, self.now);
                     self.forget(id);
-                    self.plant.states[id.slot()] = Some(State::new(id));
+                    self.plant.new_state(id);
                 }
                 continue;
             };
@@ -75,7 +78,7 @@ impl Simulation<'_> {
             }
         }
         let plant = &self.plant;
-        self.opened.retain(|id| plant.state(*id).is_some_and(|s| s.rule.is_some()));
+        self.opened.retain(|id| plant.state(*id).is_some_and(|s| s.rule.is_some()) || plant.is_light(*id));
         self.contextual = contextual;
     }
 
@@ -102,9 +105,9 @@ impl Simulation<'_> {
         }
         let was_open = before.is_some_and(|s| s.open.is_some());
         if before.is_none() {
-            self.plant.states[id.slot()] = Some(State::new(id));
+            self.plant.new_state(id);
         }
-        let state = self.plant.states[id.slot()].as_mut().expect("just made");
+        let state = self.plant.state_mut(id).expect("just made");
         state.rule = Some(rule);
         state.context = SmallVec::from_slice(context);
         state.solve = None;

@@ -45,20 +45,30 @@ impl Simulation<'_> {
                 self.look_up();
             }
             let mut firing = self.judge();
-            if firing.is_empty() && !self.opened.is_empty() {
+            let mut light = std::mem::take(&mut self.firing_light);
+            if firing.is_empty() && light.is_empty() && !self.opened.is_empty() {
                 self.choose_equations(&mut hurried, &mut firing)?;
             }
-            if firing.is_empty() {
-                self.recycle(firing);
+            if firing.is_empty() && light.is_empty() {
+                (self.firing, self.firing_light) = (firing, light);
                 break;
             }
             rounds += 1;
             if rounds > MAX_ROUNDS {
-                let site = self.site(&firing[0]);
+                let first = light.first().copied().unwrap_or_else(|| firing[0].id);
+                let site = self.site_of_firing(first, firing.first());
                 return Err(if hurried { Error::Zeno { site } } else { Error::Cascade { site, rounds } });
             }
-            self.replace(&firing, rounds)?;
-            self.recycle(firing);
+            if firing.iter().all(|fire| self.plant.is_light(fire.id)) {
+                light.extend(firing.iter().map(|fire| fire.id));
+                self.replace_all_light(&light, rounds)?;
+            } else {
+                self.promote_all(&light, &mut firing);
+                self.replace(&firing, rounds)?;
+            }
+            firing.clear();
+            light.clear();
+            (self.firing, self.firing_light) = (firing, light);
         }
         self.finish_transitions();
         self.begin_phases()
@@ -106,6 +116,9 @@ impl Simulation<'_> {
         let mut firing = std::mem::take(&mut self.firing);
         let plant = &self.plant;
         firing.extend(self.opened.iter().filter_map(|&id| {
+            if let Some(career) = plant.careers.get(plant.tree.label_if_alive(id)?) {
+                return Some(Firing { id, rule: career.rule, produce: career.produce()? });
+            }
             let state = plant.state(id)?;
             let (rule, open) = (state.rule?, state.open.as_ref()?);
             let produces = &self.model.rules[rule].produces;
@@ -115,9 +128,44 @@ impl Simulation<'_> {
         firing
     }
 
-    fn recycle(&mut self, mut firing: Vec<Firing>) {
-        firing.clear();
-        self.firing = firing;
+    /// Replaces light modules: none reads what another is replaced by.
+    fn replace_all_light(&mut self, light: &[ModuleId], rounds: usize) -> Result<(), Error> {
+        for &id in light {
+            self.replace_light(id, rounds)?;
+        }
+        self.structure += 1;
+        self.changed = true;
+        let plant = &self.plant;
+        self.opened.retain(|id| plant.state(*id).is_some());
+        Ok(())
+    }
+
+    /// Makes all productions of a round such as are known of modules with a state, those of light ones first.
+    fn promote_all(&mut self, light: &[ModuleId], firing: &mut Vec<Firing>) {
+        for fire in firing.iter() {
+            self.promote(fire.id);
+        }
+        let mut all = Vec::new();
+        for &id in light {
+            self.promote(id);
+            all.extend(self.fire_quickly(id.slot()));
+        }
+        all.append(firing);
+        *firing = all;
+    }
+
+    /// The place of a production that is one too many.
+    fn site_of_firing(&mut self, id: ModuleId, other: Option<&Firing>) -> super::error::Site {
+        let career = self.plant.careers.get(self.plant.tree.label(id));
+        let known = career.and_then(|career| Some((career.rule, career.produce()?)));
+        match (known, other) {
+            (Some((rule, produce)), _) => {
+                self.stand_still(id);
+                self.site(&Firing { id, rule, produce })
+            }
+            (None, Some(fire)) => self.site(fire),
+            (None, None) => self.site_of(id, 0, Default::default(), self.now.to_f64()),
+        }
     }
 
     /// Replaces all modules in parallel: every successor is computed before any is put in.
@@ -161,6 +209,7 @@ impl Simulation<'_> {
         }
         self.arguments = all;
         self.argument_ends = ends;
+        self.structure += 1;
         self.changed = true;
         let plant = &self.plant;
         self.opened.retain(|id| plant.state(*id).is_some());

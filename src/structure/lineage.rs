@@ -15,7 +15,23 @@ pub struct Lineage {
     pub generation: u32,
     /// Places in the successors of the last eight generations, one byte each, the latest lowest;
     /// for people to read.
+    pub(super) trail: u64,
+}
+
+/// The successors of one production, as far as their lineages have in common.
+#[derive(Clone, Copy, Debug)]
+pub struct Brood {
+    mixed: u64,
+    generation: u32,
     trail: u64,
+}
+
+impl Brood {
+    /// The module at a place of the successor.
+    pub fn child(self, place: usize) -> Lineage {
+        let Brood { mixed, generation, .. } = self;
+        Lineage { id: mix(mixed, place as u64), generation, trail: trail(self.trail, place) }
+    }
 }
 
 impl Lineage {
@@ -27,10 +43,15 @@ impl Lineage {
     /// The module at a place of the successor by which a production (a number that tells the
     /// productions of a model apart) replaced this module.
     pub fn child(self, production: usize, place: usize) -> Lineage {
-        Lineage {
-            id: mix(mix(self.id, production as u64), place as u64),
+        self.brood(production).child(place)
+    }
+
+    /// What all modules of the successor, by a production, have in common.
+    pub fn brood(self, production: usize) -> Brood {
+        Brood {
+            mixed: mix(self.id, production as u64),
             generation: self.generation.saturating_add(1),
-            trail: trail(self.trail, place),
+            trail: self.trail,
         }
     }
 

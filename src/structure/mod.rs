@@ -10,8 +10,10 @@ mod instant;
 mod lineage;
 mod string;
 mod tree;
+mod walk;
 
 pub use instant::Instant;
-pub use lineage::Lineage;
-pub use string::{Module, ModuleString};
-pub use tree::{ModuleId, Tree, Visit, Walk};
+pub use lineage::{Brood, Lineage};
+pub use string::{Module, ModuleString, Version};
+pub use tree::{ModuleId, NO_LABEL, Tree};
+pub use walk::{Visit, Walk};

@@ -3,13 +3,17 @@
 //! An axis is a doubly linked list of modules and branches; a branch holds an axis of its own. So a
 //! production costs what it replaces, and string order is a walk. Slots are used again, and a
 //! [`ModuleId`] carries the generation of its slot, so that an old id never means a new module.
+//!
+//! All that is known of a module but its parameters is one record of 64 bytes: at a million modules, what an event
+//! costs is the number of places in memory that it looks at.
 
-use super::{Instant, Lineage, ModuleString};
+use smallvec::SmallVec;
+
+use super::{Instant, Lineage, Visit, Walk};
 use crate::model::{KindId, Successor};
 
-const NONE: u32 = u32::MAX;
 /// The branch that holds the main axis.
-const TRUNK: u32 = 0;
+pub(super) const TRUNK: u32 = 0;
 
 /// A module in a [`Tree`], while it lives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -23,60 +27,84 @@ impl ModuleId {
     pub fn slot(self) -> usize {
         self.slot as usize
     }
+
+    /// Slot and generation, to be kept more tightly, and the way back.
+    pub(crate) fn parts(self) -> (u32, u32) {
+        (self.slot, self.generation)
+    }
+
+    pub(crate) fn of_parts(slot: u32, generation: u32) -> ModuleId {
+        ModuleId { slot, generation }
+    }
 }
 
+/// What stands before or after on an axis: a module or a branch, by its slot; or nothing, and then it is known which
+/// branch the axis belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Link(pub(super) u32);
+
+impl Link {
+    const END: u32 = 1 << 31;
+
+    /// The end of a branch's axis.
+    fn end_of(branch: u32) -> Link {
+        Link(branch | Link::END)
+    }
+
+    /// The branch whose axis ends here.
+    pub(super) fn ended(self) -> Option<u32> {
+        (self.0 & Link::END != 0).then_some(self.0 & !Link::END)
+    }
+}
+
+/// No module has this label.
+pub const NO_LABEL: u32 = u32::MAX;
+
 #[derive(Clone, Copy, Debug)]
-struct Node {
+pub(super) struct Node {
     /// `KindId::OPEN` for a branch.
-    kind: KindId,
-    generation: u32,
-    /// The branch whose axis this is on.
-    parent: u32,
-    before: u32,
-    after: u32,
-    /// Ends of a branch's own axis.
-    first: u32,
-    last: u32,
-    /// Where the parameters begin.
-    values: u32,
-    birth: Instant,
-    lineage: Lineage,
+    pub kind: KindId,
+    /// Of the slot.
+    pub generation: u32,
+    before: Link,
+    pub after: Link,
+    /// Where the parameters begin; of a branch, what its own axis begins with.
+    pub first: u32,
+    pub label: u32,
+    /// The lineage, in parts that leave no gap.
+    descent: u32,
+    id: u64,
+    trail: u64,
+    pub birth: Instant,
 }
 
 /// The modules alive, their order and their parameters.
 #[derive(Clone, Debug)]
 pub struct Tree {
-    nodes: Vec<Node>,
+    pub(super) nodes: Vec<Node>,
     free: Vec<u32>,
-    values: Vec<f64>,
+    pub(super) values: Vec<f64>,
     /// Free blocks of `values`, by their length.
     free_values: Vec<Vec<u32>>,
-    arities: Vec<u32>,
+    pub(super) arities: Vec<u32>,
     modules: usize,
-}
-
-/// What a walk in string order meets.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Visit {
-    Module(ModuleId),
-    Open,
-    Close,
 }
 
 impl Tree {
     /// An empty structure; `arities` gives the number of parameters of each kind.
     pub fn new(arities: Vec<u32>) -> Tree {
+        let nobody = Lineage::of_axiom(0);
         let trunk = Node {
             kind: KindId::OPEN,
             generation: 0,
-            parent: NONE,
-            before: NONE,
-            after: NONE,
-            first: NONE,
-            last: NONE,
-            values: 0,
+            before: Link::end_of(TRUNK),
+            after: Link::end_of(TRUNK),
+            first: Link::end_of(TRUNK).0,
+            label: NO_LABEL,
+            descent: nobody.generation,
+            id: nobody.id,
+            trail: nobody.trail,
             birth: Instant::ZERO,
-            lineage: Lineage::of_axiom(0),
         };
         Tree {
             nodes: vec![trunk],
@@ -125,14 +153,27 @@ impl Tree {
     }
 
     pub fn lineage(&self, id: ModuleId) -> Lineage {
-        self.node(id).lineage
+        self.node(id).lineage()
+    }
+
+    /// A number that the owner of the tree has given to a module; [`NO_LABEL`] from birth on.
+    pub fn label(&self, id: ModuleId) -> u32 {
+        self.node(id).label
+    }
+
+    pub fn set_label(&mut self, id: ModuleId, label: u32) {
+        self.nodes[id.slot()].label = label;
+    }
+
+    /// The label of a module that may be dead: then there is none.
+    pub fn label_if_alive(&self, id: ModuleId) -> Option<u32> {
+        let node = &self.nodes[id.slot()];
+        (node.generation == id.generation).then_some(node.label)
     }
 
     /// Places of a module's parameters in [`Tree::values`].
     pub fn places(&self, id: ModuleId) -> std::ops::Range<usize> {
-        let node = self.node(id);
-        let first = node.values as usize;
-        first..first + self.arities[node.kind.index()] as usize
+        self.node(id).places(&self.arities)
     }
 
     pub fn parameters(&self, id: ModuleId) -> &[f64] {
@@ -148,31 +189,33 @@ impl Tree {
         self.values[place] = value;
     }
 
-    fn allocate(&mut self, kind: KindId, parent: u32, birth: Instant, lineage: Lineage) -> u32 {
-        let arity = self.arities[kind.index()] as usize;
-        let values = match self.free_values.get_mut(arity).and_then(Vec::pop) {
-            Some(place) if arity > 0 => place,
-            _ => {
-                self.values.resize(self.values.len() + arity, 0.0);
-                (self.values.len() - arity) as u32
-            }
-        };
-        let node = Node {
+    /// Puts a node into a slot. What is after it is not known yet.
+    fn allocate(&mut self, kind: KindId, before: Link, birth: Instant, lineage: Lineage) -> u32 {
+        let mut node = Node {
             kind,
             generation: 0,
-            parent,
-            before: NONE,
-            after: NONE,
-            first: NONE,
-            last: NONE,
-            values,
+            before,
+            after: before,
+            first: 0,
+            label: NO_LABEL,
+            descent: lineage.generation,
+            id: lineage.id,
+            trail: lineage.trail,
             birth,
-            lineage,
         };
+        let arity = self.arities[kind.index()] as usize;
+        if arity > 0 {
+            let known = self.free_values.get_mut(arity).and_then(Vec::pop);
+            node.first = known.unwrap_or_else(|| {
+                self.values.resize(self.values.len() + arity, 0.0);
+                (self.values.len() - arity) as u32
+            });
+        }
         match self.free.pop() {
             Some(slot) => {
-                let generation = self.nodes[slot as usize].generation;
-                self.nodes[slot as usize] = Node { generation, ..node };
+                let place = &mut self.nodes[slot as usize];
+                node.generation = place.generation;
+                *place = node;
                 slot
             }
             None => {
@@ -185,33 +228,26 @@ impl Tree {
     fn release(&mut self, slot: u32) {
         let node = &mut self.nodes[slot as usize];
         node.generation = node.generation.wrapping_add(1);
-        let (arity, values) = (self.arities[node.kind.index()] as usize, node.values);
+        let (arity, first) = (self.arities[node.kind.index()] as usize, node.first);
         self.free.push(slot);
         if arity > 0 {
             if self.free_values.len() <= arity {
                 self.free_values.resize(arity + 1, Vec::new());
             }
-            self.free_values[arity].push(values);
+            self.free_values[arity].push(first);
         }
     }
 
-    /// Puts `slot` on its parent's axis between two neighbours.
-    fn link(&mut self, slot: u32, before: u32, after: u32) {
-        let parent = self.nodes[slot as usize].parent;
-        let node = &mut self.nodes[slot as usize];
-        (node.before, node.after) = (before, after);
-        match before {
-            NONE => self.nodes[parent as usize].first = slot,
-            b => self.nodes[b as usize].after = slot,
-        }
-        match after {
-            NONE => self.nodes[parent as usize].last = slot,
-            a => self.nodes[a as usize].before = slot,
+    /// Sets what comes after `before`, which may be the beginning of an axis.
+    fn link_forward(&mut self, before: Link, after: Link) {
+        match before.ended() {
+            Some(branch) => self.nodes[branch as usize].first = after.0,
+            None => self.nodes[before.0 as usize].after = after,
         }
     }
 
-    /// Appends a string at the end of the main axis. `lineage` names the module at each place (from 0,
-    /// brackets not counted). The new modules are added to `made`.
+    /// Appends a string at the end of the main axis, in time proportional to its length. `lineage` names the module
+    /// at each place (from 0, brackets not counted). The new modules are added to `made`.
     pub fn append(
         &mut self,
         string: &Successor,
@@ -220,8 +256,12 @@ impl Tree {
         lineage: impl Fn(usize) -> Lineage,
         made: &mut Vec<ModuleId>,
     ) {
-        let last = self.nodes[TRUNK as usize].last;
-        self.insert(TRUNK, last, NONE, string, arguments, birth, lineage, made);
+        let mut last = Link::end_of(TRUNK);
+        let mut next = Link(self.nodes[TRUNK as usize].first);
+        while next.ended().is_none() {
+            (last, next) = (next, self.nodes[next.0 as usize].after);
+        }
+        self.insert(last, next, string, arguments, birth, lineage, made);
     }
 
     /// Replaces a module by a string.
@@ -234,45 +274,39 @@ impl Tree {
         lineage: impl Fn(usize) -> Lineage,
         made: &mut Vec<ModuleId>,
     ) {
-        let Node { parent, before, after, .. } = *self.node(id);
-        match before {
-            NONE => self.nodes[parent as usize].first = after,
-            b => self.nodes[b as usize].after = after,
-        }
-        match after {
-            NONE => self.nodes[parent as usize].last = before,
-            a => self.nodes[a as usize].before = before,
-        }
+        let Node { before, after, .. } = *self.node(id);
         self.release(id.slot);
         self.modules -= 1;
-        self.insert(parent, before, after, string, arguments, birth, lineage, made);
+        self.insert(before, after, string, arguments, birth, lineage, made);
     }
 
+    /// Puts a string between two neighbours.
     #[allow(clippy::too_many_arguments)]
     fn insert(
         &mut self,
-        mut parent: u32,
-        mut before: u32,
-        mut after: u32,
+        mut before: Link,
+        after: Link,
         string: &Successor,
         arguments: &[f64],
         birth: Instant,
         lineage: impl Fn(usize) -> Lineage,
         made: &mut Vec<ModuleId>,
     ) {
-        // Where to go on after each branch that is open.
-        let mut outer: Vec<(u32, u32, u32)> = Vec::new();
+        // The branches that are open.
+        let mut branches: SmallVec<[u32; 8]> = SmallVec::new();
         let (mut place, mut next) = (0, 0);
         for &kind in &string.kinds {
             if kind == KindId::CLOSE {
-                (parent, before, after) = outer.pop().expect("brackets match: the front end saw to it");
+                let branch = branches.pop().expect("brackets match: the front end saw to it");
+                self.link_forward(before, Link::end_of(branch));
+                before = Link(branch);
                 continue;
             }
-            let slot = self.allocate(kind, parent, birth, lineage(place));
-            self.link(slot, before, after);
+            let slot = self.allocate(kind, before, birth, lineage(place));
+            self.link_forward(before, Link(slot));
             if kind == KindId::OPEN {
-                outer.push((parent, slot, after));
-                (parent, before, after) = (slot, NONE, NONE);
+                branches.push(slot);
+                before = Link::end_of(slot);
                 continue;
             }
             let id = self.id(slot);
@@ -281,9 +315,13 @@ impl Tree {
             self.values[places].copy_from_slice(&arguments[next..next + count]);
             next += count;
             place += 1;
-            before = slot;
+            before = Link(slot);
             self.modules += 1;
             made.push(id);
+        }
+        self.link_forward(before, after);
+        if after.ended().is_none() {
+            self.nodes[after.0 as usize].before = before;
         }
     }
 
@@ -292,17 +330,17 @@ impl Tree {
     pub fn left(&self, id: ModuleId, skipped: impl Fn(KindId) -> bool) -> Option<ModuleId> {
         let mut at = id.slot;
         loop {
-            let node = &self.nodes[at as usize];
-            at = match (node.before, node.parent) {
-                (NONE, NONE | TRUNK) => return None,
+            let before = self.nodes[at as usize].before;
+            at = match before.ended() {
+                Some(TRUNK) => return None,
                 // The first of a branch grows from what stands before the branch.
-                (NONE, branch) => branch,
-                (before, _) => {
-                    let kind = self.nodes[before as usize].kind;
+                Some(branch) => branch,
+                None => {
+                    let kind = self.nodes[before.0 as usize].kind;
                     if kind != KindId::OPEN && !skipped(kind) {
-                        return Some(self.id(before));
+                        return Some(self.id(before.0));
                     }
-                    before
+                    before.0
                 }
             };
         }
@@ -311,10 +349,10 @@ impl Tree {
     /// The next module on the same axis, side branches and modules of skipped kinds passed over.
     pub fn right(&self, id: ModuleId, skipped: impl Fn(KindId) -> bool) -> Option<ModuleId> {
         let mut at = self.node(id).after;
-        while at != NONE {
-            let node = &self.nodes[at as usize];
+        while at.ended().is_none() {
+            let node = &self.nodes[at.0 as usize];
             if node.kind != KindId::OPEN && !skipped(node.kind) {
-                return Some(self.id(at));
+                return Some(self.id(at.0));
             }
             at = node.after;
         }
@@ -323,9 +361,8 @@ impl Tree {
 
     /// True if a module of a certain kind stands after this one on its axis, or on a branch of that.
     pub fn is_followed(&self, id: ModuleId, wanted: impl Fn(KindId) -> bool) -> bool {
-        let node = self.node(id);
         let mut depth = 0usize;
-        for visit in (Walk { tree: self, next: node.after, inside: node.parent }) {
+        for visit in Walk::new(self, self.node(id).after) {
             match visit {
                 Visit::Module(id) if wanted(self.kind(id)) => return true,
                 Visit::Module(_) => {}
@@ -336,67 +373,16 @@ impl Tree {
         }
         false
     }
-
-    /// All modules and brackets in string order.
-    pub fn walk(&self) -> Walk<'_> {
-        Walk { tree: self, next: self.nodes[TRUNK as usize].first, inside: TRUNK }
-    }
-
-    /// Writes the structure out; `values` appends the parameters of a module.
-    pub fn write(
-        &self,
-        now: Instant,
-        time: f64,
-        out: &mut ModuleString,
-        mut values: impl FnMut(ModuleId, &mut Vec<f64>),
-    ) {
-        out.reset(time);
-        let mut parameters = Vec::new();
-        // Brackets are no modules and have no identity.
-        let nobody = Lineage::of_axiom(0);
-        for visit in self.walk() {
-            match visit {
-                Visit::Open => out.push(KindId::OPEN, [], 0.0, nobody),
-                Visit::Close => out.push(KindId::CLOSE, [], 0.0, nobody),
-                Visit::Module(id) => {
-                    let node = self.node(id);
-                    let age = now.since(node.birth).max(0.0);
-                    parameters.clear();
-                    values(id, &mut parameters);
-                    out.push(node.kind, parameters.iter().copied(), age, node.lineage);
-                }
-            }
-        }
-    }
 }
 
-/// Iterator of [`Tree::walk`].
-pub struct Walk<'t> {
-    tree: &'t Tree,
-    next: u32,
-    inside: u32,
-}
+impl Node {
+    pub fn lineage(&self) -> Lineage {
+        Lineage { id: self.id, generation: self.descent, trail: self.trail }
+    }
 
-impl Iterator for Walk<'_> {
-    type Item = Visit;
-
-    fn next(&mut self) -> Option<Visit> {
-        if self.next == NONE {
-            if self.inside == TRUNK {
-                return None;
-            }
-            let branch = &self.tree.nodes[self.inside as usize];
-            (self.next, self.inside) = (branch.after, branch.parent);
-            return Some(Visit::Close);
-        }
-        let slot = self.next;
-        let node = &self.tree.nodes[slot as usize];
-        if node.kind == KindId::OPEN {
-            (self.next, self.inside) = (node.first, slot);
-            return Some(Visit::Open);
-        }
-        self.next = node.after;
-        Some(Visit::Module(self.tree.id(slot)))
+    pub fn places(&self, arities: &[u32]) -> std::ops::Range<usize> {
+        let first = self.first as usize;
+        first..first + arities[self.kind.index()] as usize
     }
 }
 
