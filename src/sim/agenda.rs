@@ -1,25 +1,36 @@
 //! The events of light modules, in order of time.
 //!
-//! An entry is 16 bytes: the time as a float, and who it is. Instants to all their digits are computed again for those
-//! that come first (`light`), so entries of one float are one bundle here, and order within it is decided there.
-//! Entries of modules that are light no more stay until their time and are passed over then.
+//! An entry is 12 bytes: the time as a float, and the slot. Instants to all their digits are computed again for those
+//! that come first (`light`), so entries of one float are one bundle here, and order within it is decided there. A
+//! light module stays what it is until its event, so nothing is ever taken back.
 
-use crate::structure::ModuleId;
-
-/// An entry's slot, if it stands for many modules.
-const RUN: u32 = u32::MAX;
+/// An entry's slot has this bit if it is the number of a run; a tree has no such slots.
+const RUN: u32 = 1 << 31;
 /// Children of an entry in the heap: four lie in one line of the cache.
 const ARITY: usize = 4;
 /// Times that are remembered, so that equal ones meet.
 const RECENT: usize = 16;
 const NOWHERE: u32 = u32::MAX;
 
+/// The time in halves, so that four bytes less are needed.
 #[derive(Clone, Copy, Debug)]
 struct Entry {
-    time: f64,
-    /// `RUN`: `generation` is the number of a run.
+    high: u32,
+    low: u32,
     slot: u32,
-    generation: u32,
+}
+
+impl Entry {
+    #[inline]
+    fn new(time: f64, slot: u32) -> Entry {
+        let bits = time.to_bits();
+        Entry { high: (bits >> 32) as u32, low: bits as u32, slot }
+    }
+
+    #[inline]
+    fn time(self) -> f64 {
+        f64::from_bits(u64::from(self.high) << 32 | u64::from(self.low))
+    }
 }
 
 /// A heap of events in which many of one time are one entry: a thousand cells that divide together cost one place in
@@ -29,7 +40,7 @@ pub struct Agenda {
     heap: Vec<Entry>,
     /// The first place of the heap is empty: most events are followed by a later one, which is put there.
     hole: bool,
-    runs: Vec<Vec<ModuleId>>,
+    runs: Vec<Vec<u32>>,
     free_runs: Vec<u32>,
     /// Times lately put in, by a hash, with their runs.
     recent: [(u64, u32); RECENT],
@@ -53,12 +64,11 @@ fn recent_place(time: f64) -> usize {
 
 impl Agenda {
     /// Puts in an event. The time is a number.
-    pub fn push(&mut self, time: f64, id: ModuleId) {
+    pub fn push(&mut self, time: f64, slot: u32) {
         let recent = &mut self.recent[recent_place(time)];
         if recent.0 != time.to_bits() {
             *recent = (time.to_bits(), NOWHERE);
-            let (slot, generation) = id.parts();
-            return self.push_entry(Entry { time, slot, generation });
+            return self.push_entry(time, slot);
         }
         if recent.1 == NOWHERE {
             let run = self.free_runs.pop().unwrap_or(self.runs.len() as u32);
@@ -66,10 +76,10 @@ impl Agenda {
                 self.runs.push(Vec::new());
             }
             recent.1 = run;
-            self.push_entry(Entry { time, slot: RUN, generation: run });
+            self.push_entry(time, run | RUN);
         }
         let run = self.recent[recent_place(time)].1;
-        self.runs[run as usize].push(id);
+        self.runs[run as usize].push(slot);
     }
 
     /// The earliest time.
@@ -78,34 +88,36 @@ impl Agenda {
             false => self.heap.get(..1)?,
             true => self.heap.get(1..self.heap.len().min(ARITY + 1))?,
         };
-        first.iter().map(|entry| entry.time).reduce(f64::min)
+        first.iter().map(|entry| entry.time()).reduce(f64::min)
     }
 
     /// Takes out everything of the earliest time.
-    pub fn pop(&mut self, out: &mut Vec<ModuleId>) {
+    pub fn pop(&mut self, out: &mut Vec<u32>) {
         let Some(time) = self.earliest() else { return };
         while self.earliest() == Some(time) {
             self.fill_hole();
-            let Entry { slot, generation, .. } = self.heap[0];
+            let Entry { slot, .. } = self.heap[0];
             self.hole = true;
-            if slot != RUN {
-                out.push(ModuleId::of_parts(slot, generation));
+            if slot & RUN == 0 {
+                out.push(slot);
                 continue;
             }
+            let number = slot & !RUN;
             let recent = &mut self.recent[recent_place(time)];
-            if recent.1 == generation {
+            if recent.1 == number {
                 recent.1 = NOWHERE;
             }
-            let run = &mut self.runs[generation as usize];
+            let run = &mut self.runs[number as usize];
             match out.is_empty() {
                 true => std::mem::swap(out, run),
                 false => out.append(run),
             }
-            self.free_runs.push(generation);
+            self.free_runs.push(number);
         }
     }
 
-    fn push_entry(&mut self, entry: Entry) {
+    fn push_entry(&mut self, time: f64, slot: u32) {
+        let entry = Entry::new(time, slot);
         if self.hole {
             self.hole = false;
             return self.sift_down(entry);
@@ -114,7 +126,7 @@ impl Agenda {
         self.heap.push(entry);
         while at > 0 {
             let above = (at - 1) / ARITY;
-            if self.heap[above].time <= entry.time {
+            if self.heap[above].time() <= time {
                 break;
             }
             self.heap[at] = self.heap[above];
@@ -135,18 +147,20 @@ impl Agenda {
     /// Puts an entry into the first place, and sets the heap in order.
     fn sift_down(&mut self, entry: Entry) {
         let heap = &mut self.heap[..];
+        let wanted = entry.time();
         let mut at = 0;
         loop {
             let first = ARITY * at + 1;
             let Some(children) = heap.get(first..(first + ARITY).min(heap.len())) else { break };
             let mut least = 0;
-            let Some(mut time) = children.first().map(|child| child.time) else { break };
+            let Some(mut time) = children.first().map(|child| child.time()) else { break };
             for (i, child) in children.iter().enumerate().skip(1) {
-                if child.time < time {
-                    (least, time) = (i, child.time);
+                let its = child.time();
+                if its < time {
+                    (least, time) = (i, its);
                 }
             }
-            if time >= entry.time {
+            if time >= wanted {
                 break;
             }
             heap[at] = children[least];
@@ -171,14 +185,14 @@ mod tests {
                 if what == 0 {
                     let mut out = Vec::new();
                     agenda.pop(&mut out);
-                    let mut found: Vec<u32> = out.iter().map(|id| id.parts().0).collect();
+                    let mut found = out;
                     found.sort_unstable();
                     let first = list.iter().map(|e| e.0).min();
                     let wanted: Vec<u32> = list.iter().filter(|e| Some(e.0) == first).map(|e| e.1).collect();
                     prop_assert_eq!(found, wanted);
                     list.retain(|e| Some(e.0) != first);
                 } else {
-                    agenda.push(f64::from(time), ModuleId::of_parts(slot, 7));
+                    agenda.push(f64::from(time), slot);
                     list.push((time, slot));
                 }
                 prop_assert_eq!(agenda.earliest(), list.iter().map(|e| f64::from(e.0)).reduce(f64::min));

@@ -27,7 +27,7 @@ impl Simulation<'_> {
             label = child.label;
             self.plant.tree.set_label(id, label);
             if let Some(time) = child.time {
-                self.agenda.push(time, id);
+                self.agenda.push(time, id.slot() as u32);
             }
         }
         let Some(career) = self.plant.careers.get(label) else { return false };
@@ -110,8 +110,9 @@ impl Simulation<'_> {
         life
     }
 
-    /// The instant of a light module's event.
-    pub(super) fn event_of(&mut self, id: ModuleId) -> Instant {
+    /// The instant of the event of the light module in a slot.
+    pub(super) fn event_of(&mut self, slot: u32) -> Instant {
+        let id = self.plant.tree.id(slot);
         let label = self.plant.tree.label(id);
         let life = self.life(id, label);
         let at = life.at;
@@ -163,8 +164,9 @@ impl Simulation<'_> {
     }
 
     /// Replaces a light module whose event it is. Nothing that others of the instant read changes by that.
-    pub(super) fn replace_light(&mut self, id: ModuleId, rounds: usize) -> Result<(), Error> {
+    pub(super) fn replace_light(&mut self, slot: u32, rounds: usize) -> Result<(), Error> {
         let model = self.model;
+        let id = self.plant.tree.id(slot);
         let label = self.plant.tree.label(id);
         let career = self.plant.careers.get(label).expect("a light module");
         let (rule, produce) = (career.rule, career.produce().expect("it is its event"));
@@ -200,16 +202,16 @@ impl Simulation<'_> {
                 transition: None,
             });
         }
-        let brood = lineage.brood(rule << 16 | produce);
+        let family = lineage.family(rule << 16 | produce);
         let made = &mut self.made;
         made.clear();
-        tree.replace(id, successor, &life.arguments, self.now, |place| brood.child(place), made);
+        tree.replace(id, successor, &life.arguments, self.now, family, made);
         for (&id, child) in self.made.iter().zip(&life.children) {
             if child.label != NO_LABEL {
                 tree.set_label(id, child.label);
             }
             if let Some(time) = child.time {
-                self.agenda.push(time, id);
+                self.agenda.push(time, id.slot() as u32);
             }
             if child.open {
                 self.fresh.push(id);

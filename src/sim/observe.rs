@@ -79,8 +79,11 @@ impl Simulation<'_> {
         columns.resize(self.plant.careers.len(), Vec::new());
         others.clear();
         let plant = &self.plant;
-        plant.tree.write(t, now, out, |id, label, birth, from, to| match columns.get_mut(label as usize) {
-            Some(rows) => rows.push(Row { birth, from: from as u32, to: to as u32 }),
+        plant.tree.write(t, now, out, |id, label, from, to| match columns.get_mut(label as usize) {
+            Some(rows) => {
+                let birth = plant.tree.birth(id);
+                rows.push(Row { birth, from: from as u32, to: to as u32 });
+            }
             None if plant.state(id).is_some() => others.push((id, to)),
             None => {}
         });

@@ -20,22 +20,23 @@ pub(super) struct Front {
     instants: Vec<Instant>,
     first: Instant,
     /// In order of instants and slots.
-    members: Vec<ModuleId>,
+    members: Vec<u32>,
     /// How many of them are gone.
     passed: usize,
 }
 
 impl Front {
-    fn head(&self) -> Option<(Instant, ModuleId)> {
-        let id = *self.members.get(self.passed)?;
-        Some((self.instants.get(self.passed).copied().unwrap_or(self.first), id))
+    fn head(&self) -> Option<(Instant, u32)> {
+        let slot = *self.members.get(self.passed)?;
+        Some((self.instants.get(self.passed).copied().unwrap_or(self.first), slot))
     }
 }
 
 /// What is known to come.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Coming {
-    Light(Instant, ModuleId),
+    /// The slot of a light module.
+    Light(Instant, u32),
     Other(Entry),
 }
 
@@ -54,18 +55,18 @@ impl Simulation<'_> {
         let light = self.light_head();
         let other = self.queue.peek_other();
         match (light, other) {
-            (Some((at, id)), Some(entry)) => {
+            (Some((at, slot)), Some(entry)) => {
                 let order = at.partial_cmp(&entry.at).unwrap_or(Ordering::Equal);
-                let first = order.then(Who::Module(id.slot() as u32).cmp(&entry.who)) == Ordering::Less;
-                Some(if first { Coming::Light(at, id) } else { Coming::Other(entry) })
+                let first = order.then(Who::Module(slot).cmp(&entry.who)) == Ordering::Less;
+                Some(if first { Coming::Light(at, slot) } else { Coming::Other(entry) })
             }
-            (Some((at, id)), None) => Some(Coming::Light(at, id)),
+            (Some((at, slot)), None) => Some(Coming::Light(at, slot)),
             (None, other) => other.map(Coming::Other),
         }
     }
 
     /// The first light event.
-    fn light_head(&mut self) -> Option<(Instant, ModuleId)> {
+    fn light_head(&mut self) -> Option<(Instant, u32)> {
         let next = self.agenda.earliest();
         if let Some(head) = self.front.head() {
             if next.is_none_or(|next| next > self.front.time) {
@@ -73,43 +74,30 @@ impl Simulation<'_> {
             }
             // Something came up that is not later.
             let Front { time, members, passed, .. } = &mut self.front;
-            for &id in &members[*passed..] {
-                self.agenda.push(*time, id);
+            for &slot in &members[*passed..] {
+                self.agenda.push(*time, slot);
             }
         }
-        loop {
-            let mut members = std::mem::take(&mut self.front.members);
-            members.clear();
-            self.front.instants.clear();
-            self.front.passed = 0;
-            let Some(time) = self.agenda.earliest() else {
-                self.front.members = members;
-                return None;
-            };
-            self.agenda.pop(&mut members);
-            members.retain(|id| self.plant.is_light(*id));
-            let Some(&some) = members.first() else {
-                self.front.members = members;
-                continue;
-            };
-            self.front.time = time;
+        let mut members = std::mem::take(&mut self.front.members);
+        members.clear();
+        self.front.instants.clear();
+        self.front.passed = 0;
+        self.front.time = self.agenda.earliest().unwrap_or(f64::INFINITY);
+        self.agenda.pop(&mut members);
+        if let Some(&some) = members.first() {
             self.front.first = self.event_of(some);
-            let other = members.iter().position(|id| self.event_of(*id) != self.front.first);
-            if other.is_none() {
-                if !members.is_sorted() {
-                    members.sort_unstable();
-                }
-            } else {
-                let mut all: Vec<(Instant, ModuleId)> =
-                    members.iter().map(|id| (self.event_of(*id), *id)).collect();
-                all.sort_unstable_by(|a, b| a.partial_cmp(b).unwrap_or(Ordering::Equal));
-                members.clear();
-                members.extend(all.iter().map(|(_, id)| *id));
-                self.front.instants.extend(all.iter().map(|(at, _)| *at));
-            }
-            self.front.members = members;
-            return self.front.head();
         }
+        if members.iter().any(|slot| self.event_of(*slot) != self.front.first) {
+            let mut all: Vec<(Instant, u32)> = members.iter().map(|slot| (self.event_of(*slot), *slot)).collect();
+            all.sort_unstable_by(|a, b| a.partial_cmp(b).unwrap_or(Ordering::Equal));
+            members.clear();
+            members.extend(all.iter().map(|(_, slot)| *slot));
+            self.front.instants.extend(all.iter().map(|(at, _)| *at));
+        } else if !members.is_sorted() {
+            members.sort_unstable();
+        }
+        self.front.members = members;
+        self.front.head()
     }
 
     /// Takes out what `coming` has shown.
@@ -171,7 +159,7 @@ impl Simulation<'_> {
     fn pass_event(&mut self, first: Coming) -> Result<(), Error> {
         let at = first.at();
         let oldest = match first {
-            Coming::Light(_, id) if self.only_the_front(at) => {
+            Coming::Light(_, slot) if self.only_the_front(at) => {
                 // All of the front, at one instant.
                 self.now = at;
                 self.show_coupled(at);
@@ -179,7 +167,7 @@ impl Simulation<'_> {
                 self.front.members.clear();
                 self.firing_light.drain(..self.front.passed);
                 self.front.passed = 0;
-                Some(id)
+                Some(self.plant.tree.id(slot))
             }
             _ => self.gather(at)?,
         };
@@ -213,7 +201,7 @@ impl Simulation<'_> {
                     self.pass_end(entry)?;
                     continue;
                 }
-                Coming::Light(_, id) => Some(id),
+                Coming::Light(_, slot) => Some(self.plant.tree.id(slot)),
                 Coming::Other(Entry { who: Who::Module(slot), .. }) => {
                     Some(self.plant.states[slot as usize].as_ref().expect("scheduled").id)
                 }
@@ -237,7 +225,7 @@ impl Simulation<'_> {
         }
         for coming in later {
             match coming {
-                Coming::Light(at, id) => self.agenda.push(at.to_f64(), id),
+                Coming::Light(at, slot) => self.agenda.push(at.to_f64(), slot),
                 Coming::Other(entry) => self.queue.schedule(entry.who, entry.at),
             }
         }
@@ -247,14 +235,14 @@ impl Simulation<'_> {
         let mut oldest = None;
         for coming in &group {
             let who = match *coming {
-                Coming::Light(_, id) if all_light => {
-                    self.firing_light.push(id);
-                    oldest = oldest.or(Some(id));
+                Coming::Light(_, slot) if all_light => {
+                    self.firing_light.push(slot);
+                    oldest = oldest.or(Some(self.plant.tree.id(slot)));
                     continue;
                 }
-                Coming::Light(_, id) => {
-                    self.promote(id);
-                    Who::Module(id.slot() as u32)
+                Coming::Light(_, slot) => {
+                    self.promote(self.plant.tree.id(slot));
+                    Who::Module(slot)
                 }
                 Coming::Other(entry) => entry.who,
             };

@@ -55,12 +55,12 @@ impl Simulation<'_> {
             }
             rounds += 1;
             if rounds > MAX_ROUNDS {
-                let first = light.first().copied().unwrap_or_else(|| firing[0].id);
+                let first = light.first().map_or_else(|| firing[0].id, |slot| self.plant.tree.id(*slot));
                 let site = self.site_of_firing(first, firing.first());
                 return Err(if hurried { Error::Zeno { site } } else { Error::Cascade { site, rounds } });
             }
             if firing.iter().all(|fire| self.plant.is_light(fire.id)) {
-                light.extend(firing.iter().map(|fire| fire.id));
+                light.extend(firing.iter().map(|fire| fire.id.slot() as u32));
                 self.replace_all_light(&light, rounds)?;
             } else {
                 self.promote_all(&light, &mut firing);
@@ -129,9 +129,9 @@ impl Simulation<'_> {
     }
 
     /// Replaces light modules: none reads what another is replaced by.
-    fn replace_all_light(&mut self, light: &[ModuleId], rounds: usize) -> Result<(), Error> {
-        for &id in light {
-            self.replace_light(id, rounds)?;
+    fn replace_all_light(&mut self, light: &[u32], rounds: usize) -> Result<(), Error> {
+        for &slot in light {
+            self.replace_light(slot, rounds)?;
         }
         self.structure += 1;
         self.changed = true;
@@ -141,14 +141,14 @@ impl Simulation<'_> {
     }
 
     /// Makes all productions of a round such as are known of modules with a state, those of light ones first.
-    fn promote_all(&mut self, light: &[ModuleId], firing: &mut Vec<Firing>) {
+    fn promote_all(&mut self, light: &[u32], firing: &mut Vec<Firing>) {
         for fire in firing.iter() {
             self.promote(fire.id);
         }
         let mut all = Vec::new();
-        for &id in light {
-            self.promote(id);
-            all.extend(self.fire_quickly(id.slot()));
+        for &slot in light {
+            self.promote(self.plant.tree.id(slot));
+            all.extend(self.fire_quickly(slot as usize));
         }
         all.append(firing);
         *firing = all;
@@ -199,10 +199,10 @@ impl Simulation<'_> {
                 return Err(Error::TooManyModules { site: self.site(fire), limit, rounds });
             }
             self.forget(fire.id);
-            let child = |place| lineage.child(number, place);
+            let family = lineage.family(number);
             let mut made = std::mem::take(&mut self.fresh);
             let known = made.len();
-            self.plant.tree.replace(fire.id, successor, &all[first..end], self.now, child, &mut made);
+            self.plant.tree.replace(fire.id, successor, &all[first..end], self.now, family, &mut made);
             self.note_successor(fire.id, successor, &made[known..]);
             self.fresh = made;
             first = end;

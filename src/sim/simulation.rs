@@ -21,7 +21,7 @@ use super::{Method, Settings, Stats};
 use crate::diagnostic::Span;
 use crate::expr::Scratch;
 use crate::model::{KindId, Model};
-use crate::structure::{Instant, Lineage, ModuleId, ModuleString, Tree};
+use crate::structure::{Family, Instant, Lineage, ModuleId, ModuleString, Tree};
 
 /// A model developing in time; observe it with [`Simulation::at`].
 ///
@@ -87,8 +87,8 @@ pub struct Simulation<'m> {
     pub(super) argument_ends: Vec<usize>,
     /// Productions that are known to apply at the instant.
     pub(super) firing: Vec<Firing>,
-    /// Light modules whose event it is.
-    pub(super) firing_light: Vec<ModuleId>,
+    /// Slots of light modules whose event it is.
+    pub(super) firing_light: Vec<u32>,
     pub(super) made: Vec<ModuleId>,
     pub(super) motions: Vec<Motion>,
     pub(super) y: Vec<f64>,
@@ -183,7 +183,7 @@ impl<'m> Simulation<'m> {
             return Err(Error::NotFinite { site: site(), what: format!("parameter {}", at + 1) });
         }
         let tree = &mut self.plant.tree;
-        tree.append(&self.model.axiom, &arguments, Instant::ZERO, Lineage::of_axiom, &mut self.fresh);
+        tree.append(&self.model.axiom, &arguments, Instant::ZERO, Family::AXIOM, &mut self.fresh);
         self.stats.peak_modules = tree.len() as u64;
         if tree.len() > self.settings.max_modules {
             let limit = self.settings.max_modules;

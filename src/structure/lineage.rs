@@ -15,21 +15,25 @@ pub struct Lineage {
     pub generation: u32,
     /// Places in the successors of the last eight generations, one byte each, the latest lowest;
     /// for people to read.
-    pub(super) trail: u64,
-}
-
-/// The successors of one production, as far as their lineages have in common.
-#[derive(Clone, Copy, Debug)]
-pub struct Brood {
-    mixed: u64,
-    generation: u32,
     trail: u64,
 }
 
-impl Brood {
+/// What the lineages of the modules of one successor have in common.
+#[derive(Clone, Copy, Debug)]
+pub struct Family {
+    pub(super) mixed: u64,
+    pub(super) generation: u32,
+    /// The parent's.
+    pub(super) trail: u64,
+}
+
+impl Family {
+    /// That of the initial string.
+    pub const AXIOM: Family = Family { mixed: 0x646c_7379_7300, generation: 0, trail: 0 };
+
     /// The module at a place of the successor.
     pub fn child(self, place: usize) -> Lineage {
-        let Brood { mixed, generation, .. } = self;
+        let Family { mixed, generation, .. } = self;
         Lineage { id: mix(mixed, place as u64), generation, trail: trail(self.trail, place) }
     }
 }
@@ -37,18 +41,18 @@ impl Brood {
 impl Lineage {
     /// The module at a place (from 0, brackets not counted) of the initial string.
     pub fn of_axiom(place: usize) -> Lineage {
-        Lineage { id: mix(0x646c_7379_7300, place as u64), generation: 0, trail: trail(0, place) }
+        Family::AXIOM.child(place)
     }
 
     /// The module at a place of the successor by which a production (a number that tells the
     /// productions of a model apart) replaced this module.
     pub fn child(self, production: usize, place: usize) -> Lineage {
-        self.brood(production).child(place)
+        self.family(production).child(place)
     }
 
     /// What all modules of the successor, by a production, have in common.
-    pub fn brood(self, production: usize) -> Brood {
-        Brood {
+    pub fn family(self, production: usize) -> Family {
+        Family {
             mixed: mix(self.id, production as u64),
             generation: self.generation.saturating_add(1),
             trail: self.trail,

@@ -6,6 +6,7 @@
 //! - [`Lineage`]: who a module is, for as long as it lives, in every run.
 //! - [`Instant`]: when it was born, to more digits than a float has.
 
+mod brood;
 mod instant;
 mod lineage;
 mod string;
@@ -13,7 +14,7 @@ mod tree;
 mod walk;
 
 pub use instant::Instant;
-pub use lineage::{Brood, Lineage};
+pub use lineage::{Family, Lineage};
 pub use string::{Module, ModuleString, Version};
 pub use tree::{ModuleId, NO_LABEL, Tree};
 pub use walk::{Visit, Walk};

@@ -1,11 +1,12 @@
 //! The structure at one instant, in string order.
 
+use super::brood::{Broods, NO_BROOD};
 use super::{Instant, Lineage};
 use crate::model::KindId;
 
 /// All modules alive at `time`, in string order, brackets included.
 ///
-/// Parameters lie one after another in a single array: a string of a million modules is four
+/// Parameters lie one after another in a single array: a string of a million modules is a few
 /// allocations, and can be filled again for the next frame.
 ///
 /// Of a module the birth is kept, not the age: from frame to frame a string whose modules are the same has nothing
@@ -18,6 +19,9 @@ pub struct ModuleString {
     now: Instant,
     entries: Vec<Entry>,
     parameters: Vec<f64>,
+    broods: Broods,
+    /// Birth and lineage of modules that come from nowhere.
+    strangers: Vec<(Instant, Lineage)>,
     version: Option<Version>,
 }
 
@@ -30,16 +34,15 @@ pub struct Version {
     pub structure: u64,
 }
 
-/// 48 bytes; a [`Lineage`] of its own would make it 56.
+/// Who a module is says its brood; of those of none, it is said apart.
 #[derive(Clone, Copy, Debug)]
 struct Entry {
     kind: KindId,
-    generation: u32,
-    /// Where the parameters begin.
-    first: usize,
-    birth: Instant,
-    id: u64,
-    trail: u64,
+    /// Where the parameters begin. As in a tree, there are fewer than 2^32 of them.
+    first: u32,
+    brood: u32,
+    /// In the brood; in `strangers`, for a module of no brood; `NO_BROOD` for a bracket.
+    place: u32,
 }
 
 /// One module, or one bracket, of a [`ModuleString`].
@@ -59,6 +62,15 @@ impl ModuleString {
         (self.time, self.now, self.version) = (time, Instant::ZERO, None);
         self.entries.clear();
         self.parameters.clear();
+        self.strangers.clear();
+        self.broods.clear();
+    }
+
+    /// Empties the string, for modules of these broods at an instant.
+    pub(super) fn begin(&mut self, time: f64, now: Instant, broods: &Broods) {
+        self.reset(time);
+        self.now = now;
+        self.broods.copy(broods);
     }
 
     /// Appends a module.
@@ -69,30 +81,32 @@ impl ModuleString {
         age: f64,
         lineage: Lineage,
     ) {
-        let birth = self.now.after(-age);
-        let first = self.parameters.len();
+        let place = match kind.is_bracket() {
+            true => NO_BROOD,
+            false => {
+                self.strangers.push((self.now.after(-age), lineage));
+                self.strangers.len() as u32 - 1
+            }
+        };
+        let first = self.parameters.len() as u32;
         self.parameters.extend(parameters);
-        self.enter(kind, birth, lineage, first);
+        self.version = None;
+        self.entries.push(Entry { kind, first, brood: NO_BROOD, place });
     }
 
-    /// Appends a module that was born at an instant; returns the place of its first parameter.
-    pub(crate) fn push_born(
-        &mut self,
-        kind: KindId,
-        birth: Instant,
-        lineage: Lineage,
-        parameters: &[f64],
-    ) -> usize {
+    /// Appends a module of a brood; returns the place of its first parameter.
+    pub(super) fn push_known(&mut self, kind: KindId, brood: u32, place: u32, parameters: &[f64]) -> usize {
         let first = self.parameters.len();
-        self.parameters.extend_from_slice(parameters);
-        self.enter(kind, birth, lineage, first);
+        if !parameters.is_empty() {
+            self.parameters.extend_from_slice(parameters);
+        }
+        self.entries.push(Entry { kind, first: first as u32, brood, place });
         first
     }
 
-    fn enter(&mut self, kind: KindId, birth: Instant, lineage: Lineage, first: usize) {
-        self.version = None;
-        let Lineage { id, generation, trail } = lineage;
-        self.entries.push(Entry { kind, generation, first, birth, id, trail });
+    pub(super) fn push_bracket(&mut self, kind: KindId) {
+        let first = self.parameters.len() as u32;
+        self.entries.push(Entry { kind, first, brood: NO_BROOD, place: NO_BROOD });
     }
 
     /// Sets the time that the string shows, and the instant that ages are counted to.
@@ -124,14 +138,16 @@ impl ModuleString {
     }
 
     pub fn get(&self, index: usize) -> Module<'_> {
-        let entry = &self.entries[index];
-        let end = self.entries.get(index + 1).map_or(self.parameters.len(), |next| next.first);
-        Module {
-            kind: entry.kind,
-            parameters: &self.parameters[entry.first..end],
-            age: self.now.since(entry.birth).max(0.0),
-            lineage: Lineage { id: entry.id, generation: entry.generation, trail: entry.trail },
-        }
+        let Entry { kind, first, brood, place } = self.entries[index];
+        let end = self.entries.get(index + 1).map_or(self.parameters.len(), |next| next.first as usize);
+        let (birth, lineage) = match (brood, place) {
+            // Brackets are no modules, have no identity, and are of no age.
+            (NO_BROOD, NO_BROOD) => (self.now, Lineage::of_axiom(0)),
+            (NO_BROOD, stranger) => self.strangers[stranger as usize],
+            _ => (self.broods.birth(brood), self.broods.lineage(brood, place)),
+        };
+        let parameters = &self.parameters[first as usize..end];
+        Module { kind, parameters, age: self.now.since(birth).max(0.0), lineage }
     }
 
     pub fn iter(&self) -> impl Iterator<Item = Module<'_>> {

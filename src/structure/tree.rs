@@ -4,12 +4,13 @@
 //! production costs what it replaces, and string order is a walk. Slots are used again, and a
 //! [`ModuleId`] carries the generation of its slot, so that an old id never means a new module.
 //!
-//! All that is known of a module but its parameters is one record of 64 bytes: at a million modules, what an event
-//! costs is the number of places in memory that it looks at.
+//! A module is a record of 32 bytes and its parameters; its birth and lineage are kept with those of its siblings
+//! (`brood`). At a million modules, what anything costs is the memory that it touches.
 
 use smallvec::SmallVec;
 
-use super::{Instant, Lineage, Visit, Walk};
+use super::brood::{Broods, NO_BROOD};
+use super::{Family, Instant, Lineage, Visit, Walk};
 use crate::model::{KindId, Successor};
 
 /// The branch that holds the main axis.
@@ -28,12 +29,7 @@ impl ModuleId {
         self.slot as usize
     }
 
-    /// Slot and generation, to be kept more tightly, and the way back.
-    pub(crate) fn parts(self) -> (u32, u32) {
-        (self.slot, self.generation)
-    }
-
-    pub(crate) fn of_parts(slot: u32, generation: u32) -> ModuleId {
+    pub(super) fn of_parts(slot: u32, generation: u32) -> ModuleId {
         ModuleId { slot, generation }
     }
 }
@@ -71,17 +67,16 @@ pub(super) struct Node {
     /// Where the parameters begin; of a branch, what its own axis begins with.
     pub first: u32,
     pub label: u32,
-    /// The lineage, in parts that leave no gap.
-    descent: u32,
-    id: u64,
-    trail: u64,
-    pub birth: Instant,
+    pub brood: u32,
+    /// In the successor, brackets not counted.
+    pub place: u32,
 }
 
 /// The modules alive, their order and their parameters.
 #[derive(Clone, Debug)]
 pub struct Tree {
     pub(super) nodes: Vec<Node>,
+    pub(super) broods: Broods,
     free: Vec<u32>,
     pub(super) values: Vec<f64>,
     /// Free blocks of `values`, by their length.
@@ -93,7 +88,6 @@ pub struct Tree {
 impl Tree {
     /// An empty structure; `arities` gives the number of parameters of each kind.
     pub fn new(arities: Vec<u32>) -> Tree {
-        let nobody = Lineage::of_axiom(0);
         let trunk = Node {
             kind: KindId::OPEN,
             generation: 0,
@@ -101,13 +95,12 @@ impl Tree {
             after: Link::end_of(TRUNK),
             first: Link::end_of(TRUNK).0,
             label: NO_LABEL,
-            descent: nobody.generation,
-            id: nobody.id,
-            trail: nobody.trail,
-            birth: Instant::ZERO,
+            brood: NO_BROOD,
+            place: 0,
         };
         Tree {
             nodes: vec![trunk],
+            broods: Broods::default(),
             free: Vec::new(),
             values: Vec::new(),
             free_values: Vec::new(),
@@ -140,7 +133,8 @@ impl Tree {
         node
     }
 
-    fn id(&self, slot: u32) -> ModuleId {
+    /// Who lives in a slot.
+    pub fn id(&self, slot: u32) -> ModuleId {
         ModuleId { slot, generation: self.nodes[slot as usize].generation }
     }
 
@@ -149,11 +143,12 @@ impl Tree {
     }
 
     pub fn birth(&self, id: ModuleId) -> Instant {
-        self.node(id).birth
+        self.broods.birth(self.node(id).brood)
     }
 
     pub fn lineage(&self, id: ModuleId) -> Lineage {
-        self.node(id).lineage()
+        let node = self.node(id);
+        self.broods.lineage(node.brood, node.place)
     }
 
     /// A number that the owner of the tree has given to a module; [`NO_LABEL`] from birth on.
@@ -190,7 +185,7 @@ impl Tree {
     }
 
     /// Puts a node into a slot. What is after it is not known yet.
-    fn allocate(&mut self, kind: KindId, before: Link, birth: Instant, lineage: Lineage) -> u32 {
+    fn allocate(&mut self, kind: KindId, before: Link, brood: u32, place: u32) -> u32 {
         let mut node = Node {
             kind,
             generation: 0,
@@ -198,10 +193,8 @@ impl Tree {
             after: before,
             first: 0,
             label: NO_LABEL,
-            descent: lineage.generation,
-            id: lineage.id,
-            trail: lineage.trail,
-            birth,
+            brood,
+            place,
         };
         let arity = self.arities[kind.index()] as usize;
         if arity > 0 {
@@ -246,14 +239,14 @@ impl Tree {
         }
     }
 
-    /// Appends a string at the end of the main axis, in time proportional to its length. `lineage` names the module
-    /// at each place (from 0, brackets not counted). The new modules are added to `made`.
+    /// Appends a string at the end of the main axis, in time proportional to its length. The new modules are added to
+    /// `made`.
     pub fn append(
         &mut self,
         string: &Successor,
         arguments: &[f64],
         birth: Instant,
-        lineage: impl Fn(usize) -> Lineage,
+        family: Family,
         made: &mut Vec<ModuleId>,
     ) {
         let mut last = Link::end_of(TRUNK);
@@ -261,7 +254,7 @@ impl Tree {
         while next.ended().is_none() {
             (last, next) = (next, self.nodes[next.0 as usize].after);
         }
-        self.insert(last, next, string, arguments, birth, lineage, made);
+        self.insert(last, next, string, arguments, birth, family, made);
     }
 
     /// Replaces a module by a string.
@@ -271,13 +264,14 @@ impl Tree {
         string: &Successor,
         arguments: &[f64],
         birth: Instant,
-        lineage: impl Fn(usize) -> Lineage,
+        family: Family,
         made: &mut Vec<ModuleId>,
     ) {
-        let Node { before, after, .. } = *self.node(id);
+        let Node { before, after, brood, .. } = *self.node(id);
+        self.broods.leave(brood);
         self.release(id.slot);
         self.modules -= 1;
-        self.insert(before, after, string, arguments, birth, lineage, made);
+        self.insert(before, after, string, arguments, birth, family, made);
     }
 
     /// Puts a string between two neighbours.
@@ -289,12 +283,13 @@ impl Tree {
         string: &Successor,
         arguments: &[f64],
         birth: Instant,
-        lineage: impl Fn(usize) -> Lineage,
+        family: Family,
         made: &mut Vec<ModuleId>,
     ) {
         // The branches that are open.
         let mut branches: SmallVec<[u32; 8]> = SmallVec::new();
         let (mut place, mut next) = (0, 0);
+        let mut brood = NO_BROOD;
         for &kind in &string.kinds {
             if kind == KindId::CLOSE {
                 let branch = branches.pop().expect("brackets match: the front end saw to it");
@@ -302,22 +297,32 @@ impl Tree {
                 before = Link(branch);
                 continue;
             }
-            let slot = self.allocate(kind, before, birth, lineage(place));
-            self.link_forward(before, Link(slot));
             if kind == KindId::OPEN {
+                let slot = self.allocate(kind, before, NO_BROOD, 0);
+                self.link_forward(before, Link(slot));
                 branches.push(slot);
                 before = Link::end_of(slot);
                 continue;
             }
+            if brood == NO_BROOD {
+                brood = self.broods.begin(family, birth);
+            }
+            let slot = self.allocate(kind, before, brood, place);
+            self.link_forward(before, Link(slot));
             let id = self.id(slot);
             let places = self.places(id);
-            let count = places.len();
-            self.values[places].copy_from_slice(&arguments[next..next + count]);
-            next += count;
+            if !places.is_empty() {
+                let count = places.len();
+                self.values[places].copy_from_slice(&arguments[next..next + count]);
+                next += count;
+            }
             place += 1;
             before = Link(slot);
             self.modules += 1;
             made.push(id);
+        }
+        if brood != NO_BROOD {
+            self.broods.count(brood, place as usize);
         }
         self.link_forward(before, after);
         if after.ended().is_none() {
@@ -376,10 +381,6 @@ impl Tree {
 }
 
 impl Node {
-    pub fn lineage(&self) -> Lineage {
-        Lineage { id: self.id, generation: self.descent, trail: self.trail }
-    }
-
     pub fn places(&self, arities: &[u32]) -> std::ops::Range<usize> {
         let first = self.first as usize;
         first..first + arities[self.kind.index()] as usize
@@ -413,7 +414,7 @@ mod tests {
         let axiom = string(&mut kinds, text);
         let successors: Vec<_> = swaps.iter().map(|(at, s)| (*at, string(&mut kinds, s))).collect();
         let mut tree = Tree::new(vec![0; kinds.len()]);
-        tree.append(&axiom, &[], Instant::ZERO, Lineage::of_axiom, &mut Vec::new());
+        tree.append(&axiom, &[], Instant::ZERO, Family::AXIOM, &mut Vec::new());
         for (at, successor) in successors {
             let ids: Vec<ModuleId> = tree
                 .walk()
@@ -422,8 +423,8 @@ mod tests {
                     _ => None,
                 })
                 .collect();
-            let lineage = tree.lineage(ids[at]);
-            tree.replace(ids[at], &successor, &[], Instant::ZERO, |i| lineage.child(0, i), &mut Vec::new());
+            let family = tree.lineage(ids[at]).family(0);
+            tree.replace(ids[at], &successor, &[], Instant::ZERO, family, &mut Vec::new());
         }
         (kinds, tree)
     }

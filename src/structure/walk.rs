@@ -1,7 +1,7 @@
 //! String order: all modules and brackets, one after another.
 
 use super::tree::{Link, TRUNK};
-use super::{Instant, Lineage, ModuleId, ModuleString, Tree};
+use super::{Instant, ModuleId, ModuleString, Tree};
 use crate::model::KindId;
 
 /// What a walk in string order meets.
@@ -19,38 +19,35 @@ impl Tree {
     }
 
     /// Writes the structure out, every parameter with the value that the tree has of it. `note` is told each module
-    /// with its label, its birth, and the places of its parameters in the tree and in the string.
+    /// with its label and the places of its parameters in the tree and in the string.
     pub fn write(
         &self,
         time: f64,
         now: Instant,
         out: &mut ModuleString,
-        mut note: impl FnMut(ModuleId, u32, Instant, usize, usize),
+        mut note: impl FnMut(ModuleId, u32, usize, usize),
     ) {
-        out.reset(time);
-        out.show(time, now);
-        // Brackets are no modules, have no identity, and are of no age.
-        let nobody = Lineage::of_axiom(0);
+        out.begin(time, now, &self.broods);
         let mut next = Link(self.nodes[TRUNK as usize].first);
         loop {
             match next.ended() {
                 Some(TRUNK) => return,
                 Some(branch) => {
-                    out.push_born(KindId::CLOSE, now, nobody, &[]);
+                    out.push_bracket(KindId::CLOSE);
                     next = self.nodes[branch as usize].after;
                 }
                 None => {
                     let node = &self.nodes[next.0 as usize];
                     if node.kind == KindId::OPEN {
-                        out.push_born(KindId::OPEN, now, nobody, &[]);
+                        out.push_bracket(KindId::OPEN);
                         next = Link(node.first);
                         continue;
                     }
                     let places = node.places(&self.arities);
                     let from = places.start;
-                    let to = out.push_born(node.kind, node.birth, node.lineage(), &self.values[places]);
+                    let to = out.push_known(node.kind, node.brood, node.place, &self.values[places]);
                     let id = ModuleId::of_parts(next.0, node.generation);
-                    note(id, node.label, node.birth, from, to);
+                    note(id, node.label, from, to);
                     next = node.after;
                 }
             }
