@@ -17,14 +17,17 @@ const EQUAL: f64 = 8.0 * f64::EPSILON;
 /// Sides closer together than this part of the module's size may be equal but for the resolution of time.
 pub(super) const NEAR: f64 = 1e-9;
 
+/// The sign of an atom of a module that comes from nowhere, by its two sides.
+pub(super) fn sign_at_birth(a: f64, b: f64) -> Sign {
+    let (difference, size) = (a - b, a.abs().max(b.abs()));
+    let equal = size.is_finite() && difference.abs() <= EQUAL * size;
+    if equal { Sign::Zero } else { Sign::of(difference) }
+}
+
 impl Simulation<'_> {
     /// Finds the rule and context of every module for which they may be new, and opens it if they are.
     pub(super) fn look_up(&mut self) {
         let model = self.model;
-        let slots = self.plant.tree.slots();
-        if self.plant.states.len() < slots {
-            self.plant.states.resize(slots, None);
-        }
         let mut fresh = std::mem::take(&mut self.fresh);
         for id in fresh.drain(..) {
             // It may have been replaced already, within the same instant.
@@ -76,8 +79,7 @@ impl Simulation<'_> {
                 if state.is_none_or(|s| s.rule.is_some()) {
                     self.plant.materialise(id, self.now);
                     self.forget(id);
-                    let state = State { restarted: self.group, ..State::new(id) };
-                    self.plant.states[id.slot()] = Some(state);
+                    self.plant.new_state(id).restarted = self.group;
                     self.ready.push(id);
                 }
                 continue;
@@ -88,7 +90,7 @@ impl Simulation<'_> {
         }
         self.to_look = to_look;
         let plant = &self.plant;
-        self.opened.retain(|id| plant.state(*id).is_some_and(|s| s.rule.is_some()));
+        self.opened.retain(|id| plant.state(*id).is_some_and(|s| s.rule.is_some()) || plant.is_light(*id));
     }
 
     /// Gives a module its rule and opens it.
@@ -114,9 +116,9 @@ impl Simulation<'_> {
         }
         let was_open = before.is_some_and(|s| s.open.is_some());
         if before.is_none() {
-            self.plant.states[id.slot()] = Some(State::new(id));
+            self.plant.new_state(id);
         }
-        let state = self.plant.states[id.slot()].as_mut().expect("just made");
+        let state = self.plant.state_mut(id).expect("just made");
         if state.coupled {
             self.coupled.loosened.extend_from_slice(&state.context);
         }

@@ -21,6 +21,8 @@
 //! condition inside them is frozen, and its change is an event. So the methods keep their order at the end of a
 //! growth function, and a discontinuous rate costs no accuracy.
 
+mod agenda;
+mod career;
 mod choose;
 mod coupled;
 mod course;
@@ -29,11 +31,14 @@ mod error;
 mod event;
 mod implicit;
 mod integrator;
+mod light;
 mod linear;
 mod local;
 mod lookup;
 mod motion;
 mod neighbours;
+mod observe;
+mod passing;
 mod phase;
 mod plant;
 mod queue;

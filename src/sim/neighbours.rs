@@ -10,7 +10,7 @@
 use smallvec::SmallVec;
 
 use super::simulation::Simulation;
-use crate::model::KindId;
+use crate::model::{KindId, Successor};
 use crate::structure::{ModuleId, Tree};
 
 /// A neighbour, as far as it is known.
@@ -190,9 +190,18 @@ impl Simulation<'_> {
             }
         }
     }
-}
 
-/// True if some module of a string that takes a skipped module's place is not skipped: it may come between others.
-pub fn comes_between(kinds: &[KindId], skipped: impl Fn(KindId) -> bool) -> bool {
-    kinds.iter().any(|kind| !kind.is_bracket() && !skipped(*kind))
+    /// Lets those who looked at a module that has been replaced look again, and hands its neighbours on.
+    pub(super) fn hand_on(&mut self, id: ModuleId, kind: KindId, successor: &Successor, made: &[ModuleId]) {
+        if !self.looks_around {
+            return;
+        }
+        let skipped = |kind| self.model.kinds.get(kind).skipped;
+        self.to_look.extend_from_slice(self.neighbours.lookers(id));
+        self.neighbours.bury(id);
+        self.neighbours.hand_on(Some(id), &successor.kinds, made, skipped);
+        // What was skipped may turn into something that stands between others.
+        let counts = |kind: &KindId| !kind.is_bracket() && !skipped(*kind);
+        self.lost |= skipped(kind) && successor.kinds.iter().any(counts);
+    }
 }

@@ -1,5 +1,6 @@
 //! The modules and how they move: values at any instant, and along a stretch of time.
 
+use super::career::Careers;
 use super::course::{Course, Piece};
 use super::motion::Motion;
 use super::state::State;
@@ -12,19 +13,50 @@ use crate::structure::{Instant, ModuleId, Tree};
 pub struct Plant {
     /// Its values are those at the start of each motion.
     pub tree: Tree,
-    /// By slot of the tree; None for modules without rules.
-    pub states: Vec<Option<State>>,
+    /// By slot of the tree, as far as there are any; None for modules without rules, and for light ones.
+    pub states: Vec<Option<Box<State>>>,
+    /// What is known of light modules, whose labels in the tree are numbers of careers.
+    pub careers: Careers,
     /// How the coupled modules move.
     pub coupled: Option<Course>,
 }
 
 impl Plant {
     pub fn state(&self, id: ModuleId) -> Option<&State> {
-        self.states.get(id.slot())?.as_ref().filter(|s| s.id == id && s.is_alive)
+        self.states.get(id.slot())?.as_deref().filter(|s| s.id == id && s.is_alive)
     }
 
     pub fn state_mut(&mut self, id: ModuleId) -> Option<&mut State> {
-        self.states.get_mut(id.slot())?.as_mut().filter(|s| s.id == id && s.is_alive)
+        self.states.get_mut(id.slot())?.as_deref_mut().filter(|s| s.id == id && s.is_alive)
+    }
+
+    /// The memory for a module's state; it may be that of another, dead one.
+    pub fn make_state(&mut self, id: ModuleId) -> &mut State {
+        let slot = id.slot();
+        if self.states.len() <= slot {
+            self.states.resize(slot + 1, None);
+        }
+        self.states[slot].get_or_insert_with(|| Box::new(State::new(id)))
+    }
+
+    /// Gives a module a state that knows nothing yet.
+    pub fn new_state(&mut self, id: ModuleId) -> &mut State {
+        let state = self.make_state(id);
+        *state = State::new(id);
+        state
+    }
+
+    /// True for a module that is alive and light.
+    pub fn is_light(&self, id: ModuleId) -> bool {
+        self.tree.label_if_alive(id).is_some_and(|label| self.careers.get(label).is_some())
+    }
+
+    /// The rule and the clause that a module lives under.
+    pub fn rule_and_clause(&self, id: ModuleId) -> (Option<usize>, Option<usize>) {
+        match self.careers.get(self.tree.label(id)) {
+            Some(career) => (Some(career.rule), career.solve),
+            None => self.state(id).map_or((None, None), |s| (s.rule, s.solve)),
+        }
     }
 
     /// A parameter, moving since `state.since` from the value `x`, at an instant.
@@ -44,8 +76,9 @@ impl Plant {
         }
     }
 
-    /// The parameters of a module at an instant, appended to `out`.
+    /// The parameters of a module at an instant, appended to `out`; not of a light one, whose motions are not here.
     pub fn values(&self, id: ModuleId, at: Instant, out: &mut Vec<f64>) {
+        debug_assert!(self.careers.get(self.tree.label(id)).is_none_or(|career| career.is_over_at_birth()));
         let values = self.tree.parameters(id);
         match self.state(id).filter(|s| !s.motions.is_empty()) {
             None => out.extend_from_slice(values),

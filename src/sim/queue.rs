@@ -1,4 +1,4 @@
-//! The next thing that is known of each module, in order of time.
+//! The next thing that is known of each module that is not light, in order of time.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -78,7 +78,7 @@ impl Queue {
     }
 
     /// The earliest valid entry.
-    pub fn peek(&mut self) -> Option<Entry> {
+    pub fn peek_other(&mut self) -> Option<Entry> {
         while let Some(&entry) = self.heap.peek() {
             if *self.serial(entry.who) == entry.serial {
                 return Some(entry);
@@ -88,7 +88,7 @@ impl Queue {
         None
     }
 
-    /// Takes out what `peek` has shown.
+    /// Takes out what `peek_other` has shown.
     pub fn pop(&mut self) {
         self.heap.pop();
     }

@@ -6,22 +6,41 @@
 
 use smallvec::SmallVec;
 
-use super::lookup::NEAR;
+use super::lookup::{NEAR, sign_at_birth};
 use super::motion::Motion;
 use super::queue::Who;
 use super::settle::Firing;
 use super::simulation::Simulation;
-use super::state::{Change, Signs, State, What};
+use super::state::{Change, Signs, What};
 use super::watch::{opposite, rate_at};
 use crate::model::{Law, Rule, Sign, Solve, Truth, Watch};
 use crate::structure::{Instant, ModuleId};
 
 /// What a newborn module is going to do.
-struct Outlook {
-    solve: Option<usize>,
-    signs: Signs,
-    motions: SmallVec<[Motion; 2]>,
-    touched: SmallVec<[Change; 1]>,
+pub(super) enum Outlook {
+    /// It is replaced at once, by this production.
+    Over { produce: usize, signs: Signs },
+    Lives(Prospect),
+}
+
+pub(super) struct Prospect {
+    pub solve: Option<usize>,
+    pub signs: Signs,
+    pub motions: SmallVec<[Motion; 2]>,
+    /// The event with the production that follows.
+    pub event: Option<(Change, usize)>,
+    /// The time to the event, or none ever, if nothing else was in question: then it does not depend on when the
+    /// module is born, unless the rule reads `t`.
+    pub lasting: Option<Option<f64>>,
+}
+
+/// Where the two sides of an atom meet.
+pub(super) struct Meeting {
+    pub time: Instant,
+    /// The time from birth, if it was found as that.
+    pub tau: Option<f64>,
+    /// The parameter that meets a level, and the level.
+    pub level: Option<(usize, f64)>,
 }
 
 impl Simulation<'_> {
@@ -30,30 +49,38 @@ impl Simulation<'_> {
         if self.forced || !self.quick {
             return false;
         }
-        let Some(outlook) = self.outlook(id, &self.model.rules[index]) else { return false };
+        if self.plant.careers.rule(self.plant.tree.kind(id)).is_some() {
+            return self.begin_lightly(id, index);
+        }
+        self.plant.variables(id, &[], self.now, &mut self.variables);
+        let Some(Outlook::Lives(outlook)) = self.outlook(&self.model.rules[index]) else { return false };
         let who = Who::Module(id.slot() as u32);
-        match outlook.touched.first() {
-            Some(first) => self.queue.schedule(who, first.time),
+        match &outlook.event {
+            Some((change, _)) => self.queue.schedule(who, change.time),
             None => self.queue.cancel(who),
         }
-        let state = self.plant.states[id.slot()].get_or_insert_with(|| State::new(id));
+        let state = self.plant.make_state(id);
         state.renew(id);
         state.rule = Some(index);
         state.solve = outlook.solve;
         state.signs = outlook.signs;
         state.since = self.now;
         state.motions = outlook.motions;
-        state.next.what = if outlook.touched.is_empty() { What::Nothing } else { What::Event };
-        state.next.touched = outlook.touched;
+        state.next.what = if outlook.event.is_none() { What::Nothing } else { What::Event };
+        state.next.touched = outlook.event.into_iter().map(|(change, _)| change).collect();
         state.restarted = self.group;
         true
     }
 
-    fn outlook(&mut self, id: ModuleId, rule: &Rule) -> Option<Outlook> {
-        self.plant.variables(id, &[], self.now, &mut self.variables);
-        let signs = self.clear_signs(rule)?;
+    /// What a module does that is born now with the parameters that `self.variables` begins with. Then come `t` and
+    /// `age`.
+    pub(super) fn outlook(&mut self, rule: &Rule) -> Option<Outlook> {
+        let (signs, clear) = self.signs_at_birth(rule);
         let holds = |guard: &crate::model::Condition| guard.judge(|i| signs[i]) == Truth::Yes;
-        if rule.produces.iter().any(|p| holds(&p.guard)) {
+        if let Some(produce) = rule.produces.iter().position(|p| holds(&p.guard)) {
+            return Some(Outlook::Over { produce, signs });
+        }
+        if !clear {
             return None;
         }
         let solve = rule.solves.iter().position(|s| holds(&s.guard));
@@ -62,47 +89,55 @@ impl Simulation<'_> {
             None => None,
             Some(s) => Some(&rule.solves[s]),
         };
-        let mut motions = SmallVec::new();
-        if let Some(clause) = active.filter(|s| !s.of.is_empty()) {
-            let simple = |law: &Law| matches!(law, Law::Polynomial(_) | Law::Quadratic(_));
-            if !clause.switches.is_empty() || !clause.laws.iter().all(simple) {
+        let motions = self.simple_motions(rule, active)?;
+        let (event, mut lasting) = self.first_crossing(rule, active, solve, &signs, &motions)?;
+        for end in motions.iter().filter_map(Motion::end) {
+            if event.is_none_or(|(change, _)| change.time.since(self.now) >= end) {
                 return None;
             }
-            motions.resize(rule.parameters.len(), Motion::Rest);
-            if !self.formulas(clause, rule.time_variable(), &mut motions) {
-                return None;
-            }
+            lasting = None;
         }
-        let touched = self.first_crossing(rule, active, solve, &signs, &motions)?;
-        let before = |end: f64| touched.first().is_none_or(|t| t.time.since(self.now) >= end);
-        if motions.iter().filter_map(Motion::end).any(before) {
-            return None;
-        }
-        Some(Outlook { solve, signs, motions, touched })
+        Some(Outlook::Lives(Prospect { solve, signs, motions, event, lasting }))
     }
 
-    /// The signs of a rule's atoms, if all are plain.
-    fn clear_signs(&mut self, rule: &Rule) -> Option<Signs> {
+    /// The motions under a clause from `self.variables`, if they are such as are done here.
+    pub(super) fn simple_motions(
+        &mut self,
+        rule: &Rule,
+        clause: Option<&Solve>,
+    ) -> Option<SmallVec<[Motion; 2]>> {
+        let mut motions = SmallVec::new();
+        let Some(clause) = clause.filter(|s| !s.of.is_empty()) else { return Some(motions) };
+        let simple = |law: &Law| matches!(law, Law::Polynomial(_) | Law::Quadratic(_));
+        if !clause.switches.is_empty() || !clause.laws.iter().all(simple) {
+            return None;
+        }
+        motions.resize(rule.parameters.len(), Motion::Rest);
+        self.formulas(clause, rule.time_variable(), &mut motions).then_some(motions)
+    }
+
+    /// The signs of a newborn module's atoms, and whether all are plain.
+    fn signs_at_birth(&mut self, rule: &Rule) -> (Signs, bool) {
         let mut signs = Signs::new();
         if rule.atoms.is_empty() {
-            return Some(signs);
+            return (signs, true);
         }
         let mut out: SmallVec<[f64; 8]> = smallvec::smallvec![0.0; rule.sides.outputs()];
         rule.sides.eval(&self.variables, &mut self.scratch, &mut out);
         let own = &self.variables[..rule.parameters.len()];
         let scale = own.iter().fold(1.0, |m: f64, x| m.max(x.abs()));
+        let mut clear = true;
         for side in out.chunks(2) {
             let gap = side[0] - side[1];
             // Not so for NaN and for infinite sides either.
-            if !(gap.abs() > NEAR * scale.max(side[0].abs()) && gap.is_finite()) {
-                return None;
-            }
-            signs.push(Sign::of(gap));
+            clear &= gap.abs() > NEAR * scale.max(side[0].abs()) && gap.is_finite();
+            signs.push(sign_at_birth(side[0], side[1]));
         }
-        Some(signs)
+        (signs, clear)
     }
 
-    /// The signs that become zero first, if that is a formula and something follows from it; empty if none ever does.
+    /// The sign that becomes zero first, with what follows, if that is a formula and a production follows from it; None
+    /// inside if none ever does. And the time to it as [`Prospect::lasting`] has it.
     fn first_crossing(
         &mut self,
         rule: &Rule,
@@ -110,66 +145,83 @@ impl Simulation<'_> {
         solve: Option<usize>,
         signs: &Signs,
         motions: &[Motion],
-    ) -> Option<SmallVec<[Change; 1]>> {
-        let time = rule.time_variable();
-        let mut touched: SmallVec<[Change; 1]> = SmallVec::new();
+    ) -> Option<(Option<(Change, usize)>, Option<Option<f64>>)> {
+        let mut first: Option<Change> = None;
+        let mut lasting = Some(None);
         for (atom, watch) in rule.watch(solve).iter().enumerate() {
-            let (variable, program) = match watch {
-                Watch::Still => continue,
-                Watch::Root => return None,
-                Watch::Crossing { variable, level } => (*variable, level),
+            if matches!(watch, Watch::Root) {
+                return None;
+            }
+            let Some(meeting) = self.crossing(rule, clause, atom, watch, motions, self.now) else {
+                continue;
             };
-            if clause.is_some_and(|s| s.unreachable[atom]) {
+            let Meeting { time, tau, level } = meeting;
+            if time.since(self.now) <= 0.0 {
+                lasting = None;
                 continue;
             }
-            let mut level = [0.0];
-            program.eval(&self.variables, &mut self.scratch, &mut level);
-            let [level] = level;
-            let when = if !level.is_finite() {
-                continue;
-            } else if variable == time {
-                Instant::new(level)
-            } else if variable == time + 1 {
-                self.now.after(level - self.variables[variable])
-            } else {
-                let Some(motion) = motions.get(variable) else { continue };
-                let start = self.variables[variable];
-                let (variables, scratch, rates) = (&self.variables, &mut self.scratch, &mut self.rates);
-                let exact = || rate_at(clause, variables, variable, level, scratch, rates);
-                let Some(tau) = motion.reach(level - start, exact) else { continue };
-                self.now.after(tau)
-            };
-            if when.since(self.now) <= 0.0 {
-                continue;
-            }
-            let level = (variable < time).then_some((variable, level));
-            let change = Change { atom, time: when, at: Sign::Zero, after: opposite(signs[atom]), level };
-            let Some(first) = touched.first() else {
-                touched.push(change);
+            let change = Change { atom, time, at: Sign::Zero, after: opposite(signs[atom]), level };
+            let Some(known) = &mut first else {
+                first = Some(change);
+                lasting = lasting.and(tau).map(Some);
                 continue;
             };
-            let later = when.since(first.time);
+            lasting = None;
+            let later = time.since(known.time);
             // Two at one instant, or nearly so, are for others to sort out.
-            if later.abs() <= 2.0 * when.resolution() {
+            if later.abs() <= 2.0 * time.resolution() {
                 return None;
             }
             if later < 0.0 {
-                touched[0] = change;
+                *known = change;
             }
         }
-        if let Some(change) = touched.first() {
-            // Nothing may follow from it; then the search goes on, elsewhere.
-            let at = |i: usize| if i == change.atom { Sign::Zero } else { signs[i] };
-            if !rule.produces.iter().any(|p| p.guard.judge(at) == Truth::Yes) {
-                return None;
-            }
+        let Some(change) = first else { return Some((None, lasting)) };
+        // Nothing may follow from it; then the search goes on, elsewhere.
+        let at = |i: usize| if i == change.atom { Sign::Zero } else { signs[i] };
+        let produce = rule.produces.iter().position(|p| p.guard.judge(at) == Truth::Yes)?;
+        Some((Some((change, produce)), lasting))
+    }
+
+    /// When an atom's sides meet, of a module born at an instant, if that is a formula; and the parameter that meets a
+    /// level then. By `self.variables`, which are those of the birth.
+    pub(super) fn crossing(
+        &mut self,
+        rule: &Rule,
+        clause: Option<&Solve>,
+        atom: usize,
+        watch: &Watch,
+        motions: &[Motion],
+        birth: Instant,
+    ) -> Option<Meeting> {
+        let Watch::Crossing { variable, level } = watch else { return None };
+        let (variable, time) = (*variable, rule.time_variable());
+        if clause.is_some_and(|s| s.unreachable[atom]) {
+            return None;
         }
-        Some(touched)
+        let mut out = [0.0];
+        level.eval(&self.variables, &mut self.scratch, &mut out);
+        let [level] = out;
+        let tau = if !level.is_finite() {
+            return None;
+        } else if variable == time {
+            return Some(Meeting { time: Instant::new(level), tau: None, level: None });
+        } else if variable == time + 1 {
+            level - self.variables[variable]
+        } else {
+            let motion = motions.get(variable)?;
+            let start = self.variables[variable];
+            let (variables, scratch, rates) = (&self.variables, &mut self.scratch, &mut self.rates);
+            let exact = || rate_at(clause, variables, variable, level, scratch, rates);
+            motion.reach(level - start, exact)?
+        };
+        let level = (variable < time).then_some((variable, level));
+        Some(Meeting { time: birth.after(tau), tau: Some(tau), level })
     }
 
     /// The production that a module's event is, if that is all there is to it; its values are then those of the event.
     pub(super) fn fire_quickly(&mut self, slot: usize) -> Option<Firing> {
-        let state = self.plant.states[slot].as_ref()?;
+        let state = self.plant.states.get(slot)?.as_ref()?;
         if !self.quick || state.next.what != What::Event || state.is_numeric() || state.coupled {
             return None;
         }

@@ -16,7 +16,6 @@ use smallvec::SmallVec;
 
 use super::error::Error;
 use super::event::Event;
-use super::neighbours::comes_between;
 use super::simulation::Simulation;
 use super::state::{Change, Open};
 use crate::model::{Comparison, Sign, Truth};
@@ -46,20 +45,30 @@ impl Simulation<'_> {
                 self.look_up();
             }
             let mut firing = self.judge();
-            if firing.is_empty() && !self.opened.is_empty() {
+            let mut light = std::mem::take(&mut self.firing_light);
+            if firing.is_empty() && light.is_empty() && !self.opened.is_empty() {
                 self.choose_equations(&mut hurried, &mut firing)?;
             }
-            if firing.is_empty() {
-                self.recycle(firing);
+            if firing.is_empty() && light.is_empty() {
+                (self.firing, self.firing_light) = (firing, light);
                 break;
             }
             rounds += 1;
             if rounds > MAX_ROUNDS {
-                let site = self.site(&firing[0]);
+                let first = light.first().map_or_else(|| firing[0].id, |slot| self.plant.tree.id(*slot));
+                let site = self.site_of_firing(first, firing.first());
                 return Err(if hurried { Error::Zeno { site } } else { Error::Cascade { site, rounds } });
             }
-            self.replace(&firing, rounds)?;
-            self.recycle(firing);
+            if firing.iter().all(|fire| self.plant.is_light(fire.id)) {
+                light.extend(firing.iter().map(|fire| fire.id.slot() as u32));
+                self.replace_all_light(&light, rounds)?;
+            } else {
+                self.promote_all(&light, &mut firing);
+                self.replace(&firing, rounds)?;
+            }
+            firing.clear();
+            light.clear();
+            (self.firing, self.firing_light) = (firing, light);
         }
         self.finish_transitions();
         self.begin_phases()
@@ -114,6 +123,9 @@ impl Simulation<'_> {
         let mut firing = std::mem::take(&mut self.firing);
         let plant = &self.plant;
         firing.extend(self.opened.iter().filter_map(|&id| {
+            if let Some(career) = plant.careers.get(plant.tree.label_if_alive(id)?) {
+                return Some(Firing { id, rule: career.rule, produce: career.produce()? });
+            }
             let state = plant.state(id)?;
             let (rule, open) = (state.rule?, state.open.as_ref()?);
             let produces = &self.model.rules[rule].produces;
@@ -123,9 +135,44 @@ impl Simulation<'_> {
         firing
     }
 
-    fn recycle(&mut self, mut firing: Vec<Firing>) {
-        firing.clear();
-        self.firing = firing;
+    /// Replaces light modules: none reads what another is replaced by.
+    fn replace_all_light(&mut self, light: &[u32], rounds: usize) -> Result<(), Error> {
+        for &slot in light {
+            self.replace_light(slot, rounds)?;
+        }
+        self.structure += 1;
+        self.changed = true;
+        let plant = &self.plant;
+        self.opened.retain(|id| plant.state(*id).is_some());
+        Ok(())
+    }
+
+    /// Makes all productions of a round such as are known of modules with a state, those of light ones first.
+    fn promote_all(&mut self, light: &[u32], firing: &mut Vec<Firing>) {
+        for fire in firing.iter() {
+            self.promote(fire.id);
+        }
+        let mut all = Vec::new();
+        for &slot in light {
+            self.promote(self.plant.tree.id(slot));
+            all.extend(self.fire_quickly(slot as usize));
+        }
+        all.append(firing);
+        *firing = all;
+    }
+
+    /// The place of a production that is one too many.
+    fn site_of_firing(&mut self, id: ModuleId, other: Option<&Firing>) -> super::error::Site {
+        let career = self.plant.careers.get(self.plant.tree.label(id));
+        let known = career.and_then(|career| Some((career.rule, career.produce()?)));
+        match (known, other) {
+            (Some((rule, produce)), _) => {
+                self.stand_still(id);
+                self.site(&Firing { id, rule, produce })
+            }
+            (None, Some(fire)) => self.site(fire),
+            (None, None) => self.site_of(id, 0, Default::default(), self.now.to_f64()),
+        }
     }
 
     /// Replaces all modules in parallel: every successor is computed before any is put in.
@@ -160,23 +207,18 @@ impl Simulation<'_> {
             }
             let kind = self.plant.tree.kind(fire.id);
             self.forget(fire.id);
-            let child = |place| lineage.child(number, place);
+            let family = lineage.family(number);
             let mut made = std::mem::take(&mut self.fresh);
             let known = made.len();
-            self.plant.tree.replace(fire.id, successor, &all[first..end], self.now, child, &mut made);
+            self.plant.tree.replace(fire.id, successor, &all[first..end], self.now, family, &mut made);
             self.note_successor(fire.id, successor, &made[known..]);
-            if self.looks_around {
-                let skipped = |kind| model.kinds.get(kind).skipped;
-                self.to_look.extend_from_slice(self.neighbours.lookers(fire.id));
-                self.neighbours.bury(fire.id);
-                self.neighbours.hand_on(Some(fire.id), &successor.kinds, &made[known..], skipped);
-                self.lost |= skipped(kind) && comes_between(&successor.kinds, skipped);
-            }
+            self.hand_on(fire.id, kind, successor, &made[known..]);
             self.fresh = made;
             first = end;
         }
         self.arguments = all;
         self.argument_ends = ends;
+        self.structure += 1;
         self.changed = true;
         let plant = &self.plant;
         self.opened.retain(|id| plant.state(*id).is_some());

@@ -1,5 +1,9 @@
 //! The clock: events in their order, observation.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use super::agenda::Agenda;
+use super::career::Careers;
 use super::coupled::Coupled;
 use super::error::{Error, Site};
 use super::event::Event;
@@ -7,7 +11,9 @@ use super::integrator::Integrator;
 use super::motion::Motion;
 use super::neighbours::Neighbours;
 use super::plant::Plant;
-use super::queue::{Entry, Queue, Who};
+use super::observe::Gallery;
+use super::passing::{Coming, Front};
+use super::queue::Queue;
 use super::settle::Firing;
 use super::state::{Control, What};
 use super::transition::Recorder;
@@ -16,7 +22,7 @@ use super::{Method, Settings, Stats};
 use crate::diagnostic::Span;
 use crate::expr::Scratch;
 use crate::model::{KindId, Model};
-use crate::structure::{Instant, Lineage, ModuleId, ModuleString, Tree};
+use crate::structure::{Family, Instant, Lineage, ModuleId, ModuleString, Tree};
 
 /// A model developing in time; observe it with [`Simulation::at`].
 ///
@@ -31,7 +37,11 @@ pub struct Simulation<'m> {
     /// The common case is done quickly.
     pub(super) quick: bool,
     pub(super) plant: Plant,
+    /// What comes next of modules with a state.
     pub(super) queue: Queue,
+    /// What comes next of light modules, and the first of it.
+    pub(super) agenda: Agenda,
+    pub(super) front: Front,
     /// Time of the last event.
     pub(super) now: Instant,
     /// Number of the last instant at which something happened.
@@ -63,11 +73,16 @@ pub struct Simulation<'m> {
     pub(super) hints: Vec<Vec<Control>>,
     pub(super) watcher: Watcher,
     /// Events in a row of modules that hardly lived.
-    stalled: usize,
+    pub(super) stalled: usize,
     pub(super) stats: Stats,
     /// Productions since they were last taken, if they are recorded.
     pub(super) log: Option<Vec<Event>>,
     pub(super) recorder: Option<Recorder>,
+    pub(super) gallery: Gallery,
+    /// Tells the simulations of a process apart.
+    pub(super) source: u64,
+    /// Number of changes of the structure.
+    pub(super) structure: u64,
     fault: Option<Error>,
     // Memory that is used again and again.
     pub(super) variables: Vec<f64>,
@@ -76,11 +91,17 @@ pub struct Simulation<'m> {
     pub(super) argument_ends: Vec<usize>,
     /// Productions that are known to apply at the instant.
     pub(super) firing: Vec<Firing>,
+    /// Slots of light modules whose event it is.
+    pub(super) firing_light: Vec<u32>,
+    pub(super) made: Vec<ModuleId>,
     pub(super) motions: Vec<Motion>,
     pub(super) y: Vec<f64>,
     pub(super) rates: Vec<f64>,
-    group_entries: Vec<Entry>,
+    pub(super) group_entries: Vec<Coming>,
 }
+
+/// Number of simulations that there have been.
+static SOURCES: AtomicU64 = AtomicU64::new(0);
 
 /// Events in a row of modules that lived no longer than this many resolutions of time, after which events
 /// are said to pile up.
@@ -97,13 +118,16 @@ impl<'m> Simulation<'m> {
         };
         let kinds_with_context: Vec<bool> =
             model.kinds.iter().map(|(_, kind)| kind.rules.iter().any(has_context)).collect();
+        let careers = Careers::new(model, &kinds_with_context);
         let mut simulation = Simulation {
             model,
             settings,
             forced: settings.method != Method::Auto,
             quick: !settings.transitions && !settings.slow,
-            plant: Plant { tree, states: Vec::new(), coupled: None },
+            plant: Plant { tree, states: Vec::new(), careers, coupled: None },
             queue: Queue::default(),
+            agenda: Agenda::default(),
+            front: Front::default(),
             now: Instant::ZERO,
             group: 0,
             opened: Vec::new(),
@@ -136,6 +160,11 @@ impl<'m> Simulation<'m> {
             arguments: Vec::new(),
             argument_ends: Vec::new(),
             firing: Vec::new(),
+            firing_light: Vec::new(),
+            made: Vec::new(),
+            gallery: Gallery::default(),
+            source: SOURCES.fetch_add(1, Ordering::Relaxed),
+            structure: 0,
             motions: Vec::new(),
             y: Vec::new(),
             rates: Vec::new(),
@@ -160,7 +189,7 @@ impl<'m> Simulation<'m> {
             return Err(Error::NotFinite { site: site(), what: format!("parameter {}", at + 1) });
         }
         let tree = &mut self.plant.tree;
-        tree.append(&self.model.axiom, &arguments, Instant::ZERO, Lineage::of_axiom, &mut self.fresh);
+        tree.append(&self.model.axiom, &arguments, Instant::ZERO, Family::AXIOM, &mut self.fresh);
         if self.looks_around {
             let skipped = |kind| self.model.kinds.get(kind).skipped;
             self.neighbours.hand_on(None, &self.model.axiom.kinds, &self.fresh, skipped);
@@ -190,144 +219,32 @@ impl<'m> Simulation<'m> {
     /// A module lives from its birth to just before its end: at the instant of an event, the successors
     /// are there. After an error, every further call gives the same error.
     pub fn at(&mut self, t: f64, out: &mut ModuleString) -> Result<(), Error> {
-        if let Some(fault) = &self.fault {
-            return Err(fault.clone());
-        }
-        if let Err(fault) = self.advance(t) {
-            self.fault = Some(fault.clone());
-            return Err(fault);
-        }
+        self.pass(t)?;
         let at = Instant::new(t);
         // An event within the resolution of time of `t` may have taken place a little after it.
         let now = if at.since(self.now) < 0.0 { self.now } else { at };
         self.show_coupled(now);
-        let plant = &self.plant;
-        let mut bad = None;
-        plant.tree.write(now, t, out, |id, values| {
-            plant.values(id, now, values);
-            if let Some(parameter) = values.iter().position(|x| !x.is_finite()) {
-                bad.get_or_insert((id, parameter));
-            }
-        });
-        match bad {
-            Some((id, parameter)) => {
-                let fault = self.not_finite(id, parameter, now);
-                self.fault = Some(fault.clone());
-                Err(fault)
-            }
-            None => Ok(()),
+        let shown = self.observe(t, now, out);
+        if let Err(fault) = &shown {
+            self.fault = Some(fault.clone());
         }
+        shown
     }
 
-    /// Lets every event up to `t` take place, and finds out what every module does until then.
-    fn advance(&mut self, t: f64) -> Result<(), Error> {
-        let until = Instant::new(t);
-        while let Some(entry) = self.queue.peek() {
-            let ahead = entry.at.since(until);
-            if self.is_event(entry.who) {
-                if ahead > until.resolution() {
-                    break;
-                }
-                self.pass_event(entry.at)?;
-            } else {
-                if ahead >= 0.0 {
-                    break;
-                }
-                self.queue.pop();
-                self.pass_end(entry)?;
-            }
+    /// Lets time pass up to `t` without looking. As [`Simulation::at`], of which it is a part.
+    pub fn pass(&mut self, t: f64) -> Result<(), Error> {
+        if let Some(fault) = &self.fault {
+            return Err(fault.clone());
         }
-        Ok(())
-    }
-
-    /// True if the entry is an event, not the end of what is known.
-    fn is_event(&self, who: Who) -> bool {
-        match who {
-            Who::Coupled => false,
-            Who::Module(slot) => {
-                let state = self.plant.states[slot as usize].as_ref();
-                state.is_some_and(|s| s.next.what != What::Window)
-            }
+        let passed = self.advance(t);
+        if let Err(fault) = &passed {
+            self.fault = Some(fault.clone());
         }
-    }
-
-    /// Goes on from the end of what is known.
-    fn pass_end(&mut self, entry: Entry) -> Result<(), Error> {
-        self.stalled = 0;
-        match entry.who {
-            Who::Coupled => self.pass_coupled_step(entry.at),
-            Who::Module(slot) => {
-                let id = self.plant.states[slot as usize].as_ref().expect("scheduled").id;
-                self.pass_window(id, entry.at)
-            }
-        }
-    }
-
-    /// Goes to an event and through it, with all that happens at the same instant.
-    fn pass_event(&mut self, at: Instant) -> Result<(), Error> {
-        let mut group = std::mem::take(&mut self.group_entries);
-        group.clear();
-        let mut first: Option<(Instant, f64)> = None;
-        let mut later = Vec::new();
-        while let Some(entry) = self.queue.peek() {
-            if entry.at.since(at) > at.resolution() {
-                break;
-            }
-            self.queue.pop();
-            if !self.is_event(entry.who) {
-                match entry.who {
-                    // Not before what happens at this instant.
-                    Who::Coupled if !group.is_empty() => later.push(entry),
-                    _ => self.pass_end(entry)?,
-                }
-                continue;
-            }
-            if let Who::Module(slot) = entry.who {
-                let id = self.plant.states[slot as usize].as_ref().expect("scheduled").id;
-                let birth = self.plant.tree.birth(id);
-                match first {
-                    None => first = Some((birth, at.since(birth))),
-                    // Those born together have clocks that are as good as their age is short.
-                    Some((elder, age)) if elder == birth => {
-                        if entry.at.since(birth) - age > Instant::new(age).resolution() {
-                            later.push(entry);
-                            continue;
-                        }
-                    }
-                    Some(_) => {}
-                }
-            }
-            group.push(entry);
-        }
-        for entry in later {
-            self.queue.schedule(entry.who, entry.at);
-        }
-        self.now = at;
-        self.show_coupled(at);
-        let mut oldest = None;
-        for entry in &group {
-            let first = match entry.who {
-                Who::Coupled => None,
-                Who::Module(slot) => match self.fire_quickly(slot as usize) {
-                    Some(firing) => {
-                        let id = firing.id;
-                        self.firing.push(firing);
-                        Some(id)
-                    }
-                    None => Some(self.touch_alone(slot as usize)?),
-                },
-            };
-            oldest = oldest.or(first);
-        }
-        self.group_entries = group;
-        if let Some(id) = oldest {
-            self.watch_for_piling_up(id)?;
-        }
-        self.settle()
+        passed
     }
 
     /// Opens a module whose event it is.
-    fn touch_alone(&mut self, slot: usize) -> Result<ModuleId, Error> {
+    pub(super) fn touch_alone(&mut self, slot: usize) -> Result<ModuleId, Error> {
         let state = self.plant.states[slot].as_mut().expect("scheduled");
         let id = state.id;
         if state.next.what == What::Fault {
@@ -349,13 +266,13 @@ impl<'m> Simulation<'m> {
     }
 
     /// A life about as short as the resolution of time, after a life as short, after another …
-    fn watch_for_piling_up(&mut self, id: ModuleId) -> Result<(), Error> {
+    pub(super) fn watch_for_piling_up(&mut self, id: ModuleId) -> Result<(), Error> {
         let age = self.now.since(self.plant.tree.birth(id));
         self.stalled = if age <= SHORT_LIFE * self.now.resolution() { self.stalled + 1 } else { 0 };
         if self.stalled <= MAX_STALLED {
             return Ok(());
         }
-        let rule = self.plant.state(id).and_then(|s| s.rule).unwrap_or(0);
+        let rule = self.plant.rule_and_clause(id).0.unwrap_or(0);
         let site = self.site_of(id, rule, self.model.rules[rule].span, self.now.to_f64());
         Err(Error::Zeno { site })
     }
@@ -370,9 +287,9 @@ impl<'m> Simulation<'m> {
         if hint > 0.0 { hint } else { 1.0 }
     }
 
-    fn not_finite(&self, id: ModuleId, parameter: usize, at: Instant) -> Error {
-        let rule = self.plant.state(id).and_then(|s| s.rule).unwrap_or(0);
-        let solve = self.plant.state(id).and_then(|s| s.solve);
+    pub(super) fn not_finite(&self, id: ModuleId, parameter: usize, at: Instant) -> Error {
+        let (rule, solve) = self.plant.rule_and_clause(id);
+        let rule = rule.unwrap_or(0);
         let compiled = &self.model.rules[rule];
         let span = solve.map_or(compiled.span, |s| compiled.solves[s].span);
         let site = self.site_of(id, rule, span, at.to_f64());

@@ -18,19 +18,44 @@ pub struct Lineage {
     trail: u64,
 }
 
+/// What the lineages of the modules of one successor have in common.
+#[derive(Clone, Copy, Debug)]
+pub struct Family {
+    pub(super) mixed: u64,
+    pub(super) generation: u32,
+    /// The parent's.
+    pub(super) trail: u64,
+}
+
+impl Family {
+    /// That of the initial string.
+    pub const AXIOM: Family = Family { mixed: 0x646c_7379_7300, generation: 0, trail: 0 };
+
+    /// The module at a place of the successor.
+    pub fn child(self, place: usize) -> Lineage {
+        let Family { mixed, generation, .. } = self;
+        Lineage { id: mix(mixed, place as u64), generation, trail: trail(self.trail, place) }
+    }
+}
+
 impl Lineage {
     /// The module at a place (from 0, brackets not counted) of the initial string.
     pub fn of_axiom(place: usize) -> Lineage {
-        Lineage { id: mix(0x646c_7379_7300, place as u64), generation: 0, trail: trail(0, place) }
+        Family::AXIOM.child(place)
     }
 
     /// The module at a place of the successor by which a production (a number that tells the
     /// productions of a model apart) replaced this module.
     pub fn child(self, production: usize, place: usize) -> Lineage {
-        Lineage {
-            id: mix(mix(self.id, production as u64), place as u64),
+        self.family(production).child(place)
+    }
+
+    /// What all modules of the successor, by a production, have in common.
+    pub fn family(self, production: usize) -> Family {
+        Family {
+            mixed: mix(self.id, production as u64),
             generation: self.generation.saturating_add(1),
-            trail: trail(self.trail, place),
+            trail: self.trail,
         }
     }
 

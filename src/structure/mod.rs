@@ -6,12 +6,15 @@
 //! - [`Lineage`]: who a module is, for as long as it lives, in every run.
 //! - [`Instant`]: when it was born, to more digits than a float has.
 
+mod brood;
 mod instant;
 mod lineage;
 mod string;
 mod tree;
+mod walk;
 
 pub use instant::Instant;
-pub use lineage::Lineage;
-pub use string::{Module, ModuleString};
-pub use tree::{ModuleId, Tree, Visit, Walk};
+pub use lineage::{Family, Lineage};
+pub use string::{Module, ModuleString, Version};
+pub use tree::{ModuleId, NO_LABEL, Tree};
+pub use walk::{Visit, Walk};

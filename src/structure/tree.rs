@@ -3,13 +3,18 @@
 //! An axis is a doubly linked list of modules and branches; a branch holds an axis of its own. So a
 //! production costs what it replaces, and string order is a walk. Slots are used again, and a
 //! [`ModuleId`] carries the generation of its slot, so that an old id never means a new module.
+//!
+//! A module is a record of 32 bytes and its parameters; its birth and lineage are kept with those of its siblings
+//! (`brood`). At a million modules, what anything costs is the memory that it touches.
 
-use super::{Instant, Lineage, ModuleString};
+use smallvec::SmallVec;
+
+use super::brood::{Broods, NO_BROOD};
+use super::{Family, Instant, Lineage, Visit, Walk};
 use crate::model::{KindId, Successor};
 
-const NONE: u32 = u32::MAX;
 /// The branch that holds the main axis.
-const TRUNK: u32 = 0;
+pub(super) const TRUNK: u32 = 0;
 
 /// A module in a [`Tree`], while it lives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -23,44 +28,61 @@ impl ModuleId {
     pub fn slot(self) -> usize {
         self.slot as usize
     }
+
+    pub(super) fn of_parts(slot: u32, generation: u32) -> ModuleId {
+        ModuleId { slot, generation }
+    }
 }
 
+/// What stands before or after on an axis: a module or a branch, by its slot; or nothing, and then it is known which
+/// branch the axis belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Link(pub(super) u32);
+
+impl Link {
+    const END: u32 = 1 << 31;
+
+    /// The end of a branch's axis.
+    fn end_of(branch: u32) -> Link {
+        Link(branch | Link::END)
+    }
+
+    /// The branch whose axis ends here.
+    pub(super) fn ended(self) -> Option<u32> {
+        (self.0 & Link::END != 0).then_some(self.0 & !Link::END)
+    }
+}
+
+/// No module has this label.
+pub const NO_LABEL: u32 = u32::MAX;
+
 #[derive(Clone, Copy, Debug)]
-struct Node {
+pub(super) struct Node {
     /// `KindId::OPEN` for a branch.
-    kind: KindId,
-    generation: u32,
-    /// The branch whose axis this is on.
-    parent: u32,
-    before: u32,
-    after: u32,
-    /// Ends of a branch's own axis.
-    first: u32,
-    last: u32,
-    /// Where the parameters begin.
-    values: u32,
-    birth: Instant,
-    lineage: Lineage,
+    pub kind: KindId,
+    /// Of the slot.
+    pub generation: u32,
+    before: Link,
+    pub after: Link,
+    /// Where the parameters begin; of a branch, what its own axis begins with.
+    pub first: u32,
+    pub label: u32,
+    pub brood: u32,
+    /// In the successor, brackets not counted.
+    pub place: u32,
 }
 
 /// The modules alive, their order and their parameters.
 #[derive(Clone, Debug)]
 pub struct Tree {
-    nodes: Vec<Node>,
+    pub(super) nodes: Vec<Node>,
+    pub(super) broods: Broods,
     free: Vec<u32>,
-    values: Vec<f64>,
+    pub(super) values: Vec<f64>,
     /// Free blocks of `values`, by their length.
     free_values: Vec<Vec<u32>>,
-    arities: Vec<u32>,
+    pub(super) arities: Vec<u32>,
     modules: usize,
-}
-
-/// What a walk in string order meets.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Visit {
-    Module(ModuleId),
-    Open,
-    Close,
 }
 
 impl Tree {
@@ -69,17 +91,16 @@ impl Tree {
         let trunk = Node {
             kind: KindId::OPEN,
             generation: 0,
-            parent: NONE,
-            before: NONE,
-            after: NONE,
-            first: NONE,
-            last: NONE,
-            values: 0,
-            birth: Instant::ZERO,
-            lineage: Lineage::of_axiom(0),
+            before: Link::end_of(TRUNK),
+            after: Link::end_of(TRUNK),
+            first: Link::end_of(TRUNK).0,
+            label: NO_LABEL,
+            brood: NO_BROOD,
+            place: 0,
         };
         Tree {
             nodes: vec![trunk],
+            broods: Broods::default(),
             free: Vec::new(),
             values: Vec::new(),
             free_values: Vec::new(),
@@ -112,7 +133,8 @@ impl Tree {
         node
     }
 
-    fn id(&self, slot: u32) -> ModuleId {
+    /// Who lives in a slot.
+    pub fn id(&self, slot: u32) -> ModuleId {
         ModuleId { slot, generation: self.nodes[slot as usize].generation }
     }
 
@@ -121,18 +143,32 @@ impl Tree {
     }
 
     pub fn birth(&self, id: ModuleId) -> Instant {
-        self.node(id).birth
+        self.broods.birth(self.node(id).brood)
     }
 
     pub fn lineage(&self, id: ModuleId) -> Lineage {
-        self.node(id).lineage
+        let node = self.node(id);
+        self.broods.lineage(node.brood, node.place)
+    }
+
+    /// A number that the owner of the tree has given to a module; [`NO_LABEL`] from birth on.
+    pub fn label(&self, id: ModuleId) -> u32 {
+        self.node(id).label
+    }
+
+    pub fn set_label(&mut self, id: ModuleId, label: u32) {
+        self.nodes[id.slot()].label = label;
+    }
+
+    /// The label of a module that may be dead: then there is none.
+    pub fn label_if_alive(&self, id: ModuleId) -> Option<u32> {
+        let node = &self.nodes[id.slot()];
+        (node.generation == id.generation).then_some(node.label)
     }
 
     /// Places of a module's parameters in [`Tree::values`].
     pub fn places(&self, id: ModuleId) -> std::ops::Range<usize> {
-        let node = self.node(id);
-        let first = node.values as usize;
-        first..first + self.arities[node.kind.index()] as usize
+        self.node(id).places(&self.arities)
     }
 
     pub fn parameters(&self, id: ModuleId) -> &[f64] {
@@ -148,31 +184,31 @@ impl Tree {
         self.values[place] = value;
     }
 
-    fn allocate(&mut self, kind: KindId, parent: u32, birth: Instant, lineage: Lineage) -> u32 {
-        let arity = self.arities[kind.index()] as usize;
-        let values = match self.free_values.get_mut(arity).and_then(Vec::pop) {
-            Some(place) if arity > 0 => place,
-            _ => {
-                self.values.resize(self.values.len() + arity, 0.0);
-                (self.values.len() - arity) as u32
-            }
-        };
-        let node = Node {
+    /// Puts a node into a slot. What is after it is not known yet.
+    fn allocate(&mut self, kind: KindId, before: Link, brood: u32, place: u32) -> u32 {
+        let mut node = Node {
             kind,
             generation: 0,
-            parent,
-            before: NONE,
-            after: NONE,
-            first: NONE,
-            last: NONE,
-            values,
-            birth,
-            lineage,
+            before,
+            after: before,
+            first: 0,
+            label: NO_LABEL,
+            brood,
+            place,
         };
+        let arity = self.arities[kind.index()] as usize;
+        if arity > 0 {
+            let known = self.free_values.get_mut(arity).and_then(Vec::pop);
+            node.first = known.unwrap_or_else(|| {
+                self.values.resize(self.values.len() + arity, 0.0);
+                (self.values.len() - arity) as u32
+            });
+        }
         match self.free.pop() {
             Some(slot) => {
-                let generation = self.nodes[slot as usize].generation;
-                self.nodes[slot as usize] = Node { generation, ..node };
+                let place = &mut self.nodes[slot as usize];
+                node.generation = place.generation;
+                *place = node;
                 slot
             }
             None => {
@@ -185,43 +221,40 @@ impl Tree {
     fn release(&mut self, slot: u32) {
         let node = &mut self.nodes[slot as usize];
         node.generation = node.generation.wrapping_add(1);
-        let (arity, values) = (self.arities[node.kind.index()] as usize, node.values);
+        let (arity, first) = (self.arities[node.kind.index()] as usize, node.first);
         self.free.push(slot);
         if arity > 0 {
             if self.free_values.len() <= arity {
                 self.free_values.resize(arity + 1, Vec::new());
             }
-            self.free_values[arity].push(values);
+            self.free_values[arity].push(first);
         }
     }
 
-    /// Puts `slot` on its parent's axis between two neighbours.
-    fn link(&mut self, slot: u32, before: u32, after: u32) {
-        let parent = self.nodes[slot as usize].parent;
-        let node = &mut self.nodes[slot as usize];
-        (node.before, node.after) = (before, after);
-        match before {
-            NONE => self.nodes[parent as usize].first = slot,
-            b => self.nodes[b as usize].after = slot,
-        }
-        match after {
-            NONE => self.nodes[parent as usize].last = slot,
-            a => self.nodes[a as usize].before = slot,
+    /// Sets what comes after `before`, which may be the beginning of an axis.
+    fn link_forward(&mut self, before: Link, after: Link) {
+        match before.ended() {
+            Some(branch) => self.nodes[branch as usize].first = after.0,
+            None => self.nodes[before.0 as usize].after = after,
         }
     }
 
-    /// Appends a string at the end of the main axis. `lineage` names the module at each place (from 0,
-    /// brackets not counted). The new modules are added to `made`.
+    /// Appends a string at the end of the main axis, in time proportional to its length. The new modules are added to
+    /// `made`.
     pub fn append(
         &mut self,
         string: &Successor,
         arguments: &[f64],
         birth: Instant,
-        lineage: impl Fn(usize) -> Lineage,
+        family: Family,
         made: &mut Vec<ModuleId>,
     ) {
-        let last = self.nodes[TRUNK as usize].last;
-        self.insert(TRUNK, last, NONE, string, arguments, birth, lineage, made);
+        let mut last = Link::end_of(TRUNK);
+        let mut next = Link(self.nodes[TRUNK as usize].first);
+        while next.ended().is_none() {
+            (last, next) = (next, self.nodes[next.0 as usize].after);
+        }
+        self.insert(last, next, string, arguments, birth, family, made);
     }
 
     /// Replaces a module by a string.
@@ -231,59 +264,69 @@ impl Tree {
         string: &Successor,
         arguments: &[f64],
         birth: Instant,
-        lineage: impl Fn(usize) -> Lineage,
+        family: Family,
         made: &mut Vec<ModuleId>,
     ) {
-        let Node { parent, before, after, .. } = *self.node(id);
-        match before {
-            NONE => self.nodes[parent as usize].first = after,
-            b => self.nodes[b as usize].after = after,
-        }
-        match after {
-            NONE => self.nodes[parent as usize].last = before,
-            a => self.nodes[a as usize].before = before,
-        }
+        let Node { before, after, brood, .. } = *self.node(id);
+        self.broods.leave(brood);
         self.release(id.slot);
         self.modules -= 1;
-        self.insert(parent, before, after, string, arguments, birth, lineage, made);
+        self.insert(before, after, string, arguments, birth, family, made);
     }
 
+    /// Puts a string between two neighbours.
     #[allow(clippy::too_many_arguments)]
     fn insert(
         &mut self,
-        mut parent: u32,
-        mut before: u32,
-        mut after: u32,
+        mut before: Link,
+        after: Link,
         string: &Successor,
         arguments: &[f64],
         birth: Instant,
-        lineage: impl Fn(usize) -> Lineage,
+        family: Family,
         made: &mut Vec<ModuleId>,
     ) {
-        // Where to go on after each branch that is open.
-        let mut outer: Vec<(u32, u32, u32)> = Vec::new();
+        // The branches that are open.
+        let mut branches: SmallVec<[u32; 8]> = SmallVec::new();
         let (mut place, mut next) = (0, 0);
+        let mut brood = NO_BROOD;
         for &kind in &string.kinds {
             if kind == KindId::CLOSE {
-                (parent, before, after) = outer.pop().expect("brackets match: the front end saw to it");
+                let branch = branches.pop().expect("brackets match: the front end saw to it");
+                self.link_forward(before, Link::end_of(branch));
+                before = Link(branch);
                 continue;
             }
-            let slot = self.allocate(kind, parent, birth, lineage(place));
-            self.link(slot, before, after);
             if kind == KindId::OPEN {
-                outer.push((parent, slot, after));
-                (parent, before, after) = (slot, NONE, NONE);
+                let slot = self.allocate(kind, before, NO_BROOD, 0);
+                self.link_forward(before, Link(slot));
+                branches.push(slot);
+                before = Link::end_of(slot);
                 continue;
             }
+            if brood == NO_BROOD {
+                brood = self.broods.begin(family, birth);
+            }
+            let slot = self.allocate(kind, before, brood, place);
+            self.link_forward(before, Link(slot));
             let id = self.id(slot);
             let places = self.places(id);
-            let count = places.len();
-            self.values[places].copy_from_slice(&arguments[next..next + count]);
-            next += count;
+            if !places.is_empty() {
+                let count = places.len();
+                self.values[places].copy_from_slice(&arguments[next..next + count]);
+                next += count;
+            }
             place += 1;
-            before = slot;
+            before = Link(slot);
             self.modules += 1;
             made.push(id);
+        }
+        if brood != NO_BROOD {
+            self.broods.count(brood, place as usize);
+        }
+        self.link_forward(before, after);
+        if after.ended().is_none() {
+            self.nodes[after.0 as usize].before = before;
         }
     }
 
@@ -292,17 +335,17 @@ impl Tree {
     pub fn left(&self, id: ModuleId, skipped: impl Fn(KindId) -> bool) -> Option<ModuleId> {
         let mut at = id.slot;
         loop {
-            let node = &self.nodes[at as usize];
-            at = match (node.before, node.parent) {
-                (NONE, NONE | TRUNK) => return None,
+            let before = self.nodes[at as usize].before;
+            at = match before.ended() {
+                Some(TRUNK) => return None,
                 // The first of a branch grows from what stands before the branch.
-                (NONE, branch) => branch,
-                (before, _) => {
-                    let kind = self.nodes[before as usize].kind;
+                Some(branch) => branch,
+                None => {
+                    let kind = self.nodes[before.0 as usize].kind;
                     if kind != KindId::OPEN && !skipped(kind) {
-                        return Some(self.id(before));
+                        return Some(self.id(before.0));
                     }
-                    before
+                    before.0
                 }
             };
         }
@@ -311,10 +354,10 @@ impl Tree {
     /// The next module on the same axis, side branches and modules of skipped kinds passed over.
     pub fn right(&self, id: ModuleId, skipped: impl Fn(KindId) -> bool) -> Option<ModuleId> {
         let mut at = self.node(id).after;
-        while at != NONE {
-            let node = &self.nodes[at as usize];
+        while at.ended().is_none() {
+            let node = &self.nodes[at.0 as usize];
             if node.kind != KindId::OPEN && !skipped(node.kind) {
-                return Some(self.id(at));
+                return Some(self.id(at.0));
             }
             at = node.after;
         }
@@ -323,9 +366,8 @@ impl Tree {
 
     /// True if a module of a certain kind stands after this one on its axis, or on a branch of that.
     pub fn is_followed(&self, id: ModuleId, wanted: impl Fn(KindId) -> bool) -> bool {
-        let node = self.node(id);
         let mut depth = 0usize;
-        for visit in (Walk { tree: self, next: node.after, inside: node.parent }) {
+        for visit in Walk::new(self, self.node(id).after) {
             match visit {
                 Visit::Module(id) if wanted(self.kind(id)) => return true,
                 Visit::Module(_) => {}
@@ -336,67 +378,12 @@ impl Tree {
         }
         false
     }
-
-    /// All modules and brackets in string order.
-    pub fn walk(&self) -> Walk<'_> {
-        Walk { tree: self, next: self.nodes[TRUNK as usize].first, inside: TRUNK }
-    }
-
-    /// Writes the structure out; `values` appends the parameters of a module.
-    pub fn write(
-        &self,
-        now: Instant,
-        time: f64,
-        out: &mut ModuleString,
-        mut values: impl FnMut(ModuleId, &mut Vec<f64>),
-    ) {
-        out.reset(time);
-        let mut parameters = Vec::new();
-        // Brackets are no modules and have no identity.
-        let nobody = Lineage::of_axiom(0);
-        for visit in self.walk() {
-            match visit {
-                Visit::Open => out.push(KindId::OPEN, [], 0.0, nobody),
-                Visit::Close => out.push(KindId::CLOSE, [], 0.0, nobody),
-                Visit::Module(id) => {
-                    let node = self.node(id);
-                    let age = now.since(node.birth).max(0.0);
-                    parameters.clear();
-                    values(id, &mut parameters);
-                    out.push(node.kind, parameters.iter().copied(), age, node.lineage);
-                }
-            }
-        }
-    }
 }
 
-/// Iterator of [`Tree::walk`].
-pub struct Walk<'t> {
-    tree: &'t Tree,
-    next: u32,
-    inside: u32,
-}
-
-impl Iterator for Walk<'_> {
-    type Item = Visit;
-
-    fn next(&mut self) -> Option<Visit> {
-        if self.next == NONE {
-            if self.inside == TRUNK {
-                return None;
-            }
-            let branch = &self.tree.nodes[self.inside as usize];
-            (self.next, self.inside) = (branch.after, branch.parent);
-            return Some(Visit::Close);
-        }
-        let slot = self.next;
-        let node = &self.tree.nodes[slot as usize];
-        if node.kind == KindId::OPEN {
-            (self.next, self.inside) = (node.first, slot);
-            return Some(Visit::Open);
-        }
-        self.next = node.after;
-        Some(Visit::Module(self.tree.id(slot)))
+impl Node {
+    pub fn places(&self, arities: &[u32]) -> std::ops::Range<usize> {
+        let first = self.first as usize;
+        first..first + arities[self.kind.index()] as usize
     }
 }
 
@@ -427,7 +414,7 @@ mod tests {
         let axiom = string(&mut kinds, text);
         let successors: Vec<_> = swaps.iter().map(|(at, s)| (*at, string(&mut kinds, s))).collect();
         let mut tree = Tree::new(vec![0; kinds.len()]);
-        tree.append(&axiom, &[], Instant::ZERO, Lineage::of_axiom, &mut Vec::new());
+        tree.append(&axiom, &[], Instant::ZERO, Family::AXIOM, &mut Vec::new());
         for (at, successor) in successors {
             let ids: Vec<ModuleId> = tree
                 .walk()
@@ -436,8 +423,8 @@ mod tests {
                     _ => None,
                 })
                 .collect();
-            let lineage = tree.lineage(ids[at]);
-            tree.replace(ids[at], &successor, &[], Instant::ZERO, |i| lineage.child(0, i), &mut Vec::new());
+            let family = tree.lineage(ids[at]).family(0);
+            tree.replace(ids[at], &successor, &[], Instant::ZERO, family, &mut Vec::new());
         }
         (kinds, tree)
     }

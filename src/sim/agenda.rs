@@ -1,0 +1,202 @@
+//! The events of light modules, in order of time.
+//!
+//! An entry is 12 bytes: the time as a float, and the slot. Instants to all their digits are computed again for those
+//! that come first (`light`), so entries of one float are one bundle here, and order within it is decided there. A
+//! light module stays what it is until its event, so nothing is ever taken back.
+
+/// An entry's slot has this bit if it is the number of a run; a tree has no such slots.
+const RUN: u32 = 1 << 31;
+/// Children of an entry in the heap: four lie in one line of the cache.
+const ARITY: usize = 4;
+/// Times that are remembered, so that equal ones meet.
+const RECENT: usize = 16;
+const NOWHERE: u32 = u32::MAX;
+
+/// The time in halves, so that four bytes less are needed.
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    high: u32,
+    low: u32,
+    slot: u32,
+}
+
+impl Entry {
+    #[inline]
+    fn new(time: f64, slot: u32) -> Entry {
+        let bits = time.to_bits();
+        Entry { high: (bits >> 32) as u32, low: bits as u32, slot }
+    }
+
+    #[inline]
+    fn time(self) -> f64 {
+        f64::from_bits(u64::from(self.high) << 32 | u64::from(self.low))
+    }
+}
+
+/// A heap of events in which many of one time are one entry: a thousand cells that divide together cost one place in
+/// the order, and one push each.
+#[derive(Clone, Debug)]
+pub struct Agenda {
+    heap: Vec<Entry>,
+    /// The first place of the heap is empty: most events are followed by a later one, which is put there.
+    hole: bool,
+    runs: Vec<Vec<u32>>,
+    free_runs: Vec<u32>,
+    /// Times lately put in, by a hash, with their runs.
+    recent: [(u64, u32); RECENT],
+}
+
+impl Default for Agenda {
+    fn default() -> Agenda {
+        Agenda {
+            heap: Vec::new(),
+            hole: false,
+            runs: Vec::new(),
+            free_runs: Vec::new(),
+            recent: [(u64::MAX, NOWHERE); RECENT],
+        }
+    }
+}
+
+fn recent_place(time: f64) -> usize {
+    (time.to_bits().wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 60) as usize
+}
+
+impl Agenda {
+    /// Puts in an event. The time is a number.
+    pub fn push(&mut self, time: f64, slot: u32) {
+        let recent = &mut self.recent[recent_place(time)];
+        if recent.0 != time.to_bits() {
+            *recent = (time.to_bits(), NOWHERE);
+            return self.push_entry(time, slot);
+        }
+        if recent.1 == NOWHERE {
+            let run = self.free_runs.pop().unwrap_or(self.runs.len() as u32);
+            if run as usize == self.runs.len() {
+                self.runs.push(Vec::new());
+            }
+            recent.1 = run;
+            self.push_entry(time, run | RUN);
+        }
+        let run = self.recent[recent_place(time)].1;
+        self.runs[run as usize].push(slot);
+    }
+
+    /// The earliest time.
+    pub fn earliest(&self) -> Option<f64> {
+        let first = match self.hole {
+            false => self.heap.get(..1)?,
+            true => self.heap.get(1..self.heap.len().min(ARITY + 1))?,
+        };
+        first.iter().map(|entry| entry.time()).reduce(f64::min)
+    }
+
+    /// Takes out everything of the earliest time.
+    pub fn pop(&mut self, out: &mut Vec<u32>) {
+        let Some(time) = self.earliest() else { return };
+        while self.earliest() == Some(time) {
+            self.fill_hole();
+            let Entry { slot, .. } = self.heap[0];
+            self.hole = true;
+            if slot & RUN == 0 {
+                out.push(slot);
+                continue;
+            }
+            let number = slot & !RUN;
+            let recent = &mut self.recent[recent_place(time)];
+            if recent.1 == number {
+                recent.1 = NOWHERE;
+            }
+            let run = &mut self.runs[number as usize];
+            match out.is_empty() {
+                true => std::mem::swap(out, run),
+                false => out.append(run),
+            }
+            self.free_runs.push(number);
+        }
+    }
+
+    fn push_entry(&mut self, time: f64, slot: u32) {
+        let entry = Entry::new(time, slot);
+        if self.hole {
+            self.hole = false;
+            return self.sift_down(entry);
+        }
+        let mut at = self.heap.len();
+        self.heap.push(entry);
+        while at > 0 {
+            let above = (at - 1) / ARITY;
+            if self.heap[above].time() <= time {
+                break;
+            }
+            self.heap[at] = self.heap[above];
+            at = above;
+        }
+        self.heap[at] = entry;
+    }
+
+    fn fill_hole(&mut self) {
+        if std::mem::take(&mut self.hole)
+            && let Some(last) = self.heap.pop()
+            && !self.heap.is_empty()
+        {
+            self.sift_down(last);
+        }
+    }
+
+    /// Puts an entry into the first place, and sets the heap in order.
+    fn sift_down(&mut self, entry: Entry) {
+        let heap = &mut self.heap[..];
+        let wanted = entry.time();
+        let mut at = 0;
+        loop {
+            let first = ARITY * at + 1;
+            let Some(children) = heap.get(first..(first + ARITY).min(heap.len())) else { break };
+            let mut least = 0;
+            let Some(mut time) = children.first().map(|child| child.time()) else { break };
+            for (i, child) in children.iter().enumerate().skip(1) {
+                let its = child.time();
+                if its < time {
+                    (least, time) = (i, its);
+                }
+            }
+            if time >= wanted {
+                break;
+            }
+            heap[at] = children[least];
+            at = first + least;
+        }
+        heap[at] = entry;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Against a sorted list; few different times, so that many meet.
+        #[test]
+        fn bundles_come_in_order(steps in proptest::collection::vec((0..3u8, 0..40u32), 0..300)) {
+            let mut agenda = Agenda::default();
+            let mut list: Vec<(u32, u32)> = Vec::new();
+            for (slot, (what, time)) in (0..).zip(steps) {
+                if what == 0 {
+                    let mut out = Vec::new();
+                    agenda.pop(&mut out);
+                    let mut found = out;
+                    found.sort_unstable();
+                    let first = list.iter().map(|e| e.0).min();
+                    let wanted: Vec<u32> = list.iter().filter(|e| Some(e.0) == first).map(|e| e.1).collect();
+                    prop_assert_eq!(found, wanted);
+                    list.retain(|e| Some(e.0) != first);
+                } else {
+                    agenda.push(f64::from(time), slot);
+                    list.push((time, slot));
+                }
+                prop_assert_eq!(agenda.earliest(), list.iter().map(|e| f64::from(e.0)).reduce(f64::min));
+            }
+        }
+    }
+}

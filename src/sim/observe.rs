@@ -1,0 +1,184 @@
+//! Observation: the structure written out at an instant, in two passes.
+//!
+//! The first goes through the structure in string order and writes who is there, with the values of which motions are
+//! displacements; it also notes who moves. It is made anew only when the structure has changed: from frame to frame a
+//! string stays, but for the second pass, which goes through those that move, by career: the coefficients of their
+//! motions are evaluated for many modules at once (`Program::eval_lanes`, to the same bits as one by one).
+
+use super::career::Career;
+use super::error::Error;
+use super::motion::Riccati;
+use super::simulation::Simulation;
+use crate::expr::{LANES, Lanes};
+use crate::model::Law;
+use crate::structure::{Instant, ModuleId, ModuleString, Version, Visit};
+
+/// Who moves, in the structure of some version.
+#[derive(Debug, Default)]
+pub(super) struct Gallery {
+    version: Option<Version>,
+    /// Light modules, by label.
+    columns: Vec<Vec<Row>>,
+    /// Modules with a state, and where their parameters begin in the string.
+    others: Vec<(ModuleId, usize)>,
+    registers: Vec<Lanes>,
+    values: Vec<f64>,
+}
+
+/// A light module: birth, and the places of its parameters in the tree and in the string.
+#[derive(Clone, Copy, Debug)]
+struct Row {
+    birth: Instant,
+    from: u32,
+    to: u32,
+}
+
+impl Simulation<'_> {
+    /// Writes the structure into a string.
+    pub(super) fn observe(&mut self, t: f64, now: Instant, out: &mut ModuleString) -> Result<(), Error> {
+        let mut gallery = std::mem::take(&mut self.gallery);
+        let version = Version { source: self.source, structure: self.structure };
+        if gallery.version == Some(version) && out.version() == Some(version) {
+            out.show(t, now);
+        } else {
+            self.hang(&mut gallery, t, now, out);
+            gallery.version = Some(version);
+            out.set_version(version);
+        }
+        // The first place of a value that is none.
+        let mut bad = usize::MAX;
+        for &(id, to) in &gallery.others {
+            gallery.values.clear();
+            self.plant.values(id, now, &mut gallery.values);
+            let place = &mut out.parameters_mut()[to..to + gallery.values.len()];
+            place.copy_from_slice(&gallery.values);
+            if let Some(at) = place.iter().position(|x| !x.is_finite()) {
+                bad = bad.min(to + at);
+            }
+        }
+        for (label, rows) in gallery.columns.iter().enumerate().filter(|(_, rows)| !rows.is_empty()) {
+            let career = self.plant.careers.get(label as u32).expect("a light module's label");
+            let place = self.show_column(career, rows, now, &mut gallery.registers, out.parameters_mut());
+            bad = bad.min(place);
+        }
+        self.gallery = gallery;
+        match self.owner(bad) {
+            Some((id, parameter)) => {
+                // Not what anybody may go on from.
+                out.reset(t);
+                Err(self.not_finite(id, parameter, now))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// The first pass.
+    fn hang(&self, gallery: &mut Gallery, t: f64, now: Instant, out: &mut ModuleString) {
+        let Gallery { columns, others, .. } = gallery;
+        columns.iter_mut().for_each(Vec::clear);
+        columns.resize(self.plant.careers.len(), Vec::new());
+        others.clear();
+        let plant = &self.plant;
+        plant.tree.write(t, now, out, |id, label, from, to| match columns.get_mut(label as usize) {
+            Some(rows) => {
+                let birth = plant.tree.birth(id);
+                rows.push(Row { birth, from: from as u32, to: to as u32 });
+            }
+            None if plant.state(id).is_some() => others.push((id, to)),
+            None => {}
+        });
+        // What rests need not be looked at again.
+        for (label, rows) in columns.iter_mut().enumerate() {
+            let career = plant.careers.get(label as u32).expect("as many as there are columns");
+            let clause = career.solve.map(|solve| &self.model.rules[career.rule].solves[solve]);
+            if clause.is_none_or(|clause| clause.of.is_empty()) {
+                rows.clear();
+            }
+        }
+    }
+
+    /// The second pass over the modules of a career. Returns the first place of a value that is not finite.
+    fn show_column(
+        &self,
+        career: &Career,
+        rows: &[Row],
+        now: Instant,
+        registers: &mut Vec<Lanes>,
+        out: &mut [f64],
+    ) -> usize {
+        let rule = &self.model.rules[career.rule];
+        let Some(clause) = career.solve.map(|solve| &rule.solves[solve]) else { return usize::MAX };
+        let (arity, time) = (rule.parameters.len(), rule.time_variable());
+        let values = self.plant.tree.values();
+        let mut bad = usize::MAX;
+        let mut tau = [0.0; LANES];
+        for rows in rows.chunks(LANES) {
+            registers.resize(registers.len().max(time + 2), [0.0; LANES]);
+            for (lane, row) in rows.iter().enumerate() {
+                tau[lane] = now.since(row.birth).max(0.0);
+                for (i, x) in values[row.from as usize..][..arity].iter().enumerate() {
+                    registers[i][lane] = *x;
+                }
+                registers[time][lane] = row.birth.to_f64();
+            }
+            registers[time + 1] = [0.0; LANES];
+            for (law, &parameter) in clause.laws.iter().zip(&clause.of) {
+                let moved: Lanes = match law {
+                    Law::Polynomial(program) => {
+                        let mut c = [[0.0; LANES]; 4];
+                        for (power, register) in program.eval_lanes(registers).enumerate() {
+                            c[power] = registers_of(registers, register);
+                        }
+                        let starts = &registers[parameter];
+                        std::array::from_fn(|i| {
+                            let tau = tau[i];
+                            let c = [c[0][i], c[1][i] / 2.0, c[2][i] / 3.0, c[3][i] / 4.0];
+                            starts[i] + tau * (c[0] + tau * (c[1] + tau * (c[2] + tau * c[3])))
+                        })
+                    }
+                    Law::Quadratic(program) => {
+                        let mut c = [[0.0; LANES]; 3];
+                        for (power, register) in program.eval_lanes(registers).enumerate() {
+                            c[power] = registers_of(registers, register);
+                        }
+                        let mut moved = registers[parameter];
+                        for (i, x) in moved.iter_mut().enumerate().take(rows.len()) {
+                            *x += Riccati::new(*x, c[0][i], c[1][i], c[2][i]).value(tau[i]);
+                        }
+                        moved
+                    }
+                    Law::Sum { .. } | Law::Numeric(_) => continue,
+                };
+                for (row, &x) in rows.iter().zip(&moved) {
+                    let to = row.to as usize + parameter;
+                    out[to] = x;
+                    if !x.is_finite() {
+                        bad = bad.min(to);
+                    }
+                }
+            }
+        }
+        bad
+    }
+
+    /// The module whose parameter stands at a place of the string, if there is one.
+    fn owner(&self, place: usize) -> Option<(ModuleId, usize)> {
+        if place == usize::MAX {
+            return None;
+        }
+        let mut first = 0;
+        for visit in self.plant.tree.walk() {
+            let Visit::Module(id) = visit else { continue };
+            let arity = self.plant.tree.parameters(id).len();
+            if place < first + arity {
+                return Some((id, place - first));
+            }
+            first += arity;
+        }
+        None
+    }
+}
+
+fn registers_of(registers: &[Lanes], register: usize) -> Lanes {
+    registers[register]
+}

@@ -1,0 +1,270 @@
+//! The passing of time: what comes next, and what happens together.
+//!
+//! Two queues are one order: that of modules with a state (`queue`), and that of light ones (`agenda`), which says of
+//! an event no more than its time as a float. The *front* is what comes first of the latter, with its instants to all
+//! their digits. Within one instant, slots decide.
+
+use std::cmp::Ordering;
+
+use super::error::Error;
+use super::queue::{Entry, Who};
+use super::simulation::Simulation;
+use super::state::What;
+use crate::structure::{Instant, ModuleId};
+
+/// The light events of one float.
+#[derive(Debug, Default)]
+pub(super) struct Front {
+    time: f64,
+    /// The instants, if they are not all `first`.
+    instants: Vec<Instant>,
+    first: Instant,
+    /// In order of instants and slots.
+    members: Vec<u32>,
+    /// How many of them are gone.
+    passed: usize,
+}
+
+impl Front {
+    fn head(&self) -> Option<(Instant, u32)> {
+        let slot = *self.members.get(self.passed)?;
+        Some((self.instants.get(self.passed).copied().unwrap_or(self.first), slot))
+    }
+}
+
+/// What is known to come.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Coming {
+    /// The slot of a light module.
+    Light(Instant, u32),
+    Other(Entry),
+}
+
+impl Coming {
+    pub fn at(&self) -> Instant {
+        match self {
+            Coming::Light(at, _) => *at,
+            Coming::Other(entry) => entry.at,
+        }
+    }
+}
+
+impl Simulation<'_> {
+    /// What comes next.
+    pub(super) fn coming(&mut self) -> Option<Coming> {
+        let light = self.light_head();
+        let other = self.queue.peek_other();
+        match (light, other) {
+            (Some((at, slot)), Some(entry)) => {
+                let order = at.partial_cmp(&entry.at).unwrap_or(Ordering::Equal);
+                let first = order.then(Who::Module(slot).cmp(&entry.who)) == Ordering::Less;
+                Some(if first { Coming::Light(at, slot) } else { Coming::Other(entry) })
+            }
+            (Some((at, slot)), None) => Some(Coming::Light(at, slot)),
+            (None, other) => other.map(Coming::Other),
+        }
+    }
+
+    /// The first light event.
+    fn light_head(&mut self) -> Option<(Instant, u32)> {
+        let next = self.agenda.earliest();
+        if let Some(head) = self.front.head() {
+            if next.is_none_or(|next| next > self.front.time) {
+                return Some(head);
+            }
+            // Something came up that is not later.
+            let Front { time, members, passed, .. } = &mut self.front;
+            for &slot in &members[*passed..] {
+                self.agenda.push(*time, slot);
+            }
+        }
+        let mut members = std::mem::take(&mut self.front.members);
+        members.clear();
+        self.front.instants.clear();
+        self.front.passed = 0;
+        self.front.time = self.agenda.earliest().unwrap_or(f64::INFINITY);
+        self.agenda.pop(&mut members);
+        if let Some(&some) = members.first() {
+            self.front.first = self.event_of(some);
+        }
+        if members.iter().any(|slot| self.event_of(*slot) != self.front.first) {
+            let mut all: Vec<(Instant, u32)> = members.iter().map(|slot| (self.event_of(*slot), *slot)).collect();
+            all.sort_unstable_by(|a, b| a.partial_cmp(b).unwrap_or(Ordering::Equal));
+            members.clear();
+            members.extend(all.iter().map(|(_, slot)| *slot));
+            self.front.instants.extend(all.iter().map(|(at, _)| *at));
+        } else if !members.is_sorted() {
+            members.sort_unstable();
+        }
+        self.front.members = members;
+        self.front.head()
+    }
+
+    /// Takes out what `coming` has shown.
+    fn take(&mut self, coming: &Coming) {
+        match coming {
+            Coming::Light(..) => self.front.passed += 1,
+            Coming::Other(_) => self.queue.pop(),
+        }
+    }
+
+    /// Lets every event up to `t` take place, and finds out what every module does until then.
+    pub(super) fn advance(&mut self, t: f64) -> Result<(), Error> {
+        let until = Instant::new(t);
+        while let Some(coming) = self.coming() {
+            let ahead = coming.at().since(until);
+            match coming {
+                Coming::Other(entry) if !self.is_event(entry.who) => {
+                    if ahead >= 0.0 {
+                        break;
+                    }
+                    self.queue.pop();
+                    self.pass_end(entry)?;
+                }
+                _ => {
+                    if ahead > until.resolution() {
+                        break;
+                    }
+                    self.pass_event(coming)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// True if the entry is an event, not the end of what is known.
+    fn is_event(&self, who: Who) -> bool {
+        match who {
+            Who::Coupled => false,
+            Who::Module(slot) => {
+                let state = self.plant.states[slot as usize].as_ref();
+                state.is_some_and(|s| s.next.what != What::Window)
+            }
+        }
+    }
+
+    /// Goes on from the end of what is known.
+    fn pass_end(&mut self, entry: Entry) -> Result<(), Error> {
+        self.stalled = 0;
+        match entry.who {
+            Who::Coupled => self.pass_coupled_step(entry.at),
+            Who::Module(slot) => {
+                let id = self.plant.states[slot as usize].as_ref().expect("scheduled").id;
+                self.pass_window(id, entry.at)
+            }
+        }
+    }
+
+    /// Goes to an event and through it, with all that happens at the same instant.
+    fn pass_event(&mut self, first: Coming) -> Result<(), Error> {
+        let at = first.at();
+        let oldest = match first {
+            Coming::Light(_, slot) if self.only_the_front(at) => {
+                // All of the front, at one instant.
+                self.now = at;
+                self.show_coupled(at);
+                std::mem::swap(&mut self.firing_light, &mut self.front.members);
+                self.front.members.clear();
+                self.firing_light.drain(..self.front.passed);
+                self.front.passed = 0;
+                Some(self.plant.tree.id(slot))
+            }
+            _ => self.gather(at)?,
+        };
+        if let Some(id) = oldest {
+            self.watch_for_piling_up(id)?;
+        }
+        self.settle()
+    }
+
+    /// True if all of the front has one instant, and nothing else happens then.
+    fn only_the_front(&mut self, at: Instant) -> bool {
+        let far = |time: f64| time - at.to_f64() > 2.0 * at.resolution();
+        self.front.instants.is_empty()
+            && self.agenda.earliest().is_none_or(far)
+            && self.queue.peek_other().is_none_or(|entry| far(entry.at.to_f64()))
+    }
+
+    /// Opens everything that happens at an instant; tells the first module of it.
+    fn gather(&mut self, at: Instant) -> Result<Option<ModuleId>, Error> {
+        let mut group = std::mem::take(&mut self.group_entries);
+        group.clear();
+        let mut first: Option<(Instant, f64)> = None;
+        let mut later = Vec::new();
+        while let Some(coming) = self.coming() {
+            if coming.at().since(at) > at.resolution() {
+                break;
+            }
+            self.take(&coming);
+            let id = match coming {
+                // The common step does not go on before what happens at this instant.
+                Coming::Other(Entry { who: Who::Coupled, .. }) if !group.is_empty() => {
+                    later.push(coming);
+                    continue;
+                }
+                Coming::Other(entry) if !self.is_event(entry.who) => {
+                    self.pass_end(entry)?;
+                    continue;
+                }
+                Coming::Light(_, slot) => Some(self.plant.tree.id(slot)),
+                Coming::Other(Entry { who: Who::Module(slot), .. }) => {
+                    Some(self.plant.states[slot as usize].as_ref().expect("scheduled").id)
+                }
+                Coming::Other(_) => None,
+            };
+            if let Some(id) = id {
+                let birth = self.plant.tree.birth(id);
+                match first {
+                    None => first = Some((birth, at.since(birth))),
+                    // Those born together have clocks that are as good as their age is short.
+                    Some((elder, age)) if elder == birth => {
+                        if coming.at().since(birth) - age > Instant::new(age).resolution() {
+                            later.push(coming);
+                            continue;
+                        }
+                    }
+                    Some(_) => {}
+                }
+            }
+            group.push(coming);
+        }
+        for coming in later {
+            match coming {
+                Coming::Light(at, slot) => self.agenda.push(at.to_f64(), slot),
+                Coming::Other(entry) => self.queue.schedule(entry.who, entry.at),
+            }
+        }
+        self.now = at;
+        self.show_coupled(at);
+        let all_light = group.iter().all(|coming| matches!(coming, Coming::Light(..)));
+        let mut oldest = None;
+        for coming in &group {
+            let who = match *coming {
+                Coming::Light(_, slot) if all_light => {
+                    self.firing_light.push(slot);
+                    oldest = oldest.or(Some(self.plant.tree.id(slot)));
+                    continue;
+                }
+                Coming::Light(_, slot) => {
+                    self.promote(self.plant.tree.id(slot));
+                    Who::Module(slot)
+                }
+                Coming::Other(entry) => entry.who,
+            };
+            let first = match who {
+                Who::Coupled => None,
+                Who::Module(slot) => match self.fire_quickly(slot as usize) {
+                    Some(firing) => {
+                        let id = firing.id;
+                        self.firing.push(firing);
+                        Some(id)
+                    }
+                    None => Some(self.touch_alone(slot as usize)?),
+                },
+            };
+            oldest = oldest.or(first);
+        }
+        self.group_entries = group;
+        Ok(oldest)
+    }
+}
