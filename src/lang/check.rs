@@ -2,13 +2,14 @@
 
 use std::collections::{HashMap, HashSet};
 
+use super::appearance::surface_hint;
 use super::ast::{self, HeadModule};
 use super::print;
 use super::suggest::nearest;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::model::{
-    BUILT_IN_SURFACES, Class, Condition, DRAWN_WORDS, KindId, Kinds, Model, Pattern, Rule, Step, base_of,
-    class_of,
+    BUILT_IN_SURFACES, COMMAND_SURFACES, Class, Condition, DRAWN_WORDS, KindId, Kinds, Model, Pattern, Rule,
+    Step, base_of, class_of,
 };
 
 /// Most rules that one strict predecessor can have.
@@ -339,10 +340,14 @@ pub fn inert_modules(model: &Model, occurs: &HashMap<KindId, Span>, diagnostics:
         }
         match kind.class() {
             Class::Symbol => {}
-            Class::Surface if BUILT_IN_SURFACES.contains(&name) => {}
+            Class::Surface
+                if BUILT_IN_SURFACES.contains(&kind.base())
+                    || COMMAND_SURFACES.contains(&name)
+                    || model.appearance.surfaces.iter().any(|shape| shape.name == name) => {}
             Class::Surface => diagnostics.push(
                 Diagnostic::warning(format!("there is no surface `{name}`: nothing is drawn for it"))
-                    .at(first(), "built in are @L, a leaf, and @K, a flower"),
+                    .at(first(), "built in are @L, a leaf, @K, a flower, @P, a petal, and @B, a bud")
+                    .help_opt(surface_hint(name, &model.appearance)),
             ),
             Class::Word => {
                 let names: HashSet<&str> = with_rules.iter().copied().chain(DRAWN_WORDS).collect();

@@ -31,6 +31,10 @@ fn words(rule: Rule) -> Option<&'static str> {
         kw_dt => "`dt`",
         kw_step => "`step`",
         kw_in => "`in` and a range",
+        kw_from => "`from` and a file",
+        kw_strength => "`strength`",
+        surface_name => "the name of a surface such as `@P`",
+        point => "a point such as `(1, 0.5)`",
         equation | derivative | rate => "a derivative such as `dx/dt`",
         equals => "`=`",
         colon => "`:`",
@@ -92,7 +96,15 @@ pub fn explain(item: Rule, error: &Error<Rule>, text: &str, offset: usize) -> Di
 }
 
 fn is_item_with_name(item: Rule) -> bool {
-    matches!(item, Rule::const_item | Rule::param_item | Rule::def_item)
+    matches!(
+        item,
+        Rule::const_item
+            | Rule::param_item
+            | Rule::def_item
+            | Rule::color_item
+            | Rule::gradient_item
+            | Rule::contour_item
+    )
 }
 
 /// The word, number or symbol at a place.
