@@ -27,7 +27,7 @@ pub use suggest::did_you_mean;
 pub use surface::{Files, NoFiles};
 
 use crate::diagnostic::{Diagnostic, Severity, Source, Span};
-use crate::model::{Frames, Kinds, Model, Successor, analyse};
+use crate::model::{DRAWN_WORDS, Frames, Kinds, Model, Successor, analyse};
 use ast::{Action, Document, Item};
 use scope::{Scope, Variables};
 
@@ -79,10 +79,10 @@ fn build(
     let appearance = appearance::build(document, scope, files);
     let mut kinds = Kinds::default();
     let mut single = Singles::default();
-    let mut builder =
-        rules::RuleBuilder { document, scope, kinds: &mut kinds, occurs: std::collections::HashMap::new() };
+    let (occurs, drawn) = Default::default();
+    let mut builder = rules::RuleBuilder { document, scope, kinds: &mut kinds, occurs, drawn };
     let (mut rules, mut drafts, mut written) = (vec![], vec![], vec![]);
-    let (mut interpretations, mut strings) = (vec![], vec![]);
+    let (mut interpretations, mut strings, mut drawings) = (vec![], vec![], vec![]);
     let mut heads = Vec::new();
     let (mut axiom, mut ignored, mut considered) = (None, Vec::new(), Vec::new());
     let (mut title, mut angle, mut frames) = (None, 90.0, None);
@@ -119,6 +119,7 @@ fn build(
             }
             Item::Interpret { head, drawn } => {
                 heads.push(head);
+                drawings.push(&drawn[..]);
                 match builder.interpretation(head, drawn) {
                     Some(interpretation) => interpretations.push(interpretation),
                     None => whole = false,
@@ -143,7 +144,12 @@ fn build(
             _ => {}
         }
     }
-    builder.check_arities(&written, &strings);
+    let ruled: Vec<&ast::HeadModule> = written.iter().map(|rule| &rule.predecessor).collect();
+    builder.check_arities(&ruled, &strings, "in its rule");
+    // In drawings `F(x)` means a line, whatever `F` with other parameters is drawn as.
+    let drawn = |head: &&ast::HeadModule| !DRAWN_WORDS.contains(&&*head.name.text);
+    let drawn: Vec<&ast::HeadModule> = heads.iter().copied().filter(drawn).collect();
+    builder.check_arities(&drawn, &drawings, "where it is drawn");
     if !unread {
         builder.check_interpretations(&heads);
     }
