@@ -4,7 +4,9 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::export::{Camera, Page};
 use crate::lang::Setting;
+use crate::scene::Color;
 use crate::sim::Method;
 
 /// Differential L-systems: plants as growing strings of modules, whose parameters follow differential
@@ -131,9 +133,22 @@ pub struct RenderArgs {
     /// File format of the frames
     #[arg(long, value_enum, default_value_t = FrameFormat::Svg)]
     pub format: FrameFormat,
-    /// From where to look (SVG): front, side, top, or AZIMUTH,ELEVATION in degrees
+    /// From where to look: front, side, top, or AZIMUTH,ELEVATION in degrees
     #[arg(long, default_value = "front", allow_hyphen_values = true)]
     pub view: String,
+    /// Look in perspective, from where all that is drawn at any time fills this angle (1 to 120 degrees) [default:
+    /// orthographic]
+    #[arg(long, value_name = "DEGREES", value_parser = field_of_view)]
+    pub perspective: Option<f64>,
+    /// Width of pictures in pixels; the height follows [default: 1000 on the larger side]
+    #[arg(long, value_name = "PIXELS", value_parser = pixels)]
+    pub width: Option<u32>,
+    /// Width and height of pictures in pixels
+    #[arg(long, value_name = "WxH", value_parser = size, conflicts_with = "width")]
+    pub size: Option<(u32, u32)>,
+    /// Background of pictures: "#rrggbb" or none (transparent) [default: #fbfaf5]
+    #[arg(long, value_name = "COLOUR", value_parser = background)]
+    pub background: Option<Background>,
     /// Write into a directory that holds other files
     #[arg(long)]
     pub force: bool,
@@ -263,6 +278,8 @@ pub enum TextFormat {
 pub enum FrameFormat {
     /// Vector graphics, one view
     Svg,
+    /// Pixels, one view; what is nearer is in front to the pixel
+    Png,
     /// Meshes in three dimensions
     Obj,
 }
@@ -293,6 +310,44 @@ fn tolerance(text: &str) -> Result<f64, String> {
         x if (1e-13..=0.1).contains(&x) => Ok(x),
         _ => Err("must be between 1e-13 and 0.1".to_owned()),
     }
+}
+
+/// What pictures are drawn on; `None` is nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Background(pub Option<Color>);
+
+fn background(text: &str) -> Result<Background, String> {
+    if text == "none" {
+        return Ok(Background(None));
+    }
+    let digits = text.strip_prefix('#').filter(|digits| digits.len() == 6);
+    let rgb = digits.filter(|d| d.bytes().all(|b| b.is_ascii_hexdigit())).map(|d| u32::from_str_radix(d, 16));
+    match rgb {
+        Some(Ok(rgb)) => Ok(Background(Some(Color::hex(rgb)))),
+        _ => {
+            Err("expected none or a colour like #ffffff (in quotes: the shell takes # for a comment)"
+                .to_owned())
+        }
+    }
+}
+
+fn field_of_view(text: &str) -> Result<f64, String> {
+    match number(text)? {
+        x if Camera::FIELDS.contains(&x) => Ok(x),
+        _ => Err(format!("must be between {} and {} degrees", Camera::FIELDS.start(), Camera::FIELDS.end())),
+    }
+}
+
+fn pixels(text: &str) -> Result<u32, String> {
+    match text.parse::<u32>() {
+        Ok(n) if (1..=Page::MOST_ON_A_SIDE).contains(&n) => Ok(n),
+        _ => Err(format!("must be between 1 and {} pixels", Page::MOST_ON_A_SIDE)),
+    }
+}
+
+fn size(text: &str) -> Result<(u32, u32), String> {
+    let (width, height) = text.split_once('x').ok_or("expected WIDTHxHEIGHT, such as 1280x720")?;
+    Ok((pixels(width)?, pixels(height)?))
 }
 
 fn runs(text: &str) -> Result<usize, String> {

@@ -9,10 +9,12 @@ use std::time::Instant;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 
-use super::args::{FrameFormat, RenderArgs};
+use super::args::{Background, FrameFormat, RenderArgs};
 use super::common::{Failure, Run};
 use super::events::EventLog;
-use crate::export::{self, Format, FrameDirectory, FrameRecord, FrameWriter, Manifest, Survey, View};
+use crate::export::{
+    self, Format, FrameDirectory, FrameRecord, FrameWriter, Manifest, Page, Picture, Size, Survey, View,
+};
 use crate::scene::Scene;
 use crate::sim::{Method, Settings, Simulation};
 use crate::structure::ModuleString;
@@ -23,14 +25,19 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     let view: View = args.view.parse().map_err(|e| Failure::Usage(format!("error: {e}\n")))?;
     let format = match args.format {
         FrameFormat::Svg => Format::Svg,
+        FrameFormat::Png => Format::Png,
         FrameFormat::Obj => Format::Obj,
     };
+    only_of_pictures(args)?;
     let run = Run::start(&args.shared)?;
     let mut clock = run.clock;
     let count = run.times.len();
 
     let progress = bar("measuring", count);
     let mut survey = Survey::new(view);
+    if let Some(field) = args.perspective {
+        survey = survey.with_perspective(field);
+    }
     let mut events = EventLog::create(args.shared.events.as_deref(), &run)?;
     let measured = (|| {
         let mut reel = Reel::start(&run, run.settings)?;
@@ -51,9 +58,10 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     events.map_or(Ok(()), EventLog::finish)?;
     measured?;
 
+    let mut writer = FrameWriter::new(format, survey.fit());
+    writer.page = page(args, writer.fit.picture)?;
     // Only now that the run is known to be good, the directory is touched.
     let mut directory = FrameDirectory::create(&args.out, args.force).map_err(out_of_directory)?;
-    let writer = FrameWriter::new(format, survey.fit());
     let mut manifest = manifest(args, &run, view, &writer);
     let progress = bar("writing", count);
     let title = run.session.model.title.clone().unwrap_or_else(|| run.session.source.name.clone());
@@ -83,6 +91,33 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     directory.finish(&manifest).map_err(out_of_directory)?;
     progress.finish_and_clear();
     run.write_stats(&args.shared, clock, reel.simulation.stats())
+}
+
+/// Refuses flags that mean nothing for meshes.
+fn only_of_pictures(args: &RenderArgs) -> Result<(), Failure> {
+    let given = [
+        ("--perspective", args.perspective.is_some()),
+        ("--width", args.width.is_some()),
+        ("--size", args.size.is_some()),
+        ("--background", args.background.is_some()),
+    ];
+    match given.iter().find(|(_, given)| *given && args.format == FrameFormat::Obj) {
+        Some((flag, _)) => Err(Failure::Usage(format!(
+            "error: {flag} is for pictures, and an OBJ file is a mesh in space: leave it out, or choose --format svg or png\n"
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// The page that was asked for.
+fn page(args: &RenderArgs, picture: Picture) -> Result<Page, Failure> {
+    let size = match (args.size, args.width) {
+        (Some((width, height)), _) => Size::Exact(width, height),
+        (None, Some(width)) => Size::Width(width),
+        (None, None) => Size::default(),
+    };
+    let background = args.background.map_or(Some(Page::BACKGROUND), |Background(color)| color);
+    Page::new(picture, size, background).map_err(|e| Failure::Usage(format!("error: {e}\n")))
 }
 
 /// A running simulation and what is drawn of it.
@@ -125,6 +160,7 @@ fn manifest(args: &RenderArgs, run: &Run, view: View, writer: &FrameWriter) -> M
     let mut described = json!({
         "format": writer.format.extension(),
         "view": view.to_string(),
+        "perspective": args.perspective,
         "method": method,
         "parameters": parameters,
         "seed": args.shared.seed,
@@ -135,7 +171,11 @@ fn manifest(args: &RenderArgs, run: &Run, view: View, writer: &FrameWriter) -> M
         described["tolerance"] = settings.tolerance.into();
     }
     let mut manifest = Manifest::new(&run.session.source.name, model.title.clone(), described);
-    manifest.view_box = (writer.format == Format::Svg).then(|| writer.fit.picture.view_box());
+    if writer.format != Format::Obj {
+        manifest.settings["size"] = json!(writer.page.pixels);
+        manifest.settings["background"] = writer.page.background.map(|color| color.to_string()).into();
+    }
+    manifest.view_box = (writer.format == Format::Svg).then(|| writer.page.picture.view_box());
     manifest.bounds = writer.fit.bounds.map(|c| c.map(|p| [p.x, p.y, p.z]));
     manifest
 }

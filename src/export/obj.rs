@@ -15,18 +15,18 @@ pub(super) const MATERIALS: &str = "materials.mtl";
 const NORMAL_DECIMALS: usize = 4;
 
 /// A triangle: vertex and normal at each corner, by number.
-struct Triangle {
+pub(super) struct Triangle {
     owner: OwnerId,
-    material: MaterialId,
-    corners: [(u32, u32); 3],
+    pub(super) material: MaterialId,
+    pub(super) corners: [(u32, u32); 3],
 }
 
 /// A growing triangle mesh.
 #[derive(Default)]
 pub(super) struct Triangles {
-    vertices: Vec<Point>,
-    normals: Vec<Vector>,
-    faces: Vec<Triangle>,
+    pub(super) vertices: Vec<Point>,
+    pub(super) normals: Vec<Vector>,
+    pub(super) faces: Vec<Triangle>,
 }
 
 impl Triangles {
@@ -46,14 +46,20 @@ impl Triangles {
     }
 }
 
-/// The document of one frame.
-pub(super) fn document(scene: &Scene, fit: &Fit, sides: usize, title: &str) -> String {
+/// Everything in a scene as triangles, in string order; stems as tubes with so many sides.
+pub(super) fn triangles(scene: &Scene, fit: &Fit, sides: usize) -> Triangles {
     let mut mesh = Triangles::default();
     tube::add_tubes(scene, fit.default_width, sides, &mut mesh);
     add_polygons(scene, &mut mesh);
     add_surfaces(scene, &mut mesh);
     // Stable, so that triangles stay in the order in which they were made.
     mesh.faces.sort_by_key(|face| (face.owner, face.material));
+    mesh
+}
+
+/// The document of one frame.
+pub(super) fn document(scene: &Scene, fit: &Fit, sides: usize, title: &str) -> String {
+    let mesh = triangles(scene, fit, sides);
     let title: String = title.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
     let mut out = format!(
         "# {GENERATOR}\n# {title}\n# Up axis: +Y; front: +Z. Units: those of the model.\nmtllib {MATERIALS}\n"
