@@ -29,6 +29,11 @@ pub enum Action {
     Run(RunArgs),
     /// Run a model and draw it, a file for each frame
     Render(RenderArgs),
+    /// Draw the paper's figures that show development, from the models that come with the program
+    ///
+    /// Each figure is what `dlsys render` makes of a line; --list prints the lines. Writes a folder for each picture,
+    /// the models, and index.html, which shows them all.
+    Gallery(GalleryArgs),
     /// Compare methods on models: errors, wall times, counts of work; or run the hard cases
     ///
     /// Each model is run by each method at each tolerance or step size. The error is the largest over all
@@ -152,6 +157,22 @@ pub struct RenderArgs {
     /// Write into a directory that holds other files
     #[arg(long)]
     pub force: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct GalleryArgs {
+    /// Directory for the pictures; made if it is not there
+    #[arg(short, long = "out", value_name = "DIR", required_unless_present = "list")]
+    pub out: Option<PathBuf>,
+    /// Draw this figure only; can be repeated
+    #[arg(long = "figure", value_name = "N")]
+    pub figures: Vec<u8>,
+    /// File format of the pictures: svg or png
+    #[arg(long, value_enum, default_value_t = FrameFormat::Svg)]
+    pub format: FrameFormat,
+    /// Print the lines, draw nothing
+    #[arg(long)]
+    pub list: bool,
 }
 
 #[derive(Debug, Args)]
