@@ -134,6 +134,10 @@ pub struct RenderArgs {
     /// From where to look (SVG): front, side, top, or AZIMUTH,ELEVATION in degrees
     #[arg(long, default_value = "front", allow_hyphen_values = true)]
     pub view: String,
+    /// How far what is drawn may be from a curved surface, in scene units [default: 1/2000 of the extent of the
+    /// whole animation]
+    #[arg(long, value_name = "L", value_parser = positive)]
+    pub accuracy: Option<f64>,
     /// Write into a directory that holds other files
     #[arg(long)]
     pub force: bool,

@@ -53,11 +53,14 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
 
     // Only now that the run is known to be good, the directory is touched.
     let mut directory = FrameDirectory::create(&args.out, args.force).map_err(out_of_directory)?;
-    let writer = FrameWriter::new(format, survey.fit());
+    let mut fit = survey.fit();
+    fit.accuracy = args.accuracy.unwrap_or(fit.accuracy);
+    let writer = FrameWriter::new(format, fit);
     let mut manifest = manifest(args, &run, view, &writer);
     let progress = bar("writing", count);
     let title = run.session.model.title.clone().unwrap_or_else(|| run.session.source.name.clone());
     let mut reel = Reel::start(&run, Settings { log: false, ..run.settings })?;
+    reel.scene.accuracy = writer.fit.accuracy;
     for (index, &t) in run.times.iter().enumerate() {
         let before = Instant::now();
         reel.wind(t)?;
@@ -125,6 +128,7 @@ fn manifest(args: &RenderArgs, run: &Run, view: View, writer: &FrameWriter) -> M
     let mut described = json!({
         "format": writer.format.extension(),
         "view": view.to_string(),
+        "accuracy": writer.fit.accuracy,
         "method": method,
         "parameters": parameters,
         "seed": args.shared.seed,

@@ -97,6 +97,7 @@ impl Survey {
             view: self.view,
             default_width,
             extent: self.space.extent(),
+            accuracy: self.space.extent() * Fit::ACCURACY,
             bounds: self.space.corners(default_width),
             picture: Picture::around(self.seen.corners(default_width)),
         }
@@ -111,6 +112,9 @@ pub struct Fit {
     pub default_width: f64,
     /// Largest side of the box around all points of all frames, in scene units; 0 if nothing is drawn.
     pub extent: f64,
+    /// How far what is written may be from a curved surface or a round stem, in scene units; a fixed part of
+    /// the extent unless somebody chooses another.
+    pub accuracy: f64,
     /// Opposite corners of the box around everything; `None` if nothing is drawn.
     pub bounds: Option<[Point; 2]>,
     /// The picture area of the view.
@@ -118,6 +122,9 @@ pub struct Fit {
 }
 
 impl Fit {
+    /// The default accuracy, in parts of the extent: half a pixel of a picture of a thousand.
+    pub const ACCURACY: f64 = 1.0 / 2000.0;
+
     /// Opposite corners of the box around one scene, lines having their width.
     pub fn bounds_of(&self, scene: &Scene) -> Option<[Point; 2]> {
         Bounds::of(scene).corners(self.default_width)
@@ -180,6 +187,7 @@ impl FrameWriter {
 
     /// The file of a frame. `title` is for people: what it shows, and at which time.
     pub fn write(&self, scene: &Scene, title: &str) -> Vec<u8> {
+        let scene = &*scene.tessellated(self.fit.accuracy);
         match self.format {
             Format::Svg => svg::document(scene, &self.fit, title).into_bytes(),
             Format::Obj => obj::document(scene, &self.fit, self.sides.max(3), title).into_bytes(),

@@ -24,6 +24,8 @@ pub struct RuleBuilder<'b> {
     pub kinds: &'b mut Kinds,
     /// Each kind that stands in a string, with the first place where it does.
     pub occurs: HashMap<KindId, Span>,
+    /// The same for what is only drawn.
+    pub drawn: HashMap<KindId, Span>,
 }
 
 /// The pairs of expressions that the conditions of a rule compare.
@@ -187,7 +189,9 @@ impl RuleBuilder<'_> {
         // What is only drawn does not develop: it makes no rule reachable.
         let before = std::mem::take(&mut self.occurs);
         let drawn = self.successor(drawn, &variables, count);
-        self.occurs = before;
+        for (kind, span) in std::mem::replace(&mut self.occurs, before) {
+            self.drawn.entry(kind).or_insert(span);
+        }
         let kind = self.kinds.intern(&head.name.text, head.parameters.len());
         Some((kind, Interpretation { span: head.span, drawn: drawn? }))
     }

@@ -1,6 +1,6 @@
 //! How much space a scene takes up, before the default width of its lines is known.
 
-use super::{Point, Scene, Width};
+use super::{Patch, Point, Scene, Width};
 
 /// An upright box; empty if `low > high`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,7 +91,8 @@ impl Bounds {
             .surfaces
             .iter()
             .flat_map(|surface| surface.mesh.vertices.iter().map(|&v| surface.placement.point(v)));
-        for point in corners.chain(surfaces) {
+        let patches = scene.patches.iter().flat_map(Patch::hull);
+        for point in corners.chain(surfaces).chain(patches) {
             let point = turn(point);
             self.points.include(point, 0.0);
             self.known.include(point, 0.0);
