@@ -154,6 +154,10 @@ pub struct RenderArgs {
     /// Background of pictures: "#rrggbb" or none (transparent) [default: #fbfaf5]
     #[arg(long, value_name = "COLOUR", value_parser = background)]
     pub background: Option<Background>,
+    /// How far what is drawn may be from a curved surface, in scene units [default: 1/2000 of the extent of the
+    /// whole animation]
+    #[arg(long, value_name = "L", value_parser = positive)]
+    pub accuracy: Option<f64>,
     /// Write into a directory that holds other files
     #[arg(long)]
     pub force: bool,

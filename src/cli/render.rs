@@ -58,7 +58,9 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     events.map_or(Ok(()), EventLog::finish)?;
     measured?;
 
-    let mut writer = FrameWriter::new(format, survey.fit());
+    let mut fit = survey.fit();
+    fit.accuracy = args.accuracy.unwrap_or(fit.accuracy);
+    let mut writer = FrameWriter::new(format, fit);
     writer.page = page(args, writer.fit.picture)?;
     // Only now that the run is known to be good, the directory is touched.
     let mut directory = FrameDirectory::create(&args.out, args.force).map_err(out_of_directory)?;
@@ -66,6 +68,7 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     let progress = bar("writing", count);
     let title = run.session.model.title.clone().unwrap_or_else(|| run.session.source.name.clone());
     let mut reel = Reel::start(&run, Settings { log: false, ..run.settings })?;
+    reel.scene.accuracy = writer.fit.accuracy;
     for (index, &t) in run.times.iter().enumerate() {
         let before = Instant::now();
         reel.wind(t)?;
@@ -161,6 +164,7 @@ fn manifest(args: &RenderArgs, run: &Run, view: View, writer: &FrameWriter) -> M
         "format": writer.format.extension(),
         "view": view.to_string(),
         "perspective": args.perspective,
+        "accuracy": writer.fit.accuracy,
         "method": method,
         "parameters": parameters,
         "seed": args.shared.seed,

@@ -54,6 +54,7 @@ impl Survey {
             camera,
             default_width,
             extent,
+            accuracy: extent * Fit::ACCURACY,
             bounds: self.space.corners(default_width),
             picture: Picture::around(shadow.map(|shadow| camera.frame(&shadow))),
             light: Light::new(depths, extent),
@@ -69,6 +70,9 @@ pub struct Fit {
     pub default_width: f64,
     /// Largest side of the box around all points of all frames, in scene units; 0 if nothing is drawn.
     pub extent: f64,
+    /// How far what is written may be from a curved surface or a round stem, in scene units; a fixed part of
+    /// the extent unless somebody chooses another.
+    pub accuracy: f64,
     /// Opposite corners of the box around everything; `None` if nothing is drawn.
     pub bounds: Option<[Point; 2]>,
     /// The picture area of the view.
@@ -77,6 +81,9 @@ pub struct Fit {
 }
 
 impl Fit {
+    /// The default accuracy, in parts of the extent: half a pixel of a picture of a thousand.
+    pub const ACCURACY: f64 = 1.0 / 2000.0;
+
     /// Opposite corners of the box around one scene, lines having their width.
     pub fn bounds_of(&self, scene: &Scene) -> Option<[Point; 2]> {
         Bounds::of(scene).corners(self.default_width)

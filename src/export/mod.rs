@@ -102,6 +102,7 @@ impl FrameWriter {
 
     /// The file of a frame. `title` is for people: what it shows, and at which time.
     pub fn write(&self, scene: &Scene, title: &str) -> Vec<u8> {
+        let scene = &*scene.tessellated(self.fit.accuracy);
         match self.format {
             Format::Svg => svg::document(scene, &self.fit, &self.page, title).into_bytes(),
             Format::Png => png::document(scene, &self.fit, &self.page, title),

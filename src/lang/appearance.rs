@@ -111,7 +111,7 @@ fn surface(
     scope: &mut Scope,
     files: &dyn Files,
 ) -> Option<SurfaceShape> {
-    if COMMAND_SURFACES.contains(&&*name.text) {
+    if COMMAND_SURFACES.iter().any(|(command, _)| *command == &*name.text) {
         scope.diagnostics.push(
             Diagnostic::error(format!("`{}` cannot be a surface", name.text))
                 .at(name.span, "this name tells the turtle something else")

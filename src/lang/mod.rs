@@ -20,6 +20,7 @@ mod smooth;
 mod suggest;
 mod surface;
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 pub use layout::MAX_DEPTH;
@@ -79,8 +80,13 @@ fn build(
     let appearance = appearance::build(document, scope, files);
     let mut kinds = Kinds::default();
     let mut single = Singles::default();
-    let (occurs, drawn) = Default::default();
-    let mut builder = rules::RuleBuilder { document, scope, kinds: &mut kinds, occurs, drawn };
+    let mut builder = rules::RuleBuilder {
+        document,
+        scope,
+        kinds: &mut kinds,
+        occurs: HashMap::new(),
+        drawn: HashMap::new(),
+    };
     let (mut rules, mut drafts, mut written) = (vec![], vec![], vec![]);
     let (mut interpretations, mut strings, mut drawings) = (vec![], vec![], vec![]);
     let mut heads = Vec::new();
@@ -153,7 +159,7 @@ fn build(
     if !unread {
         builder.check_interpretations(&heads);
     }
-    let occurs = builder.occurs;
+    let (occurs, drawn) = (builder.occurs, builder.drawn);
     if !single.seen("the initial string") && !unread {
         scope.diagnostics.push(
             Diagnostic::error("the model has no initial string")
@@ -177,7 +183,7 @@ fn build(
         axiom: axiom.unwrap_or_else(Successor::default),
         rules,
         interpretations: Vec::new(),
-        appearance,
+        appearance: Arc::new(appearance),
         drawn_only: Vec::new(),
     };
     for (i, rule) in written.iter().enumerate() {
@@ -209,6 +215,7 @@ fn build(
     }
     check::coverage(&model, diagnostics);
     check::inert_modules(&model, &occurs, diagnostics);
+    check::commands(&model, diagnostics, &drawn.into_iter().chain(occurs).collect());
     analyse(&mut scope.graph, &mut model, &drafts);
     Some(model)
 }

@@ -30,6 +30,8 @@ pub use kind::{
 pub use law::{Jacobian, Law, Linear, Numeric, Obstacle, Watch};
 pub use rule::{Interpretation, Pattern, Produce, Rule, Solve, Successor, Switch};
 
+use std::sync::Arc;
+
 use crate::diagnostic::Span;
 
 /// A checked model, ready to run.
@@ -48,7 +50,7 @@ pub struct Model {
     pub axiom: Successor,
     pub rules: Vec<Rule>,
     pub interpretations: Vec<Interpretation>,
-    pub appearance: Appearance,
+    pub appearance: Arc<Appearance>,
     /// Per kind and parameter: no rule reads it, so that only drawing and output do.
     pub drawn_only: Vec<Vec<bool>>,
 }
@@ -72,7 +74,7 @@ impl Default for Model {
             axiom: Successor::default(),
             rules: Vec::new(),
             interpretations: Vec::new(),
-            appearance: Appearance::default(),
+            appearance: Arc::default(),
             drawn_only: Vec::new(),
         }
     }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{MaterialId, Mesh, OwnerId, Point, Vector};
+use super::{MaterialId, Mesh, OwnerId, PatchSet, Point, Vector};
 
 /// The width of a line.
 ///
@@ -65,6 +65,9 @@ pub struct Polygon {
 #[derive(Clone, Debug)]
 pub struct Surface {
     pub mesh: Arc<Mesh>,
+    /// What `mesh` is a preview of, if the surface is curved: the mesh of the right accuracy is made when a
+    /// frame is written (see [`Scene::tessellated`](super::Scene::tessellated)).
+    pub patches: Option<Arc<PatchSet>>,
     pub placement: Placement,
     /// Stands in for the materials of those faces that take a colour.
     pub tint: Option<MaterialId>,
