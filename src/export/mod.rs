@@ -175,14 +175,14 @@ impl Picture {
 pub struct FrameWriter {
     pub format: Format,
     pub fit: Fit,
-    /// Sides of the tubes that stems are made of, at least 3 (OBJ only).
+    /// Sides of the tubes that stems are made of (OBJ only); 0 for as many as the accuracy takes, and 8 at least.
     pub sides: usize,
 }
 
 impl FrameWriter {
-    /// A writer with tubes of eight sides.
+    /// A writer with tubes as round as the accuracy asks.
     pub fn new(format: Format, fit: Fit) -> FrameWriter {
-        FrameWriter { format, fit, sides: 8 }
+        FrameWriter { format, fit, sides: 0 }
     }
 
     /// The file of a frame. `title` is for people: what it shows, and at which time.
@@ -190,7 +190,7 @@ impl FrameWriter {
         let scene = &*scene.tessellated(self.fit.accuracy);
         match self.format {
             Format::Svg => svg::document(scene, &self.fit, title).into_bytes(),
-            Format::Obj => obj::document(scene, &self.fit, self.sides.max(3), title).into_bytes(),
+            Format::Obj => obj::document(scene, &self.fit, self.sides, title),
         }
     }
 
@@ -198,7 +198,7 @@ impl FrameWriter {
     pub fn companion(&self, scene: &Scene) -> Option<(&'static str, Vec<u8>)> {
         match self.format {
             Format::Svg => None,
-            Format::Obj => Some((obj::MATERIALS, obj::materials(&scene.palette).into_bytes())),
+            Format::Obj => Some((obj::MATERIALS, obj::materials(&scene.palette))),
         }
     }
 }
