@@ -89,15 +89,16 @@ pub struct FrameWriter {
     pub fit: Fit,
     /// What pictures are drawn on (SVG and PNG).
     pub page: Page,
-    /// Sides of the tubes that stems are made of, at least 3 (OBJ only).
+    /// Sides of the tubes that stems are made of (OBJ and PNG); 0 for as many as the accuracy takes, and 8 at least.
     pub sides: usize,
 }
 
 impl FrameWriter {
-    /// A writer of pictures 1000 pixels wide or high on the usual background, or of meshes with tubes of eight sides.
+    /// A writer of pictures 1000 pixels wide or high on the usual background, or of meshes with tubes as round as the
+    /// accuracy asks.
     pub fn new(format: Format, fit: Fit) -> FrameWriter {
         let page = Page::usual(fit.picture);
-        FrameWriter { format, fit, page, sides: 8 }
+        FrameWriter { format, fit, page, sides: 0 }
     }
 
     /// The file of a frame. `title` is for people: what it shows, and at which time.
@@ -106,7 +107,7 @@ impl FrameWriter {
         match self.format {
             Format::Svg => svg::document(scene, &self.fit, &self.page, title).into_bytes(),
             Format::Png => png::document(scene, &self.fit, &self.page, title),
-            Format::Obj => obj::document(scene, &self.fit, self.sides.max(3), title).into_bytes(),
+            Format::Obj => obj::document(scene, &self.fit, self.sides, title),
         }
     }
 
@@ -114,7 +115,7 @@ impl FrameWriter {
     pub fn companion(&self, scene: &Scene) -> Option<(&'static str, Vec<u8>)> {
         match self.format {
             Format::Svg | Format::Png => None,
-            Format::Obj => Some((obj::MATERIALS, obj::materials(&scene.palette).into_bytes())),
+            Format::Obj => Some((obj::MATERIALS, obj::materials(&scene.palette))),
         }
     }
 }

@@ -132,6 +132,7 @@ mod tests {
             direction: end.coords.normalize(),
             across: Vector::x(),
             widths: [width; 2],
+            contour: None,
             material: MaterialId::STEM,
             owner,
             follows: None,

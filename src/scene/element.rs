@@ -46,6 +46,8 @@ pub struct Segment {
     pub across: Vector,
     /// Widths (diameters) at the start and at the end.
     pub widths: [Width; 2],
+    /// Index of the cross-section among the model's contours; `None` is a circle.
+    pub contour: Option<u32>,
     pub material: MaterialId,
     pub owner: OwnerId,
     /// Index of the segment that this one continues: it precedes this one on the same axis and ends exactly

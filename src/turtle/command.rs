@@ -26,6 +26,8 @@ pub(super) enum Command {
     Taper,
     /// `@T(e)`: strength of the tropism.
     Bend,
+    /// `@C(n)`: cross-section of stems.
+    Contour,
     /// `;(n)`, `;(n, v)`
     Color,
     /// `[`
@@ -97,6 +99,7 @@ impl Command {
             "@B" => Command::Bud,
             "@W" => Command::Taper,
             "@T" => Command::Bend,
+            "@C" => Command::Contour,
             "@PS" => Command::BeginPatch,
             "@PC" => Command::ControlPoint,
             "@PD" => Command::DrawPatch,
@@ -121,6 +124,7 @@ impl Command {
             | Command::Width
             | Command::Taper
             | Command::Bend
+            | Command::Contour
             | Command::Leaf
             | Command::Flower
             | Command::Petal

@@ -18,7 +18,8 @@
 //! | `;(n)` `;` | colour `n` of the palette, 0 being the natural one; the next colour |
 //! | `;(n, v)` | colour at place `v` (0 to 1) of gradient `n` |
 //! | `@T(e)` | strength of the tropism from here on, in radians per scene unit: headings bend towards its direction (down, if the model declares none), see `bend.rs` |
-//! | `[` `]` | remember and return to position, orientation, width, colour and strength of tropism |
+//! | `@C(n)` | cross-section of stems from here on: a contour that the model declares, 0 being a circle. Meshes only |
+//! | `[` `]` | remember and return to position, orientation, width, colour, cross-section and strength of tropism |
 //! | `{` `.` `}` | begin a filled polygon, make the position a vertex, end it; steps between them make vertices, too, and are not drawn |
 //! | `@L(s)` `@K(s)` `@P(s)` `@B(s)` | a leaf, a flower, a petal, a bud of size `s` (1), or any surface that the model declares; nothing if `s` is not positive |
 //! | `@PS(n)` `@PC(n, r, c)` `@PD(n)` | begin Bézier patch `n`; make the position its control point in row `r` and column `c` (0 to 3); draw it, when all 16 are there. Brackets do not matter to them |
@@ -36,6 +37,8 @@ mod shapes;
 mod twofold;
 mod walk;
 
+#[cfg(test)]
+mod organ_tests;
 #[cfg(test)]
 mod tests;
 

@@ -34,6 +34,8 @@ struct State {
     width: Width,
     /// Number of the colour, 0 being the natural one, and its place in a gradient.
     color: (f64, f64),
+    /// Index of the cross-section of stems; `None` is a circle.
+    contour: Option<u32>,
     /// Strength of the tropism.
     strength: f64,
     /// The last segment on this axis, if the turtle still stands at its end.
@@ -72,6 +74,7 @@ impl<'a> Walk<'a> {
                 frame: Frame::upright(),
                 width: Width::Default(1.0),
                 color: (0.0, 0.0),
+                contour: None,
                 strength: tropism.map_or(0.0, |tropism| tropism.strength),
                 last: None,
                 run: 0,
@@ -141,6 +144,12 @@ impl<'a> Walk<'a> {
                 self.state.run = 0;
             }
             Command::Bend => self.state.strength = self.in_range(given.unwrap_or(0.0))?,
+            Command::Contour => {
+                // 0, and what is no contour, is a circle.
+                let number = given.unwrap_or(0.0).round();
+                let count = self.model.appearance.contours.len() as f64;
+                self.state.contour = (1.0..=count).contains(&number).then(|| number as u32 - 1);
+            }
             Command::Color => {
                 self.state.color = match given {
                     Some(number) => (number, read.get(1).copied().unwrap_or(0.0)),
@@ -251,6 +260,7 @@ impl<'a> Walk<'a> {
                 direction,
                 across,
                 widths: [self.state.width; 2],
+                contour: self.state.contour,
                 material: self.chosen().unwrap_or(MaterialId::STEM),
                 owner: self.owner(),
                 follows,

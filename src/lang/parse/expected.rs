@@ -163,6 +163,21 @@ fn hint_by_symbol(item: Rule, text: &str, at: usize, found: &str) -> Option<Stri
         (_, "±") => "`±` stands for both turns in the head of a rule only; write `+` or `-`",
         (_, "~") => "“not” is written `!`",
         (_, "'") => "a derivative is written `dx/dt`",
+        (Some('m'), _) if item == Rule::surface_item && before.ends_with("from") => {
+            "the name of the file is a text in quotes: `surface @P from \"petal.s\"`"
+        }
+        (Some('e'), _) if item == Rule::surface_item && before.ends_with("surface") => {
+            "the name of a surface begins with `@`: `surface @P from \"petal.s\"`"
+        }
+        (Some('=' | ','), _) if matches!(item, Rule::color_item | Rule::gradient_item) => {
+            "a colour is a text in quotes: `\"#8b6cc9\"`"
+        }
+        _ if item == Rule::tropism_item => {
+            "a tropism is a direction and a strength: `tropism 0, -1, 0 strength 0.2`"
+        }
+        _ if item == Rule::contour_item => {
+            "a contour is three points or more: `contour leaf = (1, 0) (0, 0.3) (-1, 0) (0, -0.3)`"
+        }
         (_, "-") if is_item_with_name(item) && !before.contains('=') => {
             "a name is made of letters, digits and `_`"
         }
