@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use crate::export::{Camera, Page};
+use crate::export::{Camera, Layout, Page};
 use crate::lang::Setting;
 use crate::scene::Color;
 use crate::sim::Method;
@@ -138,6 +138,23 @@ pub struct RenderArgs {
     /// File format of the frames
     #[arg(long, value_enum, default_value_t = FrameFormat::Svg)]
     pub format: FrameFormat,
+    /// A file for each frame, or all frames on one sheet
+    ///
+    /// frames: a file for each frame. overlay: all in one place, the older the fainter. stack: each below the one before,
+    /// aligned on the plant's origin; for flat plants such as filaments. grid: in rows, aligned on the ground, each with
+    /// its time. All frames of a sheet have one scale. The sheet is written as overlay.svg, stack.svg or grid.svg (or
+    /// .png).
+    #[arg(long, default_value = "frames", value_parser = layout, value_name = "frames|overlay|stack|grid")]
+    pub layout: Layout,
+    /// With --layout grid: frames in a row [default: all in one]
+    #[arg(long, value_name = "N", value_parser = columns)]
+    pub columns: Option<usize>,
+    /// With --layout grid: do not write the time below each frame
+    #[arg(long)]
+    pub no_captions: bool,
+    /// With --layout stack: from one line to the next, in scene units [default: the height of the highest]
+    #[arg(long, value_name = "H", value_parser = positive)]
+    pub row_height: Option<f64>,
     /// From where to look: front, side, top, or AZIMUTH,ELEVATION in degrees
     #[arg(long, default_value = "front", allow_hyphen_values = true)]
     pub view: String,
@@ -158,6 +175,9 @@ pub struct RenderArgs {
     /// whole animation]
     #[arg(long, value_name = "L", value_parser = positive)]
     pub accuracy: Option<f64>,
+    /// Threads that draw and write while the simulation goes on; files do not depend on it [default: one for each core]
+    #[arg(long, value_name = "N", value_parser = threads)]
+    pub threads: Option<usize>,
     /// Write into a directory that holds other files
     #[arg(long)]
     pub force: bool,
@@ -360,6 +380,26 @@ fn field_of_view(text: &str) -> Result<f64, String> {
     match number(text)? {
         x if Camera::FIELDS.contains(&x) => Ok(x),
         _ => Err(format!("must be between {} and {} degrees", Camera::FIELDS.start(), Camera::FIELDS.end())),
+    }
+}
+
+fn layout(text: &str) -> Result<Layout, String> {
+    let names: Vec<&str> = Layout::NAMED.iter().map(|(name, _)| *name).collect();
+    let found = Layout::NAMED.iter().find(|(name, _)| *name == text);
+    found.map(|(_, layout)| *layout).ok_or_else(|| format!("layouts are {}", names.join(", ")))
+}
+
+fn columns(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(n) if n >= 1 => Ok(n),
+        _ => Err("must be a number from 1".to_owned()),
+    }
+}
+
+fn threads(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(n) if (1..=256).contains(&n) => Ok(n),
+        _ => Err("must be between 1 and 256".to_owned()),
     }
 }
 

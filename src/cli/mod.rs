@@ -8,6 +8,7 @@ mod continuity;
 mod events;
 mod explain;
 mod gallery;
+mod parallel;
 mod render;
 mod report;
 mod run;

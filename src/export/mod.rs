@@ -8,12 +8,20 @@
 //! every scene ──▶ FrameWriter(Fit) ──bytes──▶ FrameDirectory
 //! ```
 //!
+//! or, where all frames go on one [`Sheet`],
+//!
+//! ```text
+//! every scene ──▶ SheetWriter(Fit, Sheet) ──part──▶ Assembly ──bytes──▶ FrameDirectory
+//! ```
+//!
 //! Nothing but [`FrameDirectory`] touches the file system.
 
 mod camera;
 mod extent;
 mod fit;
 mod frames;
+mod glyphs;
+mod layout;
 mod light;
 mod manifest;
 mod name;
@@ -23,6 +31,7 @@ mod page;
 mod painter;
 mod png;
 mod raster;
+mod sheet;
 mod stroke;
 mod svg;
 mod triangulate;
@@ -32,9 +41,11 @@ mod view;
 pub use camera::Camera;
 pub use fit::{Fit, Picture, Survey};
 pub use frames::{Error, FrameDirectory, MANIFEST, replace};
+pub use layout::{Layout, Sheet, Spacing};
 pub use light::Light;
 pub use manifest::{FrameRecord, Manifest};
 pub use page::{Page, Size, TooLarge};
+pub use sheet::{Assembly, Part, SheetError, SheetWriter};
 pub use view::{View, ViewError};
 
 use crate::scene::Scene;

@@ -66,6 +66,7 @@ fn sides(scene: &Scene, fit: &Fit, scale: f64) -> usize {
 }
 
 /// A page that images are laid on, with 16 bits to a channel, so that many faint ones leave their trace.
+#[derive(Debug)]
 pub(super) struct Canvas<'a> {
     page: &'a Page,
     /// Colour times opacity, and opacity; 65535 is all of it.
