@@ -69,8 +69,7 @@
 //!
 //! # What it does not do yet
 //!
-//! No closed forms, no stiff solver, no local clocks: one explicit integrator for everything. No random
-//! numbers, no REPL, no viewer. No surfaces but a built-in leaf and flower.
+//! No random numbers, no REPL, no viewer.
 
 pub mod cli;
 pub mod diagnostic;

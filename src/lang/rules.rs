@@ -417,11 +417,8 @@ impl RuleBuilder<'_> {
         for head in heads {
             let name = &*head.name.text;
             let given = head.parameters.len();
-            if self
-                .kinds
-                .find(name, given)
-                .is_some_and(|kind| self.occurs.contains_key(&kind) || self.drawn.contains_key(&kind))
-            {
+            let seen = |kind| self.occurs.contains_key(&kind) || self.drawn.contains_key(&kind);
+            if self.kinds.find(name, given).is_some_and(seen) {
                 continue;
             }
             let mut error =

@@ -16,5 +16,6 @@ mod gallery;
 mod inspect;
 mod language;
 mod listings;
+mod organs;
 mod report;
 mod semantics;

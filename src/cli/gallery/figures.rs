@@ -64,7 +64,7 @@ pub const FIGURES: &[Picture] = &[
         figure: 10,
         name: "figure-10",
         model: "models/campanula.dls",
-        flags: "--from 7 --to 17 --step 1 --layout grid",
+        flags: "--from 7 --to 17 --step 1 --layout grid --accuracy 0.02",
         caption: "Campanula rapunculoides: every 25th frame, from frame 175",
     },
     Picture {
@@ -78,14 +78,14 @@ pub const FIGURES: &[Picture] = &[
         figure: 12,
         name: "figure-12",
         model: "models/campanula.dls",
-        flags: "--set n_0=0 --at 1.5,2.5,3.5,4.5,5.5,6.5,9,10,11.5,13 --layout grid --view 0,15",
+        flags: "--set n_0=0 --at 1.5,2.5,3.5,4.5,5.5,6.5,9,10,11.5,13 --layout grid --view 0,15 --accuracy 0.005",
         caption: "A single flower of Campanula, from bud to fruit",
     },
     Picture {
         figure: 13,
         name: "figure-13",
         model: "models/lychnis.dls",
-        flags: "--from 3 --to 6 --step 0.5 --layout grid --view 25,10",
+        flags: "--from 3 --to 6 --step 0.5 --layout grid --view 25,10 --accuracy 0.02",
         caption: "Lychnis coronaria: every 25th frame, from frame 150",
     },
     Picture {
@@ -99,14 +99,14 @@ pub const FIGURES: &[Picture] = &[
         figure: 15,
         name: "figure-15",
         model: "models/hieracium.dls",
-        flags: "--set diagram=1 --at 17,26.5,36,40,47,49.6,52 --layout grid",
+        flags: "--set diagram=1 --at 17,26.5,36,40,47,49.6,52 --layout grid --accuracy 0.03",
         caption: "Hieracium umbellatum: frames 170, 265, 360, 400, 470, 496 and 520; the hormone rises",
     },
     Picture {
         figure: 17,
         name: "figure-17",
         model: "models/hieracium.dls",
-        flags: "--set n_0=0 --set t_h=8 --set x_th=20 --at 4,8,9,10,11,12.5,19,21,23,25.5,27 --layout grid --view 0,20",
+        flags: "--set n_0=0 --set t_h=8 --set x_th=20 --at 4,8,9,10,11,12.5,19,21,23,25.5 --layout grid --view 0,20 --accuracy 0.01",
         caption: "A single flower head of Hieracium, from bud to fruit",
     },
 ];
