@@ -7,6 +7,7 @@ mod common;
 mod continuity;
 mod events;
 mod explain;
+mod parallel;
 mod render;
 mod report;
 mod run;

@@ -13,18 +13,18 @@ pub(super) const MATERIALS: &str = "materials.mtl";
 const NORMAL_DECIMALS: usize = 4;
 
 /// A triangle: vertex and normal at each corner, by number.
-struct Triangle {
+pub(super) struct Triangle {
     owner: OwnerId,
-    material: MaterialId,
-    corners: [(u32, u32); 3],
+    pub(super) material: MaterialId,
+    pub(super) corners: [(u32, u32); 3],
 }
 
 /// A growing triangle mesh.
 #[derive(Default)]
 pub(super) struct Triangles {
-    vertices: Vec<Point>,
-    normals: Vec<Vector>,
-    faces: Vec<Triangle>,
+    pub(super) vertices: Vec<Point>,
+    pub(super) normals: Vec<Vector>,
+    pub(super) faces: Vec<Triangle>,
 }
 
 impl Triangles {
@@ -44,8 +44,16 @@ impl Triangles {
     }
 }
 
-/// The document of one frame. Tubes have so many sides; 0: as many as it takes.
-pub(super) fn document(scene: &Scene, fit: &Fit, sides: usize, title: &str) -> Vec<u8> {
+/// Everything in a scene as triangles, in string order; stems as tubes with so many sides.
+pub(super) fn triangles(scene: &Scene, fit: &Fit, sides: usize) -> Triangles {
+    let mut mesh = unordered(scene, fit, sides);
+    // Stable, so that triangles stay in the order in which they were made.
+    mesh.faces.sort_by_key(|face| (face.owner, face.material));
+    mesh
+}
+
+/// Everything in a scene as triangles. Tubes have so many sides; 0: as many as it takes.
+fn unordered(scene: &Scene, fit: &Fit, sides: usize) -> Triangles {
     let mut mesh = Triangles::default();
     // What tubes of eight sides take, half of them with domes.
     mesh.vertices.reserve(24 * scene.segments.len());
@@ -57,6 +65,12 @@ pub(super) fn document(scene: &Scene, fit: &Fit, sides: usize, title: &str) -> V
     }
     add_polygons(scene, &mut mesh);
     add_surfaces(scene, &mut mesh);
+    mesh
+}
+
+/// The document of one frame. Tubes have so many sides; 0: as many as it takes.
+pub(super) fn document(scene: &Scene, fit: &Fit, sides: usize, title: &str) -> Vec<u8> {
+    let mesh = unordered(scene, fit, sides);
     let title: String = title.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
     let head = format!(
         "# {GENERATOR}\n# {title}\n# Up axis: +Y; front: +Z. Units: those of the model.\nmtllib {MATERIALS}\n"

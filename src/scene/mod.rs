@@ -133,6 +133,22 @@ impl Scene {
         Cow::Owned(scene)
     }
 
+    /// Visits points that enclose everything that is to be seen, each with the width of the line there; corners of
+    /// what is not a line have the width 0.
+    pub fn each_point(&self, mut visit: impl FnMut(Point, Width)) {
+        for segment in &self.segments {
+            visit(segment.start, segment.widths[0]);
+            visit(segment.end, segment.widths[1]);
+        }
+        let corners = self.polygons.iter().flat_map(|polygon| polygon.vertices.iter().copied());
+        let surfaces = self
+            .surfaces
+            .iter()
+            .flat_map(|surface| surface.mesh.vertices.iter().map(|&v| surface.placement.point(v)));
+        let patches = self.patches.iter().flat_map(Patch::hull);
+        corners.chain(surfaces).chain(patches).for_each(|point| visit(point, Width::Set(0.0)));
+    }
+
     /// Enters a module that draws something. Modules are entered in string order, each once.
     pub fn add_owner(&mut self, owner: Owner) -> OwnerId {
         self.owners.push(owner);
