@@ -158,6 +158,10 @@ pub struct RenderArgs {
     /// From where to look: front, side, top, or AZIMUTH,ELEVATION in degrees
     #[arg(long, default_value = "front", allow_hyphen_values = true)]
     pub view: String,
+    /// How far what is drawn may be from a curved surface, in scene units [default: 1/2000 of the extent of the
+    /// whole animation]
+    #[arg(long, value_name = "L", value_parser = positive)]
+    pub accuracy: Option<f64>,
     /// Look in perspective, from where all that is drawn at any time fills this angle (1 to 120 degrees) [default:
     /// orthographic]
     #[arg(long, value_name = "DEGREES", value_parser = field_of_view)]
@@ -171,10 +175,6 @@ pub struct RenderArgs {
     /// Background of pictures: "#rrggbb" or none (transparent) [default: #fbfaf5]
     #[arg(long, value_name = "COLOUR", value_parser = background)]
     pub background: Option<Background>,
-    /// How far what is drawn may be from a curved surface, in scene units [default: 1/2000 of the extent of the
-    /// whole animation]
-    #[arg(long, value_name = "L", value_parser = positive)]
-    pub accuracy: Option<f64>,
     /// Threads that draw and write while the simulation goes on; files do not depend on it [default: one for each core]
     #[arg(long, value_name = "N", value_parser = threads)]
     pub threads: Option<usize>,

@@ -100,7 +100,7 @@ pub struct FrameWriter {
     pub fit: Fit,
     /// What pictures are drawn on (SVG and PNG).
     pub page: Page,
-    /// Sides of the tubes that stems are made of (OBJ and PNG); 0 for as many as the accuracy takes, and 8 at least.
+    /// Sides of the tubes that stems are made of (OBJ only); 0 for as many as the accuracy takes, and 8 at least.
     pub sides: usize,
 }
 

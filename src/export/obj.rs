@@ -44,8 +44,16 @@ impl Triangles {
     }
 }
 
-/// Everything in a scene as triangles; stems as tubes with so many sides, 0: as many as it takes.
+/// Everything in a scene as triangles, in string order; stems as tubes with so many sides.
 pub(super) fn triangles(scene: &Scene, fit: &Fit, sides: usize) -> Triangles {
+    let mut mesh = unordered(scene, fit, sides);
+    // Stable, so that triangles stay in the order in which they were made.
+    mesh.faces.sort_by_key(|face| (face.owner, face.material));
+    mesh
+}
+
+/// Everything in a scene as triangles. Tubes have so many sides; 0: as many as it takes.
+fn unordered(scene: &Scene, fit: &Fit, sides: usize) -> Triangles {
     let mut mesh = Triangles::default();
     // What tubes of eight sides take, half of them with domes.
     mesh.vertices.reserve(24 * scene.segments.len());
@@ -62,7 +70,7 @@ pub(super) fn triangles(scene: &Scene, fit: &Fit, sides: usize) -> Triangles {
 
 /// The document of one frame. Tubes have so many sides; 0: as many as it takes.
 pub(super) fn document(scene: &Scene, fit: &Fit, sides: usize, title: &str) -> Vec<u8> {
-    let mesh = triangles(scene, fit, sides);
+    let mesh = unordered(scene, fit, sides);
     let title: String = title.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
     let head = format!(
         "# {GENERATOR}\n# {title}\n# Up axis: +Y; front: +Z. Units: those of the model.\nmtllib {MATERIALS}\n"

@@ -90,6 +90,14 @@ pub struct Pose {
     pub axes: [Vector; 3],
 }
 
+/// An empty scene with the model's colours and surfaces, which are then not made again for every scene that is
+/// cloned from it.
+pub fn blank(model: &Model) -> Scene {
+    let mut scene = Scene::default();
+    prepare::prepare(model, &mut scene);
+    scene
+}
+
 /// Draws a string of modules of this model, adding to the scene.
 ///
 /// # Errors

@@ -58,8 +58,8 @@ impl Render<'_> {
             survey.add(scene);
             survey
         };
-        let pass = Pass { settings: self.run.settings, threads: self.threads, accuracy: 0.0 };
-        let measured = play(self.run, pass, clock, events.as_mut(), of_frame, |frame| {
+        let pass = Pass { settings: self.run.settings, accuracy: 0.0 };
+        let measured = play(self.run, pass, self.threads, clock, events.as_mut(), of_frame, |frame| {
             survey.merge(&frame);
             if self.args.layout != Layout::Frames {
                 self.frames.push(frame);
@@ -88,8 +88,14 @@ impl Render<'_> {
             (record(&writer.fit, shot, scene, file), companion, bytes)
         };
         let progress = bar("writing", count);
-        let stats =
-            play(self.run, self.second(&writer.fit), clock, None, work, |(record, companion, bytes)| {
+        let stats = play(
+            self.run,
+            self.writing(&writer.fit),
+            self.threads,
+            clock,
+            None,
+            work,
+            |(record, companion, bytes)| {
                 if let Some((name, bytes)) = companion {
                     directory.write(name, &bytes).map_err(out_of_directory)?;
                 }
@@ -97,7 +103,8 @@ impl Render<'_> {
                 manifest.frames.push(record);
                 progress.inc(1);
                 Ok(())
-            })?;
+            },
+        )?;
         directory.finish(&manifest).map_err(out_of_directory)?;
         progress.finish_and_clear();
         Ok(stats)
@@ -122,7 +129,7 @@ impl Render<'_> {
         };
         let mut assembly = writer.begin();
         let progress = bar("drawing", times.len());
-        let stats = play(self.run, self.second(&fit), clock, None, work, |(record, part)| {
+        let stats = play(self.run, self.writing(&fit), self.threads, clock, None, work, |(record, part)| {
             manifest.frames.push(record);
             progress.inc(1);
             assembly.add(part).map_err(refuse)
@@ -142,10 +149,9 @@ impl Render<'_> {
         self.run.session.model.title.as_deref().unwrap_or(&self.run.session.source.name)
     }
 
-    /// The second pass: what happens has been told.
-    fn second(&self, fit: &Fit) -> Pass {
-        let settings = Settings { log: false, ..self.run.settings };
-        Pass { settings, threads: self.threads, accuracy: fit.accuracy }
+    /// The second pass: what happens has been told, and how large everything is, is known.
+    fn writing(&self, fit: &Fit) -> Pass {
+        Pass { settings: Settings { log: false, ..self.run.settings }, accuracy: fit.accuracy }
     }
 
     fn manifest(&self, fit: &Fit, page: &Page) -> Manifest {

@@ -57,8 +57,7 @@ impl<'r> Reel<'r> {
 #[derive(Clone, Copy)]
 pub struct Pass {
     pub settings: Settings,
-    pub threads: usize,
-    /// Of curves, in scene units; 0 if not known yet.
+    /// See [`Scene::accuracy`].
     pub accuracy: f64,
 }
 
@@ -70,12 +69,15 @@ pub struct Pass {
 pub fn play<Done: Send>(
     run: &Run,
     pass: Pass,
+    threads: usize,
     clock: &mut Clock,
     mut log: Option<&mut EventLog>,
     work: impl Fn(&Shot, &Scene) -> Done + Sync,
     mut take: impl FnMut(Done) -> Result<(), Failure>,
 ) -> Result<Stats, Failure> {
     let mut reel = Reel::start(run, pass.settings)?;
+    let mut blank = turtle::blank(&run.session.model);
+    blank.accuracy = pass.accuracy;
     let Clock { mut simulate, mut output, .. } = *clock;
     let make = || {
         let before = Instant::now();
@@ -86,10 +88,10 @@ pub fn play<Done: Send>(
     let draw = |mut shot: Shot| -> (Vec<Event>, Result<Done, Failure>, Duration) {
         let before = Instant::now();
         let events = std::mem::take(&mut shot.events);
-        let done = scene(run, pass.accuracy, &mut shot).map(|scene| work(&shot, &scene));
+        let done = scene(run, &mut shot, &blank).map(|scene| work(&shot, &scene));
         (events, done, before.elapsed())
     };
-    let taken = parallel::in_order(pass.threads, make, draw, |(events, done, spent)| {
+    let taken = parallel::in_order(threads, make, draw, |(events, done, spent)| {
         if let Some(log) = &mut log {
             log.write(&events)?;
         }
@@ -103,13 +105,12 @@ pub fn play<Done: Send>(
 }
 
 /// What is to be seen of a shot.
-fn scene(run: &Run, accuracy: f64, shot: &mut Shot) -> Result<Scene, Failure> {
+fn scene(run: &Run, shot: &mut Shot, blank: &Scene) -> Result<Scene, Failure> {
     let string = match &mut shot.string {
         Ok(string) => string,
         failed => return std::mem::replace(failed, Ok(ModuleString::default())).map(|_| Scene::default()),
     };
-    let mut scene = Scene::default();
-    scene.accuracy = accuracy;
+    let mut scene = blank.clone();
     turtle::draw(&run.session.model, string, &mut scene)
         .map_err(|error| Failure::Model(format!("error: at t = {}: {error}\n", shot.time)))?;
     Ok(scene)
