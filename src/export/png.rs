@@ -158,7 +158,7 @@ mod tests {
     use crate::export::Picture;
 
     fn half(color: [u8; 3]) -> Image {
-        let [red, green, blue] = color.map(|c| c / 2);
+        let [red, green, blue] = color.map(|c| (u16::from(c) * 128 / 255) as u8);
         Image { width: 1, height: 1, pixels: vec![[red, green, blue, 128]] }
     }
 
