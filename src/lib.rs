@@ -46,7 +46,7 @@
 //! # The stages
 //!
 //! ```text
-//! text ──lang──▶ Model ──sim──▶ Tree at any time t ──turtle──▶ Scene ──export──▶ SVG, OBJ
+//! text ──lang──▶ Model ──sim──▶ Tree at any time t ──turtle──▶ Scene ──export──▶ SVG, PNG, OBJ
 //! ```
 //!
 //! | module | what it is |

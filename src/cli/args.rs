@@ -27,7 +27,8 @@ pub enum Action {
     Explain(ExplainArgs),
     /// Run a model and print its strings of modules
     Run(RunArgs),
-    /// Run a model and draw it, a file for each frame
+    /// Run a model and draw it: a file for each frame, or all frames on one sheet
+    #[command(after_long_help = RENDER_EXAMPLES)]
     Render(RenderArgs),
     /// Compare methods on models: errors, wall times, counts of work; or run the hard cases
     ///
@@ -42,6 +43,18 @@ pub enum Action {
     /// With --hard, models are run that state their exact answers in their first lines, and checked.
     Report(ReportArgs),
 }
+
+/// How the paper's figures are made.
+const RENDER_EXAMPLES: &str = "\
+Examples:
+  dlsys render models/lychnis.dls -o out --format png --perspective 40 --view 30,20
+      pixels, in perspective, from azimuth 30 and elevation 20 degrees
+  dlsys render models/dragon.dls -o fig6 --layout overlay --from 0 --to 1 --step 0.125
+      figure 6 of the paper, upper left: stages over one another, the older the fainter
+  dlsys render models/anabaena.dls -o fig7 --layout stack
+      figure 7: a line for each frame, one below the other
+  dlsys render models/leaf.dls -o fig9 --layout grid --at 0.5,2.15,3,4,5,6,9
+      figure 9: a row of stages with their times";
 
 /// The fields of `explain --format json`.
 const EXPLAIN_JSON: &str = "\

@@ -78,7 +78,11 @@ mod tests {
             let mut numbers = 0..100_u64;
             let mut seen = Vec::new();
             let slow_at_first = |n: u64| {
-                std::thread::sleep(std::time::Duration::from_micros(if n % 7 == 0 { 500 } else { 0 }));
+                std::thread::sleep(std::time::Duration::from_micros(if n.is_multiple_of(7) {
+                    500
+                } else {
+                    0
+                }));
                 n * n
             };
             let done: Result<(), ()> = in_order(

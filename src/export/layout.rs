@@ -69,10 +69,14 @@ pub struct Sheet {
     pub(super) cells: Vec<Cell>,
     /// Size of the captions' letters, in scene units.
     pub(super) letters: f64,
+    /// A stack of what is hardly more than lines.
+    pub(super) lines: bool,
 }
 
 /// Opacity of the oldest frame of an overlay. The last one has 1.
 const FAINTEST: f64 = 0.15;
+/// Frames this many times as wide as high are lines.
+const LINE_SHAPE: f64 = 20.0;
 /// Space between the frames of a grid, in parts of the widest.
 const GAP: f64 = 0.08;
 /// Size of letters, in parts of the larger side of a grid, and what a line takes up, in sizes of letters.
@@ -113,14 +117,17 @@ fn overlay(layout: Layout, fit: &Fit, seen: &[Option<[f64; 4]>]) -> Sheet {
         let age = (seen.len() - 1 - i) as f64 / last;
         Cell { offset: [0.0; 2], frame, opacity: 1.0 - (1.0 - FAINTEST) * age, caption: None }
     });
-    Sheet { layout, picture: fit.picture, cells: cells.collect(), letters: 0.0 }
+    Sheet { layout, picture: fit.picture, cells: cells.collect(), letters: 0.0, lines: false }
 }
 
 fn stack(seen: &[Option<[f64; 4]>], row_height: Option<f64>) -> Sheet {
     let drawn = || seen.iter().flatten();
     let widest = drawn().map(|[left, _, right, _]| right - left).fold(0.0, f64::max);
     let highest = drawn().map(|[_, bottom, _, top]| top - bottom).fold(0.0, f64::max);
-    let pitch = row_height.unwrap_or(if highest > 0.0 { highest } else { 0.01 * widest });
+    let lines = LINE_SHAPE * highest < widest;
+    // Lines touch, so that bands of colour run down through them.
+    let space = if lines { 1.0 } else { 1.0 + GAP };
+    let pitch = row_height.unwrap_or(if highest > 0.0 { space * highest } else { 0.01 * widest });
     let cells: Vec<Cell> = seen
         .iter()
         .enumerate()
@@ -135,7 +142,7 @@ fn stack(seen: &[Option<[f64; 4]>], row_height: Option<f64>) -> Sheet {
         })
         .collect();
     let all = union(cells.iter().filter_map(|cell| cell.frame));
-    Sheet { layout: Layout::Stack, picture: Picture::around(all), cells, letters: 0.0 }
+    Sheet { layout: Layout::Stack, picture: Picture::around(all), cells, letters: 0.0, lines }
 }
 
 fn grid(seen: &[Option<[f64; 4]>], ground: f64, captions: &[String], columns: usize) -> Sheet {
@@ -172,7 +179,13 @@ fn grid(seen: &[Option<[f64; 4]>], ground: f64, captions: &[String], columns: us
         }
         line -= row.below + (LINE + 0.6) * letters + gap;
     }
-    Sheet { layout: Layout::Grid, picture: Picture::around(union(extents.into_iter())), cells, letters }
+    Sheet {
+        layout: Layout::Grid,
+        picture: Picture::around(union(extents.into_iter())),
+        cells,
+        letters,
+        lines: false,
+    }
 }
 
 /// How far the frames of a row reach above and below the ground.
@@ -208,9 +221,11 @@ mod tests {
     fn a_stack_goes_down_by_the_highest() {
         let sheet = stack(&[SMALL, None, LARGE], None);
         let offsets: Vec<[f64; 2]> = sheet.cells.iter().map(|cell| cell.offset).collect();
-        assert_eq!(offsets, [[0.0, 0.0], [0.0, -7.0], [0.0, -14.0]]);
-        assert_eq!(sheet.cells[2].frame, Some([-2.0, -15.0, 4.0, -8.0]));
+        assert_eq!(offsets, [[0.0, 0.0], [0.0, -7.0 * 1.08], [0.0, -14.0 * 1.08]]);
+        assert_eq!(sheet.cells[2].frame.map(|f| [f[0], f[2]]), Some([-2.0, 4.0]), "aligned on the origin");
         assert_eq!(sheet.cells[1].frame, None);
+        let line = Some([0.0, -0.5, 100.0, 0.5]);
+        assert_eq!(stack(&[line, line], None).cells[1].offset, [0.0, -1.0], "lines touch");
         assert_eq!(stack(&[SMALL, SMALL], Some(0.5)).cells[1].offset, [0.0, -0.5]);
         let [_, bottom, _, height] = sheet.picture.area;
         assert!(bottom < -15.0 && bottom + height > 2.0);

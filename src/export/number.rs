@@ -134,8 +134,7 @@ impl Fixed {
         const POWERS: [f64; 10] = [1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9];
         let power = *POWERS.get(decimals)?;
         let scaled = x.abs() * power;
-        // Also for NaN.
-        if !(scaled < 1e12) {
+        if scaled.is_nan() || scaled >= 1e12 {
             return None;
         }
         let below = scaled as u64;

@@ -212,11 +212,11 @@ impl Band {
         for row in triangle.rows[0].max(top)..=triangle.rows[1].min(top + rows - 1) {
             for column in triangle.columns[0]..=triangle.columns[1] {
                 let (x, y) = (column as i64 * STEPS, row as i64 * STEPS);
-                let mut corner = [0; 3];
-                for k in 0..3 {
+                let value = |k: usize| {
                     let [a, b, c] = triangle.sides[k];
-                    corner[k] = a * x + b * y + c + triangle.bias[k];
-                }
+                    a * x + b * y + c + triangle.bias[k]
+                };
+                let corner = [value(0), value(1), value(2)];
                 if (0..3).any(|k| corner[k] + largest[k] < 0) {
                     continue;
                 }

@@ -4,9 +4,9 @@ use std::fmt::Write;
 
 use super::layout::{Caption, Cell};
 use super::painter::{self, text};
-use super::png::{self, Canvas};
+use super::png::{self, Canvas, Meeting};
 use super::raster::Image;
-use super::{Fit, Format, Page, Sheet, glyphs, svg};
+use super::{Fit, Format, Layout, Page, Sheet, glyphs, svg};
 use crate::scene::{Color, Scene};
 
 /// Colour of captions.
@@ -129,10 +129,11 @@ impl Assembly<'_> {
         let index = self.added;
         self.added += 1;
         let Some(cell) = self.writer.sheet.cells.get(index) else { return Ok(()) };
+        let meeting = if self.writer.sheet.layout == Layout::Stack { Meeting::Beside } else { Meeting::Over };
         match part.0 {
             Content::Image(image, corner) => {
                 if let Some(canvas) = &mut self.canvas {
-                    canvas.add(&image, corner, cell.opacity);
+                    canvas.add(&image, corner, cell.opacity, meeting);
                 }
             }
             Content::Elements(elements) => {
@@ -152,6 +153,10 @@ impl Assembly<'_> {
         if cell.offset != [0.0; 2] {
             let [x, y] = [cell.offset[0] * scale, -cell.offset[1] * scale].map(text);
             let _ = write!(out, " transform=\"translate({x} {y})\"");
+        }
+        if self.writer.sheet.lines {
+            // Rows that touch would show a seam wherever an edge is smoothed.
+            out.push_str(" shape-rendering=\"crispEdges\"");
         }
         if cell.opacity < 1.0 {
             let _ = write!(out, " opacity=\"{}\"", text(cell.opacity));
@@ -187,7 +192,7 @@ impl Assembly<'_> {
             })
             .collect();
         if !lines.is_empty() {
-            canvas.add(&glyphs::draw(page.pixels, &lines, INK), [0, 0], 1.0);
+            canvas.add(&glyphs::draw(page.pixels, &lines, INK), [0, 0], 1.0, Meeting::Over);
         }
         canvas.encode(title)
     }

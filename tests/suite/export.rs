@@ -24,7 +24,7 @@ fn written(scene: &Scene, view: &str, format: Format) -> String {
 }
 
 /// Compares with a file under `tests/golden`, line by line.
-fn assert_golden(name: &str, text: &str) {
+pub fn assert_golden(name: &str, text: &str) {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(name);
     if std::env::var_os("DLSYS_RENEW_GOLDEN").is_some() {
         std::fs::write(&path, text).expect("written");

@@ -7,6 +7,7 @@
 //! - [`cli`]: the program as it is typed.
 //! - [`inspect`]: what `explain`, `--events` and `check --continuity` say.
 //! - [`export`]: SVG and OBJ, read back by other people's code.
+//! - [`pictures`]: pixels, perspective, and sheets of several frames.
 //! - [`report`]: studies of methods, and hard cases with exact answers.
 
 mod cli;
@@ -17,5 +18,6 @@ mod inspect;
 mod language;
 mod listings;
 mod organs;
+mod pictures;
 mod report;
 mod semantics;

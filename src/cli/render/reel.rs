@@ -1,5 +1,6 @@
 //! A running simulation, frame by frame, and what is drawn of it on other threads.
 
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use crate::cli::common::{Clock, Failure, Run};
@@ -78,6 +79,9 @@ pub fn play<Done: Send>(
     let mut reel = Reel::start(run, pass.settings)?;
     let mut blank = turtle::blank(&run.session.model);
     blank.accuracy = pass.accuracy;
+    // One for each thread, in the end: scenes keep their memory.
+    let scenes: Mutex<Vec<Scene>> = Mutex::default();
+    let pool = || scenes.lock().unwrap_or_else(PoisonError::into_inner);
     let Clock { mut simulate, mut output, .. } = *clock;
     let make = || {
         let before = Instant::now();
@@ -88,7 +92,10 @@ pub fn play<Done: Send>(
     let draw = |mut shot: Shot| -> (Vec<Event>, Result<Done, Failure>, Duration) {
         let before = Instant::now();
         let events = std::mem::take(&mut shot.events);
-        let done = scene(run, &mut shot, &blank).map(|scene| work(&shot, &scene));
+        let pooled = pool().pop();
+        let mut scene = pooled.unwrap_or_else(|| blank.clone());
+        let done = draw_shot(run, &mut shot, &mut scene).map(|()| work(&shot, &scene));
+        pool().push(scene);
         (events, done, before.elapsed())
     };
     let taken = parallel::in_order(threads, make, draw, |(events, done, spent)| {
@@ -104,14 +111,12 @@ pub fn play<Done: Send>(
     taken.map(|()| reel.simulation.stats())
 }
 
-/// What is to be seen of a shot.
-fn scene(run: &Run, shot: &mut Shot, blank: &Scene) -> Result<Scene, Failure> {
-    let string = match &mut shot.string {
-        Ok(string) => string,
-        failed => return std::mem::replace(failed, Ok(ModuleString::default())).map(|_| Scene::default()),
-    };
-    let mut scene = blank.clone();
-    turtle::draw(&run.session.model, string, &mut scene)
-        .map_err(|error| Failure::Model(format!("error: at t = {}: {error}\n", shot.time)))?;
-    Ok(scene)
+/// Draws what is to be seen of a shot.
+fn draw_shot(run: &Run, shot: &mut Shot, scene: &mut Scene) -> Result<(), Failure> {
+    scene.clear();
+    match &mut shot.string {
+        Ok(string) => turtle::draw(&run.session.model, string, scene)
+            .map_err(|error| Failure::Model(format!("error: at t = {}: {error}\n", shot.time))),
+        failed => std::mem::replace(failed, Ok(ModuleString::default())).map(|_| ()),
+    }
 }
