@@ -4,6 +4,7 @@
 //! share its vertices across their groups, so a tube is one closed mesh.
 
 use super::name::Names;
+use super::number::Line;
 use super::{Fit, GENERATOR, number, triangulate, tube};
 use crate::scene::{MaterialId, OwnerId, Palette, Point, Scene, Vector};
 
@@ -132,6 +133,7 @@ fn faces(mesh: &Triangles, scene: &Scene) -> Vec<u8> {
     let mut out = Vec::with_capacity(44 * mesh.faces.len());
     let names = Names::new(scene, '.');
     let mut material = None;
+    let mut line = Line::new();
     let order = by_owner(mesh, scene.owners().len());
     for group in order.chunk_by(|&a, &b| mesh.faces[a as usize].owner == mesh.faces[b as usize].owner) {
         out.extend_from_slice(b"g ");
@@ -144,27 +146,30 @@ fn faces(mesh: &Triangles, scene: &Scene) -> Vec<u8> {
                 out.extend_from_slice(scene.palette.get(face.material).name.as_bytes());
                 out.push(b'\n');
             }
-            out.push(b'f');
+            line.word(b"f");
             for (vertex, normal) in face.corners {
                 // OBJ counts from 1.
-                out.push(b' ');
-                number::push_whole(&mut out, u64::from(vertex) + 1);
-                out.extend_from_slice(b"//");
-                number::push_whole(&mut out, u64::from(normal) + 1);
+                line.word(b" ");
+                line.whole(u64::from(vertex) + 1);
+                line.word(b"//");
+                line.whole(u64::from(normal) + 1);
             }
-            out.push(b'\n');
+            line.word(b"\n");
+            line.flush(&mut out);
         }
     }
     out
 }
 
 fn push_triple(out: &mut Vec<u8>, keyword: &str, v: &Vector, decimals: usize) {
-    out.extend_from_slice(keyword.as_bytes());
+    let mut line = Line::new();
+    line.word(keyword.as_bytes());
     for i in 0..3 {
-        out.push(b' ');
-        number::push_bytes(out, v[i], decimals);
+        line.word(b" ");
+        line.number(v[i], decimals, out);
     }
-    out.push(b'\n');
+    line.word(b"\n");
+    line.flush(out);
 }
 
 fn add_polygons(scene: &Scene, mesh: &mut Triangles) {

@@ -251,21 +251,27 @@ impl Tube<'_> {
         }
         let outwards = section.along * sign;
         let base = self.joint(centre, radius, [section; 2], [section; 2]);
-        let half = std::f64::consts::FRAC_1_SQRT_2;
-        let mut middle = Ring { vertices: Vec::new(), normals: Vec::new() };
-        for &at in self.profile {
-            let place = centre + (section.outward(at) + outwards) * (half * radius);
-            middle.vertices.push(self.out.add_vertex(place));
-            let aside = section.u * at.normal[0] + section.v * at.normal[1];
-            middle.normals.push(self.out.add_normal((aside + outwards).normalize()));
+        // As many rings from the base to the pole as make the dome as round as the tube.
+        let steps = (self.profile.len() / 8).clamp(1, 8) + 1;
+        let mut outer = Ring { vertices: base.vertices.clone(), normals: base.normals.clone() };
+        for step in 1..steps {
+            let (sin, cos) = sin_cos_degrees(90.0 * step as f64 / steps as f64);
+            let mut ring = Ring { vertices: Vec::new(), normals: Vec::new() };
+            for &at in self.profile {
+                let place = centre + (section.outward(at) * cos + outwards * sin) * radius;
+                ring.vertices.push(self.out.add_vertex(place));
+                let aside = section.u * at.normal[0] + section.v * at.normal[1];
+                ring.normals.push(self.out.add_normal((aside * cos + outwards * sin).normalize()));
+            }
+            let (low, high) = if sign < 0.0 { (&ring, &outer) } else { (&outer, &ring) };
+            self.strip(segment, low, high);
+            outer = ring;
         }
         let pole = (self.out.add_vertex(centre + outwards * radius), self.out.add_normal(outwards));
-        let (low, high) = if sign < 0.0 { (&middle, &base) } else { (&base, &middle) };
-        self.strip(segment, low, high);
         for k in 0..self.profile.len() {
             let after = (k + 1) % self.profile.len();
             let (a, b) = if sign < 0.0 { (after, k) } else { (k, after) };
-            let corner = |k: usize| (middle.vertices[k], middle.normals[k]);
+            let corner = |k: usize| (outer.vertices[k], outer.normals[k]);
             self.face(segment, [pole, corner(a), corner(b)]);
         }
         base

@@ -92,7 +92,8 @@ pub fn play<Done: Send>(
     let draw = |mut shot: Shot| -> (Vec<Event>, Result<Done, Failure>, Duration) {
         let before = Instant::now();
         let events = std::mem::take(&mut shot.events);
-        let mut scene = pool().pop().unwrap_or_else(|| blank.clone());
+        let pooled = pool().pop();
+        let mut scene = pooled.unwrap_or_else(|| blank.clone());
         let done = draw_shot(run, &mut shot, &mut scene).map(|()| work(&shot, &scene));
         pool().push(scene);
         (events, done, before.elapsed())
