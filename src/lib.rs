@@ -46,7 +46,7 @@
 //! # The stages
 //!
 //! ```text
-//! text ──lang──▶ Model ──sim──▶ Tree at any time t ──turtle──▶ Scene ──export──▶ SVG, OBJ
+//! text ──lang──▶ Model ──sim──▶ Tree at any time t ──turtle──▶ Scene ──export──▶ SVG, PNG, OBJ
 //! ```
 //!
 //! | module | what it is |
@@ -69,8 +69,7 @@
 //!
 //! # What it does not do yet
 //!
-//! No closed forms, no stiff solver, no local clocks: one explicit integrator for everything. No random
-//! numbers, no REPL, no viewer. No surfaces but a built-in leaf and flower.
+//! No random numbers, no REPL, no viewer.
 
 pub mod cli;
 pub mod diagnostic;

@@ -13,10 +13,11 @@
 //! assert!((string.get(0).parameters[0] - 1.5).abs() < 1e-12);
 //! ```
 
-use std::path::Path;
+use std::io::Read;
+use std::path::{Path, PathBuf};
 
 use crate::diagnostic::{Diagnostic, Source};
-use crate::lang::{self, Setting};
+use crate::lang::{self, Files, NoFiles, Setting};
 use crate::model::Model;
 use crate::sim::{self, Simulation};
 
@@ -51,19 +52,21 @@ impl Session {
             refuse(Source::new(&name, ""), diagnostic)
         })?;
         let source = Source::from_bytes(name, bytes).map_err(|e| refuse(e.0, e.1))?;
-        Session::from_source(source, settings)
+        let folder = Folder(path.parent().unwrap_or(Path::new("")).to_owned());
+        Session::from_source(source, settings, &folder)
     }
 
-    /// Takes a model's text from memory; `name` stands for the file in messages.
+    /// Takes a model's text from memory; `name` stands for the file in messages. Surfaces that it names are
+    /// not found.
     pub fn from_text(name: &str, text: &str, settings: &[Setting]) -> Result<Session, Box<Refused>> {
         let bytes = text.as_bytes().to_vec();
         let source = Source::from_bytes(name, bytes)
             .map_err(|e| Box::new(Refused { source: e.0, diagnostics: vec![e.1], settings: Vec::new() }))?;
-        Session::from_source(source, settings)
+        Session::from_source(source, settings, &NoFiles)
     }
 
-    fn from_source(source: Source, settings: &[Setting]) -> Result<Session, Box<Refused>> {
-        let loaded = lang::load(&source, settings);
+    fn from_source(source: Source, settings: &[Setting], files: &dyn Files) -> Result<Session, Box<Refused>> {
+        let loaded = lang::load_with(&source, settings, files);
         match loaded.model {
             Some(model) => Ok(Session { source, model, warnings: loaded.diagnostics }),
             None => Err(Box::new(Refused {
@@ -77,5 +80,37 @@ impl Session {
     /// Starts the model at t = 0.
     pub fn simulate(&self, settings: sim::Settings) -> Result<Simulation<'_>, sim::Error> {
         Simulation::new(&self.model, settings)
+    }
+}
+
+/// The folder of a model, with the files that it may read.
+struct Folder(PathBuf);
+
+impl Files for Folder {
+    fn read(&self, path: &Path, limit: u64) -> Result<Vec<u8>, String> {
+        let folder = if self.0.as_os_str().is_empty() { Path::new(".") } else { &self.0 };
+        let file = folder.join(path);
+        let failed = |error: std::io::Error| match error.kind() {
+            std::io::ErrorKind::NotFound => format!("there is no file {}", file.display()),
+            _ => format!("{}: {error}", file.display()),
+        };
+        // A link must not lead out of the folder either.
+        let (home, real) = (folder.canonicalize().map_err(failed)?, file.canonicalize().map_err(failed)?);
+        if !real.starts_with(&home) {
+            return Err(format!("{} leads out of the model's folder", file.display()));
+        }
+        if !real.metadata().map_err(failed)?.is_file() {
+            return Err(format!("{} is not a file", file.display()));
+        }
+        let mut bytes = Vec::new();
+        std::fs::File::open(&real)
+            .map_err(failed)?
+            .take(limit + 1)
+            .read_to_end(&mut bytes)
+            .map_err(failed)?;
+        if bytes.len() as u64 > limit {
+            return Err(format!("{} has more than {} MB", file.display(), limit >> 20));
+        }
+        Ok(bytes)
     }
 }

@@ -4,7 +4,9 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::export::{Camera, Layout, Page};
 use crate::lang::Setting;
+use crate::scene::Color;
 use crate::sim::Method;
 
 /// Differential L-systems: plants as growing strings of modules, whose parameters follow differential
@@ -25,8 +27,14 @@ pub enum Action {
     Explain(ExplainArgs),
     /// Run a model and print its strings of modules
     Run(RunArgs),
-    /// Run a model and draw it, a file for each frame
+    /// Run a model and draw it: a file for each frame, or all frames on one sheet
+    #[command(after_long_help = RENDER_EXAMPLES)]
     Render(RenderArgs),
+    /// Draw the paper's figures that show development, from the models that come with the program
+    ///
+    /// Each figure is what `dlsys render` makes of a line; --list prints the lines. Writes a folder for each picture,
+    /// the models, and index.html, which shows them all.
+    Gallery(GalleryArgs),
     /// Compare methods on models: errors, wall times, counts of work; or run the hard cases
     ///
     /// Each model is run by each method at each tolerance or step size. The error is the largest over all
@@ -40,6 +48,18 @@ pub enum Action {
     /// With --hard, models are run that state their exact answers in their first lines, and checked.
     Report(ReportArgs),
 }
+
+/// How the paper's figures are made.
+const RENDER_EXAMPLES: &str = "\
+Examples:
+  dlsys render models/lychnis.dls -o out --format png --perspective 40 --view 30,20
+      pixels, in perspective, from azimuth 30 and elevation 20 degrees
+  dlsys render models/dragon.dls -o fig6 --layout overlay --from 0 --to 1 --step 0.125
+      figure 6 of the paper, upper left: stages over one another, the older the fainter
+  dlsys render models/anabaena.dls -o fig7 --layout stack
+      figure 7: a line for each frame, one below the other
+  dlsys render models/leaf.dls -o fig9 --layout grid --at 0.5,2.15,3,4,5,6,9
+      figure 9: a row of stages with their times";
 
 /// The fields of `explain --format json`.
 const EXPLAIN_JSON: &str = "\
@@ -131,12 +151,65 @@ pub struct RenderArgs {
     /// File format of the frames
     #[arg(long, value_enum, default_value_t = FrameFormat::Svg)]
     pub format: FrameFormat,
-    /// From where to look (SVG): front, side, top, or AZIMUTH,ELEVATION in degrees
+    /// A file for each frame, or all frames on one sheet
+    ///
+    /// frames: a file for each frame. overlay: all in one place, the older the fainter. stack: each below the one before,
+    /// aligned on the plant's origin; for flat plants such as filaments. grid: in rows, aligned on the ground, each with
+    /// its time. All frames of a sheet have one scale. The sheet is written as overlay.svg, stack.svg or grid.svg (or
+    /// .png).
+    #[arg(long, default_value = "frames", value_parser = layout, value_name = "frames|overlay|stack|grid")]
+    pub layout: Layout,
+    /// With --layout grid: frames in a row [default: all in one]
+    #[arg(long, value_name = "N", value_parser = columns)]
+    pub columns: Option<usize>,
+    /// With --layout grid: do not write the time below each frame
+    #[arg(long)]
+    pub no_captions: bool,
+    /// With --layout stack: from one line to the next, in scene units [default: the height of the highest]
+    #[arg(long, value_name = "H", value_parser = positive)]
+    pub row_height: Option<f64>,
+    /// From where to look: front, side, top, or AZIMUTH,ELEVATION in degrees
     #[arg(long, default_value = "front", allow_hyphen_values = true)]
     pub view: String,
+    /// How far what is drawn may be from a curved surface, in scene units [default: 1/2000 of the extent of the
+    /// whole animation]
+    #[arg(long, value_name = "L", value_parser = positive)]
+    pub accuracy: Option<f64>,
+    /// Look in perspective, from where all that is drawn at any time fills this angle (1 to 120 degrees) [default:
+    /// orthographic]
+    #[arg(long, value_name = "DEGREES", value_parser = field_of_view)]
+    pub perspective: Option<f64>,
+    /// Width of pictures in pixels; the height follows [default: 1000 on the larger side]
+    #[arg(long, value_name = "PIXELS", value_parser = pixels)]
+    pub width: Option<u32>,
+    /// Width and height of pictures in pixels
+    #[arg(long, value_name = "WxH", value_parser = size, conflicts_with = "width")]
+    pub size: Option<(u32, u32)>,
+    /// Background of pictures: "#rrggbb" or none (transparent) [default: #fbfaf5]
+    #[arg(long, value_name = "COLOUR", value_parser = background)]
+    pub background: Option<Background>,
+    /// Threads that draw and write while the simulation goes on; files do not depend on it [default: one for each core]
+    #[arg(long, value_name = "N", value_parser = threads)]
+    pub threads: Option<usize>,
     /// Write into a directory that holds other files
     #[arg(long)]
     pub force: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct GalleryArgs {
+    /// Directory for the pictures; made if it is not there
+    #[arg(short, long = "out", value_name = "DIR", required_unless_present = "list")]
+    pub out: Option<PathBuf>,
+    /// Draw this figure only; can be repeated
+    #[arg(long = "figure", value_name = "N")]
+    pub figures: Vec<u8>,
+    /// File format of the pictures: svg or png
+    #[arg(long, value_enum, default_value_t = FrameFormat::Svg)]
+    pub format: FrameFormat,
+    /// Print the lines, draw nothing
+    #[arg(long)]
+    pub list: bool,
 }
 
 #[derive(Debug, Args)]
@@ -268,6 +341,8 @@ pub enum TextFormat {
 pub enum FrameFormat {
     /// Vector graphics, one view
     Svg,
+    /// Pixels, one view; what is nearer is in front to the pixel
+    Png,
     /// Meshes in three dimensions
     Obj,
 }
@@ -298,6 +373,64 @@ fn tolerance(text: &str) -> Result<f64, String> {
         x if (1e-13..=0.1).contains(&x) => Ok(x),
         _ => Err("must be between 1e-13 and 0.1".to_owned()),
     }
+}
+
+/// What pictures are drawn on; `None` is nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Background(pub Option<Color>);
+
+fn background(text: &str) -> Result<Background, String> {
+    if text == "none" {
+        return Ok(Background(None));
+    }
+    let digits = text.strip_prefix('#').filter(|digits| digits.len() == 6);
+    let rgb = digits.filter(|d| d.bytes().all(|b| b.is_ascii_hexdigit())).map(|d| u32::from_str_radix(d, 16));
+    match rgb {
+        Some(Ok(rgb)) => Ok(Background(Some(Color::hex(rgb)))),
+        _ => {
+            Err("expected none or a colour like #ffffff (in quotes: the shell takes # for a comment)"
+                .to_owned())
+        }
+    }
+}
+
+fn field_of_view(text: &str) -> Result<f64, String> {
+    match number(text)? {
+        x if Camera::FIELDS.contains(&x) => Ok(x),
+        _ => Err(format!("must be between {} and {} degrees", Camera::FIELDS.start(), Camera::FIELDS.end())),
+    }
+}
+
+fn layout(text: &str) -> Result<Layout, String> {
+    let names: Vec<&str> = Layout::NAMED.iter().map(|(name, _)| *name).collect();
+    let found = Layout::NAMED.iter().find(|(name, _)| *name == text);
+    found.map(|(_, layout)| *layout).ok_or_else(|| format!("layouts are {}", names.join(", ")))
+}
+
+fn columns(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(n) if n >= 1 => Ok(n),
+        _ => Err("must be a number from 1".to_owned()),
+    }
+}
+
+fn threads(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(n) if (1..=256).contains(&n) => Ok(n),
+        _ => Err("must be between 1 and 256".to_owned()),
+    }
+}
+
+fn pixels(text: &str) -> Result<u32, String> {
+    match text.parse::<u32>() {
+        Ok(n) if (1..=Page::MOST_ON_A_SIDE).contains(&n) => Ok(n),
+        _ => Err(format!("must be between 1 and {} pixels", Page::MOST_ON_A_SIDE)),
+    }
+}
+
+fn size(text: &str) -> Result<(u32, u32), String> {
+    let (width, height) = text.split_once('x').ok_or("expected WIDTHxHEIGHT, such as 1280x720")?;
+    Ok((pixels(width)?, pixels(height)?))
 }
 
 fn runs(text: &str) -> Result<usize, String> {

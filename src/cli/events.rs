@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 
 use super::common::{Failure, Run};
 use super::run::number;
-use crate::sim::{Event, Simulation};
+use crate::sim::Event;
 
 /// An event log that is being written.
 pub struct EventLog {
@@ -62,9 +62,9 @@ impl EventLog {
     }
 
     /// Writes what has happened since the last time.
-    pub fn write(&mut self, simulation: &mut Simulation) -> Result<(), Failure> {
-        for event in simulation.take_events() {
-            self.line(&event);
+    pub fn write(&mut self, events: &[Event]) -> Result<(), Failure> {
+        for event in events {
+            self.line(event);
             self.file.write_all(self.text.as_bytes()).map_err(|e| cannot_write(&self.path, &e))?;
         }
         Ok(())

@@ -1,4 +1,4 @@
-//! The command line: `dlsys check`, `explain`, `run`, `render` and `report`.
+//! The command line: `dlsys check`, `explain`, `run`, `render`, `gallery` and `report`.
 //!
 //! Exit status: 0 done; 1 the model or the run is at fault; 2 the command line is.
 
@@ -7,6 +7,8 @@ mod common;
 mod continuity;
 mod events;
 mod explain;
+mod gallery;
+mod parallel;
 mod render;
 mod report;
 mod run;
@@ -31,6 +33,7 @@ pub fn main() -> u8 {
         Action::Explain(args) => explain::explain(args),
         Action::Run(args) => run::run(args),
         Action::Render(args) => render::render(args),
+        Action::Gallery(args) => gallery::gallery(args),
         Action::Report(args) => report::report(args),
     };
     match done {

@@ -48,7 +48,7 @@ pub fn run(args: &RunArgs) -> Result<(), Failure> {
             let done = simulation.at(t, &mut string);
             clock.simulate += before.elapsed();
             if let Some(log) = &mut events {
-                log.write(&mut simulation)?;
+                log.write(&simulation.take_events())?;
             }
             done.map_err(|error| run.fault(&error))?;
             let before = Instant::now();

@@ -4,7 +4,10 @@
 //! meet, which lies in the plane that halves the bend, and the first and last end in a dome. Cross-sections
 //! are carried along without twist (parallel transport: each bend turns them by the least rotation). A tube
 //! is cut in two where it turns back on itself, or where it bends so much in so short a space that the ring
-//! would cut into the segment's other end.
+//! would cut into the segment's other end. A branch begins with its dome inside the stem that it grows from, so that
+//! there is no gap.
+
+use std::collections::HashMap;
 
 use super::obj::Triangles;
 use crate::scene::{Point, Scene, Segment, Vector, sin_cos_degrees};
@@ -14,6 +17,24 @@ const SHARPEST: f64 = -0.173_648_177_666_930_3;
 
 /// Adds all stems of a scene, as tubes with so many sides (at least 3).
 pub(super) fn add_tubes(scene: &Scene, default_width: f64, sides: usize, out: &mut Triangles) {
+    add(scene, default_width, |_| sides, out);
+}
+
+/// Adds all stems of a scene, as tubes whose sides are no further from round ones than `accuracy`.
+pub(super) fn add_round_tubes(scene: &Scene, default_width: f64, accuracy: f64, out: &mut Triangles) {
+    add(scene, default_width, |radius| sides_for(radius, accuracy), out);
+}
+
+/// Sides of a prism whose faces are no further from its cylinder than that. Few numbers are used, so that a
+/// stem that grows does not change all the time.
+fn sides_for(radius: f64, accuracy: f64) -> usize {
+    const STEPS: [usize; 7] = [8, 12, 16, 24, 32, 48, 64];
+    let deviation = |sides: usize| radius * (1.0 - sin_cos_degrees(180.0 / sides as f64).1);
+    STEPS.into_iter().find(|&sides| deviation(sides) <= accuracy).unwrap_or(STEPS[STEPS.len() - 1])
+}
+
+/// Adds all stems of a scene; `sides` tells the number of sides by the largest radius of a tube.
+fn add(scene: &Scene, default_width: f64, sides: impl Fn(f64) -> usize, out: &mut Triangles) {
     let radii: Vec<[f64; 2]> =
         scene.segments.iter().map(|s| s.widths.map(|w| w.resolve(default_width) / 2.0)).collect();
     let visible = |i: usize| radii[i][0] > 0.0 || radii[i][1] > 0.0;
@@ -22,21 +43,77 @@ pub(super) fn add_tubes(scene: &Scene, default_width: f64, sides: usize, out: &m
     for (i, segment) in scene.segments.iter().enumerate() {
         if let Some(before) = segment.follows
             && next[before].is_none()
-            && visible(before)
-            && visible(i)
+            && scene.segments[before].contour == segment.contour
+            && radii[before][1] > 0.0
+            && radii[i][0] > 0.0
             && can_join(&scene.segments[before], segment, radii[before][1].max(radii[i][0]))
         {
             next[before] = Some(i);
             continues[i] = true;
         }
     }
-    let circle: Vec<(f64, f64)> =
-        (0..sides).map(|k| sin_cos_degrees(360.0 * k as f64 / sides as f64)).collect();
+    let mut profiles: HashMap<(Option<u32>, usize), Vec<Spoke>> = HashMap::new();
+    let mut pieces: Vec<(&Segment, [f64; 2])> = Vec::new();
     for first in (0..scene.segments.len()).filter(|&i| !continues[i] && visible(i)) {
         let chain = std::iter::successors(Some(first), |&i| next[i]);
-        let pieces: Vec<(&Segment, [f64; 2])> = chain.map(|i| (&scene.segments[i], radii[i])).collect();
-        Tube { circle: &circle, out }.add(&pieces);
+        pieces.clear();
+        pieces.extend(chain.map(|i| (&scene.segments[i], radii[i])));
+        let sides = sides(pieces.iter().flat_map(|(_, radii)| *radii).fold(0.0, f64::max));
+        let contour = scene.segments[first].contour;
+        let profile = profiles.entry((contour, sides)).or_insert_with(|| {
+            let points = contour.and_then(|i| scene.prepared_for.as_ref()?.contours.get(i as usize));
+            points.map_or_else(|| circle(sides), |contour| curve(&contour.points, sides))
+        });
+        Tube { profile, out }.add(&pieces);
     }
+}
+
+/// A corner of a cross-section, in parts of the radius: its place, and the unit normal of the outline there.
+#[derive(Clone, Copy)]
+struct Spoke {
+    place: [f64; 2],
+    normal: [f64; 2],
+}
+
+fn circle(sides: usize) -> Vec<Spoke> {
+    (0..sides)
+        .map(|k| {
+            let (sin, cos) = sin_cos_degrees(360.0 * k as f64 / sides as f64);
+            Spoke { place: [cos, sin], normal: [cos, sin] }
+        })
+        .collect()
+}
+
+/// A smooth closed curve through points (Catmull and Rom 1974), with at least so many sides.
+fn curve(points: &[[f64; 2]], sides: usize) -> Vec<Spoke> {
+    let count = points.len();
+    let pieces = (2 * sides).div_ceil(count).max(2);
+    let mut spokes = Vec::with_capacity(count * pieces);
+    for i in 0..count {
+        let [a, b, c, d] = [count - 1, 0, 1, 2].map(|k| points[(i + k) % count]);
+        for k in 0..pieces {
+            let t = k as f64 / pieces as f64;
+            let weigh = |w: [f64; 4]| [0, 1].map(|x| w[0] * a[x] + w[1] * b[x] + w[2] * c[x] + w[3] * d[x]);
+            let place = weigh([
+                t * (t * (1.0 - 0.5 * t) - 0.5),
+                t * t * (1.5 * t - 2.5) + 1.0,
+                t * (t * (2.0 - 1.5 * t) + 0.5),
+                t * t * 0.5 * (t - 1.0),
+            ]);
+            let [x, y] = weigh([
+                t * (2.0 - 1.5 * t) - 0.5,
+                t * (4.5 * t - 5.0),
+                t * (4.0 - 4.5 * t) + 0.5,
+                t * (1.5 * t - 1.0),
+            ]);
+            let length = x.hypot(y);
+            // Where the curve has no direction, away from the middle.
+            let (x, y) = if length > 1e-9 { (y, -x) } else { (place[0], place[1]) };
+            let length = x.hypot(y).max(1e-300);
+            spokes.push(Spoke { place, normal: [x / length, y / length] });
+        }
+    }
+    spokes
 }
 
 /// Whether two segments can share a ring of this radius.
@@ -86,20 +163,21 @@ impl Section {
         Section::new(to, u, slope)
     }
 
-    /// Direction away from the axis.
-    fn outward(&self, (sin, cos): (f64, f64)) -> Vector {
-        self.u * cos + self.v * sin
+    /// Away from the axis, as far as the cross-section reaches with radius 1.
+    fn outward(&self, at: Spoke) -> Vector {
+        self.u * at.place[0] + self.v * at.place[1]
     }
 
     /// Normal of the tube's side.
-    fn normal(&self, at: (f64, f64)) -> Vector {
-        (self.outward(at) - self.along * self.slope).normalize()
+    fn normal(&self, at: Spoke) -> Vector {
+        let ([x, y], [a, b]) = (at.normal, at.place);
+        (self.u * x + self.v * y - self.along * (self.slope * (x * a + y * b))).normalize()
     }
 }
 
 struct Tube<'a> {
-    /// `(sin, cos)` of the corners of a cross-section.
-    circle: &'a [(f64, f64)],
+    /// The corners of a cross-section.
+    profile: &'a [Spoke],
     out: &'a mut Triangles,
 }
 
@@ -132,7 +210,7 @@ impl Tube<'_> {
                 let normal = self.out.add_normal(faces);
                 let flat = |ring: &Ring| Ring {
                     vertices: ring.vertices.clone(),
-                    normals: vec![normal; self.circle.len()],
+                    normals: vec![normal; self.profile.len()],
                 };
                 let (a, b) = (flat(&ring), flat(&wide));
                 self.strip(after.0, &a, &b);
@@ -152,7 +230,7 @@ impl Tube<'_> {
     ) -> Ring {
         let plane = before.along + after.along;
         let mut ring = Ring { vertices: Vec::new(), normals: Vec::new() };
-        for &at in self.circle {
+        for &at in self.profile {
             let outward = before.outward(at);
             // Along the side of the tube up to the plane.
             let slide = outward.dot(&plane) / before.along.dot(&plane);
@@ -163,24 +241,37 @@ impl Tube<'_> {
         ring
     }
 
-    /// Closes an end by a dome and returns the ring that it stands on. `sign` is -1 at the start.
+    /// Closes an end by a dome and returns the ring that it stands on; an end without width is a point.
+    /// `sign` is -1 at the start.
     fn dome(&mut self, segment: &Segment, centre: Point, radius: f64, section: &Section, sign: f64) -> Ring {
+        if radius <= 0.0 {
+            let point = self.out.add_vertex(centre);
+            let normals = self.profile.iter().map(|&at| self.out.add_normal(section.normal(at))).collect();
+            return Ring { vertices: vec![point; self.profile.len()], normals };
+        }
         let outwards = section.along * sign;
         let base = self.joint(centre, radius, [section; 2], [section; 2]);
-        let half = std::f64::consts::FRAC_1_SQRT_2;
-        let mut middle = Ring { vertices: Vec::new(), normals: Vec::new() };
-        for &at in self.circle {
-            let direction = (section.outward(at) + outwards) * half;
-            middle.vertices.push(self.out.add_vertex(centre + direction * radius));
-            middle.normals.push(self.out.add_normal(direction));
+        // As many rings from the base to the pole as make the dome as round as the tube.
+        let steps = (self.profile.len() / 8).clamp(1, 8) + 1;
+        let mut outer = Ring { vertices: base.vertices.clone(), normals: base.normals.clone() };
+        for step in 1..steps {
+            let (sin, cos) = sin_cos_degrees(90.0 * step as f64 / steps as f64);
+            let mut ring = Ring { vertices: Vec::new(), normals: Vec::new() };
+            for &at in self.profile {
+                let place = centre + (section.outward(at) * cos + outwards * sin) * radius;
+                ring.vertices.push(self.out.add_vertex(place));
+                let aside = section.u * at.normal[0] + section.v * at.normal[1];
+                ring.normals.push(self.out.add_normal((aside * cos + outwards * sin).normalize()));
+            }
+            let (low, high) = if sign < 0.0 { (&ring, &outer) } else { (&outer, &ring) };
+            self.strip(segment, low, high);
+            outer = ring;
         }
         let pole = (self.out.add_vertex(centre + outwards * radius), self.out.add_normal(outwards));
-        let (low, high) = if sign < 0.0 { (&middle, &base) } else { (&base, &middle) };
-        self.strip(segment, low, high);
-        for k in 0..self.circle.len() {
-            let after = (k + 1) % self.circle.len();
+        for k in 0..self.profile.len() {
+            let after = (k + 1) % self.profile.len();
             let (a, b) = if sign < 0.0 { (after, k) } else { (k, after) };
-            let corner = |k: usize| (middle.vertices[k], middle.normals[k]);
+            let corner = |k: usize| (outer.vertices[k], outer.normals[k]);
             self.face(segment, [pole, corner(a), corner(b)]);
         }
         base
@@ -188,8 +279,8 @@ impl Tube<'_> {
 
     /// The side between two rings, the second one further along.
     fn strip(&mut self, segment: &Segment, from: &Ring, to: &Ring) {
-        for k in 0..self.circle.len() {
-            let after = (k + 1) % self.circle.len();
+        for k in 0..self.profile.len() {
+            let after = (k + 1) % self.profile.len();
             let corner = |ring: &Ring, k: usize| (ring.vertices[k], ring.normals[k]);
             let [a, b, c, d] = [corner(from, k), corner(from, after), corner(to, after), corner(to, k)];
             self.face(segment, [a, b, c]);
@@ -198,6 +289,11 @@ impl Tube<'_> {
     }
 
     fn face(&mut self, segment: &Segment, corners: [(u32, u32); 3]) {
+        // At a point a side has one triangle, not two.
+        let [(a, _), (b, _), (c, _)] = corners;
+        if a == b || b == c || c == a {
+            return;
+        }
         self.out.add_face(segment.owner, segment.material, corners);
     }
 }

@@ -139,6 +139,14 @@ pub struct Equation {
     pub rate: Expression,
 }
 
+/// A text in quotes, without them, and where it stands.
+#[derive(Clone, Debug)]
+pub struct Text {
+    pub text: String,
+    /// With the quotes.
+    pub span: Span,
+}
+
 #[derive(Clone, Debug)]
 pub enum Item {
     Title(String),
@@ -147,6 +155,11 @@ pub enum Item {
     Def { name: Name, parameters: Vec<Name>, body: Expression },
     Angle(Expression),
     Frames { from: Expression, to: Expression, step: Expression },
+    Color { name: Name, value: Text },
+    Gradient { name: Name, stops: Vec<Text> },
+    Surface { name: Name, file: Text },
+    Contour { name: Name, points: Vec<[Expression; 2]> },
+    Tropism { direction: [Expression; 3], strength: Option<Expression> },
     Ignore(Vec<Name>),
     Consider(Vec<Name>),
     Axiom(Vec<Module>),

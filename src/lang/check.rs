@@ -2,13 +2,14 @@
 
 use std::collections::{HashMap, HashSet};
 
+use super::appearance::surface_hint;
 use super::ast::{self, HeadModule};
 use super::print;
 use super::suggest::nearest;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::model::{
-    BUILT_IN_SURFACES, Class, Condition, DRAWN_WORDS, KindId, Kinds, Model, Pattern, Rule, Step, base_of,
-    class_of,
+    BUILT_IN_SURFACES, COMMAND_SURFACES, Class, Condition, DRAWN_WORDS, KindId, Kinds, Model, Pattern, Rule,
+    Step, base_of, class_of,
 };
 
 /// Most rules that one strict predecessor can have.
@@ -339,10 +340,14 @@ pub fn inert_modules(model: &Model, occurs: &HashMap<KindId, Span>, diagnostics:
         }
         match kind.class() {
             Class::Symbol => {}
-            Class::Surface if BUILT_IN_SURFACES.contains(&name) => {}
+            Class::Surface
+                if BUILT_IN_SURFACES.contains(&kind.base())
+                    || COMMAND_SURFACES.iter().any(|(command, _)| *command == name)
+                    || model.appearance.surfaces.iter().any(|shape| shape.name == name) => {}
             Class::Surface => diagnostics.push(
                 Diagnostic::warning(format!("there is no surface `{name}`: nothing is drawn for it"))
-                    .at(first(), "built in are @L, a leaf, and @K, a flower"),
+                    .at(first(), "built in are @L, a leaf, @K, a flower, @P, a petal, and @B, a bud")
+                    .help_opt(surface_hint(name, &model.appearance)),
             ),
             Class::Word => {
                 let names: HashSet<&str> = with_rules.iter().copied().chain(DRAWN_WORDS).collect();
@@ -372,6 +377,35 @@ pub fn inert_modules(model: &Model, occurs: &HashMap<KindId, Span>, diagnostics:
                 }
             }
         }
+    }
+}
+
+/// Modules that tell the turtle something and lack parameters.
+pub fn commands(model: &Model, diagnostics: &mut Vec<Diagnostic>, places: &HashMap<KindId, Span>) {
+    for (id, kind) in model.kinds.iter() {
+        let Some((name, needed)) = COMMAND_SURFACES.into_iter().find(|(name, _)| *name == kind.base()) else {
+            continue;
+        };
+        let Some(span) = places.get(&id).filter(|_| kind.arity < needed && kind.interpretation.is_none())
+        else {
+            continue;
+        };
+        let usage = match name {
+            "@W" => "`@W(w)`: the width to which the stem tapers",
+            "@T" => "`@T(e)`: the strength of the tropism",
+            "@C" => "`@C(name)`: the contour of stems",
+            "@PC" => "`@PC(n, row, column)`: a control point of patch n, row and column from 0 to 3",
+            "@PS" => "`@PS(n)`: patch n begins",
+            _ => "`@PD(n)`: patch n is drawn",
+        };
+        diagnostics.push(
+            Diagnostic::error(format!(
+                "`{name}` needs {}, not {}",
+                super::scope::plural(needed, "parameter"),
+                kind.arity
+            ))
+            .at(*span, usage),
+        );
     }
 }
 

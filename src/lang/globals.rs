@@ -1,26 +1,28 @@
-//! Constants, `param`s and functions in the order in which they depend on one another.
+//! Constants, `param`s, functions, and the numbers of colours, in the order in which they depend on one another.
 
 use std::collections::HashMap;
 use std::sync::Arc;
 
 use super::Setting;
+use super::appearance::first_gradient;
 use super::ast::{Document, Expr, ExprId, Expression, Item, Name};
 use super::scope::{RESERVED, Scope};
 use super::suggest::did_you_mean;
 use crate::diagnostic::{Diagnostic, Span};
-use crate::model::Parameter;
+use crate::model::{BUILT_IN_COLORS, Parameter};
 
 /// What a global name is declared as.
 struct Global<'d> {
     name: &'d Name,
-    body: Expression,
     kind: Kind<'d>,
 }
 
 enum Kind<'d> {
-    Const,
-    Param(Option<(Expression, Expression)>),
-    Def(&'d [Name]),
+    Const(Expression),
+    Param(Expression, Option<(Expression, Expression)>),
+    Def(&'d [Name], Expression),
+    /// A colour, a gradient or a contour: its number.
+    Number(usize),
 }
 
 /// Declares all global names in `scope` and returns the `param`s with the values in force.
@@ -34,14 +36,15 @@ pub fn declare(document: &Document, settings: &[Setting], scope: &mut Scope) -> 
     }
     let mut parameters = Vec::new();
     for i in order(document, &globals, &index, scope) {
-        let Global { name, body, kind } = &globals[i];
+        let Global { name, kind } = &globals[i];
         match kind {
-            Kind::Def(formals) => scope.define_function(name, formals, &document.expressions, *body),
-            Kind::Const => {
+            Kind::Def(formals, body) => scope.define_function(name, formals, &document.expressions, *body),
+            Kind::Number(number) => scope.define_constant(name.text.clone(), Some(*number as f64)),
+            Kind::Const(body) => {
                 let value = scope.constant_value(&document.expressions, *body);
                 scope.define_constant(name.text.clone(), value);
             }
-            Kind::Param(range) => {
+            Kind::Param(body, range) => {
                 let value = parameter(document, name, *body, *range, settings, scope);
                 scope.define_constant(name.text.clone(), value.as_ref().map(|p| p.value));
                 parameters.extend(value);
@@ -72,11 +75,21 @@ pub fn declare(document: &Document, settings: &[Setting], scope: &mut Scope) -> 
 fn collect<'d>(document: &'d Document, scope: &mut Scope) -> Vec<Global<'d>> {
     let mut globals: Vec<Global> = Vec::new();
     let mut first: HashMap<&str, Span> = HashMap::new();
+    let mut next_color = BUILT_IN_COLORS + 1;
+    let mut next_gradient = first_gradient(document);
+    let mut next_contour = 1;
+    let count = |next: &mut usize| {
+        *next += 1;
+        Kind::Number(*next - 1)
+    };
     for (item, _) in &document.items {
         let global = match item {
-            Item::Const { name, value } => Global { name, body: *value, kind: Kind::Const },
-            Item::Param { name, value, range } => Global { name, body: *value, kind: Kind::Param(*range) },
-            Item::Def { name, parameters, body } => Global { name, body: *body, kind: Kind::Def(parameters) },
+            Item::Const { name, value } => Global { name, kind: Kind::Const(*value) },
+            Item::Param { name, value, range } => Global { name, kind: Kind::Param(*value, *range) },
+            Item::Def { name, parameters, body } => Global { name, kind: Kind::Def(parameters, *body) },
+            Item::Color { name, .. } => Global { name, kind: count(&mut next_color) },
+            Item::Gradient { name, .. } => Global { name, kind: count(&mut next_gradient) },
+            Item::Contour { name, .. } => Global { name, kind: count(&mut next_contour) },
             _ => continue,
         };
         let Name { text, span } = global.name;
@@ -181,16 +194,13 @@ fn order(
     let dependencies: Vec<Vec<(usize, Span)>> = globals
         .iter()
         .map(|global| {
-            let own: &[Name] = match global.kind {
-                Kind::Def(formals) => formals,
-                _ => &[],
+            let (own, bodies): (&[Name], Vec<Expression>) = match global.kind {
+                Kind::Def(formals, body) => (formals, vec![body]),
+                Kind::Const(body) | Kind::Param(body, None) => (&[], vec![body]),
+                Kind::Param(body, Some((from, to))) => (&[], vec![body, from, to]),
+                Kind::Number(_) => (&[], Vec::new()),
             };
-            let ranges = match global.kind {
-                Kind::Param(Some((from, to))) => vec![from, to],
-                _ => Vec::new(),
-            };
-            std::iter::once(global.body)
-                .chain(ranges)
+            (bodies.into_iter())
                 .flat_map(|e| mentions(document, e))
                 .filter(|(name, _)| !own.iter().any(|formal| formal.text == **name))
                 .filter_map(|(name, span)| Some((*index.get(&**name)?, span)))
@@ -231,7 +241,7 @@ fn order(
                             path.splice(4..path.len() - 3, ["…"]);
                         }
                         let what = match globals[to].kind {
-                            Kind::Def(_) => "calls itself",
+                            Kind::Def(..) => "calls itself",
                             _ => "depends on itself",
                         };
                         scope.diagnostics.push(

@@ -26,6 +26,11 @@ pub enum ItemKind {
     Def,
     Angle,
     Frames,
+    Color,
+    Gradient,
+    Surface,
+    Contour,
+    Tropism,
     Ignore,
     Consider,
     Axiom,
@@ -36,13 +41,18 @@ pub enum ItemKind {
 }
 
 /// The words that begin a declaration.
-pub const DECLARATIONS: [(&str, ItemKind); 11] = [
+pub const DECLARATIONS: [(&str, ItemKind); 16] = [
     ("title", ItemKind::Title),
     ("const", ItemKind::Const),
     ("param", ItemKind::Param),
     ("def", ItemKind::Def),
     ("angle", ItemKind::Angle),
     ("frames", ItemKind::Frames),
+    ("color", ItemKind::Color),
+    ("gradient", ItemKind::Gradient),
+    ("surface", ItemKind::Surface),
+    ("contour", ItemKind::Contour),
+    ("tropism", ItemKind::Tropism),
     ("ignore", ItemKind::Ignore),
     ("consider", ItemKind::Consider),
     ("initial", ItemKind::Axiom),
@@ -410,6 +420,7 @@ impl Scanner<'_> {
                 Last::Operator
             }
             "step" | "in" | "string" => Last::Operator,
+            "strength" if self.items.last().is_some_and(|i| i.kind == ItemKind::Tropism) => Last::Operator,
             _ => Last::Operand,
         }
     }

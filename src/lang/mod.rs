@@ -7,6 +7,7 @@
 //! [`load`] is the whole of it. Mistakes are collected, not thrown: a text with three mistakes gets three
 //! messages. Every pass is linear in the text, and none recurses deeper than a fixed bound.
 
+mod appearance;
 pub mod ast;
 mod check;
 mod globals;
@@ -17,14 +18,17 @@ mod rules;
 mod scope;
 mod smooth;
 mod suggest;
+mod surface;
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 pub use layout::MAX_DEPTH;
 pub use suggest::did_you_mean;
+pub use surface::{Files, NoFiles};
 
 use crate::diagnostic::{Diagnostic, Severity, Source, Span};
-use crate::model::{Frames, Kinds, Model, Successor, analyse};
+use crate::model::{DRAWN_WORDS, Frames, Kinds, Model, Successor, analyse};
 use ast::{Action, Document, Item};
 use scope::{Scope, Variables};
 
@@ -44,12 +48,17 @@ pub struct Loaded {
     pub refused_settings: Vec<Diagnostic>,
 }
 
-/// Reads, checks and compiles a model.
+/// Reads, checks and compiles a model that names no files.
 pub fn load(source: &Source, settings: &[Setting]) -> Loaded {
+    load_with(source, settings, &NoFiles)
+}
+
+/// Reads, checks and compiles a model. The surfaces that it names come from `files`.
+pub fn load_with(source: &Source, settings: &[Setting], files: &dyn Files) -> Loaded {
     let (document, mut diagnostics) = parse::parse(source);
     let unread = !diagnostics.is_empty();
     let mut scope = Scope::default();
-    let model = build(&document, settings, &mut scope, unread);
+    let model = build(&document, settings, &mut scope, unread, files);
     diagnostics.append(&mut scope.diagnostics);
     let failed = diagnostics.iter().any(|d| d.severity == Severity::Error);
     diagnostics.sort_by_key(|d| (d.severity == Severity::Warning, d.labels.first().map(|l| l.0)));
@@ -60,14 +69,26 @@ pub fn load(source: &Source, settings: &[Setting]) -> Loaded {
 
 /// Builds the model; errors go to the scope. `unread` tells that parts of the text are missing, so that
 /// nothing is said about what may stand in them.
-fn build(document: &Document, settings: &[Setting], scope: &mut Scope, unread: bool) -> Option<Model> {
+fn build(
+    document: &Document,
+    settings: &[Setting],
+    scope: &mut Scope,
+    unread: bool,
+    files: &dyn Files,
+) -> Option<Model> {
     let parameters = globals::declare(document, settings, scope);
+    let appearance = appearance::build(document, scope, files);
     let mut kinds = Kinds::default();
     let mut single = Singles::default();
-    let mut builder =
-        rules::RuleBuilder { document, scope, kinds: &mut kinds, occurs: std::collections::HashMap::new() };
+    let mut builder = rules::RuleBuilder {
+        document,
+        scope,
+        kinds: &mut kinds,
+        occurs: HashMap::new(),
+        drawn: HashMap::new(),
+    };
     let (mut rules, mut drafts, mut written) = (vec![], vec![], vec![]);
-    let (mut interpretations, mut strings) = (vec![], vec![]);
+    let (mut interpretations, mut strings, mut drawings) = (vec![], vec![], vec![]);
     let mut heads = Vec::new();
     let (mut axiom, mut ignored, mut considered) = (None, Vec::new(), Vec::new());
     let (mut title, mut angle, mut frames) = (None, 90.0, None);
@@ -104,6 +125,7 @@ fn build(document: &Document, settings: &[Setting], scope: &mut Scope, unread: b
             }
             Item::Interpret { head, drawn } => {
                 heads.push(head);
+                drawings.push(&drawn[..]);
                 match builder.interpretation(head, drawn) {
                     Some(interpretation) => interpretations.push(interpretation),
                     None => whole = false,
@@ -124,14 +146,20 @@ fn build(document: &Document, settings: &[Setting], scope: &mut Scope, unread: b
                     None => whole = false,
                 }
             }
-            Item::Const { .. } | Item::Param { .. } | Item::Def { .. } => {}
+            // Globals, and what `appearance` has built.
+            _ => {}
         }
     }
-    builder.check_arities(&written, &strings);
+    let ruled: Vec<&ast::HeadModule> = written.iter().map(|rule| &rule.predecessor).collect();
+    builder.check_arities(&ruled, &strings, "in its rule");
+    // In drawings `F(x)` means a line, whatever `F` with other parameters is drawn as.
+    let drawn = |head: &&ast::HeadModule| !DRAWN_WORDS.contains(&&*head.name.text);
+    let drawn: Vec<&ast::HeadModule> = heads.iter().copied().filter(drawn).collect();
+    builder.check_arities(&drawn, &drawings, "where it is drawn");
     if !unread {
         builder.check_interpretations(&heads);
     }
-    let occurs = builder.occurs;
+    let (occurs, drawn) = (builder.occurs, builder.drawn);
     if !single.seen("the initial string") && !unread {
         scope.diagnostics.push(
             Diagnostic::error("the model has no initial string")
@@ -140,6 +168,8 @@ fn build(document: &Document, settings: &[Setting], scope: &mut Scope, unread: b
     }
     if scope.diagnostics.is_empty() && !unread {
         unused(document, scope);
+        let is_used = |name: &str| kinds.iter().any(|(_, kind)| kind.name == name);
+        appearance::unused_surfaces(&appearance, is_used, scope);
     }
     if !whole || unread {
         return None;
@@ -153,6 +183,7 @@ fn build(document: &Document, settings: &[Setting], scope: &mut Scope, unread: b
         axiom: axiom.unwrap_or_else(Successor::default),
         rules,
         interpretations: Vec::new(),
+        appearance: Arc::new(appearance),
         drawn_only: Vec::new(),
     };
     for (i, rule) in written.iter().enumerate() {
@@ -184,6 +215,7 @@ fn build(document: &Document, settings: &[Setting], scope: &mut Scope, unread: b
     }
     check::coverage(&model, diagnostics);
     check::inert_modules(&model, &occurs, diagnostics);
+    check::commands(&model, diagnostics, &drawn.into_iter().chain(occurs).collect());
     analyse(&mut scope.graph, &mut model, &drafts);
     Some(model)
 }
@@ -237,6 +269,9 @@ fn unused(document: &Document, scope: &mut Scope) {
             Item::Const { name, .. } => ("constant", name),
             Item::Param { name, .. } => ("param", name),
             Item::Def { name, .. } => ("function", name),
+            Item::Color { name, .. } => ("colour", name),
+            Item::Gradient { name, .. } => ("gradient", name),
+            Item::Contour { name, .. } => ("contour", name),
             _ => continue,
         };
         let text: &Arc<str> = &name.text;

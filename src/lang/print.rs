@@ -218,6 +218,22 @@ pub fn document(document: &Document) -> String {
             Item::Frames { from, to, step } => {
                 format!("frames {} .. {} step {}", show(from), show(to), show(step))
             }
+            Item::Color { name, value } => format!("color {} = \"{}\"", name.text, value.text),
+            Item::Gradient { name, stops } => {
+                let stops: Vec<String> = stops.iter().map(|stop| format!("\"{}\"", stop.text)).collect();
+                format!("gradient {} = {}", name.text, stops.join(", "))
+            }
+            Item::Surface { name, file } => format!("surface {} from \"{}\"", name.text, file.text),
+            Item::Contour { name, points } => {
+                let points: Vec<String> =
+                    points.iter().map(|[x, y]| format!("({}, {})", show(x), show(y))).collect();
+                format!("contour {} = {}", name.text, points.join(" "))
+            }
+            Item::Tropism { direction, strength } => {
+                let [x, y, z] = direction.each_ref().map(show);
+                let strength = strength.as_ref().map(|e| format!(" strength {}", show(e)));
+                format!("tropism {x}, {y}, {z}{}", strength.unwrap_or_default())
+            }
             Item::Ignore(list) => format!("ignore {}", names(list, " ")),
             Item::Consider(list) => format!("consider {}", names(list, " ")),
             Item::Axiom(string) => format!("initial string: {}", modules(e, string)),

@@ -24,6 +24,8 @@ pub struct RuleBuilder<'b> {
     pub kinds: &'b mut Kinds,
     /// Each kind that stands in a string, with the first place where it does.
     pub occurs: HashMap<KindId, Span>,
+    /// The same of drawings, where they are not those of the kind itself.
+    pub drawn: HashMap<KindId, Span>,
 }
 
 /// The pairs of expressions that the conditions of a rule compare.
@@ -187,8 +189,9 @@ impl RuleBuilder<'_> {
         // What is only drawn does not develop: it makes no rule reachable.
         let before = std::mem::take(&mut self.occurs);
         let drawn = self.successor(drawn, &variables, count);
-        self.occurs = before;
+        let inside = std::mem::replace(&mut self.occurs, before);
         let kind = self.kinds.intern(&head.name.text, head.parameters.len());
+        self.drawn.extend(inside.into_iter().filter(|(other, _)| *other != kind));
         Some((kind, Interpretation { span: head.span, drawn: drawn? }))
     }
 
@@ -382,11 +385,12 @@ impl RuleBuilder<'_> {
         Some(Condition(steps))
     }
 
-    /// Wrong numbers of parameters: of words that have rules, wherever they stand in a string.
-    pub fn check_arities(&mut self, rules: &[&ast::Rule], strings: &[&[ast::Module]]) {
+    /// Wrong numbers of parameters: of words that have rules (or drawings), wherever they stand in a string (or a
+    /// drawing). `place` says where the right number is.
+    pub fn check_arities(&mut self, heads: &[&HeadModule], strings: &[&[ast::Module]], place: &str) {
         let mut declared: HashMap<&str, Vec<&HeadModule>> = HashMap::new();
-        for rule in rules {
-            declared.entry(&rule.predecessor.name.text).or_default().push(&rule.predecessor);
+        for &head in heads {
+            declared.entry(&head.name.text).or_default().push(head);
         }
         let mut reported: HashSet<(&str, usize)> = HashSet::new();
         for module in strings.iter().copied().flatten() {
@@ -405,23 +409,24 @@ impl RuleBuilder<'_> {
                 plural(heads[0].parameters.len(), "parameter"),
             ))
             .at(module.span, format!("{} here", plural(given, "parameter")))
-            .at(heads[0].span, format!("{} in its rule", plural(heads[0].parameters.len(), "parameter")));
+            .at(heads[0].span, format!("{} {place}", plural(heads[0].parameters.len(), "parameter")));
             self.error(error);
         }
     }
 
-    /// Drawings of modules that the strings never have.
+    /// Drawings of modules that neither the strings nor other drawings ever have.
     pub fn check_interpretations(&mut self, heads: &[&HeadModule]) {
         for head in heads {
             let name = &*head.name.text;
             let given = head.parameters.len();
-            if self.kinds.find(name, given).is_some_and(|kind| self.occurs.contains_key(&kind)) {
+            let seen = |kind| self.occurs.contains_key(&kind) || self.drawn.contains_key(&kind);
+            if self.kinds.find(name, given).is_some_and(seen) {
                 continue;
             }
             let mut error =
                 Diagnostic::warning(format!("nothing is drawn as `{}`", print::head_module(head)))
-                    .at(head.span, "no string has this module");
-            let other = (self.occurs.iter())
+                    .at(head.span, "no string and no other drawing has this module");
+            let other = (self.occurs.iter().chain(&self.drawn))
                 .filter(|(kind, _)| self.kinds.get(**kind).name == name)
                 .min_by_key(|(_, span)| **span);
             if let Some((kind, span)) = other {

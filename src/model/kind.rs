@@ -61,11 +61,18 @@ impl Kind {
     }
 }
 
-/// Base names of the words that the turtle draws: a line, and a move without one.
-pub const DRAWN_WORDS: [&str; 2] = ["F", "f"];
+/// Base names of the words that the turtle draws: a line, a move without one, and one that is no edge of a
+/// polygon either.
+pub const DRAWN_WORDS: [&str; 3] = ["F", "f", "g"];
 
-/// The surfaces that are built in: a leaf and a flower.
-pub const BUILT_IN_SURFACES: [&str; 2] = ["@L", "@K"];
+/// The surfaces that are built in: a leaf, a flower, a petal and a bud.
+pub const BUILT_IN_SURFACES: [&str; 4] = ["@L", "@K", "@P", "@B"];
+
+/// What is written as a surface and tells the turtle something else, with the number of parameters that it
+/// needs: a width to taper to, the strength of tropism, the contour of stems, and the beginning, the points
+/// and the drawing of a Bézier patch.
+pub const COMMAND_SURFACES: [(&str, usize); 6] =
+    [("@W", 1), ("@T", 1), ("@C", 1), ("@PS", 1), ("@PC", 3), ("@PD", 1)];
 
 /// How a name is written.
 pub fn class_of(name: &str) -> Class {

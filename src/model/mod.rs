@@ -11,6 +11,7 @@
 //!   better than a comparison of two rounded numbers whether two sides have met.
 
 mod analysis;
+mod appearance;
 mod condition;
 mod invariance;
 mod kind;
@@ -18,11 +19,18 @@ mod law;
 mod rule;
 
 pub use analysis::{Draft, analyse};
+pub use appearance::{
+    Appearance, BUILT_IN_COLORS, Contour, Gradient, NamedColor, Net, Rgb, SurfaceShape, Tropism,
+};
 pub use condition::{Comparison, Condition, Sign, Step, Truth};
 pub use invariance::never_reached;
-pub use kind::{BUILT_IN_SURFACES, Class, DRAWN_WORDS, Kind, KindId, Kinds, base_of, class_of};
+pub use kind::{
+    BUILT_IN_SURFACES, COMMAND_SURFACES, Class, DRAWN_WORDS, Kind, KindId, Kinds, base_of, class_of,
+};
 pub use law::{Jacobian, Law, Linear, Numeric, Obstacle, Watch};
 pub use rule::{Interpretation, Pattern, Produce, Rule, Solve, Successor, Switch};
+
+use std::sync::Arc;
 
 use crate::diagnostic::Span;
 
@@ -42,6 +50,7 @@ pub struct Model {
     pub axiom: Successor,
     pub rules: Vec<Rule>,
     pub interpretations: Vec<Interpretation>,
+    pub appearance: Arc<Appearance>,
     /// Per kind and parameter: no rule reads it, so that only drawing and output do.
     pub drawn_only: Vec<Vec<bool>>,
 }
@@ -65,6 +74,7 @@ impl Default for Model {
             axiom: Successor::default(),
             rules: Vec::new(),
             interpretations: Vec::new(),
+            appearance: Arc::default(),
             drawn_only: Vec::new(),
         }
     }

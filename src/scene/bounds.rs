@@ -36,8 +36,6 @@ impl Block {
 }
 
 /// The space that scenes take up: everything drawn, with the widths of lines.
-///
-/// Bounds can be taken in turned coordinates (see [`Bounds::add_seen`]), as a view needs them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bounds {
     /// Points only, no widths; what the default width is measured against.
@@ -68,34 +66,16 @@ impl Bounds {
 
     /// Takes in a scene.
     pub fn add(&mut self, scene: &Scene) {
-        self.add_seen(scene, |p| p);
-    }
-
-    /// Takes in a scene whose points are seen through `turn`, a rotation.
-    pub fn add_seen(&mut self, scene: &Scene, turn: impl Fn(Point) -> Point) {
-        for segment in &scene.segments {
-            for (point, width) in [(segment.start, segment.widths[0]), (segment.end, segment.widths[1])] {
-                let point = turn(point);
-                self.points.include(point, 0.0);
-                match width {
-                    Width::Set(width) => self.known.include(point, width / 2.0),
-                    Width::Default(factor) => {
-                        self.styled.include(point, 0.0);
-                        self.factor = self.factor.max(factor);
-                    }
+        scene.each_point(|point, width| {
+            self.points.include(point, 0.0);
+            match width {
+                Width::Set(width) => self.known.include(point, width / 2.0),
+                Width::Default(factor) => {
+                    self.styled.include(point, 0.0);
+                    self.factor = self.factor.max(factor);
                 }
             }
-        }
-        let corners = scene.polygons.iter().flat_map(|polygon| polygon.vertices.iter().copied());
-        let surfaces = scene
-            .surfaces
-            .iter()
-            .flat_map(|surface| surface.mesh.vertices.iter().map(|&v| surface.placement.point(v)));
-        for point in corners.chain(surfaces) {
-            let point = turn(point);
-            self.points.include(point, 0.0);
-            self.known.include(point, 0.0);
-        }
+        });
     }
 
     /// Takes in other bounds, taken in the same coordinates.
@@ -152,6 +132,7 @@ mod tests {
             direction: end.coords.normalize(),
             across: Vector::x(),
             widths: [width; 2],
+            contour: None,
             material: MaterialId::STEM,
             owner,
             follows: None,

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{MaterialId, Mesh, OwnerId, Point, Vector};
+use super::{MaterialId, Mesh, OwnerId, PatchSet, Point, Vector};
 
 /// The width of a line.
 ///
@@ -46,6 +46,8 @@ pub struct Segment {
     pub across: Vector,
     /// Widths (diameters) at the start and at the end.
     pub widths: [Width; 2],
+    /// Index of the cross-section among the model's contours; `None` is a circle.
+    pub contour: Option<u32>,
     pub material: MaterialId,
     pub owner: OwnerId,
     /// Index of the segment that this one continues: it precedes this one on the same axis and ends exactly
@@ -65,6 +67,9 @@ pub struct Polygon {
 #[derive(Clone, Debug)]
 pub struct Surface {
     pub mesh: Arc<Mesh>,
+    /// What `mesh` is a preview of, if the surface is curved: the mesh of the right accuracy is made when a
+    /// frame is written (see [`Scene::tessellated`](super::Scene::tessellated)).
+    pub patches: Option<Arc<PatchSet>>,
     pub placement: Placement,
     /// Stands in for the materials of those faces that take a colour.
     pub tint: Option<MaterialId>,

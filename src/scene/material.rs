@@ -1,8 +1,11 @@
 //! Materials: what a thing is made of, and the colour that goes with it.
 //!
 //! A scene names materials, never colours. The first few are what plants are drawn in when a model says
-//! nothing; the numbered ones are what `;(n)` chooses.
+//! nothing; the numbered ones are what `;(n)` chooses: twelve that are built in, then the colours and the
+//! gradients that the model declares. A gradient is [`GRADIENT_STEPS`] materials, so that a material library
+//! stays small whatever is coloured by it.
 
+use std::borrow::Cow;
 use std::fmt;
 
 /// A colour of the sRGB space, 8 bits a channel.
@@ -73,14 +76,23 @@ impl MaterialId {
 /// A named colour.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Material {
-    /// ASCII letters, digits and `-`.
-    pub name: &'static str,
+    /// ASCII letters, digits, `_` and `-`; no two materials of a palette share one.
+    pub name: Cow<'static, str>,
     pub color: Color,
 }
 
+/// Materials of each gradient.
+pub const GRADIENT_STEPS: usize = 64;
+
 /// The materials of a scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Palette(Vec<Material>);
+pub struct Palette {
+    materials: Vec<Material>,
+    /// Colours with a number, those of the model included.
+    colors: usize,
+    /// Gradients, whose numbers and materials follow those of the colours.
+    gradients: usize,
+}
 
 /// The materials of the default palette: the named ones, then the colours 1, 2, 3, ….
 const DEFAULT: [(&str, u32); 17] = [
@@ -105,30 +117,101 @@ const DEFAULT: [(&str, u32); 17] = [
 
 impl Default for Palette {
     fn default() -> Palette {
-        Palette(DEFAULT.iter().map(|&(name, rgb)| Material { name, color: Color::hex(rgb) }).collect())
+        let materials =
+            DEFAULT.iter().map(|&(name, rgb)| Material { name: name.into(), color: Color::hex(rgb) });
+        Palette { materials: materials.collect(), colors: DEFAULT.len() - MaterialId::NAMED, gradients: 0 }
     }
 }
 
 impl Palette {
+    /// The default palette, and after it colours and gradients of a model: their names, and sRGB colours at
+    /// equal distances from 0 to 1.
+    pub fn with<'n>(
+        colors: impl IntoIterator<Item = (&'n str, Color)>,
+        gradients: impl IntoIterator<Item = (&'n str, Vec<Color>)>,
+    ) -> Palette {
+        let mut palette = Palette::default();
+        for (name, color) in colors {
+            let name = palette.free_name(name);
+            palette.materials.push(Material { name: name.into(), color });
+            palette.colors += 1;
+        }
+        for (name, stops) in gradients {
+            let name = palette.free_name(name);
+            for step in 0..GRADIENT_STEPS {
+                let color = blend(&stops, step as f64 / (GRADIENT_STEPS - 1) as f64);
+                palette.materials.push(Material { name: format!("{name}-{step:02}").into(), color });
+            }
+            palette.gradients += 1;
+        }
+        palette
+    }
+
+    /// A name in ASCII that no material has, and none of a gradient of that name would.
+    fn free_name(&self, name: &str) -> String {
+        let plain: String = (name.chars())
+            .map(|c| {
+                if c.is_ascii_alphanumeric() || c == '_' { c.to_string() } else { format!("u{:x}", c as u32) }
+            })
+            .collect();
+        let taken = |name: &str| {
+            self.materials.iter().any(|m| {
+                m.name == name || m.name.strip_prefix(name).is_some_and(|rest| rest.starts_with('-'))
+            })
+        };
+        let mut free = plain.clone();
+        let mut count = 1;
+        while taken(&free) {
+            count += 1;
+            free = format!("{plain}_{count}");
+        }
+        free
+    }
+
     /// All materials, in the order of their ids.
     pub fn materials(&self) -> &[Material] {
-        &self.0
+        &self.materials
     }
 
     pub fn get(&self, id: MaterialId) -> &Material {
-        &self.0[id.index()]
+        &self.materials[id.index()]
     }
 
-    /// The material of the colour of this number, as `;(n)` chooses it: `None` for 0, which is the natural
-    /// colour of whatever is drawn. Numbers are rounded; beyond the last colour they start again at 1.
-    pub fn numbered(&self, number: f64) -> Option<MaterialId> {
+    /// The material that `;(number, value)` chooses: `None` for number 0, which is the natural colour of
+    /// whatever is drawn. Numbers are rounded; beyond the last colour and gradient they start again at 1. The
+    /// value matters to gradients only, where it runs from 0 to 1; what is beyond is drawn as the nearer end.
+    pub fn chosen(&self, number: f64, value: f64) -> Option<MaterialId> {
         let number = number.round();
-        let count = (self.0.len() - MaterialId::NAMED) as f64;
         if number == 0.0 || !number.is_finite() {
             return None;
         }
-        Some(MaterialId(MaterialId::NAMED as u32 + (number - 1.0).rem_euclid(count) as u32))
+        let place = (number - 1.0).rem_euclid((self.colors + self.gradients) as f64) as usize;
+        let offset = if place < self.colors {
+            place
+        } else {
+            let value = if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0) };
+            let step = (value * (GRADIENT_STEPS - 1) as f64).round() as usize;
+            self.colors + (place - self.colors) * GRADIENT_STEPS + step
+        };
+        Some(MaterialId((MaterialId::NAMED + offset) as u32))
     }
+
+    /// The material of the colour of this number; the beginning of a gradient.
+    pub fn numbered(&self, number: f64) -> Option<MaterialId> {
+        self.chosen(number, 0.0)
+    }
+}
+
+/// The colour at a place from 0 to 1 between stops at equal distances.
+fn blend(stops: &[Color], at: f64) -> Color {
+    let last = stops.len().saturating_sub(1);
+    let place = at * last as f64;
+    let low = (place.floor() as usize).min(last.saturating_sub(1));
+    let Some(&from) = stops.get(low) else { return Color::hex(0) };
+    let to = stops.get(low + 1).copied().unwrap_or(from);
+    let part = place - low as f64;
+    let mix = |a: u8, b: u8| (f64::from(a) * (1.0 - part) + f64::from(b) * part).round() as u8;
+    Color { red: mix(from.red, to.red), green: mix(from.green, to.green), blue: mix(from.blue, to.blue) }
 }
 
 #[cfg(test)]
@@ -138,7 +221,7 @@ mod tests {
     #[test]
     fn colour_numbers_cycle() {
         let palette = Palette::default();
-        let name = |n: f64| palette.numbered(n).map(|id| palette.get(id).name);
+        let name = |n: f64| palette.numbered(n).map(|id| palette.get(id).name.as_ref());
         assert_eq!(name(0.2), None);
         assert_eq!(name(1.0), Some("colour-1"));
         assert_eq!(name(12.0), Some("colour-12"));
@@ -154,5 +237,31 @@ mod tests {
         assert_eq!(green.lit(1.0), green);
         assert_eq!(green.to_string(), "#5d9b41");
         assert!(green.lit(0.5).green < green.green && green.lit(1.2).green > green.green);
+    }
+
+    #[test]
+    fn a_models_colours_follow_and_gradients_have_their_steps() {
+        let (black, white) = (Color::hex(0), Color::hex(0xffffff));
+        let palette = Palette::with(
+            [("leaf", Color::hex(0x102030)), ("τ", Color::hex(0x405060))],
+            [("age", vec![black, white]), ("leaf", vec![white, Color::hex(0xff0000), black])],
+        );
+        let look = |number: f64, value: f64| {
+            let material = palette.get(palette.chosen(number, value).expect("a colour"));
+            (material.name.to_string(), material.color.to_string())
+        };
+        let pair = |name: &str, color: &str| (name.to_owned(), color.to_owned());
+        assert_eq!(look(12.0, 0.3), pair("colour-12", "#555555"));
+        assert_eq!(look(13.0, 0.3), pair("leaf_2", "#102030"));
+        assert_eq!(look(14.0, 0.3), pair("u3c4", "#405060"));
+        assert_eq!(look(15.0, -7.0), pair("age-00", "#000000"));
+        assert_eq!(look(15.0, 0.5), pair("age-32", "#828282"));
+        assert_eq!(look(15.0, 2.0), pair("age-63", "#ffffff"));
+        assert_eq!(look(16.0, 0.25), pair("leaf_3-16", "#ff7d7d"));
+        assert_eq!(look(17.0, 0.0).0, "colour-1");
+        let mut names: Vec<&str> = palette.materials().iter().map(|m| &*m.name).collect();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), palette.materials().len());
     }
 }

@@ -53,6 +53,59 @@ impl Mesh {
         }
     }
 
+    /// Adds a triangle unless it has no area. Lengths are of the order of 1.
+    pub(super) fn add_face(&mut self, corners: [u32; 3], material: MaterialId, takes_tint: bool) {
+        let [p, q, r] = corners.map(|i| self.vertices[i as usize]);
+        if (q - p).cross(&(r - p)).norm() > 1e-12 {
+            self.faces.push(Face { corners, material, takes_tint });
+        }
+    }
+
+    /// Where a normal does not agree with a triangle at its vertex, as on a fold, the mean of the triangles
+    /// there takes its place. `first` is the first vertex to look at.
+    pub(super) fn orient(&mut self, first: u32) {
+        let mut means = vec![Vector::zeros(); self.vertices.len() - first as usize];
+        let mut wrong = vec![false; means.len()];
+        for face in self.faces.iter().filter(|face| face.corners[0] >= first) {
+            let [p, q, r] = face.corners.map(|i| self.vertices[i as usize]);
+            let area = (q - p).cross(&(r - p));
+            for corner in face.corners {
+                means[(corner - first) as usize] += area;
+                wrong[(corner - first) as usize] |= area.dot(&self.normals[corner as usize]) <= 0.0;
+            }
+        }
+        let normals = &mut self.normals[first as usize..];
+        for ((normal, mean), _) in normals.iter_mut().zip(means).zip(wrong).filter(|(_, wrong)| *wrong) {
+            *normal = mean.try_normalize(1e-300).unwrap_or(*normal);
+        }
+    }
+
+    /// A mesh of triangles. Where there are no normals, each vertex gets the mean of its triangles'.
+    pub fn of_triangles(
+        vertices: Vec<Point>,
+        normals: &[Vector],
+        triangles: &[[u32; 3]],
+        material: MaterialId,
+    ) -> Mesh {
+        let mut mesh = Mesh { normals: vec![Vector::zeros(); vertices.len()], vertices, faces: Vec::new() };
+        for &corners in triangles {
+            let [p, q, r] = corners.map(|i| mesh.vertices[i as usize]);
+            let area = (q - p).cross(&(r - p));
+            if area == Vector::zeros() {
+                continue;
+            }
+            mesh.faces.push(Face { corners, material, takes_tint: true });
+            for corner in corners {
+                mesh.normals[corner as usize] += area;
+            }
+        }
+        let mut mesh = mesh.finish();
+        for (own, given) in mesh.normals.iter_mut().zip(normals) {
+            *own = given.try_normalize(1e-300).unwrap_or(*own);
+        }
+        mesh
+    }
+
     /// Brings the normals to unit length, after the last grid.
     pub fn finish(mut self) -> Mesh {
         for normal in &mut self.normals {

@@ -4,7 +4,6 @@
 //! the same axis are therefore kept as one angle in degrees, reduced modulo 360, and applied only when
 //! another axis comes; for angles that are multiples of a binary fraction (45, 137.5, 1) that sum is exact,
 //! and so a plane curve is as good after a million turns as after one.
-
 //!
 //! Turns about changing axes are applied in twice the usual precision ([`Twofold`]).
 
@@ -69,6 +68,18 @@ impl Frame {
         if let Some(left) = Vector::y().cross(&heading).try_normalize(1e-9) {
             *self = Frame::looking(heading, left, heading.cross(&left));
         }
+    }
+
+    /// Turns the heading towards a unit vector at a right angle to it, by an angle in radians, and left and
+    /// up with it.
+    pub(super) fn bend(&mut self, towards: Vector, angle: f64) {
+        let [heading, left, _] = self.vectors();
+        let (sin, cos) = angle.sin_cos();
+        let turned = (heading * cos + towards * sin).normalize();
+        let across = left.dot(&towards);
+        let left = left + (towards * (cos - 1.0) - heading * sin) * across;
+        let left = (left - turned * turned.dot(&left)).normalize();
+        *self = Frame::looking(turned, left, turned.cross(&left));
     }
 
     /// Applies the pending turn.

@@ -4,6 +4,7 @@
 //! depth costs memory by the level and nothing by the module.
 
 use super::command::Command;
+use super::prepare::prepare;
 use super::walk::{Source, Walk};
 use super::{DEPTH_LIMIT, Error, MODULE_LIMIT, Pose};
 use crate::model::{KindId, Model};
@@ -24,6 +25,7 @@ struct Level<'m> {
 /// See [`super::trace`].
 pub(super) fn trace(model: &Model, string: &ModuleString, scene: &mut Scene) -> Result<Pose, Error> {
     let commands = Command::table(model);
+    prepare(model, scene);
     let mut walk = Walk::new(model, scene);
     let mut expander = Expander::new(model, &commands, string);
     for module in string.iter() {
@@ -96,7 +98,7 @@ impl<'a> Expander<'a> {
                 }
                 // Inside its own drawing a module is what its name says: `interpret F(x): !(0.1) F(x)`.
                 Command::Interpret(_) => {
-                    let plain = Command::plain(self.model.kinds.get(kind));
+                    let plain = Command::plain(self.model.kinds.get(kind), self.model);
                     walk.obey(plain, &self.arguments[from..from + arity], kind)?;
                 }
                 command => walk.obey(command, &self.arguments[from..from + arity], kind)?,

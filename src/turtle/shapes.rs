@@ -1,23 +1,23 @@
-//! The built-in surfaces: a leaf and a flower, of unit size, in the turtle's axes.
+//! The built-in surfaces: a leaf, a flower, a petal and a bud, of unit size, in the turtle's axes.
 //!
 //! Coordinates are along the heading, to the left and up. Outlines are `s^a (1 - s)^b`, with `s` from base
 //! to tip: round where the exponent is near one half, pointed where it is 1.
 
-use std::sync::{Arc, LazyLock};
+use std::sync::LazyLock;
 
-use crate::scene::{MaterialId, Mesh, Point, sin_cos_degrees};
+use crate::scene::{MaterialId, Mesh, PatchFace, Point, Shape, sin_cos_degrees};
 
 /// A pointed oval, 1 long, 0.4 wide, folded a little along the midrib and arching over.
-pub(super) fn leaf() -> Arc<Mesh> {
-    static LEAF: LazyLock<Arc<Mesh>> = LazyLock::new(|| Arc::new(make_leaf()));
-    LEAF.clone()
-}
+pub(super) static LEAF: LazyLock<Shape> = LazyLock::new(|| Shape::of_mesh(make_leaf()));
 
 /// Five petals on a green cup, 0.5 across, opening along the heading like a bell, with a yellow centre.
-pub(super) fn flower() -> Arc<Mesh> {
-    static FLOWER: LazyLock<Arc<Mesh>> = LazyLock::new(|| Arc::new(make_flower()));
-    FLOWER.clone()
-}
+pub(super) static FLOWER: LazyLock<Shape> = LazyLock::new(|| Shape::of_mesh(make_flower()));
+
+/// A rounded petal, 1 long, 0.6 wide, narrow at its base, hollow, its tip bending back: one patch.
+pub(super) static PETAL: LazyLock<Shape> = LazyLock::new(|| Shape::of_patches(make_petal()));
+
+/// A closed bud, 1 long, 0.5 thick, pointed: four patches around the heading.
+pub(super) static BUD: LazyLock<Shape> = LazyLock::new(|| Shape::of_patches(make_bud()));
 
 /// Positions from 0 to 1 that lie closer near the ends, where outlines turn most.
 fn stations(count: usize) -> impl Iterator<Item = f64> {
@@ -98,6 +98,38 @@ fn make_flower() -> Mesh {
     mesh.finish()
 }
 
+/// Rows go from base to tip, columns from left to right, so that the front is up.
+fn make_petal() -> Vec<PatchFace> {
+    // Of each row: place along the heading and rise of its edge and of its middle, half widths of both.
+    let row = |edge: [f64; 2], middle: [f64; 2], widths: [f64; 2]| {
+        let at = |[x, z]: [f64; 2], y: f64| Point::new(x, y, z);
+        [at(edge, widths[0]), at(middle, widths[1]), at(middle, -widths[1]), at(edge, -widths[0])]
+    };
+    let net = [
+        row([0.0, 0.01], [0.0, 0.0], [0.05, 0.02]),
+        row([0.3, 0.1], [0.36, -0.06], [0.16, 0.08]),
+        row([0.62, 0.14], [0.72, 0.02], [0.36, 0.14]),
+        row([0.88, 0.03], [1.05, -0.03], [0.25, 0.14]),
+    ];
+    vec![PatchFace { net, material: MaterialId::PETAL, takes_tint: true }]
+}
+
+/// Each quarter has its rows from base to tip; its columns go round so that the front is outside.
+fn make_bud() -> Vec<PatchFace> {
+    // The handle of a cubic that follows a quarter of a circle to 3 parts in 10,000.
+    const HANDLE: f64 = 0.551_915;
+    const PROFILE: [(f64, f64); 4] = [(0.0, 0.0), (0.02, 0.36), (0.52, 0.3), (1.0, 0.0)];
+    (0..4)
+        .map(|quarter| {
+            let (sin, cos) = sin_cos_degrees(90.0 * f64::from(quarter));
+            let arc = [(1.0, 0.0), (1.0, HANDLE), (HANDLE, 1.0), (0.0, 1.0)]
+                .map(|(a, b)| (a * cos - b * sin, a * sin + b * cos));
+            let net = PROFILE.map(|(x, radius)| arc.map(|(y, z)| Point::new(x, radius * y, radius * z)));
+            PatchFace { net, material: MaterialId::SEPAL, takes_tint: true }
+        })
+        .collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -111,26 +143,55 @@ mod tests {
 
     #[test]
     fn shapes_have_unit_size() {
-        let [long, wide, _] = size(&leaf());
+        let [long, wide, _] = size(&LEAF.mesh);
         assert!((long - 1.0).abs() < 1e-12 && (wide - 0.4).abs() < 0.02, "{long} {wide}");
-        let [_, wide, high] = size(&flower());
+        let [_, wide, high] = size(&FLOWER.mesh);
         assert!((0.45..0.55).contains(&wide) && (0.45..0.55).contains(&high), "{wide} {high}");
+        let [long, wide, _] = size(&PETAL.mesh);
+        assert!((0.97..1.03).contains(&long) && (0.55..0.65).contains(&wide), "{long} {wide}");
+        let [long, wide, high] = size(&BUD.mesh);
+        assert!((long - 1.0).abs() < 1e-12 && (wide - high).abs() < 1e-9, "{long} {wide} {high}");
+        assert!((0.45..0.55).contains(&wide), "{wide}");
     }
 
     #[test]
     fn normals_agree_with_the_winding() {
-        for mesh in [leaf(), flower()] {
+        for shape in [&LEAF, &FLOWER, &PETAL, &BUD] {
+            let mesh = &shape.mesh;
             for face in &mesh.faces {
                 let [p, q, r] = face.corners.map(|i| mesh.vertices[i as usize]);
                 let normal = (q - p).cross(&(r - p));
                 for corner in face.corners {
-                    assert!(normal.dot(&mesh.normals[corner as usize]) > 0.0);
+                    assert!(normal.dot(&mesh.normals[corner as usize]) > 0.0, "{p} {q} {r}");
                 }
             }
         }
-        assert!(
-            leaf().faces.iter().all(|f| leaf().normals[f.corners[0] as usize].z > 0.0),
-            "a leaf faces up"
-        );
+        let faces_up = |mesh: &Mesh| mesh.faces.iter().all(|f| mesh.normals[f.corners[0] as usize].z > 0.0);
+        assert!(faces_up(&LEAF.mesh), "a leaf faces up");
+        let middle = PETAL.mesh.normals.iter().map(|n| n.z).sum::<f64>();
+        assert!(middle > 0.0, "a petal faces up");
+    }
+
+    #[test]
+    fn a_bud_is_closed_and_faces_outwards() {
+        let mesh = &BUD.mesh;
+        let volume: f64 = (mesh.faces.iter())
+            .map(|face| {
+                let [p, q, r] = face.corners.map(|i| mesh.vertices[i as usize].coords);
+                p.dot(&q.cross(&r)) / 6.0
+            })
+            .sum();
+        assert!((0.05..0.2).contains(&volume), "{volume}");
+        // By place, every edge is passed once in each direction.
+        let place = |i: u32| mesh.vertices[i as usize].coords.map(|c| (c * 1e9).round() as i64);
+        let mut edges = std::collections::HashMap::new();
+        for face in &mesh.faces {
+            for k in 0..3 {
+                let (a, b) = (place(face.corners[k]), place(face.corners[(k + 1) % 3]));
+                *edges.entry((a.x, a.y, a.z, b.x, b.y, b.z)).or_insert(0) += 1;
+                *edges.entry((b.x, b.y, b.z, a.x, a.y, a.z)).or_insert(0) -= 1;
+            }
+        }
+        assert!(edges.values().all(|&count| count == 0));
     }
 }

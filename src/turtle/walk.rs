@@ -2,12 +2,15 @@
 
 use std::sync::Arc;
 
+use super::bend::Bend;
 use super::command::Command;
 use super::frame::{Axis, Frame};
+use super::patch::OpenPatches;
 use super::{COORDINATE_LIMIT, Error, Pose, shapes};
 use crate::model::{KindId, Model};
 use crate::scene::{
-    MaterialId, Mesh, Owner, OwnerId, Placement, Point, Polygon, Scene, Segment, Surface, Vector, Width,
+    MaterialId, Owner, OwnerId, Patch, Placement, Point, Polygon, Scene, Segment, Shape, Surface, Vector,
+    Width,
 };
 use crate::structure::Lineage;
 
@@ -29,10 +32,16 @@ struct State {
     remainder: Vector,
     frame: Frame,
     width: Width,
-    /// Number of the colour; 0 is the natural one.
-    color: f64,
+    /// Number of the colour, 0 being the natural one, and its place in a gradient.
+    color: (f64, f64),
+    /// Index of the cross-section of stems; `None` is a circle.
+    contour: Option<u32>,
+    /// Strength of the tropism.
+    strength: f64,
     /// The last segment on this axis, if the turtle still stands at its end.
     last: Option<usize>,
+    /// How many segments, the last one and those before it, were drawn since the width was set.
+    run: usize,
 }
 
 /// A turtle that walks through a string and draws into a scene.
@@ -43,6 +52,9 @@ pub(super) struct Walk<'a> {
     stack: Vec<State>,
     /// Vertices of the polygons that are open, innermost last.
     polygons: Vec<Vec<Point>>,
+    patches: OpenPatches,
+    /// Direction of the tropism.
+    target: Vector,
     source: Source,
     /// The source as an owner, once it has drawn something.
     owner: Option<OwnerId>,
@@ -52,6 +64,7 @@ pub(super) struct Walk<'a> {
 
 impl<'a> Walk<'a> {
     pub(super) fn new(model: &'a Model, scene: &'a mut Scene) -> Walk<'a> {
+        let tropism = model.appearance.tropism;
         Walk {
             model,
             scene,
@@ -60,11 +73,17 @@ impl<'a> Walk<'a> {
                 remainder: Vector::zeros(),
                 frame: Frame::upright(),
                 width: Width::Default(1.0),
-                color: 0.0,
+                color: (0.0, 0.0),
+                contour: None,
+                strength: tropism.map_or(0.0, |tropism| tropism.strength),
                 last: None,
+                run: 0,
             },
             stack: Vec::new(),
             polygons: Vec::new(),
+            patches: OpenPatches::default(),
+            // Without a declaration, gravity.
+            target: tropism.map_or(-Vector::y(), |tropism| Vector::from(tropism.direction)),
             // Replaced before the first command.
             source: Source { kind: KindId::OPEN, lineage: Lineage::of_axiom(0) },
             owner: None,
@@ -89,15 +108,23 @@ impl<'a> Walk<'a> {
 
     /// Does what a module of this kind says.
     pub(super) fn obey(&mut self, command: Command, parameters: &[f64], kind: KindId) -> Result<(), Error> {
-        let given = if command.reads_parameter() { parameters.first().copied() } else { None };
-        if let Some(value) = given.filter(|value| !value.is_finite()) {
+        let read = &parameters[..parameters.len().min(command.parameters())];
+        if let Some(&value) = read.iter().find(|value| !value.is_finite()) {
             let name = self.model.kinds.get(kind).name.clone();
             return Err(self.complain(|_, lineage| Error::NotFinite { name, lineage, value }));
         }
+        let given = read.first().copied();
         match command {
             Command::Nothing | Command::Interpret(_) => {}
             Command::Draw => self.step(given.unwrap_or(1.0), true)?,
             Command::Move => self.step(given.unwrap_or(1.0), false)?,
+            Command::Hop => {
+                // What is open waits, so that no vertex is recorded.
+                let open = std::mem::take(&mut self.polygons);
+                let done = self.step(given.unwrap_or(1.0), false);
+                self.polygons = open;
+                done?;
+            }
             Command::Turn(axis, sign) => {
                 self.state.frame.turn(axis, sign * given.unwrap_or(self.model.angle))
             }
@@ -107,12 +134,32 @@ impl<'a> Walk<'a> {
                 self.state.width = match given {
                     Some(width) => Width::Set(self.in_range(width.max(0.0))?),
                     None => self.state.width.scaled(THINNING),
+                };
+                self.state.run = 0;
+            }
+            Command::Taper => {
+                let width = Width::Set(self.in_range(given.unwrap_or(0.0).max(0.0))?);
+                self.taper(width);
+                self.state.width = width;
+                self.state.run = 0;
+            }
+            Command::Bend => self.state.strength = self.in_range(given.unwrap_or(0.0))?,
+            Command::Contour => {
+                // 0, and what is no contour, is a circle.
+                let number = given.unwrap_or(0.0).round();
+                let count = self.model.appearance.contours.len() as f64;
+                self.state.contour = (1.0..=count).contains(&number).then(|| number as u32 - 1);
+            }
+            Command::Color => {
+                self.state.color = match given {
+                    Some(number) => (number, read.get(1).copied().unwrap_or(0.0)),
+                    None => (self.state.color.0 + 1.0, 0.0),
                 }
             }
-            Command::Color => self.state.color = given.unwrap_or(self.state.color + 1.0),
             Command::Push => {
                 self.stack.push(self.state.clone());
                 self.state.last = None;
+                self.state.run = 0;
             }
             Command::Pop => {
                 // Brackets match, by the rules of the language; a stray one changes nothing.
@@ -123,8 +170,41 @@ impl<'a> Walk<'a> {
             Command::BeginPolygon => self.polygons.push(Vec::new()),
             Command::Vertex => self.record_vertex(),
             Command::EndPolygon => self.end_polygon(),
-            Command::Leaf => self.place(shapes::leaf, given.unwrap_or(1.0))?,
-            Command::Flower => self.place(shapes::flower, given.unwrap_or(1.0))?,
+            Command::Leaf => self.place(&shapes::LEAF, given)?,
+            Command::Flower => self.place(&shapes::FLOWER, given)?,
+            Command::Petal => self.place(&shapes::PETAL, given)?,
+            Command::Bud => self.place(&shapes::BUD, given)?,
+            Command::Surface(index) => {
+                if let Some(shape) = self.scene.shapes.get(index).cloned() {
+                    self.place(&shape, given)?;
+                }
+            }
+            Command::BeginPatch | Command::ControlPoint | Command::DrawPatch => self.patch(command, read)?,
+        }
+        Ok(())
+    }
+
+    /// Begins a patch, sets a point of it, or draws it.
+    fn patch(&mut self, command: Command, parameters: &[f64]) -> Result<(), Error> {
+        let Source { kind, lineage } = self.source;
+        let complain = |error: &dyn Fn(String, Lineage) -> Error| {
+            error(self.model.kinds.get(kind).name.clone(), lineage)
+        };
+        let given = |i: usize| parameters.get(i).copied().unwrap_or(0.0);
+        match command {
+            Command::BeginPatch => self.patches.begin(given(0), &complain)?,
+            Command::ControlPoint => {
+                self.patches.set([0, 1, 2].map(given), self.state.position, &complain)?
+            }
+            _ => {
+                let net = self.patches.net(given(0), &complain)?;
+                let material = self.chosen().unwrap_or(MaterialId::PETAL);
+                let owner = self.owner();
+                // All in one place there is nothing to see, as at the birth of an organ.
+                if net.iter().flatten().any(|p| *p != net[0][0]) {
+                    self.scene.patches.push(Patch { net, material, owner });
+                }
+            }
         }
         Ok(())
     }
@@ -137,33 +217,83 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// A step along the heading, drawn as a segment if `draw` and if no polygon is open.
+    /// A step along the heading, drawn if `draw` and if no polygon is open; along an arc where there is a
+    /// tropism.
     fn step(&mut self, length: f64, draw: bool) -> Result<(), Error> {
-        let start = self.state.position;
-        if length != 0.0 {
-            let [heading, left, _] = self.state.frame.vectors();
-            self.advance(heading * length)?;
-            let end = self.state.position;
-            if end != start {
-                let follows = self.state.last.take();
-                if draw && self.polygons.is_empty() {
-                    let segment = Segment {
-                        start,
-                        end,
-                        direction: heading * length.signum(),
-                        across: left,
-                        widths: [self.state.width; 2],
-                        material: self.chosen().unwrap_or(MaterialId::STEM),
-                        owner: self.owner(),
-                        follows,
-                    };
-                    self.state.last = Some(self.scene.segments.len());
-                    self.scene.segments.push(segment);
+        let [heading, left, _] = self.state.frame.vectors();
+        let bend = Bend::new(heading, self.target, self.state.strength).filter(|_| length != 0.0);
+        if let Some(bend) = bend {
+            let pieces = bend.pieces(self.in_range(length)?, self.scene.accuracy);
+            let mut before = Vector::zeros();
+            for i in 1..=pieces {
+                let displacement = bend.displacement(length * i as f64 / pieces as f64);
+                let way = displacement - before;
+                before = displacement;
+                if let Some(direction) = way.try_normalize(0.0) {
+                    self.go(way, direction, left, draw)?;
                 }
+                self.record_vertex();
             }
+            self.state.frame.bend(bend.towards(), bend.turn(length));
+            return Ok(());
+        }
+        if length != 0.0 {
+            self.go(heading * length, heading * length.signum(), left, draw)?;
         }
         self.record_vertex();
         Ok(())
+    }
+
+    /// Goes a straight way, given with its direction, and draws it as a segment if asked to.
+    fn go(&mut self, way: Vector, direction: Vector, across: Vector, draw: bool) -> Result<(), Error> {
+        let start = self.state.position;
+        self.advance(way)?;
+        let end = self.state.position;
+        if end == start {
+            return Ok(());
+        }
+        let follows = self.state.last.take();
+        if draw && self.polygons.is_empty() {
+            let segment = Segment {
+                start,
+                end,
+                direction,
+                across,
+                widths: [self.state.width; 2],
+                contour: self.state.contour,
+                material: self.chosen().unwrap_or(MaterialId::STEM),
+                owner: self.owner(),
+                follows,
+            };
+            self.state.run = if follows.is_some() { self.state.run + 1 } else { 1 };
+            self.state.last = Some(self.scene.segments.len());
+            self.scene.segments.push(segment);
+        }
+        Ok(())
+    }
+
+    /// Lets the segments drawn since the last width run evenly from that width to this one. A width that
+    /// nobody has set is not known before the whole animation is, and stays.
+    fn taper(&mut self, to: Width) {
+        let (Width::Set(from), Width::Set(to)) = (self.state.width, to) else { return };
+        let chain = |scene: &Scene, last: Option<usize>| {
+            let mut next = last;
+            let mut found = Vec::new();
+            for _ in 0..self.state.run {
+                let Some(i) = next else { break };
+                found.push((i, (scene.segments[i].end - scene.segments[i].start).norm()));
+                next = scene.segments[i].follows;
+            }
+            found
+        };
+        let run = chain(self.scene, self.state.last);
+        let whole: f64 = run.iter().map(|(_, length)| length).sum();
+        let mut rest = 0.0;
+        for (i, length) in run {
+            let width = |behind: f64| Width::Set(to + (from - to) * (behind / whole).min(1.0));
+            self.scene.segments[i].widths = [width(rest + length), width(rest)];
+            rest += length;
+        }
     }
 
     /// Moves, with compensated summation (Neumaier 1974).
@@ -201,21 +331,23 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Puts a surface at the turtle's position.
-    fn place(&mut self, mesh: fn() -> Arc<Mesh>, scale: f64) -> Result<(), Error> {
-        self.in_range(scale)?;
+    /// Puts a surface of this size (1) at the turtle's position.
+    fn place(&mut self, shape: &Shape, scale: Option<f64>) -> Result<(), Error> {
+        let scale = self.in_range(scale.unwrap_or(1.0))?;
         if scale > 0.0 {
             let placement =
                 Placement { origin: self.state.position, axes: self.state.frame.vectors(), scale };
             let (tint, owner) = (self.chosen(), self.owner());
-            self.scene.surfaces.push(Surface { mesh: mesh(), placement, tint, owner });
+            let Shape { mesh, patches } = shape.clone();
+            self.scene.surfaces.push(Surface { mesh, patches, placement, tint, owner });
         }
         Ok(())
     }
 
     /// The material of the chosen colour; `None` if things keep their own.
     fn chosen(&self) -> Option<MaterialId> {
-        self.scene.palette.numbered(self.state.color)
+        let (number, value) = self.state.color;
+        self.scene.palette.chosen(number, value)
     }
 
     /// The present source as an owner.

@@ -8,6 +8,8 @@
 //! - [`inspect`]: what `explain`, `--events` and `check --continuity` say.
 //! - [`export`]: SVG and OBJ, read back by other people's code.
 //! - [`schedulers`]: local repair against one clock, remembered neighbours against the whole string.
+//! - [`pictures`]: pixels, perspective, and sheets of several frames.
+//! - [`plants`]: the paper's plants: order of flowering, continuity, the gallery.
 //! - [`report`]: studies of methods, and hard cases with exact answers.
 
 mod cli;
@@ -17,6 +19,9 @@ mod gallery;
 mod inspect;
 mod language;
 mod listings;
+mod organs;
+mod pictures;
+mod plants;
 mod report;
 mod schedulers;
 mod semantics;

@@ -1,7 +1,7 @@
 //! What a transition does to the drawing: turtles before and after, and how fast they go.
 
 use crate::model::Model;
-use crate::scene::{Point, Scene, Vector};
+use crate::scene::{Patch, Point, Scene, Vector};
 use crate::sim::{Stand, Transition};
 use crate::structure::{Lineage, ModuleString};
 use crate::turtle::{self, Error};
@@ -157,7 +157,9 @@ impl<'m> Draughtsman<'m> {
             corners.iter().enumerate().map(|(i, p)| (next(i) - p).norm()).sum::<f64>()
         });
         let surfaces = self.scene.surfaces.iter().map(|surface| surface.placement.scale);
-        let length = lines.sum::<f64>() + outlines.sum::<f64>() + surfaces.sum::<f64>();
+        let patches = self.scene.patches.iter().map(Patch::length);
+        let length =
+            lines.sum::<f64>() + outlines.sum::<f64>() + surfaces.sum::<f64>() + patches.sum::<f64>();
         Ok(Look { position: pose.position, axes: pose.axes, length })
     }
 }

@@ -9,7 +9,8 @@ use super::{Pair, Rule};
 use crate::diagnostic::{Diagnostic, Span};
 use crate::lang::ast;
 use crate::lang::ast::{
-    Action, Clause, Equation, Expr, ExprId, Expression, Expressions, HeadModule, Item, Module, Name, Operator,
+    Action, Clause, Equation, Expr, ExprId, Expression, Expressions, HeadModule, Item, Module, Name,
+    Operator, Text,
 };
 use crate::model::Comparison;
 
@@ -69,6 +70,11 @@ impl Builder<'_> {
         Name { text: self.interner.get(pair.as_str()), span: self.span(pair) }
     }
 
+    fn text(&self, pair: &Pair) -> Text {
+        let inside = pair.as_str();
+        Text { text: inside[1..inside.len() - 1].to_owned(), span: self.span(pair) }
+    }
+
     pub fn item(&mut self, pair: Pair) -> Built<Item> {
         let rule = pair.as_rule();
         let mut inner = pair.into_inner().filter(|p| !is_punctuation(p.as_rule())).peekable();
@@ -101,6 +107,27 @@ impl Builder<'_> {
                 to: self.expression(next())?,
                 step: self.expression(next())?,
             },
+            Rule::color_item => Item::Color { name: self.name(&next()), value: self.text(&next()) },
+            Rule::gradient_item => {
+                Item::Gradient { name: self.name(&next()), stops: inner.map(|p| self.text(&p)).collect() }
+            }
+            Rule::surface_item => Item::Surface { name: self.name(&next()), file: self.text(&next()) },
+            Rule::contour_item => {
+                let name = self.name(&next());
+                let points = inner.map(|point| {
+                    let mut ends = point.into_inner().filter(|p| p.as_rule() == Rule::expr);
+                    let mut coordinate =
+                        || self.expression(ends.next().expect("a point has two coordinates"));
+                    Ok([coordinate()?, coordinate()?])
+                });
+                Item::Contour { name, points: points.collect::<Built<Vec<_>>>()? }
+            }
+            Rule::tropism_item => {
+                let direction =
+                    [self.expression(next())?, self.expression(next())?, self.expression(next())?];
+                let strength = inner.next().map(|p| self.expression(p)).transpose()?;
+                Item::Tropism { direction, strength }
+            }
             Rule::ignore_item => Item::Ignore(inner.map(|p| self.name(&p)).collect()),
             Rule::consider_item => Item::Consider(inner.map(|p| self.name(&p)).collect()),
             Rule::interpret_item => {
@@ -355,6 +382,13 @@ fn is_punctuation(rule: Rule) -> bool {
             | Rule::kw_frames
             | Rule::kw_step
             | Rule::kw_in
+            | Rule::kw_color
+            | Rule::kw_gradient
+            | Rule::kw_surface
+            | Rule::kw_from
+            | Rule::kw_contour
+            | Rule::kw_tropism
+            | Rule::kw_strength
             | Rule::kw_ignore
             | Rule::kw_consider
             | Rule::kw_interpret

@@ -31,6 +31,10 @@ fn words(rule: Rule) -> Option<&'static str> {
         kw_dt => "`dt`",
         kw_step => "`step`",
         kw_in => "`in` and a range",
+        kw_from => "`from` and a file",
+        kw_strength => "`strength`",
+        surface_name => "the name of a surface such as `@P`",
+        point => "a point such as `(1, 0.5)`",
         equation | derivative | rate => "a derivative such as `dx/dt`",
         equals => "`=`",
         colon => "`:`",
@@ -92,7 +96,15 @@ pub fn explain(item: Rule, error: &Error<Rule>, text: &str, offset: usize) -> Di
 }
 
 fn is_item_with_name(item: Rule) -> bool {
-    matches!(item, Rule::const_item | Rule::param_item | Rule::def_item)
+    matches!(
+        item,
+        Rule::const_item
+            | Rule::param_item
+            | Rule::def_item
+            | Rule::color_item
+            | Rule::gradient_item
+            | Rule::contour_item
+    )
 }
 
 /// The word, number or symbol at a place.
@@ -151,6 +163,21 @@ fn hint_by_symbol(item: Rule, text: &str, at: usize, found: &str) -> Option<Stri
         (_, "±") => "`±` stands for both turns in the head of a rule only; write `+` or `-`",
         (_, "~") => "“not” is written `!`",
         (_, "'") => "a derivative is written `dx/dt`",
+        (Some('m'), _) if item == Rule::surface_item && before.ends_with("from") => {
+            "the name of the file is a text in quotes: `surface @P from \"petal.s\"`"
+        }
+        (Some('e'), _) if item == Rule::surface_item && before.ends_with("surface") => {
+            "the name of a surface begins with `@`: `surface @P from \"petal.s\"`"
+        }
+        (Some('=' | ','), _) if matches!(item, Rule::color_item | Rule::gradient_item) => {
+            "a colour is a text in quotes: `\"#8b6cc9\"`"
+        }
+        _ if item == Rule::tropism_item => {
+            "a tropism is a direction and a strength: `tropism 0, -1, 0 strength 0.2`"
+        }
+        _ if item == Rule::contour_item => {
+            "a contour is three points or more: `contour leaf = (1, 0) (0, 0.3) (-1, 0) (0, -0.3)`"
+        }
         (_, "-") if is_item_with_name(item) && !before.contains('=') => {
             "a name is made of letters, digits and `_`"
         }

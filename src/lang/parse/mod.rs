@@ -63,6 +63,7 @@ fn declared_name(text: &str, item: &RawItem) -> Option<std::sync::Arc<str>> {
     let first = words.next()?;
     let name = match item.kind {
         ItemKind::Const | ItemKind::Param | ItemKind::Def => words.next()?,
+        ItemKind::Color | ItemKind::Gradient | ItemKind::Contour => words.next()?,
         ItemKind::Unknown if line.strip_prefix(first)?.trim_start().starts_with('=') => first,
         ItemKind::Unknown => words.next()?,
         _ => return None,
@@ -106,6 +107,11 @@ fn read_item(text: &str, item: &RawItem, builder: &mut build::Builder) -> Result
         ItemKind::Def => Rule::def_item,
         ItemKind::Angle => Rule::angle_item,
         ItemKind::Frames => Rule::frames_item,
+        ItemKind::Color => Rule::color_item,
+        ItemKind::Gradient => Rule::gradient_item,
+        ItemKind::Surface => Rule::surface_item,
+        ItemKind::Contour => Rule::contour_item,
+        ItemKind::Tropism => Rule::tropism_item,
         ItemKind::Ignore => Rule::ignore_item,
         ItemKind::Consider => Rule::consider_item,
         ItemKind::Interpret => Rule::interpret_item,

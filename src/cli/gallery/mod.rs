@@ -1,0 +1,109 @@
+//! `dlsys gallery`: the paper's figures that show development, each from its model.
+//!
+//! ```text
+//! figures (figure, model, flags) ──typed into──▶ render ──▶ DIR/figure-06-a/overlay.svg … ──▶ DIR/index.html
+//! ```
+//!
+//! A picture is what `dlsys render` makes of a line that anybody could type; there is no other way to draw here. The
+//! models are part of the program, and written to `DIR/models`, so that the lines can be typed.
+
+mod figures;
+mod page;
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use clap::Parser;
+
+use super::args::{Action, Command, FrameFormat, GalleryArgs, RenderArgs};
+use super::common::{Failure, out_error};
+use super::render::render;
+use figures::{FIGURES, Picture, models};
+
+/// Renders the figures that are asked for, or lists them.
+pub fn gallery(args: &GalleryArgs) -> Result<(), Failure> {
+    let known: Vec<String> = figures::numbers().iter().map(u8::to_string).collect();
+    if let Some(number) = args.figures.iter().find(|n| !figures::numbers().contains(n)) {
+        return Err(Failure::Usage(format!(
+            "error: the gallery has no figure {number}\n\n  = help: it has {}\n",
+            known.join(", ")
+        )));
+    }
+    if args.format == FrameFormat::Obj {
+        return Err(Failure::Usage(
+            "error: the gallery is made of pictures: svg or png; for meshes type one of its lines (`--list`) with `--format obj`\n"
+                .to_owned(),
+        ));
+    }
+    let wanted: Vec<&Picture> =
+        FIGURES.iter().filter(|p| args.figures.is_empty() || args.figures.contains(&p.figure)).collect();
+    match &args.out {
+        Some(out) if !args.list => draw(&wanted, out, args),
+        _ => wanted.iter().try_for_each(|p| say(&format!("figure {:2}  {}\n", p.figure, p.line()))),
+    }
+}
+
+fn draw(wanted: &[&Picture], out: &Path, args: &GalleryArgs) -> Result<(), Failure> {
+    let folder = out.join("models");
+    make(&folder)?;
+    for (name, text) in models() {
+        write(&folder.join(name), text)?;
+    }
+    let mut drawn = Vec::new();
+    for picture in wanted {
+        let target = out.join(picture.name);
+        render(&typed(picture, out, &target, args)?)?;
+        let file = picture.file(args.format);
+        say(&format!("figure {:2}  {}\n", picture.figure, target.join(&file).display()))?;
+        drawn.push((*picture, file));
+    }
+    let index = out.join("index.html");
+    write(&index, &page::page(&drawn))?;
+    say(&format!("all        {}\n", index.display()))
+}
+
+/// What the command line makes of a picture's line.
+fn typed(picture: &Picture, out: &Path, target: &Path, args: &GalleryArgs) -> Result<RenderArgs, Failure> {
+    let words = ["dlsys", "render", "-o", ".", picture.model].into_iter().chain(picture.flags.split(' '));
+    let typed = Command::try_parse_from(words).map_err(|error| Failure::Usage(error.to_string()))?;
+    let Action::Render(mut typed) = typed.action else { unreachable!("the line says `render`") };
+    typed.shared.model = out.join(picture.model);
+    typed.out = target.to_owned();
+    typed.format = args.format;
+    Ok(typed)
+}
+
+fn say(text: &str) -> Result<(), Failure> {
+    std::io::stdout().write_all(text.as_bytes()).map_err(out_error)
+}
+
+fn make(folder: &PathBuf) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder)
+        .map_err(|error| Failure::Model(format!("error: cannot make {}: {error}\n", folder.display())))
+}
+
+fn write(path: &PathBuf, text: &str) -> Result<(), Failure> {
+    std::fs::write(path, text)
+        .map_err(|error| Failure::Model(format!("error: cannot write {}: {error}\n", path.display())))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_line_can_be_typed() {
+        let args = GalleryArgs { out: None, figures: Vec::new(), format: FrameFormat::Svg, list: false };
+        for picture in FIGURES {
+            let typed = typed(picture, Path::new("there"), Path::new("here"), &args);
+            let typed = typed.unwrap_or_else(|error| panic!("{}: {error:?}", picture.name));
+            assert_eq!(typed.shared.model, Path::new("there").join(picture.model));
+            assert!(models().iter().any(|(name, _)| picture.model == format!("models/{name}")));
+        }
+    }
+
+    #[test]
+    fn every_figure_that_shows_development_is_there() {
+        assert_eq!(figures::numbers(), [6, 7, 9, 10, 11, 12, 13, 14, 15, 17]);
+    }
+}

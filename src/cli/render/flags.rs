@@ -1,0 +1,83 @@
+//! What the flags of `render` ask for, and which of them do not go together.
+
+use crate::cli::args::{Background, FrameFormat, RenderArgs};
+use crate::cli::common::Failure;
+use crate::export::{Format, Layout, Page, Picture, Size, Spacing, Survey, View};
+
+fn usage(message: impl std::fmt::Display) -> Failure {
+    Failure::Usage(format!("error: {message}\n"))
+}
+
+pub fn format(args: &RenderArgs) -> Format {
+    match args.format {
+        FrameFormat::Svg => Format::Svg,
+        FrameFormat::Png => Format::Png,
+        FrameFormat::Obj => Format::Obj,
+    }
+}
+
+/// A survey of nothing yet, in the view that was asked for.
+pub fn survey(args: &RenderArgs) -> Result<Survey, Failure> {
+    let view: View = args.view.parse().map_err(usage)?;
+    let survey = Survey::new(view);
+    Ok(match args.perspective {
+        Some(field) => survey.with_perspective(field),
+        None => survey,
+    })
+}
+
+/// Refuses flags that mean nothing with the format or the layout.
+pub fn agree(args: &RenderArgs) -> Result<(), Failure> {
+    if args.format == FrameFormat::Obj {
+        if args.layout != Layout::Frames {
+            return Err(usage(format!(
+                "an OBJ file is one mesh in space, so frames cannot be laid out on a sheet as --layout {} does; \
+                 choose --format svg or png, or leave out --layout for a file for each frame",
+                args.layout.name()
+            )));
+        }
+        let given = [
+            ("--perspective", args.perspective.is_some()),
+            ("--width", args.width.is_some()),
+            ("--size", args.size.is_some()),
+            ("--background", args.background.is_some()),
+        ];
+        if let Some((flag, _)) = given.iter().find(|(_, given)| *given) {
+            return Err(usage(format!(
+                "{flag} is for pictures, and an OBJ file is a mesh in space; leave it out, or choose --format svg or png"
+            )));
+        }
+    }
+    let of_layout = [
+        ("--columns", args.columns.is_some(), Layout::Grid),
+        ("--no-captions", args.no_captions, Layout::Grid),
+        ("--row-height", args.row_height.is_some(), Layout::Stack),
+    ];
+    match of_layout.iter().find(|(_, given, layout)| *given && args.layout != *layout) {
+        Some((flag, _, layout)) => Err(usage(format!(
+            "{flag} goes with --layout {}, not with {}",
+            layout.name(),
+            args.layout.name()
+        ))),
+        None => Ok(()),
+    }
+}
+
+pub fn threads(args: &RenderArgs) -> usize {
+    args.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
+}
+
+pub fn spacing(args: &RenderArgs) -> Spacing {
+    Spacing { columns: args.columns, row_height: args.row_height }
+}
+
+/// The page that was asked for, for this picture.
+pub fn page(args: &RenderArgs, picture: Picture) -> Result<Page, Failure> {
+    let size = match (args.size, args.width) {
+        (Some((width, height)), _) => Size::Exact(width, height),
+        (None, Some(width)) => Size::Width(width),
+        (None, None) => Size::default(),
+    };
+    let background = args.background.map_or(Some(Page::BACKGROUND), |Background(color)| color);
+    Page::new(picture, size, background).map_err(usage)
+}

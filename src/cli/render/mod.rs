@@ -1,0 +1,217 @@
+//! `dlsys render`: frames of an animation, or all of them on one sheet.
+//!
+//! The animation is run twice. The first run measures it, so that all frames share one picture area and
+//! one default width; the second writes the frames. Both are the same to the last bit, and running again is
+//! cheaper than keeping every frame in memory. While the simulation goes on, frames are drawn and written on other
+//! threads; a file does not depend on how many there are.
+
+mod flags;
+mod reel;
+
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::json;
+
+use super::args::RenderArgs;
+use super::common::{Clock, Failure, Run};
+use super::events::EventLog;
+use crate::export::{
+    self, Fit, Format, FrameDirectory, FrameRecord, FrameWriter, Layout, Manifest, Page, Sheet, SheetWriter,
+    Survey,
+};
+use crate::scene::Scene;
+use crate::sim::{Method, Settings, Stats};
+use reel::{Pass, Shot, play};
+
+/// Runs a model and writes its frames.
+pub fn render(args: &RenderArgs) -> Result<(), Failure> {
+    let survey = flags::survey(args)?;
+    flags::agree(args)?;
+    let run = Run::start(&args.shared)?;
+    let mut clock = run.clock;
+    let mut render = Render { args, run: &run, threads: flags::threads(args), frames: Vec::new() };
+    let mut fit = render.measure(survey, &mut clock)?.fit();
+    fit.accuracy = args.accuracy.unwrap_or(fit.accuracy);
+    let stats = match args.layout {
+        Layout::Frames => render.frames(fit, &mut clock)?,
+        layout => render.sheet(layout, fit, &mut clock)?,
+    };
+    run.write_stats(&args.shared, clock, stats)
+}
+
+/// What is being rendered.
+struct Render<'r> {
+    args: &'r RenderArgs,
+    run: &'r Run,
+    threads: usize,
+    /// Every frame's survey, where the layout asks for it.
+    frames: Vec<Survey>,
+}
+
+impl Render<'_> {
+    /// The first pass.
+    fn measure(&mut self, mut survey: Survey, clock: &mut Clock) -> Result<Survey, Failure> {
+        let progress = bar("measuring", self.run.times.len());
+        let mut events = EventLog::create(self.args.shared.events.as_deref(), self.run)?;
+        let nothing = survey.clone();
+        let of_frame = |_: &Shot, scene: &Scene| {
+            let mut survey = nothing.clone();
+            survey.add(scene);
+            survey
+        };
+        let pass = Pass { settings: self.run.settings, accuracy: 0.0 };
+        let measured = play(self.run, pass, self.threads, clock, events.as_mut(), of_frame, |frame| {
+            survey.merge(&frame);
+            if self.args.layout != Layout::Frames {
+                self.frames.push(frame);
+            }
+            progress.inc(1);
+            Ok(())
+        });
+        progress.finish_and_clear();
+        events.map_or(Ok(()), EventLog::finish)?;
+        measured.map(|_| survey)
+    }
+
+    /// The second pass, if each frame has a file of its own.
+    fn frames(&self, fit: Fit, clock: &mut Clock) -> Result<Stats, Failure> {
+        let mut writer = FrameWriter::new(flags::format(self.args), fit);
+        writer.page = flags::page(self.args, writer.page.picture)?;
+        // Only now that the run is known to be good, the directory is touched.
+        let mut directory =
+            FrameDirectory::create(&self.args.out, self.args.force).map_err(out_of_directory)?;
+        let mut manifest = self.manifest(&writer.fit, &writer.page);
+        let count = self.run.times.len();
+        let work = |shot: &Shot, scene: &Scene| {
+            let file = FrameDirectory::frame_name(shot.index, count, writer.format.extension());
+            let companion = writer.companion(scene).filter(|_| shot.index == 0);
+            let bytes = writer.write(scene, &format!("{}, t = {}", self.title(), shot.time));
+            (record(&writer.fit, shot, scene, file), companion, bytes)
+        };
+        let progress = bar("writing", count);
+        let stats = play(
+            self.run,
+            self.writing(&writer.fit),
+            self.threads,
+            clock,
+            None,
+            work,
+            |(record, companion, bytes)| {
+                if let Some((name, bytes)) = companion {
+                    directory.write(name, &bytes).map_err(out_of_directory)?;
+                }
+                directory.write(&record.file, &bytes).map_err(out_of_directory)?;
+                manifest.frames.push(record);
+                progress.inc(1);
+                Ok(())
+            },
+        )?;
+        directory.finish(&manifest).map_err(out_of_directory)?;
+        progress.finish_and_clear();
+        Ok(stats)
+    }
+
+    /// The second pass, if all frames have one file.
+    fn sheet(&self, layout: Layout, fit: Fit, clock: &mut Clock) -> Result<Stats, Failure> {
+        let times = &self.run.times;
+        let captions: Vec<String> = match layout {
+            Layout::Grid if !self.args.no_captions => times.iter().map(|t| format!("t = {t}")).collect(),
+            _ => Vec::new(),
+        };
+        let sheet = Sheet::new(layout, &fit, &self.frames, &captions, flags::spacing(self.args));
+        let page = flags::page(self.args, sheet.picture)?;
+        let refuse = |error: export::SheetError| Failure::Usage(format!("error: {error}\n"));
+        let writer = SheetWriter::new(flags::format(self.args), fit.clone(), sheet, page).map_err(refuse)?;
+        let mut directory =
+            FrameDirectory::create(&self.args.out, self.args.force).map_err(out_of_directory)?;
+        let mut manifest = self.manifest(&fit, writer.page());
+        let work = |shot: &Shot, scene: &Scene| {
+            (record(&fit, shot, scene, writer.file()), writer.part(shot.index, scene))
+        };
+        let mut assembly = writer.begin();
+        let progress = bar("drawing", times.len());
+        let stats = play(self.run, self.writing(&fit), self.threads, clock, None, work, |(record, part)| {
+            manifest.frames.push(record);
+            progress.inc(1);
+            assembly.add(part).map_err(refuse)
+        })?;
+        let title = match &times[..] {
+            [] => self.title().to_owned(),
+            [only] => format!("{}, t = {only}", self.title()),
+            [first, .., last] => format!("{}, t = {first} to {last}", self.title()),
+        };
+        directory.write(&writer.file(), &assembly.finish(&title)).map_err(out_of_directory)?;
+        directory.finish(&manifest).map_err(out_of_directory)?;
+        progress.finish_and_clear();
+        Ok(stats)
+    }
+
+    fn title(&self) -> &str {
+        self.run.session.model.title.as_deref().unwrap_or(&self.run.session.source.name)
+    }
+
+    /// The second pass: what happens has been told, and how large everything is, is known.
+    fn writing(&self, fit: &Fit) -> Pass {
+        Pass { settings: Settings { log: false, ..self.run.settings }, accuracy: fit.accuracy }
+    }
+
+    fn manifest(&self, fit: &Fit, page: &Page) -> Manifest {
+        let (args, run) = (self.args, self.run);
+        let model = &run.session.model;
+        let parameters: serde_json::Map<String, serde_json::Value> =
+            model.parameters.iter().map(|p| (p.name.clone(), p.value.into())).collect();
+        let settings = &run.settings;
+        let method = Method::NAMED.iter().rev().find(|(_, m)| *m == settings.method).map(|(name, _)| *name);
+        let format = flags::format(args);
+        let mut described = json!({
+            "format": format.extension(),
+            "layout": args.layout.name(),
+            "view": fit.camera.view().to_string(),
+            "perspective": args.perspective,
+            "accuracy": fit.accuracy,
+            "method": method,
+            "parameters": parameters,
+            "seed": args.shared.seed,
+        });
+        if settings.method.is_fixed_step() {
+            described["step_size"] = settings.step_size.into();
+        } else {
+            described["tolerance"] = settings.tolerance.into();
+        }
+        if format != Format::Obj {
+            described["size"] = json!(page.pixels);
+            described["background"] = page.background.map(|color| color.to_string()).into();
+        }
+        let mut manifest = Manifest::new(&run.session.source.name, model.title.clone(), described);
+        manifest.view_box = (format == Format::Svg).then(|| page.picture.view_box());
+        manifest.bounds = fit.bounds.map(|c| c.map(|p| [p.x, p.y, p.z]));
+        manifest
+    }
+}
+
+/// What the manifest says of a frame.
+fn record(fit: &Fit, shot: &Shot, scene: &Scene, file: String) -> FrameRecord {
+    FrameRecord {
+        index: shot.index,
+        time: shot.time,
+        file,
+        modules: shot.modules(),
+        bounds: fit.bounds_of(scene).map(|c| c.map(|p| [p.x, p.y, p.z])),
+    }
+}
+
+/// A progress bar; it hides itself where standard error is no terminal.
+fn bar(what: &'static str, count: usize) -> ProgressBar {
+    let style = ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} {per_sec}, {eta} left");
+    ProgressBar::new(count as u64)
+        .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+        .with_message(what)
+}
+
+fn out_of_directory(error: export::Error) -> Failure {
+    let message = format!("error: {error}\n");
+    match error {
+        export::Error::Io { .. } => Failure::Model(message),
+        // The directory was chosen on the command line.
+        _ => Failure::Usage(message),
+    }
+}

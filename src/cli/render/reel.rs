@@ -1,0 +1,122 @@
+//! A running simulation, frame by frame, and what is drawn of it on other threads.
+
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use crate::cli::common::{Clock, Failure, Run};
+use crate::cli::events::EventLog;
+use crate::cli::parallel;
+use crate::scene::Scene;
+use crate::sim::{Event, Settings, Simulation, Stats};
+use crate::structure::ModuleString;
+use crate::turtle;
+
+/// The structure at one observation time.
+pub struct Shot {
+    pub index: usize,
+    pub time: f64,
+    /// What has happened since the one before.
+    events: Vec<Event>,
+    string: Result<ModuleString, Failure>,
+}
+
+impl Shot {
+    /// Number of modules, brackets not counted.
+    pub fn modules(&self) -> usize {
+        let string = self.string.as_ref().ok();
+        string.map_or(0, |string| string.iter().filter(|m| !m.kind.is_bracket()).count())
+    }
+}
+
+/// A simulation and the times at which it is looked at.
+struct Reel<'r> {
+    run: &'r Run,
+    simulation: Simulation<'r>,
+    next: usize,
+    failed: bool,
+}
+
+impl<'r> Reel<'r> {
+    fn start(run: &'r Run, settings: Settings) -> Result<Reel<'r>, Failure> {
+        let simulation = run.session.simulate(settings).map_err(|error| run.fault(&error))?;
+        Ok(Reel { run, simulation, next: 0, failed: false })
+    }
+
+    /// Goes on to the next time; `None` after the last, or after an error.
+    fn shot(&mut self) -> Option<Shot> {
+        let index = self.next;
+        let &time = self.run.times.get(index).filter(|_| !self.failed)?;
+        self.next += 1;
+        let mut string = ModuleString::default();
+        let wound = self.simulation.at(time, &mut string).map_err(|error| self.run.fault(&error));
+        self.failed = wound.is_err();
+        Some(Shot { index, time, events: self.simulation.take_events(), string: wound.map(|()| string) })
+    }
+}
+
+/// How a model is run and drawn.
+#[derive(Clone, Copy)]
+pub struct Pass {
+    pub settings: Settings,
+    /// See [`Scene::accuracy`].
+    pub accuracy: f64,
+}
+
+/// Runs a model from the beginning: `work` is done on each of its scenes, on several threads, and `take` gets the
+/// results in the order of time. Time spent goes on the clock; on drawing and writing, that of all threads.
+///
+/// # Errors
+/// The first in the order of time: of the run, of drawing, of `take`.
+pub fn play<Done: Send>(
+    run: &Run,
+    pass: Pass,
+    threads: usize,
+    clock: &mut Clock,
+    mut log: Option<&mut EventLog>,
+    work: impl Fn(&Shot, &Scene) -> Done + Sync,
+    mut take: impl FnMut(Done) -> Result<(), Failure>,
+) -> Result<Stats, Failure> {
+    let mut reel = Reel::start(run, pass.settings)?;
+    let mut blank = turtle::blank(&run.session.model);
+    blank.accuracy = pass.accuracy;
+    // One for each thread, in the end: scenes keep their memory.
+    let scenes: Mutex<Vec<Scene>> = Mutex::default();
+    let pool = || scenes.lock().unwrap_or_else(PoisonError::into_inner);
+    let Clock { mut simulate, mut output, .. } = *clock;
+    let make = || {
+        let before = Instant::now();
+        let shot = reel.shot();
+        simulate += before.elapsed();
+        shot
+    };
+    let draw = |mut shot: Shot| -> (Vec<Event>, Result<Done, Failure>, Duration) {
+        let before = Instant::now();
+        let events = std::mem::take(&mut shot.events);
+        let pooled = pool().pop();
+        let mut scene = pooled.unwrap_or_else(|| blank.clone());
+        let done = draw_shot(run, &mut shot, &mut scene).map(|()| work(&shot, &scene));
+        pool().push(scene);
+        (events, done, before.elapsed())
+    };
+    let taken = parallel::in_order(threads, make, draw, |(events, done, spent)| {
+        if let Some(log) = &mut log {
+            log.write(&events)?;
+        }
+        let before = Instant::now();
+        take(done?)?;
+        output += spent + before.elapsed();
+        Ok(())
+    });
+    (clock.simulate, clock.output) = (simulate, output);
+    taken.map(|()| reel.simulation.stats())
+}
+
+/// Draws what is to be seen of a shot.
+fn draw_shot(run: &Run, shot: &mut Shot, scene: &mut Scene) -> Result<(), Failure> {
+    scene.clear();
+    match &mut shot.string {
+        Ok(string) => turtle::draw(&run.session.model, string, scene)
+            .map_err(|error| Failure::Model(format!("error: at t = {}: {error}\n", shot.time))),
+        failed => std::mem::replace(failed, Ok(ModuleString::default())).map(|_| ()),
+    }
+}

@@ -1,0 +1,264 @@
+//! Pictures as others see them: pixels at places that can be computed, sheets of several frames, and the flags of
+//! `render` that ask for them.
+
+use crate::cli::{bad, good};
+use crate::common::scene;
+use crate::export::assert_golden;
+use dlsys::export::{
+    Fit, Format, FrameWriter, Layout, Page, Sheet, SheetWriter, Size, Spacing, Survey, View,
+};
+use dlsys::scene::{Owner, Point, Polygon, Scene};
+use dlsys::structure::Lineage;
+
+/// A PNG as a reader sees it: width, height, and red, green, blue (and opacity) of each pixel.
+struct Picture {
+    width: usize,
+    height: usize,
+    channels: usize,
+    data: Vec<u8>,
+}
+
+impl Picture {
+    fn read(bytes: &[u8]) -> Picture {
+        let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().expect("a PNG");
+        let mut data = vec![0; reader.output_buffer_size().expect("small")];
+        let info = reader.next_frame(&mut data).expect("an image");
+        Picture {
+            width: info.width as usize,
+            height: info.height as usize,
+            channels: info.color_type.samples(),
+            data,
+        }
+    }
+
+    fn at(&self, x: usize, y: usize) -> &[u8] {
+        let start = (y * self.width + x) * self.channels;
+        &self.data[start..start + self.channels]
+    }
+
+    /// Whether any pixel of these columns is not as the first of all.
+    fn is_drawn_on(&self, columns: std::ops::Range<usize>) -> bool {
+        (0..self.height).any(|y| columns.clone().any(|x| self.at(x, y) != self.at(0, 0)))
+    }
+}
+
+/// Squares around the z axis: half of the side, z, number of the colour.
+fn squares(all: &[(f64, f64, f64)]) -> Scene {
+    let mut scene = Scene::default();
+    for (i, &(half, z, number)) in all.iter().enumerate() {
+        let owner = scene.add_owner(Owner { name: "P".into(), lineage: Lineage::of_axiom(i) });
+        let corners = [[-half, -half], [half, -half], [half, half], [-half, half]];
+        let material = scene.palette.numbered(number).expect("a colour");
+        let vertices = corners.map(|[x, y]| Point::new(x, y, z)).to_vec();
+        scene.polygons.push(Polygon { vertices, material, owner });
+    }
+    scene
+}
+
+fn color(number: f64) -> [u8; 3] {
+    let palette = Scene::default().palette;
+    let color = palette.get(palette.numbered(number).expect("a colour")).color;
+    [color.red, color.green, color.blue]
+}
+
+fn drawn(scene: &Scene, view: &str, field: Option<f64>) -> Picture {
+    let mut survey = Survey::new(view.parse().expect("a view"));
+    if let Some(field) = field {
+        survey = survey.with_perspective(field);
+    }
+    survey.add(scene);
+    Picture::read(&FrameWriter::new(Format::Png, survey.fit()).write(scene, "squares"))
+}
+
+#[test]
+fn nearer_wins_from_any_side_in_any_order() {
+    let mut pair = [(1.0, 1.0, 7.0), (2.0, -1.0, 9.0)];
+    for _ in 0..2 {
+        let picture = drawn(&squares(&pair), "front", None);
+        assert_eq!((picture.width, picture.height, picture.channels), (1000, 1000, 3));
+        // The picture is 4.32 wide, so a unit is 231.5 pixels. What faces the viewer in front keeps its colour.
+        assert_eq!(picture.at(500, 500), color(7.0));
+        assert_eq!(picture.at(730, 500), color(7.0));
+        assert_eq!(picture.at(733, 500), picture.at(960, 960), "beside the small square, the large one");
+        assert_ne!(picture.at(733, 500), color(9.0), "which is further away and darker");
+        assert_eq!(picture.at(965, 500), [0xfb, 0xfa, 0xf5], "beside that, nothing");
+        let behind = drawn(&squares(&pair), "180,0", None);
+        assert_eq!((behind.at(500, 500), behind.at(950, 500)), (&color(9.0)[..], &color(9.0)[..]));
+        pair.reverse();
+    }
+}
+
+#[test]
+fn in_perspective_nearer_is_larger() {
+    let scene = squares(&[(1.0, 1.0, 7.0), (2.0, -1.0, 9.0)]);
+    // At 40 degrees the eye is where the large square just fits: (2 - tan 20°)/tan 20° = 4.495 from the middle. The small
+    // one is then 1.2861 times as large, the large one 0.8180 times: 1.2861 and 1.6360 to either side.
+    let slope = 20_f64.to_radians().tan();
+    let eye = (2.0 - slope) / slope;
+    let (small, large) = (eye / (eye - 1.0), 2.0 * eye / (eye + 1.0));
+    let pixels = 1000.0 / (2.0 * large * 1.08);
+    let picture = drawn(&scene, "front", Some(40.0));
+    let column = |x: f64| (500.0 + x * pixels) as usize;
+    assert_eq!(picture.at(column(small) - 1, 500), color(7.0));
+    assert_eq!(picture.at(column(small) + 1, 500), picture.at(column(large) - 1, 500));
+    assert_eq!(picture.at(column(large) + 1, 500), [0xfb, 0xfa, 0xf5]);
+    // The same camera in SVG.
+    let mut survey = Survey::new(View::FRONT).with_perspective(40.0);
+    survey.add(&scene);
+    let text = FrameWriter::new(Format::Svg, survey.fit()).write(&scene, "");
+    let corner = format!("{:.3} {:.3}", large * 100.0, large * 100.0);
+    assert!(String::from_utf8(text).expect("UTF-8").contains(&corner), "{corner}");
+}
+
+#[test]
+fn stems_are_lit_like_cylinders() {
+    let scene = scene("!(0.4)F(4)[&(60)F(2)]");
+    let picture = drawn(&scene, "front", None);
+    let mut survey = Survey::new(View::FRONT);
+    survey.add(&scene);
+    let fit = survey.fit();
+    let [left, bottom, width, height] = fit.picture.area;
+    let place = |x: f64, y: f64| {
+        let scale = picture.width as f64 / width;
+        picture.at(((x - left) * scale) as usize, ((bottom + height - y) * scale) as usize)
+    };
+    let brightness = |pixel: &[u8]| pixel.iter().map(|&c| u32::from(c)).sum::<u32>();
+    let [lit, middle, dark] = [-0.12, 0.0, 0.17].map(|x| brightness(place(x, 1.0)));
+    assert!(lit > middle && middle > dark, "{lit} {middle} {dark}");
+}
+
+#[test]
+fn pages_have_the_size_and_background_that_was_asked_for() {
+    let scene = squares(&[(1.0, 0.0, 7.0)]);
+    let mut survey = Survey::new(View::FRONT);
+    survey.add(&scene);
+    let mut writer = FrameWriter::new(Format::Png, survey.fit());
+    writer.page = Page::new(writer.fit.picture, Size::Exact(64, 32), None).expect("small");
+    let picture = Picture::read(&writer.write(&scene, ""));
+    assert_eq!((picture.width, picture.height, picture.channels), (64, 32, 4));
+    assert_eq!((picture.at(0, 0), picture.at(20, 16)[3], picture.at(60, 16)[3]), (&[0; 4][..], 255, 0));
+    let [red, green, blue] = color(7.0);
+    assert_eq!(picture.at(32, 16), [red, green, blue, 255]);
+}
+
+/// A twig at three ages, on a sheet.
+fn sheet(layout: Layout, format: Format, spacing: Spacing) -> (Vec<u8>, Fit) {
+    let scenes =
+        ["F(1)", "F(2)[+(60);(7)F(1)]", "F(3)[+(60);(7)F(2)][-(60){f(1)+(120)f(1)+(120)f(1)}]"].map(scene);
+    let surveys: Vec<Survey> = scenes
+        .iter()
+        .map(|scene| {
+            let mut survey = Survey::new(View::FRONT);
+            survey.add(scene);
+            survey
+        })
+        .collect();
+    let mut all = Survey::new(View::FRONT);
+    surveys.iter().for_each(|survey| all.merge(survey));
+    let fit = all.fit();
+    let captions: Vec<String> = ["t = 1", "t = 2.5", "t < 10"].map(str::to_owned).into();
+    let sheet = Sheet::new(layout, &fit, &surveys, &captions, spacing);
+    let page = Page::new(sheet.picture, Size::default(), Some(Page::BACKGROUND)).expect("small");
+    let writer = SheetWriter::new(format, fit.clone(), sheet, page).expect("a picture");
+    let mut assembly = writer.begin();
+    for (i, scene) in scenes.iter().enumerate() {
+        assembly.add(writer.part(i, scene)).expect("short");
+    }
+    (assembly.finish("a twig, t = 1 to 10"), fit)
+}
+
+#[test]
+fn sheets_hold_a_group_for_each_frame() {
+    for layout in [Layout::Overlay, Layout::Stack, Layout::Grid] {
+        let (bytes, _) = sheet(layout, Format::Svg, Spacing::default());
+        let text = String::from_utf8(bytes).expect("UTF-8");
+        let tree = usvg::Tree::from_str(&text, &usvg::Options::default()).expect("an SVG");
+        let groups = (0..3).filter(|i| text.contains(&format!("<g id=\"frame-{i:04}\""))).count();
+        assert_eq!((groups, text.matches("<g id=").count()), (3, 3), "{}", layout.name());
+        for frame in ["frame-0000", "frame-0001", "frame-0002"] {
+            assert!(tree.node_by_id(frame).is_some(), "{frame} is drawn");
+        }
+        assert_golden(&format!("{}.svg", layout.name()), &text);
+    }
+}
+
+#[test]
+fn sheets_are_drawn_in_pixels_too() {
+    let (bytes, _) = sheet(Layout::Grid, Format::Png, Spacing::default());
+    let row = Picture::read(&bytes);
+    assert!(row.width == 1000 && row.height < 1000);
+    for third in 0..3 {
+        assert!(row.is_drawn_on(333 * third..333 * (third + 1)), "{third}");
+    }
+    let one_column = Spacing { columns: Some(1), ..Spacing::default() };
+    let column = Picture::read(&sheet(Layout::Grid, Format::Png, one_column).0);
+    assert!(column.height == 1000 && column.width < 500);
+    // The stem of the last frame of an overlay covers the older, fainter ones.
+    let (bytes, fit) = sheet(Layout::Overlay, Format::Png, Spacing::default());
+    let overlay = Picture::read(&bytes);
+    let [left, bottom, width, height] = fit.picture.area;
+    let scale = overlay.width as f64 / width;
+    let place = |y: f64| overlay.at((-left * scale) as usize, ((bottom + height - y) * scale) as usize);
+    assert_eq!(place(0.5), [0x6b, 0x7a, 0x3a]);
+    assert_eq!(place(2.7), [0x6b, 0x7a, 0x3a]);
+}
+
+#[test]
+fn layouts_are_rendered_whole_and_alike_by_any_number_of_threads() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let render = |threads: &str, more: &[&str]| {
+        let out = folder.path().join(format!("{threads}{}", more.join("")));
+        let path = out.to_str().expect("UTF-8");
+        let common = ["render", "models/leaf.dls", "--at", "0.5,3,9", "-o", path, "--threads", threads];
+        good(&[&common[..], more].concat());
+        out
+    };
+    for (flags, file) in [
+        (&["--layout", "overlay"][..], "overlay.svg"),
+        (&["--layout", "stack", "--format", "png", "--width", "200"], "stack.png"),
+        (&["--layout", "grid", "--columns", "2", "--perspective", "40", "--view", "30,20"], "grid.svg"),
+        (&["--format", "png", "--size", "120x90", "--background", "none"], "frame-0001.png"),
+        (&[], "frame-0002.svg"),
+    ] {
+        let [one, many] = ["1", "3"].map(|threads| render(threads, flags));
+        for name in [file, "manifest.json"] {
+            let [a, b] = [&one, &many].map(|out| std::fs::read(out.join(name)).expect("written"));
+            assert!(a == b, "{flags:?}: {name}");
+        }
+        let manifest: serde_json::Value =
+            serde_json::from_slice(&std::fs::read(one.join("manifest.json")).expect("written"))
+                .expect("JSON");
+        assert_eq!(manifest["frames"].as_array().map(Vec::len), Some(3));
+        if flags.contains(&"--layout") {
+            assert_eq!(manifest["settings"]["layout"], flags[1]);
+            assert_eq!(manifest["files"], serde_json::json!([file]));
+        }
+    }
+}
+
+#[test]
+fn flags_that_do_not_go_together_say_so() {
+    for (flags, says) in [
+        (&["--layout", "grid", "--format", "obj"][..], "an OBJ file is one mesh in space"),
+        (&["--perspective", "40", "--format", "obj"], "--perspective is for pictures"),
+        (&["--layout", "heap"], "layouts are frames, overlay, stack, grid"),
+        (&["--columns", "3"], "--columns goes with --layout grid, not with frames"),
+        (&["--layout", "overlay", "--row-height", "1"], "--row-height goes with --layout stack"),
+        (&["--layout", "grid", "--columns", "0"], "must be a number from 1"),
+        (&["--perspective", "0"], "between 1 and 120 degrees"),
+        (&["--size", "100"], "such as 1280x720"),
+        (&["--size", "30000x100"], "between 1 and 20000 pixels"),
+        (&["--size", "20000x20000"], "50 million in all"),
+        (&["--size", "10x10", "--width", "10"], "cannot be used with"),
+        (&["--background", "white"], "a colour like #ffffff"),
+        (&["--threads", "0"], "between 1 and 256"),
+    ] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let out = folder.path().join("out");
+        let path = out.to_str().expect("UTF-8");
+        let (status, message) =
+            bad(&[&["render", "models/leaf.dls", "--at", "1", "-o", path], flags].concat());
+        assert!(status == 2 && message.contains(says), "{flags:?}: {status}, {message}");
+        assert!(!out.exists(), "{flags:?}: nothing is written");
+    }
+}
