@@ -84,11 +84,20 @@ impl Agenda {
 
     /// The earliest time.
     pub fn earliest(&self) -> Option<f64> {
-        let first = match self.hole {
-            false => self.heap.get(..1)?,
-            true => self.heap.get(1..self.heap.len().min(ARITY + 1))?,
-        };
-        first.iter().map(|entry| entry.time()).reduce(f64::min)
+        self.first().map(|entry| entry.time())
+    }
+
+    /// The slot of which the earliest event is, unless it is many.
+    pub fn earliest_slot(&self) -> Option<u32> {
+        self.first().map(|entry| entry.slot).filter(|slot| slot & RUN == 0)
+    }
+
+    fn first(&self) -> Option<Entry> {
+        if !self.hole {
+            return self.heap.first().copied();
+        }
+        let children = self.heap.get(1..self.heap.len().min(ARITY + 1))?;
+        children.iter().copied().reduce(|a, b| if b.time() < a.time() { b } else { a })
     }
 
     /// Takes out everything of the earliest time.

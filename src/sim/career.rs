@@ -15,7 +15,7 @@ use crate::model::{Law, Model, Rule, Sign, Solve, Watch};
 use crate::structure::{Instant, NO_LABEL};
 
 /// A module with this label is not light, and that is known.
-pub const REFUSED: u32 = NO_LABEL - 1;
+pub const REFUSED: u16 = NO_LABEL - 1;
 /// Most careers of one rule; a model with more of them has conditions without number.
 const MAX_CAREERS: usize = 64;
 
@@ -78,7 +78,7 @@ pub struct Life {
 #[derive(Clone, Debug)]
 pub struct Forecast {
     pub values: SmallVec<[f64; 4]>,
-    pub label: u32,
+    pub label: u16,
     /// The time to the event, if there is one.
     pub tau: Option<f64>,
 }
@@ -87,7 +87,7 @@ pub struct Forecast {
 #[derive(Clone, Copy, Debug)]
 pub struct Child {
     /// Of its career; or [`REFUSED`]; or [`NO_LABEL`]: there is nothing to know, or it has a context.
-    pub label: u32,
+    pub label: u16,
     /// Of its event.
     pub time: Option<f64>,
     /// It is to be looked up.
@@ -120,7 +120,7 @@ pub fn same_bits(a: &[f64], b: &[f64]) -> bool {
 pub struct Careers {
     all: Vec<Career>,
     lives: Vec<Option<Box<Life>>>,
-    of_rule: Vec<Vec<u32>>,
+    of_rule: Vec<Vec<u16>>,
     /// By kind: the rule of those that can be light.
     rules: Vec<Option<usize>>,
     /// By rule: nothing in it depends on the time of birth.
@@ -161,20 +161,20 @@ impl Careers {
     }
 
     /// The career with a label, if it is one.
-    pub fn get(&self, label: u32) -> Option<&Career> {
+    pub fn get(&self, label: u16) -> Option<&Career> {
         self.all.get(label as usize)
     }
 
     /// The number of a career; None if there are too many of them.
-    pub fn intern(&mut self, career: Career) -> Option<u32> {
+    pub fn intern(&mut self, career: Career) -> Option<u16> {
         let known = &mut self.of_rule[career.rule];
         if let Some(&label) = known.iter().find(|label| self.all[**label as usize] == career) {
             return Some(label);
         }
-        if known.len() >= MAX_CAREERS {
+        if known.len() >= MAX_CAREERS || self.all.len() >= usize::from(REFUSED) {
             return None;
         }
-        let label = self.all.len() as u32;
+        let label = self.all.len() as u16;
         known.push(label);
         self.all.push(career);
         self.lives.push(None);
@@ -187,11 +187,11 @@ impl Careers {
     }
 
     /// The last life of a career, to be given back with [`Careers::keep`].
-    pub fn take_life(&mut self, label: u32) -> Box<Life> {
+    pub fn take_life(&mut self, label: u16) -> Box<Life> {
         self.lives[label as usize].take().unwrap_or_default()
     }
 
-    pub fn keep(&mut self, label: u32, life: Box<Life>) {
+    pub fn keep(&mut self, label: u16, life: Box<Life>) {
         self.lives[label as usize] = Some(life);
     }
 }
@@ -211,5 +211,7 @@ fn is_timeless(rule: &Rule) -> bool {
     };
     let solve_is_blind =
         |s: &Solve| blind(&s.rates) && s.laws.iter().all(law_is_blind) && s.watch.iter().all(watch_is_blind);
-    blind(&rule.sides) && rule.watch_at_rest.iter().all(watch_is_blind) && rule.solves.iter().all(solve_is_blind)
+    blind(&rule.sides)
+        && rule.watch_at_rest.iter().all(watch_is_blind)
+        && rule.solves.iter().all(solve_is_blind)
 }

@@ -72,7 +72,9 @@ impl Simulation<'_> {
         if time.is_some_and(|t| !t.is_finite()) {
             return refused;
         }
-        let Some(label) = self.plant.careers.intern(Career { rule, solve, signs, end }) else { return refused };
+        let Some(label) = self.plant.careers.intern(Career { rule, solve, signs, end }) else {
+            return refused;
+        };
         if let Some(tau) = lasting.filter(|_| timeless) {
             self.plant.careers.forecasts[rule] = Some(Forecast { values, label, tau });
         }
@@ -80,7 +82,7 @@ impl Simulation<'_> {
     }
 
     /// The life of a light module, taken out of its career; to be given back.
-    fn life(&mut self, id: ModuleId, label: u32) -> Box<Life> {
+    fn life(&mut self, id: ModuleId, label: u16) -> Box<Life> {
         let mut life = self.plant.careers.take_life(label);
         let tree = &self.plant.tree;
         let (birth, values) = (tree.birth(id), tree.parameters(id));
@@ -229,7 +231,7 @@ impl Simulation<'_> {
     }
 
     /// Finds out what follows from the end of a life now.
-    fn succeed(&mut self, life: &mut Life, label: u32, rule: usize, produce: usize) {
+    fn succeed(&mut self, life: &mut Life, label: u16, rule: usize, produce: usize) {
         let model = self.model;
         let compiled = &model.rules[rule];
         let clause = &compiled.produces[produce];
@@ -273,7 +275,7 @@ impl Simulation<'_> {
     }
 
     /// How far the instant is from the boundary: see [`Event::residual`]. By `self.variables`.
-    fn residual(&mut self, label: u32, rule: usize, produce: usize) -> f64 {
+    fn residual(&mut self, label: u16, rule: usize, produce: usize) -> f64 {
         let rule = &self.model.rules[rule];
         let career = self.plant.careers.get(label).expect("a light module");
         let mut sides: SmallVec<[f64; 16]> = smallvec::smallvec![0.0; rule.sides.outputs()];

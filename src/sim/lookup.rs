@@ -5,6 +5,7 @@
 
 use smallvec::SmallVec;
 
+use super::settle::clear;
 use super::simulation::Simulation;
 use super::state::{Signs, State};
 use super::watch::{TOUCH, opposite};
@@ -43,6 +44,7 @@ impl Simulation<'_> {
                 self.take_up(id, rule, &[]);
             }
         }
+        clear(&mut fresh);
         self.fresh = fresh;
         if std::mem::take(&mut self.lost) {
             self.neighbours.forget();

@@ -9,7 +9,7 @@ use super::career::Career;
 use super::error::Error;
 use super::motion::Riccati;
 use super::simulation::Simulation;
-use crate::expr::{LANES, Lanes};
+use crate::expr::{LANES, Lanes, Program};
 use crate::model::Law;
 use crate::structure::{Instant, ModuleId, ModuleString, Version, Visit};
 
@@ -38,7 +38,8 @@ impl Simulation<'_> {
     pub(super) fn observe(&mut self, t: f64, now: Instant, out: &mut ModuleString) -> Result<(), Error> {
         let mut gallery = std::mem::take(&mut self.gallery);
         let version = Version { source: self.source, structure: self.structure };
-        if gallery.version == Some(version) && out.version() == Some(version) {
+        let again = gallery.version == Some(version) && out.version() == Some(version);
+        if again {
             out.show(t, now);
         } else {
             self.hang(&mut gallery, t, now, out);
@@ -57,8 +58,9 @@ impl Simulation<'_> {
             }
         }
         for (label, rows) in gallery.columns.iter().enumerate().filter(|(_, rows)| !rows.is_empty()) {
-            let career = self.plant.careers.get(label as u32).expect("a light module's label");
-            let place = self.show_column(career, rows, now, &mut gallery.registers, out.parameters_mut());
+            let career = self.plant.careers.get(label as u16).expect("a light module's label");
+            let registers = &mut gallery.registers;
+            let place = self.show_column(career, rows, now, again, registers, out.parameters_mut());
             bad = bad.min(place);
         }
         self.gallery = gallery;
@@ -89,7 +91,7 @@ impl Simulation<'_> {
         });
         // What rests need not be looked at again.
         for (label, rows) in columns.iter_mut().enumerate() {
-            let career = plant.careers.get(label as u32).expect("as many as there are columns");
+            let career = plant.careers.get(label as u16).expect("as many as there are columns");
             let clause = career.solve.map(|solve| &self.model.rules[career.rule].solves[solve]);
             if clause.is_none_or(|clause| clause.of.is_empty()) {
                 rows.clear();
@@ -97,12 +99,13 @@ impl Simulation<'_> {
         }
     }
 
-    /// The second pass over the modules of a career. Returns the first place of a value that is not finite.
+    /// The second pass over the modules of a career; `again` if it has been over the same string before. Returns the first place of a value that is not finite.
     fn show_column(
         &self,
         career: &Career,
         rows: &[Row],
         now: Instant,
+        again: bool,
         registers: &mut Vec<Lanes>,
         out: &mut [f64],
     ) -> usize {
@@ -124,22 +127,13 @@ impl Simulation<'_> {
             registers[time + 1] = [0.0; LANES];
             for (law, &parameter) in clause.laws.iter().zip(&clause.of) {
                 let moved: Lanes = match law {
-                    Law::Polynomial(program) => {
-                        let mut c = [[0.0; LANES]; 4];
-                        for (power, register) in program.eval_lanes(registers).enumerate() {
-                            c[power] = registers_of(registers, register);
-                        }
-                        let starts = &registers[parameter];
-                        std::array::from_fn(|i| {
-                            let tau = tau[i];
-                            let c = [c[0][i], c[1][i] / 2.0, c[2][i] / 3.0, c[3][i] / 4.0];
-                            starts[i] + tau * (c[0] + tau * (c[1] + tau * (c[2] + tau * c[3])))
-                        })
-                    }
+                    // What is at rest is what it was in the frame before.
+                    Law::Polynomial(program) if again && is_zero(program) => continue,
+                    Law::Polynomial(program) => polynomial(program, registers, parameter, &tau),
                     Law::Quadratic(program) => {
                         let mut c = [[0.0; LANES]; 3];
                         for (power, register) in program.eval_lanes(registers).enumerate() {
-                            c[power] = registers_of(registers, register);
+                            c[power] = registers[register];
                         }
                         let mut moved = registers[parameter];
                         for (i, x) in moved.iter_mut().enumerate().take(rows.len()) {
@@ -179,6 +173,25 @@ impl Simulation<'_> {
     }
 }
 
-fn registers_of(registers: &[Lanes], register: usize) -> Lanes {
-    registers[register]
+/// True for a rate that is 0 at all times.
+fn is_zero(program: &Program) -> bool {
+    program.outputs() == 1 && program.constant_output(0) == Some(0.0)
+}
+
+/// A parameter with a polynomial rate at the time `tau` after birth, for each lane: as `Motion::value` has it.
+fn polynomial(program: &Program, registers: &mut Vec<Lanes>, parameter: usize, tau: &Lanes) -> Lanes {
+    let mut c = [[0.0; LANES]; 4];
+    for (power, register) in program.eval_lanes(registers).enumerate() {
+        c[power] = registers[register];
+    }
+    let starts = &registers[parameter];
+    if program.outputs() == 1 {
+        // What is added to the first coefficient is zero.
+        return std::array::from_fn(|i| starts[i] + tau[i] * (c[0][i] + tau[i] * 0.0));
+    }
+    std::array::from_fn(|i| {
+        let tau = tau[i];
+        let c = [c[0][i], c[1][i] / 2.0, c[2][i] / 3.0, c[3][i] / 4.0];
+        starts[i] + tau * (c[0] + tau * (c[1] + tau * (c[2] + tau * c[3])))
+    })
 }

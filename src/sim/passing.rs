@@ -88,7 +88,8 @@ impl Simulation<'_> {
             self.front.first = self.event_of(some);
         }
         if members.iter().any(|slot| self.event_of(*slot) != self.front.first) {
-            let mut all: Vec<(Instant, u32)> = members.iter().map(|slot| (self.event_of(*slot), *slot)).collect();
+            let mut all: Vec<(Instant, u32)> =
+                members.iter().map(|slot| (self.event_of(*slot), *slot)).collect();
             all.sort_unstable_by(|a, b| a.partial_cmp(b).unwrap_or(Ordering::Equal));
             members.clear();
             members.extend(all.iter().map(|(_, slot)| *slot));
@@ -162,6 +163,10 @@ impl Simulation<'_> {
             Coming::Light(_, slot) if self.only_the_front(at) => {
                 // All of the front, at one instant.
                 self.now = at;
+                // Who comes next is fetched from memory meanwhile.
+                if let Some(slot) = self.agenda.earliest_slot() {
+                    std::hint::black_box(self.plant.tree.birth(self.plant.tree.id(slot)));
+                }
                 self.show_coupled(at);
                 std::mem::swap(&mut self.firing_light, &mut self.front.members);
                 self.front.members.clear();

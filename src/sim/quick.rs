@@ -19,7 +19,10 @@ use crate::structure::{Instant, ModuleId};
 /// What a newborn module is going to do.
 pub(super) enum Outlook {
     /// It is replaced at once, by this production.
-    Over { produce: usize, signs: Signs },
+    Over {
+        produce: usize,
+        signs: Signs,
+    },
     Lives(Prospect),
 }
 

@@ -24,6 +24,9 @@ use crate::structure::ModuleId;
 /// Most rounds of productions at one instant.
 pub const MAX_ROUNDS: usize = 10_000;
 
+/// Lists that were longer are not kept for the next instant.
+const LONG: usize = 1 << 18;
+
 /// A production that applies.
 pub(super) struct Firing {
     pub id: ModuleId,
@@ -66,8 +69,8 @@ impl Simulation<'_> {
                 self.promote_all(&light, &mut firing);
                 self.replace(&firing, rounds)?;
             }
-            firing.clear();
-            light.clear();
+            clear(&mut firing);
+            clear(&mut light);
             (self.firing, self.firing_light) = (firing, light);
         }
         self.finish_transitions();
@@ -120,6 +123,11 @@ impl Simulation<'_> {
 
     /// The production of each open module whose condition holds at the instant.
     fn judge(&mut self) -> Vec<Firing> {
+        // A cascade of light modules may be most of the structure.
+        if self.opened.iter().all(|id| self.plant.is_light(*id)) {
+            self.firing_light.extend(self.opened.iter().map(|id| id.slot() as u32));
+            clear(&mut self.opened);
+        }
         let mut firing = std::mem::take(&mut self.firing);
         let plant = &self.plant;
         firing.extend(self.opened.iter().filter_map(|&id| {
@@ -257,6 +265,14 @@ impl Simulation<'_> {
             });
         }
         self.log = Some(log);
+    }
+}
+
+/// Empties a list, and gives back its memory if that is much.
+pub(super) fn clear<T>(list: &mut Vec<T>) {
+    list.clear();
+    if list.capacity() > LONG {
+        *list = Vec::new();
     }
 }
 

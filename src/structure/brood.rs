@@ -3,6 +3,8 @@
 //! A production makes several modules at once. Birth and line of descent are kept once for all of them, and given up
 //! when the last of them is gone.
 
+use std::collections::BTreeMap;
+
 use super::{Family, Instant, Lineage};
 
 /// No brood: brackets are of none.
@@ -27,14 +29,16 @@ pub(super) struct Broods {
     all: Vec<Brood>,
     /// Their numbers of generations. Beside the rest, so that neither leaves a gap.
     generations: Vec<u32>,
+    /// Where the places of a brood begin in the successor, for the further ones of a very long successor.
+    begins: BTreeMap<u32, u32>,
     free: Vec<u32>,
 }
 
 impl Broods {
-    /// A new brood, of nobody yet.
-    pub fn begin(&mut self, family: Family, birth: Instant) -> u32 {
+    /// A new brood, of nobody yet, whose modules stand at these places of the successor (brackets not counted).
+    pub fn begin(&mut self, family: Family, birth: Instant, first: u32) -> u32 {
         let brood = Brood { mixed: family.mixed, trail: family.trail & TRAIL, birth };
-        match self.free.pop() {
+        let number = match self.free.pop() {
             Some(number) => {
                 self.all[number as usize] = brood;
                 self.generations[number as usize] = family.generation;
@@ -45,12 +49,18 @@ impl Broods {
                 self.generations.push(family.generation);
                 self.all.len() as u32 - 1
             }
+        };
+        if first > 0 {
+            self.begins.insert(number, first);
         }
+        number
     }
 
-    /// Counts the modules of a new brood.
-    pub fn count(&mut self, number: u32, modules: usize) {
-        self.all[number as usize].trail += (modules as u64).min(UNCOUNTED) * ONE;
+    /// Counts the modules of a new brood, if it is one.
+    pub fn count(&mut self, number: u32, modules: u16) {
+        if let Some(brood) = self.all.get_mut(number as usize) {
+            brood.trail += u64::from(modules).min(UNCOUNTED) * ONE;
+        }
     }
 
     /// One module is gone.
@@ -61,6 +71,9 @@ impl Broods {
             1 => {
                 brood.trail -= ONE;
                 self.free.push(number);
+                if !self.begins.is_empty() {
+                    self.begins.remove(&number);
+                }
             }
             _ => brood.trail -= ONE,
         }
@@ -70,20 +83,24 @@ impl Broods {
         self.all[number as usize].birth
     }
 
-    pub fn lineage(&self, number: u32, place: u32) -> Lineage {
+    pub fn lineage(&self, number: u32, place: u16) -> Lineage {
         let Brood { mixed, trail, .. } = self.all[number as usize];
         let generation = self.generations[number as usize];
-        Family { mixed, generation, trail: trail & TRAIL }.child(place as usize)
+        let first = if self.begins.is_empty() { None } else { self.begins.get(&number) };
+        let place = *first.unwrap_or(&0) as usize + usize::from(place);
+        Family { mixed, generation, trail: trail & TRAIL }.child(place)
     }
 
     /// Becomes the same as another, but for what only matters to those who add to it.
     pub fn copy(&mut self, other: &Broods) {
         self.all.clone_from(&other.all);
         self.generations.clone_from(&other.generations);
+        self.begins.clone_from(&other.begins);
     }
 
     pub fn clear(&mut self) {
         self.all.clear();
         self.generations.clear();
+        self.begins.clear();
     }
 }

@@ -66,10 +66,12 @@ impl ModuleString {
         self.broods.clear();
     }
 
-    /// Empties the string, for modules of these broods at an instant.
-    pub(super) fn begin(&mut self, time: f64, now: Instant, broods: &Broods) {
+    /// Empties the string, for so many entries and parameters, of modules of these broods, at an instant.
+    pub(super) fn begin(&mut self, time: f64, now: Instant, broods: &Broods, extent: (usize, usize)) {
         self.reset(time);
         self.now = now;
+        self.entries.reserve(extent.0);
+        self.parameters.reserve(extent.1);
         self.broods.copy(broods);
     }
 
@@ -95,12 +97,10 @@ impl ModuleString {
     }
 
     /// Appends a module of a brood; returns the place of its first parameter.
-    pub(super) fn push_known(&mut self, kind: KindId, brood: u32, place: u32, parameters: &[f64]) -> usize {
+    pub(super) fn push_known(&mut self, kind: KindId, brood: u32, place: u16, parameters: &[f64]) -> usize {
         let first = self.parameters.len();
-        if !parameters.is_empty() {
-            self.parameters.extend_from_slice(parameters);
-        }
-        self.entries.push(Entry { kind, first: first as u32, brood, place });
+        self.parameters.extend(parameters);
+        self.entries.push(Entry { kind, first: first as u32, brood, place: u32::from(place) });
         first
     }
 
@@ -144,7 +144,7 @@ impl ModuleString {
             // Brackets are no modules, have no identity, and are of no age.
             (NO_BROOD, NO_BROOD) => (self.now, Lineage::of_axiom(0)),
             (NO_BROOD, stranger) => self.strangers[stranger as usize],
-            _ => (self.broods.birth(brood), self.broods.lineage(brood, place)),
+            _ => (self.broods.birth(brood), self.broods.lineage(brood, place as u16)),
         };
         let parameters = &self.parameters[first as usize..end];
         Module { kind, parameters, age: self.now.since(birth).max(0.0), lineage }

@@ -4,7 +4,7 @@
 //! production costs what it replaces, and string order is a walk. Slots are used again, and a
 //! [`ModuleId`] carries the generation of its slot, so that an old id never means a new module.
 //!
-//! A module is a record of 32 bytes and its parameters; its birth and lineage are kept with those of its siblings
+//! A module is a record of 28 bytes and its parameters; its birth and lineage are kept with those of its siblings
 //! (`brood`). At a million modules, what anything costs is the memory that it touches.
 
 use smallvec::SmallVec;
@@ -54,7 +54,7 @@ impl Link {
 }
 
 /// No module has this label.
-pub const NO_LABEL: u32 = u32::MAX;
+pub const NO_LABEL: u16 = u16::MAX;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Node {
@@ -66,10 +66,9 @@ pub(super) struct Node {
     pub after: Link,
     /// Where the parameters begin; of a branch, what its own axis begins with.
     pub first: u32,
-    pub label: u32,
     pub brood: u32,
-    /// In the successor, brackets not counted.
-    pub place: u32,
+    pub place: u16,
+    pub label: u16,
 }
 
 /// The modules alive, their order and their parameters.
@@ -118,6 +117,12 @@ impl Tree {
         self.modules == 0
     }
 
+    /// Number of modules and brackets, and of parameters at most.
+    pub(super) fn extent(&self) -> (usize, usize) {
+        let branches = self.nodes.len() - 1 - self.free.len() - self.modules;
+        (self.modules + 2 * branches, self.values.len())
+    }
+
     /// Slots that have ever been used; `ModuleId::slot` is below this.
     pub fn slots(&self) -> usize {
         self.nodes.len()
@@ -152,16 +157,16 @@ impl Tree {
     }
 
     /// A number that the owner of the tree has given to a module; [`NO_LABEL`] from birth on.
-    pub fn label(&self, id: ModuleId) -> u32 {
+    pub fn label(&self, id: ModuleId) -> u16 {
         self.node(id).label
     }
 
-    pub fn set_label(&mut self, id: ModuleId, label: u32) {
+    pub fn set_label(&mut self, id: ModuleId, label: u16) {
         self.nodes[id.slot()].label = label;
     }
 
     /// The label of a module that may be dead: then there is none.
-    pub fn label_if_alive(&self, id: ModuleId) -> Option<u32> {
+    pub fn label_if_alive(&self, id: ModuleId) -> Option<u16> {
         let node = &self.nodes[id.slot()];
         (node.generation == id.generation).then_some(node.label)
     }
@@ -185,17 +190,9 @@ impl Tree {
     }
 
     /// Puts a node into a slot. What is after it is not known yet.
-    fn allocate(&mut self, kind: KindId, before: Link, brood: u32, place: u32) -> u32 {
-        let mut node = Node {
-            kind,
-            generation: 0,
-            before,
-            after: before,
-            first: 0,
-            label: NO_LABEL,
-            brood,
-            place,
-        };
+    fn allocate(&mut self, kind: KindId, before: Link, brood: u32, place: u16) -> u32 {
+        let mut node =
+            Node { kind, generation: 0, before, after: before, first: 0, label: NO_LABEL, brood, place };
         let arity = self.arities[kind.index()] as usize;
         if arity > 0 {
             let known = self.free_values.get_mut(arity).and_then(Vec::pop);
@@ -289,7 +286,8 @@ impl Tree {
         // The branches that are open.
         let mut branches: SmallVec<[u32; 8]> = SmallVec::new();
         let (mut place, mut next) = (0, 0);
-        let mut brood = NO_BROOD;
+        // Of the present brood; a very long successor is several.
+        let (mut brood, mut members) = (NO_BROOD, 0);
         for &kind in &string.kinds {
             if kind == KindId::CLOSE {
                 let branch = branches.pop().expect("brackets match: the front end saw to it");
@@ -304,16 +302,20 @@ impl Tree {
                 before = Link::end_of(slot);
                 continue;
             }
-            if brood == NO_BROOD {
-                brood = self.broods.begin(family, birth);
+            if brood == NO_BROOD || members == u16::MAX {
+                self.broods.count(brood, members);
+                brood = self.broods.begin(family, birth, place);
+                members = 0;
             }
-            let slot = self.allocate(kind, before, brood, place);
+            let slot = self.allocate(kind, before, brood, members);
+            members += 1;
             self.link_forward(before, Link(slot));
             let id = self.id(slot);
             let places = self.places(id);
             if !places.is_empty() {
                 let count = places.len();
-                self.values[places].copy_from_slice(&arguments[next..next + count]);
+                let own = self.values[places].iter_mut();
+                own.zip(&arguments[next..next + count]).for_each(|(value, &x)| *value = x);
                 next += count;
             }
             place += 1;
@@ -321,9 +323,7 @@ impl Tree {
             self.modules += 1;
             made.push(id);
         }
-        if brood != NO_BROOD {
-            self.broods.count(brood, place as usize);
-        }
+        self.broods.count(brood, members);
         self.link_forward(before, after);
         if after.ended().is_none() {
             self.nodes[after.0 as usize].before = before;

@@ -25,9 +25,9 @@ impl Tree {
         time: f64,
         now: Instant,
         out: &mut ModuleString,
-        mut note: impl FnMut(ModuleId, u32, usize, usize),
+        mut note: impl FnMut(ModuleId, u16, usize, usize),
     ) {
-        out.begin(time, now, &self.broods);
+        out.begin(time, now, &self.broods, self.extent());
         let mut next = Link(self.nodes[TRUNK as usize].first);
         loop {
             match next.ended() {
