@@ -170,7 +170,8 @@ impl Rewriting {
             let replaced: Vec<Option<&str>> = (0..self.string.len())
                 .map(|i| {
                     let (c, birth) = self.string[i];
-                    let fits = |wanted: Option<char>, found: Option<char>| wanted.is_none() || wanted == found;
+                    let fits =
+                        |wanted: Option<char>, found: Option<char>| wanted.is_none() || wanted == found;
                     let rule = self.rules.iter().find(|(left, strict, right, _)| {
                         *strict == c && fits(*left, self.left(i)) && fits(*right, self.right(i))
                     })?;
@@ -205,7 +206,8 @@ fn rewriting(seed: u64) -> Rewriting {
     let mut rules = Vec::new();
     for _ in 0..9 {
         let strict = one(dice.pick(&kinds)).expect("a kind");
-        let context = |dice: &mut Dice| (dice.roll() < 0.6).then(|| one(dice.pick(&["A", "B", "D"]))).flatten();
+        let context =
+            |dice: &mut Dice| (dice.roll() < 0.6).then(|| one(dice.pick(&["A", "B", "D"]))).flatten();
         let (left, right) = (context(&mut dice), context(&mut dice));
         let length = (dice.roll() * 3.5) as usize;
         let successor: String = (0..length).map(|_| dice.pick(&parts)).collect();

@@ -91,7 +91,7 @@ impl Render<'_> {
         let stats = play(
             self.run,
             self.writing(&writer.fit),
-            self.threads,
+            self.threads_for(&writer.page),
             clock,
             None,
             work,
@@ -129,11 +129,19 @@ impl Render<'_> {
         };
         let mut assembly = writer.begin();
         let progress = bar("drawing", times.len());
-        let stats = play(self.run, self.writing(&fit), self.threads, clock, None, work, |(record, part)| {
-            manifest.frames.push(record);
-            progress.inc(1);
-            assembly.add(part).map_err(refuse)
-        })?;
+        let stats = play(
+            self.run,
+            self.writing(&fit),
+            self.threads_for(writer.page()),
+            clock,
+            None,
+            work,
+            |(record, part)| {
+                manifest.frames.push(record);
+                progress.inc(1);
+                assembly.add(part).map_err(refuse)
+            },
+        )?;
         let title = match &times[..] {
             [] => self.title().to_owned(),
             [only] => format!("{}, t = {only}", self.title()),
@@ -143,6 +151,15 @@ impl Render<'_> {
         directory.finish(&manifest).map_err(out_of_directory)?;
         progress.finish_and_clear();
         Ok(stats)
+    }
+
+    /// Threads that draw on pages of this size: of large ones not so many are in memory at once.
+    fn threads_for(&self, page: &Page) -> usize {
+        const PIXELS_AT_ONCE: u64 = 100_000_000;
+        let pixels = page.pixels.iter().map(|&side| u64::from(side)).product::<u64>();
+        let most =
+            if flags::format(self.args) == Format::Png { PIXELS_AT_ONCE / pixels.max(1) } else { u64::MAX };
+        self.threads.min(most.clamp(1, 256) as usize)
     }
 
     fn title(&self) -> &str {
