@@ -10,7 +10,7 @@ use super::career::{Career, Child, End, Forecast, Life, REFUSED, same_bits};
 use super::error::Error;
 use super::event::Event;
 use super::motion::Motion;
-use super::quick::{Outlook, Prospect};
+use super::quick::{First, Outlook, Prospect};
 use super::settle::Firing;
 use super::simulation::Simulation;
 use super::state::{Change, What};
@@ -55,7 +55,7 @@ impl Simulation<'_> {
         let refused = Child { label: REFUSED, time: None, open: true };
         let values = SmallVec::from_slice(&self.variables[..arity]);
         let Some(outlook) = self.outlook(&self.model.rules[rule]) else { return refused };
-        let Prospect { solve, signs, event, lasting, .. } = match outlook {
+        let Prospect { solve, signs, first: First { event, lasting }, .. } = match outlook {
             Outlook::Lives(prospect) => prospect,
             Outlook::Over { produce, signs } => {
                 let career = Career { rule, solve: None, signs, end: Some(End::AtBirth { produce }) };

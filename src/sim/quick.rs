@@ -16,7 +16,8 @@ use super::watch::{opposite, rate_at};
 use crate::model::{Law, Rule, Sign, Solve, Truth, Watch};
 use crate::structure::{Instant, ModuleId};
 
-/// What a newborn module is going to do.
+/// What a newborn module is going to do. It lives on the stack for a moment: a box would cost more than its size.
+#[allow(clippy::large_enum_variant)]
 pub(super) enum Outlook {
     /// It is replaced at once, by this production.
     Over {
@@ -30,7 +31,12 @@ pub(super) struct Prospect {
     pub solve: Option<usize>,
     pub signs: Signs,
     pub motions: SmallVec<[Motion; 2]>,
-    /// The event with the production that follows.
+    pub first: First,
+}
+
+/// The first event of a life.
+pub(super) struct First {
+    /// The event with the production that follows; None if there never is one.
     pub event: Option<(Change, usize)>,
     /// The time to the event, or none ever, if nothing else was in question: then it does not depend on when the
     /// module is born, unless the rule reads `t`.
@@ -58,7 +64,8 @@ impl Simulation<'_> {
         self.plant.variables(id, &[], self.now, &mut self.variables);
         let Some(Outlook::Lives(outlook)) = self.outlook(&self.model.rules[index]) else { return false };
         let who = Who::Module(id.slot() as u32);
-        match &outlook.event {
+        let event = outlook.first.event;
+        match &event {
             Some((change, _)) => self.queue.schedule(who, change.time),
             None => self.queue.cancel(who),
         }
@@ -69,8 +76,8 @@ impl Simulation<'_> {
         state.signs = outlook.signs;
         state.since = self.now;
         state.motions = outlook.motions;
-        state.next.what = if outlook.event.is_none() { What::Nothing } else { What::Event };
-        state.next.touched = outlook.event.into_iter().map(|(change, _)| change).collect();
+        state.next.what = if event.is_none() { What::Nothing } else { What::Event };
+        state.next.touched = event.into_iter().map(|(change, _)| change).collect();
         state.restarted = self.group;
         true
     }
@@ -93,14 +100,14 @@ impl Simulation<'_> {
             Some(s) => Some(&rule.solves[s]),
         };
         let motions = self.simple_motions(rule, active)?;
-        let (event, mut lasting) = self.first_crossing(rule, active, solve, &signs, &motions)?;
+        let mut first = self.first_crossing(rule, active, solve, &signs, &motions)?;
         for end in motions.iter().filter_map(Motion::end) {
-            if event.is_none_or(|(change, _)| change.time.since(self.now) >= end) {
+            if first.event.is_none_or(|(change, _)| change.time.since(self.now) >= end) {
                 return None;
             }
-            lasting = None;
+            first.lasting = None;
         }
-        Some(Outlook::Lives(Prospect { solve, signs, motions, event, lasting }))
+        Some(Outlook::Lives(Prospect { solve, signs, motions, first }))
     }
 
     /// The motions under a clause from `self.variables`, if they are such as are done here.
@@ -139,8 +146,7 @@ impl Simulation<'_> {
         (signs, clear)
     }
 
-    /// The sign that becomes zero first, with what follows, if that is a formula and a production follows from it; None
-    /// inside if none ever does. And the time to it as [`Prospect::lasting`] has it.
+    /// The sign that becomes zero first, with what follows, if that is a formula and a production follows from it.
     fn first_crossing(
         &mut self,
         rule: &Rule,
@@ -148,7 +154,7 @@ impl Simulation<'_> {
         solve: Option<usize>,
         signs: &Signs,
         motions: &[Motion],
-    ) -> Option<(Option<(Change, usize)>, Option<Option<f64>>)> {
+    ) -> Option<First> {
         let mut first: Option<Change> = None;
         let mut lasting = Some(None);
         for (atom, watch) in rule.watch(solve).iter().enumerate() {
@@ -179,11 +185,11 @@ impl Simulation<'_> {
                 *known = change;
             }
         }
-        let Some(change) = first else { return Some((None, lasting)) };
+        let Some(change) = first else { return Some(First { event: None, lasting }) };
         // Nothing may follow from it; then the search goes on, elsewhere.
         let at = |i: usize| if i == change.atom { Sign::Zero } else { signs[i] };
         let produce = rule.produces.iter().position(|p| p.guard.judge(at) == Truth::Yes)?;
-        Some((Some((change, produce)), lasting))
+        Some(First { event: Some((change, produce)), lasting })
     }
 
     /// When an atom's sides meet, of a module born at an instant, if that is a formula; and the parameter that meets a

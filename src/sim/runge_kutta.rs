@@ -201,12 +201,12 @@ impl Workspace {
                 sums[..count].fill(0.0);
                 weigh(row, &self.k, first, &mut sums[..count]);
             }
-            for lane in 0..count {
-                let j = first + lane;
+            let estimates = sums[0].iter().zip(&sums[1]).take(count);
+            for (j, (high, low)) in (first..).zip(estimates) {
                 let (a, b) = (y[j], self.end[j]);
                 let estimate = match tableau.e.len() {
-                    1 => (h * sums[0][lane]).abs(),
-                    _ => dop853_error(h * sums[0][lane], h * sums[1][lane]),
+                    1 => (h * high).abs(),
+                    _ => dop853_error(h * high, h * low),
                 };
                 // Relative to where the step begins, and to how far it goes from there at first: what
                 // grows from 1e-6 must be known to its own digits. Not to where it ends: beyond an
