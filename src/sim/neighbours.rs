@@ -7,6 +7,8 @@
 //!
 //! Whoever was looked at, matching or not, knows who looked: when it dies, those look again, and nobody else.
 
+use std::collections::HashMap;
+
 use smallvec::SmallVec;
 
 use super::simulation::Simulation;
@@ -41,6 +43,8 @@ struct Near {
 #[derive(Clone, Debug, Default)]
 pub struct Neighbours {
     near: Vec<Near>,
+    /// What stands left of what stood right of a module that has died at this instant.
+    forwards: HashMap<ModuleId, Link>,
     lookers: Vec<SmallVec<[ModuleId; 4]>>,
 }
 
@@ -59,7 +63,10 @@ impl Neighbours {
 
     /// The left neighbour, as [`Tree::left`] finds it.
     pub fn left(&mut self, tree: &Tree, id: ModuleId, skipped: impl Fn(KindId) -> bool) -> Option<ModuleId> {
-        match self.near(id).left {
+        let known = self.near(id).left;
+        let left = self.forwarded(tree, known);
+        self.near(id).left = left;
+        match left {
             Link::End => None,
             Link::Module(found) if tree.is_alive(found) => Some(found),
             _ => {
@@ -67,6 +74,32 @@ impl Neighbours {
                 self.near(id).left = found.into();
                 found
             }
+        }
+    }
+
+    /// A left neighbour, or what has taken its place at this instant. The way there is made short for the next who asks:
+    /// a million branches may ask one after another.
+    fn forwarded(&mut self, tree: &Tree, known: Link) -> Link {
+        let mut way: SmallVec<[ModuleId; 8]> = SmallVec::new();
+        let mut link = known;
+        while let Link::Module(id) = link
+            && !tree.is_alive(id)
+            && let Some(&next) = self.forwards.get(&id)
+        {
+            way.push(id);
+            link = next;
+        }
+        for id in way {
+            self.forwards.insert(id, link);
+        }
+        link
+    }
+
+    /// Says that everybody has looked who had to look at this instant.
+    pub fn end_instant(&mut self) {
+        // One large instant is no reason to sweep a large table at every small one.
+        if !self.forwards.is_empty() {
+            self.forwards = HashMap::new();
         }
     }
 
@@ -117,6 +150,7 @@ impl Neighbours {
     /// Forgets all neighbours.
     pub fn forget(&mut self) {
         self.near.clear();
+        self.end_instant();
     }
 
     /// Hands the neighbours of a module on to what has taken its place: `made` are the modules of a string of `kinds`.
@@ -165,6 +199,7 @@ impl Neighbours {
             self.near(last).right = right;
         }
         let Some(dead) = dead else { return };
+        self.forwards.insert(dead, before);
         if let Link::Module(id) = right
             && self.near(id).left == Link::Module(dead)
         {

@@ -73,6 +73,7 @@ impl Simulation<'_> {
             clear(&mut light);
             (self.firing, self.firing_light) = (firing, light);
         }
+        self.neighbours.end_instant();
         self.finish_transitions();
         self.begin_phases()
     }
