@@ -103,7 +103,7 @@ pub struct CheckArgs {
     #[arg(long, value_name = "T", value_parser = time, requires = "continuity")]
     pub to: Option<f64>,
     /// With --continuity: relative jumps up to this are none (of angles: in radians)
-    #[arg(long, value_name = "TOL", default_value = "1e-6", value_parser = tolerance, requires = "continuity")]
+    #[arg(long, value_name = "TOL", allow_negative_numbers = true, default_value = "1e-6", value_parser = tolerance, requires = "continuity")]
     pub tolerance: f64,
     /// With --continuity: exit with status 1 if a production makes a jump of this order or lower. Without this flag
     /// a jump is a finding, not a fault
@@ -166,7 +166,7 @@ pub struct RenderArgs {
     #[arg(long)]
     pub no_captions: bool,
     /// With --layout stack: from one line to the next, in scene units [default: the height of the highest]
-    #[arg(long, value_name = "H", value_parser = positive)]
+    #[arg(long, value_name = "H", allow_negative_numbers = true, value_parser = positive)]
     pub row_height: Option<f64>,
     /// From where to look: front, side, top, or AZIMUTH,ELEVATION in degrees
     #[arg(long, default_value = "front", allow_hyphen_values = true)]
@@ -233,16 +233,16 @@ pub struct ReportArgs {
     #[arg(long, value_name = "H1,H2,…", value_delimiter = ',', value_parser = positive, conflicts_with = "hard")]
     pub step_sizes: Option<Vec<f64>>,
     /// Times at which to compare [default: the model's `frames`, at most 50 of them]
-    #[arg(long, value_name = "T1,T2,…", value_delimiter = ',', value_parser = time, conflicts_with_all = ["from", "to", "step", "hard"])]
+    #[arg(long, value_name = "T1,T2,…", allow_negative_numbers = true, value_delimiter = ',', value_parser = time, conflicts_with_all = ["from", "to", "step", "hard"])]
     pub at: Option<Vec<f64>>,
     /// First of equidistant times at which to compare
-    #[arg(long, value_name = "A", value_parser = time, requires = "to", requires = "step", conflicts_with = "hard")]
+    #[arg(long, value_name = "A", allow_negative_numbers = true, value_parser = time, requires = "to", requires = "step", conflicts_with = "hard")]
     pub from: Option<f64>,
     /// Last of them
-    #[arg(long, value_name = "B", value_parser = time, requires = "from")]
+    #[arg(long, value_name = "B", allow_negative_numbers = true, value_parser = time, requires = "from")]
     pub to: Option<f64>,
     /// Time between them
-    #[arg(long, value_name = "S", value_parser = positive, requires = "from")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive, requires = "from")]
     pub step: Option<f64>,
     /// Set a `param` of every model; can be repeated
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting, conflicts_with = "hard")]
@@ -251,7 +251,7 @@ pub struct ReportArgs {
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = runs)]
     pub runs: usize,
     /// Seconds that a run may take; a point that would take longer, judged from the one before, is left out
-    #[arg(long, value_name = "S", default_value = "10", value_parser = positive)]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, default_value = "10", value_parser = positive)]
     pub time_limit: f64,
     /// More modules than this are an error
     #[arg(long, value_name = "N", default_value_t = 10_000_000)]
@@ -271,34 +271,34 @@ pub struct SharedArgs {
     /// Model file (*.dls)
     pub model: PathBuf,
     /// Times to observe
-    #[arg(long, value_name = "T1,T2,…", value_delimiter = ',', value_parser = time, conflicts_with_all = ["from", "to", "step"])]
+    #[arg(long, value_name = "T1,T2,…", allow_negative_numbers = true, value_delimiter = ',', value_parser = time, conflicts_with_all = ["from", "to", "step"])]
     pub at: Option<Vec<f64>>,
     /// First of equidistant times to observe [default: the model's `frames`]
-    #[arg(long, value_name = "A", value_parser = time, requires = "to", requires = "step")]
+    #[arg(long, value_name = "A", allow_negative_numbers = true, value_parser = time, requires = "to", requires = "step")]
     pub from: Option<f64>,
     /// Last of them
-    #[arg(long, value_name = "B", value_parser = time, requires = "from")]
+    #[arg(long, value_name = "B", allow_negative_numbers = true, value_parser = time, requires = "from")]
     pub to: Option<f64>,
     /// Time between them
-    #[arg(long, value_name = "S", value_parser = positive, requires = "from")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive, requires = "from")]
     pub step: Option<f64>,
     /// Set a `param` of the model; can be repeated
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     pub settings: Vec<Setting>,
     /// Error aimed at in every parameter, relative to max(1, |value|)
-    #[arg(long, value_name = "TOL", default_value = "1e-6", value_parser = tolerance)]
+    #[arg(long, value_name = "TOL", allow_negative_numbers = true, default_value = "1e-6", value_parser = tolerance)]
     pub tolerance: f64,
     /// How equations are integrated: auto, dopri5, dop853, radau, rk4, euler; all but auto integrate what has formulas, too
     #[arg(long, default_value = "auto", value_parser = method)]
     pub method: Method,
     /// Step of the methods with a fixed one (rk4, euler)
-    #[arg(long, value_name = "H", value_parser = positive)]
+    #[arg(long, value_name = "H", allow_negative_numbers = true, value_parser = positive)]
     pub step_size: Option<f64>,
     /// How time is advanced for modules that read their neighbours
     #[arg(long, value_enum, default_value_t = Scheduler::Auto)]
     pub scheduler: Scheduler,
     /// Length of the slices of time of the scheduler `local`; its error is of that order
-    #[arg(long, value_name = "DT", value_parser = positive)]
+    #[arg(long, value_name = "DT", allow_negative_numbers = true, value_parser = positive)]
     pub slice: Option<f64>,
     /// Seed of random numbers, for models that draw them (none does yet)
     #[arg(long, value_name = "N", default_value_t = 0)]

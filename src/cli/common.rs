@@ -100,6 +100,27 @@ struct StatsFile {
     counts: Stats,
 }
 
+/// Most slices of time of the scheduler `local`, like the most frames.
+const MAX_SLICES: f64 = 1e7;
+
+/// Refuses to write over the model, or two things into one file.
+fn spare_files(args: &SharedArgs) -> Result<(), Failure> {
+    let there = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let named =
+        [("model", Some(&args.model)), ("--events", args.events.as_ref()), ("--stats", args.stats.as_ref())];
+    for (i, (_, second)) in named.iter().enumerate() {
+        let Some(second) = second else { continue };
+        for (what, first) in &named[..i] {
+            if first.is_some_and(|first| there(first) == there(second)) {
+                let (name, path) = (named[i].0, second.display());
+                let of = if *what == "model" { "the model itself" } else { "the file of `--events`" };
+                return Err(Failure::Usage(format!("error: `{name} {path}` would be written over {of}\n")));
+            }
+        }
+    }
+    Ok(())
+}
+
 /// The scheduler that the flags say.
 fn scheduler(args: &SharedArgs) -> Result<sim::Scheduler, Failure> {
     let usage = |message: &str| Err(Failure::Usage(format!("error: {message}\n")));
@@ -126,8 +147,17 @@ impl Run {
             ));
         }
         let scheduler = scheduler(args)?;
+        spare_files(args)?;
         let session = open(&args.model, &args.settings)?;
         let times = times(args, &session)?;
+        if let (sim::Scheduler::Local { slice }, Some(end)) = (scheduler, times.last())
+            && end / slice > MAX_SLICES
+        {
+            return Err(Failure::Usage(format!(
+                "error: {slice} is too short a slice: it takes {:.1e} of them up to t = {end}, and {MAX_SLICES:e} are the most\n",
+                end / slice
+            )));
+        }
         let defaults = Settings::default();
         let settings = Settings {
             method: args.method,

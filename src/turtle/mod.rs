@@ -72,7 +72,7 @@ pub enum Error {
         "`{name}` (module {lineage}) uses patch {patch}, which is not begun; `@PS({patch})` comes before its points"
     )]
     PatchNotBegun { name: String, lineage: Lineage, patch: i64 },
-    #[error("`{name}` (module {lineage}) sets row {row}, column {column} of a patch; both go from 0 to 3")]
+    #[error("`{name}` (module {lineage}) sets row {row}, column {column} of a patch; both are 0, 1, 2 or 3")]
     NoControlPoint { name: String, lineage: Lineage, row: f64, column: f64 },
     #[error(
         "`{name}` (module {lineage}) draws patch {patch}, which has no control point at (row, column) {missing}"

@@ -34,8 +34,8 @@ impl OpenPatches {
         point: Point,
         complain: Complain,
     ) -> Result<(), Error> {
-        let (row, column) = (row.round(), column.round());
-        let place = |x: f64| (0.0..=3.0).contains(&x);
+        // What was computed may be a rounding away from what was meant, but no more.
+        let place = |x: f64| (x - x.round()).abs() < 1e-9 && (0.0..=3.0).contains(&x.round());
         if !place(row) || !place(column) {
             return Err(complain(&|name, lineage| Error::NoControlPoint { name, lineage, row, column }));
         }
@@ -43,7 +43,7 @@ impl OpenPatches {
         let Some(points) = self.0.get_mut(&patch) else {
             return Err(complain(&|name, lineage| Error::PatchNotBegun { name, lineage, patch }));
         };
-        points[row as usize * 4 + column as usize] = Some(point);
+        points[row.round() as usize * 4 + column.round() as usize] = Some(point);
         Ok(())
     }
 

@@ -243,4 +243,10 @@ fn the_gallery_is_what_its_document_says() {
     }
     let (status, message) = crate::cli::bad(&["gallery", "--figure", "8", "-o", out]);
     assert!(status == 2 && message.contains("no figure 8"), "{message}");
+    // A model that has been worked on since is nobody's to overwrite.
+    let own = folder.path().join("models/leaf.dls");
+    std::fs::write(&own, "# mine").expect("written");
+    let (status, message) = crate::cli::bad(&["gallery", "--figure", "9", "-o", out]);
+    assert!(status == 2 && message.contains("leaf.dls is not of an earlier gallery"), "{message}");
+    assert_eq!(std::fs::read_to_string(&own).expect("there"), "# mine");
 }

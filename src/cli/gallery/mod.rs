@@ -45,6 +45,7 @@ pub fn gallery(args: &GalleryArgs) -> Result<(), Failure> {
 
 fn draw(wanted: &[&Picture], out: &Path, args: &GalleryArgs) -> Result<(), Failure> {
     let folder = out.join("models");
+    spare(out, &folder)?;
     make(&folder)?;
     for (name, text) in models() {
         write(&folder.join(name), text)?;
@@ -60,6 +61,26 @@ fn draw(wanted: &[&Picture], out: &Path, args: &GalleryArgs) -> Result<(), Failu
     let index = out.join("index.html");
     write(&index, &page::page(&drawn))?;
     say(&format!("all        {}\n", index.display()))
+}
+
+/// Refuses to write over files that no gallery has written.
+fn spare(out: &Path, folder: &Path) -> Result<(), Failure> {
+    let foreign = |path: &Path, ours: &dyn Fn(&str) -> bool| match std::fs::read(path) {
+        Ok(bytes) => !std::str::from_utf8(&bytes).is_ok_and(ours),
+        Err(error) => error.kind() != std::io::ErrorKind::NotFound,
+    };
+    let index = out.join("index.html");
+    let models = models();
+    let models = models.iter().map(|(name, text)| (folder.join(name), *text));
+    let changed = models.filter(|(path, text)| foreign(path, &|found| found == *text)).map(|(path, _)| path);
+    let page = Some(index).filter(|index| foreign(index, &|found| found.contains(page::MARK)));
+    match changed.chain(page).next() {
+        Some(path) => Err(Failure::Usage(format!(
+            "error: {} is not of an earlier gallery and is not overwritten; choose another directory\n",
+            path.display()
+        ))),
+        None => Ok(()),
+    }
 }
 
 /// What the command line makes of a picture's line.

@@ -4,10 +4,14 @@ use std::fmt::Write;
 
 use super::figures::Picture;
 
+/// What every such page contains, and few others.
+pub const MARK: &str = "<title>dlsys gallery</title>";
+
 /// The text of `index.html`: pictures, with their files, in the order given.
 pub fn page(drawn: &[(&Picture, String)]) -> String {
-    let mut out = String::from(
-        "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n<title>dlsys gallery</title>\n<style>\n\
+    let mut out = format!("<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n{MARK}\n<style>\n");
+    out.push_str(
+        "\
          body { font: 15px/1.5 sans-serif; margin: 2em auto; max-width: 75em; padding: 0 1em; background: #fbfaf5; }\n\
          figure { margin: 0 0 3em; }\n\
          img { display: block; max-width: 100%; max-height: 45em; }\n\
