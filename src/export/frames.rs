@@ -109,15 +109,35 @@ impl FrameDirectory {
     /// # Errors
     /// If `name` is not a plain file name, or the file cannot be written.
     pub fn write(&mut self, name: &str, bytes: &[u8]) -> Result<(), Error> {
+        self.check(name)?;
+        let staged = self.staging().write(|file| file.write_all(bytes))?;
+        self.put(name, staged)
+    }
+
+    /// Where files are written before they have a name.
+    pub fn staging(&self) -> Staging {
+        Staging { path: self.path.clone() }
+    }
+
+    fn check(&self, name: &str) -> Result<(), Error> {
         if !is_plain(name) || name == MANIFEST {
             return Err(Error::Name(name.to_owned()));
         }
         if self.foreign.contains(name) {
             return Err(Error::Taken(self.path.join(name)));
         }
+        Ok(())
+    }
+
+    /// Gives a file that was written aside its name.
+    ///
+    /// # Errors
+    /// If `name` is not a plain file name, or the file cannot be renamed.
+    pub fn put(&mut self, name: &str, staged: Staged) -> Result<(), Error> {
+        self.check(name)?;
         let journal = self.path.join(JOURNAL);
         self.journal.write_all(format!("{name}\n").as_bytes()).map_err(io_error("write", &journal))?;
-        replace(&self.path, name, bytes)?;
+        staged.persist(&self.path.join(name))?;
         self.written.push(name.to_owned());
         Ok(())
     }
@@ -148,9 +168,45 @@ impl FrameDirectory {
     }
 }
 
+/// The place in a directory where files are written aside, on any thread.
+#[derive(Clone, Debug)]
+pub struct Staging {
+    path: PathBuf,
+}
+
+impl Staging {
+    /// Writes a file aside.
+    ///
+    /// # Errors
+    /// If it cannot be made, and those of `fill`.
+    pub fn write(&self, fill: impl FnOnce(&mut fs::File) -> io::Result<()>) -> Result<Staged, Error> {
+        let mut file = aside(&self.path)?;
+        fill(file.as_file_mut()).map_err(io_error("write to", &self.path))?;
+        Ok(Staged(file))
+    }
+}
+
+/// A file that was written aside; gone when it is dropped.
+#[derive(Debug)]
+pub struct Staged(tempfile::NamedTempFile);
+
+impl Staged {
+    fn persist(self, target: &Path) -> Result<(), Error> {
+        self.0.persist(target).map_err(|error| io_error("write", target)(error.error))?;
+        Ok(())
+    }
+}
+
 /// Writes a file aside and renames it.
 pub fn replace(directory: &Path, name: &str, bytes: &[u8]) -> Result<(), Error> {
     let target = directory.join(name);
+    let mut file = aside(directory)?;
+    file.write_all(bytes).map_err(io_error("write", &target))?;
+    Staged(file).persist(&target)
+}
+
+/// A new file with a temporary name.
+fn aside(directory: &Path) -> Result<tempfile::NamedTempFile, Error> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(TEMPORARY);
     // As any other file: what the user's mask leaves of this.
@@ -159,10 +215,7 @@ pub fn replace(directory: &Path, name: &str, bytes: &[u8]) -> Result<(), Error> 
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(fs::Permissions::from_mode(0o666))
     };
-    let mut file = builder.tempfile_in(directory).map_err(io_error("write to", directory))?;
-    file.write_all(bytes).map_err(io_error("write", &target))?;
-    file.persist(&target).map_err(|error| io_error("write", &target)(error.error))?;
-    Ok(())
+    builder.tempfile_in(directory).map_err(io_error("write to", directory))
 }
 
 /// Names of everything in a directory. Names that are not Unicode are shown as far as they are.

@@ -5,7 +5,7 @@
 //!
 //! ```text
 //! every scene ──▶ Survey ──fit──▶ Fit
-//! every scene ──▶ FrameWriter(Fit) ──bytes──▶ FrameDirectory
+//! every scene ──▶ FrameWriter(Fit) ──bytes──▶ Staging ──file──▶ FrameDirectory
 //! ```
 //!
 //! or, where all frames go on one [`Sheet`],
@@ -14,7 +14,7 @@
 //! every scene ──▶ SheetWriter(Fit, Sheet) ──part──▶ Assembly ──bytes──▶ FrameDirectory
 //! ```
 //!
-//! Nothing but [`FrameDirectory`] touches the file system.
+//! Nothing but [`FrameDirectory`] and its [`Staging`] touches the file system.
 
 mod camera;
 mod extent;
@@ -31,22 +31,27 @@ mod page;
 mod painter;
 mod png;
 mod raster;
+mod relay;
 mod sheet;
 mod stroke;
 mod svg;
+mod text;
+mod triangles;
 mod triangulate;
 mod tube;
 mod view;
 
 pub use camera::Camera;
 pub use fit::{Fit, Picture, Survey};
-pub use frames::{Error, FrameDirectory, MANIFEST, replace};
+pub use frames::{Error, FrameDirectory, MANIFEST, Staged, Staging, replace};
 pub use layout::{Layout, Sheet, Spacing};
 pub use light::Light;
 pub use manifest::{FrameRecord, Manifest};
 pub use page::{Page, Size, TooLarge};
 pub use sheet::{Assembly, Part, SheetError, SheetWriter};
 pub use view::{View, ViewError};
+
+use std::io::{self, Write};
 
 use crate::scene::Scene;
 
@@ -102,6 +107,8 @@ pub struct FrameWriter {
     pub page: Page,
     /// Sides of the tubes that stems are made of (OBJ only); 0 for as many as the accuracy takes, and 8 at least.
     pub sides: usize,
+    /// Threads that make the file of one frame (OBJ only), at least 1. The bytes do not depend on it.
+    pub threads: usize,
 }
 
 impl FrameWriter {
@@ -109,16 +116,27 @@ impl FrameWriter {
     /// accuracy asks.
     pub fn new(format: Format, fit: Fit) -> FrameWriter {
         let page = Page::usual(fit.picture);
-        FrameWriter { format, fit, page, sides: 0 }
+        FrameWriter { format, fit, page, sides: 0, threads: 1 }
     }
 
     /// The file of a frame. `title` is for people: what it shows, and at which time.
     pub fn write(&self, scene: &Scene, title: &str) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        // Memory takes whatever is written to it.
+        let _ = self.write_to(scene, title, &mut bytes);
+        bytes
+    }
+
+    /// Writes the file of a frame, a mesh in large parts as soon as they are made.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn write_to(&self, scene: &Scene, title: &str, out: &mut (dyn Write + Send)) -> io::Result<()> {
         let scene = &*scene.tessellated(self.fit.accuracy);
         match self.format {
-            Format::Svg => svg::document(scene, &self.fit, &self.page, title).into_bytes(),
-            Format::Png => png::document(scene, &self.fit, &self.page, title),
-            Format::Obj => obj::document(scene, &self.fit, self.sides, title),
+            Format::Svg => out.write_all(svg::document(scene, &self.fit, &self.page, title).as_bytes()),
+            Format::Png => out.write_all(&png::document(scene, &self.fit, &self.page, title)),
+            Format::Obj => obj::write(scene, &self.fit, self.sides, title, self.threads, out),
         }
     }
 

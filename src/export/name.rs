@@ -1,36 +1,65 @@
 //! Names of modules in files: the same from frame to frame, and unique within one.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::fmt::Write;
+use std::sync::Arc;
 
-use crate::scene::{OwnerId, Scene};
+use crate::scene::{Owner, OwnerId, Scene};
 
 /// The names of the modules of a scene, `KIND` + separator + `LINEAGE`: by what a module is called, and by
 /// who it is ([`Lineage::name`](crate::structure::Lineage::name)). They consist of ASCII letters, digits,
 /// `_`, `-` and the separator and begin with a letter or `_`, so that they are good as XML ids and as OBJ
 /// group names.
-pub(super) struct Names(Vec<String>);
+pub(super) struct Names<'s> {
+    owners: &'s [Owner],
+    separator: char,
+    kinds: HashMap<&'s str, String>,
+    /// The names of those that share a lineage: unique by construction, save for a hash that meets another.
+    shared: HashMap<usize, String>,
+}
 
-impl Names {
-    pub(super) fn new(scene: &Scene, separator: char) -> Names {
+impl<'s> Names<'s> {
+    pub(super) fn new(scene: &'s Scene, separator: char) -> Names<'s> {
+        let owners = scene.owners();
         let mut kinds: HashMap<&str, String> = HashMap::new();
-        let mut seen: HashMap<String, usize> = HashMap::with_capacity(scene.owners().len());
-        let names = scene.owners().iter().map(|owner| {
-            let kind = kinds.entry(&owner.name).or_insert_with(|| plain(&owner.name));
-            let mut name = format!("{kind}{separator}{}", owner.lineage.name());
-            // Lineages are unique by construction, save for a hash that meets another.
-            let count = seen.entry(name.clone()).or_insert(0);
-            *count += 1;
-            if *count > 1 {
-                let _ = write!(name, "-{count}");
+        for (i, owner) in owners.iter().enumerate() {
+            if i == 0 || !Arc::ptr_eq(&owner.name, &owners[i - 1].name) {
+                kinds.entry(&owner.name).or_insert_with(|| plain(&owner.name));
             }
-            name
-        });
-        Names(names.collect())
+        }
+        let mut names = Names { owners, separator, kinds, shared: HashMap::new() };
+        let mut ids: Vec<u64> = owners.iter().map(|owner| owner.lineage.id).collect();
+        ids.sort_unstable();
+        if ids.windows(2).any(|pair| pair[0] == pair[1]) {
+            let twice: HashSet<u64> =
+                ids.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]).collect();
+            let mut seen: HashMap<String, usize> = HashMap::new();
+            for (i, _) in owners.iter().enumerate().filter(|(_, o)| twice.contains(&o.lineage.id)) {
+                let mut name = names.usual(i);
+                let count = seen.entry(name.clone()).or_insert(0);
+                *count += 1;
+                if *count > 1 {
+                    let _ = write!(name, "-{count}");
+                }
+                names.shared.insert(i, name);
+            }
+        }
+        names
     }
 
-    pub(super) fn get(&self, id: OwnerId) -> &str {
-        &self.0[id.index()]
+    pub(super) fn get(&self, id: OwnerId) -> String {
+        let shared = if self.shared.is_empty() { None } else { self.shared.get(&id.index()) };
+        shared.cloned().unwrap_or_else(|| self.usual(id.index()))
+    }
+
+    fn usual(&self, owner: usize) -> String {
+        let owner = &self.owners[owner];
+        let kind = self.kinds.get(&*owner.name).map_or("", String::as_str);
+        let mut name = String::with_capacity(kind.len() + 16);
+        name.push_str(kind);
+        name.push(self.separator);
+        name.push_str(&owner.lineage.name());
+        name
     }
 }
 

@@ -2,211 +2,212 @@
 //!
 //! A module's group is named `KIND.LINEAGE`, the same in every frame. Segments that share a ring of a tube
 //! share its vertices across their groups, so a tube is one closed mesh.
+//!
+//! The mesh is never in memory: parts of the text are made on several threads and go to the file at once.
+
+use std::io::{self, Write};
+use std::ops::Range;
 
 use super::name::Names;
-use super::number::Line;
-use super::{Fit, GENERATOR, number, triangulate, tube};
+use super::text::{Corner, Text};
+use super::triangles::{Faces, Points, Ring, Solid};
+use super::{Fit, GENERATOR, number, relay};
 use crate::scene::{MaterialId, OwnerId, Palette, Point, Scene, Vector};
 
 /// Name of the material library that all frames refer to.
 pub(super) const MATERIALS: &str = "materials.mtl";
 /// Decimals of a normal.
 const NORMAL_DECIMALS: usize = 4;
+/// Points of a part of the text, about: some hundred kilobytes, which stay in a cache.
+const PART: usize = 6000;
 
-/// A triangle: vertex and normal at each corner, by number.
-pub(super) struct Triangle {
-    owner: OwnerId,
-    pub(super) material: MaterialId,
-    pub(super) corners: [(u32, u32); 3],
+/// A part of the text; items by number, of faces in the order of owners.
+enum Part {
+    Vertices(Range<usize>),
+    Normals(Range<usize>),
+    Faces(Range<usize>),
 }
 
-/// A growing triangle mesh.
-#[derive(Default)]
-pub(super) struct Triangles {
-    pub(super) vertices: Vec<Point>,
-    pub(super) normals: Vec<Vector>,
-    pub(super) faces: Vec<Triangle>,
-}
-
-impl Triangles {
-    pub(super) fn add_vertex(&mut self, p: Point) -> u32 {
-        self.vertices.push(p);
-        (self.vertices.len() - 1) as u32
-    }
-
-    pub(super) fn add_normal(&mut self, n: Vector) -> u32 {
-        self.normals.push(n);
-        (self.normals.len() - 1) as u32
-    }
-
-    /// Corners counter-clockwise, seen from outside.
-    pub(super) fn add_face(&mut self, owner: OwnerId, material: MaterialId, corners: [(u32, u32); 3]) {
-        self.faces.push(Triangle { owner, material, corners });
-    }
-}
-
-/// Everything in a scene as triangles, in string order; stems as tubes with so many sides.
-pub(super) fn triangles(scene: &Scene, fit: &Fit, sides: usize) -> Triangles {
-    let mut mesh = unordered(scene, fit, sides);
-    // Stable, so that triangles stay in the order in which they were made.
-    mesh.faces.sort_by_key(|face| (face.owner, face.material));
-    mesh
-}
-
-/// Everything in a scene as triangles. Tubes have so many sides; 0: as many as it takes.
-fn unordered(scene: &Scene, fit: &Fit, sides: usize) -> Triangles {
-    let mut mesh = Triangles::default();
-    // What tubes of eight sides take, half of them with domes.
-    mesh.vertices.reserve(24 * scene.segments.len());
-    mesh.normals.reserve(24 * scene.segments.len());
-    mesh.faces.reserve(48 * scene.segments.len());
-    match sides {
-        0 => tube::add_round_tubes(scene, fit.default_width, fit.accuracy, &mut mesh),
-        _ => tube::add_tubes(scene, fit.default_width, sides.max(3), &mut mesh),
-    }
-    add_polygons(scene, &mut mesh);
-    add_surfaces(scene, &mut mesh);
-    mesh
-}
-
-/// The document of one frame. Tubes have so many sides; 0: as many as it takes.
-pub(super) fn document(scene: &Scene, fit: &Fit, sides: usize, title: &str) -> Vec<u8> {
-    let mesh = unordered(scene, fit, sides);
-    let title: String = title.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
-    let head = format!(
-        "# {GENERATOR}\n# {title}\n# Up axis: +Y; front: +Z. Units: those of the model.\nmtllib {MATERIALS}\n"
-    );
-    let mut out = head.into_bytes();
-    out.reserve(32 * (mesh.vertices.len() + mesh.normals.len()) + 44 * mesh.faces.len());
-    let decimals = number::decimals_for(fit.extent);
-    // Halves side by side: a large mesh is mostly the writing of its numbers.
-    let (faces, points) = std::thread::scope(|scope| {
-        let (mesh, scene) = (&mesh, scene);
-        let faces = scope.spawn(move || faces(mesh, scene));
-        for p in &mesh.vertices {
-            push_triple(&mut out, "v", &p.coords, decimals);
-        }
-        for n in &mesh.normals {
-            push_triple(&mut out, "vn", n, NORMAL_DECIMALS);
-        }
-        (faces.join(), out)
-    });
-    let mut out = points;
-    match faces {
-        Ok(faces) => out.extend_from_slice(&faces),
-        Err(panic) => std::panic::resume_unwind(panic),
-    }
-    out
-}
-
-/// The numbers of all triangles, ordered by owner and material, else in the order in which they were made. A
-/// sort by counting: a large mesh has millions of triangles, and their owners are numbers from 0.
-fn by_owner(mesh: &Triangles, owners: usize) -> Vec<u32> {
-    let mut next = vec![0_u32; owners + 1];
-    for face in &mesh.faces {
-        next[face.owner.index() + 1] += 1;
-    }
-    for owner in 0..owners {
-        next[owner + 1] += next[owner];
-    }
-    let ends = next[1..].to_vec();
-    let mut order = vec![0_u32; mesh.faces.len()];
-    for (i, face) in mesh.faces.iter().enumerate() {
-        let place = &mut next[face.owner.index()];
-        order[*place as usize] = i as u32;
-        *place += 1;
-    }
-    let mut start = 0;
-    for end in ends {
-        let group = &mut order[start..end as usize];
-        let material = |i: &u32| mesh.faces[*i as usize].material;
-        if !group.is_sorted_by_key(material) {
-            group.sort_by_key(material);
-        }
-        start = end as usize;
-    }
-    order
-}
-
-/// The groups and their triangles.
-fn faces(mesh: &Triangles, scene: &Scene) -> Vec<u8> {
-    let mut out = Vec::with_capacity(44 * mesh.faces.len());
+/// Writes the document of one frame. Tubes have so many sides; 0: as many as it takes. The bytes do not depend on the
+/// number of threads.
+///
+/// # Errors
+/// Those of `out`.
+pub(super) fn write(
+    scene: &Scene,
+    fit: &Fit,
+    sides: usize,
+    title: &str,
+    threads: usize,
+    out: &mut (dyn Write + Send),
+) -> io::Result<()> {
+    let solid = Solid::new(scene, fit, sides);
     let names = Names::new(scene, '.');
-    let mut material = None;
-    let mut line = Line::new();
-    let order = by_owner(mesh, scene.owners().len());
-    for group in order.chunk_by(|&a, &b| mesh.faces[a as usize].owner == mesh.faces[b as usize].owner) {
-        out.extend_from_slice(b"g ");
-        out.extend_from_slice(names.get(mesh.faces[group[0] as usize].owner).as_bytes());
-        out.push(b'\n');
-        for face in group.iter().map(|&i| &mesh.faces[i as usize]) {
-            if material != Some(face.material) {
-                material = Some(face.material);
-                out.extend_from_slice(b"usemtl ");
-                out.extend_from_slice(scene.palette.get(face.material).name.as_bytes());
-                out.push(b'\n');
+    let order = solid.by_owner();
+    let points = solid.parts(0..solid.len(), PART);
+    let faces = whole_groups(&solid, &order);
+    let parts: Vec<Part> = (points.iter().cloned().map(Part::Vertices))
+        .chain(points.iter().cloned().map(Part::Normals))
+        .chain(faces.into_iter().map(Part::Faces))
+        .collect();
+    let title: String = title.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+    writeln!(out, "# {GENERATOR}\n# {title}\n# Up axis: +Y; front: +Z. Units: those of the model.")?;
+    writeln!(out, "mtllib {MATERIALS}")?;
+    let decimals = number::decimals_for(fit.extent);
+    let make = |part: usize, draft: &mut Draft| {
+        draft.text.clear();
+        match &parts[part] {
+            Part::Vertices(items) => {
+                solid.points(items.clone(), &mut Vertices { text: &mut draft.text, decimals });
             }
-            line.word(b"f");
-            for (vertex, normal) in face.corners {
-                // OBJ counts from 1.
-                line.word(b" ");
-                line.whole(u64::from(vertex) + 1);
-                line.word(b"//");
-                line.whole(u64::from(normal) + 1);
+            Part::Normals(items) => solid.points(items.clone(), &mut Normals { text: &mut draft.text }),
+            Part::Faces(items) => draft.groups(&solid, &names, &order[items.clone()]),
+        }
+    };
+    relay::write(threads, parts.len(), make, |draft| draft.text.bytes(), out)
+}
+
+/// Parts of a list of items by owner in which no owner is cut.
+fn whole_groups(solid: &Solid, order: &[u32]) -> Vec<Range<usize>> {
+    let mut parts = solid.parts(order.iter().map(|&n| n as usize), PART);
+    let owner = |i: usize| solid.owner_of(order[i] as usize);
+    let mut start = 0;
+    for part in &mut parts {
+        part.start = start;
+        part.end = part.end.max(start);
+        while (1..order.len()).contains(&part.end) && owner(part.end - 1) == owner(part.end) {
+            part.end += 1;
+        }
+        start = part.end;
+    }
+    parts
+}
+
+/// Writes vertices and leaves out normals.
+struct Vertices<'t> {
+    text: &'t mut Text,
+    decimals: usize,
+}
+
+impl Points for Vertices<'_> {
+    fn vertex(&mut self, at: impl FnOnce() -> Point) {
+        self.text.triple(b"v", &at().coords, self.decimals);
+    }
+
+    fn normal(&mut self, _: impl FnOnce() -> Vector) {}
+}
+
+/// Writes normals and leaves out vertices.
+struct Normals<'t> {
+    text: &'t mut Text,
+}
+
+impl Points for Normals<'_> {
+    fn vertex(&mut self, _: impl FnOnce() -> Point) {}
+
+    fn normal(&mut self, of: impl FnOnce() -> Vector) {
+        self.text.triple(b"vn", &of(), NORMAL_DECIMALS);
+    }
+}
+
+/// The text of a part, and corners of rings, which belong to many faces.
+#[derive(Default)]
+struct Draft {
+    text: Text,
+    low: Corners,
+    high: Corners,
+}
+
+/// Corners of a ring, the first one once more after the last.
+#[derive(Default)]
+struct Corners {
+    of: Option<Ring>,
+    corners: Vec<Corner>,
+}
+
+impl Corners {
+    fn set(&mut self, ring: Ring) {
+        if self.of == Some(ring) {
+            return;
+        }
+        self.of = Some(ring);
+        self.corners.clear();
+        self.corners.extend((0..ring.sides).map(|k| {
+            let (vertex, normal) = ring.corner(k);
+            Corner::new(vertex, normal)
+        }));
+        self.corners.extend_from_within(..1);
+    }
+}
+
+impl Draft {
+    /// Groups of items that are given by owner.
+    fn groups(&mut self, solid: &Solid, names: &Names, items: &[u32]) {
+        let (mut group, mut of) = (None, None);
+        let palette = &solid.scene.palette;
+        solid.faces(items, self, |draft, owner: OwnerId, material: MaterialId| {
+            if group != Some(owner) {
+                group = Some(owner);
+                draft.text.words(&[b"g ", names.get(owner).as_bytes(), b"\n"]);
             }
-            line.word(b"\n");
-            line.flush(&mut out);
+            // Each part tells its material: what comes before it, is written on another thread.
+            if of != Some(material) {
+                of = Some(material);
+                draft.text.words(&[b"usemtl ", palette.get(material).name.as_bytes(), b"\n"]);
+            }
+        });
+    }
+}
+
+impl Faces for Draft {
+    fn face(&mut self, corners: [(u32, u32); 3]) {
+        let [a, b, c] = corners.map(|(vertex, normal)| Corner::new(vertex, normal));
+        self.text.line(|line| line.face([&a, &b, &c]));
+    }
+
+    fn strip(&mut self, from: Ring, to: Ring) {
+        if self.high.of == Some(from) {
+            std::mem::swap(&mut self.low, &mut self.high);
+        }
+        self.low.set(from);
+        self.high.set(to);
+        for (low, high) in self.low.corners.windows(2).zip(self.high.corners.windows(2)) {
+            let ([a, b], [d, c]) = (low, high) else { continue };
+            self.text.line(|line| {
+                if !from.point {
+                    line.face([a, b, c]);
+                }
+                if !to.point {
+                    line.face([a, c, d]);
+                }
+            });
         }
     }
-    out
-}
 
-fn push_triple(out: &mut Vec<u8>, keyword: &str, v: &Vector, decimals: usize) {
-    let mut line = Line::new();
-    line.word(keyword.as_bytes());
-    for i in 0..3 {
-        line.word(b" ");
-        line.number(v[i], decimals, out);
-    }
-    line.word(b"\n");
-    line.flush(out);
-}
-
-fn add_polygons(scene: &Scene, mesh: &mut Triangles) {
-    for polygon in &scene.polygons {
-        let facing = triangulate::normal(&polygon.vertices);
-        let normal = mesh.add_normal(facing);
-        let first = mesh.vertices.len() as u32;
-        mesh.vertices.extend(&polygon.vertices);
-        for triangle in triangulate::triangulate(&polygon.vertices, facing) {
-            mesh.add_face(polygon.owner, polygon.material, triangle.map(|i| (first + i as u32, normal)));
+    fn fan(&mut self, pole: (u32, u32), ring: Ring, reversed: bool) {
+        let tip = Corner::new(pole.0, pole.1);
+        // Where the strip before it has left it.
+        if self.low.of == Some(ring) {
+            std::mem::swap(&mut self.low, &mut self.high);
         }
-    }
-}
-
-fn add_surfaces(scene: &Scene, mesh: &mut Triangles) {
-    for surface in &scene.surfaces {
-        let (shape, placement) = (&surface.mesh, &surface.placement);
-        let (vertex, normal) = (mesh.vertices.len() as u32, mesh.normals.len() as u32);
-        mesh.vertices.extend(shape.vertices.iter().map(|&v| placement.point(v)));
-        mesh.normals.extend(shape.normals.iter().map(|&n| placement.direction(n)));
-        for face in &shape.faces {
-            let material = surface.tint.filter(|_| face.takes_tint).unwrap_or(face.material);
-            mesh.add_face(surface.owner, material, face.corners.map(|i| (vertex + i, normal + i)));
+        self.high.set(ring);
+        for side in self.high.corners.windows(2) {
+            let [a, b] = side else { continue };
+            self.text.line(|line| line.face(if reversed { [&tip, b, a] } else { [&tip, a, b] }));
         }
     }
 }
 
 /// The material library.
 pub(super) fn materials(palette: &Palette) -> Vec<u8> {
-    let mut out = format!("# {GENERATOR}\n").into_bytes();
+    let mut out = Text::default();
+    out.words(&[b"# ", GENERATOR.as_bytes(), b"\n"]);
     for material in palette.materials() {
-        out.extend_from_slice(format!("\nnewmtl {}\n", material.name).as_bytes());
-        for (keyword, strength) in [("Ka", 0.2), ("Kd", 1.0)] {
-            let color = Vector::from(material.color.channels()) * strength;
-            push_triple(&mut out, keyword, &color, NORMAL_DECIMALS);
+        out.words(&[b"\nnewmtl ", material.name.as_bytes(), b"\n"]);
+        for (keyword, strength) in [(b"Ka", 0.2), (b"Kd", 1.0)] {
+            out.triple(keyword, &(Vector::from(material.color.channels()) * strength), NORMAL_DECIMALS);
         }
-        out.extend_from_slice(b"Ks 0.05 0.05 0.05\nNs 20\nd 1\nillum 2\n");
+        out.words(&[b"Ks 0.05 0.05 0.05\nNs 20\nd 1\nillum 2\n"]);
     }
-    out
+    out.bytes().to_vec()
 }

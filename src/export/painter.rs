@@ -78,7 +78,7 @@ struct Layer {
 struct Painter<'a> {
     scene: &'a Scene,
     style: Style<'a>,
-    names: Option<Names>,
+    names: Option<Names<'a>>,
     strokes: Strokes<'a>,
     /// Attributes and data of the nameless path that is being gathered.
     run: Option<(String, String)>,

@@ -1,7 +1,7 @@
 //! A scene as a PNG picture: stems as the tubes of the OBJ format, everything lit smoothly, what is nearer in front.
 
 use super::raster::{self, Corner, Image};
-use super::{Fit, Page, obj};
+use super::{Fit, Page, triangles};
 use crate::scene::{Color, Scene, Vector};
 
 /// How far a tube's outline may be from a circle, in pixels.
@@ -23,7 +23,7 @@ pub(super) fn document(scene: &Scene, fit: &Fit, page: &Page, title: &str) -> Ve
 /// Pixels of a scene, transparent where nothing is. A point that the camera sees at x, y is at `a x + b` and `c - a y`
 /// pixels from the upper left corner.
 pub(super) fn picture(scene: &Scene, fit: &Fit, size: [u32; 2], [a, b, c]: [f64; 3]) -> Image {
-    let mesh = obj::triangles(scene, fit, sides(scene, fit, a));
+    let mesh = triangles::triangles(scene, fit, sides(scene, fit, a));
     let scale = if fit.extent > 0.0 { 1.0 / fit.extent } else { 1.0 };
     let places: Vec<[f64; 3]> = mesh
         .vertices

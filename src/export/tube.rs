@@ -8,22 +8,13 @@
 //! there is no gap.
 
 use std::collections::HashMap;
+use std::ops::Range;
 
-use super::obj::Triangles;
+use super::triangles::{Faces, Points, Ring};
 use crate::scene::{Point, Scene, Segment, Vector, sin_cos_degrees};
 
 /// Least cosine of a bend within a tube (100 degrees).
 const SHARPEST: f64 = -0.173_648_177_666_930_3;
-
-/// Adds all stems of a scene, as tubes with so many sides (at least 3).
-pub(super) fn add_tubes(scene: &Scene, default_width: f64, sides: usize, out: &mut Triangles) {
-    add(scene, default_width, |_| sides, out);
-}
-
-/// Adds all stems of a scene, as tubes whose sides are no further from round ones than `accuracy`.
-pub(super) fn add_round_tubes(scene: &Scene, default_width: f64, accuracy: f64, out: &mut Triangles) {
-    add(scene, default_width, |radius| sides_for(radius, accuracy), out);
-}
 
 /// Sides of a prism whose faces are no further from its cylinder than that. Few numbers are used, so that a
 /// stem that grows does not change all the time.
@@ -33,38 +24,232 @@ fn sides_for(radius: f64, accuracy: f64) -> usize {
     STEPS.into_iter().find(|&sides| deviation(sides) <= accuracy).unwrap_or(STEPS[STEPS.len() - 1])
 }
 
-/// Adds all stems of a scene; `sides` tells the number of sides by the largest radius of a tube.
-fn add(scene: &Scene, default_width: f64, sides: impl Fn(f64) -> usize, out: &mut Triangles) {
-    let radii: Vec<[f64; 2]> =
-        scene.segments.iter().map(|s| s.widths.map(|w| w.resolve(default_width) / 2.0)).collect();
-    let visible = |i: usize| radii[i][0] > 0.0 || radii[i][1] > 0.0;
-    let mut next: Vec<Option<usize>> = vec![None; scene.segments.len()];
-    let mut continues = vec![false; scene.segments.len()];
-    for (i, segment) in scene.segments.iter().enumerate() {
-        if let Some(before) = segment.follows
-            && next[before].is_none()
-            && scene.segments[before].contour == segment.contour
-            && radii[before][1] > 0.0
-            && radii[i][0] > 0.0
-            && can_join(&scene.segments[before], segment, radii[before][1].max(radii[i][0]))
-        {
-            next[before] = Some(i);
-            continues[i] = true;
+/// All stems of a scene as tubes: how they are cut and how their vertices and normals are numbered. Each piece can
+/// then be made by itself, on any thread.
+pub(super) struct Tubes<'s> {
+    segments: &'s [Segment],
+    profiles: Vec<Profile>,
+    /// Along each tube, one tube after the other.
+    pieces: Vec<Piece>,
+    /// Numbers of vertices and of normals.
+    pub(super) counts: [u32; 2],
+}
+
+/// A segment of a tube.
+struct Piece {
+    segment: usize,
+    profile: usize,
+    radii: [f64; 2],
+    section: Section,
+    /// How it begins; the end is a dome if it is the last of its tube.
+    begins: Begin,
+    last: bool,
+    /// Numbers of its first vertex and normal.
+    first: [u32; 2],
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Begin {
+    /// The first of a tube.
+    Dome,
+    /// On the ring at the end of the one before.
+    Joint,
+    /// On a ring of its own at the end of the one before: the tube changes its width at once, by a flat shoulder that
+    /// belongs to this one.
+    Shoulder,
+}
+
+/// A cross-section.
+struct Profile {
+    spokes: Vec<Spoke>,
+    /// Sine and cosine of the latitudes of a dome's rings, from the base without it to the pole without it: as many
+    /// as make the dome as round as the tube.
+    latitudes: Vec<(f64, f64)>,
+}
+
+impl Profile {
+    fn new(spokes: Vec<Spoke>) -> Profile {
+        let steps = (spokes.len() / 8).clamp(1, 8) + 1;
+        let latitude = |step| sin_cos_degrees(90.0 * step as f64 / steps as f64);
+        Profile { latitudes: (1..steps).map(latitude).collect(), spokes }
+    }
+
+    /// Vertices and normals of a dome; one without width is a point.
+    fn dome(&self, radius: f64) -> [u32; 2] {
+        let sides = self.spokes.len() as u32;
+        let all = sides * (self.latitudes.len() as u32 + 1) + 1;
+        if radius > 0.0 { [all; 2] } else { [1, sides] }
+    }
+}
+
+impl<'s> Tubes<'s> {
+    /// Tubes with so many sides (at least 3); 0: as many as make them no further from round ones than `accuracy`.
+    pub(super) fn new(scene: &'s Scene, default_width: f64, sides: usize, accuracy: f64) -> Tubes<'s> {
+        let segments = &scene.segments[..];
+        let radii: Vec<[f64; 2]> =
+            segments.iter().map(|s| s.widths.map(|w| w.resolve(default_width) / 2.0)).collect();
+        const NONE: usize = usize::MAX;
+        let mut next = vec![NONE; segments.len()];
+        let mut continues = vec![false; segments.len()];
+        for (i, segment) in segments.iter().enumerate() {
+            if let Some(before) = segment.follows
+                && next[before] == NONE
+                && segments[before].contour == segment.contour
+                && radii[before][1] > 0.0
+                && radii[i][0] > 0.0
+                && can_join(&segments[before], segment, radii[before][1].max(radii[i][0]))
+            {
+                next[before] = i;
+                continues[i] = true;
+            }
+        }
+        let mut tubes = Tubes {
+            segments,
+            profiles: Vec::new(),
+            pieces: Vec::with_capacity(segments.len()),
+            counts: [0; 2],
+        };
+        let mut profiles: HashMap<(Option<u32>, usize), usize> = HashMap::new();
+        let visible = |i: usize| radii[i][0] > 0.0 || radii[i][1] > 0.0;
+        for first in (0..segments.len()).filter(|&i| !continues[i] && visible(i)) {
+            let chain = || std::iter::successors(Some(first), |&i| Some(next[i]).filter(|&i| i != NONE));
+            let sides = match sides {
+                0 => sides_for(chain().flat_map(|i| radii[i]).fold(0.0, f64::max), accuracy),
+                _ => sides.max(3),
+            };
+            let contour = segments[first].contour;
+            let profile = *profiles.entry((contour, sides)).or_insert_with(|| {
+                let points = contour.and_then(|i| scene.prepared_for.as_ref()?.contours.get(i as usize));
+                let spokes = points.map_or_else(|| circle(sides), |contour| curve(&contour.points, sides));
+                tubes.profiles.push(Profile::new(spokes));
+                tubes.profiles.len() - 1
+            });
+            for i in chain() {
+                tubes.push(i, profile, radii[i], i != first, next[i] == NONE);
+            }
+        }
+        tubes
+    }
+
+    /// Adds a piece and numbers what it is made of.
+    fn push(&mut self, segment: usize, profile: usize, radii: [f64; 2], goes_on: bool, last: bool) {
+        let here = &self.segments[segment];
+        let slope = (radii[1] - radii[0]) / (here.end - here.start).norm();
+        let shape = &self.profiles[profile];
+        let ring = shape.spokes.len() as u32;
+        let (section, begins, start) = match self.pieces.last().filter(|_| goes_on) {
+            None => (Section::new(here.direction, here.across, slope), Begin::Dome, shape.dome(radii[0])),
+            Some(before) => {
+                let section = before.section.carried(here.direction, slope);
+                let radius = before.radii[1];
+                let steps = (radii[0] - radius).abs() > 1e-9 * radius.max(radii[0]);
+                if steps {
+                    (section, Begin::Shoulder, [ring, ring + 1])
+                } else {
+                    (section, Begin::Joint, [0; 2])
+                }
+            }
+        };
+        let end = if last { shape.dome(radii[1]) } else { [ring; 2] };
+        self.pieces.push(Piece { segment, profile, radii, section, begins, last, first: self.counts });
+        for (count, (a, b)) in self.counts.iter_mut().zip(start.into_iter().zip(end)) {
+            *count += a + b;
         }
     }
-    let mut profiles: HashMap<(Option<u32>, usize), Vec<Spoke>> = HashMap::new();
-    let mut pieces: Vec<(&Segment, [f64; 2])> = Vec::new();
-    for first in (0..scene.segments.len()).filter(|&i| !continues[i] && visible(i)) {
-        let chain = std::iter::successors(Some(first), |&i| next[i]);
-        pieces.clear();
-        pieces.extend(chain.map(|i| (&scene.segments[i], radii[i])));
-        let sides = sides(pieces.iter().flat_map(|(_, radii)| *radii).fold(0.0, f64::max));
-        let contour = scene.segments[first].contour;
-        let profile = profiles.entry((contour, sides)).or_insert_with(|| {
-            let points = contour.and_then(|i| scene.prepared_for.as_ref()?.contours.get(i as usize));
-            points.map_or_else(|| circle(sides), |contour| curve(&contour.points, sides))
-        });
-        Tube { profile, out }.add(&pieces);
+
+    /// Number of pieces; each makes a part of the points, and of the triangles of its segment.
+    pub(super) fn len(&self) -> usize {
+        self.pieces.len()
+    }
+
+    /// The segment that a piece is made of.
+    pub(super) fn segment(&self, piece: usize) -> &Segment {
+        &self.segments[self.pieces[piece].segment]
+    }
+
+    /// Makes the vertices and normals of some pieces, in the order of their numbers.
+    pub(super) fn points(&self, pieces: Range<usize>, out: &mut impl Points) {
+        for i in pieces {
+            let piece = &self.pieces[i];
+            let profile = &self.profiles[piece.profile];
+            let (segment, section) = (&self.segments[piece.segment], &piece.section);
+            match piece.begins {
+                Begin::Dome => dome(profile, segment.start, piece.radii[0], section, -1.0, out),
+                Begin::Joint => {}
+                Begin::Shoulder => {
+                    let before = &self.pieces[i - 1];
+                    let centre = self.segments[before.segment].end;
+                    joint(profile, centre, piece.radii[0], [&before.section, section], [section; 2], out);
+                    let wider = piece.radii[0] > before.radii[1];
+                    out.normal(|| if wider { -section.along } else { section.along });
+                }
+            }
+            if piece.last {
+                dome(profile, segment.end, piece.radii[1], section, 1.0, out);
+            } else {
+                let after = &self.pieces[i + 1];
+                let meeting = if after.begins == Begin::Shoulder { section } else { &after.section };
+                joint(
+                    profile,
+                    segment.end,
+                    piece.radii[1],
+                    [section, &after.section],
+                    [section, meeting],
+                    out,
+                );
+            }
+        }
+    }
+
+    /// Makes the triangles of a piece.
+    pub(super) fn faces(&self, i: usize, out: &mut impl Faces) {
+        let piece = &self.pieces[i];
+        let profile = &self.profiles[piece.profile];
+        let low = self.low(i);
+        match piece.begins {
+            Begin::Dome => dome_faces(profile, low, -1.0, out),
+            Begin::Joint => {}
+            Begin::Shoulder => {
+                let normal = low.normal + low.sides;
+                let flat = |ring: Ring| Ring { normal, flat: true, ..ring };
+                out.strip(flat(self.high(i - 1)), flat(low));
+            }
+        }
+        let high = self.high(i);
+        if piece.last {
+            dome_faces(profile, high, 1.0, out);
+        }
+        out.strip(low, high);
+    }
+
+    /// The ring at the start of a piece.
+    fn low(&self, i: usize) -> Ring {
+        let piece = &self.pieces[i];
+        if piece.begins == Begin::Joint {
+            return self.high(i - 1);
+        }
+        let sides = self.profiles[piece.profile].spokes.len() as u32;
+        let [vertex, normal] = piece.first;
+        Ring { vertex, normal, sides, point: piece.radii[0] <= 0.0, flat: false }
+    }
+
+    /// The ring at the end of a piece.
+    fn high(&self, i: usize) -> Ring {
+        let piece = &self.pieces[i];
+        let profile = &self.profiles[piece.profile];
+        let sides = profile.spokes.len() as u32;
+        let [vertices, normals] = match piece.begins {
+            Begin::Dome => profile.dome(piece.radii[0]),
+            Begin::Joint => [0; 2],
+            Begin::Shoulder => [sides, sides + 1],
+        };
+        Ring {
+            vertex: piece.first[0] + vertices,
+            normal: piece.first[1] + normals,
+            sides,
+            point: piece.radii[1] <= 0.0,
+            flat: false,
+        }
     }
 }
 
@@ -128,12 +313,6 @@ fn can_join(a: &Segment, b: &Segment, radius: f64) -> bool {
     reach <= 0.5 * shorter
 }
 
-/// Vertices and normals around a tube, by number.
-struct Ring {
-    vertices: Vec<u32>,
-    normals: Vec<u32>,
-}
-
 /// Directions along and across a tube at one place: `along`, `u`, `v` are orthonormal and right-handed.
 #[derive(Clone, Copy)]
 struct Section {
@@ -164,136 +343,83 @@ impl Section {
     }
 
     /// Away from the axis, as far as the cross-section reaches with radius 1.
-    fn outward(&self, at: Spoke) -> Vector {
+    fn outward(&self, at: &Spoke) -> Vector {
         self.u * at.place[0] + self.v * at.place[1]
     }
 
     /// Normal of the tube's side.
-    fn normal(&self, at: Spoke) -> Vector {
+    fn normal(&self, at: &Spoke) -> Vector {
         let ([x, y], [a, b]) = (at.normal, at.place);
-        (self.u * x + self.v * y - self.along * (self.slope * (x * a + y * b))).normalize()
-    }
-}
-
-struct Tube<'a> {
-    /// The corners of a cross-section.
-    profile: &'a [Spoke],
-    out: &'a mut Triangles,
-}
-
-impl Tube<'_> {
-    /// Adds a closed tube along segments, given with their radii at both ends.
-    fn add(&mut self, pieces: &[(&Segment, [f64; 2])]) {
-        let slope = |&(segment, radii): &(&Segment, [f64; 2])| {
-            (radii[1] - radii[0]) / (segment.end - segment.start).norm()
-        };
-        let (first, radii) = pieces[0];
-        let mut section = Section::new(first.direction, first.across, slope(&pieces[0]));
-        let mut ring = self.dome(first, first.start, radii[0], &section, -1.0);
-        for (i, piece) in pieces.iter().enumerate() {
-            let (segment, [_, radius]) = *piece;
-            let Some(after) = pieces.get(i + 1) else {
-                let end = self.dome(segment, segment.end, radius, &section, 1.0);
-                self.strip(segment, &ring, &end);
-                return;
-            };
-            let carried = section.carried(after.0.direction, slope(after));
-            let steps = (after.1[0] - radius).abs() > 1e-9 * radius.max(after.1[0]);
-            let meeting = if steps { section } else { carried };
-            let end = self.joint(segment.end, radius, [&section, &carried], [&section, &meeting]);
-            self.strip(segment, &ring, &end);
-            ring = end;
-            if steps {
-                // The tube changes its width at once: a flat shoulder that belongs to the next segment.
-                let faces = if after.1[0] > radius { -carried.along } else { carried.along };
-                let wide = self.joint(segment.end, after.1[0], [&section, &carried], [&carried, &carried]);
-                let normal = self.out.add_normal(faces);
-                let flat = |ring: &Ring| Ring {
-                    vertices: ring.vertices.clone(),
-                    normals: vec![normal; self.profile.len()],
-                };
-                let (a, b) = (flat(&ring), flat(&wide));
-                self.strip(after.0, &a, &b);
-                ring = wide;
-            }
-            section = carried;
+        let aside = self.u * x + self.v * y;
+        // Already of length 1 on a stem that does not taper: spokes and cross-sections are.
+        if self.slope == 0.0 {
+            return aside;
         }
+        (aside - self.along * (self.slope * (x * a + y * b))).normalize()
     }
+}
 
-    /// A ring in the plane that halves the bend between two sections, with the mean of two normals.
-    fn joint(
-        &mut self,
-        centre: Point,
-        radius: f64,
-        [before, after]: [&Section; 2],
-        sides: [&Section; 2],
-    ) -> Ring {
-        let plane = before.along + after.along;
-        let mut ring = Ring { vertices: Vec::new(), normals: Vec::new() };
-        for &at in self.profile {
+/// A ring in the plane that halves the bend between two sections, with the mean of two normals.
+fn joint(
+    profile: &Profile,
+    centre: Point,
+    radius: f64,
+    [before, after]: [&Section; 2],
+    sides: [&Section; 2],
+    out: &mut impl Points,
+) {
+    let plane = before.along + after.along;
+    let lean = before.along.dot(&plane);
+    let one = std::ptr::eq(sides[0], sides[1]);
+    for at in &profile.spokes {
+        out.vertex(|| {
             let outward = before.outward(at);
             // Along the side of the tube up to the plane.
-            let slide = outward.dot(&plane) / before.along.dot(&plane);
-            ring.vertices.push(self.out.add_vertex(centre + (outward - before.along * slide) * radius));
-            let normal = (sides[0].normal(at) + sides[1].normal(at)).normalize();
-            ring.normals.push(self.out.add_normal(normal));
-        }
-        ring
+            let slide = outward.dot(&plane) / lean;
+            centre + (outward - before.along * slide) * radius
+        });
+        out.normal(|| match one {
+            true => sides[0].normal(at),
+            false => (sides[0].normal(at) + sides[1].normal(at)).normalize(),
+        });
     }
+}
 
-    /// Closes an end by a dome and returns the ring that it stands on; an end without width is a point.
-    /// `sign` is -1 at the start.
-    fn dome(&mut self, segment: &Segment, centre: Point, radius: f64, section: &Section, sign: f64) -> Ring {
-        if radius <= 0.0 {
-            let point = self.out.add_vertex(centre);
-            let normals = self.profile.iter().map(|&at| self.out.add_normal(section.normal(at))).collect();
-            return Ring { vertices: vec![point; self.profile.len()], normals };
+/// Points of a dome that closes an end, from the ring that it stands on to the pole; an end without width is a point
+/// with the normals of a ring. `sign` is -1 at the start.
+fn dome(profile: &Profile, centre: Point, radius: f64, section: &Section, sign: f64, out: &mut impl Points) {
+    if radius <= 0.0 {
+        out.vertex(|| centre);
+        for at in &profile.spokes {
+            out.normal(|| section.normal(at));
         }
-        let outwards = section.along * sign;
-        let base = self.joint(centre, radius, [section; 2], [section; 2]);
-        // As many rings from the base to the pole as make the dome as round as the tube.
-        let steps = (self.profile.len() / 8).clamp(1, 8) + 1;
-        let mut outer = Ring { vertices: base.vertices.clone(), normals: base.normals.clone() };
-        for step in 1..steps {
-            let (sin, cos) = sin_cos_degrees(90.0 * step as f64 / steps as f64);
-            let mut ring = Ring { vertices: Vec::new(), normals: Vec::new() };
-            for &at in self.profile {
-                let place = centre + (section.outward(at) * cos + outwards * sin) * radius;
-                ring.vertices.push(self.out.add_vertex(place));
-                let aside = section.u * at.normal[0] + section.v * at.normal[1];
-                ring.normals.push(self.out.add_normal((aside * cos + outwards * sin).normalize()));
-            }
-            let (low, high) = if sign < 0.0 { (&ring, &outer) } else { (&outer, &ring) };
-            self.strip(segment, low, high);
-            outer = ring;
-        }
-        let pole = (self.out.add_vertex(centre + outwards * radius), self.out.add_normal(outwards));
-        for k in 0..self.profile.len() {
-            let after = (k + 1) % self.profile.len();
-            let (a, b) = if sign < 0.0 { (after, k) } else { (k, after) };
-            let corner = |k: usize| (outer.vertices[k], outer.normals[k]);
-            self.face(segment, [pole, corner(a), corner(b)]);
-        }
-        base
+        return;
     }
+    let outwards = section.along * sign;
+    joint(profile, centre, radius, [section; 2], [section; 2], out);
+    for &(sin, cos) in &profile.latitudes {
+        for at in &profile.spokes {
+            out.vertex(|| centre + (section.outward(at) * cos + outwards * sin) * radius);
+            // Of length 1, as all three are at right angles.
+            out.normal(|| (section.u * at.normal[0] + section.v * at.normal[1]) * cos + outwards * sin);
+        }
+    }
+    out.vertex(|| centre + outwards * radius);
+    out.normal(|| outwards);
+}
 
-    /// The side between two rings, the second one further along.
-    fn strip(&mut self, segment: &Segment, from: &Ring, to: &Ring) {
-        for k in 0..self.profile.len() {
-            let after = (k + 1) % self.profile.len();
-            let corner = |ring: &Ring, k: usize| (ring.vertices[k], ring.normals[k]);
-            let [a, b, c, d] = [corner(from, k), corner(from, after), corner(to, after), corner(to, k)];
-            self.face(segment, [a, b, c]);
-            self.face(segment, [a, c, d]);
-        }
+/// Triangles of a dome on its base.
+fn dome_faces(profile: &Profile, base: Ring, sign: f64, out: &mut impl Faces) {
+    if base.point {
+        return;
     }
-
-    fn face(&mut self, segment: &Segment, corners: [(u32, u32); 3]) {
-        // At a point a side has one triangle, not two.
-        let [(a, _), (b, _), (c, _)] = corners;
-        if a == b || b == c || c == a {
-            return;
-        }
-        self.out.add_face(segment.owner, segment.material, corners);
+    let mut outer = base;
+    for _ in &profile.latitudes {
+        let ring = Ring { vertex: outer.vertex + base.sides, normal: outer.normal + base.sides, ..base };
+        let (low, high) = if sign < 0.0 { (ring, outer) } else { (outer, ring) };
+        out.strip(low, high);
+        outer = ring;
     }
+    let pole = (outer.vertex + base.sides, outer.normal + base.sides);
+    out.fan(pole, outer, sign < 0.0);
 }

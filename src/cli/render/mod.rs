@@ -81,11 +81,15 @@ impl Render<'_> {
             FrameDirectory::create(&self.args.out, self.args.force).map_err(out_of_directory)?;
         let mut manifest = self.manifest(&writer.fit, &writer.page);
         let count = self.run.times.len();
+        // Frames side by side; threads that have none help with those of others.
+        writer.threads = (self.threads / count.max(1)).max(1);
+        let staging = directory.staging();
         let work = |shot: &Shot, scene: &Scene| {
             let file = FrameDirectory::frame_name(shot.index, count, writer.format.extension());
             let companion = writer.companion(scene).filter(|_| shot.index == 0);
-            let bytes = writer.write(scene, &format!("{}, t = {}", self.title(), shot.time));
-            (record(&writer.fit, shot, scene, file), companion, bytes)
+            let title = format!("{}, t = {}", self.title(), shot.time);
+            let staged = staging.write(|file| writer.write_to(scene, &title, file));
+            (record(&writer.fit, shot, scene, file), companion, staged)
         };
         let progress = bar("writing", count);
         let stats = play(
@@ -95,11 +99,11 @@ impl Render<'_> {
             clock,
             None,
             work,
-            |(record, companion, bytes)| {
+            |(record, companion, staged)| {
                 if let Some((name, bytes)) = companion {
                     directory.write(name, &bytes).map_err(out_of_directory)?;
                 }
-                directory.write(&record.file, &bytes).map_err(out_of_directory)?;
+                staged.and_then(|staged| directory.put(&record.file, staged)).map_err(out_of_directory)?;
                 manifest.frames.push(record);
                 progress.inc(1);
                 Ok(())
