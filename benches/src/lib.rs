@@ -9,6 +9,8 @@ pub mod anabaena;
 pub mod chain;
 pub mod filament;
 pub mod measure;
+pub mod plants;
 pub mod restart;
+pub mod scale;
 pub mod solver;
 pub mod tune;

@@ -1,0 +1,117 @@
+//! What is integrated: the right-hand sides, a busy filament, filaments that grow.
+
+use std::time::Instant;
+
+use dlsys::sim::{Scheduler, Settings};
+use dlsys::structure::ModuleString;
+use dlsys_benches::measure::duration;
+use dlsys_benches::plants::{self, Growing};
+use dlsys_benches::scale::{self, median, with};
+use dlsys_benches::solver;
+
+use crate::{Outcome, ROUNDS, line};
+
+pub fn filament() -> Outcome {
+    let bare = scale::bare_right_hand_sides();
+    for (tolerance, end) in [(1e-6, 200.0), (1e-12, 200.0)] {
+        let one = |_| {
+            let work = scale::right_hand_sides(tolerance, end)?;
+            Ok(work.rhs_evaluations as f64 / work.seconds)
+        };
+        let speed = median((0..ROUNDS).map(one).collect::<Result<_, String>>()?);
+        let measured =
+            format!("{:.0} million a second, {:.2} of a bare loop over an array", speed / 1e6, speed / bare);
+        let what =
+            format!("cell evaluations, whole DOP853 step counted, 1,000 cells, tolerance {tolerance:.0e}");
+        line(&what, &measured, "100 million", Some(speed >= 1e8));
+    }
+    Ok(())
+}
+
+pub fn busy() -> Outcome {
+    let text = plants::busy(1000);
+    let run = |scheduler, tolerance| -> Result<f64, String> {
+        let one = |_| Ok(scale::work(&text, with(scheduler, tolerance), 2.0, 12.0)?.seconds / 10.0);
+        Ok(median((0..ROUNDS).map(one).collect::<Result<_, String>>()?))
+    };
+    let (auto, global) = (run(Scheduler::Auto, 1e-6)?, run(Scheduler::Global, 1e-6)?);
+    let measured = format!("{} a unit of time; `global` {:.0} times that", duration(auto), global / auto);
+    line("busy filament, 1,000 cells and events", &measured, "1.5 ms", Some(auto <= 1.5e-3));
+    let times: Vec<f64> = (1..=20).map(|k| 0.37 * f64::from(k)).collect();
+    let exact = scale::states(&text, with(Scheduler::Global, 1e-10), &times)?.0;
+    for tolerance in [1e-4, 1e-6, 1e-8] {
+        errors("busy filament", &text, &times, &exact, tolerance)?;
+    }
+    Ok(())
+}
+
+/// How far `auto` and `global` are from the reference.
+fn errors(what: &str, text: &str, times: &[f64], exact: &[ModuleString], tolerance: f64) -> Outcome {
+    let (auto, cost) = scale::states(text, with(Scheduler::Auto, tolerance), times)?;
+    let (global, other) = scale::states(text, with(Scheduler::Global, tolerance), times)?;
+    let (ours, plain) =
+        (scale::distance(&auto, exact) / tolerance, scale::distance(&global, exact) / tolerance);
+    let apart = scale::distance(&auto, &global) / tolerance;
+    let measured = format!(
+        "{ours:.2} TOL (`global` {plain:.2} TOL, apart {apart:.2} TOL); `global` takes {:.1} times as long",
+        other.seconds / cost.seconds
+    );
+    line(&format!("{what}, error of `auto` at {tolerance:.0e}"), &measured, "100 TOL", Some(ours <= 100.0));
+    Ok(())
+}
+
+/// Growth by 1 % a unit of time: how long it takes from some cells to others.
+fn time_between(from: f64, to: f64) -> f64 {
+    (to / from).ln() / 1.01f64.ln()
+}
+
+pub fn growing() -> Outcome {
+    for growing in Growing::ALL {
+        let mut costs = Vec::new();
+        let text = growing.text(100, 7);
+        let session = solver::session(&text)?;
+        let mut simulation = session.simulate(Settings::default()).map_err(|e| e.to_string())?;
+        let mut t = 0.0;
+        let mut total = 0.0;
+        for wanted in [1e3, 1e4, 1e5] {
+            // Windows of 10 units of time around the wanted number of cells.
+            while (simulation.stats().modules as f64) < wanted * 0.95 {
+                let missing = time_between(simulation.stats().modules as f64, wanted * 0.96).max(0.5);
+                let begin = Instant::now();
+                t += missing.min(20.0);
+                simulation.pass(t).map_err(|e| e.to_string())?;
+                total += begin.elapsed().as_secs_f64();
+            }
+            let mut samples = Vec::new();
+            for _ in 0..5 {
+                let cells = simulation.stats().modules as f64;
+                let begin = Instant::now();
+                t += 2.0;
+                simulation.pass(t).map_err(|e| e.to_string())?;
+                let seconds = begin.elapsed().as_secs_f64();
+                samples.push(seconds / 2.0 / (0.5 * (cells + simulation.stats().modules as f64)));
+                total += seconds;
+            }
+            costs.push(median(samples));
+        }
+        let [few, some, many] = costs[..] else { return Err("three sizes".into()) };
+        let measured = format!(
+            "{} at 1,000, {} at 10,000, {} at 100,000: ratio {:.2}; {} from 100 to 100,000 cells",
+            duration(few),
+            duration(some),
+            duration(many),
+            many / few,
+            duration(total)
+        );
+        let what = format!("growing filament, {}, a cell and unit of time", growing.name());
+        line(&what, &measured, "1.5", Some(many / few <= 1.5));
+    }
+    for growing in Growing::ALL {
+        let text = growing.text(100, 7);
+        let end = time_between(100.0, 2000.0);
+        let times: Vec<f64> = (1..=6).map(|k| end * f64::from(k) / 6.0).collect();
+        let exact = scale::states(&text, with(Scheduler::Global, 1e-10), &times)?.0;
+        errors(&format!("{} to 2,000 cells", growing.name()), &text, &times, &exact, 1e-6)?;
+    }
+    Ok(())
+}
