@@ -89,7 +89,7 @@ fn right_hand_sides(c: &mut Criterion) {
 /// Elements are branches.
 fn contexts(c: &mut Criterion) {
     for branches in Branches::ALL {
-        for n in [25_000, 100_000] {
+        for n in [4_000, 16_000] {
             let session = session(&branches.text(n));
             let mut group = c.benchmark_group(format!("branches, {}", branches.name()));
             group.sample_size(10).throughput(Throughput::Elements(n as u64));

@@ -49,6 +49,7 @@ mod tests {
     use super::*;
 
     /// (D, t, i, c_i(t)): the same sum with 30 digits.
+    #[allow(clippy::excessive_precision)]
     const SUMS: [(f64, f64, usize, f64); 6] = [
         (1e4, 1.0, 2, 253.461578034014531893600921053),
         (1e4, 10.0, 500, 159.086201106794060800396384233),

@@ -188,16 +188,17 @@ impl Growing {
 pub fn many_rules(bytes: usize) -> String {
     let mut text = String::from("initial string: F0_v(0.5, 255)\n");
     for i in 0.. {
-        if text.len() >= bytes {
-            break;
-        }
-        let next = i + 1;
+        let last = text.len() >= bytes;
+        let next = if last { 0 } else { i + 1 };
         let _ = write!(
             text,
             "F{i}(x_l, c_l) < F{i}_v(x, c) > F{i}(x_r, c_r):\n  \
              if x < 1 & c > 5 solve dx/dt = ln(1.01)*x, dc/dt = 0.03*(c_l + c_r - 2c) - 0.03*c\n  \
              if x = 1 & c > 5 produce F{i}_v(0.37*x, c) F{next}_v(0.63*x, c)\n  if c = 5 produce F{i}_h(x, c)\n"
         );
+        if last {
+            break;
+        }
     }
     text
 }

@@ -21,11 +21,14 @@ pub trait Solver {
     fn values(&self, output: usize) -> Vec<f64>;
 }
 
+/// Makes the solver for a tolerance.
+pub type Prepare = dyn Fn(f64) -> Result<Box<dyn Solver>, String>;
+
 /// A program that is not yet given a tolerance.
 pub struct Candidate {
     pub name: String,
     /// Makes the solver for a tolerance; not timed.
-    pub prepare: Box<dyn Fn(f64) -> Result<Box<dyn Solver>, String>>,
+    pub prepare: Box<Prepare>,
 }
 
 /// dlsys on a model whose string is: wall, cells with one parameter each, wall.

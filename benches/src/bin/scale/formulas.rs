@@ -1,7 +1,8 @@
 //! What is done by formulas: reading, productions, the dragon curve, branches, frames.
 
+use cpu_time::ProcessTime as Clock;
 use dlsys::sim::Settings;
-use dlsys_benches::measure::{self, duration};
+use dlsys_benches::measure::duration;
 use dlsys_benches::plants::{self, Branches, Growing, Lives};
 use dlsys_benches::scale::{self, median};
 use dlsys_benches::solver;
@@ -12,6 +13,9 @@ use crate::{Outcome, ROUNDS, line};
 /// another run, which this program cannot repeat.
 const CPFG_DRAGON: f64 = 1.3;
 
+/// Seconds that a measurement of branches may take.
+const LIMIT: f64 = 12.0;
+
 pub fn parsing() -> Outcome {
     let texts = [
         ("20,000 random cells", Growing::Vegetative.text(20_000, 1)),
@@ -20,8 +24,12 @@ pub fn parsing() -> Outcome {
     ];
     for (name, text) in texts {
         solver::session(&text)?;
-        let once =
-            median((0..ROUNDS).map(|_| measure::time(&mut || drop(solver::session(&text)), 1)).collect());
+        let one = |_| {
+            let begin = Clock::now();
+            drop(solver::session(&text));
+            begin.elapsed().as_secs_f64()
+        };
+        let once = median((0..ROUNDS).map(one).collect());
         let speed = text.len() as f64 / once / 1e6;
         line(&format!("reading, {name}"), &format!("{speed:.1} MB/s ({})", duration(once)), "", None);
     }
@@ -60,26 +68,33 @@ pub fn dragon() -> Outcome {
 
 pub fn branches() -> Outcome {
     for branches in Branches::ALL {
-        let mut costs = [0.0; 2];
-        for (cost, n) in costs.iter_mut().zip([250_000, 1_000_000]) {
-            let text = branches.text(n);
-            let session = solver::session(&text)?;
-            let settings = Settings::default();
-            let one = |_| -> Result<f64, String> {
-                let made = scale::start(&session, settings)?.seconds;
-                match branches {
-                    Branches::Rest => Ok(made),
-                    _ => Ok(scale::work(&text, settings, 0.5, 2.5)?.seconds / 2.0),
-                }
-            };
-            *cost = median((0..3).map(one).collect::<Result<_, String>>()?);
+        // Four times as many as long as that does not take too long; up to a million.
+        let (mut n, mut last, mut cost) = (16_000, f64::NAN, renewal(branches, 16_000)?);
+        while n < 1_000_000 {
+            let growth = if last.is_nan() { 16.0 } else { (cost / last).max(4.0) };
+            if cost * growth > LIMIT {
+                break;
+            }
+            n *= 4;
+            (last, cost) = (cost, renewal(branches, n)?);
         }
-        let [few, many] = costs;
         let unit = if branches == Branches::Rest { "" } else { " a unit of time" };
-        let measured = format!("{}{unit}, {:.2} times that of 250,000", duration(many), many / few);
-        line(&format!("10^6 branches, {}", branches.name()), &measured, "linear: 4", Some(many / few < 5.0));
+        let measured =
+            format!("{} for {n}{unit}, {:.2} times that of {}", duration(cost), cost / last, n / 4);
+        let met = n > 1_000_000 && cost / last < 6.0;
+        line(&format!("10^6 branches on one node, {}", branches.name()), &measured, "linear: 4", Some(met));
     }
     Ok(())
+}
+
+/// Seconds of making so many branches, or of a unit of time of what they do afterwards.
+fn renewal(branches: Branches, n: usize) -> Result<f64, String> {
+    let session = solver::session(&branches.text(n))?;
+    let settings = Settings::default();
+    match branches {
+        Branches::Rest => Ok(scale::start(&session, settings)?.seconds),
+        _ => Ok(scale::work(&branches.text(n), settings, 0.5, 2.5)?.seconds / 2.0),
+    }
 }
 
 pub fn frames() -> Outcome {
