@@ -129,7 +129,9 @@ fn what_is_wrong_with_a_patch_is_said() {
     let error = of(&net(3.0, &[])[1..]).unwrap_err().to_string();
     assert!(error.contains("not begun") && error.contains("`@PS(3)`"), "{error}");
     let error = of(&[("@PS", vec![1.0]), ("@PC", vec![1.0, 4.0, 0.0])]).unwrap_err().to_string();
-    assert!(error.contains("row 4") && error.contains("0 to 3"), "{error}");
+    assert!(error.contains("row 4") && error.contains("0, 1, 2 or 3"), "{error}");
+    let error = of(&[("@PS", vec![1.0]), ("@PC", vec![1.0, 0.5, 0.0])]).unwrap_err().to_string();
+    assert!(error.contains("row 0.5"), "{error}");
 }
 
 #[test]
