@@ -36,6 +36,20 @@ fn weigh(weights: &[f64], k: &[Vec<f64>], first: usize, sums: &mut [f64]) {
     }
 }
 
+/// So few components are not worth a block: each is added up by itself, in the same order.
+const FEW: usize = 8;
+
+/// The sum of one component's rates at the stages with these weights.
+fn weighed(weights: &[f64], k: &[Vec<f64>], component: usize) -> f64 {
+    let mut sum = 0.0;
+    for (weight, k) in weights.iter().zip(k) {
+        if *weight != 0.0 {
+            sum += weight * k[component];
+        }
+    }
+    sum
+}
+
 /// Working memory of a step.
 #[derive(Clone, Debug, Default)]
 pub struct Workspace {
@@ -164,6 +178,12 @@ impl Workspace {
 
     /// The state at which a stage's rate is taken.
     fn combine(&mut self, tableau: &Tableau, i: usize, y: &[f64], h: f64) {
+        if y.len() <= FEW {
+            for (j, (s, y)) in self.stage.iter_mut().zip(y).enumerate() {
+                *s = y + h * weighed(tableau.a[i], &self.k, j);
+            }
+            return;
+        }
         let mut first = 0;
         for (y, stage) in y.chunks(BLOCK).zip(self.stage.chunks_mut(BLOCK)) {
             let mut sums = [0.0; BLOCK];
@@ -198,8 +218,14 @@ impl Workspace {
         for first in (0..y.len()).step_by(BLOCK) {
             let count = BLOCK.min(y.len() - first);
             for (row, sums) in tableau.e.iter().zip(&mut sums) {
-                sums[..count].fill(0.0);
-                weigh(row, &self.k, first, &mut sums[..count]);
+                if count <= FEW {
+                    for (j, sum) in (first..).zip(&mut sums[..count]) {
+                        *sum = weighed(row, &self.k, j);
+                    }
+                } else {
+                    sums[..count].fill(0.0);
+                    weigh(row, &self.k, first, &mut sums[..count]);
+                }
             }
             let estimates = sums[0].iter().zip(&sums[1]).take(count);
             for (j, (high, low)) in (first..).zip(estimates) {
