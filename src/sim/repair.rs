@@ -94,12 +94,7 @@ impl Simulation<'_> {
                 return false;
             }
             let Some(trial) = self.integrate(&region) else { return false };
-            if sliced {
-                self.coupled.members.extend_from_slice(joined);
-                self.take_over(&region, trial);
-                return true;
-            }
-            let reach = self.reach(&region, &trial);
+            let reach = if sliced { 0 } else { self.reach(&region, &trial) };
             let closed = region.rings.len() <= rings;
             if reach < region.rings.len() || closed {
                 // One ring beyond the last that changed.
