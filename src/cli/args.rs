@@ -300,7 +300,7 @@ pub struct SharedArgs {
     /// Length of the slices of time of the scheduler `local`; its error is of that order
     #[arg(long, value_name = "DT", allow_negative_numbers = true, value_parser = positive)]
     pub slice: Option<f64>,
-    /// Seed of random numbers, for models that draw them (none does yet)
+    /// Seed of random numbers, for models that draw them: the same seed gives the same plant
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
     /// More modules than this are an error
@@ -312,8 +312,8 @@ pub struct SharedArgs {
     /// Write every production that takes place, up to the last observed time, as a line of JSON
     ///
     /// In the order of time. Fields: t; group, the same number for simultaneous events; lineage and id of the module
-    /// that was replaced, and its name, module; rule, its head; clause, which `produce` of the rule, from 1; line of
-    /// that clause in the model; residual, by how much the two sides of an `=` differ at the located instant (null if
+    /// that was replaced, and its name, module; rule, its head; clause, which `produce` of the rule, from 1; successor,
+    /// where a clause has several, which of them, from 1; line of that clause in the model; residual, by how much the two sides of an `=` differ at the located instant (null if
     /// that is not finite). An error at t = 0 leaves the file empty, a later one leaves what happened before it.
     #[arg(long, value_name = "FILE")]
     pub events: Option<PathBuf>,

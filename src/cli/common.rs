@@ -96,6 +96,8 @@ struct StatsFile {
     simulate_s: f64,
     output_s: f64,
     frames: usize,
+    /// Of random numbers.
+    seed: u64,
     #[serde(flatten)]
     counts: Stats,
 }
@@ -164,6 +166,7 @@ impl Run {
             scheduler,
             tolerance: args.tolerance,
             step_size: args.step_size.unwrap_or(defaults.step_size),
+            seed: args.seed,
             max_modules: args.max_modules,
             log: args.events.is_some(),
             ..defaults
@@ -190,6 +193,7 @@ impl Run {
             simulate_s: clock.simulate.as_secs_f64(),
             output_s: clock.output.as_secs_f64(),
             frames: self.times.len(),
+            seed: self.settings.seed,
             counts,
         };
         let text = serde_json::to_string_pretty(&file).expect("numbers become JSON") + "\n";

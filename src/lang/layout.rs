@@ -121,6 +121,10 @@ struct Scanner<'t> {
     errors: Vec<Diagnostic>,
     /// In a string of modules, where line breaks mean nothing.
     in_string: bool,
+    /// In a string of several successors with weights, such as `produce 2: F or 1: G`.
+    weighted: bool,
+    /// The last token asks for a weight: `produce`, or an `or` between successors.
+    weight_next: bool,
     last: Last,
     levels: Vec<Level>,
     /// Sum over `levels`.
@@ -139,6 +143,8 @@ pub fn layout(text: &str) -> Layout {
         items: Vec::new(),
         errors: Vec::new(),
         in_string: false,
+        weighted: false,
+        weight_next: false,
         last: Last::Operand,
         levels: vec![Level::default()],
         pending: 0,
@@ -218,13 +224,29 @@ impl Scanner<'_> {
         if token.0 == Token::Word { &self.text[token.1..token.2] } else { "" }
     }
 
+    /// Whether a `:` stands on the line outside parentheses opened on it, and before any `produce`, behind which it ends a
+    /// weight.
+    fn has_colon(&self, tokens: &[(Token, usize, usize)]) -> bool {
+        let mut depth = 0i64;
+        for &token in tokens {
+            match token.0 {
+                Token::Open => depth += 1,
+                Token::Close => depth -= 1,
+                Token::Colon if depth <= 0 => return true,
+                Token::Word if depth <= 0 && self.word(token) == "produce" => return false,
+                _ => {}
+            }
+        }
+        false
+    }
+
     fn line(&mut self, start: usize, end: usize, tokens: &[(Token, usize, usize)]) {
         let Some(&first) = tokens.first() else {
             self.line_break(end);
             return;
         };
         let word = self.word(first).to_owned();
-        let colon = colon_outside_parentheses(tokens);
+        let colon = self.has_colon(tokens) && !self.goes_on_with_weight(tokens);
         if let Some(kind) = self.starts_item(&word, colon, tokens) {
             let mut from = first.1;
             if kind == ItemKind::Rule && self.last == Last::Angle && self.levels.len() == 1 {
@@ -240,7 +262,7 @@ impl Scanner<'_> {
                 cut.broken = true;
             }
             self.items.push(RawItem { kind, start: from, end: from, after_colon: None, broken: false });
-            self.in_string = false;
+            (self.in_string, self.weighted, self.weight_next) = (false, false, false);
             self.last = Last::Operator;
             self.held_break = None;
         } else if let Some(at) = self.held_break.take()
@@ -278,6 +300,7 @@ impl Scanner<'_> {
         }
         // A clause with a colon too many is still a clause.
         let clause = matches!(word, "if" | "solve" | "produce") && !self.items.is_empty();
+        let clause = clause || tokens.first().is_some_and(|t| self.is_at_rate(t.1, t.2));
         if colon && !clause {
             return Some(ItemKind::Rule);
         }
@@ -288,7 +311,7 @@ impl Scanner<'_> {
         let continues = match current.kind {
             // What follows a line that is not understood is not to be complained about again.
             ItemKind::Rule | ItemKind::Unknown => {
-                matches!(word, "if" | "solve" | "produce" | "then" | "else")
+                clause || matches!(word, "then" | "else")
             }
             ItemKind::Axiom | ItemKind::Interpret => true,
             _ => matches!(word, "then" | "else"),
@@ -325,8 +348,29 @@ impl Scanner<'_> {
         self.levels.last_mut().expect("never empty")
     }
 
+    /// Whether a line goes on with the successors of a clause, with a weight and its colon: a rule's head begins neither
+    /// with a number nor with a parenthesis, and none stands where a weight must.
+    fn goes_on_with_weight(&self, tokens: &[(Token, usize, usize)]) -> bool {
+        let in_rule = self.items.last().is_some_and(|i| i.kind == ItemKind::Rule);
+        let Some(&first) = tokens.first() else { return false };
+        let begins = matches!(first.0, Token::Number | Token::Open) && (self.weighted || self.weight_next);
+        let or = self.word(first) == "or";
+        in_rule && self.in_string && self.levels.len() == 1 && (begins || self.weighted && (or || self.weight_next))
+    }
+
+    /// Whether `at rate` stands at a word.
+    fn is_at_rate(&self, start: usize, end: usize) -> bool {
+        let next = self.text[end..].trim_start_matches([' ', '\t']);
+        let in_word = |c: char| c.is_alphanumeric() || c == '_';
+        let in_rule = self.items.last().is_some_and(|i| i.kind == ItemKind::Rule && i.after_colon.is_some());
+        in_rule
+            && &self.text[start..end] == "at"
+            && next.strip_prefix("rate").is_some_and(|rest| !rest.starts_with(in_word))
+    }
+
     fn token(&mut self, (token, start, end): (Token, usize, usize)) {
         let in_expression = !self.in_string || self.levels.len() > 1;
+        self.weight_next = false;
         let mut last = Last::Operand;
         match token {
             Token::Word => {
@@ -354,6 +398,8 @@ impl Scanner<'_> {
             }
             Token::Colon => {
                 last = Last::Colon;
+                let in_rule = self.items.last().is_some_and(|i| i.kind == ItemKind::Rule);
+                self.weighted |= in_rule && self.in_string && self.levels.len() == 1;
                 if self.levels.len() == 1
                     && let Some(item) = self.items.last_mut()
                     && item.after_colon.is_none()
@@ -397,9 +443,19 @@ impl Scanner<'_> {
         match &self.text[start..end] {
             "produce" if in_rule && !inside => {
                 self.forget_pending();
-                self.in_string = true;
+                (self.in_string, self.weighted, self.weight_next) = (true, false, true);
                 Last::Operator
             }
+            "or" if in_rule && !inside && self.weighted => {
+                self.weight_next = true;
+                Last::Operator
+            }
+            "at" if !inside && self.is_at_rate(start, end) => {
+                self.forget_pending();
+                self.in_string = false;
+                Last::Operator
+            }
+            "rate" if in_rule && !inside && self.follows_at(start) => Last::Operator,
             word @ ("solve" | "if") if in_rule && !inside && (self.in_string || word == "solve") => {
                 self.forget_pending();
                 self.in_string = false;
@@ -423,6 +479,12 @@ impl Scanner<'_> {
             "strength" if self.items.last().is_some_and(|i| i.kind == ItemKind::Tropism) => Last::Operator,
             _ => Last::Operand,
         }
+    }
+
+    fn follows_at(&self, start: usize) -> bool {
+        let in_word = |c: char| c.is_alphanumeric() || c == '_';
+        let before = self.text[..start].trim_end_matches([' ', '\t']).strip_suffix("at");
+        before.is_some_and(|rest| !rest.ends_with(in_word))
     }
 
     fn count_if(&mut self, yes: bool) {
@@ -453,16 +515,3 @@ impl Scanner<'_> {
     }
 }
 
-/// Whether a `:` stands on the line outside parentheses opened on it.
-fn colon_outside_parentheses(tokens: &[(Token, usize, usize)]) -> bool {
-    let mut depth = 0i64;
-    for (token, ..) in tokens {
-        match token {
-            Token::Open => depth += 1,
-            Token::Close => depth -= 1,
-            Token::Colon if depth <= 0 => return true,
-            _ => {}
-        }
-    }
-    false
-}

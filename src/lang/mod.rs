@@ -9,6 +9,7 @@
 
 mod appearance;
 pub mod ast;
+mod chance;
 mod check;
 mod globals;
 mod layout;
@@ -84,6 +85,7 @@ fn build(
         document,
         scope,
         kinds: &mut kinds,
+        clocks: chance::Clocks::new(document),
         occurs: HashMap::new(),
         drawn: HashMap::new(),
     };
@@ -133,8 +135,8 @@ fn build(
             }
             Item::Rule(rule) => {
                 for clause in &rule.clauses {
-                    if let Action::Produce(modules) = &clause.action {
-                        strings.push(modules);
+                    if let Action::Produce(successors) = &clause.action {
+                        strings.extend(successors.iter().map(|s| &s.modules[..]));
                     }
                 }
                 written.push(rule);
@@ -159,7 +161,7 @@ fn build(
     if !unread {
         builder.check_interpretations(&heads);
     }
-    let (occurs, drawn) = (builder.occurs, builder.drawn);
+    let (occurs, drawn, clocks) = (builder.occurs, builder.drawn, builder.clocks);
     if !single.seen("the initial string") && !unread {
         scope.diagnostics.push(
             Diagnostic::error("the model has no initial string")
@@ -196,6 +198,7 @@ fn build(
             model.kinds.get_mut(kind).rules.push(i);
         }
     }
+    clocks.assign(&mut model.kinds);
     for (kind, interpretation) in interpretations {
         if let Some(before) = model.kinds.get(kind).interpretation {
             scope.diagnostics.push(

@@ -247,6 +247,9 @@ pub fn document(document: &Document) -> String {
                     if let Some(guard) = &clause.guard {
                         text += &format!("if {}\n    ", show(guard));
                     }
+                    if let Some(hazard) = &clause.hazard {
+                        text += &format!("at rate {}\n    ", show(hazard));
+                    }
                     match &clause.action {
                         Action::Solve(equations) => {
                             let all: Vec<String> = equations
@@ -255,8 +258,15 @@ pub fn document(document: &Document) -> String {
                                 .collect();
                             text += &format!("solve {}", all.join(", "));
                         }
-                        Action::Produce(successor) => {
-                            text += &format!("produce {}", modules(e, successor));
+                        Action::Produce(successors) => {
+                            let all: Vec<String> = successors
+                                .iter()
+                                .map(|a| match &a.weight {
+                                    Some(weight) => format!("{}: {}", show(weight), modules(e, &a.modules)),
+                                    None => modules(e, &a.modules),
+                                })
+                                .collect();
+                            text += &format!("produce {}", all.join("\n      or "));
                         }
                     }
                 }

@@ -3,15 +3,16 @@
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-use super::ast::{self, Action, Document, Expression, HeadModule};
+use super::ast::{self, Action, Alternative, Document, Expression, HeadModule};
+use super::chance::{Clocks, Drawn, production_keys};
 use super::print;
 use super::scope::{RESERVED, Scope, Variables, plural};
 use super::suggest::did_you_mean;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::expr::{Binary, Node, NodeId, Program, Unary};
 use crate::model::{
-    Class, Comparison, Condition, Draft, Interpretation, Jacobian, KindId, Kinds, Pattern, Produce, Rule,
-    Solve, Step, Successor, class_of, never_reached,
+    Class, Clock, Comparison, Condition, Draft, Interpretation, Jacobian, KindId, Kinds, Outcome, Pattern,
+    Produce, Rule, Solve, Step, Successor, choose, class_of, never_reached,
 };
 
 /// Longest condition, in comparisons and connectives, after functions are put in.
@@ -22,6 +23,7 @@ pub struct RuleBuilder<'b> {
     pub document: &'b Document,
     pub scope: &'b mut Scope,
     pub kinds: &'b mut Kinds,
+    pub clocks: Clocks,
     /// Each kind that stands in a string, with the first place where it does.
     pub occurs: HashMap<KindId, Span>,
     /// The same of drawings, where they are not those of the kind itself.
@@ -42,13 +44,62 @@ impl RuleBuilder<'_> {
         self.scope.diagnostics.push(error);
     }
 
-    /// A string of modules over the given variables.
+    /// A string of modules that are made, over the given variables.
     pub fn successor(
         &mut self,
         modules: &[ast::Module],
         variables: &Variables,
         count: usize,
     ) -> Option<Successor> {
+        self.scope.draws.allowed = true;
+        let successor = self.string(modules, variables, count);
+        self.scope.draws.allowed = false;
+        successor
+    }
+
+    /// The successors of a clause, with their weights.
+    fn outcome(
+        &mut self,
+        all: &[Alternative],
+        variables: &Variables,
+        count: usize,
+    ) -> Option<Outcome> {
+        let mut weights = Vec::new();
+        let mut successors = Vec::new();
+        for Alternative { weight, modules } in all {
+            let successor = self.successor(modules, variables, count);
+            let weight = weight.map(|w| self.scope.number(&self.document.expressions, w, variables));
+            weights.extend(weight.flatten());
+            successors.extend(successor);
+        }
+        if successors.len() < all.len() || weights.len() < all.iter().filter(|a| a.weight.is_some()).count() {
+            return None;
+        }
+        let fixed: Option<Vec<f64>> = weights.iter().map(|w| self.scope.graph.as_constant(*w)).collect();
+        if let Some(why) = fixed.filter(|w| !w.is_empty()).and_then(|w| choose(&w, 0.5).err()) {
+            let of = |a: &Alternative| a.weight.map(|w| self.document.expressions.span(w.root));
+            let mut spans = all.iter().filter_map(of);
+            let first = spans.next().unwrap_or_default();
+            self.error(
+                Diagnostic::error("these weights cannot be")
+                    .at(spans.fold(first, |a, b| a.to(b)), why)
+                    .help("weights are at least 0, and one of them is greater; they need not add up to 1"),
+            );
+            return None;
+        }
+        let program = Program::compile(&self.scope.graph, &weights, count);
+        Some(Outcome { weights: (!weights.is_empty()).then_some(program), successors })
+    }
+
+    fn string(
+        &mut self,
+        modules: &[ast::Module],
+        variables: &Variables,
+        count: usize,
+    ) -> Option<Successor> {
+        let mut drawn = Drawn::default();
+        let mut clocks = Vec::new();
+        let mut place = 0;
         let mut kinds = Vec::with_capacity(modules.len());
         let mut roots = Vec::new();
         let mut open: Vec<Span> = Vec::new();
@@ -82,6 +133,7 @@ impl RuleBuilder<'_> {
             }
             self.occurs.entry(kind).or_insert(module.span);
             kinds.push(kind);
+            let first = self.scope.draws.all.len() as u32;
             for &argument in &module.arguments {
                 let known = self.scope.diagnostics.len();
                 let Some(node) = self.scope.number(&self.document.expressions, argument, variables) else {
@@ -104,6 +156,12 @@ impl RuleBuilder<'_> {
                 }
                 roots.push(node);
             }
+            let draws = first..self.scope.draws.all.len() as u32;
+            if !draws.is_empty() {
+                drawn.modules.push((place, draws));
+            }
+            clocks.extend(self.clocks.for_new(&module.name, module.arguments.len(), place, roots.len()));
+            place += usize::from(!kind.is_bracket());
         }
         if let Some(bracket) = open.pop() {
             self.error(
@@ -116,7 +174,8 @@ impl RuleBuilder<'_> {
         if !good {
             return None;
         }
-        Some(Successor { kinds, arguments: Program::compile(&self.scope.graph, &roots, count) })
+        let (arguments, draws) = drawn.compile(self.scope, roots, count);
+        Some(Successor { kinds, arguments, draws, clocks })
     }
 
     /// A module whose arguments are bare names, as a rule's head has them.
@@ -140,9 +199,15 @@ impl RuleBuilder<'_> {
         let mut names: HashMap<Arc<str>, NodeId> = HashMap::new();
         let mut spans: HashMap<Arc<str>, Span> = HashMap::new();
         let mut count = 0;
-        for parameter in std::iter::once(own).chain(left).chain(right).flat_map(|m| &m.parameters) {
-            let node = self.scope.graph.var(count);
-            count += 1;
+        let mut parameters = Vec::new();
+        for module in std::iter::once(own).chain(left).chain(right) {
+            parameters.extend(module.parameters.iter().zip(count..));
+            // Behind those that are written, a module has hidden ones.
+            let hidden = self.clocks.width(&module.name.text, module.parameters.len());
+            count += (module.parameters.len() + hidden) as u32;
+        }
+        for (parameter, number) in parameters {
+            let node = self.scope.graph.var(number);
             if RESERVED.contains(&&*parameter.text) {
                 self.error(
                     Diagnostic::error(format!("a parameter cannot be called `{}`", parameter.text))
@@ -188,7 +253,7 @@ impl RuleBuilder<'_> {
         let (variables, count) = self.variables(head, &[], &[]);
         // What is only drawn does not develop: it makes no rule reachable.
         let before = std::mem::take(&mut self.occurs);
-        let drawn = self.successor(drawn, &variables, count);
+        let drawn = self.string(drawn, &variables, count);
         let inside = std::mem::replace(&mut self.occurs, before);
         let kind = self.kinds.intern(&head.name.text, head.parameters.len());
         self.drawn.extend(inside.into_iter().filter(|(other, _)| *other != kind));
@@ -205,10 +270,11 @@ impl RuleBuilder<'_> {
             "±" => &["+", "-"],
             name => &[name],
         };
-        let own = rule.predecessor.parameters.len();
+        let hidden = |me: &Self, m: &HeadModule| me.clocks.width(&m.name.text, m.parameters.len());
         for name in names {
-            self.kinds.intern(name, own);
+            self.kinds.intern(name, rule.predecessor.parameters.len());
         }
+        let own = rule.predecessor.parameters.len() + hidden(self, &rule.predecessor);
         let (variables, count) = self.variables(&rule.predecessor, &rule.left, &rule.right);
         self.scope.comparisons.clear();
 
@@ -216,36 +282,67 @@ impl RuleBuilder<'_> {
         let mut atoms = Atoms::default();
         let mut guards = Vec::new();
         for clause in &rule.clauses {
+            let mut node = None;
             let guard = match clause.guard {
                 None => Some(Condition::default()),
                 Some(guard) => {
-                    let node = self.scope.condition(&self.document.expressions, guard, &variables);
-                    node.and_then(|node| self.decompose(node, clause.span, &mut atoms))
+                    node = self.scope.condition(&self.document.expressions, guard, &variables);
+                    // Under a rate it is the clock that says when.
+                    match (node, &clause.hazard) {
+                        (Some(_), Some(_)) => Some(Condition::default()),
+                        (node, _) => node.and_then(|node| self.decompose(node, clause.span, &mut atoms)),
+                    }
                 }
             };
             good &= guard.is_some();
-            guards.push(guard.unwrap_or_default());
+            guards.push((guard.unwrap_or_default(), node));
         }
+        let mut clocks = Vec::new();
+        let mut hazards = Vec::new();
+        let mut faults = Vec::new();
         let mut drafts = Vec::new();
         let mut produces = Vec::new();
-        for (clause, guard) in rule.clauses.iter().zip(guards) {
-            match &clause.action {
-                Action::Produce(modules) => match self.successor(modules, &variables, count) {
-                    Some(successor) => produces.push(Produce { guard, span: clause.span, successor }),
+        let mut keys = production_keys(rule);
+        for (clause, (guard, node)) in rule.clauses.iter().zip(&guards) {
+            let Action::Produce(successors) = &clause.action else { continue };
+            let key = keys.next().map_or(0, |(_, key)| key);
+            let mut guard = guard.clone();
+            if clause.hazard.is_some() {
+                match self.hazard(clause, (&rule.predecessor, key), *node, &variables) {
+                    Some(hazard) => {
+                        guard = self.clock_is_down(&hazard, &mut atoms)?;
+                        faults.extend(self.negative_rate(&hazard, clause.span, count, &mut atoms));
+                        clocks.push(Clock { parameter: hazard.parameter, produce: produces.len() });
+                        hazards.push(hazard);
+                    }
                     None => good = false,
-                },
-                Action::Solve(equations) => {
-                    let rates = self.equations(equations, &rule.predecessor, &variables);
-                    let (rates, switches) = match rates {
-                        Some(rates) => self.smooth(rates, count, clause.span, &mut atoms)?,
-                        None => {
-                            good = false;
-                            continue;
-                        }
-                    };
-                    drafts.push((guard, clause.span, rates, switches));
                 }
             }
+            match self.outcome(successors, &variables, count) {
+                Some(outcome) => {
+                    produces.push(Produce { guard, span: clause.span, key, is_fault: false, outcome });
+                }
+                None => good = false,
+            }
+        }
+        produces.extend(faults);
+        for (clause, (guard, node)) in rule.clauses.iter().zip(&guards) {
+            let Action::Solve(equations) = &clause.action else { continue };
+            let rates = self.equations(equations, &rule.predecessor, &variables);
+            let Some(mut rates) = rates else {
+                good = false;
+                continue;
+            };
+            rates.extend(hazards.iter().filter_map(|hazard| self.clock_rate(hazard, *node)));
+            let (rates, switches) = self.smooth(rates, count, clause.span, &mut atoms)?;
+            drafts.push((guard.clone(), clause.span, rates, switches));
+        }
+        if let (true, Some(first)) = (drafts.is_empty(), clocks.first()) {
+            // Clocks run, though nothing else does.
+            let span = produces[first.produce].span;
+            let rates = hazards.iter().filter_map(|hazard| self.clock_rate(hazard, None)).collect();
+            let (rates, switches) = self.smooth(rates, count, span, &mut atoms)?;
+            drafts.push((Condition::default(), span, rates, switches));
         }
         if !good {
             return None;
@@ -276,13 +373,20 @@ impl RuleBuilder<'_> {
                     jacobian: Jacobian::default(),
                     watch: Vec::new(),
                     flashes: false,
+                    is_delicate: false,
                 }
             })
             .collect();
         let sides: Vec<NodeId> = atoms.sides.iter().flat_map(|(a, b)| [*a, *b]).collect();
         let sides = Program::compile(&self.scope.graph, &sides, count);
-        let pattern = |m: &HeadModule| Pattern { kinds: Vec::new(), arity: m.parameters.len() };
-        let names = |m: &HeadModule| m.parameters.iter().map(|p| p.text.to_string()).collect::<Vec<_>>();
+        let pattern = |m: &HeadModule| {
+            let arity = m.parameters.len();
+            Pattern { kinds: Vec::new(), arity, width: arity + hidden(self, m) }
+        };
+        let names = |m: &HeadModule| {
+            let clocks = std::iter::repeat_n("clock".to_owned(), hidden(self, m));
+            m.parameters.iter().map(|p| p.text.to_string()).chain(clocks).collect::<Vec<_>>()
+        };
         let compiled = Rule {
             label: print::head(rule),
             span: rule.head,
@@ -297,6 +401,8 @@ impl RuleBuilder<'_> {
             boundaries: atoms.boundaries,
             solves,
             produces,
+            hidden: hidden(self, &rule.predecessor),
+            clocks,
             moving_context: Vec::new(),
             reads_context: false,
             watch_at_rest: Vec::new(),

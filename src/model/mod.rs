@@ -12,6 +12,7 @@
 
 mod analysis;
 mod appearance;
+mod chance;
 mod condition;
 mod invariance;
 mod kind;
@@ -22,13 +23,14 @@ pub use analysis::{Draft, analyse};
 pub use appearance::{
     Appearance, BUILT_IN_COLORS, Contour, Gradient, NamedColor, Net, Rgb, SurfaceShape, Tropism,
 };
+pub use chance::{Clock, Distribution, Draw, NewClock, choose};
 pub use condition::{Comparison, Condition, Sign, Step, Truth};
 pub use invariance::never_reached;
 pub use kind::{
     BUILT_IN_SURFACES, COMMAND_SURFACES, Class, DRAWN_WORDS, Kind, KindId, Kinds, base_of, class_of,
 };
 pub use law::{Jacobian, Law, Linear, Numeric, Obstacle, Watch};
-pub use rule::{Interpretation, Pattern, Produce, Rule, Solve, Successor, Switch};
+pub use rule::{Interpretation, Outcome, Pattern, Produce, Rule, Solve, Successor, Switch};
 
 use std::sync::Arc;
 

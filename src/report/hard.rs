@@ -346,6 +346,9 @@ fn fault_name(fault: &sim::Error) -> &'static str {
         sim::Error::Cascade { .. } => "Cascade",
         sim::Error::Zeno { .. } => "Zeno",
         sim::Error::NotFinite { .. } => "NotFinite",
+        sim::Error::BadDraw { .. } => "BadDraw",
+        sim::Error::BadWeights { .. } => "BadWeights",
+        sim::Error::NegativeRate { .. } => "NegativeRate",
         sim::Error::StepTooSmall { .. } => "StepTooSmall",
         sim::Error::TooManyModules { .. } => "TooManyModules",
     }

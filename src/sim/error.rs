@@ -45,6 +45,12 @@ pub enum Error {
     Zeno { site: Site },
     #[error("{what} of {} is not finite at t = {}", .site.module, .site.when())]
     NotFinite { site: Site, what: String },
+    #[error("`{distribution}` cannot be drawn from at t = {}: {why}", .site.when())]
+    BadDraw { site: Site, distribution: &'static str, why: String },
+    #[error("no successor can be chosen for {} at t = {}: {why}", .site.module, .site.when())]
+    BadWeights { site: Site, why: String },
+    #[error("the rate of an event of {} is negative at t = {}", .site.module, .site.when())]
+    NegativeRate { site: Site },
     #[error("the step size fell to nothing at t = {}", .site.when())]
     StepTooSmall { site: Site },
     #[error("more than {limit} modules at t = {}", .site.when())]
@@ -64,6 +70,9 @@ impl Error {
             | Error::Cascade { site, .. }
             | Error::Zeno { site }
             | Error::NotFinite { site, .. }
+            | Error::BadDraw { site, .. }
+            | Error::BadWeights { site, .. }
+            | Error::NegativeRate { site }
             | Error::StepTooSmall { site }
             | Error::TooManyModules { site, .. } => site,
         }
@@ -104,6 +113,15 @@ impl Error {
             Error::NotFinite { .. } => {
                 d.help("look for a division by zero, a root or logarithm of a negative number, or growth without bound")
             }
+            Error::BadDraw { .. } => d.help(
+                "uniform(a, b) and integer(a, b) need a <= b, normal(mean, sd) and lognormal(mu, sigma) a deviation of at least 0, exponential(rate) a rate greater than 0: bound the parameter, as in `max(0.01, …)`",
+            ),
+            Error::BadWeights { .. } => d.help(
+                "weights are at least 0, and one of them is greater; they need not add up to 1. To replace nothing at some values, say so in the clause's condition: `if … produce …`",
+            ),
+            Error::NegativeRate { .. } => {
+                d.help("a rate is at least 0: bound it, as in `at rate max(0, …)`, or say when there is none: `if … at rate … produce …`")
+            }
             Error::StepTooSmall { .. } => d.help(
                 "the solution may become infinite here, or the equations jump in a way that no `if` shows; a fixed step (`--method rk4 --step-size H`) shows how it behaves",
             ),
@@ -123,6 +141,9 @@ impl Error {
             Error::Cascade { .. } => "this production applies again and again",
             Error::Zeno { .. } => "this production comes sooner and sooner",
             Error::NotFinite { .. } => "computed here",
+            Error::BadDraw { .. } => "drawn here",
+            Error::BadWeights { .. } => "by the weights of this clause",
+            Error::NegativeRate { .. } => "the rate of this clause",
             Error::StepTooSmall { .. } => "these equations",
             Error::TooManyModules { .. } => "this production made the last of them",
         }

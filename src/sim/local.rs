@@ -219,13 +219,14 @@ impl Simulation<'_> {
                 self.alone.restart(self.settings.method, y.len());
             }
             let fixed = self.settings.method.is_fixed_step();
+            let settings = self.settings.for_clocks(rule.solves[solve].is_delicate);
             // For stiff equations, bounds of rates say nothing.
             let stiff = control.stiff || self.settings.method == Method::Radau;
             let flashes = rule.solves[solve].flashes && !fixed && !stiff;
             let mut tries = 0;
             let step = loop {
                 let stats = &mut self.stats;
-                let step = self.alone.step(&self.settings, &mut control, &mut system, &y, from, None, stats);
+                let step = self.alone.step(&settings, &mut control, &mut system, &y, from, None, stats);
                 let step = step.map(|_| self.alone.dense(&mut system, &y));
                 let Ok(dense) = &step else { break step };
                 tries += 1;

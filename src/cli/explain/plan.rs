@@ -218,6 +218,7 @@ impl Facts<'_> {
             line: self.line(span.start),
             condition: if guard.is_always() { String::new() } else { self.guard(span) },
         };
+        let real = rule.produces.iter().filter(|p| !p.is_fault);
         RulePlan {
             head: rule.label.clone(),
             line: self.line(rule.span.start),
@@ -228,7 +229,7 @@ impl Facts<'_> {
                     parameters: self.parameters(index, solve),
                 })
                 .collect(),
-            produces: rule.produces.iter().map(|p| clause(&p.guard, p.span)).collect(),
+            produces: real.map(|p| clause(&p.guard, p.span)).collect(),
             conditions: (0..rule.atoms.len()).map(|atom| self.condition(rule, atom)).collect(),
         }
     }
@@ -343,11 +344,11 @@ impl Facts<'_> {
         }
         let mut first = rule.parameters.len();
         for pattern in rule.left.iter().chain(&rule.right) {
-            if variable < first + pattern.arity {
+            if variable < first + pattern.width {
                 let kinds = pattern.kinds.iter().map(|kind| self.model.kinds.get(*kind));
                 return { kinds }.any(|kind| is_numeric(self.model, kind, Some(variable - first)));
             }
-            first += pattern.arity;
+            first += pattern.width;
         }
         false
     }

@@ -15,7 +15,7 @@ fn words(rule: Rule) -> Option<&'static str> {
     Some(match rule {
         expr | number | literal | ident | call | if_expr | neg | not | coefficient => "an expression",
         or | and | le | ge | ne | lt | gt | eq | add | sub | mul | div | pow => "an operator",
-        module | modules | successor | name => "a module",
+        module | modules | successor | alternative | name => "a module",
         epsilon => "`ε` for nothing",
         arguments => "`(` and parameters",
         formals => "`(` and the names of parameters",
@@ -23,6 +23,9 @@ fn words(rule: Rule) -> Option<&'static str> {
         left_of => "`<` after the left context",
         right_of => "`>` and the right context",
         clause => "`if`, `solve` or `produce`",
+        kw_or => "`or` and another successor",
+        hazard | kw_at => "`at rate`",
+        kw_rate => "`rate`",
         solve | kw_solve => "`solve`",
         produce | kw_produce => "`produce`",
         kw_if => "`if`",
@@ -234,6 +237,12 @@ fn hint_by_word(item: Rule, text: &str, at: usize, found: &str) -> Option<String
         "then" if in_rule => "a clause has no `then`: `if x < 2 solve …`",
         "in" if item == Rule::const_item => "only a `param` has a range",
         "and" => "“and” is written `&`",
+        "or" if in_rule && line.contains("produce") => {
+            "several successors each have a weight before them: `produce 2: F(x) or 1: G(x)`"
+        }
+        _ if in_rule && last_word == "or" && before.contains("produce") => {
+            "several successors each have a weight before them: `produce 2: F(x) or 1: G(x)`"
+        }
         "or" => "“or” is written `|`",
         "not" => "“not” is written `!`",
         "to" if item == Rule::frames_item => "frames are written `frames 0 .. 10 step 0.1`",
