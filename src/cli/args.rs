@@ -232,6 +232,10 @@ pub struct ReportArgs {
     /// fourteen for euler]
     #[arg(long, value_name = "H1,H2,…", value_delimiter = ',', value_parser = positive, conflicts_with = "hard")]
     pub step_sizes: Option<Vec<f64>>,
+    /// Slices of time of `--scheduler local`, whose error is measured where modules read their neighbours [default: ten
+    /// powers of two, as step sizes]
+    #[arg(long, value_name = "DT1,DT2,…", allow_negative_numbers = true, value_delimiter = ',', value_parser = positive, conflicts_with = "hard")]
+    pub slices: Option<Vec<f64>>,
     /// Times at which to compare [default: the model's `frames`, at most 50 of them]
     #[arg(long, value_name = "T1,T2,…", allow_negative_numbers = true, value_delimiter = ',', value_parser = time, conflicts_with_all = ["from", "to", "step", "hard"])]
     pub at: Option<Vec<f64>>,
