@@ -4,6 +4,9 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use super::fmt::FmtArgs;
+use super::new::NewArgs;
+use super::shell::{self, CompletionsArgs, ManArgs};
 use crate::export::{Camera, Layout, Page};
 use crate::lang::Setting;
 use crate::scene::Color;
@@ -20,8 +23,16 @@ pub struct Command {
 
 #[derive(Debug, Subcommand)]
 pub enum Action {
+    /// Write a model to begin with, NAME.dls, with comments; never over a file that is there
+    New(NewArgs),
     /// Read a model and say what is wrong with it, without running it
     Check(CheckArgs),
+    /// Lay out model files canonically; comments and line breaks stay, and so does what they say
+    ///
+    /// A declaration or rule begins in the first column, clauses are indented by 2, what follows an `if` on lines of
+    /// their own by 4. Binary + - < = & | have spaces around them, * / ^ none; in strings of modules one space or none,
+    /// as written. A file that does not parse stays as it is. A file is replaced as a whole or not at all.
+    Fmt(FmtArgs),
     /// Say how much work each equation and each condition of a model is (with the method `auto`), and why
     #[command(after_long_help = EXPLAIN_JSON)]
     Explain(ExplainArgs),
@@ -47,6 +58,11 @@ pub enum Action {
     ///
     /// With --hard, models are run that state their exact answers in their first lines, and checked.
     Report(ReportArgs),
+    /// Print a script that completes commands and flags in a shell
+    #[command(after_long_help = shell::WHERE, after_help = shell::WHERE)]
+    Completions(CompletionsArgs),
+    /// Print a manual page: `dlsys man > dlsys.1`, `dlsys man render | man -l -`
+    Man(ManArgs),
 }
 
 /// How the paper's figures are made.
@@ -194,6 +210,13 @@ pub struct RenderArgs {
     /// Write into a directory that holds other files
     #[arg(long)]
     pub force: bool,
+    /// Go on until Ctrl-C: render again whenever the model, or a surface that it uses, is saved. An error is shown, and
+    /// the frames of the last good model stay
+    #[arg(long)]
+    pub watch: bool,
+    /// Say nothing of what was written, and show no progress
+    #[arg(short, long)]
+    pub quiet: bool,
 }
 
 #[derive(Debug, Args)]

@@ -144,8 +144,7 @@ fn action_columns(lines: &[Line<'_>], roles: &[Role]) -> Vec<Option<usize>> {
         }
         made.width
     };
-    let together =
-        |i: usize| i < lines.len() && roles[i].begin == Begin::Clause && roles[i].action.is_some();
+    let together = |i: usize| i < lines.len() && roles[i].begin == Begin::Clause && roles[i].action.is_some();
     let mut start = 0;
     while start < lines.len() {
         let end = (start..).find(|&i| !together(i)).unwrap_or(lines.len());
@@ -169,6 +168,8 @@ struct Cursor {
     /// The first column of a declared string, here and in the text; whether the lines that continue it stand below it.
     string: Option<(usize, usize)>,
     below: Option<bool>,
+    /// Brackets that were open before the lines at the left began.
+    base: usize,
 }
 
 impl Cursor {
@@ -224,13 +225,18 @@ impl Cursor {
     fn continuation(&mut self, line: &Line<'_>) -> usize {
         let first = &line.pieces[0];
         let closing = line.pieces.iter().take_while(|piece| matches!(piece.text, "]" | ")")).count();
-        let inner = 2 * self.open.saturating_sub(closing).min(DEEPEST);
+        let inner = |base: usize| 2 * self.open.saturating_sub(closing + base).min(DEEPEST);
         let mut anchor = self.anchor;
         if let Some((column, written)) = self.string {
             // The writer may put the lines below the string's first module, or at the left.
-            let below = *self.below.get_or_insert(first.column.saturating_sub(inner) > written / 2);
+            let first_line = self.below.is_none();
+            let below = *self.below.get_or_insert(first.column.saturating_sub(inner(0)) > written / 2);
             anchor = if below { column } else { 2 };
+            if first_line && !below {
+                self.base = self.open;
+            }
         }
+        let inner = inner(self.base);
         if first.text == "or" && first.operator {
             // Below the keyword, so that what it offers stands below the first offer.
             anchor = anchor.saturating_sub(3);
@@ -269,8 +275,10 @@ fn sides(symbol: &Piece<'_>) -> Sides {
 /// Whether a space stands between two pieces of a line.
 fn space(before: &Piece<'_>, after: &Piece<'_>) -> bool {
     let kept = !after.touches;
-    let word = |piece: &Piece<'_>| piece.token == Token::Word && piece.operator && !piece.grouped
-        || matches!(piece.text, "if" | "solve" | "produce") && piece.operator;
+    let word = |piece: &Piece<'_>| {
+        piece.token == Token::Word && piece.operator && !piece.grouped
+            || matches!(piece.text, "if" | "solve" | "produce") && piece.operator
+    };
     if before.token == Token::Open || matches!(after.token, Token::Close | Token::Comma | Token::Colon) {
         return false;
     }
@@ -324,14 +332,15 @@ fn indent_comments(lines: &[Line<'_>], roles: &[Role], made: &mut [Made]) {
     }
 }
 
-/// Puts comments behind neighbouring lines into one column.
+/// Puts the comments behind the lines of a paragraph into one column.
 fn align_comments(lines: &[Line<'_>], made: &mut [Made]) {
-    let trailing = |i: usize| i < lines.len() && !lines[i].pieces.is_empty() && lines[i].comment.is_some();
+    let code = |i: usize| i < lines.len() && !lines[i].pieces.is_empty();
     let mut start = 0;
     while start < lines.len() {
-        let end = (start..).find(|&i| !trailing(i)).unwrap_or(lines.len());
-        let common = made[start..end].iter().map(|m| m.width).filter(|&w| w <= LONG_LINE).max().unwrap_or(0);
-        for i in start..end {
+        let end = (start..).find(|&i| !code(i)).unwrap_or(lines.len());
+        let trailing = || (start..end).filter(|&i| lines[i].comment.is_some());
+        let common = trailing().map(|i| made[i].width).filter(|&w| w <= LONG_LINE).max().unwrap_or(0);
+        for i in trailing() {
             let column = made[i].width.max(common) + 2;
             made[i].pad(column);
             made[i].push(lines[i].comment.unwrap_or_default());

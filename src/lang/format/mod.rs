@@ -86,10 +86,7 @@ mod tests {
             ("surface @M  from\t\"m.s\"", "surface @M from \"m.s\""),
             ("contour c=(1,0)(0,1) (-1, 0)", "contour c = (1, 0) (0, 1) (-1, 0)"),
             ("tropism 0,-1,0 strength 0.2", "tropism 0, -1, 0 strength 0.2"),
-            (
-                "axiom:  F (x)[+( 30)A]  -  ![ @L(-1) ]  ;(2 , 3)",
-                "axiom: F(x)[+(30)A] - ![ @L(-1) ] ;(2, 3)",
-            ),
+            ("axiom:  F (x)[+( 30)A]  -  ![ @L(-1) ]  ;(2 , 3)", "axiom: F(x)[+(30)A] - ![ @L(-1) ] ;(2, 3)"),
             ("A(x)<B( y )>C(z) :solve dy/dt=-x*z", "A(x) < B(y) > C(z): solve dy/dt = -x*z"),
             ("±( α ):solve dα / dt = 1", "±(α): solve dα/dt = 1"),
             ("interpret @L(s) :;(2)F( s )@L(s)", "interpret @L(s): ;(2)F(s)@L(s)"),
@@ -111,16 +108,16 @@ mod tests {
         let tame = "# About.\ntitle \"Bush\"\n\ninitial string:\n  F(1)\n  [ +(30)\n    F(2)\n  ] F(3)\n\n\
             # The apex.\nA(x, y):\n  # grows\n  if x < 1 & y > 2  solve dx/dt = 1,\n                          \
             dy/dt = (1 +\n                            2)\n  if x = 1  produce F(x)\n                    \
-            A(0)  # new\n  if x > 1\n    solve dx/dt = 0  #still\n  if y = 0 &\n     x = 0\n\n    produce ε\n  \
+            A(0)  # new\n  if x > 1\n    solve dx/dt = 0       #still\n  if y = 0 &\n     x = 0\n\n    produce ε\n  \
             # nothing else\n\n#end\ninterpret A(x, y): F(x)\n                   F(y)\ninterpret B: F\n  F\n";
         assert_eq!(formatted(wild), tame);
     }
 
     #[test]
     fn guards_and_comments_stand_in_columns() {
-        let wild = "const a = 1 # one\nconst bcd = 2 # two\n\nconst e = 3 # three\nF(x):\n if x < a solve dx/dt = bcd\n\
+        let wild = "const a = 1 # one\nconst x = 10*10*10\nconst bcd = 2 # two\n\nconst e = 3 # three\nF(x):\n if x < a solve dx/dt = bcd\n\
             if x = a & t > e produce ε\naxiom: F(0)";
-        let tame = "const a = 1    # one\nconst bcd = 2  # two\n\nconst e = 3  # three\nF(x):\n  \
+        let tame = "const a = 1    # one\nconst x = 10*10*10\nconst bcd = 2  # two\n\nconst e = 3  # three\nF(x):\n  \
             if x < a          solve dx/dt = bcd\n  if x = a & t > e  produce ε\naxiom: F(0)\n";
         assert_eq!(formatted(wild), tame);
     }
