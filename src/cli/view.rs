@@ -1,4 +1,4 @@
-//! `dlsys view`: a window with the growing plant, or a page that plays it.
+//! `dlsys view`: a page for the browser that plays the growth.
 
 use std::io::Write;
 use std::path::Path;
@@ -6,8 +6,7 @@ use std::path::Path;
 use indicatif::ProgressBar;
 
 use super::args::ViewArgs;
-use super::common::{Failure, Run, out_error};
-use super::render::bar;
+use super::common::{Failure, Run, bar, out_error};
 use crate::export::{self, Survey, View};
 use crate::scene::Scene;
 use crate::sim::Settings;
@@ -18,25 +17,9 @@ use crate::view::{Recorder, Recording, Stage, page};
 /// Most frames of a recording; a screen shows no more in five minutes.
 const MOST_FRAMES: usize = 20_000;
 
-/// Shows a model.
+/// Writes the page of a model.
 pub fn view(args: &ViewArgs) -> Result<(), Failure> {
-    match &args.out {
-        Some(out) => write_page(args, out),
-        None => window(args),
-    }
-}
-
-/// Without the feature there is no window.
-fn window(args: &ViewArgs) -> Result<(), Failure> {
-    Err(Failure::Usage(format!(
-        "error: this dlsys was built without the window\n  \
-         help: build it with `cargo install --path . --features viewer`, or write a page for the browser:\n        \
-         dlsys view {} -o plant.html\n",
-        args.shared.model.display()
-    )))
-}
-
-fn write_page(args: &ViewArgs, out: &Path) -> Result<(), Failure> {
+    let out = args.out.as_path();
     spare(args, out)?;
     let run = Run::start(&args.shared)?;
     let count = run.times.len();

@@ -1,8 +1,7 @@
 //! The live viewer: a growing plant as something to walk around.
 //!
 //! ```text
-//! Scene ──▶ Stage ──▶ window (feature `viewer`), drawn as it is
-//!             └────▶ Recording ──▶ page (one HTML file that plays it)
+//! Scene ──▶ Stage ──▶ Recording ──▶ page (one HTML file that plays it)
 //! ```
 //!
 //! - [`Stage`]: a scene as a graphics processor takes it. What repeats (a surface, the side of a stem, a patch) is a
@@ -11,7 +10,7 @@
 //! - [`Recording`]: stages over time, each thing followed by the lineage of its module.
 //! - [`page`]: the recording, a player and the shaders in one file that needs no network.
 //!
-//! The shaders (`shaders/`) are the same for the page and the window.
+//! The shaders (`shaders/`) have no version line: whoever compiles them puts it first.
 
 mod encode;
 mod forms;

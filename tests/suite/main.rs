@@ -5,6 +5,7 @@
 //! - [`language`]: text to model and back; hostile input.
 //! - [`gallery`]: every mistake in `tests/errors` and the message it gets.
 //! - [`cli`]: the program as it is typed.
+//! - [`editing`]: layout, `new`, `render --watch`, completions.
 //! - [`inspect`]: what `explain`, `--events` and `check --continuity` say.
 //! - [`export`]: SVG and OBJ, read back by other people's code.
 //! - [`schedulers`]: local repair against one clock, remembered neighbours against the whole string.
@@ -14,6 +15,7 @@
 
 mod cli;
 mod common;
+mod editing;
 mod export;
 mod gallery;
 mod inspect;
