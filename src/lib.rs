@@ -83,3 +83,8 @@ pub mod session;
 pub mod sim;
 pub mod structure;
 pub mod turtle;
+
+/// The listings of the book's chapter about the library are compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/src/library.md")]
+struct BookOfTheLibrary;
