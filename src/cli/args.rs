@@ -30,6 +30,11 @@ pub enum Action {
     /// Run a model and draw it: a file for each frame, or all frames on one sheet
     #[command(after_long_help = RENDER_EXAMPLES)]
     Render(RenderArgs),
+    /// Watch a model grow: in a window, or, with -o, as a page for the browser that plays the recorded growth
+    ///
+    /// The page is one file that needs no network: with orbit, timeline, productions and the values of the params it was
+    /// made with. The window needs a dlsys that was built with `--features viewer`.
+    View(ViewArgs),
     /// Draw the paper's figures that show development, from the models that come with the program
     ///
     /// Each figure is what `dlsys render` makes of a line; --list prints the lines. Writes a folder for each picture,
@@ -197,6 +202,22 @@ pub struct RenderArgs {
 }
 
 #[derive(Debug, Args)]
+pub struct ViewArgs {
+    #[command(flatten)]
+    pub shared: SharedArgs,
+    /// Write a page that plays the growth, such as plant.html, instead of opening a window
+    #[arg(short, long = "out", value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// How far what is drawn may be from a curved surface, in scene units [default: 1/2000 of the extent of the
+    /// whole animation]
+    #[arg(long, value_name = "L", value_parser = positive)]
+    pub accuracy: Option<f64>,
+    /// Write over a file that is not a page of dlsys
+    #[arg(long, requires = "out")]
+    pub force: bool,
+}
+
+#[derive(Debug, Args)]
 pub struct GalleryArgs {
     /// Directory for the pictures; made if it is not there
     #[arg(short, long = "out", value_name = "DIR", required_unless_present = "list")]
@@ -232,6 +253,10 @@ pub struct ReportArgs {
     /// fourteen for euler]
     #[arg(long, value_name = "H1,H2,…", value_delimiter = ',', value_parser = positive, conflicts_with = "hard")]
     pub step_sizes: Option<Vec<f64>>,
+    /// Slices of time of `--scheduler local`, whose error is measured where modules read their neighbours [default: ten
+    /// powers of two, as step sizes]
+    #[arg(long, value_name = "DT1,DT2,…", allow_negative_numbers = true, value_delimiter = ',', value_parser = positive, conflicts_with = "hard")]
+    pub slices: Option<Vec<f64>>,
     /// Times at which to compare [default: the model's `frames`, at most 50 of them]
     #[arg(long, value_name = "T1,T2,…", allow_negative_numbers = true, value_delimiter = ',', value_parser = time, conflicts_with_all = ["from", "to", "step", "hard"])]
     pub at: Option<Vec<f64>>,

@@ -1,4 +1,4 @@
-//! The command line: `dlsys check`, `explain`, `run`, `render`, `gallery` and `report`.
+//! The command line: `dlsys check`, `explain`, `run`, `render`, `view`, `gallery` and `report`.
 //!
 //! Exit status: 0 done; 1 the model or the run is at fault; 2 the command line is.
 
@@ -12,6 +12,7 @@ mod parallel;
 mod render;
 mod report;
 mod run;
+mod view;
 
 use clap::Parser;
 
@@ -33,6 +34,7 @@ pub fn main() -> u8 {
         Action::Explain(args) => explain::explain(args),
         Action::Run(args) => run::run(args),
         Action::Render(args) => render::render(args),
+        Action::View(args) => view::view(args),
         Action::Gallery(args) => gallery::gallery(args),
         Action::Report(args) => report::report(args),
     };

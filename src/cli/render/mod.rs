@@ -221,7 +221,7 @@ fn record(fit: &Fit, shot: &Shot, scene: &Scene, file: String) -> FrameRecord {
 }
 
 /// A progress bar; it hides itself where standard error is no terminal.
-fn bar(what: &'static str, count: usize) -> ProgressBar {
+pub fn bar(what: &'static str, count: usize) -> ProgressBar {
     let style = ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} {per_sec}, {eta} left");
     ProgressBar::new(count as u64)
         .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
