@@ -85,3 +85,8 @@ pub mod sim;
 pub mod structure;
 pub mod turtle;
 pub mod view;
+
+/// The listings of the book's chapter about the library are compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/src/library.md")]
+struct BookOfTheLibrary;

@@ -1,5 +1,6 @@
 //! The test suite, in one binary, because linking takes longer than running.
 //!
+//! - [`book`]: the book in `docs/`, followed literally; [`pages`] reads its Markdown.
 //! - [`listings`]: the paper's models against results of an independent program.
 //! - [`semantics`]: what happens when (events, contexts, errors of a run), model by small model.
 //! - [`language`]: text to model and back; hostile input.
@@ -13,6 +14,7 @@
 //! - [`plants`]: the paper's plants: order of flowering, continuity, the gallery.
 //! - [`report`]: studies of methods, and hard cases with exact answers.
 
+mod book;
 mod cli;
 mod common;
 mod editing;
@@ -22,6 +24,7 @@ mod inspect;
 mod language;
 mod listings;
 mod organs;
+mod pages;
 mod pictures;
 mod plants;
 mod report;
