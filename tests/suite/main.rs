@@ -4,6 +4,7 @@
 //! - [`semantics`]: what happens when (events, contexts, errors of a run), model by small model.
 //! - [`language`]: text to model and back; hostile input.
 //! - [`gallery`]: every mistake in `tests/errors` and the message it gets.
+//! - [`discrete`]: derivation steps, against the models of a book; cuts.
 //! - [`cli`]: the program as it is typed.
 //! - [`inspect`]: what `explain`, `--events` and `check --continuity` say.
 //! - [`export`]: SVG and OBJ, read back by other people's code.
@@ -14,6 +15,7 @@
 
 mod cli;
 mod common;
+mod discrete;
 mod export;
 mod gallery;
 mod inspect;
