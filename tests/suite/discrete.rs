@@ -454,3 +454,33 @@ fn steps_are_the_same_whichever_way_they_are_made() {
         assert_eq!(run(other, &[24.0]), few);
     }
 }
+
+#[test]
+fn the_page_on_discrete_rules_tells_what_happens() {
+    let page = std::fs::read_to_string(repository("docs/language/discrete.md")).expect("there");
+    let listings: Vec<&str> =
+        page.split("```dls\n").skip(1).map(|rest| rest.split("```").next().expect("it ends")).collect();
+    assert_eq!(listings.len(), 5);
+    for listing in &listings {
+        let session = Session::from_text("listing.dls", listing, &[]).expect("a good listing");
+        assert!(session.warnings.is_empty(), "{:?}", session.warnings);
+    }
+    let words = strings(listings[0], &[0.0, 1.0, 2.0, 3.0]);
+    for word in &words {
+        assert!(page.contains(&word.replace(',', ", ")), "the page has {word}");
+    }
+    assert_eq!(strings(listings[1], &[3.0]), [["C(1)"; 8].join(" ")]);
+    assert_eq!(strings(listings[2], &[3.0, 4.0]), ["S(3) [ B(3) L L ] F(1)", "S(4) [ ] F(1)"]);
+    // The same segments; in the growing tree those of the last step have just begun.
+    let times: Vec<f64> = (1..8).map(f64::from).collect();
+    let (steps, growth) = (strings(listings[3], &times), strings(listings[4], &times));
+    for (i, (step, grown)) in steps.iter().zip(&growth).enumerate() {
+        let segments = |text: &str| text.split(' ').filter(|m| m.starts_with('F')).count();
+        assert_eq!(segments(step), segments(grown));
+        assert_eq!(grown.matches("F(0,").count(), 1 << i);
+    }
+    for model in std::fs::read_dir(repository("models/abop")).expect("there") {
+        let text = std::fs::read_to_string(model.expect("there").path()).expect("there");
+        assert!(Session::from_text("model.dls", &text, &[]).expect("good").warnings.is_empty());
+    }
+}
