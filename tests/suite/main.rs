@@ -5,6 +5,7 @@
 //! - [`semantics`]: what happens when (events, contexts, errors of a run), model by small model.
 //! - [`language`]: text to model and back; hostile input.
 //! - [`gallery`]: every mistake in `tests/errors` and the message it gets.
+//! - [`discrete`]: derivation steps, against the models of a book; cuts.
 //! - [`cli`]: the program as it is typed.
 //! - [`editing`]: layout, `new`, `render --watch`, completions.
 //! - [`inspect`]: what `explain`, `--events` and `check --continuity` say.
@@ -17,6 +18,7 @@
 mod book;
 mod cli;
 mod common;
+mod discrete;
 mod editing;
 mod export;
 mod gallery;
