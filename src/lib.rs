@@ -60,6 +60,7 @@
 //! | [`scene`] | geometry that knows no file format |
 //! | [`export`] | files |
 //! | [`session`] | the pipeline as a whole |
+//! | [`replay`] | any time after any other |
 //! | [`report`] | how good the answers are, and what they cost |
 //! | [`cli`] | the program |
 //! | [`diagnostic`] | messages that point at the text |
@@ -69,7 +70,7 @@
 //!
 //! # What it does not do yet
 //!
-//! No random numbers, no REPL, no viewer.
+//! No random numbers, no viewer.
 
 pub mod cli;
 pub mod diagnostic;
@@ -77,6 +78,7 @@ pub mod export;
 pub mod expr;
 pub mod lang;
 pub mod model;
+pub mod replay;
 pub mod report;
 pub mod scene;
 pub mod session;

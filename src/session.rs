@@ -22,7 +22,7 @@ use crate::model::Model;
 use crate::sim::{self, Simulation};
 
 /// A model that was read, with its text.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Session {
     pub source: Source,
     pub model: Model,
@@ -63,6 +63,22 @@ impl Session {
         let source = Source::from_bytes(name, bytes)
             .map_err(|e| Box::new(Refused { source: e.0, diagnostics: vec![e.1], settings: Vec::new() }))?;
         Session::from_source(source, settings, &NoFiles)
+    }
+
+    /// Takes a model's text from memory; the surfaces that it names come from a folder, as if the text were a file
+    /// there. `name` stands for the file in messages.
+    ///
+    /// # Errors
+    /// As of [`Session::open`].
+    pub fn from_text_in(
+        folder: &Path,
+        name: &str,
+        text: &str,
+        settings: &[Setting],
+    ) -> Result<Session, Box<Refused>> {
+        let source = Source::from_bytes(name, text.as_bytes().to_vec())
+            .map_err(|e| Box::new(Refused { source: e.0, diagnostics: vec![e.1], settings: Vec::new() }))?;
+        Session::from_source(source, settings, &Folder(folder.to_owned()))
     }
 
     fn from_source(source: Source, settings: &[Setting], files: &dyn Files) -> Result<Session, Box<Refused>> {

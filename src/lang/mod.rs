@@ -12,6 +12,7 @@ pub mod ast;
 mod check;
 mod globals;
 mod layout;
+pub mod outline;
 pub mod parse;
 pub mod print;
 mod rules;
@@ -19,6 +20,7 @@ mod scope;
 mod smooth;
 mod suggest;
 mod surface;
+pub mod words;
 
 use std::collections::HashMap;
 use std::sync::Arc;

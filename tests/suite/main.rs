@@ -10,6 +10,7 @@
 //! - [`schedulers`]: local repair against one clock, remembered neighbours against the whole string.
 //! - [`pictures`]: pixels, perspective, and sheets of several frames.
 //! - [`plants`]: the paper's plants: order of flowering, continuity, the gallery.
+//! - [`replay`]: any time after any other, to the bits of a run.
 //! - [`report`]: studies of methods, and hard cases with exact answers.
 
 mod cli;
@@ -22,6 +23,7 @@ mod listings;
 mod organs;
 mod pictures;
 mod plants;
+mod replay;
 mod report;
 mod schedulers;
 mod semantics;
