@@ -61,6 +61,7 @@
 //! | [`export`] | files |
 //! | [`session`] | the pipeline as a whole |
 //! | [`replay`] | any time after any other |
+//! | [`repl`] | the interactive session |
 //! | [`report`] | how good the answers are, and what they cost |
 //! | [`cli`] | the program |
 //! | [`diagnostic`] | messages that point at the text |
@@ -76,8 +77,10 @@ pub mod cli;
 pub mod diagnostic;
 pub mod export;
 pub mod expr;
+pub mod interrupt;
 pub mod lang;
 pub mod model;
+pub mod repl;
 pub mod replay;
 pub mod report;
 pub mod scene;

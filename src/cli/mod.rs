@@ -1,17 +1,18 @@
-//! The command line: `dlsys check`, `explain`, `run`, `render`, `gallery` and `report`.
+//! The command line: `dlsys check`, `explain`, `run`, `render`, `gallery`, `report` and `repl`.
 //!
 //! Exit status: 0 done; 1 the model or the run is at fault; 2 the command line is.
 
-mod args;
-mod common;
+pub(crate) mod args;
+pub(crate) mod common;
 mod continuity;
+pub(crate) mod embedded;
 mod events;
 mod explain;
 mod gallery;
 mod parallel;
 mod render;
 mod report;
-mod run;
+pub(crate) mod run;
 
 use clap::Parser;
 
@@ -35,6 +36,7 @@ pub fn main() -> u8 {
         Action::Render(args) => render::render(args),
         Action::Gallery(args) => gallery::gallery(args),
         Action::Report(args) => report::report(args),
+        Action::Repl(args) => crate::repl::repl(args),
     };
     match done {
         Ok(()) | Err(Failure::ClosedPipe) => 0,

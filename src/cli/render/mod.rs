@@ -24,9 +24,15 @@ use reel::{Pass, Shot, play};
 
 /// Runs a model and writes its frames.
 pub fn render(args: &RenderArgs) -> Result<(), Failure> {
+    flags::survey(args)?;
+    flags::agree(args)?;
+    render_run(args, Run::start(&args.shared)?)
+}
+
+/// The same of a model that was read.
+pub fn render_run(args: &RenderArgs, run: Run) -> Result<(), Failure> {
     let survey = flags::survey(args)?;
     flags::agree(args)?;
-    let run = Run::start(&args.shared)?;
     let mut clock = run.clock;
     let mut render = Render { args, run: &run, threads: flags::threads(args), frames: Vec::new() };
     let mut fit = render.measure(survey, &mut clock)?.fit();
