@@ -123,6 +123,14 @@ impl Tree {
         (self.modules + 2 * branches, self.values.len())
     }
 
+    /// Bytes that it takes, about.
+    pub fn size(&self) -> usize {
+        size_of_val(&self.nodes[..])
+            + size_of_val(&self.values[..])
+            + self.broods.size()
+            + 4 * self.free.len()
+    }
+
     /// Slots that have ever been used; `ModuleId::slot` is below this.
     pub fn slots(&self) -> usize {
         self.nodes.len()
