@@ -86,14 +86,16 @@ pub struct Desk {
     pub names: Rc<RefCell<Names>>,
     /// Files that this session has written, and may write again.
     pub written: HashSet<PathBuf>,
-    /// Messages of warnings that were shown.
+    /// Warnings that were shown, and those that will be, with what they are known by: much of what is missing while somebody
+    /// types is typed next, so these wait until the model is run.
     warned: HashSet<String>,
+    waiting: Vec<(String, String)>,
 }
 
 impl Desk {
     pub fn new(settings: Settings, screen: Screen) -> Desk {
         let (draft, set, names, written, warned) = Default::default();
-        Desk { draft, set, settings, screen, names, written, warned }
+        Desk { draft, set, settings, screen, names, written, warned, waiting: Vec::new() }
     }
 
     /// Prints an answer.
@@ -123,6 +125,7 @@ impl Desk {
     pub fn begin_empty(&mut self) -> Flow {
         (self.draft, self.set) = Default::default();
         self.warned.clear();
+        self.waiting.clear();
         let session = Session::from_text("typed", "initial string: ε", &[]).expect("an empty model is one");
         *self.names.borrow_mut() = Names::of(&session.model, "");
         Flow::Model { session: Box::new(session), time: 0.0 }
@@ -159,7 +162,7 @@ impl Desk {
     /// Reads a changed text, and keeps it if it is good.
     pub fn change(&mut self, change: Change, time: f64) -> Result<Flow, Fault> {
         let session = self.read(&change.text, &self.set)?;
-        self.warn(&session, Draft::has_axiom(&change.text));
+        self.note_warnings(&session);
         let done = change.done.join(", ");
         self.draft.accept(change);
         if !done.is_empty() {
@@ -213,7 +216,8 @@ impl Desk {
     }
 
     fn welcome(&mut self, session: &Session) -> Result<(), Fault> {
-        self.warn(session, true);
+        self.note_warnings(session);
+        self.warn();
         let model = &session.model;
         let title = model.title.as_ref().map_or(String::new(), |title| format!("{title}: "));
         let plural = |n: usize, word: &str| format!("{n} {word}{}", if n == 1 { "" } else { "s" });
@@ -227,17 +231,23 @@ impl Desk {
         ))
     }
 
-    /// Prints the warnings that were not there before. While there is no initial string, what is missing is still to come.
-    fn warn(&mut self, session: &Session, whole: bool) {
-        if !whole {
-            return;
-        }
-        for warning in &session.warnings {
+    /// Remembers the warnings that were not shown before.
+    fn note_warnings(&mut self, session: &Session) {
+        self.waiting.clear();
+        for warning in session.warnings.iter().take(MOST_SHOWN) {
             let place = warning.labels.first().map(|(span, _)| session.source.slice(*span));
             let key = format!("{} {}", warning.message, place.unwrap_or(""));
-            if self.warned.len() < 10_000 && self.warned.insert(key) {
-                self.complain(&warning.render(&session.source, self.screen.coloured));
+            if !self.warned.contains(&key) {
+                self.waiting.push((key, warning.render(&session.source, self.screen.coloured)));
             }
+        }
+    }
+
+    /// Prints the warnings that wait.
+    pub fn warn(&mut self) {
+        for (key, text) in std::mem::take(&mut self.waiting) {
+            self.complain(&text);
+            self.warned.insert(key);
         }
     }
 

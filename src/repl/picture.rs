@@ -10,7 +10,7 @@ use crate::sim::brief;
 use crate::turtle;
 
 /// A dot is set where so much of it (of 255) is covered; stems may be thinner than a dot.
-const COVERED: u8 = 24;
+const COVERED: u8 = 48;
 
 impl Stage<'_> {
     /// What is to be seen at present.
@@ -57,8 +57,8 @@ impl Stage<'_> {
         let side = |length: f64, most: f64| (length * scale).round().clamp(2.0, most) as u32;
         let size = Size::Exact(side(width, most[0]), side(height, most[1]));
         let page = Page::new(picture, size, None).map_err(Fault::new)?;
-        // A line that is thinner than a dot would be seen here and there only.
-        fit.default_width = fit.default_width.max(1.2 / scale);
+        // Lines of default width are a dot wide: thinner, they would be seen here and there only.
+        fit.default_width = 1.4 / scale;
         let lines = match blocks {
             true => half_blocks(&scene, &fit, &page, desk.screen.coloured),
             false => dots(&scene, &fit, &page, desk.screen.coloured),

@@ -133,6 +133,9 @@ impl<'m> Stage<'m> {
                 Err(Fault::new(format!("`{}` takes nothing more, but `{word}` follows", command.name)))
             }
         };
+        if ["run", "step", "plot", "render", "save"].contains(&command.name) && self.replay.is_some() {
+            desk.warn();
+        }
         match command.name {
             "quit" => return nothing(Flow::Quit),
             "help" => desk.say(&commands::help(&rest.join(" ")).map_err(Fault::new)?)?,
