@@ -9,6 +9,7 @@
 //! A line break ends an expression or a condition, except inside parentheses, after an operator or a
 //! comma, or before `then` and `else` (LANGUAGE, "Text"). Inside a string of modules it means nothing.
 
+use super::lexeme::{Lexeme, Token};
 use crate::diagnostic::{Diagnostic, Span};
 
 /// Deepest nesting of parentheses, signs, powers and `if` that an expression may have.
@@ -96,18 +97,6 @@ enum Last {
     Colon,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Token {
-    Word,
-    Number,
-    Text,
-    Open,
-    Close,
-    Comma,
-    Colon,
-    Symbol,
-}
-
 /// A parenthesis that is open, and what recursion is pending inside it.
 #[derive(Clone, Copy, Debug, Default)]
 struct Level {
@@ -133,10 +122,22 @@ struct Scanner<'t> {
     held_break: Option<usize>,
     /// Start of a run of lines that each end with `<` or `>`.
     run_of_angles: Option<usize>,
+    /// All tokens, where somebody wants them.
+    lexemes: Option<Vec<Lexeme>>,
 }
 
 /// Cuts a text into items. Time and memory are linear in the text.
 pub fn layout(text: &str) -> Layout {
+    scan(text, None).0
+}
+
+/// Cuts a text into items, and tells all tokens.
+pub fn lexemes(text: &str) -> (Layout, Vec<Lexeme>) {
+    let (layout, lexemes) = scan(text, Some(Vec::new()));
+    (layout, lexemes.unwrap_or_default())
+}
+
+fn scan(text: &str, lexemes: Option<Vec<Lexeme>>) -> (Layout, Option<Vec<Lexeme>>) {
     let mut scanner = Scanner {
         text,
         out: text.as_bytes().to_vec(),
@@ -148,6 +149,7 @@ pub fn layout(text: &str) -> Layout {
         pending: 0,
         held_break: None,
         run_of_angles: None,
+        lexemes,
     };
     let mut tokens = Vec::new();
     let mut start = 0;
@@ -158,7 +160,7 @@ pub fn layout(text: &str) -> Layout {
         start = end + 1;
     }
     scanner.close_item(text.len());
-    let Scanner { out, mut items, mut errors, .. } = scanner;
+    let Scanner { out, mut items, mut errors, lexemes, .. } = scanner;
     for item in &mut items {
         if item.end - item.start > MAX_ITEM && item.kind != ItemKind::Axiom && !item.broken {
             item.broken = true;
@@ -171,7 +173,7 @@ pub fn layout(text: &str) -> Layout {
     }
     // Only ASCII bytes were put in place of whole characters.
     let text = String::from_utf8(out).expect("whole characters were replaced");
-    Layout { text, items, errors }
+    (Layout { text, items, errors }, lexemes)
 }
 
 fn memchr_newline(text: &str, from: usize) -> usize {
@@ -387,6 +389,7 @@ impl Scanner<'_> {
 
     fn token(&mut self, (token, start, end): (Token, usize, usize)) {
         let in_expression = !self.in_string || self.levels.len() > 1;
+        let (after_operand, depth) = (self.last == Last::Operand, self.levels.len() - 1);
         let mut last = Last::Operand;
         match token {
             Token::Word => {
@@ -447,6 +450,10 @@ impl Scanner<'_> {
             }
         }
         self.last = last;
+        if let Some(lexemes) = &mut self.lexemes {
+            let (in_string, operator) = (!in_expression, last != Last::Operand);
+            lexemes.push(Lexeme { token, start, end, in_string, after_operand, operator, depth });
+        }
         let depth = self.levels.len() - 1 + self.pending;
         if depth > MAX_DEPTH {
             self.fault(

@@ -10,8 +10,10 @@
 mod appearance;
 pub mod ast;
 mod check;
+pub mod format;
 mod globals;
 mod layout;
+mod lexeme;
 pub mod parse;
 pub mod print;
 mod rules;
