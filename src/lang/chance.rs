@@ -9,7 +9,9 @@ use super::rules::{Atoms, RuleBuilder};
 use super::scope::{Lowered, Scope, Variables, plural};
 use crate::diagnostic::{Diagnostic, Span};
 use crate::expr::{Binary, Graph, Interval, Node, NodeId, Program, Unary};
-use crate::model::{Class, Condition, Distribution, Draw, Kinds, NewClock, Outcome, Produce, base_of, class_of};
+use crate::model::{
+    Class, Condition, Distribution, Draw, Kinds, NewClock, Outcome, Produce, base_of, class_of,
+};
 use crate::structure::key;
 
 /// Variables at and above this number are draws, before they get their places.
@@ -37,7 +39,12 @@ pub struct Draws {
 
 impl Scope {
     /// A call of a distribution.
-    pub(super) fn draw(&mut self, distribution: Distribution, span: Span, nodes: Vec<NodeId>) -> Option<Lowered> {
+    pub(super) fn draw(
+        &mut self,
+        distribution: Distribution,
+        span: Span,
+        nodes: Vec<NodeId>,
+    ) -> Option<Lowered> {
         let wanted = distribution.parameters();
         if wanted.map_or(nodes.is_empty(), |wanted| nodes.len() != wanted) {
             let wanted = wanted.map_or("values to choose from".to_owned(), |n| plural(n, "parameter"));
@@ -276,7 +283,9 @@ impl RuleBuilder<'_> {
             self.scope.diagnostics.push(
                 Diagnostic::error("a rate is a number of at least 0")
                     .at(span, format!("this is {value}"))
-                    .help("it is the mean number of events in a unit of time: `at rate 0.5` is one in 2 units"),
+                    .help(
+                        "it is the mean number of events in a unit of time: `at rate 0.5` is one in 2 units",
+                    ),
             );
             return None;
         }
@@ -356,4 +365,3 @@ fn is_never_negative(graph: &Graph, rate: NodeId, count: usize) -> bool {
     Program::compile(graph, &[rate], count).eval(&variables, &mut Vec::new(), &mut out);
     out[0].lo >= 0.0
 }
-

@@ -9,6 +9,9 @@
 //! A line break ends an expression or a condition, except inside parentheses, after an operator or a
 //! comma, or before `then` and `else` (LANGUAGE, "Text"). Inside a string of modules it means nothing.
 
+mod ahead;
+
+use super::lexeme::{Lexeme, Token};
 use crate::diagnostic::{Diagnostic, Span};
 
 /// Deepest nesting of parentheses, signs, powers and `if` that an expression may have.
@@ -25,6 +28,7 @@ pub enum ItemKind {
     Param,
     Def,
     Angle,
+    Period,
     Frames,
     Color,
     Gradient,
@@ -36,17 +40,20 @@ pub enum ItemKind {
     Axiom,
     Interpret,
     Rule,
+    /// A discrete rule, known by its arrow.
+    Step,
     /// A line that begins nothing known.
     Unknown,
 }
 
 /// The words that begin a declaration.
-pub const DECLARATIONS: [(&str, ItemKind); 16] = [
+pub const DECLARATIONS: [(&str, ItemKind); 17] = [
     ("title", ItemKind::Title),
     ("const", ItemKind::Const),
     ("param", ItemKind::Param),
     ("def", ItemKind::Def),
     ("angle", ItemKind::Angle),
+    ("period", ItemKind::Period),
     ("frames", ItemKind::Frames),
     ("color", ItemKind::Color),
     ("gradient", ItemKind::Gradient),
@@ -92,18 +99,6 @@ enum Last {
     Colon,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Token {
-    Word,
-    Number,
-    Text,
-    Open,
-    Close,
-    Comma,
-    Colon,
-    Symbol,
-}
-
 /// A parenthesis that is open, and what recursion is pending inside it.
 #[derive(Clone, Copy, Debug, Default)]
 struct Level {
@@ -133,10 +128,22 @@ struct Scanner<'t> {
     held_break: Option<usize>,
     /// Start of a run of lines that each end with `<` or `>`.
     run_of_angles: Option<usize>,
+    /// All tokens, where somebody wants them.
+    lexemes: Option<Vec<Lexeme>>,
 }
 
 /// Cuts a text into items. Time and memory are linear in the text.
 pub fn layout(text: &str) -> Layout {
+    scan(text, None).0
+}
+
+/// Cuts a text into items, and tells all tokens.
+pub fn lexemes(text: &str) -> (Layout, Vec<Lexeme>) {
+    let (layout, lexemes) = scan(text, Some(Vec::new()));
+    (layout, lexemes.unwrap_or_default())
+}
+
+fn scan(text: &str, lexemes: Option<Vec<Lexeme>>) -> (Layout, Option<Vec<Lexeme>>) {
     let mut scanner = Scanner {
         text,
         out: text.as_bytes().to_vec(),
@@ -150,6 +157,7 @@ pub fn layout(text: &str) -> Layout {
         pending: 0,
         held_break: None,
         run_of_angles: None,
+        lexemes,
     };
     let mut tokens = Vec::new();
     let mut start = 0;
@@ -160,7 +168,7 @@ pub fn layout(text: &str) -> Layout {
         start = end + 1;
     }
     scanner.close_item(text.len());
-    let Scanner { out, mut items, mut errors, .. } = scanner;
+    let Scanner { out, mut items, mut errors, lexemes, .. } = scanner;
     for item in &mut items {
         if item.end - item.start > MAX_ITEM && item.kind != ItemKind::Axiom && !item.broken {
             item.broken = true;
@@ -173,7 +181,7 @@ pub fn layout(text: &str) -> Layout {
     }
     // Only ASCII bytes were put in place of whole characters.
     let text = String::from_utf8(out).expect("whole characters were replaced");
-    Layout { text, items, errors }
+    (Layout { text, items, errors }, lexemes)
 }
 
 fn memchr_newline(text: &str, from: usize) -> usize {
@@ -224,22 +232,6 @@ impl Scanner<'_> {
         if token.0 == Token::Word { &self.text[token.1..token.2] } else { "" }
     }
 
-    /// Whether a `:` stands on the line outside parentheses opened on it, and before any `produce`, behind which it ends a
-    /// weight.
-    fn has_colon(&self, tokens: &[(Token, usize, usize)]) -> bool {
-        let mut depth = 0i64;
-        for &token in tokens {
-            match token.0 {
-                Token::Open => depth += 1,
-                Token::Close => depth -= 1,
-                Token::Colon if depth <= 0 => return true,
-                Token::Word if depth <= 0 && self.word(token) == "produce" => return false,
-                _ => {}
-            }
-        }
-        false
-    }
-
     fn line(&mut self, start: usize, end: usize, tokens: &[(Token, usize, usize)]) {
         let Some(&first) = tokens.first() else {
             self.line_break(end);
@@ -247,9 +239,20 @@ impl Scanner<'_> {
         };
         let word = self.word(first).to_owned();
         let colon = self.has_colon(tokens) && !self.goes_on_with_weight(tokens);
-        if let Some(kind) = self.starts_item(&word, colon, tokens) {
+        let arrow = self.arrow_outside_parentheses(tokens);
+        if arrow == Some(first.1) || arrow.is_some() && self.goes_on() {
+            // What looked like the head of a rule is that of a discrete one, broken over lines.
+            if let Some(item) = self.items.last_mut().filter(|i| i.kind == ItemKind::Rule) {
+                item.kind = ItemKind::Step;
+                self.held_break = None;
+            }
+        }
+        if let Some(kind) = self.starts_item(&word, colon, arrow.is_some(), tokens) {
             let mut from = first.1;
-            if kind == ItemKind::Rule && self.last == Last::Angle && self.levels.len() == 1 {
+            if matches!(kind, ItemKind::Rule | ItemKind::Step)
+                && self.last == Last::Angle
+                && self.levels.len() == 1
+            {
                 // The head was broken over lines; take back the lines before.
                 from = self.run_of_angles.unwrap_or(from);
             }
@@ -287,20 +290,31 @@ impl Scanner<'_> {
     }
 
     /// Whether a line begins an item, and which.
-    fn starts_item(&self, word: &str, colon: bool, tokens: &[(Token, usize, usize)]) -> Option<ItemKind> {
+    fn starts_item(
+        &self,
+        word: &str,
+        colon: bool,
+        arrow: bool,
+        tokens: &[(Token, usize, usize)],
+    ) -> Option<ItemKind> {
         let declared = DECLARATIONS.iter().find(|(name, _)| *name == word).map(|(_, kind)| *kind);
         let inside = self.levels.len() > 1;
         if let Some(kind) = declared {
             // Inside parentheses that somebody forgot to close, a declaration still begins one; but an
             // identifier that happens to be called `angle` does not.
             let next_is_word = matches!(tokens.get(1), Some((Token::Word | Token::Text, ..)));
-            if !inside || next_is_word || colon {
+            if !inside || next_is_word || colon || arrow {
                 return Some(kind);
             }
         }
         // A clause with a colon too many is still a clause.
         let clause = matches!(word, "if" | "solve" | "produce") && !self.items.is_empty();
         let clause = clause || tokens.first().is_some_and(|t| self.is_at_rate(t.1, t.2));
+        // So is one with an arrow; and the head of a discrete rule may have been on the line before.
+        let goes_on = self.items.last().is_some_and(|i| i.kind == ItemKind::Step) && !self.in_string;
+        if arrow && !clause && !goes_on {
+            return Some(ItemKind::Step);
+        }
         if colon && !clause {
             return Some(ItemKind::Rule);
         }
@@ -310,10 +324,8 @@ impl Scanner<'_> {
         }
         let continues = match current.kind {
             // What follows a line that is not understood is not to be complained about again.
-            ItemKind::Rule | ItemKind::Unknown => {
-                clause || matches!(word, "then" | "else")
-            }
-            ItemKind::Axiom | ItemKind::Interpret => true,
+            ItemKind::Rule | ItemKind::Unknown => clause || matches!(word, "then" | "else"),
+            ItemKind::Axiom | ItemKind::Interpret | ItemKind::Step => true,
             _ => matches!(word, "then" | "else"),
         };
         (!continues).then_some(ItemKind::Unknown)
@@ -348,29 +360,10 @@ impl Scanner<'_> {
         self.levels.last_mut().expect("never empty")
     }
 
-    /// Whether a line goes on with the successors of a clause, with a weight and its colon: a rule's head begins neither
-    /// with a number nor with a parenthesis, and none stands where a weight must.
-    fn goes_on_with_weight(&self, tokens: &[(Token, usize, usize)]) -> bool {
-        let in_rule = self.items.last().is_some_and(|i| i.kind == ItemKind::Rule);
-        let Some(&first) = tokens.first() else { return false };
-        let begins = matches!(first.0, Token::Number | Token::Open) && (self.weighted || self.weight_next);
-        let or = self.word(first) == "or";
-        in_rule && self.in_string && self.levels.len() == 1 && (begins || self.weighted && (or || self.weight_next))
-    }
-
-    /// Whether `at rate` stands at a word.
-    fn is_at_rate(&self, start: usize, end: usize) -> bool {
-        let next = self.text[end..].trim_start_matches([' ', '\t']);
-        let in_word = |c: char| c.is_alphanumeric() || c == '_';
-        let in_rule = self.items.last().is_some_and(|i| i.kind == ItemKind::Rule && i.after_colon.is_some());
-        in_rule
-            && &self.text[start..end] == "at"
-            && next.strip_prefix("rate").is_some_and(|rest| !rest.starts_with(in_word))
-    }
-
     fn token(&mut self, (token, start, end): (Token, usize, usize)) {
         let in_expression = !self.in_string || self.levels.len() > 1;
         self.weight_next = false;
+        let (after_operand, depth) = (self.last == Last::Operand, self.levels.len() - 1);
         let mut last = Last::Operand;
         match token {
             Token::Word => {
@@ -398,9 +391,10 @@ impl Scanner<'_> {
             }
             Token::Colon => {
                 last = Last::Colon;
-                let in_rule = self.items.last().is_some_and(|i| i.kind == ItemKind::Rule);
-                self.weighted |= in_rule && self.in_string && self.levels.len() == 1;
+                let weight = self.in_successor();
+                self.weighted |= weight;
                 if self.levels.len() == 1
+                    && !weight
                     && let Some(item) = self.items.last_mut()
                     && item.after_colon.is_none()
                 {
@@ -413,7 +407,14 @@ impl Scanner<'_> {
                 let symbol = &self.text[start..end];
                 let binary = self.last == Last::Operand;
                 last = if matches!(symbol, "<" | ">") { Last::Angle } else { Last::Operator };
-                if in_expression {
+                if self.is_arrow(start, end)
+                    && self.levels.len() == 1
+                    && self.items.last().is_some_and(|i| i.kind == ItemKind::Step)
+                {
+                    last = Last::Operator;
+                    (self.in_string, self.weighted, self.weight_next) = (true, false, true);
+                    self.forget_pending();
+                } else if in_expression {
                     let level = self.levels.last_mut().expect("never empty");
                     if symbol == "^" || !binary {
                         level.right += 1;
@@ -426,6 +427,10 @@ impl Scanner<'_> {
             }
         }
         self.last = last;
+        if let Some(lexemes) = &mut self.lexemes {
+            let (in_string, operator) = (!in_expression, last != Last::Operand);
+            lexemes.push(Lexeme { token, start, end, in_string, after_operand, operator, depth });
+        }
         let depth = self.levels.len() - 1 + self.pending;
         if depth > MAX_DEPTH {
             self.fault(
@@ -446,7 +451,7 @@ impl Scanner<'_> {
                 (self.in_string, self.weighted, self.weight_next) = (true, false, true);
                 Last::Operator
             }
-            "or" if in_rule && !inside && self.weighted => {
+            "or" if self.weighted && self.in_successor() => {
                 self.weight_next = true;
                 Last::Operator
             }
@@ -481,12 +486,6 @@ impl Scanner<'_> {
         }
     }
 
-    fn follows_at(&self, start: usize) -> bool {
-        let in_word = |c: char| c.is_alphanumeric() || c == '_';
-        let before = self.text[..start].trim_end_matches([' ', '\t']).strip_suffix("at");
-        before.is_some_and(|rest| !rest.ends_with(in_word))
-    }
-
     fn count_if(&mut self, yes: bool) {
         if yes {
             self.level().ifs += 1;
@@ -514,4 +513,3 @@ impl Scanner<'_> {
         self.held_break.get_or_insert(at);
     }
 }
-

@@ -5,7 +5,9 @@
 
 use std::fmt::Write;
 
-use super::ast::{Action, Document, Expr, ExprId, Expressions, HeadModule, Item, Module, Name, Operator};
+use super::ast::{
+    Action, Alternative, Document, Expr, ExprId, Expressions, HeadModule, Item, Module, Name, Operator,
+};
 
 /// How tightly a node binds; the loosest is 0.
 fn strength(expr: &Expr) -> u8 {
@@ -198,6 +200,31 @@ pub fn head(rule: &super::ast::Rule) -> String {
     out
 }
 
+/// The successors of a clause, with their weights.
+fn alternatives(expressions: &Expressions, all: &[Alternative]) -> Vec<String> {
+    let show = |a: &Alternative| match &a.weight {
+        Some(weight) => {
+            format!("{}: {}", expression(expressions, weight.root), modules(expressions, &a.modules))
+        }
+        None => modules(expressions, &a.modules),
+    };
+    all.iter().map(show).collect()
+}
+
+/// A discrete rule, on one line.
+fn discrete_rule(expressions: &Expressions, rule: &super::ast::Rule) -> String {
+    let mut text = head(rule);
+    for clause in &rule.clauses {
+        if let Some(guard) = &clause.guard {
+            text += &format!(" : {}", expression(expressions, guard.root));
+        }
+        if let Action::Produce(all) = &clause.action {
+            text += &format!(" -> {}", alternatives(expressions, all).join(" or "));
+        }
+    }
+    text
+}
+
 /// A whole document, one declaration a line, one clause a line.
 pub fn document(document: &Document) -> String {
     let e = &document.expressions;
@@ -215,6 +242,7 @@ pub fn document(document: &Document) -> String {
                 format!("def {}({}) = {}", name.text, names(parameters, ", "), show(body))
             }
             Item::Angle(value) => format!("angle {}", show(value)),
+            Item::Period(value) => format!("period {}", show(value)),
             Item::Frames { from, to, step } => {
                 format!("frames {} .. {} step {}", show(from), show(to), show(step))
             }
@@ -240,6 +268,7 @@ pub fn document(document: &Document) -> String {
             Item::Interpret { head, drawn } => {
                 format!("interpret {}: {}", head_module(head), modules(e, drawn))
             }
+            Item::Rule(rule) if rule.discrete => discrete_rule(e, rule),
             Item::Rule(rule) => {
                 let mut text = head(rule) + ":";
                 for clause in &rule.clauses {
@@ -259,13 +288,7 @@ pub fn document(document: &Document) -> String {
                             text += &format!("solve {}", all.join(", "));
                         }
                         Action::Produce(successors) => {
-                            let all: Vec<String> = successors
-                                .iter()
-                                .map(|a| match &a.weight {
-                                    Some(weight) => format!("{}: {}", show(weight), modules(e, &a.modules)),
-                                    None => modules(e, &a.modules),
-                                })
-                                .collect();
+                            let all = alternatives(e, successors);
                             text += &format!("produce {}", all.join("\n      or "));
                         }
                     }

@@ -419,8 +419,7 @@ impl Scope {
             }
             return None;
         }
-        let formal =
-            |v: u32| (FORMAL..DRAW).contains(&v).then(|| arguments[(v - FORMAL) as usize]);
+        let formal = |v: u32| (FORMAL..DRAW).contains(&v).then(|| arguments[(v - FORMAL) as usize]);
         let drawn = self.draw_again(draws, &formal)?;
         let comparisons = &self.function_comparisons;
         let mut moved = Vec::new();

@@ -55,7 +55,8 @@ pub fn analyse(graph: &mut Graph, model: &mut Model, drafts: &[Draft]) {
             let roots: Vec<NodeId> = numeric.iter().map(|i| rates[*i].1).collect();
             solve.numeric_rates = Program::compile(graph, &roots, total);
             solve.linear = linear(graph, &roots, &constants, total);
-            let clocked = rates.iter().any(|(parameter, _)| rule.clocks.iter().any(|c| c.parameter == *parameter));
+            let clocked =
+                rates.iter().any(|(parameter, _)| rule.clocks.iter().any(|c| c.parameter == *parameter));
             solve.is_delicate = clocked && laws.iter().any(|law| !law.is_closed());
             solve.flashes = nodes.iter().any(|&rate| flashes(graph, rate, rule.variables - 2));
             solve.laws = laws;
@@ -330,7 +331,7 @@ fn mark_drawn_only(graph: &Graph, model: &mut Model, drafts: &[Draft]) {
     let mut read: HashSet<(usize, usize)> = HashSet::new();
     let mut kinds_of: Vec<Vec<usize>> = vec![Vec::new(); model.rules.len()];
     for (id, kind) in model.kinds.iter() {
-        for &rule in &kind.rules {
+        for rule in kind.all_rules() {
             kinds_of[rule].push(id.index());
         }
     }

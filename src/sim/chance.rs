@@ -16,8 +16,14 @@ use crate::structure::{Family, Lineage, Purpose, Seed};
 #[derive(Clone, Debug)]
 pub enum Misfortune {
     /// A distribution has parameters that it cannot have.
-    Draw { span: Span, distribution: &'static str, why: String },
-    Weights { why: String },
+    Draw {
+        span: Span,
+        distribution: &'static str,
+        why: String,
+    },
+    Weights {
+        why: String,
+    },
     /// An argument is no finite number.
     NotFinite,
 }

@@ -9,8 +9,8 @@ use super::{Pair, Rule};
 use crate::diagnostic::{Diagnostic, Span};
 use crate::lang::ast;
 use crate::lang::ast::{
-    Action, Alternative, Clause, Equation, Expr, ExprId, Expression, Expressions, HeadModule, Item, Module, Name,
-    Operator, Text,
+    Action, Alternative, Clause, Equation, Expr, ExprId, Expression, Expressions, HeadModule, Item, Module,
+    Name, Operator, Text,
 };
 use crate::model::Comparison;
 
@@ -105,6 +105,7 @@ impl Builder<'_> {
                 body: self.expression(next())?,
             },
             Rule::angle_item => Item::Angle(self.expression(next())?),
+            Rule::period_item => Item::Period(self.expression(next())?),
             Rule::frames_item => Item::Frames {
                 from: self.expression(next())?,
                 to: self.expression(next())?,
@@ -144,6 +145,22 @@ impl Builder<'_> {
                 }
                 Item::Rule(rule)
             }
+            Rule::step_item => {
+                let mut rule = self.head(next());
+                rule.discrete = true;
+                let (mut guard, mut made) = (None, Vec::new());
+                let mut span = rule.head;
+                for part in inner {
+                    span = span.to(self.span(&part));
+                    match part.as_rule() {
+                        Rule::expr => guard = Some(self.expression(part)?),
+                        Rule::successor | Rule::choice => made = self.alternatives(part)?,
+                        _ => {}
+                    }
+                }
+                rule.clauses.push(Clause { guard, hazard: None, action: Action::Produce(made), span });
+                Item::Rule(rule)
+            }
             other => unreachable!("{other:?} is no item"),
         })
     }
@@ -172,7 +189,7 @@ impl Builder<'_> {
         let (mut left, mut right, mut predecessor) = (Vec::new(), Vec::new(), None);
         for part in pair.into_inner() {
             match part.as_rule() {
-                Rule::context => {
+                Rule::context | Rule::step_context => {
                     let side = if predecessor.is_none() { &mut left } else { &mut right };
                     for module in part.into_inner() {
                         side.push(self.head_module(module));
@@ -183,7 +200,7 @@ impl Builder<'_> {
             }
         }
         let predecessor = predecessor.expect("the grammar has a predecessor here");
-        ast::Rule { left, predecessor, right, head, clauses: Vec::new() }
+        ast::Rule { left, predecessor, right, head, discrete: false, clauses: Vec::new() }
     }
 
     fn clause(&mut self, pair: Pair) -> Built<Clause> {
@@ -413,6 +430,7 @@ fn is_punctuation(rule: Rule) -> bool {
             | Rule::kw_param
             | Rule::kw_def
             | Rule::kw_angle
+            | Rule::kw_period
             | Rule::kw_frames
             | Rule::kw_step
             | Rule::kw_in
