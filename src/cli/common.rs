@@ -27,6 +27,18 @@ pub enum Failure {
     Stale,
 }
 
+impl Failure {
+    /// The same, with the seed of the specimen that failed.
+    pub fn of_seed(self, seed: u64) -> Failure {
+        match self {
+            Failure::Model(message) => {
+                Failure::Model(format!("{message}  = of the specimen with `--seed {seed}`\n"))
+            }
+            other => other,
+        }
+    }
+}
+
 /// What an error of standard output means.
 pub fn out_error(error: std::io::Error) -> Failure {
     match error.kind() {

@@ -15,6 +15,7 @@ pub mod format;
 mod globals;
 mod layout;
 mod lexeme;
+mod measure;
 pub mod outline;
 pub mod parse;
 pub mod print;
@@ -30,6 +31,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 pub use layout::MAX_DEPTH;
+pub use measure::measure;
 pub use suggest::did_you_mean;
 pub use surface::{Files, NoFiles};
 

@@ -45,7 +45,7 @@ impl RuleBuilder<'_> {
     }
 
     /// The variables of a head, and how many there are with `t` and `age`.
-    fn variables(
+    pub(super) fn variables(
         &mut self,
         own: &HeadModule,
         left: &[HeadModule],
@@ -112,8 +112,9 @@ impl RuleBuilder<'_> {
         if !self.not_a_bracket(head) {
             return None;
         }
+        // Who draws or measures a module sees what is written of it, and no clocks.
+        let clocks = std::mem::take(&mut self.clocks);
         let (variables, count) = self.variables(head, &[], &[]);
-        // What is only drawn does not develop: it makes no rule reachable.
         if let Some(cut) = drawn.iter().find(|module| &*module.name == CUT) {
             self.error(
                 Diagnostic::error("a drawing cuts nothing off")
@@ -121,8 +122,10 @@ impl RuleBuilder<'_> {
                     .help("to draw nothing, write `ε`"),
             );
         }
+        // What is only drawn does not develop: it makes no rule reachable.
         let before = std::mem::take(&mut self.occurs);
         let drawn = self.string(drawn, &variables, count);
+        self.clocks = clocks;
         let inside = std::mem::replace(&mut self.occurs, before);
         let kind = self.kinds.intern(&head.name.text, head.parameters.len());
         self.drawn.extend(inside.into_iter().filter(|(other, _)| *other != kind));

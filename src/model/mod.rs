@@ -17,6 +17,7 @@ mod condition;
 mod invariance;
 mod kind;
 mod law;
+mod measure;
 mod rule;
 
 pub use analysis::{Draft, analyse};
@@ -30,6 +31,7 @@ pub use kind::{
     BUILT_IN_SURFACES, COMMAND_SURFACES, CUT, Class, DRAWN_WORDS, Kind, KindId, Kinds, base_of, class_of,
 };
 pub use law::{Jacobian, Law, Linear, Numeric, Obstacle, Watch};
+pub use measure::Measure;
 pub use rule::{Interpretation, Outcome, Pattern, Produce, Rule, Solve, Successor, Switch};
 
 use std::sync::Arc;

@@ -342,6 +342,14 @@ impl Facts<'_> {
         if solve.is_some_and(|s| s.unreachable[atom]) {
             return ("never met", "the equations approach it and never arrive".to_owned());
         }
+        if let Watch::Crossing { variable, .. } = watch
+            && self.clock(rule, *variable).is_some()
+        {
+            return (
+                "closed-form time",
+                "a formula tells when the integral of the rate is what was drawn".to_owned(),
+            );
+        }
         if let Watch::Crossing { variable, level } = watch {
             return ("closed-form time", words::crossing(rule, *variable, level));
         }

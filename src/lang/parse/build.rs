@@ -258,6 +258,14 @@ impl Builder<'_> {
         Ok(all)
     }
 
+    /// A head, and the expression behind its colon.
+    pub fn measure(&mut self, pair: Pair) -> Built<(HeadModule, Option<Expression>)> {
+        let mut inner = pair.into_inner().filter(|p| matches!(p.as_rule(), Rule::head_module | Rule::expr));
+        let head = self.head_module(inner.next().expect("the grammar has a head here"));
+        let expression = inner.next().map(|expression| self.expression(expression)).transpose()?;
+        Ok((head, expression))
+    }
+
     fn equation(&mut self, pair: Pair) -> Built<Equation> {
         let mut inner = pair.into_inner().filter(|p| !is_punctuation(p.as_rule()));
         let derivative = inner.next().expect("an equation has a left side");
