@@ -312,6 +312,12 @@ impl Simulation<'_> {
         self.plant.values(id, at, &mut values);
         site.module = super::describe(self.model, self.plant.tree.kind(id), &values);
         let name = rule.parameters.get(parameter).cloned().unwrap_or_default();
+        if let Some(clock) = rule.clocks.iter().find(|clock| clock.parameter == parameter)
+            && !matches!(error, StepError::TooSmall(_))
+        {
+            site.span = rule.produces[clock.produce].span;
+            return Error::NotFinite { site, what: "the rate of an event".to_owned() };
+        }
         match error {
             StepError::TooSmall(_) => Error::StepTooSmall { site },
             StepError::Rate(_) => Error::NotFinite { site, what: format!("the rate of {name}") },

@@ -335,7 +335,7 @@ impl<'m> Simulation<'m> {
         let site = self.site_of(id, rule_index, span, at.to_f64());
         if let Some(clock) = compiled.clocks.iter().find(|clock| clock.parameter == parameter) {
             let span = compiled.produces[clock.produce].span;
-            return Error::NotFinite { site: Site { span, ..site }, what: "the rate".to_owned() };
+            return Error::NotFinite { site: Site { span, ..site }, what: "the rate of an event".to_owned() };
         }
         Error::NotFinite { site, what: compiled.parameters.get(parameter).cloned().unwrap_or_default() }
     }
