@@ -59,7 +59,9 @@ impl Scope {
         let parameters: Option<Vec<f64>> = nodes.iter().map(|node| self.graph.as_constant(*node)).collect();
         if let Some(why) = parameters.and_then(|values| distribution.fault(&values)) {
             self.diagnostics.push(
-                Diagnostic::error(format!("`{}` cannot be drawn from", distribution.name())).at(span, why),
+                Diagnostic::error(format!("`{}` cannot be drawn from", distribution.name()))
+                    .at(span, why)
+                    .help(distribution.demand()),
             );
             return None;
         }
@@ -316,7 +318,7 @@ impl RuleBuilder<'_> {
         let graph = &mut self.scope.graph;
         let (clock, zero) = (graph.var(hazard.parameter as u32), graph.constant(0.0));
         let down = graph.binary(Binary::Le, clock, zero);
-        self.scope.comparisons.insert(down, (hazard.span, "clock = 0".into()));
+        self.scope.comparisons.insert(down, (hazard.span, Arc::new(["clock".to_owned(), "0".to_owned()])));
         self.decompose(down, hazard.span, atoms)
     }
 
@@ -334,7 +336,7 @@ impl RuleBuilder<'_> {
         }
         let least = graph.constant(LEAST_RATE);
         let mut fault = graph.binary(Binary::Lt, hazard.rate, least);
-        self.scope.comparisons.insert(fault, (hazard.span, "rate = 0".into()));
+        self.scope.comparisons.insert(fault, (hazard.span, Arc::new(["rate".to_owned(), "0".to_owned()])));
         if let Some(guard) = hazard.guard {
             fault = self.scope.graph.binary(Binary::And, guard, fault);
         }

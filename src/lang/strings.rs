@@ -3,6 +3,7 @@
 
 use std::collections::{HashMap, HashSet};
 
+use super::advice;
 use super::ast::{self, Alternative, HeadModule};
 use super::chance::Drawn;
 use super::print;
@@ -79,7 +80,10 @@ impl RuleBuilder<'_> {
                 "[" | "]" if !module.arguments.is_empty() => {
                     self.error(
                         Diagnostic::error("a bracket has no parameters")
-                            .at(module.span, "a `(` cannot follow a bracket"),
+                            .at(module.span, "a `(` cannot follow a bracket")
+                            .help(
+                                "write it alone; a branch that turns away has a turn in it: `[ +(45) F(1) ]`",
+                            ),
                     );
                     good = false;
                     if &*module.name == "[" {
@@ -119,7 +123,8 @@ impl RuleBuilder<'_> {
                 if let Some(value) = self.scope.graph.as_constant(node).filter(|x| !x.is_finite()) {
                     self.error(
                         Diagnostic::error("this has no finite value")
-                            .at(self.document.expressions.span(argument.root), format!("it is {value}")),
+                            .at(self.document.expressions.span(argument.root), format!("it is {value}"))
+                            .help(advice::not_finite(value)),
                     );
                     good = false;
                 }
@@ -182,7 +187,8 @@ impl RuleBuilder<'_> {
                 plural(heads[0].parameters.len(), "parameter"),
             ))
             .at(module.span, format!("{} here", plural(given, "parameter")))
-            .at(heads[0].span, format!("{} {place}", plural(heads[0].parameters.len(), "parameter")));
+            .at(heads[0].span, format!("{} {place}", plural(heads[0].parameters.len(), "parameter")))
+            .help(advice::wrong_arity(module, heads[0], place));
             self.error(error);
         }
     }
@@ -204,7 +210,11 @@ impl RuleBuilder<'_> {
                 .min_by_key(|(_, span)| **span);
             if let Some((kind, span)) = other {
                 let arity = self.kinds.get(*kind).arity;
-                error = error.at(*span, format!("here it has {}", plural(arity, "parameter")));
+                error = error
+                    .at(*span, format!("here it has {}", plural(arity, "parameter")))
+                    .help(format!("write the head with as many: `{}`", advice::head_with(head, arity)));
+            } else {
+                error = error.help(format!("put `{name}` into a string, or remove this line"));
             }
             self.error(error);
         }

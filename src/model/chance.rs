@@ -55,6 +55,24 @@ impl Distribution {
         self.entry().2
     }
 
+    /// What it needs, and what to do.
+    pub fn demand(self) -> &'static str {
+        match self {
+            Distribution::Uniform => "uniform(a, b) needs a <= b: put the smaller number first",
+            Distribution::Integer => "integer(a, b) needs a whole number between a and b, both included",
+            Distribution::Normal => {
+                "normal(mean, sd) needs a deviation of at least 0: bound it, as in `max(0, …)`"
+            }
+            Distribution::Lognormal => {
+                "lognormal(mu, sigma) needs a deviation of at least 0: bound it, as in `max(0, …)`"
+            }
+            Distribution::Exponential => {
+                "exponential(rate) needs a rate greater than 0: bound it, as in `max(0.01, …)`"
+            }
+            Distribution::Choice => "choice(a, b, …) needs finite values",
+        }
+    }
+
     /// Number of its parameters; None for any number from 1 on.
     pub fn parameters(self) -> Option<usize> {
         match self {

@@ -18,6 +18,7 @@ mod invariance;
 mod kind;
 mod law;
 mod measure;
+mod remedy;
 mod rule;
 
 pub use analysis::{Draft, analyse};
@@ -32,6 +33,7 @@ pub use kind::{
 };
 pub use law::{Jacobian, Law, Linear, Numeric, Obstacle, Watch};
 pub use measure::Measure;
+pub use remedy::{Boundary, Remedy};
 pub use rule::{Interpretation, Outcome, Pattern, Produce, Rule, Solve, Successor, Switch};
 
 use std::sync::Arc;

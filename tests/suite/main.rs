@@ -16,6 +16,7 @@
 //! - [`plants`]: the paper's plants: order of flowering, continuity, the gallery.
 //! - [`replay`]: any time after any other, to the bits of a run.
 //! - [`report`]: studies of methods, and hard cases with exact answers.
+//! - [`view`]: pages that play a recording, read back.
 
 mod book;
 mod chance;
@@ -36,3 +37,4 @@ mod replay;
 mod report;
 mod schedulers;
 mod semantics;
+mod view;

@@ -314,7 +314,7 @@ impl Facts<'_> {
             n => (0..n).map(|solve| found(Some(solve))).collect(),
         };
         let line = self.line(rule.atoms[atom].start);
-        let mut boundary = rule.boundaries[atom].clone();
+        let mut boundary = rule.boundaries[atom].to_string();
         let sides = [2 * atom, 2 * atom + 1].map(|side| rule.sides.output_reads(side)).concat();
         if let Some(clock) = sides.into_iter().find_map(|v| self.clock(rule, v)) {
             boundary = format!("{clock} = 0");
