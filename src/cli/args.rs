@@ -360,6 +360,9 @@ pub struct ReplArgs {
     /// Step of the methods with a fixed one (rk4, euler)
     #[arg(long, value_name = "H", allow_negative_numbers = true, value_parser = positive, required_if_eq_any([("method", "rk4"), ("method", "euler")]))]
     pub step_size: Option<f64>,
+    /// Seed of random numbers, for models that draw them: the same seed gives the same plant
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
     /// More modules than this are an error
     #[arg(long, value_name = "N", default_value_t = 10_000_000)]
     pub max_modules: usize,

@@ -11,7 +11,7 @@ use dlsys::structure::{Lineage, ModuleString};
 use statrs::function::erf::erfc;
 
 use crate::cli::dlsys;
-use crate::common::{plain, session};
+use crate::common::{Plain, plain, session};
 
 /// A bound of √n times the statistic of Kolmogorov and Smirnov, exceeded with probability 0.001.
 const KS: f64 = 1.949;
@@ -309,6 +309,39 @@ fn weights_of_discrete_rules_read_parameters_and_go_on_over_lines() {
     let all = events(&(text + "\nG -> B"), Settings::default(), 1.5);
     let first = all.iter().filter(|e| e.successor == Some(0)).count() as f64;
     assert!((first - 3_000.0).abs() < 3.3 * (4_000.0f64 * 3.0 / 16.0).sqrt(), "{first}");
+}
+
+#[test]
+fn models_that_use_these_words_otherwise_go_on_working() {
+    let text = "
+def uniform(a, b) = a + b
+def choice(x) = 2*x
+initial string: at(1) rate or(choice(2))
+at(x):
+  if x < 3 solve dx/dt = uniform(1, 0)
+  if x = 3 produce or(uniform(1, 2)) at(0) or(1)
+or(x) < rate: produce at(1)
+";
+    let session = session(text);
+    assert!(session.model.rules.iter().flat_map(|r| &r.produces).all(|p| !p.outcome.is_random()));
+    let mut string = ModuleString::default();
+    session.simulate(Settings::default()).expect("it starts").at(2.5, &mut string).expect("it runs");
+    let names: Vec<Plain> = plain(&session.model, &string);
+    assert_eq!(names[0], ("or".to_owned(), vec![3.0]));
+}
+
+#[test]
+fn weights_and_rates_have_a_layout() {
+    let text = "initial string: A(1)\nA(x):\n  if x<2\n at rate  3*x produce 2:F or x :G\n or 1:[ A(1) ]A(2)\n at rate 1\n  produce F\n";
+    let laid_out = |text: &str| {
+        dlsys::lang::format::format(&dlsys::diagnostic::Source::new("t", text)).expect("a layout")
+    };
+    let once = laid_out(text);
+    assert_eq!(
+        once,
+        "initial string: A(1)\nA(x):\n  if x < 2\n    at rate 3*x produce 2: F or x: G\n                     or 1: [ A(1) ]A(2)\n  at rate 1\n    produce F\n"
+    );
+    assert_eq!(laid_out(&once), once);
 }
 
 #[test]
