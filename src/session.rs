@@ -82,7 +82,8 @@ impl Session {
             Box::new(Refused { source, diagnostics: vec![diagnostic], settings: Vec::new(), inputs })
         };
         let bytes = std::fs::read(path).map_err(|error| {
-            let diagnostic = Diagnostic::error(format!("the model cannot be read: {error}"));
+            let diagnostic = Diagnostic::error(format!("the model cannot be read: {error}"))
+                .help("give the path of a model's file, `NAME.dls`; `dlsys new NAME` makes one");
             refuse(Source::new(&name, ""), diagnostic)
         })?;
         let source = Source::from_bytes(name, bytes).map_err(|e| refuse(e.0, e.1))?;

@@ -13,6 +13,7 @@ mod fmt;
 mod gallery;
 mod new;
 mod parallel;
+mod reel;
 mod render;
 mod report;
 pub(crate) mod run;

@@ -167,7 +167,8 @@ fn scan(text: &str, lexemes: Option<Vec<Lexeme>>) -> (Layout, Option<Vec<Lexeme>
             let message = format!("this declaration is longer than {} KiB", MAX_ITEM >> 10);
             errors.push(
                 Diagnostic::error(message)
-                    .at(Span::new(item.start, item.start + first_char(text, item.start)), "it begins here"),
+                    .at(Span::new(item.start, item.start + first_char(text, item.start)), "it begins here")
+                    .help("cut it into several: constants, functions, or rules with a head each"),
             );
         }
     }
@@ -363,7 +364,8 @@ impl Scanner<'_> {
             let at = self.levels.last().expect("two levels").at;
             self.fault(
                 Diagnostic::error("this `(` is never closed")
-                    .at(Span::new(at, at + 1), "expected `)` for it"),
+                    .at(Span::new(at, at + 1), "expected `)` for it")
+                    .help("write the `)` where the parameters or the term end"),
             );
         }
         self.levels.truncate(1);
@@ -407,7 +409,8 @@ impl Scanner<'_> {
                 } else {
                     self.fault(
                         Diagnostic::error("this `)` closes nothing")
-                            .at(Span::new(start, end), "there is no `(` before it"),
+                            .at(Span::new(start, end), "there is no `(` before it")
+                            .help("remove it, or write the `(` that it belongs to"),
                     );
                 }
             }

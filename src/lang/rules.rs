@@ -3,15 +3,15 @@
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
+use super::advice;
 use super::ast::{self, Action, Document, Expression, HeadModule};
 use super::print;
 use super::scope::{RESERVED, Scope, Variables, plural};
-use super::suggest::did_you_mean;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::expr::{Binary, Node, NodeId, Program, Unary};
 use crate::model::{
-    CUT, Class, Comparison, Condition, Draft, Interpretation, Jacobian, KindId, Kinds, Pattern, Produce,
-    Rule, Solve, Step, Successor, class_of, never_reached,
+    Boundary, CUT, Class, Comparison, Condition, Draft, Interpretation, Jacobian, KindId, Kinds, Pattern,
+    Produce, Rule, Solve, Step, Successor, class_of, never_reached,
 };
 
 /// Longest condition, in comparisons and connectives, after functions are put in.
@@ -33,7 +33,7 @@ pub struct RuleBuilder<'b> {
 pub(super) struct Atoms {
     sides: Vec<(NodeId, NodeId)>,
     spans: Vec<Span>,
-    boundaries: Vec<String>,
+    boundaries: Vec<Boundary>,
     index: HashMap<(NodeId, NodeId), u32>,
 }
 
@@ -59,7 +59,10 @@ impl RuleBuilder<'_> {
                 "[" | "]" if !module.arguments.is_empty() => {
                     self.error(
                         Diagnostic::error("a bracket has no parameters")
-                            .at(module.span, "a `(` cannot follow a bracket"),
+                            .at(module.span, "a `(` cannot follow a bracket")
+                            .help(
+                                "write it alone; a branch that turns away has a turn in it: `[ +(45) F(1) ]`",
+                            ),
                     );
                     good = false;
                     if &*module.name == "[" {
@@ -98,7 +101,8 @@ impl RuleBuilder<'_> {
                 if let Some(value) = self.scope.graph.as_constant(node).filter(|x| !x.is_finite()) {
                     self.error(
                         Diagnostic::error("this has no finite value")
-                            .at(self.document.expressions.span(argument.root), format!("it is {value}")),
+                            .at(self.document.expressions.span(argument.root), format!("it is {value}"))
+                            .help(advice::not_finite(value)),
                     );
                     good = false;
                 }
@@ -146,14 +150,19 @@ impl RuleBuilder<'_> {
             if RESERVED.contains(&&*parameter.text) {
                 self.error(
                     Diagnostic::error(format!("a parameter cannot be called `{}`", parameter.text))
-                        .at(parameter.span, "this name stands for time in every rule"),
+                        .at(parameter.span, "this name stands for time in every rule")
+                        .help(match &*parameter.text {
+                            "age" => "`age`, the time since the module was made, is known without a parameter; for another time choose another name".to_owned(),
+                            name => format!("`{name}`, the time since the start, is known without a parameter; for another time choose another name"),
+                        }),
                 );
             }
             if let Some(before) = spans.insert(parameter.text.clone(), parameter.span) {
                 self.error(
                     Diagnostic::error(format!("two parameters of this head are called `{}`", parameter.text))
                         .at(parameter.span, "the second one")
-                        .at(before, "the first one"),
+                        .at(before, "the first one")
+                        .help(advice::other_name(&parameter.text, !left.is_empty(), !right.is_empty())),
                 );
             }
             names.insert(parameter.text.clone(), node);
@@ -171,14 +180,16 @@ impl RuleBuilder<'_> {
         if bracket {
             self.error(
                 Diagnostic::error("a bracket has no rules")
-                    .at(head.name.span, "brackets structure the string; they do not develop"),
+                    .at(head.name.span, "brackets structure the string; they do not develop")
+                    .help("to change a branch, write a rule for a module in it"),
             );
         }
         let cut = &*head.name.text == CUT;
         if cut {
             self.error(
                 Diagnostic::error("`%` has no rules and no context")
-                    .at(head.name.span, "it cuts off the rest of its branch, and is gone at once"),
+                    .at(head.name.span, "it cuts off the rest of its branch, and is gone at once")
+                    .help("write the rule for the module that makes it, as in `A(x): if x = 1 produce %`"),
             );
         }
         !bracket && !cut
@@ -298,6 +309,7 @@ impl RuleBuilder<'_> {
         let pattern = |m: &HeadModule| Pattern { kinds: Vec::new(), arity: m.parameters.len() };
         let names = |m: &HeadModule| m.parameters.iter().map(|p| p.text.to_string()).collect::<Vec<_>>();
         let compiled = Rule {
+            index: 0,
             label: print::head(rule),
             span: rule.head,
             discrete: rule.discrete,
@@ -332,7 +344,7 @@ impl RuleBuilder<'_> {
         for equation in equations {
             let name = &equation.parameter;
             let Some(parameter) = head.parameters.iter().position(|p| p.text == name.text) else {
-                self.error(not_a_parameter(name, head, variables));
+                self.error(advice::not_a_parameter(name, head, variables));
                 good = false;
                 continue;
             };
@@ -340,7 +352,11 @@ impl RuleBuilder<'_> {
                 self.error(
                     Diagnostic::error(format!("two equations for `{}` in one `solve`", name.text))
                         .at(name.span, "the second one")
-                        .at(before, "the first one"),
+                        .at(before, "the first one")
+                        .help(format!(
+                            "keep one of them; two contributions are added: `d{0}/dt = … + …`",
+                            name.text
+                        )),
                 );
                 good = false;
             }
@@ -365,7 +381,8 @@ impl RuleBuilder<'_> {
             if steps.len() > MAX_CONDITION {
                 self.error(
                     Diagnostic::error("this condition is too long")
-                        .at(span, format!("more than {MAX_CONDITION} comparisons and connectives")),
+                        .at(span, format!("more than {MAX_CONDITION} comparisons and connectives"))
+                        .help("functions that call functions multiply what they compare: compute a shared part once"),
                 );
                 return None;
             }
@@ -391,7 +408,7 @@ impl RuleBuilder<'_> {
                         _ => Comparison::NotEqual,
                     };
                     let known = self.scope.comparisons.get(&id);
-                    let (at, boundary) = known.map_or((span, ""), |(at, boundary)| (*at, boundary));
+                    let (at, boundary) = known.map_or((span, None), |(at, sides)| (*at, Some(&**sides)));
                     steps.push(atoms.step(a, b, comparison, at, boundary));
                 }
                 node => unreachable!("{node:?} is no condition"),
@@ -424,7 +441,8 @@ impl RuleBuilder<'_> {
                 plural(heads[0].parameters.len(), "parameter"),
             ))
             .at(module.span, format!("{} here", plural(given, "parameter")))
-            .at(heads[0].span, format!("{} {place}", plural(heads[0].parameters.len(), "parameter")));
+            .at(heads[0].span, format!("{} {place}", plural(heads[0].parameters.len(), "parameter")))
+            .help(advice::wrong_arity(module, heads[0], place));
             self.error(error);
         }
     }
@@ -446,7 +464,11 @@ impl RuleBuilder<'_> {
                 .min_by_key(|(_, span)| **span);
             if let Some((kind, span)) = other {
                 let arity = self.kinds.get(*kind).arity;
-                error = error.at(*span, format!("here it has {}", plural(arity, "parameter")));
+                error = error
+                    .at(*span, format!("here it has {}", plural(arity, "parameter")))
+                    .help(format!("write the head with as many: `{}`", advice::head_with(head, arity)));
+            } else {
+                error = error.help(format!("put `{name}` into a string, or remove this line"));
             }
             self.error(error);
         }
@@ -458,27 +480,22 @@ impl RuleBuilder<'_> {
     }
 }
 
-fn not_a_parameter(name: &ast::Name, head: &HeadModule, variables: &Variables) -> Diagnostic {
-    let known = head.parameters.iter().map(|p| &*p.text);
-    let error =
-        Diagnostic::error(format!("`{}` is no parameter of `{}`", name.text, print::head_module(head)))
-            .at(name.span, "only the parameters of the strict predecessor have equations")
-            .at(head.span, "the strict predecessor");
-    if variables.names.contains_key(&name.text) && !RESERVED.contains(&&*name.text) {
-        return error
-            .help("this is a parameter of a neighbour; its equation belongs into the neighbour's rule");
-    }
-    error.help_opt(did_you_mean(&name.text, known))
-}
-
 impl Atoms {
     /// The step that compares two sides; each pair is kept once, whichever way round it is written.
-    fn step(&mut self, a: NodeId, b: NodeId, comparison: Comparison, span: Span, boundary: &str) -> Step {
+    fn step(
+        &mut self,
+        a: NodeId,
+        b: NodeId,
+        comparison: Comparison,
+        span: Span,
+        sides: Option<&[String; 2]>,
+    ) -> Step {
         let (pair, comparison) = if a <= b { ((a, b), comparison) } else { ((b, a), comparison.mirrored()) };
         let atom = *self.index.entry(pair).or_insert_with(|| {
             self.sides.push(pair);
             self.spans.push(span);
-            self.boundaries.push(boundary.to_owned());
+            let known = sides.map(|[left, right]| Boundary::new(left, right, a > b));
+            self.boundaries.push(known.unwrap_or_default());
             self.sides.len() as u32 - 1
         });
         Step::Atom(atom, comparison)

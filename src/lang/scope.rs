@@ -3,6 +3,7 @@
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
+use super::advice;
 use super::ast::{Expr, ExprId, Expression, Expressions, Name, Operator};
 use super::print;
 use super::suggest::did_you_mean;
@@ -30,7 +31,7 @@ pub struct Lowered {
 /// A function, as a graph over its formal parameters.
 #[derive(Clone, Debug)]
 struct Function {
-    parameters: usize,
+    parameters: Vec<Arc<str>>,
     /// None if its own text is at fault, which has been reported.
     body: Option<Lowered>,
 }
@@ -55,11 +56,10 @@ pub struct Scope {
     poisoned: HashSet<Arc<str>>,
     /// Names that were already complained about.
     unknown: HashSet<Arc<str>>,
-    /// Where the comparisons of the present rule are written, by their node, and their boundary as in
-    /// `x = s`. Rules number their variables alike, so one rule's nodes mean nothing in another.
-    pub comparisons: HashMap<NodeId, (Span, Arc<str>)>,
+    /// Where the comparisons of the present rule are written, by their node, and their two sides. Rules number their variables alike, so one rule's nodes mean nothing in another.
+    pub comparisons: HashMap<NodeId, (Span, Arc<[String; 2]>)>,
     /// The same for the bodies of functions.
-    function_comparisons: HashMap<NodeId, (Span, Arc<str>)>,
+    function_comparisons: HashMap<NodeId, (Span, Arc<[String; 2]>)>,
     pub diagnostics: Vec<Diagnostic>,
     /// What is wrong with the values given from outside, which is not the text's fault.
     pub refused_settings: Vec<Diagnostic>,
@@ -104,13 +104,18 @@ impl Scope {
                         "`{}` has two parameters called `{}`",
                         name.text, parameter.text
                     ))
-                    .at(parameter.span, "the second one"),
+                    .at(parameter.span, "the second one")
+                    .help(format!(
+                        "give each a name of its own, such as `{}`",
+                        advice::numbered(&parameter.text)
+                    )),
                 );
             }
         }
         let body = self.lower(all, body, &variables);
         self.function_comparisons.extend(self.comparisons.drain());
-        self.functions.insert(name.text.clone(), Function { parameters: parameters.len(), body });
+        let parameters = parameters.iter().map(|p| p.text.clone()).collect();
+        self.functions.insert(name.text.clone(), Function { parameters, body });
     }
 
     /// Lowers an expression that must be a number.
@@ -145,7 +150,8 @@ impl Scope {
         }
         self.diagnostics.push(
             Diagnostic::error("this has no finite value")
-                .at(all.span(expression.root), format!("it is {value}")),
+                .at(all.span(expression.root), format!("it is {value}"))
+                .help(advice::not_finite(value)),
         );
         None
     }
@@ -250,7 +256,9 @@ impl Scope {
                     let link = self.compare(*comparison, left, right);
                     self.comparisons.entry(link).or_insert_with(|| {
                         let sides = [a_id, *operand].map(|id| print::expression(all, id));
-                        (all.span(a_id).to(all.span(*operand)), sides.join(" = ").into())
+                        // A choice binds loosest of all.
+                        let sides = sides.map(|s| if s.starts_with("if ") { format!("({s})") } else { s });
+                        (all.span(a_id).to(all.span(*operand)), sides.into())
                     });
                     whole = Some(match whole {
                         Some(before) => self.graph.binary(Binary::And, before, link),
@@ -298,10 +306,11 @@ impl Scope {
         let error = if RESERVED.contains(&&**name) {
             Diagnostic::error(format!("`{name}` has no meaning here"))
                 .at(span, "time is known in rules only")
-                .help_opt(variables.no_time.map(str::to_owned))
+                .help(variables.no_time.unwrap_or("use it in a rule"))
         } else if self.functions.contains_key(name) || is_function(name) {
             Diagnostic::error(format!("`{name}` is a function"))
-                .at(span, format!("expected its arguments, as in `{name}(x)`"))
+                .at(span, "expected its arguments")
+                .help(format!("call it: `{}`", self.call_of(name)))
         } else {
             let known = variables
                 .names
@@ -345,14 +354,23 @@ impl Scope {
                     plural(wanted, "parameter"),
                     nodes.len()
                 ))
-                .at(span, format!("{} given", plural(nodes.len(), "argument"))),
+                .at(span, format!("{} given", plural(nodes.len(), "argument")))
+                .help(match &**name {
+                    "min" | "max" if nodes.len() > 2 => {
+                        let texts: Vec<String> =
+                            arguments.iter().map(|(id, _)| print::expression(all, *id)).collect();
+                        let nested = |inner: String, next: &String| format!("{name}({inner}, {next})");
+                        format!("write `{}`", texts[1..].iter().fold(texts[0].clone(), nested))
+                    }
+                    _ => format!("it is called as `{}`", me.call_of(name)),
+                }),
             );
             None
         };
         let number = |node| Some(Lowered { node, is_condition: false });
         if let Some(function) = self.functions.get(name).cloned() {
             self.used.insert(name.clone());
-            count(self, function.parameters)?;
+            count(self, function.parameters.len())?;
             return self.inline(function.body?, &nodes, span);
         }
         if let Some((_, op)) = Unary::NAMED.iter().find(|(n, _)| **n == **name) {
@@ -380,6 +398,15 @@ impl Scope {
         };
         self.diagnostics.push(error);
         None
+    }
+
+    /// How a function is called.
+    fn call_of(&self, name: &str) -> String {
+        match self.functions.get(name) {
+            Some(function) => format!("{name}({})", function.parameters.join(", ")),
+            None if Binary::NAMED.iter().any(|(n, _)| *n == name) => format!("{name}(x, y)"),
+            None => format!("{name}(x)"),
+        }
     }
 
     /// A function's body with the arguments in place of its formal parameters.

@@ -16,6 +16,7 @@ mod condition;
 mod invariance;
 mod kind;
 mod law;
+mod remedy;
 mod rule;
 
 pub use analysis::{Draft, analyse};
@@ -28,6 +29,7 @@ pub use kind::{
     BUILT_IN_SURFACES, COMMAND_SURFACES, CUT, Class, DRAWN_WORDS, Kind, KindId, Kinds, base_of, class_of,
 };
 pub use law::{Jacobian, Law, Linear, Numeric, Obstacle, Watch};
+pub use remedy::{Boundary, Remedy};
 pub use rule::{Interpretation, Pattern, Produce, Rule, Solve, Successor, Switch};
 
 use std::sync::Arc;

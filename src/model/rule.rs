@@ -6,13 +6,15 @@
 //! predecessor; the parameters of the context modules, left to right as written; `t`; `age`; then one
 //! truth value for each [`Switch`].
 
-use super::{Condition, Jacobian, KindId, Law, Linear, Watch};
+use super::{Boundary, Condition, Jacobian, KindId, Law, Linear, Watch};
 use crate::diagnostic::Span;
 use crate::expr::{Program, Scratch, Value};
 
 /// Context, equations and productions of one strict predecessor.
 #[derive(Clone, Debug)]
 pub struct Rule {
+    /// Its place among the rules of the model.
+    pub index: usize,
     /// The head as written.
     pub label: String,
     pub span: Span,
@@ -35,7 +37,7 @@ pub struct Rule {
     /// Where each atom is written.
     pub atoms: Vec<Span>,
     /// The boundary of each atom, as in `x = s`, for messages.
-    pub boundaries: Vec<String>,
+    pub boundaries: Vec<Boundary>,
     /// In the order written: of those that hold, the first is active.
     pub solves: Vec<Solve>,
     /// In the order written: of those that hold at one instant, the first wins.

@@ -1,6 +1,7 @@
 //! What can go wrong while a model runs.
 
 use crate::diagnostic::{Diagnostic, Span};
+use crate::model::Remedy;
 use crate::structure::Lineage;
 
 /// A module in trouble: what an error message says of it.
@@ -34,8 +35,8 @@ pub enum Error {
         site: Site,
         /// It never was inside.
         born: bool,
-        /// The comparisons that fail, with their places and how the production for them would begin.
-        failing: Vec<(Span, String)>,
+        /// The comparisons that fail, with their places and what could be written for them.
+        failing: Vec<(Span, Option<Remedy>)>,
     },
     #[error("the equations of {} push against each other at t = {}", .site.module, .site.when())]
     Chattering { site: Site },
@@ -91,9 +92,18 @@ impl Error {
         d = d.note(format!("{} is {descent}; its rule is {}", site.module, site.rule));
         match self {
             Error::OutsideDomain { failing, .. } => {
-                let missing: Vec<String> =
-                    failing.iter().map(|(_, begin)| format!("`{begin} produce …`")).collect();
-                d.help_opt((!missing.is_empty()).then(|| format!("say what happens there: {}", missing.join(" or "))))
+                let remedies = || failing.iter().filter_map(|(_, remedy)| remedy.as_ref());
+                let clauses = |part: fn(&Remedy) -> &Option<String>| {
+                    let quoted = remedies().filter_map(|r| part(r).as_ref()).map(|clause| format!("`{clause}`"));
+                    quoted.collect::<Vec<_>>().join(" or ")
+                };
+                let (produce, rest) = (clauses(|r| &r.produce), clauses(|r| &r.rest));
+                if produce.is_empty() && rest.is_empty() {
+                    return d.help("write a clause for what happens there: `if … = … produce …`");
+                }
+                let made = format!("say what it becomes there, in a clause of this rule such as {produce}");
+                let d = d.help_opt((!produce.is_empty()).then_some(made));
+                d.help_opt((!rest.is_empty()).then(|| format!("or let it stay as it is: {rest}")))
             }
             Error::Chattering { .. } => d.help(
                 "let one side hold at the boundary with an equation of its own, for example `dx/dt = 0`",

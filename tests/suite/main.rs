@@ -16,6 +16,7 @@
 //! - [`repl`]: the interactive session, without a terminal and with one.
 //! - [`replay`]: any time after any other, to the bits of a run.
 //! - [`report`]: studies of methods, and hard cases with exact answers.
+//! - [`view`]: pages that play a recording, read back.
 
 mod book;
 mod cli;
@@ -36,3 +37,4 @@ mod replay;
 mod report;
 mod schedulers;
 mod semantics;
+mod view;

@@ -302,7 +302,7 @@ impl Facts<'_> {
             n => (0..n).map(|solve| found(Some(solve))).collect(),
         };
         let line = self.line(rule.atoms[atom].start);
-        ConditionPlan { boundary: rule.boundaries[atom].clone(), line, decides, found }
+        ConditionPlan { boundary: rule.boundaries[atom].to_string(), line, decides, found }
     }
 
     fn watch(&self, rule: &Rule, solve: Option<usize>, atom: usize) -> (&'static str, String) {

@@ -6,7 +6,6 @@
 //! threads; a file does not depend on how many there are.
 
 mod flags;
-mod reel;
 mod watch;
 
 use std::io::Write;
@@ -18,13 +17,13 @@ use serde_json::json;
 use super::args::RenderArgs;
 use super::common::{Clock, Failure, Run, bar, count_of, out_error, size_of};
 use super::events::EventLog;
+use super::reel::{Pass, Shot, play};
 use crate::export::{
     self, Fit, Format, FrameDirectory, FrameRecord, FrameWriter, Layout, Manifest, Page, Sheet, SheetWriter,
     Survey,
 };
 use crate::scene::Scene;
 use crate::sim::{Method, Settings, Stats};
-use reel::{Pass, Shot, play};
 
 /// Runs a model and writes its frames; with `--watch`, again and again.
 pub fn render(args: &RenderArgs) -> Result<(), Failure> {

@@ -342,7 +342,8 @@ impl Builder<'_> {
         }
         Err(Box::new(
             Diagnostic::error("this number is too large")
-                .at(self.span(pair), format!("the greatest number is {:e}", f64::MAX)),
+                .at(self.span(pair), format!("the greatest number is {:e}", f64::MAX))
+                .help("choose larger units of length or time, so that numbers stay small"),
         ))
     }
 

@@ -6,6 +6,7 @@ use pest::error::{Error, ErrorVariant, InputLocation};
 
 use super::Rule;
 use crate::diagnostic::{Diagnostic, Span};
+use crate::lang::advice;
 use crate::lang::layout::{DECLARATIONS, RawItem};
 use crate::lang::suggest::nearest;
 
@@ -95,7 +96,9 @@ pub fn explain(item: Rule, error: &Error<Rule>, text: &str, offset: usize) -> Di
         Span::new(offset + at, offset + end)
     };
     let what = if end == at { format!("{what} after this") } else { what };
-    Diagnostic::error(message).at(span, what).help_opt(hint(item, text, at, found))
+    Diagnostic::error(message)
+        .at(span, what)
+        .help(hint(item, text, at, found).unwrap_or_else(|| advice::usage(item).to_owned()))
 }
 
 fn is_item_with_name(item: Rule) -> bool {
@@ -281,6 +284,10 @@ fn hint_by_word(item: Rule, text: &str, at: usize, found: &str) -> Option<String
         }
         "else" if in_rule => "every clause has a condition of its own: `if … solve …`, `if … produce …`",
         "if" if in_rule => "after its condition a clause has `solve` or `produce`",
+        _ if ended && before.ends_with(['+', '-', '*', '/', '^', '=', '<', '>', '&', '|']) => {
+            "an operator has something on both sides: add what is missing, or remove the sign"
+        }
+        _ if has_open_if(line) => "in an expression `if` has three parts: `if x < 1 then 0.5 else 0`",
         _ if ended && before.ends_with("produce") => "to produce nothing, write `produce ε`",
         _ if ended && in_rule && before.ends_with(':') => {
             "under its head a rule has clauses: `solve dx/dt = …`, `if x = 1 produce …`"
@@ -291,6 +298,7 @@ fn hint_by_word(item: Rule, text: &str, at: usize, found: &str) -> Option<String
         _ if in_rule && !has_head && before.ends_with(|c: char| c.is_alphanumeric()) && is_word => {
             "the names of parameters are separated by commas"
         }
+        _ if in_rule && last_word == "dt" => "a derivative is followed by `=`, as in `dx/dt = 0.1*x`",
         _ if in_rule && line.ends_with("solve") => "a `solve` gives derivatives: `solve dx/dt = …`",
         _ if in_rule && is_word && is_derivative(rest) => {
             if line.contains("solve") {
@@ -322,6 +330,16 @@ fn hint_by_word(item: Rule, text: &str, at: usize, found: &str) -> Option<String
 fn last_keyword(text: &str) -> Option<&str> {
     let words = text.rsplit(|c: char| !(c.is_alphanumeric() || c == '_'));
     words.into_iter().find(|word| matches!(*word, "if" | "solve" | "produce"))
+}
+
+/// Whether a line ends inside an `if` that is part of an expression.
+fn has_open_if(line: &str) -> bool {
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    let Some(at) = ["if ", "if("].iter().filter_map(|word| line.rfind(word)).max() else { return false };
+    let before = line[..at].trim_end();
+    let inside = before.ends_with(['=', '+', '-', '*', '/', '^', '(', ',', '<', '>'])
+        || ["then", "else"].iter().any(|word| before.ends_with(word));
+    !line[..at].ends_with(is_word) && inside && !line[at..].split(|c| !is_word(c)).any(|word| word == "else")
 }
 
 /// Whether a text begins with something like `dx/dt`.
@@ -370,5 +388,7 @@ pub fn unknown_line(text: &str, item: &RawItem) -> Diagnostic {
         return diagnostic.help("a constant is declared with `const NAME = VALUE`");
     }
     let known: Vec<&str> = DECLARATIONS.iter().map(|(name, _)| *name).collect();
-    diagnostic.note(format!("declarations begin with {}", known.join(", ")))
+    diagnostic
+        .note(format!("declarations begin with {}", known.join(", ")))
+        .help("a rule has a head with a colon, and clauses: `A(x): solve dx/dt = 1`")
 }

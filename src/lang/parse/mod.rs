@@ -14,6 +14,7 @@ use pest::Parser;
 use super::ast::{Document, Expression, Item, Module};
 use super::layout::{ItemKind, RawItem, layout};
 use crate::diagnostic::{Diagnostic, Source, Span};
+use crate::lang::advice;
 
 /// The pest parser of `grammars/dlsys.pest`.
 #[derive(pest_derive::Parser)]
@@ -134,10 +135,16 @@ fn read_axiom(text: &str, item: &RawItem, builder: &mut build::Builder) -> Resul
     let Some(mut at) = item.after_colon.filter(|_| matches!(words[..], ["axiom"] | ["initial", "string"]))
     else {
         return Err(Box::new(
-            Diagnostic::error("the initial string is written `initial string: …` or `axiom: …`").at(
-                Span::new(item.start, item.start + head.lines().next().unwrap_or("").len()),
-                "expected a `:` after this",
-            ),
+            Diagnostic::error("the initial string is written `initial string: …` or `axiom: …`")
+                .at(
+                    Span::new(item.start, item.start + head.lines().next().unwrap_or("").len()),
+                    if words == ["initial"] {
+                        "expected `string:` after this"
+                    } else {
+                        "expected a `:` after this"
+                    },
+                )
+                .help(advice::initial_string(text[item.start..item.end].lines().next().unwrap_or_default())),
         ));
     };
     let mut modules: Vec<Module> = Vec::new();
@@ -157,7 +164,8 @@ fn read_axiom(text: &str, item: &RawItem, builder: &mut build::Builder) -> Resul
         if modules.len() > MAX_AXIOM {
             return Err(Box::new(
                 Diagnostic::error(format!("the initial string has more than {MAX_AXIOM} modules"))
-                    .at(modules[MAX_AXIOM].span, "this one is too many"),
+                    .at(modules[MAX_AXIOM].span, "this one is too many")
+                    .help("begin with fewer, and let rules make the others"),
             ));
         }
         at = end;
