@@ -24,6 +24,13 @@ const LONG: Duration = Duration::from_millis(400);
 const LEAST: Duration = Duration::from_millis(250);
 /// Most pixels of a picture that moves, and of one that stands still; the screen makes up the rest.
 const MOST_PIXELS: [f64; 2] = [1.2e6, 8e6];
+/// Parts of the screen's pixels, each way, that what moves is drawn with: fewer where drawing takes longer than the first of these
+/// times, more where it takes less than the second.
+const COARSE: [f64; 3] = [1.0, 0.7, 0.5];
+const TOO_LONG: Duration = Duration::from_millis(22);
+const SHORT: Duration = Duration::from_millis(7);
+/// Of the panel at the side, in points.
+const WIDTH: f32 = 270.0;
 /// Degrees for a drag over the height of the picture.
 const TURN: [f64; 2] = [250.0, 180.0];
 
@@ -50,6 +57,8 @@ pub struct Window {
     pub(super) shown: Option<(Order, u64, [Duration; 2])>,
     /// The last order, and when it was given.
     pub(super) ordered: Option<(Order, Instant)>,
+    /// Which of [`COARSE`].
+    coarse: usize,
     info: bool,
     last: Instant,
     moved: Instant,
@@ -91,6 +100,7 @@ impl Window {
             texture: None,
             shown: None,
             ordered: None,
+            coarse: 0,
             info: true,
             last: Instant::now(),
             moved: Instant::now(),
@@ -133,6 +143,14 @@ impl Window {
                         None => self.texture = Some(context.load_texture("plant", picture.image, options)),
                     }
                     self.trouble = None;
+                    let drawn = picture.spent[1];
+                    if picture.order.shot.as_ref().is_some_and(|shot| !shot.fine) {
+                        if drawn > TOO_LONG {
+                            self.coarse = (self.coarse + 1).min(COARSE.len() - 1);
+                        } else if drawn < SHORT {
+                            self.coarse = self.coarse.saturating_sub(1);
+                        }
+                    }
                     self.shown = Some((picture.order, picture.modules, picture.spent));
                 }
             }
@@ -168,7 +186,8 @@ impl Window {
     fn order(&mut self, pixels: [f64; 2]) {
         let fine = !self.player.playing && self.moved.elapsed() >= STILL;
         let most = MOST_PIXELS[usize::from(fine)];
-        let less = (most / (pixels[0] * pixels[1]).max(1.0)).sqrt().min(1.0);
+        let coarse = if fine { 1.0 } else { COARSE[self.coarse] };
+        let less = (most / (pixels[0] * pixels[1]).max(1.0)).sqrt().min(1.0) * coarse;
         let shot = self.look.clone().filter(|_| self.facts.is_some()).map(|look| Shot {
             time: self.player.time,
             look,
@@ -187,7 +206,9 @@ impl Window {
         if *last == order {
             return;
         }
-        let plain = |order: &Order| order.shot.clone().map(|shot| Shot { fine: false, ..shot });
+        // How it is drawn is not what is moved.
+        let plain =
+            |order: &Order| order.shot.clone().map(|shot| Shot { fine: false, pixels: [0; 2], ..shot });
         if order.set != last.set || plain(&order) != plain(last) {
             self.moved = Instant::now();
         }
@@ -398,7 +419,10 @@ impl eframe::App for Window {
         self.last = now;
         self.keys(context);
         if self.info {
-            egui::SidePanel::right("info").default_width(260.0).show(context, |ui| panel::show(self, ui));
+            egui::SidePanel::right("info")
+                .default_width(WIDTH)
+                .width_range(WIDTH..=2.0 * WIDTH)
+                .show(context, |ui| panel::show(self, ui));
         }
         egui::TopBottomPanel::bottom("controls").show(context, |ui| {
             ui.add_space(4.0);
@@ -407,8 +431,8 @@ impl eframe::App for Window {
             ui.add_space(4.0);
         });
         if let Some(trouble) = &self.trouble {
-            egui::TopBottomPanel::bottom("trouble").resizable(true).show(context, |ui| {
-                egui::ScrollArea::both().max_height(260.0).show(ui, |ui| {
+            egui::TopBottomPanel::bottom("trouble").show(context, |ui| {
+                egui::ScrollArea::both().max_height(240.0).auto_shrink([false, true]).show(ui, |ui| {
                     let text = RichText::new(trouble.trim_end())
                         .monospace()
                         .color(Color32::from_rgb(0xa0, 0x1c, 0x1c));
@@ -418,10 +442,10 @@ impl eframe::App for Window {
         }
         let frame = egui::Frame::new().fill(background());
         let pixels = egui::CentralPanel::default().frame(frame).show(context, |ui| self.plant(ui)).inner;
-        self.order(pixels);
         let mut trial = std::mem::take(&mut self.trial);
         trial.step(self, context);
         self.trial = trial;
+        self.order(pixels);
         if self.player.playing {
             context.request_repaint();
         } else if !self.is_settled() {
@@ -448,6 +472,6 @@ fn style(context: &egui::Context) {
     visuals.selection.bg_fill = Color32::from_rgb(0xcf, 0xe3, 0xbf);
     visuals.selection.stroke.color = Color32::from_rgb(0x2c, 0x33, 0x26);
     visuals.slider_trailing_fill = true;
-    context.set_visuals(visuals);
+    context.set_visuals_of(egui::Theme::Light, visuals);
     context.set_theme(egui::Theme::Light);
 }

@@ -21,6 +21,7 @@ const KEYS: [(&str, &str); 11] = [
 
 /// Draws it.
 pub fn show(window: &mut Window, ui: &mut egui::Ui) {
+    ui.set_min_width(ui.available_width());
     ui.add_space(6.0);
     parameters(window, ui);
     productions(window, ui);
@@ -93,6 +94,8 @@ fn productions(window: &mut Window, ui: &mut egui::Ui) {
     let middle = (past as f32 - 0.5) * (height + spacing) - most / 2.0;
     let area = if window.player.playing { area.vertical_scroll_offset(middle.max(0.0)) } else { area };
     area.show_rows(ui, height, rows.len() + usize::from(history.left_out > 0), |ui, range| {
+        ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Truncate);
+        ui.set_min_width(ui.available_width());
         for i in range {
             let Some(row) = rows.get(i) else {
                 ui.weak(format!("… and {} more", history.left_out));

@@ -1,6 +1,6 @@
 //! The timeline: modules over time, productions as ticks, and where one is.
 
-use eframe::egui::{self, Color32, Pos2, Sense, Shape, Stroke};
+use eframe::egui::{self, Color32, Pos2, Rangef, Rect, Sense, Stroke};
 
 use super::life::Life;
 use super::player::Player;
@@ -36,10 +36,10 @@ pub fn show(ui: &mut egui::Ui, player: &mut Player, life: Option<&Life>) {
         let y = |modules: u64| floor - (floor - area.top()) * modules as f32 / most;
         for pair in life.counts.windows(2) {
             let [(a, before), (b, after)] = [pair[0], pair[1]];
-            let corners =
-                [(a, floor), (a, y(before)), (b, y(after)), (b, floor)].map(|(t, y)| Pos2::new(x(t), y));
-            painter.add(Shape::convex_polygon(corners.to_vec(), FILL, Stroke::NONE));
-            painter.line_segment([corners[1], corners[2]], Stroke::new(1.0, LINE));
+            let area = Rect::from_min_max(Pos2::new(x(a), y(before)), Pos2::new(x(b), floor));
+            painter.rect_filled(area, 0.0, FILL);
+            painter.hline(area.x_range(), area.top(), Stroke::new(1.0, LINE));
+            painter.vline(area.right(), Rangef::new(y(before), y(after)), Stroke::new(1.0, LINE));
         }
         let mut last = f32::NEG_INFINITY;
         for happening in life.history.happenings.iter().filter(|h| (from..=to).contains(&h.t)) {

@@ -51,7 +51,7 @@ enum Stage {
     /// It was moved then; the new picture is not there yet.
     Slid(usize, Instant),
     /// The new picture was handed to the screen; when this is done again, it is there.
-    Handed(usize, Instant),
+    Handed(usize, Instant, [Duration; 2]),
     /// Since when, pictures so far, and the time of the last one.
     Playing(Instant, u32, f64),
     Screenshot,
@@ -109,15 +109,14 @@ impl Runner {
                 }
             }
             Stage::Slid(number, since) => {
-                let changed = window.shown.as_ref().is_some_and(|(order, ..)| order.set == window.set);
-                if changed && window.trouble.is_none() {
-                    self.stage = Stage::Handed(*number, *since);
+                let new = window.shown.as_ref().filter(|(order, ..)| order.set == window.set);
+                if let Some((_, _, spent)) = new {
+                    self.stage = Stage::Handed(*number, *since, *spent);
                 }
             }
-            Stage::Handed(number, since) => {
+            Stage::Handed(number, since, spent) => {
                 let Setting { name, value } = &slide[*number];
-                let [ran, drawn] =
-                    window.shown.as_ref().map(|shown| shown.2).unwrap_or_default().map(milliseconds);
+                let [ran, drawn] = spent.map(milliseconds);
                 say(&format!(
                     "{name} = {value}: on the screen after {:.1} ms (read and run {ran:.1}, drawn {drawn:.1})",
                     milliseconds(since.elapsed())
