@@ -18,6 +18,7 @@ mod render;
 mod report;
 pub(crate) mod run;
 mod shell;
+mod specimens;
 mod view;
 
 use clap::Parser;
