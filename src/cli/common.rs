@@ -32,7 +32,10 @@ impl Failure {
     pub fn of_seed(self, seed: u64) -> Failure {
         match self {
             Failure::Model(message) => {
-                Failure::Model(format!("{message}  = of the specimen with `--seed {seed}`\n"))
+                let message = message.trim_end();
+                Failure::Model(format!(
+                    "{message}\n  = note: this happens to the specimen of `--seed {seed}`\n\n"
+                ))
             }
             other => other,
         }
