@@ -3,10 +3,9 @@
 use std::io::Write;
 use std::path::Path;
 
-use indicatif::ProgressBar;
-
 use super::args::ViewArgs;
-use super::common::{Failure, Run, bar, out_error};
+use super::common::{Failure, Run, out_error};
+use super::progress::Progress;
 use crate::export::{self, Survey, View};
 use crate::scene::Scene;
 use crate::sim::Settings;
@@ -61,8 +60,8 @@ fn spare(args: &ViewArgs, out: &Path) -> Result<(), Failure> {
 fn record(run: &Run, accuracy: Option<f64>) -> Result<Recording, Failure> {
     let mut survey = Survey::new(View::FRONT);
     let settings = Settings { log: false, ..run.settings };
-    let progress = bar("measuring", run.times.len());
-    each_frame(run, settings, 0.0, &progress, |_, scene, _| {
+    let progress = Progress::new("measuring", run.times.len());
+    each_frame(run, settings, 0.0, progress, |_, scene, _| {
         survey.add(scene);
         Ok(())
     })?;
@@ -74,8 +73,8 @@ fn record(run: &Run, accuracy: Option<f64>) -> Result<Recording, Failure> {
     let mut recorder = Recorder::new(model, &name, &fit);
     let mut stage = Stage::default();
     let settings = Settings { log: true, ..run.settings };
-    let progress = bar("recording", run.times.len());
-    each_frame(run, settings, fit.accuracy, &progress, |string, scene, events| {
+    let progress = Progress::new("recording", run.times.len());
+    each_frame(run, settings, fit.accuracy, progress, |string, scene, events| {
         recorder.history().add(&events, model, source);
         stage.set(scene, fit.default_width, recorder.forms());
         let modules = string.iter().filter(|m| !m.kind.is_bracket()).count() as u64;
@@ -93,7 +92,7 @@ fn each_frame(
     run: &Run,
     settings: Settings,
     accuracy: f64,
-    progress: &ProgressBar,
+    mut progress: Progress,
     mut take: impl FnMut(&ModuleString, &Scene, Vec<crate::sim::Event>) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
     let mut simulation = run.session.simulate(settings).map_err(|error| run.fault(&error))?;
@@ -103,11 +102,12 @@ fn each_frame(
     for &time in &run.times {
         simulation.at(time, &mut string).map_err(|error| run.fault(&error))?;
         scene.clear();
-        turtle::draw(&run.session.model, &string, &mut scene)
-            .map_err(|error| Failure::Model(format!("error: at t = {time}: {error}\n")))?;
+        run.draw(&string, &mut scene)?;
+        run.note(std::mem::take(&mut scene.warnings));
         take(&string, &scene, simulation.take_events())?;
-        progress.inc(1);
+        progress.inc();
     }
-    progress.finish_and_clear();
+    drop(progress);
+    run.warn();
     Ok(())
 }
