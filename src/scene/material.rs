@@ -196,6 +196,11 @@ impl Palette {
         Some(MaterialId((MaterialId::NAMED + offset) as u32))
     }
 
+    /// How many colours have a number, and how many gradients have one after them.
+    pub fn counts(&self) -> [usize; 2] {
+        [self.colors, self.gradients]
+    }
+
     /// The material of the colour of this number; the beginning of a gradient.
     pub fn numbered(&self, number: f64) -> Option<MaterialId> {
         self.chosen(number, 0.0)
