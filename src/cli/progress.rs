@@ -50,7 +50,9 @@ impl Progress {
 
     /// Work that shows nothing, whoever asks.
     pub fn quiet() -> Progress {
-        Progress { quiet: true, ..Progress::new("", 0) }
+        let mut progress = Progress::new("", 0);
+        progress.quiet = true;
+        progress
     }
 
     /// Says what is being done now.

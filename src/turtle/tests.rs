@@ -5,6 +5,7 @@ use crate::diagnostic::Span;
 use crate::expr::{Binary, Graph, NodeId, Program};
 use crate::model::{Interpretation, Successor};
 use crate::scene::{MaterialId, Point, Vector, Width};
+use crate::structure::Lineage;
 
 /// Modules by name and parameters.
 fn string(model: &mut Model, modules: &[(&str, &[f64])]) -> ModuleString {

@@ -123,17 +123,17 @@ impl<'a> Walk<'a> {
     pub(super) fn complain(&self, fault: Fault) -> Error {
         let Source { kind, lineage } = self.source;
         let name = self.model.kinds.get(kind).name.clone();
-        Error { fault, name, lineage, span: self.place(), time: self.time }
+        Error { fault, name, lineage, span: self.written(), time: self.time }
     }
 
     /// A warning about the present source.
     fn remark(&mut self, remark: Remark) {
-        let span = self.place();
+        let span = self.written();
         self.scene.warnings.extend(self.remarks.add(remark, self.model, span, self.time));
     }
 
     /// Where the text says how the present source is drawn.
-    fn place(&self) -> Option<Span> {
+    fn written(&self) -> Option<Span> {
         error::place(self.model, self.source.kind, self.source.lineage, self.inside)
     }
 
