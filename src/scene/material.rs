@@ -147,6 +147,13 @@ impl Palette {
         palette
     }
 
+    /// Adds a material without a number, such as a surface brings with it.
+    pub fn add(&mut self, name: &str, color: Color) -> MaterialId {
+        let name = self.free_name(name);
+        self.materials.push(Material { name: name.into(), color });
+        MaterialId(self.materials.len() as u32 - 1)
+    }
+
     /// A name in ASCII that no material has, and none of a gradient of that name would.
     fn free_name(&self, name: &str) -> String {
         let plain: String = (name.chars())
