@@ -22,7 +22,7 @@ use std::time::SystemTime;
 
 use crate::diagnostic::{Diagnostic, Source};
 use crate::lang::{self, Files, NoFiles, Setting};
-use crate::model::Model;
+use crate::model::{Measure, Model};
 use crate::sim::{self, Simulation};
 
 /// A model that was read, with its text.
@@ -155,6 +155,19 @@ impl Session {
                 inputs: Vec::new(),
             })),
         }
+    }
+
+    /// Reads what is to be measured of this model's strings: `F(x): x` is the sum of x over all modules `F(x)`, and `F(x)`
+    /// is their number. It may use the constants, params and functions of the model, `t` and `age`.
+    ///
+    /// # Errors
+    /// The messages, to be drawn with the returned source.
+    pub fn measure(&self, text: &str) -> Result<Measure, (Source, Vec<Diagnostic>)> {
+        let values = self.model.parameters.iter();
+        let settings: Vec<Setting> =
+            values.map(|p| Setting { name: p.name.clone(), value: p.value }).collect();
+        let source = Source::new("measure", text);
+        lang::measure(&self.source, &settings, &self.model, &source).map_err(|said| (source, said))
     }
 
     /// Starts the model at t = 0.

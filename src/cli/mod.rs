@@ -19,6 +19,7 @@ mod render;
 mod report;
 pub(crate) mod run;
 mod shell;
+mod specimens;
 mod view;
 
 use clap::Parser;

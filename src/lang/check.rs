@@ -161,7 +161,8 @@ pub fn reachability(
     let mut queue: Vec<KindId> = model.axiom.kinds.clone();
     while let Some(kind) = queue.pop() {
         for rule in model.kinds.get(kind).all_rules() {
-            for made in model.rules[rule].produces.iter().flat_map(|p| &p.successor.kinds) {
+            let successors = model.rules[rule].produces.iter().flat_map(|p| &p.outcome.successors);
+            for made in successors.flat_map(|s| &s.kinds) {
                 if alive.insert(*made) {
                     queue.push(*made);
                 }
@@ -231,7 +232,7 @@ fn shadowed_rule(model: &Model, index: usize, own: &[KindId], diagnostics: &mut 
 
 fn clauses(rule: &Rule, diagnostics: &mut Vec<Diagnostic>) {
     let solves: Vec<(&Condition, Span)> = rule.solves.iter().map(|s| (&s.guard, s.span)).collect();
-    let produces: Vec<(&Condition, Span)> = rule.produces.iter().map(|p| (&p.guard, p.span)).collect();
+    let produces = rule.produces.iter().filter(|p| !p.is_fault).map(|p| (&p.guard, p.span)).collect();
     for (kind, clauses) in [("solve", solves), ("produce", produces)] {
         for (i, (guard, span)) in clauses.iter().enumerate() {
             if guard.0 == [Step::Constant(false)] {

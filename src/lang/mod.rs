@@ -10,17 +10,20 @@
 mod advice;
 mod appearance;
 pub mod ast;
+mod chance;
 mod check;
 pub mod format;
 mod globals;
 mod layout;
 mod lexeme;
+mod measure;
 pub mod outline;
 pub mod parse;
 pub mod print;
 mod rules;
 mod scope;
 mod smooth;
+mod strings;
 mod suggest;
 mod surface;
 pub mod words;
@@ -29,6 +32,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 pub use layout::MAX_DEPTH;
+pub use measure::measure;
 pub use suggest::did_you_mean;
 pub use surface::{Files, NoFiles};
 
@@ -89,6 +93,7 @@ fn build(
         document,
         scope,
         kinds: &mut kinds,
+        clocks: chance::Clocks::new(document),
         occurs: HashMap::new(),
         drawn: HashMap::new(),
     };
@@ -144,8 +149,8 @@ fn build(
             }
             Item::Rule(rule) => {
                 for clause in &rule.clauses {
-                    if let Action::Produce(modules) = &clause.action {
-                        strings.push(modules);
+                    if let Action::Produce(successors) = &clause.action {
+                        strings.extend(successors.iter().map(|s| &s.modules[..]));
                     }
                 }
                 written.push(rule);
@@ -171,7 +176,7 @@ fn build(
     if !unread {
         builder.check_interpretations(&heads);
     }
-    let (occurs, drawn) = (builder.occurs, builder.drawn);
+    let (occurs, drawn, clocks) = (builder.occurs, builder.drawn, builder.clocks);
     if !single.seen("the initial string") && !unread {
         scope.diagnostics.push(
             Diagnostic::error("the model has no initial string")
@@ -211,6 +216,7 @@ fn build(
             if rule.discrete { &mut kind.steps } else { &mut kind.rules }.push(i);
         }
     }
+    clocks.assign(&mut model.kinds);
     for (kind, interpretation) in interpretations {
         if let Some(before) = model.kinds.get(kind).interpretation {
             scope.diagnostics.push(

@@ -1,15 +1,17 @@
 //! Constants, parameters and functions of a model, and the lowering of expressions to the graph.
 
 use std::collections::{HashMap, HashSet};
+use std::ops::Range;
 use std::sync::Arc;
 
 use super::advice;
 use super::ast::{Expr, ExprId, Expression, Expressions, Name, Operator};
+use super::chance::{DRAW, Draws};
 use super::print;
 use super::suggest::did_you_mean;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::expr::{Binary, Graph, Node, NodeId, Unary};
-use crate::model::Comparison;
+use crate::model::{Comparison, Distribution};
 
 /// Most nodes that the functions of a model may expand to.
 const MAX_WORK: usize = 20_000_000;
@@ -34,6 +36,8 @@ struct Function {
     parameters: Vec<Arc<str>>,
     /// None if its own text is at fault, which has been reported.
     body: Option<Lowered>,
+    /// The random numbers that its body draws.
+    draws: Range<u32>,
 }
 
 /// Names that an expression can use besides the global ones.
@@ -61,6 +65,7 @@ pub struct Scope {
     /// The same for the bodies of functions.
     function_comparisons: HashMap<NodeId, (Span, Arc<[String; 2]>)>,
     pub diagnostics: Vec<Diagnostic>,
+    pub draws: Draws,
     /// What is wrong with the values given from outside, which is not the text's fault.
     pub refused_settings: Vec<Diagnostic>,
     work: usize,
@@ -112,10 +117,15 @@ impl Scope {
                 );
             }
         }
+        let first = self.draws.all.len() as u32;
+        // Whether it may draw is asked where it is called.
+        self.draws.allowed = true;
         let body = self.lower(all, body, &variables);
+        self.draws.allowed = false;
         self.function_comparisons.extend(self.comparisons.drain());
+        let draws = first..self.draws.all.len() as u32;
         let parameters = parameters.iter().map(|p| p.text.clone()).collect();
-        self.functions.insert(name.text.clone(), Function { parameters, body });
+        self.functions.insert(name.text.clone(), Function { parameters, body, draws });
     }
 
     /// Lowers an expression that must be a number.
@@ -371,7 +381,10 @@ impl Scope {
         if let Some(function) = self.functions.get(name).cloned() {
             self.used.insert(name.clone());
             count(self, function.parameters.len())?;
-            return self.inline(function.body?, &nodes, span);
+            if !function.draws.is_empty() {
+                self.may_draw(name, span)?;
+            }
+            return self.inline(function.body?, function.draws, &nodes, span);
         }
         if let Some((_, op)) = Unary::NAMED.iter().find(|(n, _)| **n == **name) {
             count(self, 1)?;
@@ -381,10 +394,14 @@ impl Scope {
             count(self, 2)?;
             return number(self.graph.binary(*op, nodes[0], nodes[1]));
         }
+        if let Some(distribution) = Distribution::named(name) {
+            return self.draw(distribution, span, nodes);
+        }
         if self.poisoned.contains(name) || !self.unknown.insert(name.clone()) {
             return None;
         }
         let built_in = Unary::NAMED.iter().map(|(n, _)| *n).chain(Binary::NAMED.iter().map(|(n, _)| *n));
+        let built_in = built_in.chain(Distribution::NAMED.iter().map(|(n, ..)| *n));
         let known = self.functions.keys().filter(|_| self.suggests()).map(|n| &**n).chain(built_in);
         let mut error =
             Diagnostic::error(format!("unknown function `{name}`")).at(span, "no function has this name");
@@ -410,8 +427,14 @@ impl Scope {
     }
 
     /// A function's body with the arguments in place of its formal parameters.
-    fn inline(&mut self, body: Lowered, arguments: &[NodeId], span: Span) -> Option<Lowered> {
-        self.work += self.graph.reachable(&[body.node]).len();
+    fn inline(
+        &mut self,
+        body: Lowered,
+        draws: Range<u32>,
+        arguments: &[NodeId],
+        span: Span,
+    ) -> Option<Lowered> {
+        self.work += self.graph.reachable(&[body.node]).len() + draws.len();
         if self.work > MAX_WORK {
             if self.work < usize::MAX / 2 {
                 self.work = usize::MAX / 2;
@@ -423,11 +446,14 @@ impl Scope {
             }
             return None;
         }
+        let formal = |v: u32| (FORMAL..DRAW).contains(&v).then(|| arguments[(v - FORMAL) as usize]);
+        let drawn = self.draw_again(draws, &formal)?;
         let comparisons = &self.function_comparisons;
         let mut moved = Vec::new();
         let node = self.graph.rewrite(&[body.node], |graph, id, node| {
             let image = match node {
-                Node::Var(v) if v >= FORMAL => return Some(arguments[(v - FORMAL) as usize]),
+                Node::Var(v) if v >= DRAW => return drawn.get(&v).copied(),
+                Node::Var(v) => return formal(v),
                 Node::Binary(op @ (Binary::Lt | Binary::Le | Binary::Eq | Binary::Ne), a, b) => {
                     graph.binary(op, a, b)
                 }

@@ -2,12 +2,13 @@
 
 use super::layout::DECLARATIONS;
 use crate::expr::{Binary, Unary};
+use crate::model::Distribution;
 
 /// Words that begin a part of a rule. Also those of an expression, which may stand at the beginning of a line.
-pub const CLAUSES: [&str; 5] = ["if", "then", "else", "solve", "produce"];
+pub const CLAUSES: [&str; 7] = ["if", "then", "else", "solve", "produce", "or", "at"];
 
 /// Words that mean something in certain places only.
-pub const PARTICLES: [&str; 5] = ["string", "in", "step", "from", "strength"];
+pub const PARTICLES: [&str; 6] = ["string", "in", "step", "from", "strength", "rate"];
 
 /// Names of numbers that every expression, or every rule, may use.
 pub const VALUES: [&str; 4] = ["pi", "e", "t", "age"];
@@ -17,9 +18,11 @@ pub fn declarations() -> impl Iterator<Item = &'static str> {
     DECLARATIONS.iter().map(|(word, _)| *word)
 }
 
-/// Functions that are built in.
+/// Functions that are built in, and distributions that are called like them.
 pub fn functions() -> impl Iterator<Item = &'static str> {
-    Unary::NAMED.iter().map(|(name, _)| *name).chain(Binary::NAMED.iter().map(|(name, _)| *name))
+    let numbers =
+        Unary::NAMED.iter().map(|(name, _)| *name).chain(Binary::NAMED.iter().map(|(name, _)| *name));
+    numbers.chain(Distribution::NAMED.iter().map(|(name, ..)| *name))
 }
 
 /// How a declaration goes on after its first word, for somebody who types it; empty for a word that begins none.

@@ -69,14 +69,16 @@ impl Remedy {
         };
         let name = kinds.iter().map(|(_, kind)| kind).find(|k| k.all_rules().any(|i| i == rule.index));
         let name = name.map(|kind| kind.name.as_str()).filter(|name| class_of(name) == Class::Word);
+        // Clocks of events at a rate are nothing that can be written.
+        let shown = rule.parameters.len() - rule.hidden;
         let produce = name.map(|name| {
             let ending = ending(kinds, name);
-            match &*rule.parameters.join(", ") {
+            match &*rule.parameters[..shown].join(", ") {
                 "" => format!("if {at} produce {ending}"),
                 all => format!("if {at} produce {ending}({all})"),
             }
         });
-        let moving = rule.solves.iter().flat_map(|solve| &solve.of).min();
+        let moving = rule.solves.iter().flat_map(|solve| &solve.of).filter(|p| **p < shown).min();
         let rest = moving.map(|&p| format!("if {beyond} solve d{}/dt = 0", rule.parameters[p]));
         (produce.is_some() || rest.is_some()).then_some(Remedy { produce, rest })
     }

@@ -5,7 +5,7 @@
 
 use super::{COORDINATE_LIMIT, DEPTH_LIMIT, MODULE_LIMIT};
 use crate::diagnostic::{Diagnostic, Span};
-use crate::model::{KindId, Model};
+use crate::model::{KindId, Model, Produce};
 use crate::structure::Lineage;
 
 /// Most warnings of one frame.
@@ -192,5 +192,6 @@ pub(super) fn place(model: &Model, kind: KindId, lineage: Lineage, inside: Optio
         return known(model.axiom_span);
     }
     let productions = model.rules.iter().flat_map(|rule| &rule.produces);
-    productions.filter(|p| p.successor.kinds.contains(&kind)).map(|p| p.span).next().and_then(known)
+    let makes = |p: &&Produce| p.outcome.successors.iter().any(|s| s.kinds.contains(&kind));
+    productions.filter(makes).map(|p| p.span).next().and_then(known)
 }

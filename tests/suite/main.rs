@@ -5,6 +5,7 @@
 //! - [`semantics`]: what happens when (events, contexts, errors of a run), model by small model.
 //! - [`language`]: text to model and back; hostile input.
 //! - [`gallery`]: every mistake in `tests/errors` and the message it gets.
+//! - [`chance`]: times, draws and choices against their distributions; what they depend on.
 //! - [`discrete`]: derivation steps, against the models of a book; cuts.
 //! - [`cli`]: the program as it is typed.
 //! - [`editing`]: layout, `new`, `render --watch`, completions.
@@ -19,6 +20,7 @@
 //! - [`view`]: pages that play a recording, read back.
 
 mod book;
+mod chance;
 mod cli;
 mod common;
 mod discrete;

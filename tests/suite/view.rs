@@ -91,7 +91,9 @@ fn tracks(page: &str) -> Vec<Track> {
         .map(|_| {
             let head = [(); 6].map(|()| natural());
             // Looks: not looked at here.
-            (0..3 * natural()).for_each(|_| drop(natural()));
+            (0..3 * natural()).for_each(|_| {
+                let _ = natural();
+            });
             head
         })
         .collect();

@@ -16,7 +16,7 @@ fn words(rule: Rule) -> Option<&'static str> {
     Some(match rule {
         expr | number | literal | ident | call | if_expr | neg | not | coefficient => "an expression",
         or | and | le | ge | ne | lt | gt | eq | add | sub | mul | div | pow => "an operator",
-        module | modules | successor | name => "a module",
+        module | modules | successor | alternative | name => "a module",
         epsilon => "`ε` for nothing",
         arguments => "`(` and parameters",
         formals => "`(` and the names of parameters",
@@ -27,6 +27,9 @@ fn words(rule: Rule) -> Option<&'static str> {
         left_of => "`<` after the left context",
         right_of => "`>` and the right context",
         clause => "`if`, `solve` or `produce`",
+        kw_or => "`or` and another successor",
+        hazard | kw_at => "`at rate`",
+        kw_rate => "`rate`",
         solve | kw_solve => "`solve`",
         produce | kw_produce => "`produce`",
         kw_if => "`if`",
@@ -137,7 +140,49 @@ fn hint(item: Rule, text: &str, at: usize, found: &str) -> Option<String> {
     {
         return Some(format!("did you mean `{word}`?"));
     }
+    if let Some(advice) = hint_of_chance(item, text, at, found) {
+        return Some(advice.to_owned());
+    }
     hint_by_symbol(item, text, at, found).or_else(|| hint_by_word(item, text, at, found))
+}
+
+/// Advice for successors with weights and for events at a rate.
+fn hint_of_chance(item: Rule, text: &str, at: usize, found: &str) -> Option<&'static str> {
+    const WEIGHTS: &str = "several successors each have a weight before them: `produce 2: F(x) or 1: G(x)`";
+    const STEP: &str = "several successors each have a weight before them: `A -> 2: F A or 1: F`";
+    if !matches!(item, Rule::rule_item | Rule::step_item) {
+        return None;
+    }
+    let before = text[..at].trim_end();
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    let words: Vec<&str> = before.split(|c| !is_word(c)).filter(|w| !w.is_empty()).collect();
+    let last = words.last().copied().unwrap_or_default().trim_start();
+    let last = if before.ends_with(is_word) { last } else { "" };
+    let arrow = before.rfind("->").max(before.rfind('→'));
+    // From the beginning of the successor on.
+    let successor = match item {
+        Rule::step_item => arrow.map(|at| &before[at..])?,
+        _ => before.rfind("produce").map_or("", |at| &before[at..]),
+    };
+    let weights = if item == Rule::step_item { STEP } else { WEIGHTS };
+    let has_or = successor.split(|c| !is_word(c)).any(|word| word == "or");
+    let number = found.starts_with(|c: char| c.is_ascii_digit());
+    let begins = last == "produce" || successor.trim_end_matches(['>', '→', '-']).is_empty();
+    match found {
+        "or" if !successor.is_empty() => Some(weights),
+        _ if last == "or" || has_or && matches!(found, "" | "\n" | "or" | ":") => Some(weights),
+        _ if number && begins && !successor.is_empty() => Some(weights),
+        "produce" | "solve" if last == "rate" => {
+            Some("behind `at rate` stands the rate: `at rate 0.5 produce …`")
+        }
+        "solve" if before.rsplit('\n').next().is_some_and(|line| line.contains("at rate")) => {
+            Some("what happens at a rate is a production: `at rate 0.5 produce …`")
+        }
+        _ if last == "rate" && words.len() > 1 && words[words.len() - 2] != "at" => Some(
+            "a production at a rate is written `at rate 0.5 produce …`, with `if …` before it if it has a condition",
+        ),
+        _ => None,
+    }
 }
 
 /// Advice that the symbols around the place give.

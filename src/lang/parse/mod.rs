@@ -11,7 +11,7 @@ mod expected;
 
 use pest::Parser;
 
-use super::ast::{Document, Expression, Item, Module};
+use super::ast::{Document, Expression, HeadModule, Item, Module};
 use super::layout::{ItemKind, RawItem, layout};
 use crate::diagnostic::{Diagnostic, Source, Span};
 use crate::lang::advice;
@@ -87,6 +87,24 @@ pub fn parse_expression(source: &Source) -> Result<(Document, Expression), Vec<D
     let expression = builder.expression(inner).map_err(|e| vec![*e])?;
     Ok((document, expression))
 }
+
+/// Reads what is to be measured: the head of a module, and the expression that is added up, if it is not just counted.
+pub fn parse_measure(source: &Source) -> Result<(Document, HeadModule, Option<Expression>), Vec<Diagnostic>> {
+    let cut = layout(&format!("const it =\n{}", source.text));
+    if !cut.errors.is_empty() {
+        return Err(vec![Diagnostic::error("this cannot be measured").help(MEASURE)]);
+    }
+    let mut document = Document::default();
+    let mut interner = build::Interner::default();
+    let mut builder =
+        build::Builder { expressions: &mut document.expressions, interner: &mut interner, offset: 0 };
+    let pair = pest_parse(Rule::measure, &source.text, 0).map_err(|e| vec![(*e).help(MEASURE)])?;
+    let (head, expression) = builder.measure(pair).map_err(|e| vec![*e])?;
+    Ok((document, head, expression))
+}
+
+/// How a measure is written.
+pub const MEASURE: &str = "a measure is a module, with names for its parameters, and what is added up over all of them: `F(x): x`; without that they are counted: `F(x)`";
 
 fn trimmed(text: &str, item: &RawItem) -> Span {
     let body = text[item.start..item.end].trim_end();
