@@ -119,7 +119,6 @@ fn tracks(page: &str) -> Vec<Track> {
         }
         tracks.push(Track { kind, first, last: first + span, stride: 1 << log2, samples });
     }
-    drop(natural);
     assert_eq!(at, bytes.len(), "nothing is left over");
     tracks
 }
