@@ -19,6 +19,9 @@ use crate::sim::Method;
 pub struct Command {
     #[command(subcommand)]
     pub action: Action,
+    /// Show the progress of long work on standard error even where that is no terminal: a line every 5 seconds
+    #[arg(long, global = true)]
+    pub progress: bool,
 }
 
 #[derive(Debug, Subcommand)]
@@ -228,6 +231,9 @@ pub struct RenderArgs {
     pub view: String,
     /// How far what is drawn may be from a curved surface, in scene units [default: 1/2000 of the extent of the
     /// whole animation]
+    ///
+    /// Of stems, bent stems and Bézier patches, up to 4096 sides of a stem and 64 pieces on an edge of a patch. The leaf
+    /// @L, the flower @K and meshes from files have the faces that they have.
     #[arg(long, value_name = "L", value_parser = positive)]
     pub accuracy: Option<f64>,
     /// Look in perspective, from where all that is drawn at any time fills this angle (1 to 120 degrees) [default:
@@ -279,6 +285,9 @@ pub struct ViewArgs {
     pub play: Option<f64>,
     /// How far what is drawn may be from a curved surface, in scene units [default: 1/2000 of the extent of the
     /// whole animation]
+    ///
+    /// Of stems, bent stems and Bézier patches, up to 4096 sides of a stem and 64 pieces on an edge of a patch. The leaf
+    /// @L, the flower @K and meshes from files have the faces that they have.
     #[arg(long, value_name = "L", value_parser = positive, requires = "out")]
     pub accuracy: Option<f64>,
     /// Write over a file that is not a page of dlsys
@@ -292,7 +301,7 @@ pub struct GalleryArgs {
     #[arg(short, long = "out", value_name = "DIR", required_unless_present = "list")]
     pub out: Option<PathBuf>,
     /// Draw this figure only; can be repeated
-    #[arg(long = "figure", value_name = "N")]
+    #[arg(long = "figure", value_name = "N", value_parser = figure)]
     pub figures: Vec<u8>,
     /// File format of the pictures: svg or png
     #[arg(long, value_enum, default_value_t = FrameFormat::Svg)]
@@ -552,6 +561,11 @@ fn pixels(text: &str) -> Result<u32, String> {
 fn size(text: &str) -> Result<(u32, u32), String> {
     let (width, height) = text.split_once('x').ok_or("expected WIDTHxHEIGHT, such as 1280x720")?;
     Ok((pixels(width)?, pixels(height)?))
+}
+
+fn figure(text: &str) -> Result<u8, String> {
+    text.parse()
+        .map_err(|_| "expected the number of a figure of the paper, such as 6; --list shows them".to_owned())
 }
 
 /// Seeds from one to another, both included.

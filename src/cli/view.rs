@@ -4,7 +4,8 @@ use std::io::Write;
 use std::path::Path;
 
 use super::args::ViewArgs;
-use super::common::{Failure, Run, bar, out_error};
+use super::common::{Failure, Run, out_error};
+use super::progress::Progress;
 use super::reel::{Pass, Shot, play};
 use crate::export::{self, Survey, View};
 use crate::scene::Scene;
@@ -113,7 +114,7 @@ fn record(run: &Run, accuracy: Option<f64>) -> Result<Recording, Failure> {
     let nothing = Survey::new(View::FRONT);
     let mut survey = nothing.clone();
     let pass = Pass { settings: Settings { log: false, ..run.settings }, accuracy: 0.0 };
-    let progress = bar("measuring", run.times.len());
+    let mut progress = Progress::new("measuring", run.times.len());
     let of_frame = |_: &Shot, scene: &Scene| {
         let mut survey = nothing.clone();
         survey.add(scene);
@@ -121,10 +122,11 @@ fn record(run: &Run, accuracy: Option<f64>) -> Result<Recording, Failure> {
     };
     play(run, pass, threads, &mut clock, None, of_frame, |frame| {
         survey.merge(&frame);
-        progress.inc(1);
+        progress.inc();
         Ok(())
     })?;
-    progress.finish_and_clear();
+    drop(progress);
+    run.warn();
     let mut fit = survey.fit();
     fit.accuracy = accuracy.unwrap_or(fit.accuracy);
     let (model, source) = (&run.session.model, &run.session.source);
@@ -132,7 +134,7 @@ fn record(run: &Run, accuracy: Option<f64>) -> Result<Recording, Failure> {
         Path::new(&source.name).file_name().map_or(source.name.clone(), |n| n.to_string_lossy().into());
     let mut recorder = Recorder::new(model, &name, &fit);
     let pass = Pass { settings: Settings { log: true, ..run.settings }, accuracy: fit.accuracy };
-    let progress = bar("recording", run.times.len());
+    let mut progress = Progress::new("recording", run.times.len());
     let staged = |shot: &Shot, scene: &Scene| {
         let mut stage = Stage::default();
         stage.set(scene, fit.default_width);
@@ -140,13 +142,13 @@ fn record(run: &Run, accuracy: Option<f64>) -> Result<Recording, Failure> {
     };
     play(run, pass, threads, &mut clock, None, staged, |(time, modules, events, stage)| {
         recorder.history().add(&events, model, source);
-        progress.inc(1);
+        progress.inc();
         recorder.add(time, modules, &stage).map_err(|error| {
             Failure::Model(format!(
                 "error: {error}\n  help: take fewer frames with `--from A --to B --step S`\n"
             ))
         })
     })?;
-    progress.finish_and_clear();
+    drop(progress);
     Ok(recorder.finish())
 }

@@ -102,7 +102,7 @@ fn build(
     let mut heads = Vec::new();
     let (mut axiom, mut ignored, mut considered) = (None, Vec::new(), Vec::new());
     let (mut title, mut angle, mut frames) = (None, 90.0, None);
-    let mut period = None;
+    let (mut period, mut axiom_span) = (None, Span::default());
     let mut whole = true;
     for (item, span) in &document.items {
         match item {
@@ -135,6 +135,7 @@ fn build(
                     no_time: Some("the initial string is made at t = 0"),
                     ..Variables::default()
                 };
+                axiom_span = *span;
                 axiom = builder.successor(modules, &variables, 0);
                 whole &= axiom.is_some();
             }
@@ -198,6 +199,7 @@ fn build(
         parameters,
         kinds,
         axiom: axiom.unwrap_or_else(Successor::default),
+        axiom_span,
         rules,
         interpretations: Vec::new(),
         appearance: Arc::new(appearance),

@@ -9,6 +9,25 @@
 //! - [`Law`], [`Watch`]: how much work an equation or a comparison is; found by [`analyse`].
 //! - [`Condition`]: the logic of an `if`, over the signs of differences, because the simulation knows
 //!   better than a comparison of two rounded numbers whether two sides have met.
+//!
+//! # Examples
+//!
+//! ```
+//! use dlsys::model::Law;
+//! use dlsys::session::Session;
+//!
+//! let text = "
+//!     param r = 0.5 in 0 .. 1
+//!     initial string: F(1) A
+//!     F(x): solve dx/dt = r*x
+//! ";
+//! let model = Session::from_text("stem.dls", text, &[]).expect("a good model").model;
+//! assert_eq!((&*model.parameters[0].name, model.parameters[0].value), ("r", 0.5));
+//! let kind = model.kinds.find("F", 1).expect("it is in the initial string");
+//! let rule = &model.rules[model.kinds.get(kind).rules[0]];
+//! // Growth at a constant relative rate has a formula: nothing is integrated.
+//! assert!(!matches!(rule.solves[0].laws[0], Law::Numeric(_)));
+//! ```
 
 mod analysis;
 mod appearance;
@@ -56,6 +75,8 @@ pub struct Model {
     pub kinds: Kinds,
     /// The initial string; its arguments read no variables.
     pub axiom: Successor,
+    /// Where it is written.
+    pub axiom_span: Span,
     pub rules: Vec<Rule>,
     pub interpretations: Vec<Interpretation>,
     pub appearance: Arc<Appearance>,
@@ -81,6 +102,7 @@ impl Default for Model {
             parameters: Vec::new(),
             kinds: Kinds::default(),
             axiom: Successor::default(),
+            axiom_span: Span::default(),
             rules: Vec::new(),
             interpretations: Vec::new(),
             appearance: Arc::default(),

@@ -3,6 +3,7 @@
 //!
 //! The language reads no file itself; it asks a [`Files`], which whoever has the model's text provides.
 
+mod materials;
 mod mesh;
 mod patches;
 
@@ -61,14 +62,13 @@ impl Fault {
 
 /// Reads a surface; its name and place are left empty.
 pub fn read(path: &str, files: &dyn Files) -> Result<SurfaceShape, Fault> {
-    let inside = Path::new(path).components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
-    if path.is_empty() || !inside || path.contains('\\') {
+    if !is_inside(path) {
         return Err(Fault::whole("the path leaves the model's folder")
             .help("surfaces stand in the folder of the model or below it, as in `\"surfaces/petal.s\"`"));
     }
     let extension = Path::new(path).extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
     let parse = match extension.as_deref() {
-        Some("s") => patches::parse,
+        Some("s") => |text: &str, _: &str, _: &dyn Files| patches::parse(text),
         Some("obj") => mesh::parse,
         _ => {
             return Err(Fault::whole("this is no kind of surface file")
@@ -78,7 +78,13 @@ pub fn read(path: &str, files: &dyn Files) -> Result<SurfaceShape, Fault> {
     let bytes = files.read(Path::new(path), SIZE_LIMIT).map_err(|what| {
         Fault::whole(what).help("put it into the folder of the model's file or below; the path begins there")
     })?;
-    parse(&String::from_utf8_lossy(&bytes))
+    parse(&String::from_utf8_lossy(&bytes), path, files)
+}
+
+/// Whether a path stays in the model's folder.
+fn is_inside(path: &str) -> bool {
+    let inside = Path::new(path).components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
+    inside && !path.is_empty() && !path.contains('\\')
 }
 
 /// A number of a surface file.
