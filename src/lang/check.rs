@@ -9,7 +9,7 @@ use super::suggest::nearest;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::model::{
     BUILT_IN_SURFACES, COMMAND_SURFACES, Class, Condition, DRAWN_WORDS, KindId, Kinds, Model, Pattern, Rule,
-    Step, base_of, class_of,
+    Step, Turn, base_of, class_of,
 };
 
 /// Most rules that one strict predecessor can have.
@@ -42,14 +42,22 @@ impl<'k> ByName<'k> {
 }
 
 /// Matches the modules of contexts to kinds; a context that nothing can match is an error.
-pub fn resolve_contexts(model: &mut Model, rules: &[&ast::Rule], diagnostics: &mut Vec<Diagnostic>) {
+pub fn resolve_contexts(
+    model: &mut Model,
+    rules: &[&ast::Rule],
+    gathered: &[Vec<HeadModule>],
+    diagnostics: &mut Vec<Diagnostic>,
+) {
     let names = ByName::new(&model.kinds);
-    for (rule, written) in model.rules.iter_mut().zip(rules) {
+    for ((rule, written), gathered) in model.rules.iter_mut().zip(rules).zip(gathered) {
         let sides = [(&mut rule.left, &written.left), (&mut rule.right, &written.right)];
         for (patterns, heads) in sides {
             for (pattern, head) in patterns.iter_mut().zip(heads) {
                 resolve(&model.kinds, &names, pattern, head, diagnostics);
             }
+        }
+        for (aggregate, head) in rule.aggregates.iter_mut().zip(gathered) {
+            resolve(&model.kinds, &names, &mut aggregate.pattern, head, diagnostics);
         }
     }
 }
@@ -188,6 +196,9 @@ fn shadowed_rule(model: &Model, index: usize, own: &[KindId], diagnostics: &mut 
     let shadow = earlier.map(|j| (*j, &model.rules[*j])).find(|(j, before)| {
         own.iter().all(|k| model.kinds.get(*k).rules.contains(j))
             && before.left.len() <= rule.left.len()
+            // What stands on branches is found one way or another.
+            && before.right_shape.iter().all(|turn| *turn == Turn::Module)
+            && rule.right_shape.iter().all(|turn| *turn == Turn::Module)
             && before.right.len() <= rule.right.len()
             && before.left.iter().rev().zip(rule.left.iter().rev()).all(|(a, b)| wider(a, b))
             && before.right.iter().zip(&rule.right).all(|(a, b)| wider(a, b))
@@ -314,7 +325,7 @@ pub fn inert_modules(model: &Model, occurs: &HashMap<KindId, Span>, diagnostics:
     let in_context: HashSet<KindId> = model
         .rules
         .iter()
-        .flat_map(|r| r.left.iter().chain(&r.right))
+        .flat_map(|r| r.left.iter().chain(&r.right).chain(r.aggregates.iter().map(|a| &a.pattern)))
         .flat_map(|p| p.kinds.iter().copied())
         .collect();
     let with_rules: HashSet<&str> = model

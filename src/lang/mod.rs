@@ -10,6 +10,8 @@
 mod appearance;
 pub mod ast;
 mod check;
+mod equations;
+mod gather;
 mod globals;
 mod layout;
 pub mod parse;
@@ -85,6 +87,7 @@ fn build(
         scope,
         kinds: &mut kinds,
         occurs: HashMap::new(),
+        gathered: Vec::new(),
         drawn: HashMap::new(),
     };
     let (mut rules, mut drafts, mut written) = (vec![], vec![], vec![]);
@@ -159,7 +162,7 @@ fn build(
     if !unread {
         builder.check_interpretations(&heads);
     }
-    let (occurs, drawn) = (builder.occurs, builder.drawn);
+    let (occurs, drawn, gathered) = (builder.occurs, builder.drawn, builder.gathered);
     if !single.seen("the initial string") && !unread {
         scope.diagnostics.push(
             Diagnostic::error("the model has no initial string")
@@ -209,7 +212,7 @@ fn build(
     }
     let diagnostics = &mut scope.diagnostics;
     check::filter_contexts(&mut model.kinds, &ignored, &considered, diagnostics);
-    check::resolve_contexts(&mut model, &written, diagnostics);
+    check::resolve_contexts(&mut model, &written, &gathered, diagnostics);
     if single.seen("the initial string") {
         check::reachability(&model, &written, &occurs, diagnostics);
     }

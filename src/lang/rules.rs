@@ -4,9 +4,10 @@ use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 use super::ast::{self, Action, Document, Expression, HeadModule};
+use super::equations::Equations;
+use super::gather::watched;
 use super::print;
 use super::scope::{RESERVED, Scope, Variables, plural};
-use super::suggest::did_you_mean;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::expr::{Binary, Node, NodeId, Program, Unary};
 use crate::model::{
@@ -24,6 +25,8 @@ pub struct RuleBuilder<'b> {
     pub kinds: &'b mut Kinds,
     /// Each kind that stands in a string, with the first place where it does.
     pub occurs: HashMap<KindId, Span>,
+    /// The heads of the aggregates of each rule.
+    pub gathered: Vec<Vec<HeadModule>>,
     /// The same of drawings, where they are not those of the kind itself.
     pub drawn: HashMap<KindId, Span>,
 }
@@ -38,7 +41,7 @@ pub(super) struct Atoms {
 }
 
 impl RuleBuilder<'_> {
-    fn error(&mut self, error: Diagnostic) {
+    pub(super) fn error(&mut self, error: Diagnostic) {
         self.scope.diagnostics.push(error);
     }
 
@@ -136,6 +139,7 @@ impl RuleBuilder<'_> {
         own: &HeadModule,
         left: &[HeadModule],
         right: &[HeadModule],
+        aggregates: u32,
     ) -> (Variables, usize) {
         let mut names: HashMap<Arc<str>, NodeId> = HashMap::new();
         let mut spans: HashMap<Arc<str>, Span> = HashMap::new();
@@ -158,12 +162,15 @@ impl RuleBuilder<'_> {
             }
             names.insert(parameter.text.clone(), node);
         }
+        let first_aggregate = count;
+        count += aggregates;
         for name in RESERVED {
             let node = self.scope.graph.var(count);
             names.insert(name.into(), node);
             count += 1;
         }
-        (Variables { names, no_time: None }, count as usize)
+        let aggregates = Some((first_aggregate, count));
+        (Variables { names, no_time: None, aggregates }, count as usize)
     }
 
     fn not_a_bracket(&mut self, head: &HeadModule) -> bool {
@@ -185,7 +192,9 @@ impl RuleBuilder<'_> {
         if !self.not_a_bracket(head) {
             return None;
         }
-        let (variables, count) = self.variables(head, &[], &[]);
+        let (mut variables, count) = self.variables(head, &[], &[], 0);
+        // Drawing sees one module after another.
+        variables.aggregates = None;
         // What is only drawn does not develop: it makes no rule reachable.
         let before = std::mem::take(&mut self.occurs);
         let drawn = self.successor(drawn, &variables, count);
@@ -209,8 +218,10 @@ impl RuleBuilder<'_> {
         for name in names {
             self.kinds.intern(name, own);
         }
-        let (variables, count) = self.variables(&rule.predecessor, &rule.left, &rule.right);
+        let written = self.aggregates_in(rule);
+        let (variables, count) = self.variables(&rule.predecessor, &rule.left, &rule.right, written);
         self.scope.comparisons.clear();
+        self.scope.gathered.clear();
 
         // All conditions first: they share their atoms.
         let mut atoms = Atoms::default();
@@ -235,15 +246,16 @@ impl RuleBuilder<'_> {
                     None => good = false,
                 },
                 Action::Solve(equations) => {
-                    let rates = self.equations(equations, &rule.predecessor, &variables);
-                    let (rates, switches) = match rates {
-                        Some(rates) => self.smooth(rates, count, clause.span, &mut atoms)?,
-                        None => {
-                            good = false;
-                            continue;
-                        }
+                    let Some(mut equations) =
+                        self.equations(equations, &rule.predecessor, &variables, clause.span)
+                    else {
+                        good = false;
+                        continue;
                     };
-                    drafts.push((guard, clause.span, rates, switches));
+                    let (smooth, switches) =
+                        self.smooth(equations.all(), count, clause.span, &mut atoms)?;
+                    equations.set_all(smooth);
+                    drafts.push((guard, clause.span, equations, switches));
                 }
             }
         }
@@ -251,16 +263,25 @@ impl RuleBuilder<'_> {
             return None;
         }
         let context = count - own - 2;
-        let mut draft = Draft { rates: Vec::new(), sides: atoms.sides.clone() };
+        let (aggregates, terms) = self.aggregates(count);
+        let sides = atoms.sides.clone();
+        let mut draft = Draft { rates: Vec::new(), algebraic: Vec::new(), sides, terms };
         let solves = drafts
             .into_iter()
-            .map(|(guard, span, rates, switches)| {
+            .map(|(guard, span, Equations { rates, algebraic }, switches)| {
                 let total = count + switches.len();
+                let graph = &self.scope.graph;
+                // A value that has no rate is not known to approach anything.
+                let given = |(a, b): (NodeId, NodeId)| {
+                    let read = graph.variables(&[a, b]);
+                    algebraic.iter().any(|entry| read.contains(&(entry.parameter as u32)))
+                };
                 let unreachable = (atoms.sides.iter())
-                    .map(|&sides| never_reached(&self.scope.graph, sides, &rates, own, context, total))
+                    .map(|&sides| !given(sides) && never_reached(graph, sides, &rates, own, context, total))
                     .collect();
                 let roots: Vec<NodeId> = rates.iter().map(|(_, node)| *node).collect();
                 draft.rates.push(rates.clone());
+                draft.algebraic.push(algebraic);
                 Solve {
                     guard,
                     span,
@@ -274,6 +295,7 @@ impl RuleBuilder<'_> {
                     numeric_rates: Program::default(),
                     linear: None,
                     jacobian: Jacobian::default(),
+                    algebraic: Default::default(),
                     watch: Vec::new(),
                     flashes: false,
                 }
@@ -281,6 +303,7 @@ impl RuleBuilder<'_> {
             .collect();
         let sides: Vec<NodeId> = atoms.sides.iter().flat_map(|(a, b)| [*a, *b]).collect();
         let sides = Program::compile(&self.scope.graph, &sides, count);
+        let first = count - 2 - written as usize;
         let pattern = |m: &HeadModule| Pattern { kinds: Vec::new(), arity: m.parameters.len() };
         let names = |m: &HeadModule| m.parameters.iter().map(|p| p.text.to_string()).collect::<Vec<_>>();
         let compiled = Rule {
@@ -290,8 +313,11 @@ impl RuleBuilder<'_> {
             context_names: rule.left.iter().chain(&rule.right).flat_map(names).collect(),
             left: rule.left.iter().map(pattern).collect(),
             right: rule.right.iter().map(pattern).collect(),
+            right_shape: rule.right_shape.clone(),
             variables: count,
-            watched: (0..count).map(|v| sides.reads().binary_search(&v).is_ok()).collect(),
+            watched: watched(&sides, &aggregates, count, first),
+            aggregates,
+            first_aggregate: first,
             sides,
             atoms: atoms.spans,
             boundaries: atoms.boundaries,
@@ -302,40 +328,6 @@ impl RuleBuilder<'_> {
             watch_at_rest: Vec::new(),
         };
         Some((compiled, draft))
-    }
-
-    /// The derivatives of a `solve`, by parameter; those that are the constant 0 are left out.
-    fn equations(
-        &mut self,
-        equations: &[ast::Equation],
-        head: &HeadModule,
-        variables: &Variables,
-    ) -> Option<Vec<(usize, NodeId)>> {
-        let mut rates: Vec<(usize, NodeId)> = Vec::new();
-        let mut seen: HashMap<usize, Span> = HashMap::new();
-        let mut good = true;
-        for equation in equations {
-            let name = &equation.parameter;
-            let Some(parameter) = head.parameters.iter().position(|p| p.text == name.text) else {
-                self.error(not_a_parameter(name, head, variables));
-                good = false;
-                continue;
-            };
-            if let Some(before) = seen.insert(parameter, name.span) {
-                self.error(
-                    Diagnostic::error(format!("two equations for `{}` in one `solve`", name.text))
-                        .at(name.span, "the second one")
-                        .at(before, "the first one"),
-                );
-                good = false;
-            }
-            match self.scope.number(&self.document.expressions, equation.rate, variables) {
-                Some(rate) if self.scope.graph.as_constant(rate) == Some(0.0) => {}
-                Some(rate) => rates.push((parameter, rate)),
-                None => good = false,
-            }
-        }
-        good.then_some(rates)
     }
 
     /// Takes a condition apart into comparisons of two sides.
@@ -441,19 +433,6 @@ impl RuleBuilder<'_> {
     pub fn constant(&mut self, expression: Expression) -> Option<f64> {
         self.scope.constant_value(&self.document.expressions, expression)
     }
-}
-
-fn not_a_parameter(name: &ast::Name, head: &HeadModule, variables: &Variables) -> Diagnostic {
-    let known = head.parameters.iter().map(|p| &*p.text);
-    let error =
-        Diagnostic::error(format!("`{}` is no parameter of `{}`", name.text, print::head_module(head)))
-            .at(name.span, "only the parameters of the strict predecessor have equations")
-            .at(head.span, "the strict predecessor");
-    if variables.names.contains_key(&name.text) && !RESERVED.contains(&&*name.text) {
-        return error
-            .help("this is a parameter of a neighbour; its equation belongs into the neighbour's rule");
-    }
-    error.help_opt(did_you_mean(&name.text, known))
 }
 
 impl Atoms {

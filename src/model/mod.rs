@@ -10,15 +10,19 @@
 //! - [`Condition`]: the logic of an `if`, over the signs of differences, because the simulation knows
 //!   better than a comparison of two rounded numbers whether two sides have met.
 
+mod algebraic;
 mod analysis;
 mod appearance;
 mod condition;
 mod invariance;
 mod kind;
 mod law;
+mod need;
+mod rank;
 mod rule;
 
-pub use analysis::{Draft, analyse};
+pub use algebraic::{Aggregate, Algebraic, Fold, Turn};
+pub use analysis::{AlgebraicDraft, Draft, analyse};
 pub use appearance::{
     Appearance, BUILT_IN_COLORS, Contour, Gradient, NamedColor, Net, Rgb, SurfaceShape, Tropism,
 };
@@ -28,6 +32,7 @@ pub use kind::{
     BUILT_IN_SURFACES, COMMAND_SURFACES, Class, DRAWN_WORDS, Kind, KindId, Kinds, base_of, class_of,
 };
 pub use law::{Jacobian, Law, Linear, Numeric, Obstacle, Watch};
+pub use rank::is_singular;
 pub use rule::{Interpretation, Pattern, Produce, Rule, Solve, Successor, Switch};
 
 use std::sync::Arc;
@@ -58,7 +63,8 @@ pub struct Model {
 impl Model {
     /// True if every parameter of every rule follows a formula: nothing is ever integrated numerically.
     pub fn is_closed_form(&self) -> bool {
-        self.rules.iter().flat_map(|r| &r.solves).flat_map(|s| &s.laws).all(Law::is_closed)
+        let mut solves = self.rules.iter().flat_map(|r| &r.solves);
+        solves.all(|s| s.laws.iter().all(Law::is_closed) && s.algebraic.closed.iter().all(|closed| *closed))
     }
 }
 

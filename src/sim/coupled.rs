@@ -19,6 +19,7 @@ use super::{Method, Scheduler};
 use crate::model::Model;
 use crate::structure::{Instant, ModuleId, Visit};
 use smallvec::SmallVec;
+use std::collections::HashSet;
 
 /// The coupled modules and their common step.
 #[derive(Default)]
@@ -105,11 +106,15 @@ impl Simulation<'_> {
     /// Looks at the modules that have begun new motions, and at their neighbours.
     fn affected(&mut self, begun: &[ModuleId]) -> Affected {
         let mut near = std::mem::take(&mut self.coupled.loosened);
+        // Whose many neighbours are there already.
+        let mut known = HashSet::new();
         for &id in begun {
             near.push(id);
             self.readers(id, |reader, context| {
                 near.push(reader);
-                near.extend_from_slice(context);
+                if context.len() < 8 || known.insert(reader) {
+                    near.extend_from_slice(context);
+                }
             });
             if let Some(state) = self.plant.state(id) {
                 near.extend_from_slice(&state.context);
@@ -149,6 +154,14 @@ impl Simulation<'_> {
         let Some(rule) = state.rule else { return false };
         let numeric = |id: &ModuleId| self.plant.state(*id).is_some_and(|s| s.is_numeric());
         if self.model.rules[rule].reads_context && (state.is_numeric() || state.context.iter().any(numeric)) {
+            return true;
+        }
+        // What is solved for is solved for here.
+        let solved = |s: usize| {
+            let algebraic = &self.model.rules[rule].solves[s].algebraic;
+            (0..algebraic.of.len()).any(|place| algebraic.is_solved(place, state.forced))
+        };
+        if state.solve.is_some_and(solved) {
             return true;
         }
         let mut read = false;
@@ -359,10 +372,14 @@ impl Simulation<'_> {
     }
 }
 
-/// The parameters of a coupled module that are integrated, in the order of their components.
+/// The parameters of a coupled module that are integrated, then those that are solved for, in the order of their
+/// components.
 pub(super) fn integrated(model: &Model, state: &State) -> SmallVec<[usize; 4]> {
     let Some((rule, solve)) = state.rule.zip(state.solve) else { return SmallVec::new() };
     let solve = &model.rules[rule].solves[solve];
     let numeric = |i: &usize| state.forced || solve.numeric.contains(i);
-    (0..solve.of.len()).filter(numeric).map(|i| solve.of[i]).collect()
+    let algebraic = &solve.algebraic;
+    let solved = |place: &usize| algebraic.is_solved(*place, state.forced);
+    let given = (0..algebraic.of.len()).filter(solved).map(|place| algebraic.of[place]);
+    (0..solve.of.len()).filter(numeric).map(|i| solve.of[i]).chain(given).collect()
 }

@@ -22,13 +22,17 @@
 //! growth function, and a discontinuous rate costs no accuracy.
 
 mod agenda;
+mod algebra;
+mod around;
 mod career;
 mod choose;
+mod consistent;
 mod coupled;
 mod course;
 mod dense;
 mod error;
 mod event;
+mod gather;
 mod implicit;
 mod integrator;
 mod light;

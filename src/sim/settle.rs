@@ -194,8 +194,9 @@ impl Simulation<'_> {
         ends.clear();
         for fire in firing {
             let state = self.plant.state(fire.id).expect("fires");
-            let successor = &model.rules[fire.rule].produces[fire.produce].successor;
-            self.plant.variables(fire.id, &state.context, self.now, &mut self.variables);
+            let rule = &model.rules[fire.rule];
+            let successor = &rule.produces[fire.produce].successor;
+            self.plant.variables(rule, fire.id, &state.context, self.now, &mut self.variables);
             let first = all.len();
             all.resize(first + successor.arguments.outputs(), 0.0);
             successor.arguments.eval(&self.variables, &mut self.scratch, &mut all[first..]);
@@ -243,7 +244,7 @@ impl Simulation<'_> {
         for fire in firing {
             let state = self.plant.state(fire.id).expect("fires");
             let rule = &self.model.rules[fire.rule];
-            self.plant.variables(fire.id, &state.context, self.now, &mut self.variables);
+            self.plant.variables(rule, fire.id, &state.context, self.now, &mut self.variables);
             let mut sides: SmallVec<[f64; 16]> = smallvec::smallvec![0.0; rule.sides.outputs()];
             rule.sides.eval(&self.variables, &mut self.scratch, &mut sides);
             let zero = |atom: usize| match &state.open {

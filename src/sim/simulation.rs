@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::agenda::Agenda;
 use super::career::Careers;
+use super::consistent::Consistency;
 use super::coupled::Coupled;
 use super::error::{Error, Site};
 use super::event::Event;
@@ -58,6 +59,10 @@ pub struct Simulation<'m> {
     pub(super) looks_around: bool,
     pub(super) kinds_with_context: Vec<bool>,
     pub(super) neighbours: Neighbours,
+    /// Some rule has an aggregate.
+    pub(super) gathers: bool,
+    /// Modules attached to the one that looks.
+    pub(super) attached: Vec<ModuleId>,
     /// Modules whose neighbours have changed.
     pub(super) to_look: Vec<ModuleId>,
     /// What is known of neighbours may be wrong.
@@ -65,6 +70,7 @@ pub struct Simulation<'m> {
     /// Modules that rest on a boundary and have a context: neighbours may move it.
     pub(super) resting: Vec<ModuleId>,
     pub(super) coupled: Coupled,
+    pub(super) algebra: Consistency,
     pub(super) alone: Integrator,
     /// Whose step it made last, and to when.
     pub(super) alone_last: Option<(ModuleId, Instant)>,
@@ -112,10 +118,7 @@ impl<'m> Simulation<'m> {
     /// Makes the initial string at t = 0 and lets everything happen that happens there.
     pub fn new(model: &'m Model, settings: Settings) -> Result<Simulation<'m>, Error> {
         let tree = Tree::new(model.kinds.iter().map(|(_, kind)| kind.arity as u32).collect());
-        let has_context = |rule: &usize| {
-            let rule = &model.rules[*rule];
-            !rule.left.is_empty() || !rule.right.is_empty()
-        };
+        let has_context = |rule: &usize| model.rules[*rule].looks_around();
         let kinds_with_context: Vec<bool> =
             model.kinds.iter().map(|(_, kind)| kind.rules.iter().any(has_context)).collect();
         let careers = Careers::new(model, &kinds_with_context);
@@ -137,6 +140,9 @@ impl<'m> Simulation<'m> {
             looks_around: kinds_with_context.contains(&true),
             kinds_with_context,
             neighbours: Neighbours::default(),
+            gathers: model.rules.iter().any(|rule| !rule.aggregates.is_empty()),
+            attached: Vec::new(),
+            algebra: Consistency::new(model),
             to_look: Vec::new(),
             lost: false,
             resting: Vec::new(),

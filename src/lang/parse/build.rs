@@ -1,6 +1,6 @@
 //! From pest's pairs to the syntax tree.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, LazyLock};
 
 use pest::pratt_parser::{Assoc, Op, PrattParser};
@@ -9,10 +9,10 @@ use super::{Pair, Rule};
 use crate::diagnostic::{Diagnostic, Span};
 use crate::lang::ast;
 use crate::lang::ast::{
-    Action, Clause, Equation, Expr, ExprId, Expression, Expressions, HeadModule, Item, Module, Name,
+    Action, Aggregate, Clause, Equation, Expr, ExprId, Expression, Expressions, HeadModule, Item, Module, Name,
     Operator, Text,
 };
-use crate::model::Comparison;
+use crate::model::{Comparison, Fold, Turn};
 
 type Built<T> = Result<T, Box<Diagnostic>>;
 
@@ -56,6 +56,8 @@ pub struct Builder<'d> {
     pub interner: &'d mut Interner,
     /// Where the parsed piece begins in the file.
     pub offset: usize,
+    /// Names of the model's own functions.
+    pub defined: &'d HashSet<&'d str>,
 }
 
 impl Builder<'_> {
@@ -135,10 +137,12 @@ impl Builder<'_> {
             }
             Rule::rule_item => {
                 let head = next();
+                let first = self.expressions.next();
                 let mut rule = self.head(head);
                 for clause in inner {
                     rule.clauses.push(self.clause(clause)?);
                 }
+                rule.nodes = (first, self.expressions.next());
                 Item::Rule(rule)
             }
             other => unreachable!("{other:?} is no item"),
@@ -167,12 +171,22 @@ impl Builder<'_> {
     fn head(&mut self, pair: Pair) -> ast::Rule {
         let head = self.span(&pair);
         let (mut left, mut right, mut predecessor) = (Vec::new(), Vec::new(), None);
+        let mut right_shape = Vec::new();
         for part in pair.into_inner() {
             match part.as_rule() {
                 Rule::context => {
-                    let side = if predecessor.is_none() { &mut left } else { &mut right };
-                    for module in part.into_inner() {
-                        side.push(self.head_module(module));
+                    left.extend(part.into_inner().map(|module| self.head_module(module)));
+                }
+                Rule::right_context => {
+                    for part in part.into_inner() {
+                        right_shape.push(match part.as_rule() {
+                            Rule::bracket_open => Turn::Open,
+                            Rule::bracket_close => Turn::Close,
+                            _ => {
+                                right.push(self.head_module(part));
+                                Turn::Module
+                            }
+                        });
                     }
                 }
                 Rule::plus_minus | Rule::head_module => predecessor = Some(self.head_module(part)),
@@ -180,7 +194,7 @@ impl Builder<'_> {
             }
         }
         let predecessor = predecessor.expect("the grammar has a predecessor here");
-        ast::Rule { left, predecessor, right, head, clauses: Vec::new() }
+        ast::Rule { left, predecessor, right, right_shape, head, clauses: Vec::new(), nodes: (ExprId(0), ExprId(0)) }
     }
 
     fn clause(&mut self, pair: Pair) -> Built<Clause> {
@@ -208,18 +222,28 @@ impl Builder<'_> {
     }
 
     fn equation(&mut self, pair: Pair) -> Built<Equation> {
+        let span = self.span(&pair);
         let mut inner = pair.into_inner().filter(|p| !is_punctuation(p.as_rule()));
-        let derivative = inner.next().expect("an equation has a left side");
-        let rate = derivative.into_inner().next().expect("a derivative has a name");
+        let side = inner.next().expect("an equation has a left side");
+        let mut right = || inner.next().expect("an equation has a right side");
+        match side.as_rule() {
+            Rule::zero => {
+                let residual = self.expression(right())?;
+                let unknown = inner.next().map(|name| self.name(&name));
+                return Ok(Equation::Zero { residual, unknown, span });
+            }
+            Rule::ident => {
+                return Ok(Equation::Value { parameter: self.name(&side), value: self.expression(right())? });
+            }
+            _ => {}
+        }
+        let rate = side.into_inner().next().expect("a derivative has a name");
         let whole = self.span(&rate);
         let parameter = Name {
             text: self.interner.get(&rate.as_str()[1..]),
             span: Span { start: whole.start + 1, end: whole.end },
         };
-        Ok(Equation {
-            parameter,
-            rate: self.expression(inner.next().expect("an equation has a right side"))?,
-        })
+        Ok(Equation::Rate { parameter, rate: self.expression(right())? })
     }
 
     fn successor(&mut self, pair: Pair) -> Built<Vec<Module>> {
@@ -346,6 +370,7 @@ impl Builder<'_> {
                 let arguments = inner.map(|p| self.expr(p)).collect::<Built<Vec<_>>>()?;
                 Ok(self.expressions.push(Expr::Call(name, arguments), span))
             }
+            Rule::aggregate => self.aggregate(pair),
             Rule::if_expr => {
                 let parts = pair.into_inner().filter(|p| p.as_rule() == Rule::expr);
                 let mut parts = parts.map(|p| self.expr(p)).collect::<Built<Vec<_>>>()?;
@@ -365,6 +390,42 @@ impl Builder<'_> {
             }
             other => unreachable!("{other:?} is no operand"),
         }
+    }
+}
+
+impl Builder<'_> {
+    /// Something of all modules attached to one.
+    fn aggregate(&mut self, pair: Pair) -> Built<ExprId> {
+        let span = self.span(&pair);
+        let mut inner = pair.into_inner().filter(|p| !is_punctuation(p.as_rule()));
+        let mut next = || inner.next().expect("the grammar has a part here");
+        let fold = match next().as_str().trim_end() {
+            "sum" => Fold::Sum,
+            "largest" => Fold::Largest,
+            "smallest" => Fold::Smallest,
+            _ => Fold::Count,
+        };
+        let module = next();
+        // A function of the model's own called `count` is what it was.
+        if fold == Fold::Count && self.defined.contains("count") {
+            let argument = self.as_call(module)?;
+            let name = self.interner.get("count");
+            return Ok(self.expressions.push(Expr::Call(name, vec![argument]), span));
+        }
+        let head = self.head_module(module);
+        let term = inner.next().map(|term| self.expression(term)).transpose()?;
+        Ok(self.expressions.push(Expr::Aggregate(Box::new(Aggregate { fold, head, term })), span))
+    }
+
+    /// What was read as a module with the names of its parameters, as a name or the call of a function.
+    fn as_call(&mut self, module: Pair) -> Built<ExprId> {
+        let span = self.span(&module);
+        let head = self.head_module(module);
+        let arguments: Vec<ExprId> =
+            head.parameters.iter().map(|p| self.expressions.push(Expr::Name(p.text.clone()), p.span)).collect();
+        let bare = arguments.is_empty();
+        let node = if bare { Expr::Name(head.name.text) } else { Expr::Call(head.name.text, arguments) };
+        Ok(self.expressions.push(node, span))
     }
 }
 
@@ -392,6 +453,7 @@ fn is_punctuation(rule: Rule) -> bool {
             | Rule::kw_ignore
             | Rule::kw_consider
             | Rule::kw_interpret
+            | Rule::kw_for
             | Rule::EOI
     )
 }
