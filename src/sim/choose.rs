@@ -204,9 +204,27 @@ impl Simulation<'_> {
         self.variables_ahead(rule, id, &around, tau, rule.reads_context, DEPTH, out);
     }
 
+    /// The variables of a rule, given the rates of the module's own parameters.
+    #[allow(clippy::too_many_arguments)]
+    pub(super) fn neighbours_ahead(
+        &mut self,
+        rule: &Rule,
+        id: ModuleId,
+        around: &Around,
+        tau: f64,
+        depth: usize,
+        own: &[f64],
+        out: &mut Vec<Dual<f64>>,
+    ) {
+        self.variables_ahead(rule, id, around, tau, rule.reads_context, depth - 1, out);
+        for (variable, &rate) in out.iter_mut().zip(own) {
+            variable.rate = rate;
+        }
+    }
+
     /// The variables of a rule with their rates; those of neighbours are 0 if they are not read.
     #[allow(clippy::too_many_arguments)]
-    pub(super) fn variables_ahead(
+    fn variables_ahead(
         &mut self,
         rule: &Rule,
         id: ModuleId,

@@ -47,6 +47,9 @@ pub struct Coupled {
     since_mark: usize,
 }
 
+/// Most times that a step is tried whose algebraic components cannot be followed.
+const MAX_TRIES: usize = 100;
+
 /// Solving without steps begins anew, for all modules, at every event: after so many of them steps are made.
 const MAX_CUTS: u32 = 2;
 
@@ -269,10 +272,40 @@ impl Simulation<'_> {
         let Coupled { system, y, integrator, control, .. } = &mut self.coupled;
         let mut equations = Equations::new(system, rules, None);
         let limit = self.settings.slice_end(from);
-        let step = integrator.step(&self.settings, control, &mut equations, y, from, limit, &mut self.stats);
-        let end = step.map_err(|error| self.coupled_error(error, from))?;
-        self.coupled.pending = true;
-        self.plant.coupled = None;
+        let (mut course, mut tries) = (None, 0);
+        let step = loop {
+            let stats = &mut self.stats;
+            let step = integrator.step(&self.settings, control, &mut equations, y, from, limit, stats);
+            if step.is_err() || system.algebra.is_empty() {
+                break step;
+            }
+            match integrator.blended(&mut equations, y, &self.settings, control) {
+                Ok(stretches) => {
+                    course = Some(Course::of(stretches));
+                    break step;
+                }
+                Err(fault) => {
+                    tries += 1;
+                    stats.rejected += 1;
+                    if tries > MAX_TRIES || self.settings.method.is_fixed_step() {
+                        break Err(StepError::NotFinite(fault.component()));
+                    }
+                }
+            }
+        };
+        let end = match step {
+            Ok(end) => end,
+            Err(error) => {
+                // What cannot be solved for says more than that no step goes on.
+                let fault = equations.make_consistent(0.0, &mut y.clone()).err();
+                return Err(match fault {
+                    Some(fault) => self.unsolved(fault, self.coupled.system.owner(fault.component()), from),
+                    None => self.coupled_error(error, from),
+                });
+            }
+        };
+        self.coupled.pending = course.is_none();
+        self.plant.coupled = course;
         if self.watches_coupled() {
             self.show_coupled(from);
             let members = std::mem::take(&mut self.coupled.members);

@@ -23,6 +23,26 @@ impl Site {
     }
 }
 
+/// Why a parameter cannot be solved for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unsolved {
+    Singular,
+    Nothing,
+    NotFinite,
+    Rough,
+}
+
+impl Unsolved {
+    fn message(self) -> &'static str {
+        match self {
+            Unsolved::Singular => "is not determined by its equations, which are singular,",
+            Unsolved::Nothing => "has no value that solves its equations",
+            Unsolved::NotFinite => "has no value: its equations are undefined",
+            Unsolved::Rough => "changes too fast to be followed",
+        }
+    }
+}
+
 /// An error of a run. All name the rule, the module with its lineage, and the time.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum Error {
@@ -47,6 +67,13 @@ pub enum Error {
     NotFinite { site: Site, what: String },
     #[error("the step size fell to nothing at t = {}", .site.when())]
     StepTooSmall { site: Site },
+    #[error("{} of {} {} at t = {}", .what, .site.module, .fault.message(), .site.when())]
+    Unsolved {
+        site: Site,
+        /// The parameter that is solved for.
+        what: String,
+        fault: Unsolved,
+    },
     #[error("more than {limit} modules at t = {}", .site.when())]
     TooManyModules {
         site: Site,
@@ -65,6 +92,7 @@ impl Error {
             | Error::Zeno { site }
             | Error::NotFinite { site, .. }
             | Error::StepTooSmall { site }
+            | Error::Unsolved { site, .. }
             | Error::TooManyModules { site, .. } => site,
         }
     }
@@ -107,6 +135,12 @@ impl Error {
             Error::StepTooSmall { .. } => d.help(
                 "the solution may become infinite here, or the equations jump in a way that no `if` shows; a fixed step (`--method rk4 --step-size H`) shows how it behaves",
             ),
+            Error::Unsolved { fault, .. } => d.help(match fault {
+                Unsolved::Singular => "there the equations do not say how the parameter goes on: a double root, or two solutions that meet. Change the equations before this, or end the module's life at a condition that holds earlier",
+                Unsolved::Nothing => "the search begins with the value that the module was written with, or had just before: write one closer to the solution, or see whether there is one",
+                Unsolved::NotFinite => "look for a division by zero, or a root or logarithm of a negative number, at the written value too: the search begins there",
+                Unsolved::Rough => "it jumps, or turns without end, in a way that no `if` shows",
+            }),
             Error::TooManyModules { rounds, .. } if *rounds > 8 => d
                 .note(format!("{rounds} productions followed one another without time going on"))
                 .help("a successor that meets the condition again is replaced again at once: change the condition, or the successor's parameters"),
@@ -124,6 +158,7 @@ impl Error {
             Error::Zeno { .. } => "this production comes sooner and sooner",
             Error::NotFinite { .. } => "computed here",
             Error::StepTooSmall { .. } => "these equations",
+            Error::Unsolved { .. } => "solved for here",
             Error::TooManyModules { .. } => "this production made the last of them",
         }
     }

@@ -273,7 +273,7 @@ impl Simulation<'_> {
 
     /// The signs of a rule's atoms by the values of now, and whether all are far from zero. `followed` are the signs
     /// that the module was followed with.
-    fn signs_of_values(
+    pub(super) fn signs_of_values(
         &mut self,
         id: ModuleId,
         rule: &Rule,

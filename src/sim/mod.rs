@@ -24,6 +24,7 @@
 mod agenda;
 mod algebra;
 mod around;
+mod blend;
 mod career;
 mod choose;
 mod consistent;
@@ -61,7 +62,7 @@ mod tableau;
 mod transition;
 mod watch;
 
-pub use error::{Error, Site};
+pub use error::{Error, Site, Unsolved};
 pub use event::Event;
 pub use settle::MAX_ROUNDS;
 pub use simulation::{Simulation, brief, describe};

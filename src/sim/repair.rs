@@ -208,7 +208,11 @@ impl Simulation<'_> {
             let stats = &mut self.stats;
             let step = integrator.step(&self.settings, control, &mut equations, &y, from, end, stats);
             from = step.ok()?;
-            stretches.push(integrator.dense(&mut equations, &y));
+            if system.algebra.is_empty() {
+                stretches.push(integrator.dense(&mut equations, &y));
+            } else {
+                stretches.extend(integrator.blended(&mut equations, &y, &self.settings, control).ok()?);
+            }
             integrator.advance(&mut y);
             system.advance(from);
         }

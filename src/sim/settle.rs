@@ -41,11 +41,13 @@ impl Simulation<'_> {
         self.group += 1;
         self.note_arrivals();
         self.open_resting();
+        self.begin_levelling();
         let mut rounds = 0;
         let mut hurried = false;
         loop {
             if !self.fresh.is_empty() || std::mem::take(&mut self.changed) {
                 self.look_up();
+                self.level(false)?;
             }
             let mut firing = self.judge();
             let mut light = std::mem::take(&mut self.firing_light);
@@ -53,6 +55,10 @@ impl Simulation<'_> {
                 self.choose_equations(&mut hurried, &mut firing)?;
             }
             if firing.is_empty() && light.is_empty() {
+                if self.level(true)? {
+                    (self.firing, self.firing_light) = (firing, light);
+                    continue;
+                }
                 (self.firing, self.firing_light) = (firing, light);
                 break;
             }
@@ -187,6 +193,9 @@ impl Simulation<'_> {
     /// Replaces all modules in parallel: every successor is computed before any is put in.
     fn replace(&mut self, firing: &[Firing], rounds: usize) -> Result<(), Error> {
         let model = self.model;
+        if self.reads_lazily() {
+            self.refresh(self.now)?;
+        }
         self.record(firing);
         let mut all = std::mem::take(&mut self.arguments);
         all.clear();

@@ -255,6 +255,11 @@ impl System {
         system
     }
 
+    /// A system without rows.
+    pub fn at(start: Instant) -> System {
+        System { start, ..System::default() }
+    }
+
     /// Completes a system of rows.
     pub fn finish(&mut self, rules: &[Rule]) {
         self.algebra = Algebra::new(self, rules);
@@ -264,13 +269,10 @@ impl System {
 
     /// Adds the equations of algebraic parameters of a module alone, of which are given their first component and their
     /// places. The sources of the row, and the children, have been added.
-    #[allow(clippy::too_many_arguments)]
     pub fn push_instant(
         &mut self,
         (rule, solve): (usize, usize),
-        forced: bool,
-        first_source: usize,
-        sources: usize,
+        (first_source, sources): (usize, usize),
         switches: impl Iterator<Item = f64>,
         (first_rate, given): (usize, &[u32]),
         birth: Instant,
@@ -280,7 +282,7 @@ impl System {
         self.rows.push(Row {
             rule,
             solve,
-            forced,
+            forced: false,
             first_source,
             sources,
             first_switch,
@@ -569,7 +571,8 @@ impl Rates for Equations<'_> {
         let mut scratch = std::mem::take(&mut self.scratch);
         let mut values = Vec::new();
         out.clear();
-        self.settle(tau, y);
+        // Rates that are not finite say so when they are asked for.
+        let _ = self.settle(tau, y);
         let settled = std::mem::take(&mut self.settled);
         let y = if self.system.algebra.is_empty() { y } else { &settled };
         for row in &self.system.rows {
