@@ -54,6 +54,11 @@ const MAX_STEPS: usize = 64;
 /// A region of more than this part of all modules is no region.
 const MOST: f64 = 0.5;
 
+/// What flows along branches is to be conserved whatever the tolerance: what the edge of a region sends to the outside,
+/// the outside gets only as it was before. In models that add up over branches no more than this may be neglected, for
+/// its size.
+const CONSERVED: f64 = 1e-11;
+
 const NOT_HERE: u32 = u32::MAX;
 
 /// Modules that are integrated again, the seeds first, then ring after ring.
@@ -223,6 +228,7 @@ impl Simulation<'_> {
     fn reach(&self, region: &Region, trial: &Trial) -> usize {
         let Some(course) = &self.plant.coupled else { return 0 };
         let tolerance = INNER_TOLERANCE * self.settings.tolerance;
+        let tolerance = if self.gathers { tolerance.min(CONSERVED) } else { tolerance };
         let changes = |component: u32, number: usize| {
             trial.stretches.iter().any(|dense| {
                 [0.5, 1.0].into_iter().any(|position| {
