@@ -59,6 +59,7 @@
 //! | [`turtle`] | strings as geometry |
 //! | [`scene`] | geometry that knows no file format |
 //! | [`export`] | files |
+//! | [`view`] | a plant as something to walk around: recordings, a page that plays them, a window |
 //! | [`session`] | the pipeline as a whole |
 //! | [`report`] | how good the answers are, and what they cost |
 //! | [`cli`] | the program |
@@ -69,7 +70,7 @@
 //!
 //! # What it does not do yet
 //!
-//! No random numbers, no REPL, no viewer.
+//! No random numbers, no REPL.
 
 pub mod cli;
 pub mod diagnostic;
@@ -83,3 +84,9 @@ pub mod session;
 pub mod sim;
 pub mod structure;
 pub mod turtle;
+pub mod view;
+
+/// The listings of the book's chapter about the library are compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/src/library.md")]
+struct BookOfTheLibrary;

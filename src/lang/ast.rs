@@ -128,6 +128,8 @@ pub struct Rule {
     pub right_shape: Vec<Turn>,
     /// The whole head.
     pub head: Span,
+    /// Written with `->`: applied at the multiples of the period. It has one clause, which produces.
+    pub discrete: bool,
     pub clauses: Vec<Clause>,
     /// The expressions of the whole rule: from the first to before the second.
     pub nodes: (ExprId, ExprId),
@@ -179,20 +181,55 @@ pub struct Text {
 #[derive(Clone, Debug)]
 pub enum Item {
     Title(String),
-    Const { name: Name, value: Expression },
-    Param { name: Name, value: Expression, range: Option<(Expression, Expression)> },
-    Def { name: Name, parameters: Vec<Name>, body: Expression },
+    Const {
+        name: Name,
+        value: Expression,
+    },
+    Param {
+        name: Name,
+        value: Expression,
+        range: Option<(Expression, Expression)>,
+    },
+    Def {
+        name: Name,
+        parameters: Vec<Name>,
+        body: Expression,
+    },
     Angle(Expression),
-    Frames { from: Expression, to: Expression, step: Expression },
-    Color { name: Name, value: Text },
-    Gradient { name: Name, stops: Vec<Text> },
-    Surface { name: Name, file: Text },
-    Contour { name: Name, points: Vec<[Expression; 2]> },
-    Tropism { direction: [Expression; 3], strength: Option<Expression> },
+    /// Of the discrete rules.
+    Period(Expression),
+    Frames {
+        from: Expression,
+        to: Expression,
+        step: Expression,
+    },
+    Color {
+        name: Name,
+        value: Text,
+    },
+    Gradient {
+        name: Name,
+        stops: Vec<Text>,
+    },
+    Surface {
+        name: Name,
+        file: Text,
+    },
+    Contour {
+        name: Name,
+        points: Vec<[Expression; 2]>,
+    },
+    Tropism {
+        direction: [Expression; 3],
+        strength: Option<Expression>,
+    },
     Ignore(Vec<Name>),
     Consider(Vec<Name>),
     Axiom(Vec<Module>),
-    Interpret { head: HeadModule, drawn: Vec<Module> },
+    Interpret {
+        head: HeadModule,
+        drawn: Vec<Module>,
+    },
     Rule(Rule),
 }
 

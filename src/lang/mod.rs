@@ -12,8 +12,10 @@ pub mod ast;
 mod check;
 mod equations;
 mod gather;
+pub mod format;
 mod globals;
 mod layout;
+mod lexeme;
 pub mod parse;
 pub mod print;
 mod rules;
@@ -95,6 +97,7 @@ fn build(
     let mut heads = Vec::new();
     let (mut axiom, mut ignored, mut considered) = (None, Vec::new(), Vec::new());
     let (mut title, mut angle, mut frames) = (None, 90.0, None);
+    let mut period = None;
     let mut whole = true;
     for (item, span) in &document.items {
         match item {
@@ -105,6 +108,10 @@ fn build(
             Item::Angle(value) => {
                 single.once("angle", *span, builder.scope);
                 angle = builder.constant(*value).unwrap_or(90.0);
+            }
+            Item::Period(value) => {
+                single.once("period", *span, builder.scope);
+                period = Some((builder.constant(*value).unwrap_or(1.0), *span));
             }
             Item::Frames { from, to, step } => {
                 single.once("frames", *span, builder.scope);
@@ -181,6 +188,7 @@ fn build(
         title,
         angle,
         frames,
+        period: period.map_or(1.0, |(period, _)| period),
         parameters,
         kinds,
         axiom: axiom.unwrap_or_else(Successor::default),
@@ -196,7 +204,8 @@ fn build(
         };
         for name in names {
             let kind = model.kinds.intern(name, rule.predecessor.parameters.len());
-            model.kinds.get_mut(kind).rules.push(i);
+            let kind = model.kinds.get_mut(kind);
+            if rule.discrete { &mut kind.steps } else { &mut kind.rules }.push(i);
         }
     }
     for (kind, interpretation) in interpretations {
@@ -216,6 +225,7 @@ fn build(
     if single.seen("the initial string") {
         check::reachability(&model, &written, &occurs, diagnostics);
     }
+    check::period(period, &model, diagnostics);
     check::coverage(&model, diagnostics);
     check::inert_modules(&model, &occurs, diagnostics);
     check::commands(&model, diagnostics, &drawn.into_iter().chain(occurs).collect());

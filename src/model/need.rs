@@ -20,7 +20,7 @@ impl Owners<'_> {
     fn new<'m>(graph: &Graph, model: &'m Model, drafts: &[Draft]) -> Owners<'m> {
         let mut kinds_of: Vec<Vec<usize>> = vec![Vec::new(); model.rules.len()];
         for (id, kind) in model.kinds.iter() {
-            for &rule in &kind.rules {
+            for rule in kind.all_rules() {
                 kinds_of[rule].push(id.index());
             }
         }

@@ -348,6 +348,7 @@ fn fault_name(fault: &sim::Error) -> &'static str {
         sim::Error::NotFinite { .. } => "NotFinite",
         sim::Error::StepTooSmall { .. } => "StepTooSmall",
         sim::Error::Unsolved { .. } => "Unsolved",
+        sim::Error::PeriodTooShort { .. } => "PeriodTooShort",
         sim::Error::TooManyModules { .. } => "TooManyModules",
     }
 }

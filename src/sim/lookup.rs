@@ -47,12 +47,16 @@ impl Simulation<'_> {
     pub(super) fn look_up(&mut self) {
         let model = self.model;
         let mut fresh = std::mem::take(&mut self.fresh);
+        self.cut_branches(&fresh);
         for id in fresh.drain(..) {
             // It may have been replaced already, within the same instant.
             if !self.plant.tree.is_alive(id) {
                 continue;
             }
             let kind = self.plant.tree.kind(id);
+            if self.steps.has_rules[kind.index()] {
+                self.steps.join(id);
+            }
             if self.kinds_with_context[kind.index()] {
                 self.to_look.push(id);
             } else if let Some(&rule) = model.kinds.get(kind).rules.first()
@@ -97,7 +101,7 @@ impl Simulation<'_> {
             }
             let rules = &model.kinds.get(self.plant.tree.kind(id)).rules;
             let applies =
-                rules.iter().copied().find(|&rule| self.context(id, &model.rules[rule], &mut context));
+                rules.iter().copied().find(|&rule| self.context(id, &model.rules[rule], true, &mut context));
             let state = self.plant.state(id);
             let Some(rule) = applies else {
                 if state.is_none_or(|s| s.rule.is_some()) {
@@ -167,8 +171,8 @@ impl Simulation<'_> {
     }
 
     /// Collects the context that a rule asks for, in the order of the rule's variables; false if it is
-    /// not there.
-    fn context(&mut self, id: ModuleId, rule: &Rule, out: &mut Around) -> bool {
+    /// not there. `lasting` says that the module goes on looking at what it has found.
+    pub(super) fn context(&mut self, id: ModuleId, rule: &Rule, lasting: bool, out: &mut Around) -> bool {
         out.clear();
         let skipped = |kind| self.model.kinds.get(kind).skipped;
         let (tree, neighbours) = (&self.plant.tree, &mut self.neighbours);
@@ -178,7 +182,9 @@ impl Simulation<'_> {
                 false => neighbours.right(tree, *at, skipped),
             };
             let Some(found) = found else { return false };
-            neighbours.note(tree, id, found);
+            if lasting {
+                neighbours.note(tree, id, found);
+            }
             *at = found;
             out.push(found);
             pattern.matches(tree.kind(found))
@@ -192,12 +198,12 @@ impl Simulation<'_> {
             if !rule.right.iter().all(|pattern| look(&mut at, pattern, false)) {
                 return false;
             }
-        } else if self.follow(id, id, &rule.right_shape, &mut rule.right.iter(), out).is_none() {
+        } else if self.follow((id, lasting), id, &rule.right_shape, &mut rule.right.iter(), out).is_none() {
             return false;
         }
         out.reverse(rule.left.len());
         if !rule.aggregates.is_empty() {
-            self.attached_to(id, id);
+            self.attached_to((id, lasting), id);
             let tree = &self.plant.tree;
             for aggregate in &rule.aggregates {
                 let matching = |child: &&ModuleId| aggregate.pattern.matches(tree.kind(**child));
@@ -207,13 +213,13 @@ impl Simulation<'_> {
         true
     }
 
-    /// Finds the modules attached to one, and notes that somebody has looked at them. Tells whether the last is on its
+    /// Finds the modules attached to one, and notes, if that is to last, that somebody has looked at them. Tells whether the last is on its
     /// axis.
-    fn attached_to(&mut self, looker: ModuleId, id: ModuleId) -> bool {
+    fn attached_to(&mut self, (looker, lasting): (ModuleId, bool), id: ModuleId) -> bool {
         let (tree, neighbours) = (&self.plant.tree, &mut self.neighbours);
         self.attached.clear();
         let on_axis = tree.children(id, |kind| self.model.kinds.get(kind).skipped, &mut self.attached);
-        for child in &self.attached {
+        for child in self.attached.iter().filter(|_| lasting) {
             neighbours.note(tree, looker, *child);
         }
         on_axis
@@ -223,7 +229,7 @@ impl Simulation<'_> {
     /// before it, that begins with what is written. None if it is not there. No deeper than brackets in a text.
     fn follow(
         &mut self,
-        looker: ModuleId,
+        looker: (ModuleId, bool),
         from: ModuleId,
         shape: &[Turn],
         patterns: &mut std::slice::Iter<Pattern>,

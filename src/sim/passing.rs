@@ -30,6 +30,26 @@ impl Front {
         let slot = *self.members.get(self.passed)?;
         Some((self.instants.get(self.passed).copied().unwrap_or(self.first), slot))
     }
+
+    /// Takes out some of those who are still to come, and tells them.
+    pub(super) fn remove(&mut self, is_gone: impl Fn(u32) -> bool) -> Vec<u32> {
+        let mut gone = Vec::new();
+        let mut kept = self.passed;
+        for i in self.passed..self.members.len() {
+            if is_gone(self.members[i]) {
+                gone.push(self.members[i]);
+                continue;
+            }
+            self.members.swap(kept, i);
+            if !self.instants.is_empty() {
+                self.instants.swap(kept, i);
+            }
+            kept += 1;
+        }
+        self.members.truncate(kept);
+        self.instants.truncate(kept);
+        gone
+    }
 }
 
 /// What is known to come.
@@ -82,8 +102,14 @@ impl Simulation<'_> {
         members.clear();
         self.front.instants.clear();
         self.front.passed = 0;
-        self.front.time = self.agenda.earliest().unwrap_or(f64::INFINITY);
-        self.agenda.pop(&mut members);
+        while members.is_empty() && self.agenda.earliest().is_some() {
+            self.front.time = self.agenda.earliest().unwrap_or(f64::INFINITY);
+            self.agenda.pop(&mut members);
+            self.without_ghosts(&mut members);
+        }
+        if members.is_empty() {
+            self.front.time = f64::INFINITY;
+        }
         if let Some(&some) = members.first() {
             self.front.first = self.event_of(some);
         }
@@ -137,6 +163,7 @@ impl Simulation<'_> {
     fn is_event(&self, who: Who) -> bool {
         match who {
             Who::Coupled => false,
+            Who::Step => true,
             Who::Module(slot) => {
                 let state = self.plant.states[slot as usize].as_ref();
                 state.is_some_and(|s| s.next.what != What::Window)
@@ -149,6 +176,7 @@ impl Simulation<'_> {
         self.stalled = 0;
         match entry.who {
             Who::Coupled => self.pass_coupled_step(entry.at),
+            Who::Step => unreachable!("a step is an event"),
             Who::Module(slot) => {
                 let id = self.plant.states[slot as usize].as_ref().expect("scheduled").id;
                 self.pass_window(id, entry.at)
@@ -241,7 +269,10 @@ impl Simulation<'_> {
         }
         self.now = at;
         self.show_coupled(at);
-        let all_light = group.iter().all(|coming| matches!(coming, Coming::Light(..)));
+        let all_light = group.iter().all(|coming| match coming {
+            Coming::Light(..) => true,
+            Coming::Other(entry) => entry.who == Who::Step,
+        });
         let mut oldest = None;
         for coming in &group {
             let who = match *coming {
@@ -258,6 +289,10 @@ impl Simulation<'_> {
             };
             let first = match who {
                 Who::Coupled => None,
+                Who::Step => {
+                    self.begin_step();
+                    None
+                }
                 Who::Module(slot) => match self.fire_quickly(slot as usize) {
                     Some(firing) => {
                         let id = firing.id;

@@ -1,11 +1,13 @@
 //! The clock: events in their order, observation.
 
+use std::collections::HashSet;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::agenda::Agenda;
 use super::career::Careers;
 use super::consistent::Consistency;
 use super::coupled::Coupled;
+use super::derive::Steps;
 use super::error::{Error, Site};
 use super::event::Event;
 use super::integrator::Integrator;
@@ -22,7 +24,7 @@ use super::watch::Watcher;
 use super::{Method, Settings, Stats};
 use crate::diagnostic::Span;
 use crate::expr::Scratch;
-use crate::model::{KindId, Model};
+use crate::model::{CUT, KindId, Model};
 use crate::structure::{Family, Instant, Lineage, ModuleId, ModuleString, Tree};
 
 /// A model developing in time; observe it with [`Simulation::at`].
@@ -43,6 +45,10 @@ pub struct Simulation<'m> {
     /// What comes next of light modules, and the first of it.
     pub(super) agenda: Agenda,
     pub(super) front: Front,
+    /// The kind of `%`, if the model has it.
+    pub(super) cuts: Option<KindId>,
+    /// Slots of light modules that were cut off before their events.
+    pub(super) ghosts: HashSet<u32>,
     /// Time of the last event.
     pub(super) now: Instant,
     /// Number of the last instant at which something happened.
@@ -58,6 +64,10 @@ pub struct Simulation<'m> {
     /// Some rule has a context.
     pub(super) looks_around: bool,
     pub(super) kinds_with_context: Vec<bool>,
+    /// Neighbours are remembered.
+    pub(super) hands_on: bool,
+    /// Discrete rules.
+    pub(super) steps: Steps,
     pub(super) neighbours: Neighbours,
     /// Some rule has an aggregate.
     pub(super) gathers: bool,
@@ -121,6 +131,8 @@ impl<'m> Simulation<'m> {
         let has_context = |rule: &usize| model.rules[*rule].looks_around();
         let kinds_with_context: Vec<bool> =
             model.kinds.iter().map(|(_, kind)| kind.rules.iter().any(has_context)).collect();
+        let looks_around = kinds_with_context.contains(&true);
+        let hands_on = looks_around || model.rules.iter().any(|rule| rule.discrete && rule.context_len() > 0);
         let careers = Careers::new(model, &kinds_with_context);
         let mut simulation = Simulation {
             model,
@@ -131,14 +143,18 @@ impl<'m> Simulation<'m> {
             queue: Queue::default(),
             agenda: Agenda::default(),
             front: Front::default(),
+            cuts: model.kinds.find(CUT, 0),
+            ghosts: HashSet::new(),
             now: Instant::ZERO,
             group: 0,
             opened: Vec::new(),
             ready: Vec::new(),
             fresh: Vec::new(),
             changed: true,
-            looks_around: kinds_with_context.contains(&true),
+            looks_around,
             kinds_with_context,
+            hands_on,
+            steps: Steps::new(model),
             neighbours: Neighbours::default(),
             gathers: model.rules.iter().any(|rule| !rule.aggregates.is_empty()),
             attached: Vec::new(),
@@ -196,7 +212,7 @@ impl<'m> Simulation<'m> {
         }
         let tree = &mut self.plant.tree;
         tree.append(&self.model.axiom, &arguments, Instant::ZERO, Family::AXIOM, &mut self.fresh);
-        if self.looks_around {
+        if self.hands_on {
             let skipped = |kind| self.model.kinds.get(kind).skipped;
             self.neighbours.hand_on(None, &self.model.axiom.kinds, &self.fresh, skipped);
         }

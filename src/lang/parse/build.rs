@@ -104,6 +104,7 @@ impl Builder<'_> {
                 body: self.expression(next())?,
             },
             Rule::angle_item => Item::Angle(self.expression(next())?),
+            Rule::period_item => Item::Period(self.expression(next())?),
             Rule::frames_item => Item::Frames {
                 from: self.expression(next())?,
                 to: self.expression(next())?,
@@ -145,6 +146,25 @@ impl Builder<'_> {
                 rule.nodes = (first, self.expressions.next());
                 Item::Rule(rule)
             }
+            Rule::step_item => {
+                let head = next();
+                let first = self.expressions.next();
+                let mut rule = self.head(head);
+                rule.discrete = true;
+                let (mut guard, mut made) = (None, Vec::new());
+                let mut span = rule.head;
+                for part in inner {
+                    span = span.to(self.span(&part));
+                    match part.as_rule() {
+                        Rule::expr => guard = Some(self.expression(part)?),
+                        Rule::successor => made = self.successor(part)?,
+                        _ => {}
+                    }
+                }
+                rule.clauses.push(Clause { guard, action: Action::Produce(made), span });
+                rule.nodes = (first, self.expressions.next());
+                Item::Rule(rule)
+            }
             other => unreachable!("{other:?} is no item"),
         })
     }
@@ -174,10 +194,10 @@ impl Builder<'_> {
         let mut right_shape = Vec::new();
         for part in pair.into_inner() {
             match part.as_rule() {
-                Rule::context => {
+                Rule::context | Rule::step_context => {
                     left.extend(part.into_inner().map(|module| self.head_module(module)));
                 }
-                Rule::right_context => {
+                Rule::right_context | Rule::step_right => {
                     for part in part.into_inner() {
                         right_shape.push(match part.as_rule() {
                             Rule::bracket_open => Turn::Open,
@@ -194,7 +214,8 @@ impl Builder<'_> {
             }
         }
         let predecessor = predecessor.expect("the grammar has a predecessor here");
-        ast::Rule { left, predecessor, right, right_shape, head, clauses: Vec::new(), nodes: (ExprId(0), ExprId(0)) }
+        let nodes = (ExprId(0), ExprId(0));
+        ast::Rule { left, predecessor, right, right_shape, head, discrete: false, clauses: Vec::new(), nodes }
     }
 
     fn clause(&mut self, pair: Pair) -> Built<Clause> {
@@ -440,6 +461,7 @@ fn is_punctuation(rule: Rule) -> bool {
             | Rule::kw_param
             | Rule::kw_def
             | Rule::kw_angle
+            | Rule::kw_period
             | Rule::kw_frames
             | Rule::kw_step
             | Rule::kw_in
