@@ -61,6 +61,8 @@
 //! | [`export`] | files |
 //! | [`view`] | a plant as something to walk around: recordings, a page that plays them, a window |
 //! | [`session`] | the pipeline as a whole |
+//! | [`replay`] | any time after any other |
+//! | [`repl`] | the interactive session |
 //! | [`report`] | how good the answers are, and what they cost |
 //! | [`cli`] | the program |
 //! | [`diagnostic`] | messages that point at the text |
@@ -70,14 +72,17 @@
 //!
 //! # What it does not do yet
 //!
-//! No random numbers, no REPL.
+//! No random numbers.
 
 pub mod cli;
 pub mod diagnostic;
 pub mod export;
 pub mod expr;
+pub mod interrupt;
 pub mod lang;
 pub mod model;
+pub mod repl;
+pub mod replay;
 pub mod report;
 pub mod scene;
 pub mod session;

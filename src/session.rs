@@ -24,7 +24,7 @@ use crate::model::Model;
 use crate::sim::{self, Simulation};
 
 /// A model that was read, with its text.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Session {
     pub source: Source,
     pub model: Model,
@@ -101,8 +101,16 @@ impl Session {
     /// Takes a model's text from memory; `name` stands for the file in messages. Surfaces that it names are
     /// not found.
     pub fn from_text(name: &str, text: &str, settings: &[Setting]) -> Result<Session, Box<Refused>> {
-        let bytes = text.as_bytes().to_vec();
-        let source = Source::from_bytes(name, bytes).map_err(|e| {
+        Session::read_text(name, text, settings, &NoFiles)
+    }
+
+    fn read_text(
+        name: &str,
+        text: &str,
+        settings: &[Setting],
+        files: &dyn Files,
+    ) -> Result<Session, Box<Refused>> {
+        let source = Source::from_bytes(name, text.as_bytes().to_vec()).map_err(|e| {
             Box::new(Refused {
                 source: e.0,
                 diagnostics: vec![e.1],
@@ -110,7 +118,27 @@ impl Session {
                 inputs: Vec::new(),
             })
         })?;
-        Session::from_source(source, settings, &NoFiles)
+        Session::from_source(source, settings, files)
+    }
+
+    /// Takes a model's text from memory; the surfaces that it names come from a folder, as if the text were a file
+    /// there. `name` stands for the file in messages.
+    ///
+    /// # Errors
+    /// As of [`Session::open`].
+    pub fn from_text_in(
+        folder: &Path,
+        name: &str,
+        text: &str,
+        settings: &[Setting],
+    ) -> Result<Session, Box<Refused>> {
+        let folder = Folder { path: folder.to_owned(), inputs: RefCell::default() };
+        let mut read = Session::read_text(name, text, settings, &folder);
+        match &mut read {
+            Ok(session) => session.inputs = folder.inputs.into_inner(),
+            Err(refused) => refused.inputs = folder.inputs.into_inner(),
+        }
+        read
     }
 
     fn from_source(source: Source, settings: &[Setting], files: &dyn Files) -> Result<Session, Box<Refused>> {

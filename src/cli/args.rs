@@ -68,6 +68,12 @@ pub enum Action {
     Completions(CompletionsArgs),
     /// Print a manual page: `dlsys man > dlsys.1`, `dlsys man render | man -l -`
     Man(ManArgs),
+    /// Write a model, run it, look at it and change it, line by line
+    ///
+    /// Type declarations and rules as in a model file, and commands: run, step, back, show, inspect, plot, draw, export …;
+    /// `help` lists them. Without a terminal the lines of standard input are done one after another; exit status 1 if
+    /// one of them failed. The history is kept in $XDG_STATE_HOME/dlsys (or ~/.local/state/dlsys).
+    Repl(ReplArgs),
 }
 
 /// How the paper's figures are made.
@@ -311,6 +317,30 @@ pub struct ReportArgs {
     /// With --hard, run only the case of this name; can be repeated
     #[arg(long = "case", value_name = "ID")]
     pub cases: Vec<String>,
+}
+
+#[derive(Debug, Args)]
+pub struct ReplArgs {
+    /// Model file (*.dls) to begin with
+    pub model: Option<PathBuf>,
+    /// Set a `param` of the model; can be repeated
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting, requires = "model")]
+    pub settings: Vec<Setting>,
+    /// Error aimed at in every parameter, relative to max(1, |value|)
+    #[arg(long, value_name = "TOL", allow_negative_numbers = true, default_value = "1e-6", value_parser = tolerance)]
+    pub tolerance: f64,
+    /// How equations are integrated: auto, dopri5, dop853, radau, rk4, euler
+    #[arg(long, default_value = "auto", value_parser = method)]
+    pub method: Method,
+    /// Step of the methods with a fixed one (rk4, euler)
+    #[arg(long, value_name = "H", allow_negative_numbers = true, value_parser = positive, required_if_eq_any([("method", "rk4"), ("method", "euler")]))]
+    pub step_size: Option<f64>,
+    /// More modules than this are an error
+    #[arg(long, value_name = "N", default_value_t = 10_000_000)]
+    pub max_modules: usize,
+    /// Print each line before what it does, as on a terminal; for transcripts
+    #[arg(long)]
+    pub echo: bool,
 }
 
 /// Flags of everything that runs a model.

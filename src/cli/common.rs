@@ -139,6 +139,17 @@ fn spare_files(args: &SharedArgs) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Refuses what is wrong with the flags, whatever the model says.
+fn ready(args: &SharedArgs) -> Result<(), Failure> {
+    if args.method.is_fixed_step() && args.step_size.is_none() {
+        return Err(Failure::Usage(
+            "error: this method has a fixed step: give it with `--step-size H`\n".to_owned(),
+        ));
+    }
+    scheduler(args)?;
+    spare_files(args)
+}
+
 /// The scheduler that the flags say.
 fn scheduler(args: &SharedArgs) -> Result<sim::Scheduler, Failure> {
     let usage = |message: &str| Err(Failure::Usage(format!("error: {message}\n")));
@@ -157,16 +168,20 @@ fn scheduler(args: &SharedArgs) -> Result<sim::Scheduler, Failure> {
 }
 
 impl Run {
+    /// Reads the model.
     pub fn start(args: &SharedArgs) -> Result<Run, Failure> {
         let before = Instant::now();
-        if args.method.is_fixed_step() && args.step_size.is_none() {
-            return Err(Failure::Usage(
-                "error: this method has a fixed step: give it with `--step-size H`\n".to_owned(),
-            ));
-        }
-        let scheduler = scheduler(args)?;
-        spare_files(args)?;
+        ready(args)?;
         let session = open(&args.model, &args.settings)?;
+        let mut run = Run::of(session, args)?;
+        run.clock.parse = before.elapsed();
+        Ok(run)
+    }
+
+    /// Of a model that was read.
+    pub fn of(session: Session, args: &SharedArgs) -> Result<Run, Failure> {
+        ready(args)?;
+        let scheduler = scheduler(args)?;
         let times = times(args, &session)?;
         if let (sim::Scheduler::Local { slice }, Some(end)) = (scheduler, times.last())
             && end / slice > MAX_SLICES
@@ -186,8 +201,7 @@ impl Run {
             log: args.events.is_some(),
             ..defaults
         };
-        let clock = Clock { parse: before.elapsed(), ..Clock::default() };
-        Ok(Run { session, times, settings, clock })
+        Ok(Run { session, times, settings, clock: Clock::default() })
     }
 
     /// Starts a simulation.

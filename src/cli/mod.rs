@@ -1,11 +1,12 @@
-//! The command line: `dlsys check`, `explain`, `run`, `render`, `view`, `gallery` and `report`; `new`, `fmt`; `completions`,
+//! The command line: `dlsys check`, `explain`, `run`, `render`, `view`, `gallery`, `report` and `repl`; `new`, `fmt`; `completions`,
 //! `man`.
 //!
 //! Exit status: 0 done; 1 the model or the run is at fault; 2 the command line is.
 
-mod args;
-mod common;
+pub(crate) mod args;
+pub(crate) mod common;
 mod continuity;
+pub(crate) mod embedded;
 mod events;
 mod explain;
 mod fmt;
@@ -14,7 +15,7 @@ mod new;
 mod parallel;
 mod render;
 mod report;
-mod run;
+pub(crate) mod run;
 mod shell;
 mod view;
 
@@ -45,6 +46,7 @@ pub fn main() -> u8 {
         Action::Report(args) => report::report(args),
         Action::Completions(args) => shell::completions(args),
         Action::Man(args) => shell::man(args),
+        Action::Repl(args) => crate::repl::repl(args),
     };
     match done {
         Ok(()) | Err(Failure::ClosedPipe | Failure::Stale) => 0,

@@ -153,6 +153,13 @@ impl FrameWriter {
     }
 }
 
+/// The pixels of a scene on a page, row by row from the top: red, green and blue, each times the opacity, and the opacity;
+/// 0 where nothing is drawn, whatever the page's background.
+pub fn pixels(scene: &Scene, fit: &Fit, page: &Page) -> Vec<[u8; 4]> {
+    let scene = &*scene.tessellated(fit.accuracy);
+    png::picture(scene, fit, page.pixels, page.placement()).pixels
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

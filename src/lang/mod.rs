@@ -16,6 +16,7 @@ pub mod format;
 mod globals;
 mod layout;
 mod lexeme;
+pub mod outline;
 pub mod parse;
 pub mod print;
 mod rules;
@@ -23,6 +24,7 @@ mod scope;
 mod smooth;
 mod suggest;
 mod surface;
+pub mod words;
 
 use std::collections::HashMap;
 use std::sync::Arc;

@@ -22,7 +22,7 @@ const JUMP: f64 = 10.0;
 const MAX_ROUNDS: usize = 100;
 
 /// What is known of a model's algebraic parameters.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Consistency {
     /// There are some.
     pub any: bool,

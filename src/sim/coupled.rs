@@ -23,7 +23,7 @@ use smallvec::SmallVec;
 use std::collections::HashSet;
 
 /// The coupled modules and their common step.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub struct Coupled {
     /// Those of the common step in string order, then those that have come since; some may have gone.
     pub members: Vec<ModuleId>,

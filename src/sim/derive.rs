@@ -21,7 +21,7 @@ use crate::model::{Model, Rule, Truth};
 use crate::structure::{Instant, ModuleId};
 
 /// What is known of the steps.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Steps {
     /// Number of the last step, the period being what separates two.
     passed: f64,

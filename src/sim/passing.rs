@@ -13,7 +13,7 @@ use super::state::What;
 use crate::structure::{Instant, ModuleId};
 
 /// The light events of one float.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Front {
     time: f64,
     /// The instants, if they are not all `first`.
@@ -67,6 +67,13 @@ impl Coming {
             Coming::Other(entry) => entry.at,
         }
     }
+}
+
+/// True if what comes at an instant is passed on the way to another: events of that instant itself take place, what is
+/// known up to there is enough.
+pub(super) fn is_before(at: Instant, event: bool, until: Instant) -> bool {
+    let ahead = at.since(until);
+    if event { ahead <= until.resolution() } else { ahead < 0.0 }
 }
 
 impl Simulation<'_> {
@@ -137,26 +144,30 @@ impl Simulation<'_> {
 
     /// Lets every event up to `t` take place, and finds out what every module does until then.
     pub(super) fn advance(&mut self, t: f64) -> Result<(), Error> {
-        let until = Instant::new(t);
-        while let Some(coming) = self.coming() {
-            let ahead = coming.at().since(until);
-            match coming {
-                Coming::Other(entry) if !self.is_event(entry.who) => {
-                    if ahead >= 0.0 {
-                        break;
-                    }
-                    self.queue.pop();
-                    self.pass_end(entry)?;
-                }
-                _ => {
-                    if ahead > until.resolution() {
-                        break;
-                    }
-                    self.pass_event(coming)?;
-                }
-            }
-        }
+        while self.advance_once(t)?.is_some() {}
         Ok(())
+    }
+
+    /// Passes the next thing that is known to come, if that is before `t`; tells whether it was an event.
+    pub(super) fn advance_once(&mut self, t: f64) -> Result<Option<bool>, Error> {
+        let until = Instant::new(t);
+        let Some(coming) = self.coming() else { return Ok(None) };
+        let event = match coming {
+            Coming::Other(entry) => self.is_event(entry.who),
+            Coming::Light(..) => true,
+        };
+        if !is_before(coming.at(), event, until) {
+            return Ok(None);
+        }
+        (self.passed, self.last) = (self.passed + 1, Some((coming.at(), event)));
+        match coming {
+            Coming::Other(entry) if !event => {
+                self.queue.pop();
+                self.pass_end(entry)?;
+            }
+            _ => self.pass_event(coming)?,
+        }
+        Ok(Some(event))
     }
 
     /// True if the entry is an event, not the end of what is known.

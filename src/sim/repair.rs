@@ -29,6 +29,7 @@ use super::system::{Equations, System};
 use crate::structure::{Instant, ModuleId};
 
 /// What repairs have learnt, and their memory.
+#[derive(Clone)]
 pub struct Repairer {
     integrator: Integrator,
     control: Control,

@@ -32,7 +32,7 @@ pub const MAX_ROUNDS: usize = 10_000;
 const LONG: usize = 1 << 18;
 
 /// A production that applies.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Firing {
     pub id: ModuleId,
     pub rule: usize,

@@ -32,6 +32,7 @@ use crate::structure::{Family, Instant, Lineage, ModuleId, ModuleString, Tree};
 /// Every module has a clock of its own unless it reads a neighbour that is integrated numerically; those share
 /// one. Steps and events do not depend on what is observed, so the state at a time is the same bits whichever other
 /// times are asked for.
+#[derive(Clone)]
 pub struct Simulation<'m> {
     pub(super) model: &'m Model,
     pub(super) settings: Settings,
@@ -100,6 +101,9 @@ pub struct Simulation<'m> {
     /// Number of changes of the structure.
     pub(super) structure: u64,
     fault: Option<Error>,
+    /// Entries of the queues passed so far; the last of them, and whether it was an event.
+    pub(super) passed: u64,
+    pub(super) last: Option<(Instant, bool)>,
     // Memory that is used again and again.
     pub(super) variables: Vec<f64>,
     pub(super) scratch: Scratch<f64>,
@@ -177,6 +181,8 @@ impl<'m> Simulation<'m> {
             log: settings.log.then(Vec::new),
             recorder: (settings.log && settings.transitions).then(Recorder::default),
             fault: None,
+            passed: 0,
+            last: None,
             variables: Vec::new(),
             scratch: Vec::new(),
             arguments: Vec::new(),
@@ -255,14 +261,23 @@ impl<'m> Simulation<'m> {
 
     /// Lets time pass up to `t` without looking. As [`Simulation::at`], of which it is a part.
     pub fn pass(&mut self, t: f64) -> Result<(), Error> {
+        self.guarded(|simulation| simulation.advance(t))
+    }
+
+    /// Does something unless there was an error, and remembers its error.
+    pub(super) fn guarded<T>(&mut self, go: impl FnOnce(&mut Self) -> Result<T, Error>) -> Result<T, Error> {
         if let Some(fault) = &self.fault {
             return Err(fault.clone());
         }
-        let passed = self.advance(t);
-        if let Err(fault) = &passed {
+        let gone = go(self);
+        if let Err(fault) = &gone {
             self.fault = Some(fault.clone());
         }
-        passed
+        gone
+    }
+
+    pub(super) fn has_failed(&self) -> bool {
+        self.fault.is_some()
     }
 
     /// Opens a module whose event it is.

@@ -13,6 +13,7 @@
 //! - [`schedulers`]: local repair against one clock, remembered neighbours against the whole string.
 //! - [`pictures`]: pixels, perspective, and sheets of several frames.
 //! - [`plants`]: the paper's plants: order of flowering, continuity, the gallery.
+//! - [`replay`]: any time after any other, to the bits of a run.
 //! - [`report`]: studies of methods, and hard cases with exact answers.
 
 mod book;
@@ -29,6 +30,7 @@ mod organs;
 mod pages;
 mod pictures;
 mod plants;
+mod replay;
 mod report;
 mod schedulers;
 mod semantics;

@@ -33,10 +33,16 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
 
 /// Renders, unless it becomes stale before anything is written.
 fn once(args: &RenderArgs, stale: &(dyn Fn() -> bool + Sync)) -> Result<(), Failure> {
+    flags::survey(args)?;
+    flags::agree(args)?;
+    render_run(args, Run::start(&args.shared)?, stale)
+}
+
+/// The same of a model that was read.
+pub fn render_run(args: &RenderArgs, run: Run, stale: &(dyn Fn() -> bool + Sync)) -> Result<(), Failure> {
     let begun = Instant::now();
     let survey = flags::survey(args)?;
     flags::agree(args)?;
-    let run = Run::start(&args.shared)?;
     let mut clock = run.clock;
     let mut render = Render { args, run: &run, threads: flags::threads(args), frames: Vec::new(), stale };
     let mut fit = render.measure(survey, &mut clock)?.fit();
