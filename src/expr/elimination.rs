@@ -18,7 +18,7 @@ pub fn eliminate(a: &mut [f64], b: &mut [f64]) -> f64 {
         let better = |i: &usize, j: &usize| a[i * n + k].abs().total_cmp(&a[j * n + k].abs());
         let pivot = (k..n).max_by(better).unwrap_or(k);
         let size = a[pivot * n + k].abs();
-        if !(size > 0.0) {
+        if size.is_nan() || size == 0.0 {
             return if size.is_nan() { f64::NAN } else { 0.0 };
         }
         smallest = smallest.min(size);

@@ -71,7 +71,9 @@ impl RuleBuilder<'_> {
         let mut good = true;
         for equation in equations {
             let name = match equation {
-                ast::Equation::Rate { parameter, .. } | ast::Equation::Value { parameter, .. } => Some(parameter),
+                ast::Equation::Rate { parameter, .. } | ast::Equation::Value { parameter, .. } => {
+                    Some(parameter)
+                }
                 ast::Equation::Zero { unknown, .. } => unknown.as_ref(),
             };
             let parameter = match name.map(|name| self.parameter(name, head, variables, equation)) {
@@ -226,8 +228,8 @@ impl RuleBuilder<'_> {
             let name = |p: &usize| format!("`{}`", head.parameters[*p].text);
             let names: Vec<String> = free.iter().map(name).collect();
             let first = zeros.iter().find(|zero| zero.unknown.is_none()).expect("one is missing");
-            let error = Diagnostic::error("it is not clear which parameters the equations are to be solved for")
-                .at(
+            let error =
+                Diagnostic::error("it is not clear which parameters the equations are to be solved for").at(
                     first.span,
                     match free.len() {
                         0 => "nothing in it is left to be determined".to_owned(),

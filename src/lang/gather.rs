@@ -1,6 +1,7 @@
 //! Aggregates of a rule: what is written as `sum(B(x, c): …)`.
 
 use super::ast::{self, Expr, ExprId};
+use super::print;
 use super::rules::RuleBuilder;
 use crate::expr::{NodeId, Program};
 use crate::model::{Aggregate, Jacobian, Pattern};
@@ -24,6 +25,7 @@ impl RuleBuilder<'_> {
                 term: Program::compile(&self.scope.graph, &[one.term], count + one.head.parameters.len()),
                 jacobian: Jacobian::default(),
                 moves: false,
+                label: format!("{} over {}", one.fold.name(), print::head_module(&one.head)),
                 span: one.head.span,
             })
             .collect();

@@ -10,6 +10,7 @@
 //! comma, or before `then` and `else` (LANGUAGE, "Text"). Inside a string of modules it means nothing.
 
 use super::lexeme::{Lexeme, Token};
+use super::words::FOLDS;
 use crate::diagnostic::{Diagnostic, Span};
 
 /// Deepest nesting of parentheses, signs, powers and `if` that an expression may have.
@@ -105,6 +106,8 @@ struct Level {
     right: usize,
     /// `if` without its `else`.
     ifs: usize,
+    /// Opened by a word over neighbours, `sum(`: a colon belongs to it.
+    is_sum: bool,
 }
 
 struct Scanner<'t> {
@@ -230,7 +233,8 @@ impl Scanner<'_> {
             return;
         };
         let word = self.word(first).to_owned();
-        let colon = colon_outside_parentheses(tokens);
+        let in_sum = self.levels.last().is_some_and(|level| level.is_sum);
+        let colon = !in_sum && colon_outside_parentheses(tokens);
         let arrow = self.arrow_outside_parentheses(tokens);
         if arrow == Some(first.1) || arrow.is_some() && self.goes_on() {
             // What looked like the head of a rule is that of a discrete one, broken over lines.
@@ -397,7 +401,10 @@ impl Scanner<'_> {
             }
             Token::Number | Token::Text => {}
             Token::Open => {
-                self.levels.push(Level { at: start, ..Level::default() });
+                let outside = |c: char| !c.is_alphanumeric() && c != '_';
+                let word = self.text[..start].trim_end().rsplit(outside).next().unwrap_or_default();
+                let is_sum = FOLDS.contains(&word);
+                self.levels.push(Level { at: start, is_sum, ..Level::default() });
                 last = Last::Operator;
             }
             Token::Close => {
@@ -417,6 +424,7 @@ impl Scanner<'_> {
             }
             Token::Colon => {
                 last = Last::Colon;
+                self.level().is_sum = false;
                 if self.levels.len() == 1
                     && let Some(item) = self.items.last_mut()
                     && item.after_colon.is_none()
@@ -494,6 +502,7 @@ impl Scanner<'_> {
                 Last::Operator
             }
             "step" | "in" | "string" => Last::Operator,
+            "for" if in_rule && !inside && !self.in_string && self.last == Last::Operand => Last::Operator,
             "strength" if self.items.last().is_some_and(|i| i.kind == ItemKind::Tropism) => Last::Operator,
             _ => Last::Operand,
         }

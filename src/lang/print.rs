@@ -5,7 +5,9 @@
 
 use std::fmt::Write;
 
-use super::ast::{Action, Document, Equation, Expr, ExprId, Expressions, HeadModule, Item, Module, Name, Operator};
+use super::ast::{
+    Action, Document, Equation, Expr, ExprId, Expressions, HeadModule, Item, Module, Name, Operator,
+};
 use crate::model::Turn;
 
 /// How tightly a node binds; the loosest is 0.
@@ -21,11 +23,7 @@ fn strength(expr: &Expr) -> u8 {
         Expr::Negate(_) => 7,
         Expr::Scale(..) => 8,
         Expr::Binary(Operator::Pow, ..) => 9,
-        Expr::Number(_)
-        | Expr::Name(_)
-        | Expr::Call(..)
-        | Expr::Parenthesis(_)
-        | Expr::Aggregate(_) => 10,
+        Expr::Number(_) | Expr::Name(_) | Expr::Call(..) | Expr::Parenthesis(_) | Expr::Aggregate(_) => 10,
     }
 }
 

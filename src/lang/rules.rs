@@ -266,8 +266,7 @@ impl RuleBuilder<'_> {
                         good = false;
                         continue;
                     };
-                    let (smooth, switches) =
-                        self.smooth(equations.all(), count, clause.span, &mut atoms)?;
+                    let (smooth, switches) = self.smooth(equations.all(), count, clause.span, &mut atoms)?;
                     equations.set_all(smooth);
                     drafts.push((guard, clause.span, equations, switches));
                 }

@@ -7,7 +7,10 @@ use crate::expr::{Binary, Unary};
 pub const CLAUSES: [&str; 5] = ["if", "then", "else", "solve", "produce"];
 
 /// Words that mean something in certain places only.
-pub const PARTICLES: [&str; 5] = ["string", "in", "step", "from", "strength"];
+pub const PARTICLES: [&str; 6] = ["string", "in", "step", "from", "strength", "for"];
+
+/// Words for what becomes of the modules attached to one: `sum(B(x): x)`.
+pub const FOLDS: [&str; 4] = ["sum", "count", "largest", "smallest"];
 
 /// Names of numbers that every expression, or every rule, may use.
 pub const VALUES: [&str; 4] = ["pi", "e", "t", "age"];
@@ -17,9 +20,11 @@ pub fn declarations() -> impl Iterator<Item = &'static str> {
     DECLARATIONS.iter().map(|(word, _)| *word)
 }
 
-/// Functions that are built in.
+/// Functions that are built in, and what is written like them.
 pub fn functions() -> impl Iterator<Item = &'static str> {
-    Unary::NAMED.iter().map(|(name, _)| *name).chain(Binary::NAMED.iter().map(|(name, _)| *name))
+    let functions =
+        Unary::NAMED.iter().map(|(name, _)| *name).chain(Binary::NAMED.iter().map(|(name, _)| *name));
+    functions.chain(FOLDS)
 }
 
 /// How a declaration goes on after its first word, for somebody who types it; empty for a word that begins none.

@@ -22,7 +22,8 @@ pub struct Algebraic {
     pub explicit: Vec<bool>,
     /// A formula of constants, time and parameters that follow formulas.
     pub closed: Vec<bool>,
-    /// Some rate, condition or other such parameter reads it. What nobody reads is computed when somebody looks.
+    /// It is implicit, or some rate, condition or other such parameter reads it. An explicit one that nobody reads is
+    /// computed when somebody looks.
     pub needed: Vec<bool>,
     /// f of explicit parameters, g of implicit ones.
     pub values: Program,
@@ -93,6 +94,8 @@ pub struct Aggregate {
     pub jacobian: Jacobian,
     /// Something in it changes from one event to the next.
     pub moves: bool,
+    /// As it is written, without the term.
+    pub label: String,
     pub span: Span,
 }
 

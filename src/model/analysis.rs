@@ -69,11 +69,12 @@ pub fn analyse(graph: &mut Graph, model: &mut Model, drafts: &[Draft]) {
             let monotone = |variable: usize| {
                 let position = rates.iter().position(|(p, _)| *p == variable);
                 let given = algebraic.iter().any(|entry| entry.parameter == variable);
-                !given && position.is_none_or(|i| match &laws[i] {
-                    Law::Polynomial(coefficients) => coefficients.outputs() == 1,
-                    Law::Quadratic(_) => true,
-                    _ => false,
-                })
+                !given
+                    && position.is_none_or(|i| match &laws[i] {
+                        Law::Polynomial(coefficients) => coefficients.outputs() == 1,
+                        Law::Quadratic(_) => true,
+                        _ => false,
+                    })
             };
             solve.watch =
                 draft.sides.iter().map(|&s| watch(graph, s, &constants, &monotone, all.len())).collect();
@@ -95,14 +96,11 @@ pub fn analyse(graph: &mut Graph, model: &mut Model, drafts: &[Draft]) {
     }
     let needed = needed(graph, model, drafts);
     for rule in 0..model.rules.len() {
-        let kinds: Vec<usize> = model.kinds.iter().filter(|(_, k)| k.rules.contains(&rule)).map(|(id, _)| id.index()).collect();
+        let kinds: Vec<usize> =
+            model.kinds.iter().filter(|(_, k)| k.rules.contains(&rule)).map(|(id, _)| id.index()).collect();
         for algebraic in model.rules[rule].solves.iter_mut().map(|s| &mut s.algebraic) {
             let is_needed = |p: &usize| kinds.iter().any(|kind| needed.contains(&(*kind, *p)));
             algebraic.needed = algebraic.of.iter().map(is_needed).collect();
-            // Implicit ones are solved for together.
-            let Algebraic { explicit, needed, .. } = algebraic;
-            let implicit = explicit.iter().zip(&*needed).any(|(explicit, needed)| !explicit && *needed);
-            explicit.iter().zip(needed).for_each(|(explicit, needed)| *needed |= implicit && !explicit);
         }
     }
     model.drawn_only = drawn_only(graph, model, drafts);

@@ -66,6 +66,10 @@ pub fn needed(graph: &Graph, model: &Model, drafts: &[Draft]) -> Read {
     let owners = Owners::new(graph, model, drafts);
     let mut read = Read::new();
     for (index, draft) in drafts.iter().enumerate() {
+        // An implicit one is followed from its start: solved for now and then, it might be another solution.
+        for entry in draft.algebraic.iter().flatten().filter(|entry| !entry.explicit) {
+            owners.add(index, entry.parameter, &mut read);
+        }
         let sides = draft.sides.iter().flat_map(|(a, b)| [*a, *b]);
         let nodes: Vec<NodeId> = sides.chain(draft.rates.iter().flatten().map(|r| r.1)).collect();
         for v in graph.variables(&nodes) {
@@ -77,12 +81,8 @@ pub fn needed(graph: &Graph, model: &Model, drafts: &[Draft]) -> Read {
         for (index, draft) in drafts.iter().enumerate() {
             for clause in &draft.algebraic {
                 let is_read = |p: usize| owners.kinds_of[index].iter().any(|kind| read.contains(&(*kind, p)));
-                // Implicit ones of a clause are solved for together.
-                let implicit = clause.iter().any(|e| !e.explicit && is_read(e.parameter));
-                let nodes: Vec<NodeId> = (clause.iter())
-                    .filter(|e| if e.explicit { is_read(e.parameter) } else { implicit })
-                    .map(|e| e.node)
-                    .collect();
+                let known = clause.iter().filter(|e| !e.explicit || is_read(e.parameter));
+                let nodes: Vec<NodeId> = known.map(|e| e.node).collect();
                 for v in graph.variables(&nodes) {
                     owners.add(index, v as usize, &mut read);
                 }

@@ -49,6 +49,8 @@ pub enum Fault {
     None(usize),
     /// A value on the way is not finite.
     NotFinite(usize),
+    /// The partial derivatives become singular before long.
+    Fading(usize),
     /// It moves too fast to be followed.
     Rough(usize),
 }
@@ -56,7 +58,11 @@ pub enum Fault {
 impl Fault {
     pub fn component(self) -> usize {
         match self {
-            Fault::Singular(c) | Fault::None(c) | Fault::NotFinite(c) | Fault::Rough(c) => c,
+            Fault::Singular(c)
+            | Fault::None(c)
+            | Fault::NotFinite(c)
+            | Fault::Fading(c)
+            | Fault::Rough(c) => c,
         }
     }
 }
@@ -69,6 +75,8 @@ const MAX_CORRECTIONS: usize = 60;
 const SMALL: f64 = 1e-9;
 /// A pivot of no more than this part of its row is none.
 const SINGULAR: f64 = 1e-13;
+/// Where steps have become nothing, unknowns that matter so little in their equations, for what else is in them, are why.
+const FADING: f64 = 1e-2;
 /// So few unknowns are eliminated with pivoting.
 const FEW: usize = 48;
 /// No more of them, if elimination without pivoting fails.
@@ -206,6 +214,19 @@ impl Algebra {
     }
 }
 
+impl Algebra {
+    /// What has brought the steps to a stop: unknowns whose equations become singular, and which therefore turn ever
+    /// faster.
+    pub fn fading(&self, system: &System, rules: &[Rule], inputs: &[f64], y: &[f64]) -> Option<Fault> {
+        let mut memory = Memory::default();
+        let mut solver = Solver { algebra: self, system, rules, tau: 0.0, inputs, memory: &mut memory };
+        let implicit = self.blocks.iter().filter(|block| !block.explicit);
+        let mut known = implicit.map(|block| (block, solver.condition(block, y)));
+        let (block, _) = known.find(|(_, condition)| *condition < FADING)?;
+        Some(Fault::Fading(self.unknowns[block.unknowns[0] as usize].component as usize))
+    }
+}
+
 /// The algebraic parameters of a row's clause.
 fn of<'r>(rules: &'r [Rule], row: &Row) -> &'r Algebraic {
     &rules[row.rule].solves[row.solve].algebraic
@@ -250,8 +271,39 @@ impl Solver<'_> {
         }
     }
 
-    /// The partial derivatives of the equations of a block by its unknowns.
+    /// The partial derivatives of the equations of a block by its unknowns: row, column and value.
     fn partials(&mut self, block: &Block, y: &[f64]) -> Vec<(u32, u32, f64)> {
+        let mut all = self.all_partials(block, y);
+        all.retain_mut(|(_, component, _)| {
+            let unknown = self.algebra.number.get(*component as usize).copied().unwrap_or(NONE);
+            let column = block.unknowns.binary_search(&unknown);
+            *component = column.unwrap_or_default() as u32;
+            column.is_ok()
+        });
+        all
+    }
+
+    /// How much the unknowns of a block matter in their equations, as a part of what matters most there.
+    fn condition(&mut self, block: &Block, y: &[f64]) -> f64 {
+        const MOMENT: f64 = 1e-6;
+        let (mut before, mut after) = (Vec::new(), Vec::new());
+        self.residuals(block, y, &mut before);
+        let tau = std::mem::replace(&mut self.tau, MOMENT);
+        self.residuals(block, y, &mut after);
+        self.tau = tau;
+        let mut sizes: Vec<f64> = before.iter().zip(&after).map(|(a, b)| (b - a).abs() / MOMENT).collect();
+        for (row, _, value) in self.all_partials(block, y) {
+            sizes[row as usize] = sizes[row as usize].max(value.abs());
+        }
+        let mut largest = vec![0.0_f64; sizes.len()];
+        for (row, _, value) in self.partials(block, y) {
+            largest[row as usize] = largest[row as usize].max(value.abs());
+        }
+        largest.iter().zip(&sizes).map(|(own, all)| own / all).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The partial derivatives of the equations of a block: row, component and value.
+    fn all_partials(&mut self, block: &Block, y: &[f64]) -> Vec<(u32, u32, f64)> {
         let mut all = Vec::new();
         for (i, &n) in block.unknowns.iter().enumerate() {
             let unknown = self.algebra.unknowns[n as usize];
@@ -265,15 +317,12 @@ impl Solver<'_> {
             let slopes = self.system.slopes(self.rules, &row, variables, self.tau, y, self.inputs);
             let explicit = algebraic.explicit[unknown.place as usize];
             if explicit {
-                all.push((i as u32, i as u32, 1.0));
+                all.push((i as u32, unknown.component, 1.0));
             }
             self.system.visit_partials(self.rules, &row, jacobian, |partial| {
-                let other = self.algebra.number.get(partial.component as usize).copied().unwrap_or(NONE);
-                if jacobian.entries[partial.entry].0 == unknown.place as usize
-                    && let Ok(column) = block.unknowns.binary_search(&other)
-                {
+                if jacobian.entries[partial.entry].0 == unknown.place as usize {
                     let value = partial.value(partials, &slopes);
-                    all.push((i as u32, column as u32, if explicit { -value } else { value }));
+                    all.push((i as u32, partial.component, if explicit { -value } else { value }));
                 }
             });
         }
@@ -326,7 +375,11 @@ impl Solver<'_> {
                 }
                 part *= 0.5;
                 if part < 1e-6 {
-                    return Err(if bad(&trial).is_some() { Fault::NotFinite(places[0]) } else { Fault::None(places[0]) });
+                    return Err(if bad(&trial).is_some() {
+                        Fault::NotFinite(places[0])
+                    } else {
+                        Fault::None(places[0])
+                    });
                 }
             }
             std::mem::swap(&mut left, &mut trial);

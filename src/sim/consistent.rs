@@ -191,8 +191,7 @@ impl Simulation<'_> {
                 if algebraic.is_lazy(place) == lazy {
                     number.insert((id, parameter), y.len() as u32);
                     system.places.push((first + parameter, id, parameter));
-                    // Not what it was when somebody looked last.
-                    y.push(if lazy { 0.0 } else { values[parameter] });
+                    y.push(values[parameter]);
                     places.push(place as u32);
                 }
             }
@@ -290,6 +289,7 @@ impl Simulation<'_> {
             Fault::Singular(_) => Unsolved::Singular,
             Fault::None(_) => Unsolved::Nothing,
             Fault::NotFinite(_) => Unsolved::NotFinite,
+            Fault::Fading(_) => Unsolved::Fading,
             Fault::Rough(_) => Unsolved::Rough,
         };
         Error::Unsolved { site, what, fault }
@@ -311,7 +311,8 @@ impl Simulation<'_> {
         variables.extend(switches.iter().map(|&on| Dual { value: f64::from(u8::from(on)), rate: 0.0 }));
         let mut left = vec![Dual { value: 0.0, rate: 0.0 }; algebraic.of.len()];
         // First the implicit ones: G z' = -(the rate of g while z stands still).
-        let implicit: Vec<usize> = (0..algebraic.of.len()).filter(|place| !algebraic.explicit[*place]).collect();
+        let implicit: Vec<usize> =
+            (0..algebraic.of.len()).filter(|place| !algebraic.explicit[*place]).collect();
         if !implicit.is_empty() {
             algebraic.values.eval(&variables, &mut Vec::new(), &mut left);
             let point: Vec<f64> = variables.iter().map(|v| v.value).collect();

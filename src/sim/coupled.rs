@@ -307,6 +307,8 @@ impl Simulation<'_> {
             Err(error) => {
                 // What cannot be solved for says more than that no step goes on.
                 let fault = equations.make_consistent(0.0, &mut y.clone()).err();
+                let slow = matches!(error, StepError::TooSmall(_));
+                let fault = fault.or_else(|| slow.then(|| equations.fading(y)).flatten());
                 return Err(match fault {
                     Some(fault) => self.unsolved(fault, self.coupled.system.owner(fault.component()), from),
                     None => self.coupled_error(error, from),

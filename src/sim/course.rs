@@ -44,7 +44,8 @@ impl Course {
         let end = stretches.last().expect("one at least").end;
         let count = stretches.len() as u32;
         let track = |component: u32| Track { first: 0, count, component };
-        let tracks = if count == 1 { Vec::new() } else { (0..stretches[0].len() as u32).map(track).collect() };
+        let tracks =
+            if count == 1 { Vec::new() } else { (0..stretches[0].len() as u32).map(track).collect() };
         Course { stretches, tracks, end }
     }
 

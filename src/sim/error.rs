@@ -29,6 +29,7 @@ pub enum Unsolved {
     Singular,
     Nothing,
     NotFinite,
+    Fading,
     Rough,
 }
 
@@ -38,6 +39,7 @@ impl Unsolved {
             Unsolved::Singular => "is not determined by its equations, which are singular,",
             Unsolved::Nothing => "has no value that solves its equations",
             Unsolved::NotFinite => "has no value: its equations are undefined",
+            Unsolved::Fading => "is hardly determined any more by its equations, which become singular,",
             Unsolved::Rough => "changes too fast to be followed",
         }
     }
@@ -142,7 +144,7 @@ impl Error {
                 "the solution may become infinite here, or the equations jump in a way that no `if` shows; a fixed step (`--method rk4 --step-size H`) shows how it behaves",
             ),
             Error::Unsolved { fault, .. } => d.help(match fault {
-                Unsolved::Singular => "there the equations do not say how the parameter goes on: a double root, or two solutions that meet. Change the equations before this, or end the module's life at a condition that holds earlier",
+                Unsolved::Singular | Unsolved::Fading => "there the equations do not say how the parameter goes on: a double root, or two solutions that meet. Change the equations before this, or end the module's life at a condition that holds earlier",
                 Unsolved::Nothing => "the search begins with the value that the module was written with, or had just before: write one closer to the solution, or see whether there is one",
                 Unsolved::NotFinite => "look for a division by zero, or a root or logarithm of a negative number, at the written value too: the search begins there",
                 Unsolved::Rough => "it jumps, or turns without end, in a way that no `if` shows",

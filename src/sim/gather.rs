@@ -203,6 +203,11 @@ impl Equations<'_> {
         self.registers = registers;
     }
 
+    /// Equations that become singular, at the start of a step.
+    pub fn fading(&mut self, y: &[f64]) -> Option<Fault> {
+        self.system.algebra.fading(self.system, self.rules, &self.inputs, y)
+    }
+
     /// How far the errors of the components at the end of a step move what is solved for.
     pub fn sensitivity(&mut self, tau: f64, end: &[f64], errors: &[f64], tolerance: f64) -> f64 {
         let there: Result<Vec<f64>, Fault> = (|| {

@@ -6,8 +6,8 @@
 
 use smallvec::SmallVec;
 
-use super::career::{Career, Child, End, Forecast, Life, REFUSED, same_bits};
 use super::around::Around;
+use super::career::{Career, Child, End, Forecast, Life, REFUSED, same_bits};
 use super::error::Error;
 use super::event::Event;
 use super::motion::Motion;

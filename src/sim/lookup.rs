@@ -7,8 +7,8 @@ use std::collections::HashSet;
 
 use smallvec::SmallVec;
 
-use super::settle::clear;
 use super::around::Around;
+use super::settle::clear;
 use super::simulation::Simulation;
 use super::state::{Signs, State};
 use super::watch::{TOUCH, opposite};

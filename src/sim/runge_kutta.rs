@@ -265,7 +265,7 @@ impl Workspace {
 
     /// The estimated error of one component at the end of the step, with its sign.
     fn estimate(&self, tableau: &Tableau, h: f64, component: usize) -> f64 {
-        let high = h * weighed(&tableau.e[0], &self.k, component);
+        let high = h * weighed(tableau.e[0], &self.k, component);
         match tableau.e.get(1) {
             None => high,
             Some(low) => dop853_error(high, h * weighed(low, &self.k, component)).copysign(high),

@@ -14,6 +14,9 @@ use smallvec::SmallVec;
 /// Rule, clause and whether all is integrated, and the rows for which that is so.
 type Batch = ((usize, usize, bool), SmallVec<[u32; 16]>);
 
+/// A rule and one of its aggregates.
+type Term = (usize, usize);
+
 /// Where a variable of a rule comes from.
 #[derive(Clone, Copy, Debug)]
 pub enum Source {
@@ -39,7 +42,7 @@ pub struct System {
     pub sums: Vec<Sum>,
     pub children: Vec<Source>,
     /// Numbers of aggregates with their children, as many as are worked on together, by rule and number of the aggregate.
-    pub folds: Vec<((usize, usize), Vec<(u32, u32)>)>,
+    pub folds: Vec<(Term, Vec<(u32, u32)>)>,
     pub algebra: Algebra,
     /// Of each algebraic component of each row: its place among the algebraic parameters of the clause.
     given: Vec<u32>,
@@ -522,7 +525,9 @@ impl<'s> Equations<'s> {
     /// Solves for the algebraic components of a state.
     pub fn make_consistent(&mut self, tau: f64, y: &mut [f64]) -> Result<(), Fault> {
         self.settle(tau, y)?;
-        y.copy_from_slice(&self.settled);
+        if !self.system.algebra.is_empty() {
+            y.copy_from_slice(&self.settled);
+        }
         Ok(())
     }
 

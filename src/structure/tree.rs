@@ -425,12 +425,7 @@ impl Tree {
 
     /// The modules attached to this one, in string order, appended to `out`: the first of each side branch, then the next
     /// on the same axis, modules of skipped kinds passed over. Also tells whether the last is on the axis.
-    pub fn children(
-        &self,
-        id: ModuleId,
-        skipped: impl Fn(KindId) -> bool,
-        out: &mut Vec<ModuleId>,
-    ) -> bool {
+    pub fn children(&self, id: ModuleId, skipped: impl Fn(KindId) -> bool, out: &mut Vec<ModuleId>) -> bool {
         let mut at = self.node(id).after;
         // The branches that are open.
         let mut branches: SmallVec<[u32; 8]> = SmallVec::new();

@@ -2,6 +2,7 @@
 //!
 //! - [`book`]: the book in `docs/`, followed literally; [`pages`] reads its Markdown.
 //! - [`listings`]: the paper's models against results of an independent program.
+//! - [`algebraic`], [`signals`]: values and equations instead of rates; sums over what is attached; contexts with branches.
 //! - [`semantics`]: what happens when (events, contexts, errors of a run), model by small model.
 //! - [`language`]: text to model and back; hostile input.
 //! - [`gallery`]: every mistake in `tests/errors` and the message it gets.
@@ -16,6 +17,7 @@
 //! - [`replay`]: any time after any other, to the bits of a run.
 //! - [`report`]: studies of methods, and hard cases with exact answers.
 
+mod algebraic;
 mod book;
 mod cli;
 mod common;
@@ -34,3 +36,4 @@ mod replay;
 mod report;
 mod schedulers;
 mod semantics;
+mod signals;

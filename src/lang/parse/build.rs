@@ -9,8 +9,8 @@ use super::{Pair, Rule};
 use crate::diagnostic::{Diagnostic, Span};
 use crate::lang::ast;
 use crate::lang::ast::{
-    Action, Aggregate, Clause, Equation, Expr, ExprId, Expression, Expressions, HeadModule, Item, Module, Name,
-    Operator, Text,
+    Action, Aggregate, Clause, Equation, Expr, ExprId, Expression, Expressions, HeadModule, Item, Module,
+    Name, Operator, Text,
 };
 use crate::model::{Comparison, Fold, Turn};
 
@@ -442,8 +442,11 @@ impl Builder<'_> {
     fn as_call(&mut self, module: Pair) -> Built<ExprId> {
         let span = self.span(&module);
         let head = self.head_module(module);
-        let arguments: Vec<ExprId> =
-            head.parameters.iter().map(|p| self.expressions.push(Expr::Name(p.text.clone()), p.span)).collect();
+        let arguments: Vec<ExprId> = head
+            .parameters
+            .iter()
+            .map(|p| self.expressions.push(Expr::Name(p.text.clone()), p.span))
+            .collect();
         let bare = arguments.is_empty();
         let node = if bare { Expr::Name(head.name.text) } else { Expr::Call(head.name.text, arguments) };
         Ok(self.expressions.push(node, span))

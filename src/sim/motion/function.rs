@@ -34,7 +34,12 @@ impl Function {
         function.start.is_finite().then_some(function)
     }
 
-    fn evaluate<T: Value>(&self, mut variables: Vec<T>, motion: impl Fn(&Motion, f64) -> T, time: [T; 2]) -> T {
+    fn evaluate<T: Value>(
+        &self,
+        mut variables: Vec<T>,
+        motion: impl Fn(&Motion, f64) -> T,
+        time: [T; 2],
+    ) -> T {
         for (variable, how) in &self.moving {
             variables[*variable] = motion(how, self.variables[*variable]);
         }
