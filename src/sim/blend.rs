@@ -12,7 +12,7 @@ use std::sync::LazyLock;
 
 use super::algebra::Fault;
 use super::dense::{Dense, MAX_DEGREE};
-use super::system::Equations;
+use super::equations::Equations;
 use crate::expr::eliminate;
 
 const POINTS: usize = MAX_DEGREE + 1;

@@ -8,10 +8,11 @@ use std::collections::HashMap;
 
 use super::algebra::Fault;
 use super::around::Around;
+use super::equations::Equations;
 use super::error::{Error, Unsolved};
 use super::lookup::NEAR;
 use super::simulation::Simulation;
-use super::system::{Equations, Source, Sum, System};
+use super::system::{Source, Sum, System};
 use crate::expr::{Dual, eliminate};
 use crate::model::{Model, Truth};
 use crate::structure::{Instant, ModuleId, Visit};

@@ -5,6 +5,7 @@
 //! it is repaired there (`repair`), or ends it for all.
 
 use super::course::Course;
+use super::equations::Equations;
 use super::error::Error;
 use super::integrator::{Integrator, StepError, foresee};
 use super::linear::Linear;
@@ -14,7 +15,7 @@ use super::queue::Who;
 use super::repair::Repairer;
 use super::simulation::Simulation;
 use super::state::{Control, Next, State, What};
-use super::system::{Equations, System};
+use super::system::System;
 use super::watch::needs_search;
 use super::{Method, Scheduler};
 use crate::model::Model;

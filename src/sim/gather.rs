@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::algebra::Fault;
-use super::system::{Equations, Row, Source, Sum, System};
+use super::equations::Equations;
+use super::system::{Row, Source, Sum, System};
 use crate::expr::LANES;
 use crate::model::{Jacobian, Rule};
 

@@ -2,10 +2,10 @@
 
 use super::algebra::Fault;
 use super::dense::Dense;
+use super::equations::Equations;
 use super::implicit::Implicit;
 use super::runge_kutta::{Rates, Trial, Workspace};
 use super::state::Control;
-use super::system::Equations;
 use super::{Method, Settings, Stats};
 use crate::structure::Instant;
 

@@ -35,6 +35,7 @@ mod course;
 mod cut;
 mod dense;
 mod derive;
+mod equations;
 mod error;
 mod event;
 mod gather;

@@ -20,12 +20,13 @@
 use super::coupled::integrated;
 use super::course::Course;
 use super::dense::Dense;
+use super::equations::Equations;
 use super::integrator::{INNER_TOLERANCE, Integrator};
 use super::motion::Motion;
 use super::queue::Who;
 use super::simulation::Simulation;
 use super::state::{Control, Next};
-use super::system::{Equations, System};
+use super::system::System;
 use crate::structure::{Instant, ModuleId};
 
 /// What repairs have learnt, and their memory.
