@@ -53,11 +53,12 @@ pub fn resolve_contexts(
         let sides = [(&mut rule.left, &written.left), (&mut rule.right, &written.right)];
         for (patterns, heads) in sides {
             for (pattern, head) in patterns.iter_mut().zip(heads) {
-                resolve(&model.kinds, &names, pattern, head, diagnostics);
+                resolve(&model.kinds, &names, pattern, head, "this context is never there", diagnostics);
             }
         }
         for (aggregate, head) in rule.aggregates.iter_mut().zip(gathered) {
-            resolve(&model.kinds, &names, &mut aggregate.pattern, head, diagnostics);
+            let never = "nothing of this name is ever attached to a module";
+            resolve(&model.kinds, &names, &mut aggregate.pattern, head, never, diagnostics);
         }
     }
 }
@@ -67,6 +68,7 @@ fn resolve(
     names: &ByName,
     pattern: &mut Pattern,
     head: &HeadModule,
+    never: &str,
     diagnostics: &mut Vec<Diagnostic>,
 ) {
     let name = &*head.name.text;
@@ -82,14 +84,14 @@ fn resolve(
             ))
             .at(head.span, "the number of parameters must agree, or the context is never there"),
             None => Diagnostic::error(format!("there is no module `{name}`"))
-                .at(head.span, "this context is never there")
+                .at(head.span, never)
                 .help_opt(near_kind(kinds, name)),
         };
         diagnostics.push(error);
     } else if pattern.kinds.iter().all(|id| kinds.get(*id).skipped) {
         diagnostics.push(
             Diagnostic::error(format!("`{name}` is passed over in the search for context"))
-                .at(head.span, "this context is never there")
+                .at(head.span, never)
                 .help(if class_of(name) == Class::Word {
                     format!("take `{name}` out of `ignore`, or name it in `consider`")
                 } else {

@@ -89,7 +89,8 @@ impl RuleBuilder<'_> {
                 self.error(
                     Diagnostic::error(format!("two equations for `{}` in one `solve`", name.text))
                         .at(name.span, "the second one")
-                        .at(before, "the first one"),
+                        .at(before, "the first one")
+                        .help("a parameter has a rate, or a value, or an equation that is solved for it: take one out"),
                 );
                 good = false;
             }

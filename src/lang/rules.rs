@@ -178,7 +178,8 @@ impl RuleBuilder<'_> {
         if bracket {
             self.error(
                 Diagnostic::error("a bracket has no rules")
-                    .at(head.name.span, "brackets structure the string; they do not develop"),
+                    .at(head.name.span, "brackets structure the string; they do not develop")
+                    .help("in a context after `>` they stand in pairs around a branch: `A > [ B ] C`"),
             );
         }
         let cut = &*head.name.text == CUT;

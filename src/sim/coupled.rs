@@ -308,8 +308,6 @@ impl Simulation<'_> {
             Err(error) => {
                 // What cannot be solved for says more than that no step goes on.
                 let fault = equations.make_consistent(0.0, &mut y.clone()).err();
-                let slow = matches!(error, StepError::TooSmall(_));
-                let fault = fault.or_else(|| slow.then(|| equations.fading(y)).flatten());
                 return Err(match fault {
                     Some(fault) => self.unsolved(fault, self.coupled.system.owner(fault.component()), from),
                     None => self.coupled_error(error, from),
@@ -418,7 +416,13 @@ impl Simulation<'_> {
     }
 
     fn coupled_error(&self, error: StepError, at: Instant) -> Error {
-        let owner = |component: usize| self.coupled.system.owner(component);
+        let Coupled { system, y, .. } = &self.coupled;
+        let owner = |component: usize| system.owner(component);
+        if matches!(error, StepError::TooSmall(_))
+            && let Some(fault) = Equations::new(system, &self.model.rules, None).fading(y)
+        {
+            return self.unsolved(fault, owner(fault.component()), at);
+        }
         self.step_error(error, at, owner)
     }
 }

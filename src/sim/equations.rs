@@ -35,9 +35,14 @@ impl<'s> Equations<'s> {
         Equations { system, rules, course, inputs, sums, settled, variables, scratch, registers }
     }
 
+    /// Reads the inputs.
+    pub fn read_inputs(&mut self, tau: f64) {
+        self.system.read(self.course, tau, &mut self.inputs);
+    }
+
     /// Puts the state into `settled`, with its algebraic components solved for; and reads the inputs.
     fn settle(&mut self, tau: f64, y: &[f64]) -> Result<(), Fault> {
-        self.system.read(self.course, tau, &mut self.inputs);
+        self.read_inputs(tau);
         if self.system.algebra.is_empty() {
             return Ok(());
         }

@@ -206,6 +206,7 @@ impl Equations<'_> {
 
     /// Equations that become singular, at the start of a step.
     pub fn fading(&mut self, y: &[f64]) -> Option<Fault> {
+        self.read_inputs(0.0);
         self.system.algebra.fading(self.system, self.rules, &self.inputs, y)
     }
 

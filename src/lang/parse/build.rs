@@ -12,6 +12,7 @@ use crate::lang::ast::{
     Action, Aggregate, Clause, Equation, Expr, ExprId, Expression, Expressions, HeadModule, Item, Module,
     Name, Operator, Text,
 };
+use crate::lang::words::FOLDS;
 use crate::model::{Comparison, Fold, Turn};
 
 type Built<T> = Result<T, Box<Diagnostic>>;
@@ -388,6 +389,20 @@ impl Builder<'_> {
             Rule::call => {
                 let mut inner = pair.into_inner().filter(|p| !is_punctuation(p.as_rule()));
                 let name = self.interner.get(inner.next().expect("a call has a name").as_str());
+                if FOLDS.contains(&&*name) && !self.defined.contains(&*name) {
+                    return Err(Box::new(
+                        Diagnostic::error(format!("`{name}` is not over numbers"))
+                            .at(span, "expected a module, with names for its parameters")
+                            .help(match &*name {
+                                "count" => {
+                                    "it counts what is attached to this module: `count(B(x))`".to_owned()
+                                }
+                                _ => {
+                                    format!("it goes over what is attached to this module: `{name}(B(x): x)`")
+                                }
+                            }),
+                    ));
+                }
                 let arguments = inner.map(|p| self.expr(p)).collect::<Built<Vec<_>>>()?;
                 Ok(self.expressions.push(Expr::Call(name, arguments), span))
             }
