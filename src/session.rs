@@ -20,7 +20,7 @@ use std::time::SystemTime;
 
 use crate::diagnostic::{Diagnostic, Source};
 use crate::lang::{self, Files, NoFiles, Setting};
-use crate::model::Model;
+use crate::model::{Measure, Model};
 use crate::sim::{self, Simulation};
 
 /// A model that was read, with its text.
@@ -82,7 +82,8 @@ impl Session {
             Box::new(Refused { source, diagnostics: vec![diagnostic], settings: Vec::new(), inputs })
         };
         let bytes = std::fs::read(path).map_err(|error| {
-            let diagnostic = Diagnostic::error(format!("the model cannot be read: {error}"));
+            let diagnostic = Diagnostic::error(format!("the model cannot be read: {error}"))
+                .help("give the path of a model's file, `NAME.dls`; `dlsys new NAME` makes one");
             refuse(Source::new(&name, ""), diagnostic)
         })?;
         let source = Source::from_bytes(name, bytes).map_err(|e| refuse(e.0, e.1))?;
@@ -152,6 +153,19 @@ impl Session {
                 inputs: Vec::new(),
             })),
         }
+    }
+
+    /// Reads what is to be measured of this model's strings: `F(x): x` is the sum of x over all modules `F(x)`, and `F(x)`
+    /// is their number. It may use the constants, params and functions of the model, `t` and `age`.
+    ///
+    /// # Errors
+    /// The messages, to be drawn with the returned source.
+    pub fn measure(&self, text: &str) -> Result<Measure, (Source, Vec<Diagnostic>)> {
+        let values = self.model.parameters.iter();
+        let settings: Vec<Setting> =
+            values.map(|p| Setting { name: p.name.clone(), value: p.value }).collect();
+        let source = Source::new("measure", text);
+        lang::measure(&self.source, &settings, &self.model, &source).map_err(|said| (source, said))
     }
 
     /// Starts the model at t = 0.

@@ -10,11 +10,10 @@
 
 use std::collections::HashMap;
 
+use super::advice;
 use super::ast::{self, Expression, HeadModule};
-use super::print;
 use super::rules::RuleBuilder;
-use super::scope::{RESERVED, Variables};
-use super::suggest::did_you_mean;
+use super::scope::Variables;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::expr::{Graph, Node, NodeId};
 use crate::model::{AlgebraicDraft, is_singular};
@@ -137,7 +136,7 @@ impl RuleBuilder<'_> {
     ) -> Option<usize> {
         let known = head.parameters.iter().position(|p| p.text == name.text);
         if known.is_none() {
-            let mut error = not_a_parameter(name, head, variables);
+            let mut error = advice::not_a_parameter(name, head, variables);
             let of_rate = name.text.strip_prefix('d').unwrap_or_default();
             if matches!(equation, ast::Equation::Value { .. })
                 && head.parameters.iter().any(|p| &*p.text == of_rate)
@@ -334,17 +333,4 @@ fn augment(
         }
     }
     false
-}
-
-fn not_a_parameter(name: &ast::Name, head: &HeadModule, variables: &Variables) -> Diagnostic {
-    let known = head.parameters.iter().map(|p| &*p.text);
-    let error =
-        Diagnostic::error(format!("`{}` is no parameter of `{}`", name.text, print::head_module(head)))
-            .at(name.span, "only the parameters of the strict predecessor have equations")
-            .at(head.span, "the strict predecessor");
-    if variables.names.contains_key(&name.text) && !RESERVED.contains(&&*name.text) {
-        return error
-            .help("this is a parameter of a neighbour; its equation belongs into the neighbour's rule");
-    }
-    error.help_opt(did_you_mean(&name.text, known))
 }

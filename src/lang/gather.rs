@@ -1,6 +1,7 @@
 //! Aggregates of a rule: what is written as `sum(B(x, c): …)`.
 
-use super::ast::{self, Expr, ExprId};
+use super::ast::{self, Expr, ExprId, HeadModule};
+use super::chance::Clocks;
 use super::print;
 use super::rules::RuleBuilder;
 use crate::expr::{NodeId, Program};
@@ -18,11 +19,23 @@ impl RuleBuilder<'_> {
     /// terms. One that is written twice is there once, and then nobody reads the last of the variables.
     pub(super) fn aggregates(&mut self, count: usize) -> (Vec<Aggregate>, Vec<NodeId>) {
         let gathered = std::mem::take(&mut self.scope.gathered);
+        // Behind the parameters that are written stand hidden ones.
+        let width = |clocks: &Clocks, m: &HeadModule| {
+            m.parameters.len() + clocks.width(&m.name.text, m.parameters.len())
+        };
         let aggregates = (gathered.iter())
             .map(|one| Aggregate {
                 fold: one.fold,
-                pattern: Pattern { kinds: Vec::new(), arity: one.head.parameters.len() },
-                term: Program::compile(&self.scope.graph, &[one.term], count + one.head.parameters.len()),
+                pattern: Pattern {
+                    kinds: Vec::new(),
+                    arity: one.head.parameters.len(),
+                    width: width(&self.clocks, &one.head),
+                },
+                term: Program::compile(
+                    &self.scope.graph,
+                    &[one.term],
+                    count + width(&self.clocks, &one.head),
+                ),
                 jacobian: Jacobian::default(),
                 moves: false,
                 label: format!("{} over {}", one.fold.name(), print::head_module(&one.head)),

@@ -6,7 +6,8 @@
 use std::fmt::Write;
 
 use super::ast::{
-    Action, Document, Equation, Expr, ExprId, Expressions, HeadModule, Item, Module, Name, Operator,
+    Action, Alternative, Document, Equation, Expr, ExprId, Expressions, HeadModule, Item, Module, Name,
+    Operator,
 };
 use crate::model::Turn;
 
@@ -221,6 +222,17 @@ pub fn head(rule: &super::ast::Rule) -> String {
     out
 }
 
+/// The successors of a clause, with their weights.
+fn alternatives(expressions: &Expressions, all: &[Alternative]) -> Vec<String> {
+    let show = |a: &Alternative| match &a.weight {
+        Some(weight) => {
+            format!("{}: {}", expression(expressions, weight.root), modules(expressions, &a.modules))
+        }
+        None => modules(expressions, &a.modules),
+    };
+    all.iter().map(show).collect()
+}
+
 /// A discrete rule, on one line.
 fn discrete_rule(expressions: &Expressions, rule: &super::ast::Rule) -> String {
     let mut text = head(rule);
@@ -228,8 +240,8 @@ fn discrete_rule(expressions: &Expressions, rule: &super::ast::Rule) -> String {
         if let Some(guard) = &clause.guard {
             text += &format!(" : {}", expression(expressions, guard.root));
         }
-        if let Action::Produce(successor) = &clause.action {
-            text += &format!(" -> {}", modules(expressions, successor));
+        if let Action::Produce(all) = &clause.action {
+            text += &format!(" -> {}", alternatives(expressions, all).join(" or "));
         }
     }
     text
@@ -286,6 +298,9 @@ pub fn document(document: &Document) -> String {
                     if let Some(guard) = &clause.guard {
                         text += &format!("if {}\n    ", show(guard));
                     }
+                    if let Some(hazard) = &clause.hazard {
+                        text += &format!("at rate {}\n    ", show(hazard));
+                    }
                     match &clause.action {
                         Action::Solve(equations) => {
                             let all: Vec<String> = equations
@@ -307,8 +322,9 @@ pub fn document(document: &Document) -> String {
                                 .collect();
                             text += &format!("solve {}", all.join(", "));
                         }
-                        Action::Produce(successor) => {
-                            text += &format!("produce {}", modules(e, successor));
+                        Action::Produce(successors) => {
+                            let all = alternatives(e, successors);
+                            text += &format!("produce {}", all.join("\n      or "));
                         }
                     }
                 }

@@ -1,14 +1,17 @@
 //! Constants, parameters and functions of a model, and the lowering of expressions to the graph.
 
 use std::collections::{HashMap, HashSet};
+use std::ops::Range;
 use std::sync::Arc;
 
+use super::advice;
 use super::ast::{Aggregate, Expr, ExprId, Expression, Expressions, HeadModule, Name, Operator};
+use super::chance::{DRAW, Draws};
 use super::print;
 use super::suggest::did_you_mean;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::expr::{Binary, Graph, Node, NodeId, Unary};
-use crate::model::{Comparison, Fold};
+use crate::model::{Comparison, Distribution, Fold};
 
 /// Most nodes that the functions of a model may expand to.
 const MAX_WORK: usize = 20_000_000;
@@ -30,9 +33,11 @@ pub struct Lowered {
 /// A function, as a graph over its formal parameters.
 #[derive(Clone, Debug)]
 struct Function {
-    parameters: usize,
+    parameters: Vec<Arc<str>>,
     /// None if its own text is at fault, which has been reported.
     body: Option<Lowered>,
+    /// The random numbers that its body draws.
+    draws: Range<u32>,
 }
 
 /// Names that an expression can use besides the global ones.
@@ -65,14 +70,15 @@ pub struct Scope {
     poisoned: HashSet<Arc<str>>,
     /// Names that were already complained about.
     unknown: HashSet<Arc<str>>,
-    /// Where the comparisons of the present rule are written, by their node, and their boundary as in
-    /// `x = s`. Rules number their variables alike, so one rule's nodes mean nothing in another.
-    pub comparisons: HashMap<NodeId, (Span, Arc<str>)>,
+    /// Where the comparisons of the present rule are written, by their node, and their two sides. Rules number their
+    /// variables alike, so one rule's nodes mean nothing in another.
+    pub comparisons: HashMap<NodeId, (Span, Arc<[String; 2]>)>,
     /// The aggregates of the present rule, in the order of their variables.
     pub gathered: Vec<Gathered>,
     /// The same for the bodies of functions.
-    function_comparisons: HashMap<NodeId, (Span, Arc<str>)>,
+    function_comparisons: HashMap<NodeId, (Span, Arc<[String; 2]>)>,
     pub diagnostics: Vec<Diagnostic>,
+    pub draws: Draws,
     /// What is wrong with the values given from outside, which is not the text's fault.
     pub refused_settings: Vec<Diagnostic>,
     work: usize,
@@ -116,13 +122,23 @@ impl Scope {
                         "`{}` has two parameters called `{}`",
                         name.text, parameter.text
                     ))
-                    .at(parameter.span, "the second one"),
+                    .at(parameter.span, "the second one")
+                    .help(format!(
+                        "give each a name of its own, such as `{}`",
+                        advice::numbered(&parameter.text)
+                    )),
                 );
             }
         }
+        let first = self.draws.all.len() as u32;
+        // Whether it may draw is asked where it is called.
+        self.draws.allowed = true;
         let body = self.lower(all, body, &variables);
+        self.draws.allowed = false;
         self.function_comparisons.extend(self.comparisons.drain());
-        self.functions.insert(name.text.clone(), Function { parameters: parameters.len(), body });
+        let draws = first..self.draws.all.len() as u32;
+        let parameters = parameters.iter().map(|p| p.text.clone()).collect();
+        self.functions.insert(name.text.clone(), Function { parameters, body, draws });
     }
 
     /// Lowers an expression that must be a number.
@@ -157,7 +173,8 @@ impl Scope {
         }
         self.diagnostics.push(
             Diagnostic::error("this has no finite value")
-                .at(all.span(expression.root), format!("it is {value}")),
+                .at(all.span(expression.root), format!("it is {value}"))
+                .help(advice::not_finite(value)),
         );
         None
     }
@@ -269,7 +286,9 @@ impl Scope {
                     let link = self.compare(*comparison, left, right);
                     self.comparisons.entry(link).or_insert_with(|| {
                         let sides = [a_id, *operand].map(|id| print::expression(all, id));
-                        (all.span(a_id).to(all.span(*operand)), sides.join(" = ").into())
+                        // A choice binds loosest of all.
+                        let sides = sides.map(|s| if s.starts_with("if ") { format!("({s})") } else { s });
+                        (all.span(a_id).to(all.span(*operand)), sides.into())
                     });
                     whole = Some(match whole {
                         Some(before) => self.graph.binary(Binary::And, before, link),
@@ -359,10 +378,11 @@ impl Scope {
         let error = if RESERVED.contains(&&**name) {
             Diagnostic::error(format!("`{name}` has no meaning here"))
                 .at(span, "time is known in rules only")
-                .help_opt(variables.no_time.map(str::to_owned))
+                .help(variables.no_time.unwrap_or("use it in a rule"))
         } else if self.functions.contains_key(name) || is_function(name) {
             Diagnostic::error(format!("`{name}` is a function"))
-                .at(span, format!("expected its arguments, as in `{name}(x)`"))
+                .at(span, "expected its arguments")
+                .help(format!("call it: `{}`", self.call_of(name)))
         } else {
             let known = variables
                 .names
@@ -406,15 +426,27 @@ impl Scope {
                     plural(wanted, "parameter"),
                     nodes.len()
                 ))
-                .at(span, format!("{} given", plural(nodes.len(), "argument"))),
+                .at(span, format!("{} given", plural(nodes.len(), "argument")))
+                .help(match &**name {
+                    "min" | "max" if nodes.len() > 2 => {
+                        let texts: Vec<String> =
+                            arguments.iter().map(|(id, _)| print::expression(all, *id)).collect();
+                        let nested = |inner: String, next: &String| format!("{name}({inner}, {next})");
+                        format!("write `{}`", texts[1..].iter().fold(texts[0].clone(), nested))
+                    }
+                    _ => format!("it is called as `{}`", me.call_of(name)),
+                }),
             );
             None
         };
         let number = |node| Some(Lowered { node, is_condition: false });
         if let Some(function) = self.functions.get(name).cloned() {
             self.used.insert(name.clone());
-            count(self, function.parameters)?;
-            return self.inline(function.body?, &nodes, span);
+            count(self, function.parameters.len())?;
+            if !function.draws.is_empty() {
+                self.may_draw(name, span)?;
+            }
+            return self.inline(function.body?, function.draws, &nodes, span);
         }
         if let Some((_, op)) = Unary::NAMED.iter().find(|(n, _)| **n == **name) {
             count(self, 1)?;
@@ -424,10 +456,14 @@ impl Scope {
             count(self, 2)?;
             return number(self.graph.binary(*op, nodes[0], nodes[1]));
         }
+        if let Some(distribution) = Distribution::named(name) {
+            return self.draw(distribution, span, nodes);
+        }
         if self.poisoned.contains(name) || !self.unknown.insert(name.clone()) {
             return None;
         }
         let built_in = Unary::NAMED.iter().map(|(n, _)| *n).chain(Binary::NAMED.iter().map(|(n, _)| *n));
+        let built_in = built_in.chain(Distribution::NAMED.iter().map(|(n, ..)| *n));
         let known = self.functions.keys().filter(|_| self.suggests()).map(|n| &**n).chain(built_in);
         let mut error =
             Diagnostic::error(format!("unknown function `{name}`")).at(span, "no function has this name");
@@ -443,9 +479,24 @@ impl Scope {
         None
     }
 
+    /// How a function is called.
+    fn call_of(&self, name: &str) -> String {
+        match self.functions.get(name) {
+            Some(function) => format!("{name}({})", function.parameters.join(", ")),
+            None if Binary::NAMED.iter().any(|(n, _)| *n == name) => format!("{name}(x, y)"),
+            None => format!("{name}(x)"),
+        }
+    }
+
     /// A function's body with the arguments in place of its formal parameters.
-    fn inline(&mut self, body: Lowered, arguments: &[NodeId], span: Span) -> Option<Lowered> {
-        self.work += self.graph.reachable(&[body.node]).len();
+    fn inline(
+        &mut self,
+        body: Lowered,
+        draws: Range<u32>,
+        arguments: &[NodeId],
+        span: Span,
+    ) -> Option<Lowered> {
+        self.work += self.graph.reachable(&[body.node]).len() + draws.len();
         if self.work > MAX_WORK {
             if self.work < usize::MAX / 2 {
                 self.work = usize::MAX / 2;
@@ -457,11 +508,14 @@ impl Scope {
             }
             return None;
         }
+        let formal = |v: u32| (FORMAL..DRAW).contains(&v).then(|| arguments[(v - FORMAL) as usize]);
+        let drawn = self.draw_again(draws, &formal)?;
         let comparisons = &self.function_comparisons;
         let mut moved = Vec::new();
         let node = self.graph.rewrite(&[body.node], |graph, id, node| {
             let image = match node {
-                Node::Var(v) if v >= FORMAL => return Some(arguments[(v - FORMAL) as usize]),
+                Node::Var(v) if v >= DRAW => return drawn.get(&v).copied(),
+                Node::Var(v) => return formal(v),
                 Node::Binary(op @ (Binary::Lt | Binary::Le | Binary::Eq | Binary::Ne), a, b) => {
                     graph.binary(op, a, b)
                 }

@@ -2,12 +2,13 @@
 
 use super::layout::DECLARATIONS;
 use crate::expr::{Binary, Unary};
+use crate::model::Distribution;
 
 /// Words that begin a part of a rule. Also those of an expression, which may stand at the beginning of a line.
-pub const CLAUSES: [&str; 5] = ["if", "then", "else", "solve", "produce"];
+pub const CLAUSES: [&str; 7] = ["if", "then", "else", "solve", "produce", "or", "at"];
 
 /// Words that mean something in certain places only.
-pub const PARTICLES: [&str; 6] = ["string", "in", "step", "from", "strength", "for"];
+pub const PARTICLES: [&str; 7] = ["string", "in", "step", "from", "strength", "rate", "for"];
 
 /// Words for what becomes of the modules attached to one: `sum(B(x): x)`.
 pub const FOLDS: [&str; 4] = ["sum", "count", "largest", "smallest"];
@@ -22,9 +23,9 @@ pub fn declarations() -> impl Iterator<Item = &'static str> {
 
 /// Functions that are built in, and what is written like them.
 pub fn functions() -> impl Iterator<Item = &'static str> {
-    let functions =
+    let numbers =
         Unary::NAMED.iter().map(|(name, _)| *name).chain(Binary::NAMED.iter().map(|(name, _)| *name));
-    functions.chain(FOLDS)
+    numbers.chain(Distribution::NAMED.iter().map(|(name, ..)| *name)).chain(FOLDS)
 }
 
 /// How a declaration goes on after its first word, for somebody who types it; empty for a word that begins none.

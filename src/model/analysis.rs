@@ -88,6 +88,9 @@ pub fn analyse(graph: &mut Graph, model: &mut Model, drafts: &[Draft]) {
             let roots: Vec<NodeId> = numeric.iter().map(|i| rates[*i].1).collect();
             solve.numeric_rates = Program::compile(graph, &roots, total);
             solve.linear = linear(graph, &roots, &constants, total);
+            let clocked =
+                rates.iter().any(|(parameter, _)| rule.clocks.iter().any(|c| c.parameter == *parameter));
+            solve.is_delicate = clocked && laws.iter().any(|law| !law.is_closed());
             solve.flashes = nodes.iter().any(|&rate| flashes(graph, rate, rule.variables - 2));
             solve.laws = laws;
             solve.numeric = numeric;
@@ -108,7 +111,7 @@ pub fn analyse(graph: &mut Graph, model: &mut Model, drafts: &[Draft]) {
 
 /// Per kind and parameter: whether some rule has an equation for it.
 fn moving_parameters(model: &Model) -> Vec<Vec<bool>> {
-    let mut all: Vec<Vec<bool>> = model.kinds.iter().map(|(_, kind)| vec![false; kind.arity]).collect();
+    let mut all: Vec<Vec<bool>> = model.kinds.iter().map(|(_, kind)| vec![false; kind.width()]).collect();
     for (id, kind) in model.kinds.iter() {
         for solve in kind.rules.iter().flat_map(|r| &model.rules[*r].solves) {
             for &parameter in solve.of.iter().chain(&solve.algebraic.of) {
@@ -122,7 +125,7 @@ fn moving_parameters(model: &Model) -> Vec<Vec<bool>> {
 /// For each parameter of the context: whether it moves in any kind that matches; then the same for each aggregate.
 fn moving_context(graph: &Graph, kinds: &[Vec<bool>], rule: &Rule, terms: &[NodeId]) -> Vec<bool> {
     let mut all: Vec<bool> = (rule.left.iter().chain(&rule.right))
-        .flat_map(|pattern| (0..pattern.arity).map(|p| moves(kinds, pattern, p)))
+        .flat_map(|pattern| (0..pattern.width).map(|p| moves(kinds, pattern, p)))
         .collect();
     let context = rule.parameters.len() + all.len();
     let moving: Vec<bool> = (rule.aggregates.iter().zip(terms))
@@ -160,7 +163,7 @@ fn gather(graph: &mut Graph, kinds: &[Vec<bool>], rule: &mut Rule, terms: &[Node
             v if v < first => moving[v - own],
             _ => false,
         };
-        let total = count + pattern.arity;
+        let total = count + pattern.width;
         let (mut entries, mut roots) = (Vec::new(), Vec::new());
         for v in graph.variables(&[terms[i]]) {
             if changes(v as usize) {

@@ -13,12 +13,15 @@
 mod algebraic;
 mod analysis;
 mod appearance;
+mod chance;
 mod condition;
 mod invariance;
 mod kind;
 mod law;
+mod measure;
 mod need;
 mod rank;
+mod remedy;
 mod rule;
 
 pub use algebraic::{Aggregate, Algebraic, Fold, Turn};
@@ -26,14 +29,17 @@ pub use analysis::{AlgebraicDraft, Draft, analyse};
 pub use appearance::{
     Appearance, BUILT_IN_COLORS, Contour, Gradient, NamedColor, Net, Rgb, SurfaceShape, Tropism,
 };
+pub use chance::{Clock, Distribution, Draw, NewClock, choose};
 pub use condition::{Comparison, Condition, Sign, Step, Truth};
 pub use invariance::never_reached;
 pub use kind::{
     BUILT_IN_SURFACES, COMMAND_SURFACES, CUT, Class, DRAWN_WORDS, Kind, KindId, Kinds, base_of, class_of,
 };
 pub use law::{Jacobian, Law, Linear, Numeric, Obstacle, Watch};
+pub use measure::Measure;
 pub use rank::is_singular;
-pub use rule::{Interpretation, Pattern, Produce, Rule, Solve, Successor, Switch};
+pub use remedy::{Boundary, Remedy};
+pub use rule::{Interpretation, Outcome, Pattern, Produce, Rule, Solve, Successor, Switch};
 
 use std::sync::Arc;
 

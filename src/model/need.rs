@@ -52,11 +52,11 @@ impl Owners<'_> {
         }
         let mut first = own;
         for pattern in rule.left.iter().chain(&rule.right) {
-            if v < first + pattern.arity {
+            if v < first + pattern.width {
                 read.extend(pattern.kinds.iter().map(|k| (k.index(), v - first)));
                 return;
             }
-            first += pattern.arity;
+            first += pattern.width;
         }
     }
 }
@@ -106,7 +106,7 @@ pub fn drawn_only(graph: &Graph, model: &Model, drafts: &[Draft]) -> Vec<Vec<boo
             let others = graph.variables(&[node]).into_iter().map(|v| v as usize);
             variables.extend(others.filter(|v| *v != parameter));
         }
-        variables.extend(rule.produces.iter().flat_map(|p| p.successor.arguments.reads()));
+        variables.extend(rule.produces.iter().flat_map(|p| p.outcome.reads()));
         for v in variables {
             owners.add(index, v, &mut read);
         }

@@ -283,13 +283,14 @@ impl Simulation<'_> {
         let mut equations = Equations::new(system, rules, None);
         let limit = self.settings.slice_end(from);
         let (mut course, mut tries) = (None, 0);
+        let settings = &self.coupled_settings;
         let step = loop {
             let stats = &mut self.stats;
-            let step = integrator.step(&self.settings, control, &mut equations, y, from, limit, stats);
+            let step = integrator.step(settings, control, &mut equations, y, from, limit, stats);
             if step.is_err() || system.algebra.is_empty() {
                 break step;
             }
-            match integrator.blended(&mut equations, y, &self.settings, control) {
+            match integrator.blended(&mut equations, y, settings, control) {
                 Ok(stretches) => {
                     course = Some(Course::of(stretches));
                     break step;
@@ -297,7 +298,7 @@ impl Simulation<'_> {
                 Err(fault) => {
                     tries += 1;
                     stats.rejected += 1;
-                    if tries > MAX_TRIES || self.settings.method.is_fixed_step() {
+                    if tries > MAX_TRIES || settings.method.is_fixed_step() {
                         break Err(StepError::NotFinite(fault.component()));
                     }
                 }

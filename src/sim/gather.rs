@@ -81,8 +81,8 @@ impl System {
     fn children_of(&self, rules: &[Rule], number: u32) -> impl Iterator<Item = &[Source]> + '_ {
         let sum = self.sums[number as usize];
         let row = &self.rows[sum.row as usize];
-        let arity = rules[row.rule].aggregates[sum.aggregate].pattern.arity;
-        (0..sum.count).map(move |child| &self.children[sum.first + child * arity..][..arity])
+        let width = rules[row.rule].aggregates[sum.aggregate].pattern.width;
+        (0..sum.count).map(move |child| &self.children[sum.first + child * width..][..width])
     }
 
     /// Calls a function with the component that each partial derivative of a Jacobian is by.
@@ -180,15 +180,15 @@ impl Equations<'_> {
         let system = self.system;
         let rule = &self.rules[rule];
         let aggregate = &rule.aggregates[aggregate];
-        let arity = aggregate.pattern.arity;
+        let width = aggregate.pattern.width;
         let mut registers = std::mem::take(&mut self.registers);
-        registers.resize(rule.variables + arity, [0.0; LANES]);
+        registers.resize(rule.variables + width, [0.0; LANES]);
         for v in aggregate.term.reads() {
             for (lane, &(number, child)) in registers[v].iter_mut().zip(lanes) {
                 let sum = &system.sums[number as usize];
                 let row = &system.rows[sum.row as usize];
                 let source = match v.checked_sub(rule.variables) {
-                    Some(of_child) => system.children[sum.first + child as usize * arity + of_child],
+                    Some(of_child) => system.children[sum.first + child as usize * width + of_child],
                     None if v < row.sources => system.sources[row.first_source + v],
                     None => Source::Fixed(system.time(row, v - row.sources, tau)),
                 };

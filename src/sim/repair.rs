@@ -215,12 +215,13 @@ impl Simulation<'_> {
             let mut equations = Equations::new(system, rules, Some(course));
             let end = Some(course.end);
             let stats = &mut self.stats;
-            let step = integrator.step(&self.settings, control, &mut equations, &y, from, end, stats);
+            let step = integrator.step(&self.coupled_settings, control, &mut equations, &y, from, end, stats);
             from = step.ok()?;
             if system.algebra.is_empty() {
                 stretches.push(integrator.dense(&mut equations, &y));
             } else {
-                stretches.extend(integrator.blended(&mut equations, &y, &self.settings, control).ok()?);
+                stretches
+                    .extend(integrator.blended(&mut equations, &y, &self.coupled_settings, control).ok()?);
             }
             integrator.advance(&mut y);
             system.advance(from);
@@ -231,7 +232,7 @@ impl Simulation<'_> {
     /// The number of rings that a trial changes by more than may be neglected.
     fn reach(&self, region: &Region, trial: &Trial) -> usize {
         let Some(course) = &self.plant.coupled else { return 0 };
-        let tolerance = INNER_TOLERANCE * self.settings.tolerance;
+        let tolerance = INNER_TOLERANCE * self.coupled_settings.tolerance;
         let tolerance = if self.gathers { tolerance.min(CONSERVED) } else { tolerance };
         let changes = |component: u32, number: usize| {
             trial.stretches.iter().any(|dense| {

@@ -9,11 +9,14 @@ use super::{Pair, Rule};
 use crate::diagnostic::{Diagnostic, Span};
 use crate::lang::ast;
 use crate::lang::ast::{
-    Action, Aggregate, Clause, Equation, Expr, ExprId, Expression, Expressions, HeadModule, Item, Module,
-    Name, Operator, Text,
+    Action, Aggregate, Alternative, Clause, Equation, Expr, ExprId, Expression, Expressions, HeadModule,
+    Item, Module, Name, Operator, Text,
 };
 use crate::lang::words::FOLDS;
 use crate::model::{Comparison, Fold, Turn};
+
+/// Most symbols and names of a weight outside parentheses.
+const MAX_WEIGHT: usize = 200;
 
 type Built<T> = Result<T, Box<Diagnostic>>;
 
@@ -58,7 +61,7 @@ pub struct Builder<'d> {
     /// Where the parsed piece begins in the file.
     pub offset: usize,
     /// Names of the model's own functions.
-    pub defined: &'d HashSet<&'d str>,
+    pub defined: Option<&'d HashSet<&'d str>>,
 }
 
 impl Builder<'_> {
@@ -158,11 +161,11 @@ impl Builder<'_> {
                     span = span.to(self.span(&part));
                     match part.as_rule() {
                         Rule::expr => guard = Some(self.expression(part)?),
-                        Rule::successor => made = self.successor(part)?,
+                        Rule::successor | Rule::choice => made = self.alternatives(part)?,
                         _ => {}
                     }
                 }
-                rule.clauses.push(Clause { guard, action: Action::Produce(made), span });
+                rule.clauses.push(Clause { guard, hazard: None, action: Action::Produce(made), span });
                 rule.nodes = (first, self.expressions.next());
                 Item::Rule(rule)
             }
@@ -222,6 +225,7 @@ impl Builder<'_> {
     fn clause(&mut self, pair: Pair) -> Built<Clause> {
         let span = self.span(&pair);
         let mut guard = None;
+        let mut hazard = None;
         let mut action = None;
         for part in pair.into_inner() {
             match part.as_rule() {
@@ -233,14 +237,52 @@ impl Builder<'_> {
                     }
                     action = Some(Action::Solve(equations));
                 }
+                Rule::hazard => {
+                    let rate = part.into_inner().find(|p| p.as_rule() == Rule::expr);
+                    hazard = Some(self.expression(rate.expect("the grammar has a rate here"))?);
+                }
                 Rule::produce => {
-                    let successor = part.into_inner().find(|p| p.as_rule() == Rule::successor);
-                    action = Some(Action::Produce(self.successor(successor.expect("a successor"))?));
+                    let mut inner = part.into_inner();
+                    let successor = inner.find(|p| matches!(p.as_rule(), Rule::successor | Rule::choice));
+                    action = Some(Action::Produce(self.alternatives(successor.expect("a successor"))?));
                 }
                 _ => {}
             }
         }
-        Ok(Clause { guard, action: action.expect("a clause solves or produces"), span })
+        Ok(Clause { guard, hazard, action: action.expect("a clause solves or produces"), span })
+    }
+
+    /// The successors of a clause: one, or several with weights.
+    pub fn alternatives(&mut self, pair: Pair) -> Built<Vec<Alternative>> {
+        if pair.as_rule() == Rule::successor {
+            return Ok(vec![Alternative { weight: None, modules: self.successor(pair)? }]);
+        }
+        let mut all = Vec::new();
+        for weighted in pair.into_inner().filter(|p| p.as_rule() == Rule::weighted) {
+            let mut inner = weighted.into_inner().filter(|p| !is_punctuation(p.as_rule()));
+            let mut next = || inner.next().expect("the grammar has a part here");
+            let weight = next();
+            // The layout bounds nesting in expressions, and takes this for a part of a string.
+            let symbols = weight.clone().into_inner().count();
+            if symbols > MAX_WEIGHT {
+                return Err(Box::new(
+                    Diagnostic::error("this weight is too long")
+                        .at(self.span(&weight), format!("more than {MAX_WEIGHT} symbols"))
+                        .help("name it: `const w = …` or `def w(x) = …`"),
+                ));
+            }
+            let weight = Some(self.expression(weight)?);
+            all.push(Alternative { weight, modules: self.successor(next())? });
+        }
+        Ok(all)
+    }
+
+    /// A head, and the expression behind its colon.
+    pub fn measure(&mut self, pair: Pair) -> Built<(HeadModule, Option<Expression>)> {
+        let mut inner = pair.into_inner().filter(|p| matches!(p.as_rule(), Rule::head_module | Rule::expr));
+        let head = self.head_module(inner.next().expect("the grammar has a head here"));
+        let expression = inner.next().map(|expression| self.expression(expression)).transpose()?;
+        Ok((head, expression))
     }
 
     fn equation(&mut self, pair: Pair) -> Built<Equation> {
@@ -371,7 +413,8 @@ impl Builder<'_> {
         }
         Err(Box::new(
             Diagnostic::error("this number is too large")
-                .at(self.span(pair), format!("the greatest number is {:e}", f64::MAX)),
+                .at(self.span(pair), format!("the greatest number is {:e}", f64::MAX))
+                .help("choose larger units of length or time, so that numbers stay small"),
         ))
     }
 
@@ -389,7 +432,7 @@ impl Builder<'_> {
             Rule::call => {
                 let mut inner = pair.into_inner().filter(|p| !is_punctuation(p.as_rule()));
                 let name = self.interner.get(inner.next().expect("a call has a name").as_str());
-                if FOLDS.contains(&&*name) && !self.defined.contains(&*name) {
+                if FOLDS.contains(&&*name) && self.defined.is_some_and(|defined| !defined.contains(&*name)) {
                     return Err(Box::new(
                         Diagnostic::error(format!("`{name}` is not over numbers"))
                             .at(span, "expected a module, with names for its parameters")
@@ -443,7 +486,7 @@ impl Builder<'_> {
         };
         let module = next();
         // A function of the model's own called `count` is what it was.
-        if fold == Fold::Count && self.defined.contains("count") {
+        if fold == Fold::Count && self.defined.is_none_or(|defined| defined.contains("count")) {
             let argument = self.as_call(module)?;
             let name = self.interner.get("count");
             return Ok(self.expressions.push(Expr::Call(name, vec![argument]), span));
