@@ -1,6 +1,7 @@
 //! The test suite, in one binary, because linking takes longer than running.
 //!
 //! - [`book`]: the book in `docs/`, followed literally; [`pages`] reads its Markdown.
+//! - [`light`]: modules with formulas only, the quick way against the general one.
 //! - [`listings`]: the paper's models against results of an independent program.
 //! - [`algebraic`], [`signals`]: values and equations instead of rates; sums over what is attached; contexts with branches.
 //! - [`semantics`]: what happens when (events, contexts, errors of a run), model by small model.
@@ -31,6 +32,7 @@ mod export;
 mod gallery;
 mod inspect;
 mod language;
+mod light;
 mod listings;
 mod organs;
 mod pages;
