@@ -89,7 +89,13 @@ impl RuleBuilder<'_> {
                     Diagnostic::error(format!("two equations for `{}` in one `solve`", name.text))
                         .at(name.span, "the second one")
                         .at(before, "the first one")
-                        .help("a parameter has a rate, or a value, or an equation that is solved for it: take one out"),
+                        .help(match equation {
+                            ast::Equation::Rate { .. } => format!(
+                                "keep one of them; two contributions are added: `d{0}/dt = … + …`",
+                                name.text
+                            ),
+                            _ => "a parameter has a rate, a value, or an equation that is solved for it: keep one".to_owned(),
+                        }),
                 );
                 good = false;
             }

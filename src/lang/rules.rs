@@ -99,15 +99,17 @@ impl RuleBuilder<'_> {
         (Variables { names, no_time: None, aggregates }, count as usize)
     }
 
-    fn not_a_bracket(&mut self, head: &HeadModule) -> bool {
+    fn not_a_bracket(&mut self, head: &HeadModule, is_context: bool) -> bool {
         let bracket = matches!(&*head.name.text, "[" | "]");
         if bracket {
             self.error(
                 Diagnostic::error("a bracket has no rules")
                     .at(head.name.span, "brackets structure the string; they do not develop")
-                    .help(
-                        "to change a branch, write a rule for a module in it; in a context after `>` brackets stand in pairs around a branch: `A > [ B ] C`",
-                    ),
+                    .help(if is_context {
+                        "in a context after `>` brackets stand in pairs around a branch: `A > [ B ] C`"
+                    } else {
+                        "to change a branch, write a rule for a module in it"
+                    }),
             );
         }
         let cut = &*head.name.text == CUT;
@@ -126,7 +128,7 @@ impl RuleBuilder<'_> {
         head: &HeadModule,
         drawn: &[ast::Module],
     ) -> Option<(KindId, Interpretation)> {
-        if !self.not_a_bracket(head) {
+        if !self.not_a_bracket(head, false) {
             return None;
         }
         // Who draws or measures a module sees what is written of it, and no clocks.
@@ -153,9 +155,9 @@ impl RuleBuilder<'_> {
 
     /// A rule, and the kinds it is for. `PatternNames` are matched to kinds once all kinds are known.
     pub fn rule(&mut self, rule: &ast::Rule) -> Option<(Rule, Draft)> {
-        let mut good = self.not_a_bracket(&rule.predecessor);
+        let mut good = self.not_a_bracket(&rule.predecessor, false);
         for context in rule.left.iter().chain(&rule.right) {
-            good &= self.not_a_bracket(context);
+            good &= self.not_a_bracket(context, true);
         }
         let names: &[&str] = match &*rule.predecessor.name.text {
             "±" => &["+", "-"],
