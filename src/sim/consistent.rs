@@ -293,7 +293,7 @@ impl Simulation<'_> {
             Fault::Fading(_) => Unsolved::Fading,
             Fault::Rough(_) => Unsolved::Rough,
         };
-        Error::Unsolved { site, what, fault }
+        Error::Unsolved { site, unknown: Box::new((what, fault)) }
     }
 
     /// Adds the rates of a module's algebraic parameters to those of the others: by differentiating their equations.

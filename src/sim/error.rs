@@ -78,12 +78,11 @@ pub enum Error {
     NegativeRate { site: Site },
     #[error("the step size fell to nothing at t = {}", .site.when())]
     StepTooSmall { site: Site },
-    #[error("{} of {} {} at t = {}", .what, .site.module, .fault.message(), .site.when())]
+    #[error("{} of {} {} at t = {}", .unknown.0, .site.module, .unknown.1.message(), .site.when())]
     Unsolved {
         site: Site,
-        /// The parameter that is solved for.
-        what: String,
-        fault: Unsolved,
+        /// The parameter that is solved for, and why that fails.
+        unknown: Box<(String, Unsolved)>,
     },
     #[error("more than {limit} modules at t = {}", .site.when())]
     TooManyModules {
@@ -171,7 +170,7 @@ impl Error {
             Error::StepTooSmall { .. } => d.help(
                 "the solution may become infinite here, or the equations jump in a way that no `if` shows; a fixed step (`--method rk4 --step-size H`) shows how it behaves",
             ),
-            Error::Unsolved { fault, .. } => d.help(match fault {
+            Error::Unsolved { unknown, .. } => d.help(match unknown.1 {
                 Unsolved::Singular | Unsolved::Fading => "there the equations do not say how the parameter goes on: a double root, or two solutions that meet. Change the equations before this, or end the module's life at a condition that holds earlier",
                 Unsolved::Nothing => "the search begins with the value that the module was written with, or had just before: write one closer to the solution, or see whether there is one",
                 Unsolved::NotFinite => "look for a division by zero, or a root or logarithm of a negative number, at the written value too: the search begins there",
