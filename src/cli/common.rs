@@ -164,6 +164,25 @@ fn ready(args: &SharedArgs) -> Result<(), Failure> {
     spare_files(args)
 }
 
+/// The settings that the flags say.
+///
+/// # Errors
+/// What is wrong with them, whatever the model says.
+pub fn settings(args: &SharedArgs) -> Result<Settings, Failure> {
+    ready(args)?;
+    let defaults = Settings::default();
+    Ok(Settings {
+        method: args.method,
+        scheduler: scheduler(args)?,
+        tolerance: args.tolerance,
+        step_size: args.step_size.unwrap_or(defaults.step_size),
+        seed: args.seed,
+        max_modules: args.max_modules,
+        log: args.events.is_some(),
+        ..defaults
+    })
+}
+
 /// The scheduler that the flags say.
 fn scheduler(args: &SharedArgs) -> Result<sim::Scheduler, Failure> {
     let usage = |message: &str| Err(Failure::Usage(format!("error: {message}\n")));
@@ -194,10 +213,9 @@ impl Run {
 
     /// Of a model that was read.
     pub fn of(session: Session, args: &SharedArgs) -> Result<Run, Failure> {
-        ready(args)?;
-        let scheduler = scheduler(args)?;
+        let settings = settings(args)?;
         let times = times(args, &session)?;
-        if let (sim::Scheduler::Local { slice }, Some(end)) = (scheduler, times.last())
+        if let (sim::Scheduler::Local { slice }, Some(end)) = (settings.scheduler, times.last())
             && end / slice > MAX_SLICES
         {
             return Err(Failure::Usage(format!(
@@ -205,17 +223,6 @@ impl Run {
                 end / slice
             )));
         }
-        let defaults = Settings::default();
-        let settings = Settings {
-            method: args.method,
-            scheduler,
-            tolerance: args.tolerance,
-            step_size: args.step_size.unwrap_or(defaults.step_size),
-            seed: args.seed,
-            max_modules: args.max_modules,
-            log: args.events.is_some(),
-            ..defaults
-        };
         Ok(Run { session, times, settings, clock: Clock::default() })
     }
 

@@ -44,7 +44,7 @@ use ast::{Action, Document, Item};
 use scope::{Scope, Variables};
 
 /// A value for a `param`, given from outside.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
     pub name: String,
     pub value: f64,

@@ -70,8 +70,8 @@ pub enum Error {
     PeriodTooShort { site: Site, period: f64 },
     #[error("{what} of {} is not finite at t = {}", .site.module, .site.when())]
     NotFinite { site: Site, what: String },
-    #[error("`{distribution}` cannot be drawn from at t = {}: {why}", .site.when())]
-    BadDraw { site: Site, distribution: &'static str, why: String },
+    #[error("`{}` cannot be drawn from at t = {}: {why}", .distribution.name(), .site.when())]
+    BadDraw { site: Site, distribution: Distribution, why: Box<str> },
     #[error("no successor can be chosen for {} at t = {}: {why}", .site.module, .site.when())]
     BadWeights { site: Site, why: String },
     #[error("the rate of an event of {} is negative at t = {}", .site.module, .site.when())]
@@ -159,7 +159,7 @@ impl Error {
                 d.help("look for a division by zero, a root or logarithm of a negative number, or growth without bound")
             }
             Error::BadDraw { distribution, .. } => {
-                d.help_opt(Distribution::named(distribution).map(|d| d.demand().to_owned()))
+                d.help(distribution.demand())
             }
             Error::BadWeights { .. } => d.help(
                 "weights are at least 0, and one of them is greater; they need not add up to 1. To replace nothing at some values, say so in the clause's condition: `if … produce …`",
