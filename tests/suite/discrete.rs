@@ -459,9 +459,9 @@ fn steps_are_the_same_whichever_way_they_are_made() {
 
 #[test]
 fn the_page_on_discrete_rules_tells_what_happens() {
-    let page = std::fs::read_to_string(repository("docs/language/discrete.md")).expect("there");
+    let page = std::fs::read_to_string(repository("docs/src/language/discrete.md")).expect("there");
     let listings: Vec<&str> =
-        page.split("```dls\n").skip(1).map(|rest| rest.split("```").next().expect("it ends")).collect();
+        page.split("```dlsys\n").skip(1).map(|rest| rest.split("```").next().expect("it ends")).collect();
     assert_eq!(listings.len(), 5);
     for listing in &listings {
         let session = Session::from_text("listing.dls", listing, &[]).expect("a good listing");
