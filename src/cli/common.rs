@@ -37,7 +37,10 @@ impl Failure {
     pub fn of_seed(self, seed: u64) -> Failure {
         match self {
             Failure::Model(message) => {
-                Failure::Model(format!("{message}  = of the specimen with `--seed {seed}`\n"))
+                let message = message.trim_end();
+                Failure::Model(format!(
+                    "{message}\n  = note: this happens to the specimen of `--seed {seed}`\n\n"
+                ))
             }
             other => other,
         }
@@ -202,6 +205,25 @@ fn ready(args: &SharedArgs) -> Result<(), Failure> {
     spare_files(args)
 }
 
+/// The settings that the flags say.
+///
+/// # Errors
+/// What is wrong with them, whatever the model says.
+pub fn settings(args: &SharedArgs) -> Result<Settings, Failure> {
+    ready(args)?;
+    let defaults = Settings::default();
+    Ok(Settings {
+        method: args.method,
+        scheduler: scheduler(args)?,
+        tolerance: args.tolerance,
+        step_size: args.step_size.unwrap_or(defaults.step_size),
+        seed: args.seed,
+        max_modules: args.max_modules,
+        log: args.events.is_some(),
+        ..defaults
+    })
+}
+
 /// The scheduler that the flags say.
 fn scheduler(args: &SharedArgs) -> Result<sim::Scheduler, Failure> {
     let usage = |message: &str| Err(Failure::Usage(format!("error: {message}\n")));
@@ -232,10 +254,9 @@ impl Run {
 
     /// Of a model that was read.
     pub fn of(session: Session, args: &SharedArgs) -> Result<Run, Failure> {
-        ready(args)?;
-        let scheduler = scheduler(args)?;
+        let settings = settings(args)?;
         let times = times(args, &session)?;
-        if let (sim::Scheduler::Local { slice }, Some(end)) = (scheduler, times.last())
+        if let (sim::Scheduler::Local { slice }, Some(end)) = (settings.scheduler, times.last())
             && end / slice > MAX_SLICES
         {
             return Err(Failure::Usage(format!(
@@ -243,17 +264,6 @@ impl Run {
                 end / slice
             )));
         }
-        let defaults = Settings::default();
-        let settings = Settings {
-            method: args.method,
-            scheduler,
-            tolerance: args.tolerance,
-            step_size: args.step_size.unwrap_or(defaults.step_size),
-            seed: args.seed,
-            max_modules: args.max_modules,
-            log: args.events.is_some(),
-            ..defaults
-        };
         Ok(Run { session, remarks: Mutex::default(), times, settings, clock: Clock::default() })
     }
 

@@ -1,4 +1,4 @@
-//! `dlsys view`: a page for the browser that plays the growth.
+//! `dlsys view`: the growing plant in a window, or as a page for the browser that plays it.
 
 use std::io::Write;
 use std::path::Path;
@@ -15,9 +15,60 @@ use crate::view::{Recorder, Recording, Stage, page};
 /// Most frames of a recording; a screen shows no more in five minutes.
 const MOST_FRAMES: usize = 20_000;
 
-/// Writes the page of a model.
+/// Opens the window, or writes a page.
 pub fn view(args: &ViewArgs) -> Result<(), Failure> {
-    let out = args.out.as_path();
+    match &args.out {
+        Some(out) => write(args, out),
+        None => open(args),
+    }
+}
+
+#[cfg(not(feature = "viewer"))]
+fn open(args: &ViewArgs) -> Result<(), Failure> {
+    let model = args.shared.model.display();
+    Err(Failure::Usage(format!(
+        "error: this dlsys was built without the window\n  help: `dlsys view {model} -o plant.html` writes a page that plays the growth in a browser;\n        `cargo install --path . --features viewer` builds the window too (minutes; no system packages)\n"
+    )))
+}
+
+#[cfg(feature = "viewer")]
+fn open(args: &ViewArgs) -> Result<(), Failure> {
+    use super::common::settings;
+    use crate::view::window::{Error, Options, Trial, open};
+    let shared = &args.shared;
+    let model = shared.model.clone();
+    if !model.is_file() {
+        // The message of everybody else.
+        return super::common::open(&model, &shared.settings).map(drop);
+    }
+    let range = shared.from.zip(shared.to).map(|(from, to)| [from, to]);
+    if let Some([from, to]) = range.filter(|[from, to]| to < from) {
+        return Err(Failure::Usage(format!("error: --to {to} is before --from {from}\n")));
+    }
+    let options = Options {
+        model,
+        set: shared.settings.clone(),
+        settings: settings(shared)?,
+        range,
+        at: shared.at.as_ref().and_then(|at| at.iter().copied().reduce(f64::min)),
+        trial: Trial {
+            delay: args.delay,
+            slide: args.slide.clone(),
+            play: args.play,
+            screenshot: args.screenshot.clone(),
+        },
+    };
+    open(options).map_err(|error| {
+        let help = match error {
+            Error::Screen(_) => "\n  help: `-o plant.html` writes a page that plays the growth in a browser",
+            Error::Trial(_) => "",
+        };
+        Failure::Model(format!("error: {error}{help}\n"))
+    })
+}
+
+/// Writes the page of a model.
+fn write(args: &ViewArgs, out: &Path) -> Result<(), Failure> {
     spare(args, out)?;
     let run = Run::start(&args.shared)?;
     let count = run.times.len();

@@ -179,11 +179,31 @@ impl FrameWriter {
     }
 }
 
+/// How smooth edges are in pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Smoothness {
+    /// As in files: sixteen samples to a pixel.
+    Fine,
+    /// Four samples, for what moves.
+    Quick,
+}
+
 /// The pixels of a scene on a page, row by row from the top: red, green and blue, each times the opacity, and the opacity;
 /// 0 where nothing is drawn, whatever the page's background.
 pub fn pixels(scene: &Scene, fit: &Fit, page: &Page) -> Vec<[u8; 4]> {
+    pixels_by(scene, fit, page, Smoothness::Fine, 1)
+}
+
+/// The same, as smooth as it should be, made by so many threads; the pixels do not depend on that.
+pub fn pixels_by(
+    scene: &Scene,
+    fit: &Fit,
+    page: &Page,
+    smoothness: Smoothness,
+    threads: usize,
+) -> Vec<[u8; 4]> {
     let scene = &*scene.tessellated(fit.accuracy);
-    png::picture(scene, fit, page.pixels, page.placement()).pixels
+    png::picture(scene, fit, page.pixels, page.placement(), smoothness, threads).pixels
 }
 
 #[cfg(test)]
