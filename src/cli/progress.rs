@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::common::tell;
+use crate::sim::brief;
 
 /// Work that is done earlier shows no progress.
 const PATIENCE: Duration = Duration::from_secs(1);
@@ -92,7 +93,7 @@ impl Progress {
         let (done, all) = (self.bar.position(), self.bar.length().unwrap_or(0));
         let rate = done as f64 / self.begun.elapsed().as_secs_f64().max(1e-9);
         let left = if done > 0 {
-            format!(", {:.3}/s, {:.0} s left", rate, all.saturating_sub(done) as f64 / rate)
+            format!(", {}/s, {:.0} s left", brief(rate, 3), all.saturating_sub(done) as f64 / rate)
         } else {
             String::new()
         };

@@ -95,7 +95,7 @@ fn events_before_an_error_are_logged() {
     let events = scratch.lines("events.jsonl");
     assert_eq!((status, events.len(), events[0]["t"].as_f64()), (1, 1, Some(1.0)));
     let (status, message) = bad(&["run", &model, "--at", "0", "--events", &scratch.path("no/such/folder")]);
-    assert!(status == 1 && message.contains("cannot write"), "{message}");
+    assert!(status == 2 && message.contains("there is no directory"), "{message}");
 }
 
 #[test]
