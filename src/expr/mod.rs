@@ -22,6 +22,7 @@
 
 mod derivative;
 mod dual;
+mod elimination;
 mod graph;
 mod interval;
 mod ops;
@@ -31,6 +32,7 @@ mod program;
 mod tests;
 
 pub use dual::Dual;
+pub use elimination::eliminate;
 pub use graph::{Graph, Node, NodeId};
 pub use interval::Interval;
 pub use ops::{Binary, Unary, Value};

@@ -12,7 +12,9 @@ mod appearance;
 pub mod ast;
 mod chance;
 mod check;
+mod equations;
 pub mod format;
+mod gather;
 mod globals;
 mod layout;
 mod lexeme;
@@ -95,6 +97,7 @@ fn build(
         kinds: &mut kinds,
         clocks: chance::Clocks::new(document),
         occurs: HashMap::new(),
+        gathered: Vec::new(),
         drawn: HashMap::new(),
     };
     let (mut rules, mut drafts, mut written) = (vec![], vec![], vec![]);
@@ -176,7 +179,7 @@ fn build(
     if !unread {
         builder.check_interpretations(&heads);
     }
-    let (occurs, drawn, clocks) = (builder.occurs, builder.drawn, builder.clocks);
+    let (occurs, drawn, gathered, clocks) = (builder.occurs, builder.drawn, builder.gathered, builder.clocks);
     if !single.seen("the initial string") && !unread {
         scope.diagnostics.push(
             Diagnostic::error("the model has no initial string")
@@ -231,7 +234,7 @@ fn build(
     }
     let diagnostics = &mut scope.diagnostics;
     check::filter_contexts(&mut model.kinds, &ignored, &considered, diagnostics);
-    check::resolve_contexts(&mut model, &written, diagnostics);
+    check::resolve_contexts(&mut model, &written, &gathered, diagnostics);
     if single.seen("the initial string") {
         check::reachability(&model, &written, &occurs, diagnostics);
     }

@@ -8,7 +8,10 @@ use crate::model::Distribution;
 pub const CLAUSES: [&str; 7] = ["if", "then", "else", "solve", "produce", "or", "at"];
 
 /// Words that mean something in certain places only.
-pub const PARTICLES: [&str; 6] = ["string", "in", "step", "from", "strength", "rate"];
+pub const PARTICLES: [&str; 7] = ["string", "in", "step", "from", "strength", "rate", "for"];
+
+/// Words for what becomes of the modules attached to one: `sum(B(x): x)`.
+pub const FOLDS: [&str; 4] = ["sum", "count", "largest", "smallest"];
 
 /// Names of numbers that every expression, or every rule, may use.
 pub const VALUES: [&str; 4] = ["pi", "e", "t", "age"];
@@ -18,11 +21,11 @@ pub fn declarations() -> impl Iterator<Item = &'static str> {
     DECLARATIONS.iter().map(|(word, _)| *word)
 }
 
-/// Functions that are built in, and distributions that are called like them.
+/// Functions that are built in, and what is written like them.
 pub fn functions() -> impl Iterator<Item = &'static str> {
     let numbers =
         Unary::NAMED.iter().map(|(name, _)| *name).chain(Binary::NAMED.iter().map(|(name, _)| *name));
-    numbers.chain(Distribution::NAMED.iter().map(|(name, ..)| *name))
+    numbers.chain(Distribution::NAMED.iter().map(|(name, ..)| *name)).chain(FOLDS)
 }
 
 /// How a declaration goes on after its first word, for somebody who types it; empty for a word that begins none.

@@ -29,6 +29,7 @@
 //! assert!(!matches!(rule.solves[0].laws[0], Law::Numeric(_)));
 //! ```
 
+mod algebraic;
 mod analysis;
 mod appearance;
 mod chance;
@@ -37,10 +38,13 @@ mod invariance;
 mod kind;
 mod law;
 mod measure;
+mod need;
+mod rank;
 mod remedy;
 mod rule;
 
-pub use analysis::{Draft, analyse};
+pub use algebraic::{Aggregate, Algebraic, Fold, Turn};
+pub use analysis::{AlgebraicDraft, Draft, analyse};
 pub use appearance::{
     Appearance, BUILT_IN_COLORS, Contour, Gradient, NamedColor, Net, Rgb, SurfaceShape, Tropism,
 };
@@ -52,6 +56,7 @@ pub use kind::{
 };
 pub use law::{Jacobian, Law, Linear, Numeric, Obstacle, Watch};
 pub use measure::Measure;
+pub use rank::is_singular;
 pub use remedy::{Boundary, Remedy};
 pub use rule::{Interpretation, Outcome, Pattern, Produce, Rule, Solve, Successor, Switch};
 
@@ -87,7 +92,8 @@ pub struct Model {
 impl Model {
     /// True if every parameter of every rule follows a formula: nothing is ever integrated numerically.
     pub fn is_closed_form(&self) -> bool {
-        self.rules.iter().flat_map(|r| &r.solves).flat_map(|s| &s.laws).all(Law::is_closed)
+        let mut solves = self.rules.iter().flat_map(|r| &r.solves);
+        solves.all(|s| s.laws.iter().all(Law::is_closed) && s.algebraic.closed.iter().all(|closed| *closed))
     }
 }
 

@@ -24,6 +24,28 @@ impl Site {
     }
 }
 
+/// Why a parameter cannot be solved for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unsolved {
+    Singular,
+    Nothing,
+    NotFinite,
+    Fading,
+    Rough,
+}
+
+impl Unsolved {
+    fn message(self) -> &'static str {
+        match self {
+            Unsolved::Singular => "is not determined by its equations, which are singular,",
+            Unsolved::Nothing => "has no value that solves its equations",
+            Unsolved::NotFinite => "has no value: its equations are undefined",
+            Unsolved::Fading => "is hardly determined any more by its equations, which become singular,",
+            Unsolved::Rough => "changes too fast to be followed",
+        }
+    }
+}
+
 /// An error of a run. All name the rule, the module with its lineage, and the time.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum Error {
@@ -56,6 +78,12 @@ pub enum Error {
     NegativeRate { site: Site },
     #[error("the step size fell to nothing at t = {}", .site.when())]
     StepTooSmall { site: Site },
+    #[error("{} of {} {} at t = {}", .unknown.0, .site.module, .unknown.1.message(), .site.when())]
+    Unsolved {
+        site: Site,
+        /// The parameter that is solved for, and why that fails.
+        unknown: Box<(String, Unsolved)>,
+    },
     #[error("more than {limit} modules at t = {}", .site.when())]
     TooManyModules {
         site: Site,
@@ -78,6 +106,7 @@ impl Error {
             | Error::BadWeights { site, .. }
             | Error::NegativeRate { site }
             | Error::StepTooSmall { site }
+            | Error::Unsolved { site, .. }
             | Error::TooManyModules { site, .. } => site,
         }
     }
@@ -141,6 +170,12 @@ impl Error {
             Error::StepTooSmall { .. } => d.help(
                 "the solution may become infinite here, or the equations jump in a way that no `if` shows; a fixed step (`--method rk4 --step-size H`) shows how it behaves",
             ),
+            Error::Unsolved { unknown, .. } => d.help(match unknown.1 {
+                Unsolved::Singular | Unsolved::Fading => "there the equations do not say how the parameter goes on: a double root, or two solutions that meet. Change the equations before this, or end the module's life at a condition that holds earlier",
+                Unsolved::Nothing => "the search begins with the value that the module was written with, or had just before: write one closer to the solution, or see whether there is one",
+                Unsolved::NotFinite => "look for a division by zero, or a root or logarithm of a negative number, at the written value too: the search begins there",
+                Unsolved::Rough => "it jumps, or turns without end, in a way that no `if` shows",
+            }),
             Error::TooManyModules { rounds, .. } if *rounds > 8 => d
                 .note(format!("{rounds} productions followed one another without time going on"))
                 .help("a successor that meets the condition again is replaced again at once: change the condition, or the successor's parameters"),
@@ -162,6 +197,7 @@ impl Error {
             Error::BadWeights { .. } => "by the weights of this clause",
             Error::NegativeRate { .. } => "the rate of this clause",
             Error::StepTooSmall { .. } => "these equations",
+            Error::Unsolved { .. } => "solved for here",
             Error::TooManyModules { .. } => "this production made the last of them",
         }
     }

@@ -56,16 +56,22 @@
 
 mod access;
 mod agenda;
+mod algebra;
+mod around;
+mod blend;
 mod career;
 mod chance;
 mod choose;
+mod consistent;
 mod coupled;
 mod course;
 mod cut;
 mod dense;
 mod derive;
+mod equations;
 mod error;
 mod event;
+mod gather;
 mod implicit;
 mod inspect;
 mod integrator;
@@ -96,7 +102,7 @@ mod transition;
 mod watch;
 
 pub use access::Passed;
-pub use error::{Error, Site};
+pub use error::{Error, Site, Unsolved};
 pub use event::Event;
 pub use inspect::{Inspection, Seen};
 pub use settle::MAX_ROUNDS;

@@ -273,6 +273,10 @@ fn shape(all: &Expressions, id: ExprId) -> String {
             format!("(chain {} {})", shape(all, *first), links.join(" "))
         }
         Expr::If(c, a, b) => format!("(if {} {} {})", shape(all, *c), shape(all, *a), shape(all, *b)),
+        Expr::Aggregate(of) => {
+            let term = of.term.map_or(String::new(), |term| shape(all, term.root));
+            format!("({} {} {term})", of.fold.name(), of.head.name.text)
+        }
     }
 }
 

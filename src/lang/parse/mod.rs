@@ -36,6 +36,8 @@ pub fn parse(source: &Source) -> (Document, Vec<Diagnostic>) {
     let mut errors = cut.errors;
     let mut document = Document::default();
     let mut interner = build::Interner::default();
+    let functions = cut.items.iter().filter(|item| item.kind == ItemKind::Def);
+    let defined = functions.filter_map(|item| declared_word(&cut.text, item)).collect();
     for item in &cut.items {
         if errors.len() >= MAX_ERRORS {
             break;
@@ -44,8 +46,12 @@ pub fn parse(source: &Source) -> (Document, Vec<Diagnostic>) {
             document.unread.extend(declared_name(&cut.text, item));
             continue;
         }
-        let mut builder =
-            build::Builder { expressions: &mut document.expressions, interner: &mut interner, offset: 0 };
+        let mut builder = build::Builder {
+            expressions: &mut document.expressions,
+            interner: &mut interner,
+            offset: 0,
+            defined: Some(&defined),
+        };
         match read_item(&cut.text, item, &mut builder) {
             Ok(read) => document.items.push((read, trimmed(&cut.text, item))),
             Err(error) => {
@@ -59,6 +65,10 @@ pub fn parse(source: &Source) -> (Document, Vec<Diagnostic>) {
 
 /// The name that an item declares, or seems to: `const k …`, but also `cosnt k …` and `k = …`.
 fn declared_name(text: &str, item: &RawItem) -> Option<std::sync::Arc<str>> {
+    Some(declared_word(text, item)?.into())
+}
+
+fn declared_word<'t>(text: &'t str, item: &RawItem) -> Option<&'t str> {
     let line = text[item.start..item.end].lines().next()?;
     let mut words = line.split(|c: char| !(c.is_alphanumeric() || c == '_')).filter(|w| !w.is_empty());
     let first = words.next()?;
@@ -69,7 +79,7 @@ fn declared_name(text: &str, item: &RawItem) -> Option<std::sync::Arc<str>> {
         ItemKind::Unknown => words.next()?,
         _ => return None,
     };
-    Some(name.into())
+    Some(name)
 }
 
 /// Reads one expression.
@@ -80,8 +90,12 @@ pub fn parse_expression(source: &Source) -> Result<(Document, Expression), Vec<D
     }
     let mut document = Document::default();
     let mut interner = build::Interner::default();
-    let mut builder =
-        build::Builder { expressions: &mut document.expressions, interner: &mut interner, offset: 0 };
+    let mut builder = build::Builder {
+        expressions: &mut document.expressions,
+        interner: &mut interner,
+        offset: 0,
+        defined: None,
+    };
     let pair = pest_parse(Rule::lone_expr, &source.text, 0).map_err(|e| vec![*e])?;
     let inner = pair.into_inner().next().expect("the grammar has an expression here");
     let expression = builder.expression(inner).map_err(|e| vec![*e])?;
@@ -96,8 +110,12 @@ pub fn parse_measure(source: &Source) -> Result<(Document, HeadModule, Option<Ex
     }
     let mut document = Document::default();
     let mut interner = build::Interner::default();
-    let mut builder =
-        build::Builder { expressions: &mut document.expressions, interner: &mut interner, offset: 0 };
+    let mut builder = build::Builder {
+        expressions: &mut document.expressions,
+        interner: &mut interner,
+        offset: 0,
+        defined: None,
+    };
     let pair = pest_parse(Rule::measure, &source.text, 0).map_err(|e| vec![(*e).help(MEASURE)])?;
     let (head, expression) = builder.measure(pair).map_err(|e| vec![*e])?;
     Ok((document, head, expression))

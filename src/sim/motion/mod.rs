@@ -3,9 +3,11 @@
 //! Time is counted from the start of the motion, values as displacements from the value there, so that a module born
 //! at t = 1e9 moves as precisely as one born at 0.
 
+mod function;
 mod riccati;
 mod sum;
 
+pub use function::Function;
 pub use riccati::Riccati;
 pub use sum::{Sum, Terms};
 
@@ -21,6 +23,7 @@ pub enum Motion {
     Polynomial([f64; 4]),
     Riccati(Riccati),
     Sum(Box<Sum>),
+    Function(Box<Function>),
     /// Dense output of a step of the module itself: the number of the component.
     Step(u32),
     /// Dense output of the coupled modules: the number of the component.
@@ -40,6 +43,7 @@ impl Motion {
             Motion::Polynomial(c) => tau * (c[0] + tau * (c[1] + tau * (c[2] + tau * c[3]))),
             Motion::Riccati(law) => law.value(tau),
             Motion::Sum(sum) => sum.value(tau),
+            Motion::Function(function) => function.value(tau),
             Motion::Step(_) | Motion::Coupled(_) => f64::NAN,
         }
     }
@@ -50,6 +54,7 @@ impl Motion {
             Motion::Polynomial(c) => c[0] + tau * (2.0 * c[1] + tau * (3.0 * c[2] + tau * 4.0 * c[3])),
             Motion::Riccati(law) => law.rate(law.value(tau)),
             Motion::Sum(sum) => sum.rate(tau),
+            Motion::Function(function) => function.rate(tau),
             Motion::Step(_) | Motion::Coupled(_) => f64::NAN,
         }
     }
@@ -61,6 +66,7 @@ impl Motion {
             Motion::Polynomial(c) => bound_polynomial(c, from, to),
             Motion::Riccati(law) => law.over(from, to),
             Motion::Sum(sum) => sum.over(from, to),
+            Motion::Function(function) => function.over(from, to),
             Motion::Step(_) | Motion::Coupled(_) => Dual { value: Interval::ENTIRE, rate: Interval::ENTIRE },
         }
     }
@@ -96,7 +102,7 @@ impl Motion {
                 if d == 0.0 { Terms::affine(x, f) } else { Terms::exponential(x - f / d, f / d, d) }
             }),
             Motion::Sum(sum) => Some(sum.terms(x)),
-            Motion::Step(_) | Motion::Coupled(_) => None,
+            Motion::Function(_) | Motion::Step(_) | Motion::Coupled(_) => None,
         }
     }
 }
