@@ -67,6 +67,7 @@ impl Session {
 
     fn from_source(source: Source, settings: &[Setting], files: &dyn Files) -> Result<Session, Box<Refused>> {
         let loaded = lang::load_with(&source, settings, files);
+        let source = loaded.source.unwrap_or(source);
         match loaded.model {
             Some(model) => Ok(Session { source, model, warnings: loaded.diagnostics }),
             None => Err(Box::new(Refused {

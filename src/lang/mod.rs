@@ -10,7 +10,9 @@
 mod appearance;
 pub mod ast;
 mod check;
+mod curves;
 mod globals;
+mod include;
 mod layout;
 pub mod parse;
 pub mod print;
@@ -19,10 +21,12 @@ mod scope;
 mod smooth;
 mod suggest;
 mod surface;
+mod table;
 
 use std::collections::HashMap;
 use std::sync::Arc;
 
+pub use include::read;
 pub use layout::MAX_DEPTH;
 pub use suggest::did_you_mean;
 pub use surface::{Files, NoFiles};
@@ -43,6 +47,8 @@ pub struct Setting {
 #[derive(Debug)]
 pub struct Loaded {
     pub model: Option<Model>,
+    /// The text with all that it includes, if that is more than was given: places in messages are places in it.
+    pub source: Option<Source>,
     pub diagnostics: Vec<Diagnostic>,
     /// What is wrong with the settings; then there is no model either.
     pub refused_settings: Vec<Diagnostic>,
@@ -55,7 +61,7 @@ pub fn load(source: &Source, settings: &[Setting]) -> Loaded {
 
 /// Reads, checks and compiles a model. The surfaces that it names come from `files`.
 pub fn load_with(source: &Source, settings: &[Setting], files: &dyn Files) -> Loaded {
-    let (document, mut diagnostics) = parse::parse(source);
+    let (whole, document, mut diagnostics) = include::read(source, files);
     let unread = !diagnostics.is_empty();
     let mut scope = Scope::default();
     let model = build(&document, settings, &mut scope, unread, files);
@@ -64,7 +70,7 @@ pub fn load_with(source: &Source, settings: &[Setting], files: &dyn Files) -> Lo
     diagnostics.sort_by_key(|d| (d.severity == Severity::Warning, d.labels.first().map(|l| l.0)));
     let refused_settings = scope.refused_settings;
     let model = model.filter(|_| !failed && refused_settings.is_empty());
-    Loaded { model, diagnostics, refused_settings }
+    Loaded { model, source: whole, diagnostics, refused_settings }
 }
 
 /// Builds the model; errors go to the scope. `unread` tells that parts of the text are missing, so that
@@ -76,7 +82,7 @@ fn build(
     unread: bool,
     files: &dyn Files,
 ) -> Option<Model> {
-    let parameters = globals::declare(document, settings, scope);
+    let parameters = globals::declare(document, settings, scope, files);
     let appearance = appearance::build(document, scope, files);
     let mut kinds = Kinds::default();
     let mut single = Singles::default();
@@ -185,6 +191,7 @@ fn build(
         interpretations: Vec::new(),
         appearance: Arc::new(appearance),
         drawn_only: Vec::new(),
+        curves: scope.graph.curves().to_vec(),
     };
     for (i, rule) in written.iter().enumerate() {
         let names: &[&str] = match &*rule.predecessor.name.text {
@@ -264,11 +271,14 @@ fn check_frames(frames: Option<&Frames>, span: Span, scope: &mut Scope) {
 
 /// Constants and functions that nothing uses.
 fn unused(document: &Document, scope: &mut Scope) {
-    for (item, _) in &document.items {
+    for (item, _) in document.own_items() {
         let (what, name) = match item {
             Item::Const { name, .. } => ("constant", name),
             Item::Param { name, .. } => ("param", name),
             Item::Def { name, .. } => ("function", name),
+            Item::Array { name, .. } => ("array", name),
+            Item::Curve { name, .. } => ("curve", name),
+            Item::Table { name, .. } => ("table", name),
             Item::Color { name, .. } => ("colour", name),
             Item::Gradient { name, .. } => ("gradient", name),
             Item::Contour { name, .. } => ("contour", name),

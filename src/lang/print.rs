@@ -5,12 +5,14 @@
 
 use std::fmt::Write;
 
+use crate::expr::Sort;
+
 use super::ast::{Action, Document, Expr, ExprId, Expressions, HeadModule, Item, Module, Name, Operator};
 
 /// How tightly a node binds; the loosest is 0.
 fn strength(expr: &Expr) -> u8 {
     match expr {
-        Expr::If(..) => 0,
+        Expr::If(..) | Expr::Match(..) => 0,
         Expr::Binary(Operator::Or, ..) => 1,
         Expr::Binary(Operator::And, ..) => 2,
         Expr::Not(_) => 3,
@@ -20,7 +22,7 @@ fn strength(expr: &Expr) -> u8 {
         Expr::Negate(_) => 7,
         Expr::Scale(..) => 8,
         Expr::Binary(Operator::Pow, ..) => 9,
-        Expr::Number(_) | Expr::Name(_) | Expr::Call(..) | Expr::Parenthesis(_) => 10,
+        Expr::Number(_) | Expr::Name(_) | Expr::Call(..) | Expr::Index(..) | Expr::Parenthesis(_) => 10,
     }
 }
 
@@ -81,6 +83,9 @@ pub fn expression(expressions: &Expressions, root: ExprId) -> String {
                 }
                 parts.push(Task::Text(")"));
             }
+            Expr::Index(name, index) => {
+                parts.extend([Task::Text(name), Task::Text("["), Task::Node(*index, 0), Task::Text("]")]);
+            }
             Expr::Negate(a) => parts.extend([Task::Text("-"), Task::Node(*a, own)]),
             Expr::Not(a) => parts.extend([Task::Text("!"), Task::Node(*a, own)]),
             Expr::Scale(factor, a) => {
@@ -90,7 +95,7 @@ pub fn expression(expressions: &Expressions, root: ExprId) -> String {
                 }
                 // Only a name, a call or a parenthesis can stand directly behind a number.
                 let first = leftmost(expressions, *a);
-                let bare = matches!(first, Expr::Name(_) | Expr::Call(..) | Expr::Parenthesis(_))
+                let bare = matches!(first, Expr::Name(_) | Expr::Call(..) | Expr::Index(..) | Expr::Parenthesis(_))
                     && strength(expressions.get(*a)) >= own
                     && !exponent_like(first);
                 if bare {
@@ -124,6 +129,15 @@ pub fn expression(expressions: &Expressions, root: ExprId) -> String {
                 Task::Text(" else "),
                 Task::Node(*otherwise, 0),
             ]),
+            Expr::Match(subject, cases, otherwise) => {
+                parts.extend([Task::Text("match "), Task::Node(*subject, 1)]);
+                for (value, then) in cases {
+                    // An inner `match` would take the cases that follow.
+                    parts.extend([Task::Text(" case "), Task::Node(*value, 1), Task::Text(": ")]);
+                    parts.push(Task::Node(*then, 1));
+                }
+                parts.extend([Task::Text(" else "), Task::Node(*otherwise, 0)]);
+            }
             Expr::Parenthesis(a) => parts.extend([Task::Text("("), Task::Node(*a, 0), Task::Text(")")]),
         }
         if enclosed {
@@ -147,7 +161,7 @@ fn leftmost(expressions: &Expressions, mut id: ExprId) -> &Expr {
 
 /// A name that a number before it would swallow: `2e3` is 2000, not 2 times `e3`.
 fn exponent_like(expr: &Expr) -> bool {
-    matches!(expr, Expr::Name(name) | Expr::Call(name, _) if name.starts_with(['e', 'E']))
+    matches!(expr, Expr::Name(name) | Expr::Call(name, _) | Expr::Index(name, _) if name.starts_with(['e', 'E']))
 }
 
 /// Modules as text.
@@ -198,6 +212,16 @@ pub fn head(rule: &super::ast::Rule) -> String {
     out
 }
 
+/// The word for a sort of curve, which the default does not need.
+fn sort_word(sort: Sort, default: Sort) -> &'static str {
+    match sort {
+        sort if sort == default => "",
+        Sort::Linear => "linear ",
+        Sort::Monotone => "monotone ",
+        Sort::Spline => "spline ",
+    }
+}
+
 /// A whole document, one declaration a line, one clause a line.
 pub fn document(document: &Document) -> String {
     let e = &document.expressions;
@@ -207,6 +231,23 @@ pub fn document(document: &Document) -> String {
         out += &match item {
             Item::Title(text) => format!("title \"{text}\""),
             Item::Const { name, value } => format!("const {} = {}", name.text, show(value)),
+            Item::Include(file) => format!("include \"{}\"", file.text),
+            Item::Array { name, values } => {
+                let values: Vec<String> = values.iter().map(show).collect();
+                format!("const {} = [{}]", name.text, values.join(", "))
+            }
+            Item::Curve { name, sort, points, periodic } => {
+                let points: Vec<String> =
+                    points.iter().map(|[x, y]| format!("({}, {})", show(x), show(y))).collect();
+                let end = if *periodic { " periodic" } else { "" };
+                format!("curve {}{} = {}{end}", sort_word(*sort, Sort::Monotone), name.text, points.join(" "))
+            }
+            Item::Table { name, sort, file, column, periodic } => {
+                let column = column.as_ref().map(|c| format!(" column \"{}\"", c.text)).unwrap_or_default();
+                let end = if *periodic { " periodic" } else { "" };
+                let sort = sort_word(*sort, Sort::Linear);
+                format!("table {sort}{} from \"{}\"{column}{end}", name.text, file.text)
+            }
             Item::Param { name, value, range: None } => format!("param {} = {}", name.text, show(value)),
             Item::Param { name, value, range: Some((a, b)) } => {
                 format!("param {} = {} in {} .. {}", name.text, show(value), show(a), show(b))
@@ -242,6 +283,9 @@ pub fn document(document: &Document) -> String {
             }
             Item::Rule(rule) => {
                 let mut text = head(rule) + ":";
+                for (name, value) in &rule.locals {
+                    text += &format!("\n  let {} = {}", name.text, show(value));
+                }
                 for clause in &rule.clauses {
                     text += "\n  ";
                     if let Some(guard) = &clause.guard {

@@ -7,14 +7,14 @@ use super::ast::{Expr, ExprId, Expression, Expressions, Name, Operator};
 use super::print;
 use super::suggest::did_you_mean;
 use crate::diagnostic::{Diagnostic, Span};
-use crate::expr::{Binary, Graph, Node, NodeId, Unary};
+use crate::expr::{Binary, Graph, Integral, Lookup, Node, NodeId, Part, Unary};
 use crate::model::Comparison;
 
 /// Most nodes that the functions of a model may expand to.
 const MAX_WORK: usize = 20_000_000;
 
 /// Variables at and above this number are parameters of functions.
-const FORMAL: u32 = 1 << 24;
+pub(super) const FORMAL: u32 = 1 << 24;
 
 /// Names that mean something everywhere in a rule.
 pub const RESERVED: [&str; 2] = ["t", "age"];
@@ -29,10 +29,14 @@ pub struct Lowered {
 
 /// A function, as a graph over its formal parameters.
 #[derive(Clone, Debug)]
-struct Function {
-    parameters: usize,
+pub(super) struct Function {
+    pub parameters: usize,
     /// None if its own text is at fault, which has been reported.
-    body: Option<Lowered>,
+    pub body: Option<Lowered>,
+    /// Of the library.
+    pub library: bool,
+    /// Parts of the body with a known antiderivative.
+    pub integrals: Vec<(NodeId, Integral)>,
 }
 
 /// Names that an expression can use besides the global ones.
@@ -48,13 +52,16 @@ pub struct Variables {
 pub struct Scope {
     pub graph: Graph,
     /// Values; None if the declaration is at fault, which has been reported.
-    constants: HashMap<Arc<str>, Option<f64>>,
-    functions: HashMap<Arc<str>, Function>,
+    pub(super) constants: HashMap<Arc<str>, Option<f64>>,
+    pub(super) functions: HashMap<Arc<str>, Function>,
+    /// None as for constants.
+    pub(super) curves: HashMap<Arc<str>, Option<Lookup>>,
+    pub(super) arrays: HashMap<Arc<str>, Option<Lookup>>,
     /// Global names that some expression has used.
     pub used: HashSet<Arc<str>>,
-    poisoned: HashSet<Arc<str>>,
+    pub(super) poisoned: HashSet<Arc<str>>,
     /// Names that were already complained about.
-    unknown: HashSet<Arc<str>>,
+    pub(super) unknown: HashSet<Arc<str>>,
     /// Where the comparisons of the present rule are written, by their node, and their boundary as in
     /// `x = s`. Rules number their variables alike, so one rule's nodes mean nothing in another.
     pub comparisons: HashMap<NodeId, (Span, Arc<str>)>,
@@ -81,7 +88,7 @@ impl Scope {
 
     /// Whether a suggestion is worth its time: it looks at every known name, and after so many errors
     /// nobody reads it.
-    fn suggests(&self) -> bool {
+    pub(super) fn suggests(&self) -> bool {
         self.diagnostics.len() < 50
     }
 
@@ -91,7 +98,14 @@ impl Scope {
     }
 
     /// Lowers the body of a function and makes it known.
-    pub fn define_function(&mut self, name: &Name, parameters: &[Name], all: &Expressions, body: Expression) {
+    pub fn define_function(
+        &mut self,
+        name: &Name,
+        parameters: &[Name],
+        all: &Expressions,
+        body: Expression,
+        library: bool,
+    ) {
         let mut variables = Variables {
             no_time: Some("a function sees only its parameters: pass it on, as in `G(x, age)`"),
             ..Variables::default()
@@ -110,7 +124,12 @@ impl Scope {
         }
         let body = self.lower(all, body, &variables);
         self.function_comparisons.extend(self.comparisons.drain());
-        self.functions.insert(name.text.clone(), Function { parameters: parameters.len(), body });
+        let integrals = body.map_or_else(Vec::new, |body| {
+            let parts = self.graph.reachable(&[body.node]);
+            self.graph.noted_integrals(&parts)
+        });
+        let function = Function { parameters: parameters.len(), body, library, integrals };
+        self.functions.insert(name.text.clone(), function);
     }
 
     /// Lowers an expression that must be a number.
@@ -150,7 +169,7 @@ impl Scope {
         None
     }
 
-    fn expect_number(&mut self, all: &Expressions, id: ExprId, lowered: Lowered) -> Option<NodeId> {
+    pub(super) fn expect_number(&mut self, all: &Expressions, id: ExprId, lowered: Lowered) -> Option<NodeId> {
         if !lowered.is_condition {
             return Some(lowered.node);
         }
@@ -179,7 +198,12 @@ impl Scope {
         let (first, last) = (expression.first.0, expression.root.0);
         // Operands stand before their users, so this is a loop however deep the expression is.
         let mut done: Vec<Option<Lowered>> = Vec::with_capacity((last - first + 1) as usize);
+        let named = self.functional_names(all, expression);
         for id in first..=last {
+            if named.contains(&ExprId(id)) {
+                done.push(None);
+                continue;
+            }
             let lowered = self.lower_node(all, ExprId(id), variables, |o| done[(o.0 - first) as usize]);
             done.push(lowered);
         }
@@ -201,10 +225,50 @@ impl Scope {
             Expr::Name(name) => number(self.name(name, span, variables)?),
             Expr::Call(name, arguments) => {
                 let mut nodes = Vec::with_capacity(arguments.len());
+                if self.is_functional(name) {
+                    for &argument in arguments.iter().skip(1) {
+                        nodes.push((argument, done(argument)?));
+                    }
+                    return self.functional(all, name, span, arguments.first().copied(), &nodes);
+                }
                 for &argument in arguments {
                     nodes.push((argument, done(argument)?));
                 }
                 self.call(all, name, span, &nodes, variables)
+            }
+            Expr::Index(name, index) => {
+                let index = self.expect_number(all, *index, done(*index)?)?;
+                number(self.element(name, index, span)?)
+            }
+            Expr::Match(subject, cases, otherwise) => {
+                let node = self.expect_number(all, *subject, done(*subject)?);
+                let mut whole = self.expect_number(all, *otherwise, done(*otherwise)?);
+                let mut seen: Vec<(NodeId, ExprId)> = Vec::new();
+                let mut links = Vec::new();
+                for (value, then) in cases {
+                    let case = self.expect_number(all, *value, done(*value)?)?;
+                    let then = self.expect_number(all, *then, done(*then)?)?;
+                    if let Some((_, before)) = seen.iter().find(|(known, _)| *known == case) {
+                        self.diagnostics.push(
+                            Diagnostic::error("two cases of one `match` are alike")
+                                .at(all.span(*value), "this one never has its turn")
+                                .at(all.span(*before), "this one comes first")
+                                .help("take one of them out, or give it another value"),
+                        );
+                        return None;
+                    }
+                    seen.push((case, *value));
+                    links.push((case, then, *value));
+                }
+                let node = node?;
+                for (case, then, value) in links.into_iter().rev() {
+                    let link = self.compare(Comparison::Equal, node, case);
+                    let sides = [*subject, value].map(|id| print::expression(all, id));
+                    let at = (all.span(*subject).to(all.span(value)), sides.join(" = ").into());
+                    self.comparisons.entry(link).or_insert(at);
+                    whole = Some(self.graph.select(link, then, whole?));
+                }
+                number(whole?)
             }
             Expr::Parenthesis(a) => done(*a),
             Expr::Negate(a) => {
@@ -299,6 +363,12 @@ impl Scope {
             Diagnostic::error(format!("`{name}` has no meaning here"))
                 .at(span, "time is known in rules only")
                 .help_opt(variables.no_time.map(str::to_owned))
+        } else if self.curves.contains_key(name) {
+            Diagnostic::error(format!("`{name}` is a curve"))
+                .at(span, format!("expected its argument, as in `{name}(age)`"))
+        } else if self.arrays.contains_key(name) {
+            Diagnostic::error(format!("`{name}` is an array"))
+                .at(span, format!("expected the number of an element, as in `{name}[0]`"))
         } else if self.functions.contains_key(name) || is_function(name) {
             Diagnostic::error(format!("`{name}` is a function"))
                 .at(span, format!("expected its arguments, as in `{name}(x)`"))
@@ -353,7 +423,16 @@ impl Scope {
         if let Some(function) = self.functions.get(name).cloned() {
             self.used.insert(name.clone());
             count(self, function.parameters)?;
-            return self.inline(function.body?, &nodes, span);
+            let whole = self.inline(&function, &nodes, span)?;
+            if function.library {
+                self.know_library_integral(name, whole.node, &nodes, span);
+            }
+            return Some(whole);
+        }
+        if let Some(curve) = self.curves.get(name).copied() {
+            self.used.insert(name.clone());
+            count(self, 1)?;
+            return number(self.graph.curve(curve?, Part::Value, nodes[0]));
         }
         if let Some((_, op)) = Unary::NAMED.iter().find(|(n, _)| **n == **name) {
             count(self, 1)?;
@@ -367,12 +446,16 @@ impl Scope {
             return None;
         }
         let built_in = Unary::NAMED.iter().map(|(n, _)| *n).chain(Binary::NAMED.iter().map(|(n, _)| *n));
-        let known = self.functions.keys().filter(|_| self.suggests()).map(|n| &**n).chain(built_in);
+        let own = self.functions.keys().chain(self.curves.keys()).filter(|_| self.suggests());
+        let known = own.map(|n| &**n).chain(built_in).chain(super::include::library_names());
         let mut error =
             Diagnostic::error(format!("unknown function `{name}`")).at(span, "no function has this name");
         error = match did_you_mean(name, known) {
             _ if &**name == "log" => error.help("the natural logarithm is `ln`, the decimal one `log10`"),
             Some(help) => error.help(help),
+            None if self.arrays.contains_key(name) => {
+                error.help(format!("`{name}` is an array, and its elements are written `{name}[i]`"))
+            }
             None if self.constants.contains_key(name) || variables.names.contains_key(name) => {
                 error.help(format!("to multiply, write `{name}*(…)`"))
             }
@@ -383,7 +466,13 @@ impl Scope {
     }
 
     /// A function's body with the arguments in place of its formal parameters.
-    fn inline(&mut self, body: Lowered, arguments: &[NodeId], span: Span) -> Option<Lowered> {
+    pub(super) fn inline(
+        &mut self,
+        function: &Function,
+        arguments: &[NodeId],
+        span: Span,
+    ) -> Option<Lowered> {
+        let body = function.body?;
         self.work += self.graph.reachable(&[body.node]).len();
         if self.work > MAX_WORK {
             if self.work < usize::MAX / 2 {
@@ -398,7 +487,9 @@ impl Scope {
         }
         let comparisons = &self.function_comparisons;
         let mut moved = Vec::new();
-        let node = self.graph.rewrite(&[body.node], |graph, id, node| {
+        let known = function.integrals.iter().flat_map(|(of, i)| [*of, i.whole, i.argument]);
+        let roots: Vec<NodeId> = std::iter::once(body.node).chain(known).collect();
+        let images = self.graph.rewrite(&roots, |graph, id, node| {
             let image = match node {
                 Node::Var(v) if v >= FORMAL => return Some(arguments[(v - FORMAL) as usize]),
                 Node::Binary(op @ (Binary::Lt | Binary::Le | Binary::Eq | Binary::Ne), a, b) => {
@@ -410,7 +501,12 @@ impl Scope {
                 moved.push((image, at.clone()));
             }
             Some(image)
-        })[0];
+        });
+        for integral in images[1..].chunks(3) {
+            let [of, whole, argument] = integral[..] else { unreachable!("threes") };
+            self.graph.know_integral(of, Integral { whole, argument });
+        }
+        let node = images[0];
         for (image, at) in moved {
             self.comparisons.entry(image).or_insert(at);
         }

@@ -33,6 +33,7 @@ pub use rule::{Interpretation, Pattern, Produce, Rule, Solve, Successor, Switch}
 use std::sync::Arc;
 
 use crate::diagnostic::Span;
+use crate::expr::Curve;
 
 /// A checked model, ready to run.
 #[derive(Clone, Debug)]
@@ -53,6 +54,8 @@ pub struct Model {
     pub appearance: Arc<Appearance>,
     /// Per kind and parameter: no rule reads it, so that only drawing and output do.
     pub drawn_only: Vec<Vec<bool>>,
+    /// Curves and tables, in the order of their declarations.
+    pub curves: Vec<Arc<Curve>>,
 }
 
 impl Model {
@@ -76,6 +79,7 @@ impl Default for Model {
             interpretations: Vec::new(),
             appearance: Arc::default(),
             drawn_only: Vec::new(),
+            curves: Vec::new(),
         }
     }
 }

@@ -13,7 +13,7 @@ use crate::lang::suggest::nearest;
 fn words(rule: Rule) -> Option<&'static str> {
     use Rule::*;
     Some(match rule {
-        expr | number | literal | ident | call | if_expr | neg | not | coefficient => "an expression",
+        expr | number | literal | ident | call | indexed | array | if_expr | match_expr | neg | not | coefficient => "an expression",
         or | and | le | ge | ne | lt | gt | eq | add | sub | mul | div | pow => "an operator",
         module | modules | successor | name => "a module",
         epsilon => "`ε` for nothing",
@@ -23,6 +23,12 @@ fn words(rule: Rule) -> Option<&'static str> {
         left_of => "`<` after the left context",
         right_of => "`>` and the right context",
         clause => "`if`, `solve` or `produce`",
+        local | kw_let => "`let`",
+        kw_match => "`match`",
+        kw_case => "`case`",
+        kw_column => "`column` and its name",
+        periodic => "`periodic`",
+        sort => "`linear`, `monotone` or `spline`",
         solve | kw_solve => "`solve`",
         produce | kw_produce => "`produce`",
         kw_if => "`if`",
@@ -104,6 +110,8 @@ fn is_item_with_name(item: Rule) -> bool {
             | Rule::color_item
             | Rule::gradient_item
             | Rule::contour_item
+            | Rule::curve_item
+            | Rule::table_item
     )
 }
 

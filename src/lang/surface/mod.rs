@@ -59,10 +59,15 @@ impl Fault {
     }
 }
 
+/// True if a path goes down from where it begins, and never up.
+pub fn is_inside(path: &str) -> bool {
+    let inside = Path::new(path).components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
+    !path.is_empty() && inside && !path.contains('\\')
+}
+
 /// Reads a surface; its name and place are left empty.
 pub fn read(path: &str, files: &dyn Files) -> Result<SurfaceShape, Fault> {
-    let inside = Path::new(path).components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
-    if path.is_empty() || !inside || path.contains('\\') {
+    if !is_inside(path) {
         return Err(Fault::whole("the path leaves the model's folder")
             .help("surfaces stand in the folder of the model or below it, as in `\"surfaces/petal.s\"`"));
     }
