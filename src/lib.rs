@@ -59,7 +59,10 @@
 //! | [`turtle`] | strings as geometry |
 //! | [`scene`] | geometry that knows no file format |
 //! | [`export`] | files |
+//! | [`view`] | a plant as something to walk around: recordings, a page that plays them, a window |
 //! | [`session`] | the pipeline as a whole |
+//! | [`replay`] | any time after any other |
+//! | [`repl`] | the interactive session |
 //! | [`report`] | how good the answers are, and what they cost |
 //! | [`cli`] | the program |
 //! | [`diagnostic`] | messages that point at the text |
@@ -69,17 +72,26 @@
 //!
 //! # What it does not do yet
 //!
-//! No random numbers, no REPL, no viewer.
+//! No random numbers.
 
 pub mod cli;
 pub mod diagnostic;
 pub mod export;
 pub mod expr;
+pub mod interrupt;
 pub mod lang;
 pub mod model;
+pub mod repl;
+pub mod replay;
 pub mod report;
 pub mod scene;
 pub mod session;
 pub mod sim;
 pub mod structure;
 pub mod turtle;
+pub mod view;
+
+/// The listings of the book's chapter about the library are compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/src/library.md")]
+struct BookOfTheLibrary;

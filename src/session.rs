@@ -13,8 +13,10 @@
 //! assert!((string.get(0).parameters[0] - 1.5).abs() < 1e-12);
 //! ```
 
+use std::cell::RefCell;
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 use crate::diagnostic::{Diagnostic, Source};
 use crate::lang::{self, Files, NoFiles, Setting};
@@ -22,12 +24,14 @@ use crate::model::Model;
 use crate::sim::{self, Simulation};
 
 /// A model that was read, with its text.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Session {
     pub source: Source,
     pub model: Model,
     /// What there is to say about the text though it runs.
     pub warnings: Vec<Diagnostic>,
+    /// The files that were read: the model, unless it came from memory, and what it names.
+    pub inputs: Vec<Input>,
 }
 
 /// Why there is no session.
@@ -38,42 +42,115 @@ pub struct Refused {
     pub diagnostics: Vec<Diagnostic>,
     /// What is wrong with the settings.
     pub settings: Vec<Diagnostic>,
+    /// The files that were read, or looked for.
+    pub inputs: Vec<Input>,
+}
+
+/// A file that was read or looked for, and what it was like just before.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Input {
+    pub path: PathBuf,
+    /// When it was changed last, and its length; `None` if it was not there.
+    state: Option<(SystemTime, u64)>,
+}
+
+impl Input {
+    /// A file as it is now.
+    pub fn now(path: &Path) -> Input {
+        let state = std::fs::metadata(path).and_then(|found| Ok((found.modified()?, found.len()))).ok();
+        Input { path: path.to_owned(), state }
+    }
+
+    /// Whether it was there.
+    pub fn is_there(&self) -> bool {
+        self.state.is_some()
+    }
+
+    /// Whether the file is another by now: changed, made or removed.
+    pub fn is_stale(&self) -> bool {
+        Input::now(&self.path) != *self
+    }
 }
 
 impl Session {
     /// Reads a model file.
     pub fn open(path: &Path, settings: &[Setting]) -> Result<Session, Box<Refused>> {
         let name = path.display().to_string();
+        let model = Input::now(path);
         let refuse = |source, diagnostic| {
-            Box::new(Refused { source, diagnostics: vec![diagnostic], settings: Vec::new() })
+            let inputs = vec![model.clone()];
+            Box::new(Refused { source, diagnostics: vec![diagnostic], settings: Vec::new(), inputs })
         };
         let bytes = std::fs::read(path).map_err(|error| {
             let diagnostic = Diagnostic::error(format!("the model cannot be read: {error}"));
             refuse(Source::new(&name, ""), diagnostic)
         })?;
         let source = Source::from_bytes(name, bytes).map_err(|e| refuse(e.0, e.1))?;
-        let folder = Folder(path.parent().unwrap_or(Path::new("")).to_owned());
-        Session::from_source(source, settings, &folder)
+        let folder = Folder {
+            path: path.parent().unwrap_or(Path::new("")).to_owned(),
+            inputs: RefCell::new(vec![model.clone()]),
+        };
+        let mut read = Session::from_source(source, settings, &folder);
+        match &mut read {
+            Ok(session) => session.inputs = folder.inputs.into_inner(),
+            Err(refused) => refused.inputs = folder.inputs.into_inner(),
+        }
+        read
     }
 
     /// Takes a model's text from memory; `name` stands for the file in messages. Surfaces that it names are
     /// not found.
     pub fn from_text(name: &str, text: &str, settings: &[Setting]) -> Result<Session, Box<Refused>> {
-        let bytes = text.as_bytes().to_vec();
-        let source = Source::from_bytes(name, bytes)
-            .map_err(|e| Box::new(Refused { source: e.0, diagnostics: vec![e.1], settings: Vec::new() }))?;
-        Session::from_source(source, settings, &NoFiles)
+        Session::read_text(name, text, settings, &NoFiles)
+    }
+
+    fn read_text(
+        name: &str,
+        text: &str,
+        settings: &[Setting],
+        files: &dyn Files,
+    ) -> Result<Session, Box<Refused>> {
+        let source = Source::from_bytes(name, text.as_bytes().to_vec()).map_err(|e| {
+            Box::new(Refused {
+                source: e.0,
+                diagnostics: vec![e.1],
+                settings: Vec::new(),
+                inputs: Vec::new(),
+            })
+        })?;
+        Session::from_source(source, settings, files)
+    }
+
+    /// Takes a model's text from memory; the surfaces that it names come from a folder, as if the text were a file
+    /// there. `name` stands for the file in messages.
+    ///
+    /// # Errors
+    /// As of [`Session::open`].
+    pub fn from_text_in(
+        folder: &Path,
+        name: &str,
+        text: &str,
+        settings: &[Setting],
+    ) -> Result<Session, Box<Refused>> {
+        let folder = Folder { path: folder.to_owned(), inputs: RefCell::default() };
+        let mut read = Session::read_text(name, text, settings, &folder);
+        match &mut read {
+            Ok(session) => session.inputs = folder.inputs.into_inner(),
+            Err(refused) => refused.inputs = folder.inputs.into_inner(),
+        }
+        read
     }
 
     fn from_source(source: Source, settings: &[Setting], files: &dyn Files) -> Result<Session, Box<Refused>> {
         let loaded = lang::load_with(&source, settings, files);
         let source = loaded.source.unwrap_or(source);
         match loaded.model {
-            Some(model) => Ok(Session { source, model, warnings: loaded.diagnostics }),
+            Some(model) => Ok(Session { source, model, warnings: loaded.diagnostics, inputs: Vec::new() }),
             None => Err(Box::new(Refused {
                 source,
                 diagnostics: loaded.diagnostics,
                 settings: loaded.refused_settings,
+                inputs: Vec::new(),
             })),
         }
     }
@@ -85,12 +162,17 @@ impl Session {
 }
 
 /// The folder of a model, with the files that it may read.
-struct Folder(PathBuf);
+struct Folder {
+    path: PathBuf,
+    /// What was asked for.
+    inputs: RefCell<Vec<Input>>,
+}
 
 impl Files for Folder {
     fn read(&self, path: &Path, limit: u64) -> Result<Vec<u8>, String> {
-        let folder = if self.0.as_os_str().is_empty() { Path::new(".") } else { &self.0 };
+        let folder = if self.path.as_os_str().is_empty() { Path::new(".") } else { &self.path };
         let file = folder.join(path);
+        self.inputs.borrow_mut().push(Input::now(&file));
         let failed = |error: std::io::Error| match error.kind() {
             std::io::ErrorKind::NotFound => format!("there is no file {}", file.display()),
             _ => format!("{}: {error}", file.display()),

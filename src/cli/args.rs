@@ -4,6 +4,9 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use super::fmt::FmtArgs;
+use super::new::NewArgs;
+use super::shell::{self, CompletionsArgs, ManArgs};
 use crate::export::{Camera, Layout, Page};
 use crate::lang::Setting;
 use crate::scene::Color;
@@ -20,8 +23,16 @@ pub struct Command {
 
 #[derive(Debug, Subcommand)]
 pub enum Action {
+    /// Write a model to begin with, NAME.dls, with comments; never over a file that is there
+    New(NewArgs),
     /// Read a model and say what is wrong with it, without running it
     Check(CheckArgs),
+    /// Lay out model files canonically; comments and line breaks stay, and so does what they say
+    ///
+    /// A declaration or rule begins in the first column, clauses are indented by 2, what follows an `if` on lines of
+    /// their own by 4. Binary + - < = & | have spaces around them, * / ^ none; in strings of modules one space or none,
+    /// as written. A file that does not parse stays as it is. A file is replaced as a whole or not at all.
+    Fmt(FmtArgs),
     /// Say how much work each equation and each condition of a model is (with the method `auto`), and why
     #[command(after_long_help = EXPLAIN_JSON)]
     Explain(ExplainArgs),
@@ -30,6 +41,11 @@ pub enum Action {
     /// Run a model and draw it: a file for each frame, or all frames on one sheet
     #[command(after_long_help = RENDER_EXAMPLES)]
     Render(RenderArgs),
+    /// Write a page for the browser that plays the growth of a model
+    ///
+    /// The page is one file that needs no network: with orbit, timeline, productions and the values of the params it was
+    /// made with.
+    View(ViewArgs),
     /// Draw the paper's figures that show development, from the models that come with the program
     ///
     /// Each figure is what `dlsys render` makes of a line; --list prints the lines. Writes a folder for each picture,
@@ -47,6 +63,17 @@ pub enum Action {
     ///
     /// With --hard, models are run that state their exact answers in their first lines, and checked.
     Report(ReportArgs),
+    /// Print a script that completes commands and flags in a shell
+    #[command(after_long_help = shell::WHERE, after_help = shell::WHERE)]
+    Completions(CompletionsArgs),
+    /// Print a manual page: `dlsys man > dlsys.1`, `dlsys man render | man -l -`
+    Man(ManArgs),
+    /// Write a model, run it, look at it and change it, line by line
+    ///
+    /// Type declarations and rules as in a model file, and commands: run, step, back, show, inspect, plot, draw, export …;
+    /// `help` lists them. Without a terminal the lines of standard input are done one after another; exit status 1 if
+    /// one of them failed. The history is kept in $XDG_STATE_HOME/dlsys (or ~/.local/state/dlsys).
+    Repl(ReplArgs),
 }
 
 /// How the paper's figures are made.
@@ -194,6 +221,29 @@ pub struct RenderArgs {
     /// Write into a directory that holds other files
     #[arg(long)]
     pub force: bool,
+    /// Go on until Ctrl-C: render again whenever the model, or a surface that it uses, is saved. An error is shown, and
+    /// the frames of the last good model stay
+    #[arg(long)]
+    pub watch: bool,
+    /// Say nothing of what was written, and show no progress
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct ViewArgs {
+    #[command(flatten)]
+    pub shared: SharedArgs,
+    /// The page to write, such as plant.html
+    #[arg(short, long = "out", value_name = "FILE")]
+    pub out: PathBuf,
+    /// How far what is drawn may be from a curved surface, in scene units [default: 1/2000 of the extent of the
+    /// whole animation]
+    #[arg(long, value_name = "L", value_parser = positive)]
+    pub accuracy: Option<f64>,
+    /// Write over a file that is not a page of dlsys
+    #[arg(long)]
+    pub force: bool,
 }
 
 #[derive(Debug, Args)]
@@ -232,6 +282,10 @@ pub struct ReportArgs {
     /// fourteen for euler]
     #[arg(long, value_name = "H1,H2,…", value_delimiter = ',', value_parser = positive, conflicts_with = "hard")]
     pub step_sizes: Option<Vec<f64>>,
+    /// Slices of time of `--scheduler local`, whose error is measured where modules read their neighbours [default: ten
+    /// powers of two, as step sizes]
+    #[arg(long, value_name = "DT1,DT2,…", allow_negative_numbers = true, value_delimiter = ',', value_parser = positive, conflicts_with = "hard")]
+    pub slices: Option<Vec<f64>>,
     /// Times at which to compare [default: the model's `frames`, at most 50 of them]
     #[arg(long, value_name = "T1,T2,…", allow_negative_numbers = true, value_delimiter = ',', value_parser = time, conflicts_with_all = ["from", "to", "step", "hard"])]
     pub at: Option<Vec<f64>>,
@@ -263,6 +317,30 @@ pub struct ReportArgs {
     /// With --hard, run only the case of this name; can be repeated
     #[arg(long = "case", value_name = "ID")]
     pub cases: Vec<String>,
+}
+
+#[derive(Debug, Args)]
+pub struct ReplArgs {
+    /// Model file (*.dls) to begin with
+    pub model: Option<PathBuf>,
+    /// Set a `param` of the model; can be repeated
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting, requires = "model")]
+    pub settings: Vec<Setting>,
+    /// Error aimed at in every parameter, relative to max(1, |value|)
+    #[arg(long, value_name = "TOL", allow_negative_numbers = true, default_value = "1e-6", value_parser = tolerance)]
+    pub tolerance: f64,
+    /// How equations are integrated: auto, dopri5, dop853, radau, rk4, euler
+    #[arg(long, default_value = "auto", value_parser = method)]
+    pub method: Method,
+    /// Step of the methods with a fixed one (rk4, euler)
+    #[arg(long, value_name = "H", allow_negative_numbers = true, value_parser = positive, required_if_eq_any([("method", "rk4"), ("method", "euler")]))]
+    pub step_size: Option<f64>,
+    /// More modules than this are an error
+    #[arg(long, value_name = "N", default_value_t = 10_000_000)]
+    pub max_modules: usize,
+    /// Print each line before what it does, as on a terminal; for transcripts
+    #[arg(long)]
+    pub echo: bool,
 }
 
 /// Flags of everything that runs a model.

@@ -4,6 +4,7 @@ use std::io::IsTerminal;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 use super::args::{Scheduler, SharedArgs};
@@ -22,6 +23,8 @@ pub enum Failure {
     Usage(String),
     /// Nobody reads the output any more. That is their right: 0.
     ClosedPipe,
+    /// What was under way is of no use any more, because a file that it reads has changed.
+    Stale,
 }
 
 /// What an error of standard output means.
@@ -36,6 +39,21 @@ pub fn out_error(error: std::io::Error) -> Failure {
 pub fn tell(message: &str) {
     use std::io::Write;
     let _ = std::io::stderr().write_all(message.as_bytes());
+}
+
+/// `1 rule`, `2 rules`.
+pub fn count_of(count: usize, what: &str) -> String {
+    if count == 1 { format!("1 {what}") } else { format!("{count} {what}s") }
+}
+
+/// A number of bytes as people read it.
+pub fn size_of(bytes: u64) -> String {
+    match bytes as f64 {
+        n if n >= 1e9 => format!("{:.2} GB", n / 1e9),
+        n if n >= 1e6 => format!("{:.1} MB", n / 1e6),
+        n if n >= 1e3 => format!("{:.0} kB", n / 1e3),
+        n => format!("{n} bytes"),
+    }
 }
 
 /// True if messages may be coloured.
@@ -121,6 +139,17 @@ fn spare_files(args: &SharedArgs) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Refuses what is wrong with the flags, whatever the model says.
+fn ready(args: &SharedArgs) -> Result<(), Failure> {
+    if args.method.is_fixed_step() && args.step_size.is_none() {
+        return Err(Failure::Usage(
+            "error: this method has a fixed step: give it with `--step-size H`\n".to_owned(),
+        ));
+    }
+    scheduler(args)?;
+    spare_files(args)
+}
+
 /// The scheduler that the flags say.
 fn scheduler(args: &SharedArgs) -> Result<sim::Scheduler, Failure> {
     let usage = |message: &str| Err(Failure::Usage(format!("error: {message}\n")));
@@ -139,16 +168,20 @@ fn scheduler(args: &SharedArgs) -> Result<sim::Scheduler, Failure> {
 }
 
 impl Run {
+    /// Reads the model.
     pub fn start(args: &SharedArgs) -> Result<Run, Failure> {
         let before = Instant::now();
-        if args.method.is_fixed_step() && args.step_size.is_none() {
-            return Err(Failure::Usage(
-                "error: this method has a fixed step: give it with `--step-size H`\n".to_owned(),
-            ));
-        }
-        let scheduler = scheduler(args)?;
-        spare_files(args)?;
+        ready(args)?;
         let session = open(&args.model, &args.settings)?;
+        let mut run = Run::of(session, args)?;
+        run.clock.parse = before.elapsed();
+        Ok(run)
+    }
+
+    /// Of a model that was read.
+    pub fn of(session: Session, args: &SharedArgs) -> Result<Run, Failure> {
+        ready(args)?;
+        let scheduler = scheduler(args)?;
         let times = times(args, &session)?;
         if let (sim::Scheduler::Local { slice }, Some(end)) = (scheduler, times.last())
             && end / slice > MAX_SLICES
@@ -168,8 +201,7 @@ impl Run {
             log: args.events.is_some(),
             ..defaults
         };
-        let clock = Clock { parse: before.elapsed(), ..Clock::default() };
-        Ok(Run { session, times, settings, clock })
+        Ok(Run { session, times, settings, clock: Clock::default() })
     }
 
     /// Starts a simulation.
@@ -225,4 +257,12 @@ fn times(args: &SharedArgs, session: &Session) -> Result<Vec<f64>, Failure> {
         })?,
     };
     Ok(frames.times().collect())
+}
+
+/// A progress bar with rate and remaining time; it hides itself where standard error is no terminal.
+pub fn bar(what: &'static str, count: usize) -> ProgressBar {
+    let style = ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} {per_sec}, {eta} left");
+    ProgressBar::new(count as u64)
+        .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+        .with_message(what)
 }

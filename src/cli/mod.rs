@@ -1,17 +1,23 @@
-//! The command line: `dlsys check`, `explain`, `run`, `render`, `gallery` and `report`.
+//! The command line: `dlsys check`, `explain`, `run`, `render`, `view`, `gallery`, `report` and `repl`; `new`, `fmt`; `completions`,
+//! `man`.
 //!
 //! Exit status: 0 done; 1 the model or the run is at fault; 2 the command line is.
 
-mod args;
-mod common;
+pub(crate) mod args;
+pub(crate) mod common;
 mod continuity;
+pub(crate) mod embedded;
 mod events;
 mod explain;
+mod fmt;
 mod gallery;
+mod new;
 mod parallel;
 mod render;
 mod report;
-mod run;
+pub(crate) mod run;
+mod shell;
+mod view;
 
 use clap::Parser;
 
@@ -29,15 +35,21 @@ pub fn main() -> u8 {
         }
     };
     let done = match &command.action {
+        Action::New(args) => new::new(args),
+        Action::Fmt(args) => fmt::fmt(args),
         Action::Check(args) => run::check(args),
         Action::Explain(args) => explain::explain(args),
         Action::Run(args) => run::run(args),
         Action::Render(args) => render::render(args),
+        Action::View(args) => view::view(args),
         Action::Gallery(args) => gallery::gallery(args),
         Action::Report(args) => report::report(args),
+        Action::Completions(args) => shell::completions(args),
+        Action::Man(args) => shell::man(args),
+        Action::Repl(args) => crate::repl::repl(args),
     };
     match done {
-        Ok(()) | Err(Failure::ClosedPipe) => 0,
+        Ok(()) | Err(Failure::ClosedPipe | Failure::Stale) => 0,
         Err(Failure::Model(message)) => {
             tell(&message);
             1

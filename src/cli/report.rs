@@ -37,11 +37,13 @@ pub fn report(args: &ReportArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-fn study(args: &ReportArgs, session: &Session, name: &str) -> Result<(), Failure> {
+/// Studies a model that was read; `name` is that of its files.
+pub fn study(args: &ReportArgs, session: &Session, name: &str) -> Result<(), Failure> {
     let plan = Plan {
         methods: args.methods.clone().unwrap_or_else(|| Method::NAMED.iter().map(|(_, m)| *m).collect()),
         tolerances: args.tolerances.clone().unwrap_or_else(Plan::default_tolerances),
         step_sizes: args.step_sizes.clone(),
+        slices: args.slices.clone(),
         times: times(args, session)?,
         runs: args.runs,
         time_limit: args.time_limit,

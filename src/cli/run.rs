@@ -39,7 +39,7 @@ pub fn run(args: &RunArgs) -> Result<(), Failure> {
     let mut out = std::io::BufWriter::with_capacity(1 << 16, std::io::stdout().lock());
     let printer = Printer::new(&run.session.model);
     let mut events = EventLog::create(args.shared.events.as_deref(), &run)?;
-    let result = (|| {
+    let result = (|| -> Result<_, Failure> {
         let mut simulation = run.simulate()?;
         let mut string = ModuleString::default();
         let mut text = String::new();

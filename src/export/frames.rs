@@ -53,6 +53,8 @@ pub struct FrameDirectory {
     foreign: BTreeSet<String>,
     /// Files of this render, in the order of writing.
     written: Vec<String>,
+    /// Their bytes.
+    bytes: u64,
     journal: fs::File,
 }
 
@@ -94,7 +96,7 @@ impl FrameDirectory {
         let journal =
             fs::OpenOptions::new().append(true).open(&journal).map_err(io_error("open", &journal))?;
         let foreign = present.iter().filter(foreign).cloned().collect();
-        Ok(FrameDirectory { path: path.to_owned(), earlier, foreign, written: Vec::new(), journal })
+        Ok(FrameDirectory { path: path.to_owned(), earlier, foreign, written: Vec::new(), bytes: 0, journal })
     }
 
     /// Name of a frame: `frame-0000.svg`. All frames of a render of `count` have the same number of digits,
@@ -112,6 +114,11 @@ impl FrameDirectory {
         self.check(name)?;
         let staged = self.staging().write(|file| file.write_all(bytes))?;
         self.put(name, staged)
+    }
+
+    /// Bytes of the files that were written so far.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
     }
 
     /// Where files are written before they have a name.
@@ -137,6 +144,7 @@ impl FrameDirectory {
         self.check(name)?;
         let journal = self.path.join(JOURNAL);
         self.journal.write_all(format!("{name}\n").as_bytes()).map_err(io_error("write", &journal))?;
+        self.bytes += staged.0.as_file().metadata().map_or(0, |found| found.len());
         staged.persist(&self.path.join(name))?;
         self.written.push(name.to_owned());
         Ok(())

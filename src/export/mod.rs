@@ -22,6 +22,7 @@ mod fit;
 mod frames;
 mod glyphs;
 mod layout;
+mod lengths;
 mod light;
 mod manifest;
 mod name;
@@ -45,10 +46,13 @@ pub use camera::Camera;
 pub use fit::{Fit, Picture, Survey};
 pub use frames::{Error, FrameDirectory, MANIFEST, Staged, Staging, replace};
 pub use layout::{Layout, Sheet, Spacing};
+pub use lengths::{CrossSection, Length, cross_section, lengths};
 pub use light::Light;
 pub use manifest::{FrameRecord, Manifest};
 pub use page::{Page, Size, TooLarge};
 pub use sheet::{Assembly, Part, SheetError, SheetWriter};
+pub use triangulate::{normal, triangulate};
+pub use tube::Spoke;
 pub use view::{View, ViewError};
 
 use std::io::{self, Write};
@@ -147,6 +151,13 @@ impl FrameWriter {
             Format::Obj => Some((obj::MATERIALS, obj::materials(&scene.palette))),
         }
     }
+}
+
+/// The pixels of a scene on a page, row by row from the top: red, green and blue, each times the opacity, and the opacity;
+/// 0 where nothing is drawn, whatever the page's background.
+pub fn pixels(scene: &Scene, fit: &Fit, page: &Page) -> Vec<[u8; 4]> {
+    let scene = &*scene.tessellated(fit.accuracy);
+    png::picture(scene, fit, page.pixels, page.placement()).pixels
 }
 
 #[cfg(test)]

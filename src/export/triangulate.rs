@@ -7,7 +7,7 @@ const EAR_LIMIT: usize = 4096;
 
 /// The direction in which a polygon faces: its vertices go counter-clockwise about it. Newell's method, so
 /// the polygon need not be flat or convex. `Vector::z()` if it has no area.
-pub(super) fn normal(vertices: &[Point]) -> Vector {
+pub fn normal(vertices: &[Point]) -> Vector {
     let Some(&origin) = vertices.first() else { return Vector::z() };
     let mut sum = Vector::zeros();
     let mut longest = 0.0_f64;
@@ -23,7 +23,7 @@ pub(super) fn normal(vertices: &[Point]) -> Vector {
 /// Cuts a polygon into `n - 2` triangles of vertex indices, turning the same way as the polygon, by cutting
 /// off ears (Meisters 1975) in the plane that `normal` is normal to. Outlines that cross themselves give
 /// triangles, too, but not a meaningful area.
-pub(super) fn triangulate(vertices: &[Point], normal: Vector) -> Vec<[usize; 3]> {
+pub fn triangulate(vertices: &[Point], normal: Vector) -> Vec<[usize; 3]> {
     let flat = flatten(vertices, normal);
     let mut rest: Vec<usize> = (0..vertices.len()).collect();
     let mut triangles = Vec::with_capacity(vertices.len().saturating_sub(2));

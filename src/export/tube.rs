@@ -10,6 +10,7 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
+use super::lengths::{CrossSection, Length};
 use super::triangles::{Faces, Points, Ring};
 use crate::scene::{Point, Scene, Segment, Vector, sin_cos_degrees};
 
@@ -18,7 +19,7 @@ const SHARPEST: f64 = -0.173_648_177_666_930_3;
 
 /// Sides of a prism whose faces are no further from its cylinder than that. Few numbers are used, so that a
 /// stem that grows does not change all the time.
-fn sides_for(radius: f64, accuracy: f64) -> usize {
+pub(super) fn sides_for(radius: f64, accuracy: f64) -> usize {
     const STEPS: [usize; 7] = [8, 12, 16, 24, 32, 48, 64];
     let deviation = |sides: usize| radius * (1.0 - sin_cos_degrees(180.0 / sides as f64).1);
     STEPS.into_iter().find(|&sides| deviation(sides) <= accuracy).unwrap_or(STEPS[STEPS.len() - 1])
@@ -167,6 +168,36 @@ impl<'s> Tubes<'s> {
         &self.segments[self.pieces[piece].segment]
     }
 
+    /// A piece between its two cross-sections, before it the flat shoulder on which it begins, if it does.
+    pub(super) fn lengths(&self, i: usize) -> impl Iterator<Item = Length> {
+        let piece = &self.pieces[i];
+        let segment = &self.segments[piece.segment];
+        let (begin, end) = (piece.begins, self.end(i));
+        let start = match begin {
+            Begin::Dome => CrossSection::across(segment.start, &piece.section, piece.radii[0]),
+            Begin::Joint => self.end(i - 1),
+            Begin::Shoulder => {
+                let before = &self.pieces[i - 1];
+                let centre = self.segments[before.segment].end;
+                CrossSection::between(centre, &before.section, &piece.section, piece.radii[0])
+            }
+        };
+        let length = |ends, caps| Length { segment: piece.segment, ends, caps };
+        let shoulder = (begin == Begin::Shoulder).then(|| length([self.end(i - 1), start], [false; 2]));
+        let caps = [begin == Begin::Dome && piece.radii[0] > 0.0, piece.last && piece.radii[1] > 0.0];
+        shoulder.into_iter().chain([length([start, end], caps)])
+    }
+
+    /// The cross-section at the end of a piece.
+    fn end(&self, i: usize) -> CrossSection {
+        let piece = &self.pieces[i];
+        let (centre, radius) = (self.segments[piece.segment].end, piece.radii[1]);
+        if piece.last {
+            return CrossSection::across(centre, &piece.section, radius);
+        }
+        CrossSection::between(centre, &piece.section, &self.pieces[i + 1].section, radius)
+    }
+
     /// Makes the vertices and normals of some pieces, in the order of their numbers.
     pub(super) fn points(&self, pieces: Range<usize>, out: &mut impl Points) {
         for i in pieces {
@@ -254,13 +285,13 @@ impl<'s> Tubes<'s> {
 }
 
 /// A corner of a cross-section, in parts of the radius: its place, and the unit normal of the outline there.
-#[derive(Clone, Copy)]
-struct Spoke {
-    place: [f64; 2],
-    normal: [f64; 2],
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spoke {
+    pub place: [f64; 2],
+    pub normal: [f64; 2],
 }
 
-fn circle(sides: usize) -> Vec<Spoke> {
+pub(super) fn circle(sides: usize) -> Vec<Spoke> {
     (0..sides)
         .map(|k| {
             let (sin, cos) = sin_cos_degrees(360.0 * k as f64 / sides as f64);
@@ -270,7 +301,7 @@ fn circle(sides: usize) -> Vec<Spoke> {
 }
 
 /// A smooth closed curve through points (Catmull and Rom 1974), with at least so many sides.
-fn curve(points: &[[f64; 2]], sides: usize) -> Vec<Spoke> {
+pub(super) fn curve(points: &[[f64; 2]], sides: usize) -> Vec<Spoke> {
     let count = points.len();
     let pieces = (2 * sides).div_ceil(count).max(2);
     let mut spokes = Vec::with_capacity(count * pieces);
@@ -315,10 +346,10 @@ fn can_join(a: &Segment, b: &Segment, radius: f64) -> bool {
 
 /// Directions along and across a tube at one place: `along`, `u`, `v` are orthonormal and right-handed.
 #[derive(Clone, Copy)]
-struct Section {
-    along: Vector,
-    u: Vector,
-    v: Vector,
+pub(super) struct Section {
+    pub(super) along: Vector,
+    pub(super) u: Vector,
+    pub(super) v: Vector,
     /// Growth of the radius along the segment.
     slope: f64,
 }

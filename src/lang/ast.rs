@@ -134,6 +134,8 @@ pub struct Rule {
     pub head: Span,
     /// `let` lines.
     pub locals: Vec<(Name, Expression)>,
+    /// Written with `->`: applied at the multiples of the period. It has one clause, which produces.
+    pub discrete: bool,
     pub clauses: Vec<Clause>,
 }
 
@@ -169,24 +171,73 @@ pub struct Text {
 #[derive(Clone, Debug)]
 pub enum Item {
     Title(String),
-    Const { name: Name, value: Expression },
-    Array { name: Name, values: Vec<Expression> },
-    Curve { name: Name, sort: Sort, points: Vec<[Expression; 2]>, periodic: bool },
-    Table { name: Name, sort: Sort, file: Text, column: Option<Text>, periodic: bool },
+    Array {
+        name: Name,
+        values: Vec<Expression>,
+    },
+    Curve {
+        name: Name,
+        sort: Sort,
+        points: Vec<[Expression; 2]>,
+        periodic: bool,
+    },
+    Table {
+        name: Name,
+        sort: Sort,
+        file: Text,
+        column: Option<Text>,
+        periodic: bool,
+    },
     Include(Text),
-    Param { name: Name, value: Expression, range: Option<(Expression, Expression)> },
-    Def { name: Name, parameters: Vec<Name>, body: Expression },
+    Const {
+        name: Name,
+        value: Expression,
+    },
+    Param {
+        name: Name,
+        value: Expression,
+        range: Option<(Expression, Expression)>,
+    },
+    Def {
+        name: Name,
+        parameters: Vec<Name>,
+        body: Expression,
+    },
     Angle(Expression),
-    Frames { from: Expression, to: Expression, step: Expression },
-    Color { name: Name, value: Text },
-    Gradient { name: Name, stops: Vec<Text> },
-    Surface { name: Name, file: Text },
-    Contour { name: Name, points: Vec<[Expression; 2]> },
-    Tropism { direction: [Expression; 3], strength: Option<Expression> },
+    /// Of the discrete rules.
+    Period(Expression),
+    Frames {
+        from: Expression,
+        to: Expression,
+        step: Expression,
+    },
+    Color {
+        name: Name,
+        value: Text,
+    },
+    Gradient {
+        name: Name,
+        stops: Vec<Text>,
+    },
+    Surface {
+        name: Name,
+        file: Text,
+    },
+    Contour {
+        name: Name,
+        points: Vec<[Expression; 2]>,
+    },
+    Tropism {
+        direction: [Expression; 3],
+        strength: Option<Expression>,
+    },
     Ignore(Vec<Name>),
     Consider(Vec<Name>),
     Axiom(Vec<Module>),
-    Interpret { head: HeadModule, drawn: Vec<Module> },
+    Interpret {
+        head: HeadModule,
+        drawn: Vec<Module>,
+    },
     Rule(Rule),
 }
 

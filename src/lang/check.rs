@@ -138,13 +138,13 @@ pub fn reachability(
 ) {
     let mut kinds_of: Vec<Vec<KindId>> = vec![Vec::new(); model.rules.len()];
     for (id, kind) in model.kinds.iter() {
-        for &rule in &kind.rules {
+        for rule in kind.all_rules() {
             kinds_of[rule].push(id);
         }
     }
     for (i, rule) in model.rules.iter().enumerate() {
         let own = &kinds_of[i];
-        if let Some(at) = model.kinds.get(own[0]).rules.get(MAX_RULES)
+        if let Some(at) = model.kinds.get(own[0]).rules_like(rule).get(MAX_RULES)
             && *at == i
         {
             diagnostics.push(
@@ -162,7 +162,7 @@ pub fn reachability(
     let mut alive: HashSet<KindId> = model.axiom.kinds.iter().copied().collect();
     let mut queue: Vec<KindId> = model.axiom.kinds.clone();
     while let Some(kind) = queue.pop() {
-        for &rule in &model.kinds.get(kind).rules {
+        for rule in model.kinds.get(kind).all_rules() {
             for made in model.rules[rule].produces.iter().flat_map(|p| &p.successor.kinds) {
                 if alive.insert(*made) {
                     queue.push(*made);
@@ -184,9 +184,13 @@ pub fn reachability(
 fn shadowed_rule(model: &Model, index: usize, own: &[KindId], diagnostics: &mut Vec<Diagnostic>) {
     let rule = &model.rules[index];
     let wider = |a: &Pattern, b: &Pattern| b.kinds.iter().all(|k| a.matches(*k));
-    let earlier = model.kinds.get(own[0]).rules.iter().take(MAX_RULES).take_while(|j| **j < index);
+    let own_rules = model.kinds.get(own[0]).rules_like(rule);
+    let earlier = own_rules.iter().take(MAX_RULES).take_while(|j| **j < index);
+    // Of discrete rules the first applies whose condition holds, too.
+    let holds = |before: &Rule| !rule.discrete || before.produces.iter().all(|p| p.guard.is_always());
     let shadow = earlier.map(|j| (*j, &model.rules[*j])).find(|(j, before)| {
-        own.iter().all(|k| model.kinds.get(*k).rules.contains(j))
+        holds(before)
+            && own.iter().all(|k| model.kinds.get(*k).rules_like(rule).contains(j))
             && before.left.len() <= rule.left.len()
             && before.right.len() <= rule.right.len()
             && before.left.iter().rev().zip(rule.left.iter().rev()).all(|(a, b)| wider(a, b))
@@ -197,6 +201,15 @@ fn shadowed_rule(model: &Model, index: usize, own: &[KindId], diagnostics: &mut 
             && before.right.len() == rule.right.len()
             && before.label == rule.label
         {
+            if rule.discrete {
+                diagnostics.push(
+                    Diagnostic::error("this rule can never be reached")
+                        .at(rule.span, "it has the head of the rule before it, and that one always holds")
+                        .at(before.span, "this rule comes first")
+                        .help("give the first one a condition: `A(x) : x > 3 -> …`"),
+                );
+                return;
+            }
             diagnostics.push(
                 Diagnostic::error("two rules have the same head")
                     .at(rule.span, "this one never has its turn")
@@ -274,11 +287,29 @@ fn never_made(model: &Model, rule: &ast::Rule, occurs: &HashMap<KindId, Span>) -
     }
     let known = occurs.keys().map(|id| model.kinds.get(*id).name.as_str());
     let near = nearest(name, known);
-    let idle = |near: &str| model.kinds.iter().all(|(_, k)| k.name != near || k.rules.is_empty());
+    let idle = |near: &str| model.kinds.iter().all(|(_, k)| k.name != near || k.has_no_rules());
     if class_of(name) == Class::Word && near.is_some_and(idle) {
         return None;
     }
     Some(error.help_opt(near.map(|near| format!("did you mean `{near}`?"))))
+}
+
+/// The period of the discrete rules.
+pub fn period(declared: Option<(f64, Span)>, model: &Model, diagnostics: &mut Vec<Diagnostic>) {
+    let Some((period, span)) = declared else { return };
+    if period <= 0.0 {
+        diagnostics.push(
+            Diagnostic::error("this period cannot be")
+                .at(span, format!("it is {period}; steps need time to pass between them"))
+                .help("discrete rules apply at t = P, 2P, …: `period 1`"),
+        );
+    } else if model.rules.iter().all(|rule| !rule.discrete) {
+        diagnostics.push(
+            Diagnostic::warning("no rule has a period")
+                .at(span, "it is that of discrete rules, and there is none")
+                .help("a discrete rule is written `A(x) : x > 3 -> F(x) A(x/2)`"),
+        );
+    }
 }
 
 /// Domains that can be left without a production.
@@ -320,7 +351,7 @@ pub fn inert_modules(model: &Model, occurs: &HashMap<KindId, Span>, diagnostics:
     let with_rules: HashSet<&str> = model
         .kinds
         .iter()
-        .filter(|(_, k)| !k.rules.is_empty() || k.interpretation.is_some())
+        .filter(|(_, k)| !k.has_no_rules() || k.interpretation.is_some())
         .map(|(_, k)| k.name.as_str())
         .collect();
     let mut all: Vec<(Span, KindId)> = occurs.iter().map(|(kind, span)| (*span, *kind)).collect();

@@ -9,6 +9,7 @@
 //! A line break ends an expression or a condition, except inside parentheses, after an operator or a
 //! comma, or before `then` and `else` (LANGUAGE, "Text"). Inside a string of modules it means nothing.
 
+use super::lexeme::{Lexeme, Token};
 use crate::diagnostic::{Diagnostic, Span};
 
 /// Deepest nesting of parentheses, signs, powers and `if` that an expression may have.
@@ -28,6 +29,7 @@ pub enum ItemKind {
     Param,
     Def,
     Angle,
+    Period,
     Frames,
     Color,
     Gradient,
@@ -39,12 +41,14 @@ pub enum ItemKind {
     Axiom,
     Interpret,
     Rule,
+    /// A discrete rule, known by its arrow.
+    Step,
     /// A line that begins nothing known.
     Unknown,
 }
 
 /// The words that begin a declaration.
-pub const DECLARATIONS: [(&str, ItemKind); 19] = [
+pub const DECLARATIONS: [(&str, ItemKind); 20] = [
     ("title", ItemKind::Title),
     ("include", ItemKind::Include),
     ("const", ItemKind::Const),
@@ -53,6 +57,7 @@ pub const DECLARATIONS: [(&str, ItemKind); 19] = [
     ("curve", ItemKind::Curve),
     ("table", ItemKind::Table),
     ("angle", ItemKind::Angle),
+    ("period", ItemKind::Period),
     ("frames", ItemKind::Frames),
     ("color", ItemKind::Color),
     ("gradient", ItemKind::Gradient),
@@ -98,18 +103,6 @@ enum Last {
     Colon,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Token {
-    Word,
-    Number,
-    Text,
-    Open,
-    Close,
-    Comma,
-    Colon,
-    Symbol,
-}
-
 /// A parenthesis that is open, and what recursion is pending inside it.
 #[derive(Clone, Copy, Debug, Default)]
 struct Level {
@@ -141,10 +134,22 @@ struct Scanner<'t> {
     next: Option<Token>,
     /// The expression before the last line break has a `match`.
     matching: bool,
+    /// All tokens, where somebody wants them.
+    lexemes: Option<Vec<Lexeme>>,
 }
 
 /// Cuts a text into items. Time and memory are linear in the text.
 pub fn layout(text: &str) -> Layout {
+    scan(text, None).0
+}
+
+/// Cuts a text into items, and tells all tokens.
+pub fn lexemes(text: &str) -> (Layout, Vec<Lexeme>) {
+    let (layout, lexemes) = scan(text, Some(Vec::new()));
+    (layout, lexemes.unwrap_or_default())
+}
+
+fn scan(text: &str, lexemes: Option<Vec<Lexeme>>) -> (Layout, Option<Vec<Lexeme>>) {
     let mut scanner = Scanner {
         text,
         out: text.as_bytes().to_vec(),
@@ -158,6 +163,7 @@ pub fn layout(text: &str) -> Layout {
         run_of_angles: None,
         next: None,
         matching: false,
+        lexemes,
     };
     let mut tokens = Vec::new();
     let mut start = 0;
@@ -168,7 +174,7 @@ pub fn layout(text: &str) -> Layout {
         start = end + 1;
     }
     scanner.close_item(text.len());
-    let Scanner { out, mut items, mut errors, .. } = scanner;
+    let Scanner { out, mut items, mut errors, lexemes, .. } = scanner;
     for item in &mut items {
         if item.end - item.start > MAX_ITEM && item.kind != ItemKind::Axiom && !item.broken {
             item.broken = true;
@@ -181,7 +187,7 @@ pub fn layout(text: &str) -> Layout {
     }
     // Only ASCII bytes were put in place of whole characters.
     let text = String::from_utf8(out).expect("whole characters were replaced");
-    Layout { text, items, errors }
+    (Layout { text, items, errors }, lexemes)
 }
 
 fn memchr_newline(text: &str, from: usize) -> usize {
@@ -239,9 +245,20 @@ impl Scanner<'_> {
         };
         let word = self.word(first).to_owned();
         let colon = colon_outside_parentheses(tokens);
-        if let Some(kind) = self.starts_item(&word, colon, tokens) {
+        let arrow = self.arrow_outside_parentheses(tokens);
+        if arrow == Some(first.1) || arrow.is_some() && self.goes_on() {
+            // What looked like the head of a rule is that of a discrete one, broken over lines.
+            if let Some(item) = self.items.last_mut().filter(|i| i.kind == ItemKind::Rule) {
+                item.kind = ItemKind::Step;
+                self.held_break = None;
+            }
+        }
+        if let Some(kind) = self.starts_item(&word, colon, arrow.is_some(), tokens) {
             let mut from = first.1;
-            if kind == ItemKind::Rule && self.last == Last::Angle && self.levels.len() == 1 {
+            if matches!(kind, ItemKind::Rule | ItemKind::Step)
+                && self.last == Last::Angle
+                && self.levels.len() == 1
+            {
                 // The head was broken over lines; take back the lines before.
                 from = self.run_of_angles.unwrap_or(from);
             }
@@ -280,7 +297,13 @@ impl Scanner<'_> {
     }
 
     /// Whether a line begins an item, and which.
-    fn starts_item(&self, word: &str, colon: bool, tokens: &[(Token, usize, usize)]) -> Option<ItemKind> {
+    fn starts_item(
+        &self,
+        word: &str,
+        colon: bool,
+        arrow: bool,
+        tokens: &[(Token, usize, usize)],
+    ) -> Option<ItemKind> {
         let declared = DECLARATIONS.iter().find(|(name, _)| *name == word).map(|(_, kind)| *kind);
         let inside = self.levels.len() > 1;
         // Words that came later may be names of modules in older models: they begin a declaration only where they
@@ -292,7 +315,7 @@ impl Scanner<'_> {
             // Inside parentheses that somebody forgot to close, a declaration still begins one; but an
             // identifier that happens to be called `angle` does not.
             let next_is_word = matches!(tokens.get(1), Some((Token::Word | Token::Text, ..)));
-            if !inside || next_is_word || colon {
+            if !inside || next_is_word || colon || arrow {
                 return Some(kind);
             }
         }
@@ -303,6 +326,11 @@ impl Scanner<'_> {
         let case = word == "case" && (self.matching || self.level_matches());
         let clause =
             matches!(word, "if" | "solve" | "produce") && !self.items.is_empty() || is_let || case;
+        // So is one with an arrow; and the head of a discrete rule may have been on the line before.
+        let goes_on = self.items.last().is_some_and(|i| i.kind == ItemKind::Step) && !self.in_string;
+        if arrow && !clause && !goes_on {
+            return Some(ItemKind::Step);
+        }
         if colon && !clause {
             return Some(ItemKind::Rule);
         }
@@ -315,10 +343,44 @@ impl Scanner<'_> {
             ItemKind::Rule | ItemKind::Unknown => {
                 is_let || case || matches!(word, "if" | "solve" | "produce" | "then" | "else")
             }
-            ItemKind::Axiom | ItemKind::Interpret => true,
+            ItemKind::Axiom | ItemKind::Interpret | ItemKind::Step => true,
             _ => case || matches!(word, "then" | "else"),
         };
         (!continues).then_some(ItemKind::Unknown)
+    }
+
+    /// Where a line has the arrow of a discrete rule.
+    fn arrow_outside_parentheses(&self, tokens: &[(Token, usize, usize)]) -> Option<usize> {
+        let mut depth = 0i64;
+        for (i, &(token, start, end)) in tokens.iter().enumerate() {
+            match token {
+                Token::Open => depth += 1,
+                Token::Close => depth -= 1,
+                Token::Symbol if depth > 0 => {}
+                Token::Symbol if &self.text[start..end] == "→" => return Some(start),
+                Token::Symbol if self.ends_arrow(start) => {
+                    // `-->` is an arrow as well.
+                    let long = i > 1 && tokens[i - 2].2 + 1 == start && self.text[..start].ends_with("--");
+                    return Some(start - if long { 2 } else { 1 });
+                }
+                _ => {}
+            }
+        }
+        None
+    }
+
+    /// True for the `>` of an arrow.
+    fn ends_arrow(&self, at: usize) -> bool {
+        self.text[at..].starts_with('>') && self.text[..at].ends_with('-')
+    }
+
+    /// True where a rule's head, or its condition, cannot end with the line before.
+    fn goes_on(&self) -> bool {
+        let in_rule = self.items.last().is_some_and(|i| i.kind == ItemKind::Rule && i.after_colon.is_some());
+        in_rule
+            && !self.in_string
+            && self.levels.len() == 1
+            && matches!(self.last, Last::Colon | Last::Operator)
     }
 
     fn close_item(&mut self, end: usize) {
@@ -356,6 +418,7 @@ impl Scanner<'_> {
 
     fn token(&mut self, (token, start, end): (Token, usize, usize)) {
         let in_expression = !self.in_string || self.levels.len() > 1;
+        let (after_operand, depth) = (self.last == Last::Operand, self.levels.len() - 1);
         let mut last = Last::Operand;
         match token {
             Token::Word => {
@@ -402,7 +465,14 @@ impl Scanner<'_> {
                     "]" => Last::Operand,
                     _ => Last::Operator,
                 };
-                if in_expression {
+                if (symbol == "→" || self.ends_arrow(start))
+                    && self.levels.len() == 1
+                    && self.items.last().is_some_and(|i| i.kind == ItemKind::Step)
+                {
+                    last = Last::Operator;
+                    self.in_string = true;
+                    self.forget_pending();
+                } else if in_expression {
                     let level = self.levels.last_mut().expect("never empty");
                     if symbol == "^" || !binary {
                         level.right += 1;
@@ -415,6 +485,10 @@ impl Scanner<'_> {
             }
         }
         self.last = last;
+        if let Some(lexemes) = &mut self.lexemes {
+            let (in_string, operator) = (!in_expression, last != Last::Operand);
+            lexemes.push(Lexeme { token, start, end, in_string, after_operand, operator, depth });
+        }
         let depth = self.levels.len() - 1 + self.pending;
         if depth > MAX_DEPTH {
             self.fault(

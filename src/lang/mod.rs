@@ -11,9 +11,12 @@ mod appearance;
 pub mod ast;
 mod check;
 mod curves;
+pub mod format;
 mod globals;
 mod include;
 mod layout;
+mod lexeme;
+pub mod outline;
 pub mod parse;
 pub mod print;
 mod rules;
@@ -22,6 +25,7 @@ mod smooth;
 mod suggest;
 mod surface;
 mod table;
+pub mod words;
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -98,6 +102,7 @@ fn build(
     let mut heads = Vec::new();
     let (mut axiom, mut ignored, mut considered) = (None, Vec::new(), Vec::new());
     let (mut title, mut angle, mut frames) = (None, 90.0, None);
+    let mut period = None;
     let mut whole = true;
     for (item, span) in &document.items {
         match item {
@@ -108,6 +113,10 @@ fn build(
             Item::Angle(value) => {
                 single.once("angle", *span, builder.scope);
                 angle = builder.constant(*value).unwrap_or(90.0);
+            }
+            Item::Period(value) => {
+                single.once("period", *span, builder.scope);
+                period = Some((builder.constant(*value).unwrap_or(1.0), *span));
             }
             Item::Frames { from, to, step } => {
                 single.once("frames", *span, builder.scope);
@@ -184,6 +193,7 @@ fn build(
         title,
         angle,
         frames,
+        period: period.map_or(1.0, |(period, _)| period),
         parameters,
         kinds,
         axiom: axiom.unwrap_or_else(Successor::default),
@@ -200,7 +210,8 @@ fn build(
         };
         for name in names {
             let kind = model.kinds.intern(name, rule.predecessor.parameters.len());
-            model.kinds.get_mut(kind).rules.push(i);
+            let kind = model.kinds.get_mut(kind);
+            if rule.discrete { &mut kind.steps } else { &mut kind.rules }.push(i);
         }
     }
     for (kind, interpretation) in interpretations {
@@ -220,6 +231,7 @@ fn build(
     if single.seen("the initial string") {
         check::reachability(&model, &written, &occurs, diagnostics);
     }
+    check::period(period, &model, diagnostics);
     check::coverage(&model, diagnostics);
     check::inert_modules(&model, &occurs, diagnostics);
     check::commands(&model, diagnostics, &drawn.into_iter().chain(occurs).collect());

@@ -222,6 +222,20 @@ fn sort_word(sort: Sort, default: Sort) -> &'static str {
     }
 }
 
+/// A discrete rule, on one line.
+fn discrete_rule(expressions: &Expressions, rule: &super::ast::Rule) -> String {
+    let mut text = head(rule);
+    for clause in &rule.clauses {
+        if let Some(guard) = &clause.guard {
+            text += &format!(" : {}", expression(expressions, guard.root));
+        }
+        if let Action::Produce(successor) = &clause.action {
+            text += &format!(" -> {}", modules(expressions, successor));
+        }
+    }
+    text
+}
+
 /// A whole document, one declaration a line, one clause a line.
 pub fn document(document: &Document) -> String {
     let e = &document.expressions;
@@ -256,6 +270,7 @@ pub fn document(document: &Document) -> String {
                 format!("def {}({}) = {}", name.text, names(parameters, ", "), show(body))
             }
             Item::Angle(value) => format!("angle {}", show(value)),
+            Item::Period(value) => format!("period {}", show(value)),
             Item::Frames { from, to, step } => {
                 format!("frames {} .. {} step {}", show(from), show(to), show(step))
             }
@@ -281,6 +296,7 @@ pub fn document(document: &Document) -> String {
             Item::Interpret { head, drawn } => {
                 format!("interpret {}: {}", head_module(head), modules(e, drawn))
             }
+            Item::Rule(rule) if rule.discrete => discrete_rule(e, rule),
             Item::Rule(rule) => {
                 let mut text = head(rule) + ":";
                 for (name, value) in &rule.locals {

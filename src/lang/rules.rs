@@ -10,8 +10,8 @@ use super::suggest::did_you_mean;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::expr::{Binary, Node, NodeId, Program, Unary};
 use crate::model::{
-    Class, Comparison, Condition, Draft, Interpretation, Jacobian, KindId, Kinds, Pattern, Produce, Rule,
-    Solve, Step, Successor, class_of, never_reached,
+    CUT, Class, Comparison, Condition, Draft, Interpretation, Jacobian, KindId, Kinds, Pattern, Produce,
+    Rule, Solve, Step, Successor, class_of, never_reached,
 };
 
 /// Longest condition, in comparisons and connectives, after functions are put in.
@@ -174,7 +174,14 @@ impl RuleBuilder<'_> {
                     .at(head.name.span, "brackets structure the string; they do not develop"),
             );
         }
-        !bracket
+        let cut = &*head.name.text == CUT;
+        if cut {
+            self.error(
+                Diagnostic::error("`%` has no rules and no context")
+                    .at(head.name.span, "it cuts off the rest of its branch, and is gone at once"),
+            );
+        }
+        !bracket && !cut
     }
 
     pub fn interpretation(
@@ -187,6 +194,13 @@ impl RuleBuilder<'_> {
         }
         let (variables, count) = self.variables(head, &[], &[]);
         // What is only drawn does not develop: it makes no rule reachable.
+        if let Some(cut) = drawn.iter().find(|module| &*module.name == CUT) {
+            self.error(
+                Diagnostic::error("a drawing cuts nothing off")
+                    .at(cut.span, "`%` belongs into the successors of rules")
+                    .help("to draw nothing, write `ε`"),
+            );
+        }
         let before = std::mem::take(&mut self.occurs);
         let drawn = self.successor(drawn, &variables, count);
         let inside = std::mem::replace(&mut self.occurs, before);
@@ -287,6 +301,7 @@ impl RuleBuilder<'_> {
         let compiled = Rule {
             label: print::head(rule),
             span: rule.head,
+            discrete: rule.discrete,
             parameters: names(&rule.predecessor),
             context_names: rule.left.iter().chain(&rule.right).flat_map(names).collect(),
             left: rule.left.iter().map(pattern).collect(),

@@ -328,7 +328,7 @@ fn mark_drawn_only(graph: &Graph, model: &mut Model, drafts: &[Draft]) {
     let mut read: HashSet<(usize, usize)> = HashSet::new();
     let mut kinds_of: Vec<Vec<usize>> = vec![Vec::new(); model.rules.len()];
     for (id, kind) in model.kinds.iter() {
-        for &rule in &kind.rules {
+        for rule in kind.all_rules() {
             kinds_of[rule].push(id.index());
         }
     }

@@ -42,6 +42,8 @@ pub struct Kind {
     /// Indices into [`Model::rules`](super::Model::rules) of the rules with this strict predecessor, in
     /// the order in which they are written.
     pub rules: Vec<usize>,
+    /// The same of discrete rules, which are in force besides.
+    pub steps: Vec<usize>,
     /// Index into [`Model::interpretations`](super::Model::interpretations).
     pub interpretation: Option<usize>,
     /// Passed over in the search for context (LANGUAGE: symbols and surfaces unless a `consider` names
@@ -50,6 +52,20 @@ pub struct Kind {
 }
 
 impl Kind {
+    /// Continuous and discrete rules.
+    pub fn all_rules(&self) -> impl Iterator<Item = usize> + '_ {
+        self.rules.iter().chain(&self.steps).copied()
+    }
+
+    pub fn has_no_rules(&self) -> bool {
+        self.rules.is_empty() && self.steps.is_empty()
+    }
+
+    /// The rules that are discrete if this one is.
+    pub fn rules_like(&self, rule: &super::Rule) -> &[usize] {
+        if rule.discrete { &self.steps } else { &self.rules }
+    }
+
     pub fn class(&self) -> Class {
         class_of(&self.name)
     }
@@ -67,6 +83,9 @@ pub const DRAWN_WORDS: [&str; 3] = ["F", "f", "g"];
 
 /// The surfaces that are built in: a leaf, a flower, a petal and a bud.
 pub const BUILT_IN_SURFACES: [&str; 4] = ["@L", "@K", "@P", "@B"];
+
+/// What stands behind this on its branch goes, and so does it.
+pub const CUT: &str = "%";
 
 /// What is written as a surface and tells the turtle something else, with the number of parameters that it
 /// needs: a width to taper to, the strength of tropism, the contour of stems, and the beginning, the points
@@ -118,6 +137,7 @@ impl Kinds {
             name: name.to_owned(),
             arity,
             rules: Vec::new(),
+            steps: Vec::new(),
             interpretation: None,
             skipped: class_of(name) != Class::Word,
         });

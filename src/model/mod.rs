@@ -25,7 +25,7 @@ pub use appearance::{
 pub use condition::{Comparison, Condition, Sign, Step, Truth};
 pub use invariance::never_reached;
 pub use kind::{
-    BUILT_IN_SURFACES, COMMAND_SURFACES, Class, DRAWN_WORDS, Kind, KindId, Kinds, base_of, class_of,
+    BUILT_IN_SURFACES, COMMAND_SURFACES, CUT, Class, DRAWN_WORDS, Kind, KindId, Kinds, base_of, class_of,
 };
 pub use law::{Jacobian, Law, Linear, Numeric, Obstacle, Watch};
 pub use rule::{Interpretation, Pattern, Produce, Rule, Solve, Successor, Switch};
@@ -44,6 +44,8 @@ pub struct Model {
     pub angle: f64,
     /// Default observation times (`frames`).
     pub frames: Option<Frames>,
+    /// Discrete rules apply at its multiples (`period`; 1 if not given).
+    pub period: f64,
     /// What can be set from outside (`param`), with the values in force.
     pub parameters: Vec<Parameter>,
     pub kinds: Kinds,
@@ -72,6 +74,7 @@ impl Default for Model {
             title: None,
             angle: 90.0,
             frames: None,
+            period: 1.0,
             parameters: Vec::new(),
             kinds: Kinds::default(),
             axiom: Successor::default(),

@@ -16,6 +16,8 @@ pub struct Rule {
     /// The head as written.
     pub label: String,
     pub span: Span,
+    /// It applies at the multiples of the model's period only, has no equations and one production.
+    pub discrete: bool,
     /// Names of the strict predecessor's parameters.
     pub parameters: Vec<String>,
     /// Names of the context's parameters, in the order of the variables.
@@ -54,6 +56,11 @@ impl Rule {
             && self.produces.is_empty()
             && self.solves.len() <= 1
             && self.solves.iter().all(|s| s.guard.is_always() && s.switches.is_empty())
+    }
+
+    /// Number of modules that its context consists of.
+    pub fn context_len(&self) -> usize {
+        self.left.len() + self.right.len()
     }
 
     /// How each atom is watched under a clause.

@@ -347,6 +347,7 @@ fn fault_name(fault: &sim::Error) -> &'static str {
         sim::Error::Zeno { .. } => "Zeno",
         sim::Error::NotFinite { .. } => "NotFinite",
         sim::Error::StepTooSmall { .. } => "StepTooSmall",
+        sim::Error::PeriodTooShort { .. } => "PeriodTooShort",
         sim::Error::TooManyModules { .. } => "TooManyModules",
     }
 }

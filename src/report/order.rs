@@ -1,13 +1,15 @@
 //! Orders of methods: what the books say, and what a study shows.
 
 /// The order of a method: on a smooth solution the error of a step of length h is O(h^(order + 1)). None for
-/// `auto`, which is whatever it chooses.
+/// `auto`, which is whatever it chooses. The scheduler `local`, whose neighbours stand still for a slice of time, is a
+/// method of order 1 in the length of the slice.
 ///
 /// Sources: forward Euler (paper, section 8); classical Runge-Kutta and DOPRI5 (Hairer, Nørsett and Wanner,
 /// Solving Ordinary Differential Equations I, 2nd ed. 1993, II.1 and II.5), DOP853 (II.10), Radau IIA with
 /// five stages (Hairer and Wanner, Solving ODEs II, IV.5: 2s - 1).
 pub fn nominal_order(method: &str) -> Option<u32> {
-    const ORDERS: [(&str, u32); 5] = [("euler", 1), ("rk4", 4), ("dopri5", 5), ("dop853", 8), ("radau", 9)];
+    const ORDERS: [(&str, u32); 6] =
+        [("local", 1), ("euler", 1), ("rk4", 4), ("dopri5", 5), ("dop853", 8), ("radau", 9)];
     ORDERS.iter().find(|(name, _)| *name == method).map(|(_, order)| *order)
 }
 

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use crate::session::Session;
-use crate::sim::{self, Event, Method, Settings, Simulation, Stats, brief};
+use crate::sim::{self, Event, Method, Scheduler, Settings, Simulation, Stats, brief};
 use crate::structure::ModuleString;
 
 /// What a method is asked for.
@@ -13,21 +13,24 @@ pub enum Accuracy {
     Tolerance(f64),
     /// Fixed step, in units of the model's time.
     StepSize(f64),
+    /// Slice of time of the scheduler `local`, in the same units.
+    Slice(f64),
 }
 
 impl Accuracy {
     /// The number alone.
     pub fn value(self) -> f64 {
         match self {
-            Accuracy::Tolerance(x) | Accuracy::StepSize(x) => x,
+            Accuracy::Tolerance(x) | Accuracy::StepSize(x) | Accuracy::Slice(x) => x,
         }
     }
 
-    /// `tolerance` or `step_size`, as in files.
+    /// `tolerance`, `step_size` or `slice`, as in files.
     pub fn key(self) -> &'static str {
         match self {
             Accuracy::Tolerance(_) => "tolerance",
             Accuracy::StepSize(_) => "step_size",
+            Accuracy::Slice(_) => "slice",
         }
     }
 }
@@ -36,8 +39,8 @@ impl std::fmt::Display for Accuracy {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Accuracy::Tolerance(x) => write!(f, "{x:e}"),
-            Accuracy::StepSize(x) if *x < 1e-3 => write!(f, "{x:.2e}"),
-            Accuracy::StepSize(x) => write!(f, "{}", brief(*x, 5)),
+            Accuracy::StepSize(x) | Accuracy::Slice(x) if *x < 1e-3 => write!(f, "{x:.2e}"),
+            Accuracy::StepSize(x) | Accuracy::Slice(x) => write!(f, "{}", brief(*x, 5)),
         }
     }
 }
@@ -55,6 +58,7 @@ impl Setup {
         match self.accuracy {
             Accuracy::Tolerance(x) => settings.tolerance = x,
             Accuracy::StepSize(x) => settings.step_size = x,
+            Accuracy::Slice(slice) => settings.scheduler = Scheduler::Local { slice },
         }
         settings
     }
@@ -65,6 +69,7 @@ impl std::fmt::Display for Setup {
         let what = match self.accuracy {
             Accuracy::Tolerance(_) => "tolerance",
             Accuracy::StepSize(_) => "step",
+            Accuracy::Slice(slice) => return write!(f, "local at slice {slice}"),
         };
         write!(f, "{} at {what} {}", method_name(self.method), self.accuracy)
     }

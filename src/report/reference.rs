@@ -40,7 +40,7 @@ impl Reference {
         match setup.accuracy {
             Accuracy::Tolerance(tolerance) => 10.0 * tolerance,
             // Its error is unknown: only what is simultaneous in the reference may be exchanged.
-            Accuracy::StepSize(_) => 10.0 * TIGHTEST,
+            Accuracy::StepSize(_) | Accuracy::Slice(_) => 10.0 * TIGHTEST,
         }
     }
 }

@@ -15,6 +15,8 @@ pub struct Plan {
     pub tolerances: Vec<f64>,
     /// For methods with a fixed step; None for powers of two that suit the model's span of time.
     pub step_sizes: Option<Vec<f64>>,
+    /// For the scheduler `local`, by which modules that read neighbours are studied besides; None for ten powers of two.
+    pub slices: Option<Vec<f64>>,
     /// Times to observe, increasing; see [`default_times`].
     pub times: Vec<f64>,
     /// Timed runs of a point, at least 1; fewer if together they take longer than a few seconds.
@@ -96,13 +98,16 @@ pub struct Point {
     pub result: Result<Outcome, f64>,
 }
 
-/// All points of a method.
+/// The name that the scheduler `local` has among methods.
+const LOCAL: &str = "local";
+
+/// All points of a method, or of the scheduler `local` (with the method `auto`).
 #[derive(Clone, Debug)]
 pub struct Series {
     pub method: Method,
     pub name: &'static str,
     /// Order by the books, and as observed: error against step size or, with step control, against
-    /// evaluations of the right-hand side.
+    /// evaluations of the right-hand side; of `local` against the length of the slice.
     pub order: Option<u32>,
     pub observed: Option<f64>,
     pub reference: Reference,
@@ -151,14 +156,21 @@ pub fn study(
         runs: plan.runs,
         series: Vec::new(),
     };
-    for &method in &plan.methods {
-        watch(&format!("{}: reference", method_name(method)));
+    // What neighbours do matters only if somebody reads them.
+    let local = session.model.rules.iter().any(|rule| rule.reads_context).then_some((Method::Auto, LOCAL));
+    let all = plan.methods.iter().map(|&method| (method, method_name(method))).chain(local);
+    for (method, name) in all {
+        watch(&format!("{name}: reference"));
         let reference = references.of(method)?;
         if study.series.is_empty() {
             (study.events, study.modules) = (reference.record.stats.events, reference.record.stats.modules);
         }
-        let order = nominal_order(method_name(method));
-        let mut accuracies: Vec<Accuracy> = if method.is_fixed_step() {
+        let order = nominal_order(name);
+        let mut accuracies: Vec<Accuracy> = if name == LOCAL {
+            let slices = plan.slices.clone();
+            let slices = slices.unwrap_or_else(|| Plan::default_step_sizes(task.end(), None));
+            slices.into_iter().map(Accuracy::Slice).collect()
+        } else if method.is_fixed_step() {
             let steps = plan.step_sizes.clone();
             let steps = steps.unwrap_or_else(|| Plan::default_step_sizes(task.end(), order));
             steps.into_iter().map(Accuracy::StepSize).collect()
@@ -179,7 +191,6 @@ pub fn study(
             points.push(Point { accuracy, result: Ok(outcome(task, setup, &reference, plan.runs)) });
         }
         let observed = observe(&points, order, &reference);
-        let name = method_name(method);
         study.series.push(Series { method, name, order, observed, reference, points });
         done(&study);
     }
@@ -221,7 +232,7 @@ fn expected_seconds(points: &[Point], next: Accuracy, order: Option<u32>) -> f64
     };
     let finer = (last.accuracy.value() / next.value()).max(1.0);
     let exponent = match next {
-        Accuracy::StepSize(_) => 1.0,
+        Accuracy::StepSize(_) | Accuracy::Slice(_) => 1.0,
         Accuracy::Tolerance(_) => 1.0 / f64::from(order.unwrap_or(5)),
     };
     taken * finer.powf(exponent)
@@ -235,7 +246,7 @@ fn observe(points: &[Point], order: Option<u32>, reference: &Reference) -> Optio
     let seen = points.iter().filter_map(|point| {
         let outcome = point.result.as_ref().ok()?;
         let work = match point.accuracy {
-            Accuracy::StepSize(h) => 1.0 / h,
+            Accuracy::StepSize(h) | Accuracy::Slice(h) => 1.0 / h,
             Accuracy::Tolerance(_) => outcome.stats.rhs_evaluations as f64,
         };
         outcome.agreement.is_right().then_some((work, outcome.error?))
@@ -275,6 +286,7 @@ mod tests {
             methods: Method::NAMED.iter().map(|(_, m)| *m).collect(),
             tolerances: Plan::default_tolerances(),
             step_sizes: None,
+            slices: None,
             times: (1..=60).map(f64::from).collect(),
             runs: 1,
             time_limit: 10.0,

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::hard::Row;
+use super::record::Accuracy;
 use super::study::{Outcome, Series, Study};
 use crate::sim::brief;
 
@@ -63,10 +64,11 @@ pub fn study_head(study: &Study) -> String {
 pub fn series_table(series: &Series) -> String {
     let mut out = format!("\n{}  {}\n", series.name, order_text(series));
     let mut table = Table::default();
-    let accuracy = match series.method.is_fixed_step() {
-        true => "step size",
-        false => "tolerance",
-    };
+    let accuracy = series.points.first().map_or("", |point| match point.accuracy {
+        Accuracy::Tolerance(_) => "tolerance",
+        Accuracy::StepSize(_) => "step size",
+        Accuracy::Slice(_) => "slice",
+    });
     let heads = [accuracy, "error", "time", "spread", "steps", "rejected", "rhs", "events", "modules", ""];
     table.push(heads.map(str::to_owned));
     for point in &series.points {

@@ -140,7 +140,7 @@ impl Careers {
         }
         let rules = (model.kinds.iter())
             .map(|(id, kind)| {
-                let alone = !kinds_with_context[id.index()] && !seen[id.index()];
+                let alone = !kinds_with_context[id.index()] && !seen[id.index()] && kind.steps.is_empty();
                 kind.rules.first().copied().filter(|_| alone)
             })
             .collect();

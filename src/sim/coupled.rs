@@ -15,13 +15,14 @@ use super::repair::Repairer;
 use super::simulation::Simulation;
 use super::state::{Control, Next, State, What};
 use super::system::{Equations, System};
+use super::watch::needs_search;
 use super::{Method, Scheduler};
 use crate::model::Model;
 use crate::structure::{Instant, ModuleId, Visit};
 use smallvec::SmallVec;
 
 /// The coupled modules and their common step.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub struct Coupled {
     /// Those of the common step in string order, then those that have come since; some may have gone.
     pub members: Vec<ModuleId>,
@@ -86,6 +87,12 @@ impl Simulation<'_> {
         self.coupled.repaired |= !freed.is_empty();
         for &id in &joined {
             self.plant.state_mut(id).expect("seen above").coupled = true;
+        }
+        for &id in &seeds {
+            let now = self.now;
+            let state = self.plant.state_mut(id).expect("seen above");
+            state.pass_changes(now);
+            state.next = Next::default();
         }
         if seeds.is_empty() || self.repair(&seeds, &joined) {
             return Ok(());
@@ -193,8 +200,10 @@ impl Simulation<'_> {
                 self.coupled.y.push(value);
             }
             state.pass_changes(at);
-            state.next = Next::default();
-            self.queue.cancel(Who::Module(id.slot() as u32));
+            if !state.next.lasting {
+                state.next = Next::default();
+                self.queue.cancel(Who::Module(id.slot() as u32));
+            }
         }
         self.queue.cancel(Who::Coupled);
         self.coupled.system =
@@ -260,23 +269,27 @@ impl Simulation<'_> {
         let end = step.map_err(|error| self.coupled_error(error, from))?;
         self.coupled.pending = true;
         self.plant.coupled = None;
-        if self.watches_coupled() {
-            self.show_coupled(from);
-            let members = std::mem::take(&mut self.coupled.members);
-            for &id in &members {
-                self.search_member(id, from);
-            }
-            self.coupled.members = members;
+        let members = std::mem::take(&mut self.coupled.members);
+        for &id in &members {
+            self.search_member(id, from);
         }
+        self.coupled.members = members;
         self.queue.schedule(Who::Coupled, end);
         Ok(())
     }
 
     /// Finds a coupled module's next event before the end of the common step.
     pub(super) fn search_member(&mut self, id: ModuleId, from: Instant) {
-        if !self.is_watched(id) {
+        let Some(state) = self.plant.state(id) else { return };
+        let Some(rule) = state.rule.map(|r| &self.model.rules[r]) else { return };
+        if rule.atoms.is_empty() || state.next.lasting {
             return;
         }
+        if !needs_search(state, rule) {
+            self.look_ahead(id, from).expect("no step is made");
+            return;
+        }
+        self.show_coupled(from);
         let who = Who::Module(id.slot() as u32);
         let mut start = from;
         loop {
@@ -323,6 +336,8 @@ impl Simulation<'_> {
         }
         let slice_ends = |from| self.settings.slice_end(from).is_some_and(|end| end == at);
         if self.coupled.repaired || slice_ends(self.coupled.system.start) {
+            // What the step has brought is read from its motion, which nobody may have asked for yet.
+            self.show_coupled(at);
             return self.restart_coupled(at);
         }
         let Coupled { members, system, y, integrator, control, .. } = &mut self.coupled;

@@ -43,6 +43,8 @@ pub enum Error {
     Cascade { site: Site, rounds: usize },
     #[error("events pile up before t = {}", .site.when())]
     Zeno { site: Site },
+    #[error("steps that are {period} apart cannot be told apart at t = {}", .site.when())]
+    PeriodTooShort { site: Site, period: f64 },
     #[error("{what} of {} is not finite at t = {}", .site.module, .site.when())]
     NotFinite { site: Site, what: String },
     #[error("the step size fell to nothing at t = {}", .site.when())]
@@ -63,6 +65,7 @@ impl Error {
             | Error::Chattering { site }
             | Error::Cascade { site, .. }
             | Error::Zeno { site }
+            | Error::PeriodTooShort { site, .. }
             | Error::NotFinite { site, .. }
             | Error::StepTooSmall { site }
             | Error::TooManyModules { site, .. } => site,
@@ -101,6 +104,9 @@ impl Error {
             Error::Zeno { .. } => {
                 d.help("each life is shorter than the one before, and all of them end before this time: stop the production below some size")
             }
+            Error::PeriodTooShort { .. } => {
+                d.help("times have 16 digits: choose a longer `period`, or stop the discrete rules before this time")
+            }
             Error::NotFinite { .. } => {
                 d.help("look for a division by zero, a root or logarithm of a negative number, or growth without bound")
             }
@@ -122,6 +128,7 @@ impl Error {
             Error::Chattering { .. } => "on each side of the boundary the equations lead to the other",
             Error::Cascade { .. } => "this production applies again and again",
             Error::Zeno { .. } => "this production comes sooner and sooner",
+            Error::PeriodTooShort { .. } => "a discrete rule, which applies at the multiples of the period",
             Error::NotFinite { .. } => "computed here",
             Error::StepTooSmall { .. } => "these equations",
             Error::TooManyModules { .. } => "this production made the last of them",

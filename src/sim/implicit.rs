@@ -13,6 +13,7 @@ const FIVE_STAGES_BELOW: f64 = 1e-5;
 const FLOOR: f64 = 1e-18;
 
 /// The method with what it knows of one system.
+#[derive(Clone)]
 pub struct Implicit {
     radau: Radau,
     stages: usize,

@@ -8,7 +8,7 @@ use super::{Method, Settings, Stats};
 use crate::structure::Instant;
 
 /// Makes the steps of one system of equations after another.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub struct Integrator {
     workspace: Workspace,
     implicit: Option<Box<Implicit>>,

@@ -220,7 +220,7 @@ impl Simulation<'_> {
             }
         }
         self.plant.careers.keep(label, life);
-        if self.looks_around {
+        if self.hands_on {
             let made = std::mem::take(&mut self.made);
             self.hand_on(id, kind, successor, &made);
             self.made = made;
@@ -268,7 +268,7 @@ impl Simulation<'_> {
                 self.foresee(rule)
             }
             None => {
-                let open = !self.model.kinds.get(kind).rules.is_empty();
+                let open = Some(kind) == self.cuts || !self.model.kinds.get(kind).has_no_rules();
                 Child { label: NO_LABEL, time: None, open }
             }
         }

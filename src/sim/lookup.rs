@@ -30,12 +30,16 @@ impl Simulation<'_> {
     pub(super) fn look_up(&mut self) {
         let model = self.model;
         let mut fresh = std::mem::take(&mut self.fresh);
+        self.cut_branches(&fresh);
         for id in fresh.drain(..) {
             // It may have been replaced already, within the same instant.
             if !self.plant.tree.is_alive(id) {
                 continue;
             }
             let kind = self.plant.tree.kind(id);
+            if self.steps.has_rules[kind.index()] {
+                self.steps.join(id);
+            }
             if self.kinds_with_context[kind.index()] {
                 self.to_look.push(id);
             } else if let Some(&rule) = model.kinds.get(kind).rules.first()
@@ -75,7 +79,7 @@ impl Simulation<'_> {
             }
             let rules = &model.kinds.get(self.plant.tree.kind(id)).rules;
             let applies =
-                rules.iter().copied().find(|&rule| self.context(id, &model.rules[rule], &mut context));
+                rules.iter().copied().find(|&rule| self.context(id, &model.rules[rule], true, &mut context));
             let state = self.plant.state(id);
             let Some(rule) = applies else {
                 if state.is_none_or(|s| s.rule.is_some()) {
@@ -145,8 +149,14 @@ impl Simulation<'_> {
     }
 
     /// Collects the context that a rule asks for, in the order of the rule's variables; false if it is
-    /// not there.
-    fn context(&mut self, id: ModuleId, rule: &Rule, out: &mut SmallVec<[ModuleId; 2]>) -> bool {
+    /// not there. `lasting` says that the module goes on looking at what it has found.
+    pub(super) fn context(
+        &mut self,
+        id: ModuleId,
+        rule: &Rule,
+        lasting: bool,
+        out: &mut SmallVec<[ModuleId; 2]>,
+    ) -> bool {
         out.clear();
         let skipped = |kind| self.model.kinds.get(kind).skipped;
         let (tree, neighbours) = (&self.plant.tree, &mut self.neighbours);
@@ -156,7 +166,9 @@ impl Simulation<'_> {
                 false => neighbours.right(tree, *at, skipped),
             };
             let Some(found) = found else { return false };
-            neighbours.note(tree, id, found);
+            if lasting {
+                neighbours.note(tree, id, found);
+            }
             *at = found;
             out.push(found);
             pattern.matches(tree.kind(found))

@@ -13,6 +13,7 @@
 //! - `settle`, `choose`, `lookup`: what happens at one instant.
 //! - `phase`: from an instant to the next; `motion`: formulas; `local`, `coupled`, `system`, `linear`:
 //!   numeric integration.
+//! - `access`: going to and fro; `inspect`: all that is known of one module.
 //! - `plant`, `state`: the modules and how they move; `watch`, `roots`: the search for events.
 //! - `integrator`, `runge_kutta`, `tableau`, `implicit`, `radau`, `sparse`, `dense`: one step, and the solution inside it.
 //!
@@ -21,15 +22,19 @@
 //! condition inside them is frozen, and its change is an event. So the methods keep their order at the end of a
 //! growth function, and a discontinuous rate costs no accuracy.
 
+mod access;
 mod agenda;
 mod career;
 mod choose;
 mod coupled;
 mod course;
+mod cut;
 mod dense;
+mod derive;
 mod error;
 mod event;
 mod implicit;
+mod inspect;
 mod integrator;
 mod light;
 mod linear;
@@ -57,8 +62,10 @@ mod tableau;
 mod transition;
 mod watch;
 
+pub use access::Passed;
 pub use error::{Error, Site};
 pub use event::Event;
+pub use inspect::{Inspection, Seen};
 pub use settle::MAX_ROUNDS;
 pub use simulation::{Simulation, brief, describe};
 pub use transition::{Stand, Transition};

@@ -228,7 +228,7 @@ impl Simulation<'_> {
 
     /// Lets those who looked at a module that has been replaced look again, and hands its neighbours on.
     pub(super) fn hand_on(&mut self, id: ModuleId, kind: KindId, successor: &Successor, made: &[ModuleId]) {
-        if !self.looks_around {
+        if !self.hands_on {
             return;
         }
         let skipped = |kind| self.model.kinds.get(kind).skipped;

@@ -25,6 +25,13 @@ pub(super) struct Gallery {
     values: Vec<f64>,
 }
 
+/// A copy of a simulation looks anew: what is remembered here may be as large as all the rest.
+impl Clone for Gallery {
+    fn clone(&self) -> Gallery {
+        Gallery::default()
+    }
+}
+
 /// A light module: birth, and the places of its parameters in the tree and in the string.
 #[derive(Clone, Copy, Debug)]
 struct Row {

@@ -13,7 +13,7 @@ use super::state::What;
 use crate::structure::{Instant, ModuleId};
 
 /// The light events of one float.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Front {
     time: f64,
     /// The instants, if they are not all `first`.
@@ -29,6 +29,26 @@ impl Front {
     fn head(&self) -> Option<(Instant, u32)> {
         let slot = *self.members.get(self.passed)?;
         Some((self.instants.get(self.passed).copied().unwrap_or(self.first), slot))
+    }
+
+    /// Takes out some of those who are still to come, and tells them.
+    pub(super) fn remove(&mut self, is_gone: impl Fn(u32) -> bool) -> Vec<u32> {
+        let mut gone = Vec::new();
+        let mut kept = self.passed;
+        for i in self.passed..self.members.len() {
+            if is_gone(self.members[i]) {
+                gone.push(self.members[i]);
+                continue;
+            }
+            self.members.swap(kept, i);
+            if !self.instants.is_empty() {
+                self.instants.swap(kept, i);
+            }
+            kept += 1;
+        }
+        self.members.truncate(kept);
+        self.instants.truncate(kept);
+        gone
     }
 }
 
@@ -47,6 +67,13 @@ impl Coming {
             Coming::Other(entry) => entry.at,
         }
     }
+}
+
+/// True if what comes at an instant is passed on the way to another: events of that instant itself take place, what is
+/// known up to there is enough.
+pub(super) fn is_before(at: Instant, event: bool, until: Instant) -> bool {
+    let ahead = at.since(until);
+    if event { ahead <= until.resolution() } else { ahead < 0.0 }
 }
 
 impl Simulation<'_> {
@@ -82,8 +109,14 @@ impl Simulation<'_> {
         members.clear();
         self.front.instants.clear();
         self.front.passed = 0;
-        self.front.time = self.agenda.earliest().unwrap_or(f64::INFINITY);
-        self.agenda.pop(&mut members);
+        while members.is_empty() && self.agenda.earliest().is_some() {
+            self.front.time = self.agenda.earliest().unwrap_or(f64::INFINITY);
+            self.agenda.pop(&mut members);
+            self.without_ghosts(&mut members);
+        }
+        if members.is_empty() {
+            self.front.time = f64::INFINITY;
+        }
         if let Some(&some) = members.first() {
             self.front.first = self.event_of(some);
         }
@@ -111,32 +144,37 @@ impl Simulation<'_> {
 
     /// Lets every event up to `t` take place, and finds out what every module does until then.
     pub(super) fn advance(&mut self, t: f64) -> Result<(), Error> {
-        let until = Instant::new(t);
-        while let Some(coming) = self.coming() {
-            let ahead = coming.at().since(until);
-            match coming {
-                Coming::Other(entry) if !self.is_event(entry.who) => {
-                    if ahead >= 0.0 {
-                        break;
-                    }
-                    self.queue.pop();
-                    self.pass_end(entry)?;
-                }
-                _ => {
-                    if ahead > until.resolution() {
-                        break;
-                    }
-                    self.pass_event(coming)?;
-                }
-            }
-        }
+        while self.advance_once(t)?.is_some() {}
         Ok(())
+    }
+
+    /// Passes the next thing that is known to come, if that is before `t`; tells whether it was an event.
+    pub(super) fn advance_once(&mut self, t: f64) -> Result<Option<bool>, Error> {
+        let until = Instant::new(t);
+        let Some(coming) = self.coming() else { return Ok(None) };
+        let event = match coming {
+            Coming::Other(entry) => self.is_event(entry.who),
+            Coming::Light(..) => true,
+        };
+        if !is_before(coming.at(), event, until) {
+            return Ok(None);
+        }
+        (self.passed, self.last) = (self.passed + 1, Some((coming.at(), event)));
+        match coming {
+            Coming::Other(entry) if !event => {
+                self.queue.pop();
+                self.pass_end(entry)?;
+            }
+            _ => self.pass_event(coming)?,
+        }
+        Ok(Some(event))
     }
 
     /// True if the entry is an event, not the end of what is known.
     fn is_event(&self, who: Who) -> bool {
         match who {
             Who::Coupled => false,
+            Who::Step => true,
             Who::Module(slot) => {
                 let state = self.plant.states[slot as usize].as_ref();
                 state.is_some_and(|s| s.next.what != What::Window)
@@ -149,6 +187,7 @@ impl Simulation<'_> {
         self.stalled = 0;
         match entry.who {
             Who::Coupled => self.pass_coupled_step(entry.at),
+            Who::Step => unreachable!("a step is an event"),
             Who::Module(slot) => {
                 let id = self.plant.states[slot as usize].as_ref().expect("scheduled").id;
                 self.pass_window(id, entry.at)
@@ -241,7 +280,10 @@ impl Simulation<'_> {
         }
         self.now = at;
         self.show_coupled(at);
-        let all_light = group.iter().all(|coming| matches!(coming, Coming::Light(..)));
+        let all_light = group.iter().all(|coming| match coming {
+            Coming::Light(..) => true,
+            Coming::Other(entry) => entry.who == Who::Step,
+        });
         let mut oldest = None;
         for coming in &group {
             let who = match *coming {
@@ -258,6 +300,10 @@ impl Simulation<'_> {
             };
             let first = match who {
                 Who::Coupled => None,
+                Who::Step => {
+                    self.begin_step();
+                    None
+                }
                 Who::Module(slot) => match self.fire_quickly(slot as usize) {
                     Some(firing) => {
                         let id = firing.id;

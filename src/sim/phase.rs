@@ -167,7 +167,8 @@ impl Simulation<'_> {
         let Plant { tree, states, .. } = &mut self.plant;
         let state = states[id.slot()].as_mut().expect("a module with a rule");
         let rule = &model.rules[state.rule.expect("a module with a rule")];
-        let numeric = state.is_numeric();
+        // The steps of coupled modules are not their own.
+        let numeric = state.is_numeric() && !state.coupled;
         state.next = Next::default();
         let (h, limit) = if numeric {
             match self.step_alone(id, from) {
@@ -199,7 +200,8 @@ impl Simulation<'_> {
             _ => (what, at),
         };
         let state = self.plant.state_mut(id).expect("seen above");
-        state.next = Next { what, touched: found.touched, changes: found.changes };
+        let lasting = limit.is_infinite();
+        state.next = Next { what, touched: found.touched, changes: found.changes, lasting };
         if what == What::Nothing {
             self.queue.cancel(who);
         } else {
@@ -230,7 +232,7 @@ impl Simulation<'_> {
             return None;
         }
         let state = self.plant.state_mut(id)?;
-        state.next = Next { what: What::Event, touched, changes: Vec::new() };
+        state.next = Next { what: What::Event, touched, ..Next::default() };
         self.queue.schedule(Who::Module(id.slot() as u32), at);
         Some(())
     }

@@ -5,11 +5,12 @@ use std::collections::BinaryHeap;
 
 use crate::structure::Instant;
 
-/// Who an entry is about: a slot of the tree, or the coupled modules together.
+/// Who an entry is about: a slot of the tree, the coupled modules together, or all that discrete rules apply to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Who {
     Module(u32),
     Coupled,
+    Step,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -48,12 +49,14 @@ pub struct Queue {
     /// The valid entry of each slot.
     serials: Vec<u32>,
     coupled: u32,
+    step: u32,
 }
 
 impl Queue {
     fn serial(&mut self, who: Who) -> &mut u32 {
         match who {
             Who::Coupled => &mut self.coupled,
+            Who::Step => &mut self.step,
             Who::Module(slot) => {
                 let slot = slot as usize;
                 if self.serials.len() <= slot {

@@ -29,6 +29,7 @@ use super::system::{Equations, System};
 use crate::structure::{Instant, ModuleId};
 
 /// What repairs have learnt, and their memory.
+#[derive(Clone)]
 pub struct Repairer {
     integrator: Integrator,
     control: Control,
@@ -36,14 +37,16 @@ pub struct Repairer {
     rings: usize,
     /// By component: its number in the system of the region.
     numbers: Vec<u32>,
+    /// Memory for the equations of a region.
+    system: System,
     /// Number of the last visit to modules.
     visit: u64,
 }
 
 impl Default for Repairer {
     fn default() -> Repairer {
-        let (integrator, control, numbers) = Default::default();
-        Repairer { integrator, control, rings: 3, numbers, visit: 0 }
+        let (integrator, control, numbers, system) = Default::default();
+        Repairer { integrator, control, rings: 3, numbers, system, visit: 0 }
     }
 }
 
@@ -183,7 +186,7 @@ impl Simulation<'_> {
                 }
             }
         }
-        let Repairer { integrator, control, numbers, .. } = &mut self.coupled.repairer;
+        let Repairer { integrator, control, numbers, system, .. } = &mut self.coupled.repairer;
         for (number, &component) in components.iter().enumerate() {
             if numbers.len() <= component as usize {
                 numbers.resize(component as usize + 1, NOT_HERE);
@@ -192,8 +195,8 @@ impl Simulation<'_> {
         }
         let number = |component: u32| numbers.get(component as usize).copied().filter(|n| *n != NOT_HERE);
         let rules = &self.model.rules;
-        let mut system =
-            System::new(rules, &self.plant, &region.members, self.now, number, self.settings.is_sliced());
+        let frozen = self.settings.is_sliced();
+        system.rebuild(rules, &self.plant, &region.members, self.now, number, frozen);
         for &component in &components {
             numbers[component as usize] = NOT_HERE;
         }
@@ -203,7 +206,7 @@ impl Simulation<'_> {
             if stretches.len() >= MAX_STEPS {
                 return None;
             }
-            let mut equations = Equations::new(&system, rules, Some(course));
+            let mut equations = Equations::new(system, rules, Some(course));
             let end = Some(course.end);
             let stats = &mut self.stats;
             let step = integrator.step(&self.settings, control, &mut equations, &y, from, end, stats);
@@ -257,9 +260,11 @@ impl Simulation<'_> {
         for &id in &region.members {
             let state = self.plant.state_mut(id).expect("a member");
             state.pass_changes(now);
-            state.next = Next::default();
-            self.queue.cancel(Who::Module(id.slot() as u32));
-            self.search_member(id, now);
+            if !state.next.lasting {
+                state.next = Next::default();
+                self.queue.cancel(Who::Module(id.slot() as u32));
+                self.search_member(id, now);
+            }
         }
     }
 }

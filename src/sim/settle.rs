@@ -16,9 +16,10 @@ use smallvec::SmallVec;
 
 use super::error::Error;
 use super::event::Event;
+use super::plant::Plant;
 use super::simulation::Simulation;
 use super::state::{Change, Open};
-use crate::model::{Comparison, Sign, Truth};
+use crate::model::{Comparison, Model, Sign, Truth};
 use crate::structure::ModuleId;
 
 /// Most rounds of productions at one instant.
@@ -28,6 +29,7 @@ pub const MAX_ROUNDS: usize = 10_000;
 const LONG: usize = 1 << 18;
 
 /// A production that applies.
+#[derive(Clone, Debug)]
 pub(super) struct Firing {
     pub id: ModuleId,
     pub rule: usize,
@@ -49,6 +51,13 @@ impl Simulation<'_> {
             }
             let mut firing = self.judge();
             let mut light = std::mem::take(&mut self.firing_light);
+            self.find_steps(&mut firing);
+            if !self.steps.firing.is_empty() {
+                rounds += 1;
+                self.replace_with_steps(&mut light, &mut firing, rounds)?;
+                (self.firing, self.firing_light) = (firing, light);
+                continue;
+            }
             if firing.is_empty() && light.is_empty() && !self.opened.is_empty() {
                 self.choose_equations(&mut hurried, &mut firing)?;
             }
@@ -75,7 +84,31 @@ impl Simulation<'_> {
         }
         self.neighbours.end_instant();
         self.finish_transitions();
-        self.begin_phases()
+        self.begin_phases()?;
+        self.arrange_step()
+    }
+
+    /// The round to which a derivation step belongs. Nobody reads light modules, so they may be replaced first; all
+    /// others are replaced together.
+    fn replace_with_steps(
+        &mut self,
+        light: &mut Vec<u32>,
+        firing: &mut Vec<Firing>,
+        rounds: usize,
+    ) -> Result<(), Error> {
+        if firing.is_empty() && !light.is_empty() {
+            self.replace_all_light(light, rounds)?;
+        } else if !firing.is_empty() {
+            self.promote_all(light, firing);
+        }
+        let mut steps = std::mem::take(&mut self.steps.firing);
+        firing.append(&mut steps);
+        self.replace(firing, rounds)?;
+        self.steps.firing = steps;
+        clear(&mut self.steps.firing);
+        clear(firing);
+        clear(light);
+        Ok(())
     }
 
     /// Opens a module because of signs that are zero now.
@@ -192,10 +225,11 @@ impl Simulation<'_> {
         all.clear();
         let mut ends = std::mem::take(&mut self.argument_ends);
         ends.clear();
+        let mut contexts = 0;
         for fire in firing {
-            let state = self.plant.state(fire.id).expect("fires");
+            let context = context_of(model, &self.plant, &self.steps.contexts, fire, &mut contexts);
             let successor = &model.rules[fire.rule].produces[fire.produce].successor;
-            self.plant.variables(fire.id, &state.context, self.now, &mut self.variables);
+            self.plant.variables(fire.id, context, self.now, &mut self.variables);
             let first = all.len();
             all.resize(first + successor.arguments.outputs(), 0.0);
             successor.arguments.eval(&self.variables, &mut self.scratch, &mut all[first..]);
@@ -240,17 +274,21 @@ impl Simulation<'_> {
     fn record(&mut self, firing: &[Firing]) {
         let Some(mut log) = self.log.take() else { return };
         self.note_predecessors(firing, log.len());
+        let (mut contexts, model) = (0, self.model);
         for fire in firing {
-            let state = self.plant.state(fire.id).expect("fires");
-            let rule = &self.model.rules[fire.rule];
-            self.plant.variables(fire.id, &state.context, self.now, &mut self.variables);
+            let rule = &model.rules[fire.rule];
+            let context = context_of(model, &self.plant, &self.steps.contexts, fire, &mut contexts);
+            self.plant.variables(fire.id, context, self.now, &mut self.variables);
             let mut sides: SmallVec<[f64; 16]> = smallvec::smallvec![0.0; rule.sides.outputs()];
             rule.sides.eval(&self.variables, &mut self.scratch, &mut sides);
-            let zero = |atom: usize| match &state.open {
-                Some(open) => open.at[atom] == Sign::Zero,
-                None => state.next.touched.iter().any(|change| change.atom == atom),
+            let state = self.plant.state(fire.id).filter(|_| !rule.discrete);
+            let zero = |atom: usize| match state.map(|state| (state, &state.open)) {
+                None => false,
+                Some((_, Some(open))) => open.at[atom] == Sign::Zero,
+                Some((state, None)) => state.next.touched.iter().any(|change| change.atom == atom),
             };
             let residual = (rule.produces[fire.produce].guard.atoms())
+                .filter(|_| !rule.discrete)
                 .filter(|(atom, comparison)| *comparison == Comparison::Equal || zero(*atom))
                 .map(|(atom, _)| (sides[2 * atom] - sides[2 * atom + 1]).abs())
                 .fold(0.0, f64::max);
@@ -267,6 +305,23 @@ impl Simulation<'_> {
         }
         self.log = Some(log);
     }
+}
+
+/// The context of a production. Those of a step are kept in the order of its productions; `passed` counts them.
+fn context_of<'c>(
+    model: &Model,
+    plant: &'c Plant,
+    steps: &'c [ModuleId],
+    fire: &Firing,
+    passed: &mut usize,
+) -> &'c [ModuleId] {
+    let rule = &model.rules[fire.rule];
+    if !rule.discrete {
+        return plant.state(fire.id).map_or(&[], |state| &state.context);
+    }
+    let first = *passed;
+    *passed += rule.context_len();
+    &steps[first..*passed]
 }
 
 /// Empties a list, and gives back its memory if that is much.

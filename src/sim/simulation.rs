@@ -1,10 +1,12 @@
 //! The clock: events in their order, observation.
 
+use std::collections::HashSet;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::agenda::Agenda;
 use super::career::Careers;
 use super::coupled::Coupled;
+use super::derive::Steps;
 use super::error::{Error, Site};
 use super::event::Event;
 use super::integrator::Integrator;
@@ -21,7 +23,7 @@ use super::watch::Watcher;
 use super::{Method, Settings, Stats};
 use crate::diagnostic::Span;
 use crate::expr::Scratch;
-use crate::model::{KindId, Model};
+use crate::model::{CUT, KindId, Model};
 use crate::structure::{Family, Instant, Lineage, ModuleId, ModuleString, Tree};
 
 /// A model developing in time; observe it with [`Simulation::at`].
@@ -29,6 +31,7 @@ use crate::structure::{Family, Instant, Lineage, ModuleId, ModuleString, Tree};
 /// Every module has a clock of its own unless it reads a neighbour that is integrated numerically; those share
 /// one. Steps and events do not depend on what is observed, so the state at a time is the same bits whichever other
 /// times are asked for.
+#[derive(Clone)]
 pub struct Simulation<'m> {
     pub(super) model: &'m Model,
     pub(super) settings: Settings,
@@ -42,6 +45,10 @@ pub struct Simulation<'m> {
     /// What comes next of light modules, and the first of it.
     pub(super) agenda: Agenda,
     pub(super) front: Front,
+    /// The kind of `%`, if the model has it.
+    pub(super) cuts: Option<KindId>,
+    /// Slots of light modules that were cut off before their events.
+    pub(super) ghosts: HashSet<u32>,
     /// Time of the last event.
     pub(super) now: Instant,
     /// Number of the last instant at which something happened.
@@ -57,6 +64,10 @@ pub struct Simulation<'m> {
     /// Some rule has a context.
     pub(super) looks_around: bool,
     pub(super) kinds_with_context: Vec<bool>,
+    /// Neighbours are remembered.
+    pub(super) hands_on: bool,
+    /// Discrete rules.
+    pub(super) steps: Steps,
     pub(super) neighbours: Neighbours,
     /// Modules whose neighbours have changed.
     pub(super) to_look: Vec<ModuleId>,
@@ -84,6 +95,9 @@ pub struct Simulation<'m> {
     /// Number of changes of the structure.
     pub(super) structure: u64,
     fault: Option<Error>,
+    /// Entries of the queues passed so far; the last of them, and whether it was an event.
+    pub(super) passed: u64,
+    pub(super) last: Option<(Instant, bool)>,
     // Memory that is used again and again.
     pub(super) variables: Vec<f64>,
     pub(super) scratch: Scratch<f64>,
@@ -118,6 +132,8 @@ impl<'m> Simulation<'m> {
         };
         let kinds_with_context: Vec<bool> =
             model.kinds.iter().map(|(_, kind)| kind.rules.iter().any(has_context)).collect();
+        let looks_around = kinds_with_context.contains(&true);
+        let hands_on = looks_around || model.rules.iter().any(|rule| rule.discrete && rule.context_len() > 0);
         let careers = Careers::new(model, &kinds_with_context);
         let mut simulation = Simulation {
             model,
@@ -128,14 +144,18 @@ impl<'m> Simulation<'m> {
             queue: Queue::default(),
             agenda: Agenda::default(),
             front: Front::default(),
+            cuts: model.kinds.find(CUT, 0),
+            ghosts: HashSet::new(),
             now: Instant::ZERO,
             group: 0,
             opened: Vec::new(),
             ready: Vec::new(),
             fresh: Vec::new(),
             changed: true,
-            looks_around: kinds_with_context.contains(&true),
+            looks_around,
             kinds_with_context,
+            hands_on,
+            steps: Steps::new(model),
             neighbours: Neighbours::default(),
             to_look: Vec::new(),
             lost: false,
@@ -155,6 +175,8 @@ impl<'m> Simulation<'m> {
             log: settings.log.then(Vec::new),
             recorder: (settings.log && settings.transitions).then(Recorder::default),
             fault: None,
+            passed: 0,
+            last: None,
             variables: Vec::new(),
             scratch: Vec::new(),
             arguments: Vec::new(),
@@ -190,7 +212,7 @@ impl<'m> Simulation<'m> {
         }
         let tree = &mut self.plant.tree;
         tree.append(&self.model.axiom, &arguments, Instant::ZERO, Family::AXIOM, &mut self.fresh);
-        if self.looks_around {
+        if self.hands_on {
             let skipped = |kind| self.model.kinds.get(kind).skipped;
             self.neighbours.hand_on(None, &self.model.axiom.kinds, &self.fresh, skipped);
         }
@@ -233,14 +255,23 @@ impl<'m> Simulation<'m> {
 
     /// Lets time pass up to `t` without looking. As [`Simulation::at`], of which it is a part.
     pub fn pass(&mut self, t: f64) -> Result<(), Error> {
+        self.guarded(|simulation| simulation.advance(t))
+    }
+
+    /// Does something unless there was an error, and remembers its error.
+    pub(super) fn guarded<T>(&mut self, go: impl FnOnce(&mut Self) -> Result<T, Error>) -> Result<T, Error> {
         if let Some(fault) = &self.fault {
             return Err(fault.clone());
         }
-        let passed = self.advance(t);
-        if let Err(fault) = &passed {
+        let gone = go(self);
+        if let Err(fault) = &gone {
             self.fault = Some(fault.clone());
         }
-        passed
+        gone
+    }
+
+    pub(super) fn has_failed(&self) -> bool {
+        self.fault.is_some()
     }
 
     /// Opens a module whose event it is.

@@ -82,6 +82,8 @@ pub struct Next {
     pub touched: SmallVec<[Change; 1]>,
     /// Signs that change before then, without consequence.
     pub changes: Vec<Change>,
+    /// All this follows from formulas, and holds whatever a common step brings.
+    pub lasting: bool,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -156,6 +158,7 @@ impl State {
         self.switches.clear();
         (self.step, self.open) = (None, None);
         self.next.changes.clear();
+        self.next.lasting = false;
         (self.window, self.forced, self.coupled) = (0.0, false, false);
     }
 

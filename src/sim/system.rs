@@ -7,6 +7,10 @@ use super::runge_kutta::Rates;
 use crate::expr::{LANES, Lanes, Program, Scratch};
 use crate::model::Rule;
 use crate::structure::{Instant, ModuleId};
+use smallvec::SmallVec;
+
+/// Rule, clause and whether all is integrated, and the rows for which that is so.
+type Batch = ((usize, usize, bool), SmallVec<[u32; 16]>);
 
 /// Where a variable of a rule comes from.
 #[derive(Clone, Copy, Debug)]
@@ -137,12 +141,34 @@ impl System {
         unknown: impl Fn(u32) -> Option<u32>,
         frozen: bool,
     ) -> System {
-        let mut system = System { start, ..System::default() };
+        let mut system = System::default();
+        system.rebuild(rules, plant, members, start, unknown, frozen);
+        system
+    }
+
+    /// The same, in the memory of other equations.
+    pub fn rebuild(
+        &mut self,
+        rules: &[Rule],
+        plant: &Plant,
+        members: &[ModuleId],
+        start: Instant,
+        unknown: impl Fn(u32) -> Option<u32>,
+        frozen: bool,
+    ) {
+        let system = self;
+        system.start = start;
+        system.rows.clear();
+        system.sources.clear();
+        system.formulas.clear();
+        system.inputs.clear();
+        system.switches.clear();
+        system.places.clear();
         let mut values_then = Vec::new();
         for &id in members {
             let state = plant.state(id).expect("members have states");
             let first = plant.tree.places(id).start;
-            let mut own: Vec<(u32, usize)> = (state.motions.iter().enumerate())
+            let mut own: SmallVec<[(u32, usize); 4]> = (state.motions.iter().enumerate())
                 .filter_map(|(parameter, m)| match m {
                     Motion::Coupled(c) => Some((*c, parameter)),
                     _ => None,
@@ -200,20 +226,20 @@ impl System {
             });
         }
         system.batch(rules);
-        system
     }
 
     /// Puts rows with the same program together, a chunk of them for each evaluation.
     fn batch(&mut self, rules: &[Rule]) {
-        let mut batches: Vec<((usize, usize, bool), Vec<u32>)> = Vec::new();
+        let mut batches: SmallVec<[Batch; 4]> = SmallVec::new();
         for (n, row) in self.rows.iter().enumerate() {
             let key = (row.rule, row.solve, row.forced);
             match batches.iter_mut().find(|(k, _)| *k == key) {
                 Some((_, rows)) => rows.push(n as u32),
-                None => batches.push((key, vec![n as u32])),
+                None => batches.push((key, smallvec::smallvec![n as u32])),
             }
         }
-        let mut chunks = Vec::new();
+        let mut chunks = std::mem::take(&mut self.chunks);
+        chunks.clear();
         for (_, rows) in &batches {
             let first = &self.rows[rows[0] as usize];
             let program = program(rules, first);

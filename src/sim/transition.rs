@@ -38,14 +38,14 @@ pub struct Transition {
 }
 
 /// Productions of the present instant.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Recorder {
     /// Rates just before it of all modules that it may concern.
     arrivals: BTreeMap<ModuleId, Vec<f64>>,
     fired: BTreeMap<ModuleId, Fired>,
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Fired {
     /// Index into the log.
     event: usize,

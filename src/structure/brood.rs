@@ -35,6 +35,11 @@ pub(super) struct Broods {
 }
 
 impl Broods {
+    /// Bytes that they take, about.
+    pub fn size(&self) -> usize {
+        size_of_val(&self.all[..]) + size_of_val(&self.generations[..]) + 4 * self.free.len()
+    }
+
     /// A new brood, of nobody yet, whose modules stand at these places of the successor (brackets not counted).
     pub fn begin(&mut self, family: Family, birth: Instant, first: u32) -> u32 {
         let brood = Brood { mixed: family.mixed, trail: family.trail & TRAIL, birth };

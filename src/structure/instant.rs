@@ -17,6 +17,12 @@ impl Instant {
         Instant { high: t, low: 0.0 }
     }
 
+    /// The product of a whole number and a duration.
+    pub fn multiple(n: f64, duration: f64) -> Instant {
+        let high = n * duration;
+        Instant { high, low: n.mul_add(duration, -high) }
+    }
+
     /// The instant after a duration.
     pub fn after(self, duration: f64) -> Instant {
         let (high, error) = two_sum(self.high, duration);

@@ -123,6 +123,14 @@ impl Tree {
         (self.modules + 2 * branches, self.values.len())
     }
 
+    /// Bytes that it takes, about.
+    pub fn size(&self) -> usize {
+        size_of_val(&self.nodes[..])
+            + size_of_val(&self.values[..])
+            + self.broods.size()
+            + 4 * self.free.len()
+    }
+
     /// Slots that have ever been used; `ModuleId::slot` is below this.
     pub fn slots(&self) -> usize {
         self.nodes.len()
@@ -216,10 +224,15 @@ impl Tree {
     }
 
     fn release(&mut self, slot: u32) {
+        self.end(slot);
+        self.free.push(slot);
+    }
+
+    /// Ends the life of whoever is in a slot. The slot is not free yet.
+    fn end(&mut self, slot: u32) {
         let node = &mut self.nodes[slot as usize];
         node.generation = node.generation.wrapping_add(1);
         let (arity, first) = (self.arities[node.kind.index()] as usize, node.first);
-        self.free.push(slot);
         if arity > 0 {
             if self.free_values.len() <= arity {
                 self.free_values.resize(arity + 1, Vec::new());
@@ -269,6 +282,52 @@ impl Tree {
         self.release(id.slot);
         self.modules -= 1;
         self.insert(before, after, string, arguments, birth, family, made);
+    }
+
+    /// Takes out a module and all that follows on its axis, with all branches. Slots that are to be kept stay empty until
+    /// they are given back with [`Tree::free_slot`].
+    pub fn cut(&mut self, id: ModuleId, keep: impl Fn(u32) -> bool) {
+        let before = self.node(id).before;
+        let mut axes = vec![Link(id.slot)];
+        let mut end = None;
+        while let Some(mut at) = axes.pop() {
+            while at.ended().is_none() {
+                let Node { kind, after, first, brood, .. } = self.nodes[at.0 as usize];
+                if kind == KindId::OPEN {
+                    axes.push(Link(first));
+                } else {
+                    self.broods.leave(brood);
+                    self.modules -= 1;
+                }
+                if keep(at.0) {
+                    self.end(at.0)
+                } else {
+                    self.release(at.0)
+                }
+                at = after;
+            }
+            end.get_or_insert(at);
+        }
+        self.link_forward(before, end.expect("an axis has an end"));
+    }
+
+    /// Gives back a slot that was kept when its module was cut off.
+    pub fn free_slot(&mut self, slot: u32) {
+        self.free.push(slot);
+    }
+
+    /// The modules that follow on the axis of this one, with all branches, in string order.
+    pub fn following(&self, id: ModuleId) -> Vec<ModuleId> {
+        let (mut depth, mut out) = (0usize, Vec::new());
+        for visit in Walk::new(self, self.node(id).after) {
+            match visit {
+                Visit::Module(id) => out.push(id),
+                Visit::Open => depth += 1,
+                Visit::Close if depth == 0 => break,
+                Visit::Close => depth -= 1,
+            }
+        }
+        out
     }
 
     /// Puts a string between two neighbours.
@@ -434,6 +493,32 @@ mod tests {
         let (kinds, tree) = grown("AB[C[D]E]F", &[(2, "X[Y]"), (0, ""), (0, "PQ")]);
         assert_eq!(show(&kinds, &tree), "PQ[X[Y][D]E]F");
         assert_eq!(tree.len(), 7);
+    }
+
+    #[test]
+    fn what_is_cut_leaves_room_for_others() {
+        let (mut kinds, mut tree) = grown("A[B[C]%D[E[F]G]H]I", &[]);
+        let more = string(&mut kinds, "XY[Z]");
+        let cut = kinds.find("%", 0).expect("%");
+        let find = |tree: &Tree, kind| {
+            let modules = tree.walk().filter_map(|v| if let Visit::Module(id) = v { Some(id) } else { None });
+            { modules }.find(|id| tree.kind(*id) == kind).expect("it is there")
+        };
+        let cut = find(&tree, cut);
+        assert_eq!(tree.following(cut).len(), 5);
+        tree.cut(cut, |slot| slot as usize == cut.slot());
+        assert_eq!((show(&kinds, &tree).as_str(), tree.len()), ("A[B[C]]I", 4));
+        assert!(!tree.is_alive(cut));
+        let mut made = Vec::new();
+        for _ in 0..3 {
+            let last = find(&tree, kinds.find("B", 0).expect("B"));
+            let family = tree.lineage(last).family(0);
+            let b = string(&mut kinds, "B[A]");
+            tree.replace(last, &b, &[], Instant::ZERO, family, &mut made);
+            tree.append(&more, &[], Instant::ZERO, Family::AXIOM, &mut made);
+        }
+        assert_eq!(show(&kinds, &tree), "A[B[A][A][A][C]]IXY[Z]XY[Z]XY[Z]");
+        assert!(made.iter().all(|id| id.slot() != cut.slot()), "its slot is kept");
     }
 
     #[test]

@@ -1,27 +1,36 @@
 //! The test suite, in one binary, because linking takes longer than running.
 //!
+//! - [`book`]: the book in `docs/`, followed literally; [`pages`] reads its Markdown.
 //! - [`listings`]: the paper's models against results of an independent program.
 //! - [`semantics`]: what happens when (events, contexts, errors of a run), model by small model.
 //! - [`language`]: text to model and back; hostile input.
 //! - [`gallery`]: every mistake in `tests/errors` and the message it gets.
+//! - [`discrete`]: derivation steps, against the models of a book; cuts.
 //! - [`cli`]: the program as it is typed.
+//! - [`editing`]: layout, `new`, `render --watch`, completions.
 //! - [`inspect`]: what `explain`, `--events` and `check --continuity` say.
 //! - [`export`]: SVG and OBJ, read back by other people's code.
 //! - [`schedulers`]: local repair against one clock, remembered neighbours against the whole string.
 //! - [`pictures`]: pixels, perspective, and sheets of several frames.
 //! - [`plants`]: the paper's plants: order of flowering, continuity, the gallery.
+//! - [`replay`]: any time after any other, to the bits of a run.
 //! - [`report`]: studies of methods, and hard cases with exact answers.
 
+mod book;
 mod cli;
 mod common;
+mod discrete;
+mod editing;
 mod export;
 mod gallery;
 mod inspect;
 mod language;
 mod listings;
 mod organs;
+mod pages;
 mod pictures;
 mod plants;
+mod replay;
 mod report;
 mod schedulers;
 mod semantics;

@@ -223,12 +223,12 @@ fn petals_move_smoothly() {
 
 #[test]
 fn the_gallery_is_what_its_document_says() {
-    let document = std::fs::read_to_string(repository("docs/figures.md")).expect("there");
+    let document = std::fs::read_to_string(repository("docs/src/figures.md")).expect("there");
     let lines = good(&["gallery", "--list"]);
     for line in lines.lines() {
         let (_, command) = line.split_once("  dlsys").expect("a command");
         let command = format!("dlsys{command}");
-        assert!(document.contains(&command), "docs/figures.md lacks `{command}`");
+        assert!(document.contains(&command), "docs/src/figures.md lacks `{command}`");
     }
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().to_str().expect("UTF-8");

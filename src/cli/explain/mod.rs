@@ -30,11 +30,16 @@ use std::io::Write;
 
 use super::args::{ExplainArgs, TextFormat};
 use super::common::{Failure, open, out_error};
+use crate::session::Session;
 
 /// Prints the classes of work of a model.
 pub fn explain(args: &ExplainArgs) -> Result<(), Failure> {
-    let session = open(&args.model, &args.settings)?;
-    let plan = plan::Plan::new(&session);
+    show(args, &open(&args.model, &args.settings)?)
+}
+
+/// The same of a model that was read.
+pub fn show(args: &ExplainArgs, session: &Session) -> Result<(), Failure> {
+    let plan = plan::Plan::new(session);
     let shown = match args.format {
         TextFormat::Text => text::show(&plan),
         TextFormat::Json => serde_json::to_string(&plan).expect("text becomes JSON") + "\n",

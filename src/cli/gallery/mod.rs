@@ -91,6 +91,8 @@ fn typed(picture: &Picture, out: &Path, target: &Path, args: &GalleryArgs) -> Re
     typed.shared.model = out.join(picture.model);
     typed.out = target.to_owned();
     typed.format = args.format;
+    // The gallery says itself what it has drawn.
+    typed.quiet = true;
     Ok(typed)
 }
 

@@ -7,12 +7,16 @@
 
 mod flags;
 mod reel;
+mod watch;
 
-use indicatif::{ProgressBar, ProgressStyle};
+use std::io::Write;
+use std::time::Instant;
+
+use indicatif::ProgressBar;
 use serde_json::json;
 
 use super::args::RenderArgs;
-use super::common::{Clock, Failure, Run};
+use super::common::{Clock, Failure, Run, bar, count_of, out_error, size_of};
 use super::events::EventLog;
 use crate::export::{
     self, Fit, Format, FrameDirectory, FrameRecord, FrameWriter, Layout, Manifest, Page, Sheet, SheetWriter,
@@ -22,20 +26,50 @@ use crate::scene::Scene;
 use crate::sim::{Method, Settings, Stats};
 use reel::{Pass, Shot, play};
 
-/// Runs a model and writes its frames.
+/// Runs a model and writes its frames; with `--watch`, again and again.
 pub fn render(args: &RenderArgs) -> Result<(), Failure> {
+    if args.watch { watch::watch(args) } else { once(args, &|| false) }
+}
+
+/// Renders, unless it becomes stale before anything is written.
+fn once(args: &RenderArgs, stale: &(dyn Fn() -> bool + Sync)) -> Result<(), Failure> {
+    flags::survey(args)?;
+    flags::agree(args)?;
+    render_run(args, Run::start(&args.shared)?, stale)
+}
+
+/// The same of a model that was read.
+pub fn render_run(args: &RenderArgs, run: Run, stale: &(dyn Fn() -> bool + Sync)) -> Result<(), Failure> {
+    let begun = Instant::now();
     let survey = flags::survey(args)?;
     flags::agree(args)?;
-    let run = Run::start(&args.shared)?;
     let mut clock = run.clock;
-    let mut render = Render { args, run: &run, threads: flags::threads(args), frames: Vec::new() };
+    let mut render = Render { args, run: &run, threads: flags::threads(args), frames: Vec::new(), stale };
     let mut fit = render.measure(survey, &mut clock)?.fit();
     fit.accuracy = args.accuracy.unwrap_or(fit.accuracy);
-    let stats = match args.layout {
+    let (stats, written) = match args.layout {
         Layout::Frames => render.frames(fit, &mut clock)?,
         layout => render.sheet(layout, fit, &mut clock)?,
     };
-    run.write_stats(&args.shared, clock, stats)
+    run.write_stats(&args.shared, clock, stats)?;
+    if args.quiet {
+        return Ok(());
+    }
+    let line = format!(
+        "{}, {}, in {:.2} s: {}\n",
+        count_of(run.times.len(), "frame"),
+        size_of(written.bytes),
+        begun.elapsed().as_secs_f64(),
+        written.names
+    );
+    std::io::stdout().write_all(line.as_bytes()).map_err(out_error)
+}
+
+/// What there is to be said of a render in one line.
+struct Written {
+    bytes: u64,
+    /// The first file and the last.
+    names: String,
 }
 
 /// What is being rendered.
@@ -45,12 +79,14 @@ struct Render<'r> {
     threads: usize,
     /// Every frame's survey, where the layout asks for it.
     frames: Vec<Survey>,
+    /// Whether somebody has changed what is being rendered.
+    stale: &'r (dyn Fn() -> bool + Sync),
 }
 
 impl Render<'_> {
     /// The first pass.
     fn measure(&mut self, mut survey: Survey, clock: &mut Clock) -> Result<Survey, Failure> {
-        let progress = bar("measuring", self.run.times.len());
+        let progress = self.bar("measuring", self.run.times.len());
         let mut events = EventLog::create(self.args.shared.events.as_deref(), self.run)?;
         let nothing = survey.clone();
         let of_frame = |_: &Shot, scene: &Scene| {
@@ -65,7 +101,7 @@ impl Render<'_> {
                 self.frames.push(frame);
             }
             progress.inc(1);
-            Ok(())
+            if (self.stale)() { Err(Failure::Stale) } else { Ok(()) }
         });
         progress.finish_and_clear();
         events.map_or(Ok(()), EventLog::finish)?;
@@ -73,7 +109,7 @@ impl Render<'_> {
     }
 
     /// The second pass, if each frame has a file of its own.
-    fn frames(&self, fit: Fit, clock: &mut Clock) -> Result<Stats, Failure> {
+    fn frames(&self, fit: Fit, clock: &mut Clock) -> Result<(Stats, Written), Failure> {
         let mut writer = FrameWriter::new(flags::format(self.args), fit);
         writer.page = flags::page(self.args, writer.page.picture)?;
         // Only now that the run is known to be good, the directory is touched.
@@ -91,7 +127,7 @@ impl Render<'_> {
             let staged = staging.write(|file| writer.write_to(scene, &title, file));
             (record(&writer.fit, shot, scene, file), companion, staged)
         };
-        let progress = bar("writing", count);
+        let progress = self.bar("writing", count);
         let stats = play(
             self.run,
             self.writing(&writer.fit),
@@ -109,13 +145,19 @@ impl Render<'_> {
                 Ok(())
             },
         )?;
+        let names = match &manifest.frames[..] {
+            [] => self.args.out.display().to_string(),
+            [only] => self.args.out.join(&only.file).display().to_string(),
+            [first, .., last] => format!("{} to {}", self.args.out.join(&first.file).display(), last.file),
+        };
+        let written = Written { bytes: directory.bytes(), names };
         directory.finish(&manifest).map_err(out_of_directory)?;
         progress.finish_and_clear();
-        Ok(stats)
+        Ok((stats, written))
     }
 
     /// The second pass, if all frames have one file.
-    fn sheet(&self, layout: Layout, fit: Fit, clock: &mut Clock) -> Result<Stats, Failure> {
+    fn sheet(&self, layout: Layout, fit: Fit, clock: &mut Clock) -> Result<(Stats, Written), Failure> {
         let times = &self.run.times;
         let captions: Vec<String> = match layout {
             Layout::Grid if !self.args.no_captions => times.iter().map(|t| format!("t = {t}")).collect(),
@@ -132,7 +174,7 @@ impl Render<'_> {
             (record(&fit, shot, scene, writer.file()), writer.part(shot.index, scene))
         };
         let mut assembly = writer.begin();
-        let progress = bar("drawing", times.len());
+        let progress = self.bar("drawing", times.len());
         let stats = play(
             self.run,
             self.writing(&fit),
@@ -152,9 +194,19 @@ impl Render<'_> {
             [first, .., last] => format!("{}, t = {first} to {last}", self.title()),
         };
         directory.write(&writer.file(), &assembly.finish(&title)).map_err(out_of_directory)?;
+        let names = self.args.out.join(writer.file()).display().to_string();
+        let written = Written { bytes: directory.bytes(), names };
         directory.finish(&manifest).map_err(out_of_directory)?;
         progress.finish_and_clear();
-        Ok(stats)
+        Ok((stats, written))
+    }
+
+    /// A progress bar; it hides itself where standard error is no terminal.
+    fn bar(&self, what: &'static str, count: usize) -> ProgressBar {
+        if self.args.quiet {
+            return ProgressBar::hidden();
+        }
+        bar(what, count)
     }
 
     /// Threads that draw on pages of this size: of large ones not so many are in memory at once.
@@ -218,14 +270,6 @@ fn record(fit: &Fit, shot: &Shot, scene: &Scene, file: String) -> FrameRecord {
         modules: shot.modules(),
         bounds: fit.bounds_of(scene).map(|c| c.map(|p| [p.x, p.y, p.z])),
     }
-}
-
-/// A progress bar; it hides itself where standard error is no terminal.
-fn bar(what: &'static str, count: usize) -> ProgressBar {
-    let style = ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} {per_sec}, {eta} left");
-    ProgressBar::new(count as u64)
-        .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
-        .with_message(what)
 }
 
 fn out_of_directory(error: export::Error) -> Failure {

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use crate::cli::common::{Clock, Failure, Run};
 use crate::cli::events::EventLog;
 use crate::cli::parallel;
+use crate::interrupt;
 use crate::scene::Scene;
 use crate::sim::{Event, Settings, Simulation, Stats};
 use crate::structure::ModuleString;
@@ -47,6 +48,11 @@ impl<'r> Reel<'r> {
         let index = self.next;
         let &time = self.run.times.get(index).filter(|_| !self.failed)?;
         self.next += 1;
+        if interrupt::asked() {
+            self.failed = true;
+            let string = Err(Failure::Model(format!("stopped before t = {time}\n")));
+            return Some(Shot { index, time, events: Vec::new(), string });
+        }
         let mut string = ModuleString::default();
         let wound = self.simulation.at(time, &mut string).map_err(|error| self.run.fault(&error));
         self.failed = wound.is_err();

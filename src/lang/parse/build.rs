@@ -135,6 +135,7 @@ impl Builder<'_> {
                 body: self.expression(next())?,
             },
             Rule::angle_item => Item::Angle(self.expression(next())?),
+            Rule::period_item => Item::Period(self.expression(next())?),
             Rule::frames_item => Item::Frames {
                 from: self.expression(next())?,
                 to: self.expression(next())?,
@@ -173,6 +174,22 @@ impl Builder<'_> {
                         rule.clauses.push(self.clause(part)?);
                     }
                 }
+                Item::Rule(rule)
+            }
+            Rule::step_item => {
+                let mut rule = self.head(next());
+                rule.discrete = true;
+                let (mut guard, mut made) = (None, Vec::new());
+                let mut span = rule.head;
+                for part in inner {
+                    span = span.to(self.span(&part));
+                    match part.as_rule() {
+                        Rule::expr => guard = Some(self.expression(part)?),
+                        Rule::successor => made = self.successor(part)?,
+                        _ => {}
+                    }
+                }
+                rule.clauses.push(Clause { guard, action: Action::Produce(made), span });
                 Item::Rule(rule)
             }
             other => unreachable!("{other:?} is no item"),
@@ -222,7 +239,7 @@ impl Builder<'_> {
         let (mut left, mut right, mut predecessor) = (Vec::new(), Vec::new(), None);
         for part in pair.into_inner() {
             match part.as_rule() {
-                Rule::context => {
+                Rule::context | Rule::step_context => {
                     let side = if predecessor.is_none() { &mut left } else { &mut right };
                     for module in part.into_inner() {
                         side.push(self.head_module(module));
@@ -233,7 +250,7 @@ impl Builder<'_> {
             }
         }
         let predecessor = predecessor.expect("the grammar has a predecessor here");
-        ast::Rule { left, predecessor, right, head, locals: Vec::new(), clauses: Vec::new() }
+        ast::Rule { left, predecessor, right, head, discrete: false, locals: Vec::new(), clauses: Vec::new() }
     }
 
     fn clause(&mut self, pair: Pair) -> Built<Clause> {
@@ -454,6 +471,7 @@ fn is_punctuation(rule: Rule) -> bool {
             | Rule::kw_param
             | Rule::kw_def
             | Rule::kw_angle
+            | Rule::kw_period
             | Rule::kw_frames
             | Rule::kw_step
             | Rule::kw_in

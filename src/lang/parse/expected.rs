@@ -20,6 +20,9 @@ fn words(rule: Rule) -> Option<&'static str> {
         arguments => "`(` and parameters",
         formals => "`(` and the names of parameters",
         head | head_module | plus_minus | context => "a module",
+        step_head | step_context => "a module",
+        arrow => "`->` and a successor",
+        always => "`*`",
         left_of => "`<` after the left context",
         right_of => "`>` and the right context",
         clause => "`if`, `solve` or `produce`",
@@ -155,10 +158,9 @@ fn hint_by_symbol(item: Rule, text: &str, at: usize, found: &str) -> Option<Stri
         (Some('&'), "&") if touching => "“and” is written with one `&`",
         (Some('|'), "|") if touching => "“or” is written with one `|`",
         (Some('*'), "*") if touching => "a power is written `x^2`",
-        (Some('-'), ">") if touching => {
-            "a production is written `produce …`, after an `if` with its condition"
-        }
-        (_, "→") => "a production is written `produce …`, after an `if` with its condition",
+        (_, _) if item == Rule::step_item => return hint_for_step(text, at, found),
+        (Some('-'), ">") if touching => ARROW,
+        (_, "→") => ARROW,
         (_, "/") if text[at..].starts_with("//") => "a comment begins with `#`",
         (_, "−" | "–") => "this is a typographic dash; a minus is written `-`",
         (_, "“" | "”" | "‘" | "’" | "„") => "quotation marks are straight: `\"…\"`",
@@ -200,6 +202,9 @@ fn hint_by_symbol(item: Rule, text: &str, at: usize, found: &str) -> Option<Stri
         (Some(c), ",") if c.is_ascii_digit() && touching && item != Rule::modules => {
             "the decimal sign is a point: `0.5`"
         }
+        (_, "=") if item == Rule::modules && text[at..].starts_with("=>") => {
+            "a discrete rule is written `A(x) : x > 3 -> F(x)`"
+        }
         (_, ",") if item == Rule::modules => "modules stand one after another, with spaces and no commas",
         (c, ".")
             if text[at + 1..].starts_with(|c: char| c.is_ascii_digit())
@@ -217,6 +222,39 @@ fn hint_by_symbol(item: Rule, text: &str, at: usize, found: &str) -> Option<Stri
             "a condition has no `:` behind it: `if x < 1 solve …`"
         }
         (_, ":") if in_rule && before.contains(':') => "a new rule begins on a line of its own",
+        _ => return None,
+    };
+    Some(advice.to_owned())
+}
+
+const ARROW: &str = "in a clause a production is written `if x = 2 produce …`; a discrete rule has its arrow behind the head: `A(x) : x > 3 -> …`";
+
+/// Advice for discrete rules.
+fn hint_for_step(text: &str, at: usize, found: &str) -> Option<String> {
+    let before = text[..at].trim_end();
+    let rest = text[at..].trim_start();
+    let has_arrow = before.contains("->") || before.contains('→');
+    let advice = match found {
+        "" | "\n" if before.ends_with("->") || before.ends_with('→') => "to produce nothing, write `-> ε`",
+        "if" | "solve" | "produce" if has_arrow => {
+            "a discrete rule has no clauses: it is `A(x) : x > 3 -> F(x)`; equations stand in a rule of their own, `A(x): solve …`"
+        }
+        "if" => "a discrete rule has its condition behind the colon, without `if`: `A(x) : x > 3 -> F(x)`",
+        _ if before.ends_with(':') && rest.starts_with("if ") => {
+            "a discrete rule has its condition behind the colon, without `if`: `A(x) : x > 3 -> F(x)`"
+        }
+        _ if before.contains(": if ") && !has_arrow => {
+            "a discrete rule has its condition behind the colon, without `if`: `A(x) : x > 3 -> F(x)`"
+        }
+        ">" if before.trim_end_matches('-').trim_end().ends_with(':') => {
+            "without a condition there is no colon: `A(x) -> F(x)`; one that always holds is `A(x) : * -> F(x)`"
+        }
+        _ if !has_arrow && found.starts_with(|c: char| c.is_ascii_digit()) => {
+            "a head names its parameters; values belong to the initial string and to successors"
+        }
+        ":" if has_arrow => "the condition stands before the arrow: `A(x) : x > 3 -> F(x)`",
+        ">" | "→" if has_arrow => "a rule has one arrow; a new rule begins on a line of its own",
+        "," if has_arrow => "modules stand one after another, with spaces and no commas",
         _ => return None,
     };
     Some(advice.to_owned())
@@ -332,6 +370,9 @@ pub fn unknown_line(text: &str, item: &RawItem) -> Diagnostic {
     }
     if whole.contains("solve") || whole.contains("produce") {
         return diagnostic.help("a rule's head ends with `:`");
+    }
+    if line.contains("=>") || line.contains("<-") || line.contains("⇒") {
+        return diagnostic.help("a discrete rule is written `A(x) : x > 3 -> F(x)`");
     }
     if line.contains('=') {
         return diagnostic.help("a constant is declared with `const NAME = VALUE`");

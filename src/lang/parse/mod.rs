@@ -131,6 +131,7 @@ fn read_item(text: &str, item: &RawItem, builder: &mut build::Builder) -> Result
         ItemKind::Param => Rule::param_item,
         ItemKind::Def => Rule::def_item,
         ItemKind::Angle => Rule::angle_item,
+        ItemKind::Period => Rule::period_item,
         ItemKind::Frames => Rule::frames_item,
         ItemKind::Color => Rule::color_item,
         ItemKind::Gradient => Rule::gradient_item,
@@ -141,6 +142,7 @@ fn read_item(text: &str, item: &RawItem, builder: &mut build::Builder) -> Result
         ItemKind::Consider => Rule::consider_item,
         ItemKind::Interpret => Rule::interpret_item,
         ItemKind::Rule => Rule::rule_item,
+        ItemKind::Step => Rule::step_item,
         ItemKind::Axiom => return read_axiom(text, item, builder),
         ItemKind::Unknown => return Err(Box::new(expected::unknown_line(text, item))),
     };

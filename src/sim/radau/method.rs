@@ -28,6 +28,7 @@ enum Jacobian {
 type Newton = Result<u32, Attempt>;
 
 /// A method with fixed number of stages; `L = (S + 1) / 2` lanes: one real and the complex systems.
+#[derive(Clone)]
 pub(super) struct Method<const S: usize, const L: usize> {
     table: Collocation<S, L>,
     lambda: Wide<L>,

@@ -40,12 +40,14 @@ pub enum Attempt {
     NotFinite(Option<usize>),
 }
 
+#[derive(Clone)]
 enum Kind {
     Three(Box<Method<3, 2>>),
     Five(Box<Method<5, 3>>),
 }
 
 /// Radau IIA steps. Holds the work space, the Jacobian and its factors, and the step before.
+#[derive(Clone)]
 pub struct Radau(Kind);
 
 macro_rules! each {

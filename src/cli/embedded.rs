@@ -1,0 +1,44 @@
+//! Commands of the command line, with all their flags, on a model in hand: what `render`, `explain` and `report` are in
+//! an interactive session.
+
+use clap::Parser;
+
+use super::args::{Action, Command};
+use super::common::{Failure, Run};
+use super::{explain, render, report};
+use crate::session::Session;
+
+/// Runs a command; `words` is its name and what follows, without the model.
+///
+/// # Errors
+/// As on the command line; help that was asked for is no error.
+pub fn run(session: &Session, words: &[String]) -> Result<(), Failure> {
+    if words.iter().any(|word| word == "--set" || word.starts_with("--set=")) {
+        let message = "error: params are set by the command `set NAME = VALUE` here, not by `--set`\n";
+        return Err(Failure::Usage(message.to_owned()));
+    }
+    let mut line = vec!["dlsys".to_owned()];
+    line.extend(words.iter().take(1).cloned());
+    // A name that begins with a dash is no flag.
+    line.push(format!("./{}", session.source.name).replace(".//", "/"));
+    line.extend(words.iter().skip(1).cloned());
+    let command = match Command::try_parse_from(&line) {
+        Ok(command) => command,
+        Err(error) => {
+            return match error.use_stderr() {
+                true => Err(Failure::Usage(error.to_string())),
+                false => error.print().map_err(super::common::out_error),
+            };
+        }
+    };
+    match &command.action {
+        Action::Render(args) => render::render_run(args, Run::of(session.clone(), &args.shared)?, &|| false),
+        Action::Explain(args) => explain::show(args, session),
+        Action::Report(args) => {
+            let stem = std::path::Path::new(&session.source.name).file_stem();
+            let name = stem.map_or("model".to_owned(), |s| s.to_string_lossy().into_owned());
+            report::study(args, session, &name)
+        }
+        _ => Err(Failure::Usage(format!("error: `{}` is no command of a session\n", words[0]))),
+    }
+}

@@ -1,0 +1,94 @@
+//! `dlsys new`: a model to begin with.
+
+use std::fs;
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::common::{Failure, out_error};
+
+/// The model, with `NAME` for the name.
+const START: &str = include_str!("start.dls");
+
+#[derive(Debug, Args)]
+pub struct NewArgs {
+    /// Name of the plant; the model is NAME.dls
+    pub name: PathBuf,
+}
+
+/// Writes the model; a file that is there stays as it is.
+pub fn new(args: &NewArgs) -> Result<(), Failure> {
+    let path = if args.name.extension().is_some_and(|e| e == "dls") {
+        args.name.clone()
+    } else {
+        let mut name = args.name.clone().into_os_string();
+        name.push(".dls");
+        PathBuf::from(name)
+    };
+    let stem = path.file_stem().map_or(String::new(), |stem| stem.to_string_lossy().into_owned());
+    if stem.is_empty() || stem == ".dls" || args.name.as_os_str().to_string_lossy().ends_with(['/', '\\']) {
+        return Err(Failure::Usage(format!(
+            "error: `{}` is no name for a model\n\n  = help: give it one, such as `dlsys new fern`\n",
+            args.name.display()
+        )));
+    }
+    let written = fs::File::create_new(&path).and_then(|mut file| file.write_all(text(&stem).as_bytes()));
+    written.map_err(|error| {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let help = match error.kind() {
+            ErrorKind::AlreadyExists => {
+                return Failure::Usage(format!(
+                    "error: {} is there already and is not overwritten\n\n  = help: choose another name, or begin from that: \
+                     `dlsys render {0} -o frames`\n",
+                    path.display()
+                ));
+            }
+            ErrorKind::NotFound => format!("make the folder first: `mkdir -p {}`", folder.display()),
+            _ => format!("check the rights to {}", folder.display()),
+        };
+        Failure::Model(format!("error: cannot write {}: {error}\n\n  = help: {help}\n", path.display()))
+    })?;
+    let (file, frames) = (path.display(), path.with_extension(""));
+    let frames = frames.display();
+    let next = [
+        (
+            format!("render {file} -o {frames}"),
+            format!("draws it; open {frames}/frame-0120.svg in a browser"),
+        ),
+        (
+            format!("render {file} -o {frames} --watch"),
+            "draws it again whenever you save the model".to_owned(),
+        ),
+        (format!("check {file}"), "says what is wrong with it".to_owned()),
+    ];
+    let width = next.iter().map(|(command, _)| command.chars().count()).max().unwrap_or(0);
+    let mut text = format!("{file} is written. What to do with it:\n");
+    for (command, what) in &next {
+        text += &format!("  dlsys {command:width$}  {what}\n");
+    }
+    std::io::stdout().write_all(text.as_bytes()).map_err(out_error)
+}
+
+/// The model's text. A name may have characters that a title cannot.
+fn text(name: &str) -> String {
+    let name: String = name.chars().filter(|c| *c != '"' && !c.is_control()).collect();
+    START.replace("NAME", &name)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::diagnostic::Source;
+    use crate::lang::format::format;
+    use crate::session::Session;
+
+    #[test]
+    fn the_model_is_good_and_tidy() {
+        let text = super::text("a \"fern\"\n");
+        let session = Session::from_text("fern.dls", &text, &[]).expect("a good model");
+        assert!(session.warnings.is_empty(), "{:?}", session.warnings);
+        assert_eq!(session.model.title.as_deref(), Some("a fern"));
+        assert_eq!(format(&Source::new("fern.dls", &*text)).expect("good"), text);
+        assert_eq!(session.model.frames.expect("frames").times().count(), 121);
+    }
+}

@@ -1,0 +1,113 @@
+//! `dlsys view`: a page for the browser that plays the growth.
+
+use std::io::Write;
+use std::path::Path;
+
+use indicatif::ProgressBar;
+
+use super::args::ViewArgs;
+use super::common::{Failure, Run, bar, out_error};
+use crate::export::{self, Survey, View};
+use crate::scene::Scene;
+use crate::sim::Settings;
+use crate::structure::ModuleString;
+use crate::turtle;
+use crate::view::{Recorder, Recording, Stage, page};
+
+/// Most frames of a recording; a screen shows no more in five minutes.
+const MOST_FRAMES: usize = 20_000;
+
+/// Writes the page of a model.
+pub fn view(args: &ViewArgs) -> Result<(), Failure> {
+    let out = args.out.as_path();
+    spare(args, out)?;
+    let run = Run::start(&args.shared)?;
+    let count = run.times.len();
+    if count > MOST_FRAMES {
+        return Err(Failure::Usage(format!(
+            "error: {count} frames are too many for a page, which takes {MOST_FRAMES}: choose fewer with `--from A --to B --step S`\n"
+        )));
+    }
+    let recording = record(&run, args.accuracy)?;
+    let document = page::document(&recording);
+    let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let name = out.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
+    export::replace(folder, &name, document.as_bytes())
+        .map_err(|error| Failure::Model(format!("error: {error}\n")))?;
+    let megabytes = document.len() as f64 / 1e6;
+    writeln!(std::io::stdout(), "{}: {count} frames, {megabytes:.1} MB", out.display()).map_err(out_error)
+}
+
+/// Refuses to write over what is not a page of ours.
+fn spare(args: &ViewArgs, out: &Path) -> Result<(), Failure> {
+    use std::io::Read;
+    let usage = |message: String| Err(Failure::Usage(format!("error: {message}\n")));
+    if out.is_dir() || out.file_name().is_none() {
+        return usage(format!("`-o {}` is a directory: name the page, such as plant.html", out.display()));
+    }
+    let Ok(file) = std::fs::File::open(out) else { return Ok(()) };
+    let mut start = Vec::new();
+    let read = file.take(page::MARK.len() as u64).read_to_end(&mut start);
+    if args.force || (read.is_ok() && start == page::MARK.as_bytes()) {
+        return Ok(());
+    }
+    usage(format!(
+        "{} is there and is not a page of `dlsys view`: choose another name, or add --force",
+        out.display()
+    ))
+}
+
+/// Runs the model twice: what is recorded is in parts of its extent.
+fn record(run: &Run, accuracy: Option<f64>) -> Result<Recording, Failure> {
+    let mut survey = Survey::new(View::FRONT);
+    let settings = Settings { log: false, ..run.settings };
+    let progress = bar("measuring", run.times.len());
+    each_frame(run, settings, 0.0, &progress, |_, scene, _| {
+        survey.add(scene);
+        Ok(())
+    })?;
+    let mut fit = survey.fit();
+    fit.accuracy = accuracy.unwrap_or(fit.accuracy);
+    let (model, source) = (&run.session.model, &run.session.source);
+    let name =
+        Path::new(&source.name).file_name().map_or(source.name.clone(), |n| n.to_string_lossy().into());
+    let mut recorder = Recorder::new(model, &name, &fit);
+    let mut stage = Stage::default();
+    let settings = Settings { log: true, ..run.settings };
+    let progress = bar("recording", run.times.len());
+    each_frame(run, settings, fit.accuracy, &progress, |string, scene, events| {
+        recorder.history().add(&events, model, source);
+        stage.set(scene, fit.default_width, recorder.forms());
+        let modules = string.iter().filter(|m| !m.kind.is_bracket()).count() as u64;
+        recorder.add(string.time, modules, &stage).map_err(|error| {
+            Failure::Model(format!(
+                "error: {error}\n  help: take fewer frames with `--from A --to B --step S`\n"
+            ))
+        })
+    })?;
+    Ok(recorder.finish())
+}
+
+/// Runs the model and draws it at each time.
+fn each_frame(
+    run: &Run,
+    settings: Settings,
+    accuracy: f64,
+    progress: &ProgressBar,
+    mut take: impl FnMut(&ModuleString, &Scene, Vec<crate::sim::Event>) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let mut simulation = run.session.simulate(settings).map_err(|error| run.fault(&error))?;
+    let mut string = ModuleString::default();
+    let mut scene = turtle::blank(&run.session.model);
+    scene.accuracy = accuracy;
+    for &time in &run.times {
+        simulation.at(time, &mut string).map_err(|error| run.fault(&error))?;
+        scene.clear();
+        turtle::draw(&run.session.model, &string, &mut scene)
+            .map_err(|error| Failure::Model(format!("error: at t = {time}: {error}\n")))?;
+        take(&string, &scene, simulation.take_events())?;
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+    Ok(())
+}

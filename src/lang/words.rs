@@ -1,0 +1,58 @@
+//! The words of the language, for those who colour, complete or count them.
+
+use super::layout::DECLARATIONS;
+use crate::expr::{Binary, Unary};
+
+/// Words that begin a part of a rule. Also those of an expression, which may stand at the beginning of a line.
+pub const CLAUSES: [&str; 5] = ["if", "then", "else", "solve", "produce"];
+
+/// Words that mean something in certain places only.
+pub const PARTICLES: [&str; 5] = ["string", "in", "step", "from", "strength"];
+
+/// Names of numbers that every expression, or every rule, may use.
+pub const VALUES: [&str; 4] = ["pi", "e", "t", "age"];
+
+/// Words that begin a declaration.
+pub fn declarations() -> impl Iterator<Item = &'static str> {
+    DECLARATIONS.iter().map(|(word, _)| *word)
+}
+
+/// Functions that are built in.
+pub fn functions() -> impl Iterator<Item = &'static str> {
+    Unary::NAMED.iter().map(|(name, _)| *name).chain(Binary::NAMED.iter().map(|(name, _)| *name))
+}
+
+/// How a declaration goes on after its first word, for somebody who types it; empty for a word that begins none.
+pub fn usage(declaration: &str) -> &'static str {
+    match declaration {
+        "title" => "\"…\"",
+        "const" => "NAME = VALUE",
+        "param" => "NAME = VALUE in LOW .. HIGH",
+        "def" => "NAME(x, …) = EXPRESSION",
+        "angle" => "DEGREES",
+        "frames" => "FROM .. TO step STEP",
+        "color" => "NAME = \"#rrggbb\"",
+        "gradient" => "NAME = \"#rrggbb\", \"#rrggbb\", …",
+        "surface" => "@NAME from \"FILE\"",
+        "contour" => "NAME = (x, y) (x, y) …",
+        "tropism" => "X, Y, Z strength E",
+        "ignore" | "consider" => "NAME …",
+        "initial" => "string: MODULE …",
+        "axiom" => ": MODULE …",
+        "interpret" => "HEAD: MODULE …",
+        _ => "",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_declaration_has_its_usage() {
+        for word in declarations() {
+            assert!(!usage(word).is_empty(), "{word}");
+        }
+        assert!(functions().any(|name| name == "sin") && functions().any(|name| name == "max"));
+    }
+}

@@ -1,0 +1,266 @@
+//! What outlives a model: its text as it is being written, the params that were set, the screen.
+
+use std::cell::RefCell;
+use std::collections::HashSet;
+use std::io::{IsTerminal, Write};
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+
+use super::assist::Names;
+use super::draft::{Change, Draft};
+use super::stage::{Flow, Stage};
+use crate::cli::common::Failure;
+use crate::diagnostic::{Diagnostic, Severity};
+use crate::lang::Setting;
+use crate::session::{Refused, Session};
+use crate::sim::{Settings, brief};
+
+/// Most messages that are printed of one text.
+const MOST_SHOWN: usize = 20;
+
+/// Why a statement has failed.
+#[derive(Debug)]
+pub enum Fault {
+    /// The message, drawn.
+    Said(String),
+    /// Nobody reads the answers any more.
+    Closed,
+}
+
+impl Fault {
+    /// A message in one line, without the line break.
+    pub fn new(message: impl std::fmt::Display) -> Fault {
+        Fault::Said(format!("error: {message}\n"))
+    }
+}
+
+impl From<Failure> for Fault {
+    fn from(failure: Failure) -> Fault {
+        match failure {
+            Failure::Model(message) | Failure::Usage(message) => Fault::Said(message),
+            Failure::ClosedPipe | Failure::Stale => Fault::Closed,
+        }
+    }
+}
+
+impl From<Fault> for Failure {
+    fn from(fault: Fault) -> Failure {
+        match fault {
+            Fault::Said(message) => Failure::Model(message),
+            Fault::Closed => Failure::ClosedPipe,
+        }
+    }
+}
+
+/// Where answers appear.
+#[derive(Clone, Copy, Debug)]
+pub struct Screen {
+    pub coloured: bool,
+    /// Size in characters.
+    pub columns: usize,
+    pub rows: usize,
+}
+
+impl Screen {
+    /// That of this process. Without a terminal all screens are alike, so that transcripts are.
+    pub fn of_process() -> Screen {
+        let plain = Screen { coloured: false, columns: 80, rows: 24 };
+        if !std::io::stdout().is_terminal() {
+            return plain;
+        }
+        let size = terminal_size::terminal_size();
+        let (columns, rows) = size.map_or((80, 24), |(w, h)| (usize::from(w.0), usize::from(h.0)));
+        let coloured = std::env::var_os("NO_COLOR").is_none();
+        Screen { coloured, columns: columns.clamp(40, 200), rows: rows.clamp(12, 100) }
+    }
+}
+
+/// See the module.
+pub struct Desk {
+    pub draft: Draft,
+    /// Values of params.
+    pub set: Vec<Setting>,
+    pub settings: Settings,
+    pub screen: Screen,
+    /// For completion.
+    pub names: Rc<RefCell<Names>>,
+    /// Files that this session has written, and may write again.
+    pub written: HashSet<PathBuf>,
+    /// Warnings that were shown, and those that will be, with what they are known by: much of what is missing while somebody
+    /// types is typed next, so these wait until the model is run.
+    warned: HashSet<String>,
+    waiting: Vec<(String, String)>,
+}
+
+impl Desk {
+    pub fn new(settings: Settings, screen: Screen) -> Desk {
+        let (draft, set, names, written, warned) = Default::default();
+        Desk { draft, set, settings, screen, names, written, warned, waiting: Vec::new() }
+    }
+
+    /// Prints an answer.
+    ///
+    /// # Errors
+    /// If nobody reads it.
+    pub fn say(&self, text: &str) -> Result<(), Fault> {
+        let mut out = std::io::stdout().lock();
+        out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(|_| Fault::Closed)
+    }
+
+    /// Prints what is wrong.
+    pub fn complain(&self, text: &str) {
+        let text = text.trim_end();
+        crate::cli::common::tell(&format!("{text}\n"));
+    }
+
+    /// What a terminal shows before a line.
+    pub fn prompt(&self, stage: &Stage) -> String {
+        match stage.time() {
+            Some(t) => format!("t={}> ", brief(t, 6)),
+            None => "> ".to_owned(),
+        }
+    }
+
+    /// Begins with no model at all.
+    pub fn begin_empty(&mut self) -> Flow {
+        (self.draft, self.set) = Default::default();
+        self.warned.clear();
+        self.waiting.clear();
+        let session = Session::from_text("typed", "initial string: ε", &[]).expect("an empty model is one");
+        *self.names.borrow_mut() = Names::of(&session.model, "");
+        Flow::Model { session: Box::new(session), time: 0.0 }
+    }
+
+    /// Reads a model file.
+    pub fn load(&mut self, path: &Path, set: &[Setting]) -> Result<Flow, Fault> {
+        let session = Session::open(path, set).map_err(|refused| self.refusal(&refused))?;
+        self.draft = Draft::of_file(path, session.source.text.clone());
+        self.set = set.to_vec();
+        self.warned.clear();
+        self.welcome(&session)?;
+        Ok(self.begin(session, 0.0))
+    }
+
+    /// Reads the file again; what was typed since is gone.
+    pub fn reload(&mut self, time: f64) -> Result<Flow, Fault> {
+        let Some(path) = self.draft.path.clone() else {
+            return Err(Fault::new(
+                "this model has no file yet; `save FILE` gives it one, `load FILE` reads one",
+            ));
+        };
+        let session = Session::open(&path, &self.set).map_err(|refused| self.refusal(&refused))?;
+        let text = session.source.text.clone();
+        if text != self.draft.text {
+            let change = Change::whole(text);
+            self.draft.accept(change);
+        }
+        self.draft.set_saved(&path);
+        self.welcome(&session)?;
+        Ok(self.begin(session, time))
+    }
+
+    /// Reads a changed text, and keeps it if it is good.
+    pub fn change(&mut self, change: Change, time: f64) -> Result<Flow, Fault> {
+        let session = self.read(&change.text, &self.set)?;
+        self.note_warnings(&session);
+        let done = change.done.join(", ");
+        self.draft.accept(change);
+        if !done.is_empty() {
+            self.say(&format!("{done}\n"))?;
+        }
+        Ok(self.begin(session, time))
+    }
+
+    /// Takes the last change back.
+    pub fn undo(&mut self, time: f64) -> Result<Flow, Fault> {
+        let Some(text) = self.draft.previous().map(str::to_owned) else {
+            return Err(Fault::new("nothing was changed yet"));
+        };
+        let session = self.read(&text, &self.set)?;
+        self.draft.undo();
+        self.say("the last change is taken back; `list` shows the text\n")?;
+        Ok(self.begin(session, time))
+    }
+
+    /// Gives a param another value.
+    pub fn set(&mut self, name: &str, value: f64, time: f64) -> Result<Flow, Fault> {
+        let mut set = self.set.clone();
+        set.retain(|setting| setting.name != name);
+        set.push(Setting { name: name.to_owned(), value });
+        let session = self.read(&self.draft.text, &set)?;
+        self.set = set;
+        self.say(&format!("{name} = {}\n", brief(value, 12)))?;
+        Ok(self.begin(session, time))
+    }
+
+    fn read(&self, text: &str, set: &[Setting]) -> Result<Session, Fault> {
+        // As long as there is no initial string, the empty one stands for it.
+        let whole = match Draft::has_axiom(text) {
+            true => text.to_owned(),
+            false => format!("{text}\ninitial string: ε\n"),
+        };
+        // A param that was set and is no more is no mistake of what was typed.
+        let declared = |setting: &&Setting| {
+            crate::lang::outline::outline(text).iter().any(|entry| entry.name == setting.name)
+        };
+        let kept: Vec<Setting> = set.iter().filter(declared).cloned().collect();
+        let set = if text == self.draft.text { set } else { &kept[..] };
+        let name = self.draft.name();
+        let read = Session::from_text_in(&self.draft.folder(), &name, &whole, set);
+        read.map_err(|refused| self.refusal(&refused))
+    }
+
+    fn begin(&mut self, session: Session, time: f64) -> Flow {
+        *self.names.borrow_mut() = Names::of(&session.model, &self.draft.text);
+        Flow::Model { session: Box::new(session), time }
+    }
+
+    fn welcome(&mut self, session: &Session) -> Result<(), Fault> {
+        self.note_warnings(session);
+        self.warn();
+        let model = &session.model;
+        let title = model.title.as_ref().map_or(String::new(), |title| format!("{title}: "));
+        let plural = |n: usize, word: &str| format!("{n} {word}{}", if n == 1 { "" } else { "s" });
+        let frames = model.frames.map_or(String::new(), |f| {
+            format!(", frames {} .. {} step {}", brief(f.from, 6), brief(f.to, 6), brief(f.step, 6))
+        });
+        self.say(&format!(
+            "{title}{}, {}{frames}\n",
+            plural(model.rules.len(), "rule"),
+            plural(model.parameters.len(), "param")
+        ))
+    }
+
+    /// Remembers the warnings that were not shown before.
+    fn note_warnings(&mut self, session: &Session) {
+        self.waiting.clear();
+        for warning in session.warnings.iter().take(MOST_SHOWN) {
+            let place = warning.labels.first().map(|(span, _)| session.source.slice(*span));
+            let key = format!("{} {}", warning.message, place.unwrap_or(""));
+            if !self.warned.contains(&key) {
+                self.waiting.push((key, warning.render(&session.source, self.screen.coloured)));
+            }
+        }
+    }
+
+    /// Prints the warnings that wait.
+    pub fn warn(&mut self) {
+        for (key, text) in std::mem::take(&mut self.waiting) {
+            self.complain(&text);
+            self.warned.insert(key);
+        }
+    }
+
+    /// All that is wrong with a text.
+    pub fn refusal(&self, refused: &Refused) -> Fault {
+        let wrong = |d: &&Diagnostic| d.severity == Severity::Error;
+        let all: Vec<&Diagnostic> =
+            refused.diagnostics.iter().filter(wrong).chain(&refused.settings).collect();
+        let draw = |d: &&Diagnostic| d.render(&refused.source, self.screen.coloured);
+        let mut text: String = all.iter().take(MOST_SHOWN).map(draw).collect();
+        if all.len() > MOST_SHOWN {
+            text += &format!("… and {} more\n", all.len() - MOST_SHOWN);
+        }
+        Fault::Said(text)
+    }
+}

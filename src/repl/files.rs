@@ -1,0 +1,162 @@
+//! Commands that write files: `save` and `export`. Files are whole or absent, and other people's are left alone.
+
+use std::path::{Path, PathBuf};
+
+use super::commands;
+use super::desk::{Desk, Fault};
+use super::stage::{Stage, misused};
+use crate::cli::run::Printer;
+use crate::export::{self, Format, FrameWriter, Page, Size, Survey, View};
+use crate::sim::brief;
+
+/// Says whether a file may be written.
+fn spare(path: &Path, force: bool, desk: &Desk) -> Result<(), Fault> {
+    if path.exists() && !force && !desk.written.contains(&real(path)) {
+        let path = path.display();
+        return Err(Fault::new(format!(
+            "{path} is there already; another name, or `--force` after it to replace it"
+        )));
+    }
+    Ok(())
+}
+
+/// One name for a file, however it is spelt.
+fn real(path: &Path) -> PathBuf {
+    path.canonicalize().unwrap_or_else(|_| path.to_owned())
+}
+
+/// Writes a file, whole or not at all.
+fn write(path: &Path, bytes: &[u8], desk: &mut Desk) -> Result<(), Fault> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let Some(name) = path.file_name().and_then(|name| name.to_str()) else {
+        return Err(Fault::new(format!("{} is no name for a file", path.display())));
+    };
+    export::replace(folder, name, bytes).map_err(Fault::new)?;
+    desk.written.insert(real(path));
+    Ok(())
+}
+
+/// Takes a flag without value out of the words.
+fn flag(words: &mut Vec<String>, name: &str) -> bool {
+    let before = words.len();
+    words.retain(|word| word != name);
+    words.len() < before
+}
+
+/// Takes a flag with its value out of the words.
+fn value(words: &mut Vec<String>, name: &str) -> Result<Option<String>, Fault> {
+    let Some(at) = words.iter().position(|word| word == name) else { return Ok(None) };
+    words.remove(at);
+    if at >= words.len() {
+        return Err(Fault::new(format!("{name} needs a value after it")));
+    }
+    Ok(Some(words.remove(at)))
+}
+
+impl Stage<'_> {
+    /// `save [FILE] [--force]`
+    pub fn save(&mut self, rest: &[String], desk: &mut Desk) -> Result<(), Fault> {
+        let mut words = rest.to_vec();
+        let force = flag(&mut words, "--force");
+        let path = match &words[..] {
+            [] => match desk.draft.path.clone() {
+                Some(path) => path,
+                None => return Err(Fault::new("this model has no file yet: `save NAME.dls` gives it one")),
+            },
+            [name] => PathBuf::from(name),
+            _ => return Err(misused(commands::find("save").expect("it is one"))),
+        };
+        if desk.draft.text.trim().is_empty() {
+            return Err(Fault::new("there is nothing to save yet"));
+        }
+        let own = desk.draft.path.as_ref().is_some_and(|known| real(known) == real(&path));
+        if !own {
+            spare(&path, force, desk)?;
+        }
+        let text = desk.draft.text.clone();
+        write(&path, text.as_bytes(), desk)?;
+        desk.draft.set_saved(&path);
+        let lines = text.lines().count();
+        let noun = if lines == 1 { "line" } else { "lines" };
+        desk.say(&format!("{}: {lines} {noun}\n", path.display()))?;
+        if !desk.set.is_empty() {
+            let set: Vec<String> = desk.set.iter().map(|s| format!("{} = {}", s.name, s.value)).collect();
+            desk.say(&format!("  not in the file: what was set, {}\n", set.join(", ")))?;
+        }
+        Ok(())
+    }
+
+    /// `export FILE [--view V] [--perspective D] [--width N] [--force]`
+    pub fn export(&mut self, rest: &[String], desk: &mut Desk) -> Result<(), Fault> {
+        let mut words = rest.to_vec();
+        let force = flag(&mut words, "--force");
+        let number = |text: Option<String>, what: &str, range: std::ops::RangeInclusive<f64>| match text {
+            None => Ok(None),
+            Some(text) => match text.parse::<f64>().ok().filter(|x| range.contains(x)) {
+                Some(x) => Ok(Some(x)),
+                None => Err(Fault::new(format!(
+                    "{what} is a number from {} to {}, not `{text}`",
+                    range.start(),
+                    range.end()
+                ))),
+            },
+        };
+        let view = match value(&mut words, "--view")? {
+            Some(text) => text.parse().map_err(|error: export::ViewError| Fault::new(error))?,
+            None => View::FRONT,
+        };
+        let perspective =
+            number(value(&mut words, "--perspective")?, "--perspective", export::Camera::FIELDS)?;
+        let side = f64::from(Page::MOST_ON_A_SIDE);
+        let width = number(value(&mut words, "--width")?, "--width", 1.0..=side)?;
+        let [name] = &words[..] else { return Err(misused(commands::find("export").expect("it is one"))) };
+        let path = PathBuf::from(name);
+        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_lowercase();
+        self.replay()?;
+        let (bytes, companion) = match extension.as_str() {
+            "json" | "txt" => {
+                let printer = Printer::new(&self.session.model);
+                let string = self.replay()?.string();
+                let mut text = String::new();
+                match extension.as_str() {
+                    "json" => printer.json(string, &mut text),
+                    _ => printer.text(string, &mut text),
+                }
+                (text.into_bytes(), None)
+            }
+            other => {
+                let format: Format = other.parse().map_err(|_| {
+                    Fault::new(format!(
+                        "the name tells the format: .svg, .png, .obj, .json or .txt, but this one ends with `{}`; `render -o DIR` writes all frames",
+                        name.chars().rev().take(8).collect::<Vec<_>>().into_iter().rev().collect::<String>()
+                    ))
+                })?;
+                let scene = self.scene()?;
+                let mut survey = Survey::new(view);
+                if let Some(field) = perspective {
+                    survey = survey.with_perspective(field);
+                }
+                survey.add(&scene);
+                let mut writer = FrameWriter::new(format, survey.fit());
+                if let Some(width) = width {
+                    let size = Size::Width(width as u32);
+                    writer.page =
+                        Page::new(writer.page.picture, size, Some(Page::BACKGROUND)).map_err(Fault::new)?;
+                }
+                let model = &self.session.model;
+                let name = model.title.as_deref().unwrap_or(&self.session.source.name);
+                let title = format!("{name}, t = {}", brief(self.time().unwrap_or(0.0), 9));
+                (writer.write(&scene, &title), writer.companion(&scene))
+            }
+        };
+        let beside = |name: &str| path.with_file_name(name);
+        spare(&path, force, desk)?;
+        if let Some((name, bytes)) = &companion {
+            spare(&beside(name), force, desk)?;
+            write(&beside(name), bytes, desk)?;
+        }
+        write(&path, &bytes, desk)?;
+        let with = companion.map_or(String::new(), |(name, _)| format!(", with {name}"));
+        desk.say(&format!("{}: {} bytes{with}\n", path.display(), bytes.len()))
+    }
+}

@@ -1,0 +1,237 @@
+//! The interactive session: `dlsys repl [MODEL]`.
+//!
+//! ```text
+//! terminal or script ──input──▶ statements ──┬─ text of the model ──draft──▶ Session, read anew
+//!                       grammar, assist      └─ commands ──▶ Stage (a Session and its Replay) ──▶ answers
+//! ```
+//!
+//! - `input`, `grammar`, `assist`: lines, what they are, and what helps to type them; `commands`: the list of commands.
+//! - `draft`: the model's text, changed piece by piece. A change that cannot be read is rolled back whole.
+//! - `desk`: all that outlives a model. `stage`: a model in time, and what commands do with it.
+//! - `travel`, `show`, `plot`, `picture`, `files`: the commands, by what they are about. `braille`: pictures made of dots.
+//!
+//! Answers go to standard output, complaints to standard error. Without a terminal the statements of standard input are done
+//! one after another, and the exit status is 1 if one of them has failed.
+
+mod assist;
+mod braille;
+mod commands;
+mod desk;
+mod draft;
+mod files;
+mod grammar;
+mod input;
+mod picture;
+mod plot;
+mod show;
+mod stage;
+mod travel;
+
+use std::io::IsTerminal;
+
+use crate::cli::args::ReplArgs;
+use crate::cli::common::Failure;
+use crate::interrupt;
+use crate::sim::{self, Settings};
+use desk::{Desk, Fault, Screen};
+use grammar::{Line, Statement};
+use input::{Input, Next};
+use stage::{Flow, Stage};
+
+/// Runs a session to its end.
+///
+/// # Errors
+/// If the terminal fails or, without one, if a statement has failed.
+pub fn repl(args: &ReplArgs) -> Result<(), Failure> {
+    let interactive = std::io::stdin().is_terminal() && std::io::stdout().is_terminal();
+    let screen = Screen::of_process();
+    let defaults = Settings::default();
+    let settings = Settings {
+        method: args.method,
+        scheduler: sim::Scheduler::Auto,
+        tolerance: args.tolerance,
+        step_size: args.step_size.unwrap_or(defaults.step_size),
+        max_modules: args.max_modules,
+        ..defaults
+    };
+    let mut desk = Desk::new(settings, screen);
+    let mut log = Log { echo: args.echo, interactive, ..Log::default() };
+    let mut input = match interactive {
+        true => Input::terminal(desk.names.clone(), screen.coloured)
+            .map_err(|why| Failure::Model(format!("error: the terminal cannot be used: {why}\n")))?,
+        false => Input::script(),
+    };
+    if interactive {
+        // Only who goes on after it needs to hear it.
+        interrupt::listen();
+        let version = env!("CARGO_PKG_VERSION");
+        desk.say(&format!(
+            "dlsys {version}. Type declarations and rules, or commands; `help` lists them.\n"
+        ))?;
+    }
+    let mut start = match &args.model {
+        Some(path) => match desk.load(path, &args.settings) {
+            Ok(flow) => flow,
+            Err(Fault::Closed) => return Err(Failure::ClosedPipe),
+            // On a terminal somebody may mend the file and try again.
+            Err(Fault::Said(message)) if interactive => {
+                desk.complain(&message);
+                desk.begin_empty()
+            }
+            Err(Fault::Said(message)) => return Err(Failure::Model(message)),
+        },
+        None => desk.begin_empty(),
+    };
+    // Each round is one model; whatever changes it begins another.
+    while let Flow::Model { session, time } = start {
+        let mut stage = Stage::new(&session, &desk);
+        let set = stage.set(time, &desk);
+        log.take(set, &mut desk, None)?;
+        start = play(&mut stage, &mut desk, &mut input, &mut log)?;
+    }
+    if interactive && !desk.draft.is_saved() {
+        desk.say("The model was not saved; the history has what was typed.\n")?;
+    }
+    log.verdict()
+}
+
+/// Does one statement after another, until there is another model or no more to do.
+fn play(stage: &mut Stage, desk: &mut Desk, input: &mut Input, log: &mut Log) -> Result<Flow, Failure> {
+    let mut cancelled = false;
+    loop {
+        let statement = match input.next(&desk.prompt(stage)) {
+            Next::Statement(statement) => statement,
+            Next::Cancelled => {
+                if std::mem::replace(&mut cancelled, true) {
+                    desk.say("Ctrl-D or `quit` ends the session.\n")?;
+                    cancelled = false;
+                }
+                continue;
+            }
+            Next::End => return Ok(Flow::Quit),
+            Next::Broken(why) => {
+                return Err(Failure::Model(format!("error: the input cannot be read: {why}\n")));
+            }
+        };
+        cancelled = false;
+        interrupt::clear();
+        if log.echo && !log.interactive {
+            desk.say(&echo(&statement))?;
+        }
+        let done = stage.obey(&statement, desk);
+        if let Some(flow) = log.take(done, desk, Some(&statement))?
+            && !matches!(flow, Flow::On)
+        {
+            return Ok(flow);
+        }
+    }
+}
+
+/// A statement as it would look on a terminal.
+fn echo(statement: &Statement) -> String {
+    let mut lines = statement.text.lines();
+    let mut text = format!("> {}\n", lines.next().unwrap_or(""));
+    lines.for_each(|line| text += &format!("  {line}\n"));
+    text
+}
+
+/// What has failed.
+#[derive(Debug, Default)]
+struct Log {
+    echo: bool,
+    interactive: bool,
+    statements: usize,
+    /// Lines of the input.
+    failed: Vec<usize>,
+}
+
+impl Log {
+    /// Takes what came of a statement; says what is wrong with it.
+    fn take<T>(
+        &mut self,
+        done: Result<T, Fault>,
+        desk: &mut Desk,
+        statement: Option<&Statement>,
+    ) -> Result<Option<T>, Failure> {
+        self.statements += usize::from(statement.is_some());
+        match done {
+            Ok(value) => Ok(Some(value)),
+            Err(Fault::Closed) => Err(Failure::ClosedPipe),
+            Err(Fault::Said(message)) => {
+                desk.complain(&message);
+                if !self.interactive {
+                    let line = statement.map_or(0, |statement| statement.line);
+                    self.failed.push(line);
+                    let what = statement.map_or("", |s| s.text.lines().next().unwrap_or("")).trim();
+                    if statement.is_some() {
+                        desk.complain(&format!("(line {line} of the input: {what})\n"));
+                    }
+                }
+                Ok(None)
+            }
+        }
+    }
+
+    /// The end of a script.
+    fn verdict(&self) -> Result<(), Failure> {
+        if self.failed.is_empty() || self.interactive {
+            return Ok(());
+        }
+        let lines: Vec<String> = self.failed.iter().take(20).map(usize::to_string).collect();
+        let more = if self.failed.len() > lines.len() { " …" } else { "" };
+        let noun = if lines.len() == 1 { "line" } else { "lines" };
+        Err(Failure::Model(format!(
+            "error: {} of {} statements failed, {noun} {}{more}\n",
+            self.failed.len(),
+            self.statements,
+            lines.join(", ")
+        )))
+    }
+}
+
+impl Statement {
+    /// A command's name and what follows it; quotes hold spaces together.
+    fn words(&self) -> Vec<String> {
+        debug_assert!(self.kind == Line::Command);
+        let text = self.text.trim();
+        let text = text.strip_prefix(':').unwrap_or(text).trim();
+        let text = text.strip_prefix('?').map_or(text.to_owned(), |rest| format!("help {rest}"));
+        let (mut words, mut word, mut quoted, mut any) = (Vec::new(), String::new(), false, false);
+        let mut chars = text.chars().peekable();
+        while let Some(c) = chars.next() {
+            match c {
+                '"' => (quoted, any) = (!quoted, true),
+                // A remark; but `#3` is a module.
+                '#' if !quoted && !any && !chars.peek().is_some_and(char::is_ascii_digit) => break,
+                c if c.is_whitespace() && !quoted => {
+                    if std::mem::take(&mut any) {
+                        words.push(std::mem::take(&mut word));
+                    }
+                }
+                c => {
+                    word.push(c);
+                    any = true;
+                }
+            }
+        }
+        if any {
+            words.push(word);
+        }
+        words
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_of_a_command() {
+        let words = |text: &str| Statement { kind: Line::Command, text: text.to_owned(), line: 1 }.words();
+        assert_eq!(words("plot #3.x 0..9 # a remark"), ["plot", "#3.x", "0..9"]);
+        assert_eq!(words("load \"my plants/a b.dls\""), ["load", "my plants/a b.dls"]);
+        assert_eq!(words(":run"), ["run"]);
+        assert_eq!(words("?plot"), ["help", "plot"]);
+        assert!(words(":").is_empty());
+    }
+}

@@ -1,0 +1,258 @@
+//! `plot`: a parameter over time, in dots.
+
+use std::collections::BTreeMap;
+
+use super::assist::parameter_names;
+use super::braille::Sheet;
+use super::commands;
+use super::desk::{Desk, Fault};
+use super::show::{is_called, known_name};
+use super::stage::{Stage, misused};
+use super::travel::time_of;
+use crate::interrupt;
+use crate::lang::did_you_mean;
+use crate::model::{KindId, Model};
+use crate::replay::Stop;
+use crate::sim::brief;
+use crate::structure::{Lineage, ModuleString};
+
+/// What is plotted.
+enum Subject {
+    /// Each module of these kinds is a dot: kinds with the place of the parameter.
+    Each(BTreeMap<KindId, usize>),
+    /// One number for all of them.
+    Whole(Summary, BTreeMap<KindId, usize>),
+    Count(Vec<KindId>),
+    One(Lineage, usize),
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Summary {
+    Sum,
+    Mean,
+    Max,
+    Min,
+}
+
+const SUMMARIES: [(&str, Summary); 4] =
+    [("sum", Summary::Sum), ("mean", Summary::Mean), ("max", Summary::Max), ("min", Summary::Min)];
+
+/// Room for the numbers on the left.
+const MARGIN: usize = 11;
+const INK: [u8; 3] = [90, 170, 90];
+
+impl Stage<'_> {
+    /// `plot SPEC [A..B]`
+    pub fn plot(&mut self, rest: &[String], desk: &Desk) -> Result<(), Fault> {
+        let (range, words) = match rest.split_last() {
+            Some((last, words)) if last.contains("..") && !words.is_empty() => (Some(last), words),
+            _ => (None, rest),
+        };
+        let present = self.replay()?.time();
+        let (from, to) = match range.and_then(|range| range.split_once("..")) {
+            Some((a, b)) => (time_of(a)?, time_of(b)?),
+            None => match self.session.model.frames {
+                _ if present > 0.0 => (0.0, present),
+                Some(frames) if frames.to > 0.0 => (0.0, frames.to),
+                _ => {
+                    return Err(Fault::new(
+                        "at t = 0 there is nothing to plot; `run` first, or say from when to when, as in `plot F.x 0..10`",
+                    ));
+                }
+            },
+        };
+        if to <= from {
+            return Err(Fault::new(format!("{} .. {} is no stretch of time", brief(from, 9), brief(to, 9))));
+        }
+        let (subject, title) = self.subject(words)?;
+        let sheet_rows = (desk.screen.rows - 6).clamp(6, 16);
+        let mut sheet = Sheet::new(desk.screen.columns - MARGIN - 2, sheet_rows);
+        let [width, height] = sheet.size();
+        // What is to be seen, by column.
+        let mut columns: Vec<Vec<f64>> = Vec::new();
+        let (mut interrupted, mut failed) = (false, None);
+        for i in 0..width {
+            let t = from + (to - from) * i as f64 / (width - 1) as f64;
+            match self.replay()?.seek(t) {
+                Ok(stop) => interrupted = stop == Stop::Interrupted,
+                Err(error) => failed = Some(error),
+            }
+            if interrupted || failed.is_some() {
+                break;
+            }
+            columns.push(subject.values(self.replay()?.string()));
+        }
+        // To where we were; that way is short, and must be gone.
+        interrupt::clear();
+        let gone = self.replay()?.seek(present);
+        self.arrive(gone, desk)?;
+        if let Some(error) = failed {
+            return Err(self.drawn(&error, desk));
+        }
+        if interrupted {
+            return desk.say("stopped\n");
+        }
+        let finite = || columns.iter().flatten().copied().filter(|x| x.is_finite());
+        let (mut low, mut high) =
+            finite().fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), x| (lo.min(x), hi.max(x)));
+        if low > high {
+            return desk.say("there is no such module from first to last\n");
+        }
+        // Zero is shown where it is near; a line that is flat lies in the middle.
+        if low > 0.0 && low < 0.3 * high {
+            low = 0.0;
+        }
+        if high < 0.0 && high > 0.3 * low {
+            high = 0.0;
+        }
+        if high - low <= 1e-12 * high.abs().max(low.abs()) {
+            let room = if high == 0.0 { 1.0 } else { 0.1 * high.abs() };
+            (low, high) = (low - room, high + room);
+        }
+        let place = |x: f64| (high - x) / (high - low) * (height - 1) as f64;
+        let joined = !matches!(subject, Subject::Each(_));
+        for (i, values) in columns.iter().enumerate() {
+            let values = values.iter().filter(|x| x.is_finite());
+            for &x in values {
+                let before =
+                    i.checked_sub(1).and_then(|i| columns[i].first()).filter(|x| joined && x.is_finite());
+                match before {
+                    Some(&y) => sheet.line([i as f64 - 1.0, place(y)], [i as f64, place(x)], Some(INK)),
+                    None => sheet.dot(i, place(x).round() as usize, Some(INK)),
+                }
+            }
+        }
+        desk.say(&framed(&sheet.rows(desk.screen.coloured), &title, [from, to], [low, high], width / 2))
+    }
+
+    fn subject(&mut self, words: &[String]) -> Result<(Subject, String), Fault> {
+        let words: Vec<&str> = words.iter().map(String::as_str).collect();
+        match words[..] {
+            ["count", name] => {
+                let model = &self.session.model;
+                let name = known_name(model, name)?;
+                let kinds = model.kinds.iter().map(|(id, _)| id).filter(|id| is_called(model, *id, name));
+                Ok((Subject::Count(kinds.collect()), format!("number of {name}")))
+            }
+            [spec] if spec.starts_with('#') => {
+                let Some((number, parameter)) = spec[1..].split_once('.') else {
+                    return Err(misused(commands::find("plot").expect("it is one")));
+                };
+                let (number, lineage) = self.find(&[number.to_owned()])?;
+                let model = &self.session.model;
+                let replay = self.replay()?;
+                let module = super::show::modules(replay).find(|m| m.number == number);
+                let kind = module.map(|m| m.module.kind).unwrap_or(KindId::OPEN);
+                let place = parameter_place(model, kind, parameter)?;
+                let name = &model.kinds.get(kind).name;
+                Ok((Subject::One(lineage, place), format!("{parameter} of {name}, module {number}")))
+            }
+            [spec] => {
+                let kinds = self.kinds_with(spec)?;
+                Ok((Subject::Each(kinds), format!("{spec}, each module a dot")))
+            }
+            [how, spec] => match SUMMARIES.iter().find(|(name, _)| *name == how) {
+                Some((_, summary)) => {
+                    let kinds = self.kinds_with(spec)?;
+                    Ok((Subject::Whole(*summary, kinds), format!("{how} of {spec}")))
+                }
+                None => Err(Fault::new(format!("`{how}` is none of sum, mean, max, min, count"))),
+            },
+            _ => Err(misused(commands::find("plot").expect("it is one"))),
+        }
+    }
+
+    /// The kinds that `NAME.PARAM` means.
+    fn kinds_with(&self, spec: &str) -> Result<BTreeMap<KindId, usize>, Fault> {
+        let model = &self.session.model;
+        let Some((name, parameter)) = spec.rsplit_once('.').filter(|(name, _)| !name.is_empty()) else {
+            let all = model.kinds.iter().find(|(id, _)| is_called(model, *id, spec));
+            let own = all.map(|(id, _)| parameter_names(model, id)).unwrap_or_default();
+            let example = own.first().map_or("F.x".to_owned(), |parameter| format!("{spec}.{parameter}"));
+            return Err(Fault::new(format!("say which parameter, as in `plot {example}`")));
+        };
+        let name = known_name(model, name)?;
+        let mut kinds = BTreeMap::new();
+        let mut missing = None;
+        for (id, _) in model.kinds.iter().filter(|(id, _)| is_called(model, *id, name)) {
+            match parameter_place(model, id, parameter) {
+                Ok(place) => drop(kinds.insert(id, place)),
+                Err(fault) => missing = Some(fault),
+            }
+        }
+        match missing {
+            Some(fault) if kinds.is_empty() => Err(fault),
+            _ => Ok(kinds),
+        }
+    }
+}
+
+/// The place of a parameter, by name or by number from 1.
+fn parameter_place(model: &Model, kind: KindId, parameter: &str) -> Result<usize, Fault> {
+    let names = parameter_names(model, kind);
+    let kind = model.kinds.get(kind);
+    let number = parameter.parse::<usize>().ok().filter(|n| (1..=kind.arity).contains(n));
+    if let Some(place) = names.iter().position(|name| name == parameter).or(number.map(|n| n - 1)) {
+        return Ok(place);
+    }
+    if names.is_empty() {
+        return Err(Fault::new(format!("`{}` has no parameters", kind.name)));
+    }
+    let hint = did_you_mean(parameter, names.iter().map(String::as_str));
+    let hint = hint.unwrap_or_else(|| format!("it has {}", names.join(", ")));
+    Err(Fault::new(format!("`{}` has no parameter `{parameter}`; {hint}", kind.name)))
+}
+
+impl Subject {
+    /// What is to be seen of a string.
+    fn values(&self, string: &ModuleString) -> Vec<f64> {
+        let of = |kinds: &BTreeMap<KindId, usize>| -> Vec<f64> {
+            let value =
+                |m: crate::structure::Module| kinds.get(&m.kind).and_then(|i| m.parameters.get(*i)).copied();
+            string.iter().filter_map(value).collect()
+        };
+        match self {
+            Subject::Each(kinds) => of(kinds),
+            Subject::Count(kinds) => vec![string.iter().filter(|m| kinds.contains(&m.kind)).count() as f64],
+            Subject::One(lineage, place) => {
+                let own = |m: &crate::structure::Module| m.lineage == *lineage && !m.kind.is_bracket();
+                string.iter().find(own).and_then(|m| m.parameters.get(*place).copied()).into_iter().collect()
+            }
+            Subject::Whole(summary, kinds) => {
+                let all = of(kinds);
+                let sum: f64 = all.iter().sum();
+                match summary {
+                    Summary::Sum => vec![sum],
+                    _ if all.is_empty() => Vec::new(),
+                    Summary::Mean => vec![sum / all.len() as f64],
+                    Summary::Max => vec![all.iter().copied().fold(f64::NEG_INFINITY, f64::max)],
+                    Summary::Min => vec![all.iter().copied().fold(f64::INFINITY, f64::min)],
+                }
+            }
+        }
+    }
+}
+
+/// The dots with a frame and its numbers.
+fn framed(rows: &[String], title: &str, [from, to]: [f64; 2], [low, high]: [f64; 2], width: usize) -> String {
+    let mut out = format!("{:MARGIN$}{title}\n", "");
+    let middle = rows.len() / 2;
+    for (i, row) in rows.iter().enumerate() {
+        let number = match i {
+            0 => brief(high, 5),
+            i if i + 1 == rows.len() => brief(low, 5),
+            // The middle of the rows, not of the numbers: where its dots are.
+            i if i == middle && rows.len() > 8 => {
+                brief(high - (high - low) * (i as f64 + 0.5) / rows.len() as f64, 3)
+            }
+            _ => String::new(),
+        };
+        let tick = if number.is_empty() { '│' } else { '┤' };
+        out += format!("{number:>w$} {tick}{row}", w = MARGIN - 2).trim_end();
+        out.push('\n');
+    }
+    out += &format!("{:w$}└{}\n", "", "─".repeat(width), w = MARGIN - 1);
+    let (first, last) = (format!("t = {}", brief(from, 6)), brief(to, 6));
+    let gap = width.saturating_sub(first.chars().count() + last.chars().count());
+    out + &format!("{:MARGIN$}{first}{:gap$}{last}\n", "", "")
+}

@@ -1,0 +1,365 @@
+//! Commands about modules and texts: `list`, `show`, `inspect`, `events`.
+
+use super::assist::{coloured, parameter_names};
+use super::commands;
+use super::desk::{Desk, Fault};
+use super::stage::{Stage, misused};
+use crate::lang::did_you_mean;
+use crate::model::{KindId, Model};
+use crate::replay::Replay;
+use crate::sim::{Seen, brief, describe};
+use crate::structure::{Lineage, Module};
+
+/// Lines of a string, or rows of a table, that are printed unless more are asked for.
+const MOST_LINES: usize = 16;
+/// Productions that `events` prints.
+const MOST_EVENTS: usize = 20;
+
+/// A module of the present string with its number, brackets not counted.
+pub struct Numbered<'a> {
+    pub number: usize,
+    pub module: Module<'a>,
+}
+
+/// All modules, numbered from 1.
+pub fn modules<'a>(replay: &'a Replay) -> impl Iterator<Item = Numbered<'a>> {
+    let all = replay.string().iter().filter(|module| !module.kind.is_bracket());
+    all.zip(1..).map(|(module, number)| Numbered { number, module })
+}
+
+/// True if a kind is meant by a name: its own, or, without `_`, its base.
+pub fn is_called(model: &Model, kind: KindId, name: &str) -> bool {
+    let kind = model.kinds.get(kind);
+    kind.name == name || !name.contains('_') && kind.base() == name
+}
+
+/// The name of modules, if the model has some.
+pub fn known_name<'n>(model: &Model, name: &'n str) -> Result<&'n str, Fault> {
+    let kinds = || model.kinds.iter().filter(|(id, _)| !id.is_bracket());
+    if kinds().any(|(id, _)| is_called(model, id, name)) {
+        return Ok(name);
+    }
+    let hint = did_you_mean(name, kinds().map(|(_, kind)| kind.name.as_str()));
+    let hint = hint.map_or(String::new(), |hint| format!("; {hint}"));
+    Err(Fault::new(format!("the model has no module `{name}`{hint}")))
+}
+
+impl Stage<'_> {
+    /// `list [NAME]`
+    pub fn list(&mut self, rest: &[String], desk: &Desk) -> Result<(), Fault> {
+        let text = &desk.draft.text;
+        let names = desk.names.borrow();
+        let wanted: Vec<bool> = match rest {
+            [] => text.lines().map(|_| true).collect(),
+            [name] => {
+                let mut wanted = vec![false; text.lines().count()];
+                let position = |byte: usize| text[..byte].matches('\n').count();
+                for entry in crate::lang::outline::outline(text) {
+                    let range = entry.span.range();
+                    let part = |c: char| c.is_alphanumeric() || c == '_' || c == '@';
+                    let own = &text[range.clone()];
+                    if own.split(|c| !part(c)).any(|word| word == name) || entry.name == *name {
+                        let lines = position(range.start)..=position(range.end.max(range.start + 1) - 1);
+                        lines.for_each(|line| wanted[line] = true);
+                    }
+                }
+                if !wanted.contains(&true) {
+                    return Err(Fault::new(format!("nothing in the text mentions `{name}`")));
+                }
+                wanted
+            }
+            _ => return Err(misused(commands::find("list").expect("it is one"))),
+        };
+        if text.trim().is_empty() {
+            return desk.say("nothing was typed yet, and no file is loaded\n");
+        }
+        let mut out = String::new();
+        for ((line, number), _) in text.lines().zip(1..).zip(wanted).filter(|(_, wanted)| *wanted) {
+            let shown = if desk.screen.coloured { coloured(line, &names) } else { line.to_owned() };
+            out += format!("{number:>4}  {shown}").trim_end();
+            out.push('\n');
+        }
+        desk.say(&out)
+    }
+
+    /// `show [all | A..B | NAME]`
+    pub fn show(&mut self, rest: &[String], desk: &Desk) -> Result<(), Fault> {
+        let model = &self.session.model;
+        let status = self.status()?;
+        let replay = self.replay()?;
+        match rest {
+            [] => desk.say(&(status + &string(model, replay, desk.screen.columns, MOST_LINES))),
+            [all] if all == "all" => {
+                desk.say(&(status + &string(model, replay, desk.screen.columns, usize::MAX)))
+            }
+            [range] if range.starts_with(|c: char| c.is_ascii_digit()) => {
+                let (from, to) = range.split_once("..").unwrap_or((range, range));
+                let number = |text: &str| text.parse::<usize>().ok().filter(|n| *n >= 1);
+                let (Some(from), Some(to)) = (number(from), number(to)) else {
+                    return Err(Fault::new(format!(
+                        "`{range}` is no part of the string: `show 10..20` is from the 10th to the 20th module"
+                    )));
+                };
+                let rows = modules(replay).filter(|m| (from..=to).contains(&m.number));
+                desk.say(&table(model, rows, usize::MAX)?)
+            }
+            [name, more @ ..] if more.is_empty() || more == ["all"] => {
+                let name = known_name(model, name)?;
+                let rows = modules(replay).filter(|m| is_called(model, m.module.kind, name));
+                let most = if more.is_empty() { MOST_LINES } else { usize::MAX };
+                desk.say(&table(model, rows, most)?)
+            }
+            _ => Err(misused(commands::find("show").expect("it is one"))),
+        }
+    }
+
+    /// The module that words name.
+    pub fn find(&mut self, rest: &[String]) -> Result<(usize, Lineage), Fault> {
+        let model = &self.session.model;
+        let replay = self.replay()?;
+        let found = |m: Option<Numbered>, what: String| match m {
+            Some(m) => Ok((m.number, m.module.lineage)),
+            None => Err(Fault::new(format!("{what} at present; `show` lists the modules"))),
+        };
+        let count = modules(replay).count();
+        let words: Vec<&str> = rest.iter().map(|word| word.trim_start_matches('#')).collect();
+        let number = |text: &str| text.parse::<usize>().ok();
+        match words[..] {
+            [word] if number(word).is_some() => {
+                let n = number(word).unwrap_or(0);
+                found(
+                    modules(replay).find(|m| m.number == n),
+                    format!("there are {count} modules, and no number {n},"),
+                )
+            }
+            [word]
+                if word.contains('.')
+                    || word.starts_with('…')
+                    || word.len() == 13 && number(&word[..1]).is_some() =>
+            {
+                let is_it =
+                    |m: &Numbered| m.module.lineage.to_string() == word || m.module.lineage.name() == word;
+                found(modules(replay).find(is_it), format!("there is no module of the lineage {word}"))
+            }
+            [name] | [name, _] => {
+                let name = known_name(model, name)?;
+                let nth = match words.get(1) {
+                    None => 1,
+                    Some(text) => match number(text).filter(|n| *n >= 1) {
+                        Some(n) => n,
+                        None => return Err(Fault::new(format!("`{text}` is not a number from 1"))),
+                    },
+                };
+                let mut all = modules(replay).filter(|m| is_called(model, m.module.kind, name));
+                let which = if nth == 1 {
+                    format!("there is no `{name}`")
+                } else {
+                    format!("there are not {nth} `{name}`")
+                };
+                found(all.nth(nth - 1), which)
+            }
+            _ => Err(misused(commands::find("inspect").expect("it is one"))),
+        }
+    }
+
+    /// `inspect N | NAME [N] | LINEAGE`
+    pub fn inspect(&mut self, rest: &[String], desk: &Desk) -> Result<(), Fault> {
+        let (number, lineage) = self.find(rest)?;
+        let limit = self.horizon(self.time().unwrap_or(0.0));
+        let session = self.session;
+        let model = &session.model;
+        let replay = self.replay()?;
+        let t = replay.time();
+        let Some(all) = replay.simulation().inspect(t, number - 1) else {
+            return Err(Fault::new("this module cannot be looked at now"));
+        };
+        let line = |span: crate::diagnostic::Span| session.source.position(span.start).0;
+        let count = modules(replay).count();
+        let name = |seen: &Seen| describe(model, seen.kind, &seen.parameters);
+        let mut out = format!("{}\n", name(&all.module));
+        let ago = brief(t - all.birth, 6);
+        out += &format!(
+            "  module {number} of {count}, lineage {lineage}, born at t = {} ({ago} old)\n",
+            brief(all.birth, 9)
+        );
+        match all.rule {
+            Some(rule) => {
+                out +=
+                    &format!("  rule      {}, line {}", model.rules[rule].label, line(model.rules[rule].span))
+            }
+            None if model.kinds.get(all.module.kind).rules.is_empty() => {
+                out += "  rule      none: it stays as it is"
+            }
+            None => out += "  rule      none whose context is there: it stays as it is",
+        }
+        if let (Some(rule), Some(solve)) = (all.rule, all.solve) {
+            out += &format!("; equations of line {}", line(model.rules[rule].solves[solve].span));
+        }
+        out.push('\n');
+        let names = match all.rule {
+            Some(rule) => model.rules[rule].parameters.clone(),
+            None => parameter_names(model, all.module.kind),
+        };
+        let mut rows = Vec::new();
+        for (i, value) in all.module.parameters.iter().enumerate() {
+            let parameter = names.get(i).cloned().unwrap_or_default();
+            let rate = all.rates.get(i).copied().unwrap_or(0.0);
+            rows.push([parameter.clone(), brief(*value, 9), format!("d{parameter}/dt"), brief(rate, 9)]);
+        }
+        let width = |k: usize| rows.iter().map(|row: &[String; 4]| row[k].chars().count()).max().unwrap_or(0);
+        let [a, b, c] = [width(0), width(1), width(2)];
+        for ([parameter, value, rate, of], i) in rows.iter().zip(0..) {
+            let title = if i == 0 { "state" } else { "" };
+            out += &format!("  {title:8}  {parameter:a$} = {value:b$}   {rate:c$} = {of}\n");
+        }
+        let mut neighbour = |title: &str, seen: &Option<Seen>| {
+            let Some(seen) = seen else {
+                out += &format!("  {title:8}  none\n");
+                return;
+            };
+            let at = modules(replay).find(|m| m.module.lineage == seen.lineage).map_or(0, |m| m.number);
+            let read = if all.context.iter().any(|other| other.lineage == seen.lineage) {
+                ", in the rule's context"
+            } else {
+                ""
+            };
+            out += &format!("  {title:8}  {} (module {at}{read})\n", name(seen));
+        };
+        neighbour("left", &all.left);
+        neighbour("right", &all.right);
+        let apart =
+            |seen: &&Seen| [&all.left, &all.right].into_iter().flatten().all(|n| n.lineage != seen.lineage);
+        for seen in all.context.iter().filter(apart) {
+            out += &format!("  context   {}\n", name(seen));
+        }
+        match replay.end_of(lineage, limit) {
+            Some(event) => {
+                let rule = &model.rules[event.rule];
+                let clause = line(rule.produces[event.clause].span);
+                out += &format!(
+                    "  next      replaced at t = {}, by line {clause} ({})\n",
+                    brief(event.time, 9),
+                    rule.label
+                );
+            }
+            None => out += &format!("  next      nothing up to t = {}\n", brief(limit, 9)),
+        }
+        desk.say(&out)
+    }
+
+    /// `events [N | all] [NAME]`
+    pub fn events(&mut self, rest: &[String], desk: &Desk) -> Result<(), Fault> {
+        let session = self.session;
+        let model = &session.model;
+        let (most, rest) = match rest {
+            [first, rest @ ..] if first == "all" => (usize::MAX, rest),
+            [first, rest @ ..] if first.starts_with(|c: char| c.is_ascii_digit()) => match first.parse() {
+                Ok(n) => (n, rest),
+                Err(_) => return Err(Fault::new(format!("`{first}` is not a number"))),
+            },
+            rest => (MOST_EVENTS, rest),
+        };
+        let name = match rest {
+            [] => None,
+            [name] => Some(known_name(model, name)?),
+            _ => return Err(misused(commands::find("events").expect("it is one"))),
+        };
+        let replay = self.replay()?;
+        let wanted = |kind: KindId| name.is_none_or(|name| is_called(model, kind, name));
+        let count = replay.events().filter(|event| wanted(event.kind)).count();
+        let forgotten = replay.forgotten_events();
+        if count == 0 {
+            return desk.say("no productions so far\n");
+        }
+        let mut out = String::new();
+        if forgotten > 0 {
+            out += &format!("the first {forgotten} productions of the run are forgotten\n");
+        }
+        if count > most {
+            out += &format!("the last {most} of {count}; `events all` lists all\n");
+        }
+        let rows = replay.events().filter(|event| wanted(event.kind)).skip(count.saturating_sub(most)).map(
+            |event| {
+                let rule = &model.rules[event.rule];
+                let (line, _) = session.source.position(rule.produces[event.clause].span.start);
+                [
+                    brief(event.time, 9),
+                    model.kinds.get(event.kind).name.clone(),
+                    format!("line {line}"),
+                    event.lineage.to_string(),
+                ]
+            },
+        );
+        out += &columns(["t", "module", "replaced by", "lineage"], rows.collect());
+        desk.say(&out)
+    }
+}
+
+/// The string as it would be typed.
+fn string(model: &Model, replay: &Replay, width: usize, most: usize) -> String {
+    let (mut out, mut lines, mut line, mut shown) = (String::new(), 0, String::new(), 0);
+    let all = replay.string();
+    let count = |range: std::ops::Range<usize>| range.filter(|i| !all.get(*i).kind.is_bracket()).count();
+    for (i, module) in all.iter().enumerate() {
+        let text = describe(model, module.kind, module.parameters);
+        if !line.is_empty() && 2 + line.chars().count() + 1 + text.chars().count() > width {
+            out += &format!("  {line}\n");
+            line.clear();
+            lines += 1;
+            if lines >= most {
+                let rest = count(i..all.len());
+                return out
+                    + &format!(
+                        "… {rest} more modules; `show all` prints them, `show NAME` those of one name\n"
+                    );
+            }
+        }
+        if !line.is_empty() {
+            line.push(' ');
+        }
+        line += &text;
+        shown += 1;
+    }
+    if shown == 0 {
+        return "  ε\n".to_owned();
+    }
+    out + &format!("  {line}\n")
+}
+
+/// Modules with numbers, ages and lineages.
+fn table<'a>(model: &Model, rows: impl Iterator<Item = Numbered<'a>>, most: usize) -> Result<String, Fault> {
+    let mut all = rows.peekable();
+    if all.peek().is_none() {
+        return Ok("there are none at present\n".to_owned());
+    }
+    let row = |m: Numbered| {
+        let module = &m.module;
+        [
+            m.number.to_string(),
+            describe(model, module.kind, module.parameters),
+            brief(module.age, 6),
+            module.lineage.to_string(),
+        ]
+    };
+    let shown: Vec<[String; 4]> = all.by_ref().take(most).map(row).collect();
+    let mut text = columns(["#", "module", "age", "lineage"], shown);
+    match all.count() {
+        0 => {}
+        more => text += &format!("… {more} more; `all` after the name prints them\n"),
+    }
+    Ok(text)
+}
+
+/// Rows under headings, each column as wide as it must be.
+fn columns(heads: [&str; 4], rows: Vec<[String; 4]>) -> String {
+    let mut all = vec![heads.map(str::to_owned)];
+    all.extend(rows);
+    let width = |k: usize| all.iter().map(|row| row[k].chars().count()).max().unwrap_or(0);
+    let [a, b, c] = [width(0), width(1), width(2)];
+    let mut out = String::new();
+    for [w, x, y, z] in &all {
+        out += format!("  {w:>a$}  {x:b$}  {y:c$}  {z}").trim_end();
+        out.push('\n');
+    }
+    out
+}

@@ -1,0 +1,27 @@
+//! The live viewer: a growing plant as something to walk around.
+//!
+//! ```text
+//! Scene ──▶ Stage ──▶ Recording ──▶ page (one HTML file that plays it)
+//! ```
+//!
+//! - [`Stage`]: a scene as a graphics processor takes it. What repeats (a surface, the side of a stem, a patch) is a
+//!   form; each thing is a few numbers that place its form. All of them are points or differences of points, so halfway
+//!   between two stages is halfway between their numbers.
+//! - [`Recording`]: stages over time, each thing followed by the lineage of its module.
+//! - [`page`]: the recording, a player and the shaders in one file that needs no network.
+//!
+//! The shaders (`shaders/`) have no version line: whoever compiles them puts it first.
+
+mod encode;
+mod forms;
+mod history;
+pub mod page;
+mod recording;
+mod stage;
+mod track;
+
+pub use forms::{Forms, MeshForm, MeshVertex};
+pub use history::{Happening, History};
+pub use recording::{Recorder, Recording, TooMuch};
+pub use stage::{Form, Item, Key, Look, Stage};
+pub use track::Track;
