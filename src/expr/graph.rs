@@ -125,6 +125,12 @@ impl Graph {
         Some(Integral { whole: self.curve(curve, whole, argument), argument })
     }
 
+    /// True if [`Graph::integral_of`] knows an antiderivative.
+    pub fn integral_is_known(&self, id: NodeId) -> bool {
+        let part = |part| matches!(part, Part::Value | Part::Slope | Part::Second | Part::PhaseSlope);
+        self.integrals.contains_key(&id) || matches!(self.node(id), Node::Curve(_, p, _) if part(p))
+    }
+
     /// Those of the given expressions of which [`Graph::know_integral`] was told.
     pub fn noted_integrals(&self, among: &[NodeId]) -> Vec<(NodeId, Integral)> {
         if self.integrals.is_empty() {

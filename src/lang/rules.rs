@@ -252,7 +252,7 @@ impl RuleBuilder<'_> {
                 Action::Solve(equations) => {
                     let rates = self.equations(equations, &rule.predecessor, &variables);
                     let (rates, switches) = match rates {
-                        Some(rates) => self.smooth(rates, count, clause.span, &mut atoms)?,
+                        Some(rates) => self.smooth(rates, own, count, clause.span, &mut atoms)?,
                         None => {
                             good = false;
                             continue;

@@ -13,6 +13,7 @@
 mod analysis;
 mod appearance;
 mod condition;
+mod driven;
 mod invariance;
 mod kind;
 mod law;
@@ -22,6 +23,7 @@ pub use analysis::{Draft, analyse};
 pub use appearance::{
     Appearance, BUILT_IN_COLORS, Contour, Gradient, NamedColor, Net, Rgb, SurfaceShape, Tropism,
 };
+pub use driven::{Driven, DrivenForm, Flow, driven_form, outside_of_drivers};
 pub use condition::{Comparison, Condition, Sign, Step, Truth};
 pub use invariance::never_reached;
 pub use kind::{

@@ -148,7 +148,7 @@ impl Simulation<'_> {
                         }
                         moved
                     }
-                    Law::Sum { .. } | Law::Numeric(_) => continue,
+                    Law::Sum { .. } | Law::Driven(_) | Law::Numeric(_) => continue,
                 };
                 for (row, &x) in rows.iter().zip(&moved) {
                     let to = row.to as usize + parameter;

@@ -2,14 +2,14 @@
 
 use super::dense::Dense;
 use super::error::Error;
-use super::motion::{Motion, Riccati, Terms};
+use super::motion::{Driven, Flow, Growth, Motion, Pace, Riccati, Terms};
 use super::plant::{Path, Plant};
 use super::queue::Who;
 use super::simulation::Simulation;
 use super::state::{Change, Next, What};
 use super::watch::needs_search;
 use crate::expr::Value;
-use crate::model::{Law, Sign, Solve};
+use crate::model::{self, Law, Sign, Solve};
 use crate::structure::{Instant, ModuleId};
 use smallvec::SmallVec;
 
@@ -115,6 +115,10 @@ impl Simulation<'_> {
                     motions[parameter] = Motion::Riccati(riccati);
                 }
                 Law::Sum { .. } => sums_follow = true,
+                Law::Driven(driven) => match self.driven(driven, parameter, time) {
+                    Some(motion) => motions[parameter] = motion,
+                    None => return false,
+                },
                 Law::Numeric(_) => {}
             }
         }
@@ -125,6 +129,27 @@ impl Simulation<'_> {
             motions[solve.of[position]] = Motion::Step(component as u32);
         }
         motions.iter().zip(&self.variables).all(|(m, _)| !m.is_formula() || m.rate(0.0).is_finite())
+    }
+
+    /// The motion of a parameter at a pace; None if its formula does not hold for these numbers.
+    fn driven(&mut self, law: &crate::model::Driven, parameter: usize, time: usize) -> Option<Motion> {
+        let mut c = [0.0; 3];
+        let coefficients = &mut c[..law.coefficients.outputs()];
+        law.coefficients.eval(&self.variables, &mut self.scratch, coefficients);
+        if coefficients.iter().any(|c| !c.is_finite()) {
+            return None;
+        }
+        let x = self.variables[parameter];
+        let flow = match law.flow {
+            model::Flow::Quadratic => Flow::quadratic(x, c[0], c[1], c[2]),
+            model::Flow::Gompertz => Flow::Growth(Growth::gompertz(x, c[0], c[1])?),
+            model::Flow::Bernoulli => Flow::Growth(Growth::bernoulli(x, c[0], c[1], c[2])?),
+        };
+        let pace = match &law.pace {
+            Some(program) => Some(Pace::new(program.clone(), &self.variables, time)?),
+            None => None,
+        };
+        Some(Motion::Driven(Box::new(Driven::new(flow, pace))))
     }
 
     /// The motions that are sums, those that others depend on first.

@@ -3,9 +3,13 @@
 //! Time is counted from the start of the motion, values as displacements from the value there, so that a module born
 //! at t = 1e9 moves as precisely as one born at 0.
 
+mod driven;
+mod growth;
 mod riccati;
 mod sum;
 
+pub use driven::{Driven, Flow, Pace};
+pub use growth::Growth;
 pub use riccati::Riccati;
 pub use sum::{Sum, Terms};
 
@@ -21,6 +25,7 @@ pub enum Motion {
     Polynomial([f64; 4]),
     Riccati(Riccati),
     Sum(Box<Sum>),
+    Driven(Box<Driven>),
     /// Dense output of a step of the module itself: the number of the component.
     Step(u32),
     /// Dense output of the coupled modules: the number of the component.
@@ -40,6 +45,7 @@ impl Motion {
             Motion::Polynomial(c) => tau * (c[0] + tau * (c[1] + tau * (c[2] + tau * c[3]))),
             Motion::Riccati(law) => law.value(tau),
             Motion::Sum(sum) => sum.value(tau),
+            Motion::Driven(driven) => driven.value(tau),
             Motion::Step(_) | Motion::Coupled(_) => f64::NAN,
         }
     }
@@ -50,6 +56,7 @@ impl Motion {
             Motion::Polynomial(c) => c[0] + tau * (2.0 * c[1] + tau * (3.0 * c[2] + tau * 4.0 * c[3])),
             Motion::Riccati(law) => law.rate(law.value(tau)),
             Motion::Sum(sum) => sum.rate(tau),
+            Motion::Driven(driven) => driven.rate(tau),
             Motion::Step(_) | Motion::Coupled(_) => f64::NAN,
         }
     }
@@ -61,6 +68,7 @@ impl Motion {
             Motion::Polynomial(c) => bound_polynomial(c, from, to),
             Motion::Riccati(law) => law.over(from, to),
             Motion::Sum(sum) => sum.over(from, to),
+            Motion::Driven(driven) => driven.over(from, to),
             Motion::Step(_) | Motion::Coupled(_) => Dual { value: Interval::ENTIRE, rate: Interval::ENTIRE },
         }
     }
@@ -74,6 +82,7 @@ impl Motion {
                 (tau > 0.0 && tau.is_finite()).then_some(tau)
             }
             Motion::Riccati(law) => law.reach(u, rate),
+            Motion::Driven(driven) => driven.reach(u, rate),
             _ => None,
         }
     }
@@ -82,6 +91,7 @@ impl Motion {
     pub fn end(&self) -> Option<f64> {
         match self {
             Motion::Riccati(law) => law.pole(),
+            Motion::Driven(driven) => driven.end(),
             _ => None,
         }
     }
@@ -96,7 +106,7 @@ impl Motion {
                 if d == 0.0 { Terms::affine(x, f) } else { Terms::exponential(x - f / d, f / d, d) }
             }),
             Motion::Sum(sum) => Some(sum.terms(x)),
-            Motion::Step(_) | Motion::Coupled(_) => None,
+            Motion::Driven(_) | Motion::Step(_) | Motion::Coupled(_) => None,
         }
     }
 }
