@@ -30,6 +30,7 @@ pub fn usage(declaration: &str) -> &'static str {
         "param" => "NAME = VALUE in LOW .. HIGH",
         "def" => "NAME(x, …) = EXPRESSION",
         "angle" => "DEGREES",
+        "period" => "DURATION",
         "frames" => "FROM .. TO step STEP",
         "color" => "NAME = \"#rrggbb\"",
         "gradient" => "NAME = \"#rrggbb\", \"#rrggbb\", …",

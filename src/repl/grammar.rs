@@ -127,7 +127,8 @@ pub fn is_complete(input: &str) -> bool {
         Some(Line::Clause) => return input.ends_with('\n') || !is_open(&format!("x: {input}")),
         _ => return true,
     }
-    if input.ends_with('\n') && input.lines().last().is_some_and(|line| line.trim().is_empty()) {
+    let last = input.rsplit('\n').next().unwrap_or("");
+    if input.contains('\n') && last.trim().is_empty() {
         return true;
     }
     let several = input.trim_end().contains('\n');

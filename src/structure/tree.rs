@@ -497,7 +497,7 @@ mod tests {
 
     #[test]
     fn what_is_cut_leaves_room_for_others() {
-        let (mut kinds, mut tree) = grown("A[B[C]%D[E[F]G]H]I", &[]);
+        let (mut kinds, mut tree) = grown("A[B[C]%D[E[F]G]H]IXYZ", &[]);
         let more = string(&mut kinds, "XY[Z]");
         let cut = kinds.find("%", 0).expect("%");
         let find = |tree: &Tree, kind| {
@@ -507,7 +507,7 @@ mod tests {
         let cut = find(&tree, cut);
         assert_eq!(tree.following(cut).len(), 5);
         tree.cut(cut, |slot| slot as usize == cut.slot());
-        assert_eq!((show(&kinds, &tree).as_str(), tree.len()), ("A[B[C]]I", 4));
+        assert_eq!((show(&kinds, &tree).as_str(), tree.len()), ("A[B[C]]IXYZ", 7));
         assert!(!tree.is_alive(cut));
         let mut made = Vec::new();
         for _ in 0..3 {
@@ -517,7 +517,7 @@ mod tests {
             tree.replace(last, &b, &[], Instant::ZERO, family, &mut made);
             tree.append(&more, &[], Instant::ZERO, Family::AXIOM, &mut made);
         }
-        assert_eq!(show(&kinds, &tree), "A[B[A][A][A][C]]IXY[Z]XY[Z]XY[Z]");
+        assert_eq!(show(&kinds, &tree), "A[B[A][A][A][C]]IXYZXY[Z]XY[Z]XY[Z]");
         assert!(made.iter().all(|id| id.slot() != cut.slot()), "its slot is kept");
     }
 

@@ -48,6 +48,8 @@ fn symbols(text: &str) -> Vec<String> {
     out
 }
 
+type Count = (&'static str, fn(i64) -> i64);
+
 struct Figure {
     /// In the book.
     place: &'static str,
@@ -55,7 +57,7 @@ struct Figure {
     rules: &'static [(&'static str, &'static str)],
     steps: usize,
     /// A symbol, and how many there are after n steps.
-    counts: &'static [(&'static str, fn(i64) -> i64)],
+    counts: &'static [Count],
 }
 
 fn power(base: i64, n: i64) -> i64 {
@@ -477,7 +479,7 @@ fn the_page_on_discrete_rules_tells_what_happens() {
     for (i, (step, grown)) in steps.iter().zip(&growth).enumerate() {
         let segments = |text: &str| text.split(' ').filter(|m| m.starts_with('F')).count();
         assert_eq!(segments(step), segments(grown));
-        assert_eq!(grown.matches("F(0,").count(), 1 << i);
+        assert_eq!(grown.matches("F_g(0,").count(), 1 << i);
     }
     for model in std::fs::read_dir(repository("models/abop")).expect("there") {
         let text = std::fs::read_to_string(model.expect("there").path()).expect("there");
