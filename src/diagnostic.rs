@@ -227,10 +227,9 @@ impl Diagnostic {
                 labels.remove(0);
                 continue;
             }
-            let mut snippet =
-                Snippet::source(&source.text[range.clone()])
-                    .line_start(source.position(span.start).0)
-                    .path(source.name_of(span.start));
+            let mut snippet = Snippet::source(&source.text[range.clone()])
+                .line_start(source.position(span.start).0)
+                .path(source.name_of(span.start));
             let first_label = std::ptr::eq(*labels.first().expect("not empty"), &self.labels[0]);
             let mut kind = if first_label { AnnotationKind::Primary } else { AnnotationKind::Context };
             labels.retain(|(other, remark)| {

@@ -99,7 +99,11 @@ impl Expressions {
     pub fn iter_within(&self, first: ExprId, last: Option<Span>) -> impl Iterator<Item = &Expr> {
         let end = last.map_or(u32::MAX, |span| span.end);
         let from = first.0 as usize;
-        self.nodes[from..].iter().zip(&self.spans[from..]).take_while(move |(_, s)| s.start < end).map(|n| n.0)
+        self.nodes[from..]
+            .iter()
+            .zip(&self.spans[from..])
+            .take_while(move |(_, s)| s.start < end)
+            .map(|n| n.0)
     }
 
     /// Widens the place of a node in the text, as parentheses do.

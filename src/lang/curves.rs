@@ -70,10 +70,14 @@ impl Scope {
                         let line = |i: usize| format!("line {} of the file", rows[i].line);
                         match made {
                             Err(CurveFault::NotAscending(i)) => {
-                                let what = format!("{}: its first number is not greater than the one before", line(i));
-                                self.diagnostics.push(unreadable(name, file.span, &what).help(
-                                    "the first column is the argument, and must ascend",
-                                ));
+                                let what = format!(
+                                    "{}: its first number is not greater than the one before",
+                                    line(i)
+                                );
+                                self.diagnostics.push(
+                                    unreadable(name, file.span, &what)
+                                        .help("the first column is the argument, and must ascend"),
+                                );
                                 None
                             }
                             made => self.curve_or_error(name, span, &|_| file.span, "row", made),
@@ -84,7 +88,11 @@ impl Scope {
                             Some(line) => format!("{}, line {line}: {}", file.text, fault.what),
                             None => fault.what,
                         };
-                        let at = if fault.of_column { column.as_ref().map_or(file.span, |c| c.span) } else { file.span };
+                        let at = if fault.of_column {
+                            column.as_ref().map_or(file.span, |c| c.span)
+                        } else {
+                            file.span
+                        };
                         self.diagnostics.push(unreadable(name, at, &place).help_opt(fault.help));
                         None
                     }
@@ -189,9 +197,19 @@ impl Scope {
         if given == wanted {
             return Some(());
         }
+        let form = FUNCTIONALS.iter().find(|(name, _)| *name == what);
         self.diagnostics.push(
-            Diagnostic::error(format!("`{what}` has {} here, not {}", plural(wanted + 1, "argument"), given + 1))
-                .at(span, format!("{} given", plural(given + 1, "argument"))),
+            Diagnostic::error(format!(
+                "`{what}` has {} here, not {}",
+                plural(wanted + 1, "argument"),
+                given + 1
+            ))
+            .at(span, format!("{} given", plural(given + 1, "argument")))
+            .help_opt(
+                form.map(|(_, form)| {
+                    format!("it is written `{form}`; of a function the other arguments follow")
+                }),
+            ),
         );
         None
     }
@@ -236,7 +254,8 @@ impl Scope {
         self.used.insert(name.clone());
         let ends = usize::from(what == "integral");
         self.arguments(what, span, nodes.len(), function.parameters + ends)?;
-        let related = function.library.then(|| self.functions.get(&*format!("{name}_{what}")).cloned()).flatten();
+        let related =
+            function.library.then(|| self.functions.get(&*format!("{name}_{what}")).cloned()).flatten();
         match (what, related) {
             ("slope", Some(slope)) => {
                 let slope = self.inline(&slope, nodes, span)?.node;
@@ -249,7 +268,8 @@ impl Scope {
                 let node = self.graph.derivative(body, FORMAL);
                 let body = Some(Lowered { node, is_condition: false });
                 let slope = super::scope::Function { body, ..function.clone() };
-                let (slope, whole) = (self.inline(&slope, nodes, span)?, self.inline(&function, nodes, span)?);
+                let (slope, whole) =
+                    (self.inline(&slope, nodes, span)?, self.inline(&function, nodes, span)?);
                 let integral = Integral { whole: whole.node, argument: nodes[0] };
                 // Where the function jumps or bends, its slope tells nothing of the jump.
                 if self.is_smooth(integral.whole) {
@@ -259,7 +279,8 @@ impl Scope {
             }
             ("integral", Some(integral)) => {
                 let at = |me: &mut Scope, i: usize| {
-                    let arguments: Vec<NodeId> = std::iter::once(nodes[i]).chain(nodes[2..].iter().copied()).collect();
+                    let arguments: Vec<NodeId> =
+                        std::iter::once(nodes[i]).chain(nodes[2..].iter().copied()).collect();
                     me.inline(&integral, &arguments, span).map(|whole| whole.node)
                 };
                 let (from, to) = (at(self, 0)?, at(self, 1)?);
@@ -284,8 +305,12 @@ impl Scope {
     fn is_smooth(&self, root: NodeId) -> bool {
         use crate::expr::Node;
         !self.graph.reachable(&[root]).into_iter().any(|id| match self.graph.node(id) {
-            Node::Select(..) | Node::Binary(Binary::Min | Binary::Max | Binary::Atan2, ..) | Node::Element(..) => true,
-            Node::Unary(op, _) => matches!(op, Unary::Abs | Unary::Sign | Unary::Floor | Unary::Ceil | Unary::Tan),
+            Node::Select(..)
+            | Node::Binary(Binary::Min | Binary::Max | Binary::Atan2, ..)
+            | Node::Element(..) => true,
+            Node::Unary(op, _) => {
+                matches!(op, Unary::Abs | Unary::Sign | Unary::Floor | Unary::Ceil | Unary::Tan)
+            }
             _ => false,
         })
     }
@@ -321,7 +346,9 @@ impl Scope {
         let near = did_you_mean(name, self.arrays.keys().filter(|_| self.suggests()).map(|n| &**n));
         let help = near.or_else(|| Some(format!("declare it: `const {name} = [1, 2, 3]`")));
         self.diagnostics.push(
-            Diagnostic::error(format!("there is no array `{name}`")).at(at, "only arrays have elements").help_opt(help),
+            Diagnostic::error(format!("there is no array `{name}`"))
+                .at(at, "only arrays have elements")
+                .help_opt(help),
         );
         None
     }
@@ -336,7 +363,10 @@ impl Scope {
             self.diagnostics.push(
                 Diagnostic::error(format!("the array `{name}` has no element {i}"))
                     .at(span, format!("it has {}", plural(known.values.len(), "element")))
-                    .help(format!("elements are counted from 0: the last one is `{name}[{}]`", known.values.len() - 1)),
+                    .help(format!(
+                        "elements are counted from 0: the last one is `{name}[{}]`",
+                        known.values.len() - 1
+                    )),
             );
             return None;
         }

@@ -7,8 +7,8 @@ use super::Setting;
 use super::appearance::first_gradient;
 use super::ast::{Document, Expr, ExprId, Expression, Item, Name};
 use super::scope::{RESERVED, Scope};
-use super::surface::Files;
 use super::suggest::did_you_mean;
+use super::surface::Files;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::model::{BUILT_IN_COLORS, Parameter};
 
@@ -190,7 +190,9 @@ fn parameter(
 /// The global names that an expression mentions, in order.
 fn mentions(document: &Document, expression: Expression) -> impl Iterator<Item = (&Arc<str>, Span)> {
     (expression.first.0..=expression.root.0).filter_map(|id| match document.expressions.get(ExprId(id)) {
-        Expr::Name(name) | Expr::Call(name, _) | Expr::Index(name, _) => Some((name, document.expressions.span(ExprId(id)))),
+        Expr::Name(name) | Expr::Call(name, _) | Expr::Index(name, _) => {
+            Some((name, document.expressions.span(ExprId(id))))
+        }
         _ => None,
     })
 }

@@ -31,7 +31,8 @@ pub fn read(source: &Source, files: &dyn Files) -> (Option<Source>, Document, Ve
     let mut whole = None;
     let items = if includes {
         let source = whole.insert(source.clone());
-        let mut inclusion = Inclusion { reader: &mut reader, source, files, chain: vec![], seen: HashMap::new() };
+        let mut inclusion =
+            Inclusion { reader: &mut reader, source, files, chain: vec![], seen: HashMap::new() };
         inclusion.expand(items)
     } else {
         items
@@ -67,6 +68,12 @@ fn wants_library(document: &Document) -> bool {
 pub fn library_names<'n>() -> impl Iterator<Item = &'n str> {
     let names = LIBRARY.lines().filter_map(|line| line.strip_prefix("def ")?.split_once('('));
     names.map(|(name, _)| name)
+}
+
+/// How a function of the library is called.
+pub fn library_usage(name: &str) -> Option<&'static str> {
+    let mut calls = LIBRARY.lines().filter_map(|line| Some(line.strip_prefix("def ")?.split_once(" = ")?.0));
+    calls.find(|call| call.split_once('(').is_some_and(|(known, _)| known == name))
 }
 
 /// The global name that an item declares.
@@ -131,7 +138,8 @@ impl Inclusion<'_> {
 
     /// The name and the text of a file; None if it has been read before.
     fn open(&self, file: &Text) -> Result<Option<(Arc<str>, String)>, Box<Diagnostic>> {
-        let fault = |what: &str| Diagnostic::error(format!("`{}` cannot be included", file.text)).at(file.span, what);
+        let fault =
+            |what: &str| Diagnostic::error(format!("`{}` cannot be included", file.text)).at(file.span, what);
         if !super::surface::is_inside(&file.text) {
             return Err(Box::new(fault("the path leaves the model's folder").help(
                 "included files stand in the folder of the model or below it, or in a folder given with `--include-path DIR`, \
@@ -157,7 +165,8 @@ impl Inclusion<'_> {
         }
         if self.seen.len() >= MAX_FILES {
             return Err(Box::new(
-                fault(&format!("a model has at most {MAX_FILES} included files")).help("put several of them into one"),
+                fault(&format!("a model has at most {MAX_FILES} included files"))
+                    .help("put several of them into one"),
             ));
         }
         let room = Source::LIMIT.saturating_sub(self.source.text.len()) as u64;
@@ -167,7 +176,8 @@ impl Inclusion<'_> {
             ))
         })?;
         let text = String::from_utf8(bytes).map_err(|error| {
-            let line = error.as_bytes()[..error.utf8_error().valid_up_to()].iter().filter(|b| **b == b'\n').count();
+            let line =
+                error.as_bytes()[..error.utf8_error().valid_up_to()].iter().filter(|b| **b == b'\n').count();
             Box::new(
                 fault(&format!("line {} of it is not valid UTF-8", line + 1))
                     .help("save the file as UTF-8 (in most editors: “Save with encoding”)"),

@@ -324,8 +324,7 @@ impl Scanner<'_> {
             && follows(1) == Some(Token::Word)
             && tokens.get(2).is_some_and(|t| &self.text[t.1..t.2] == "=");
         let case = word == "case" && (self.matching || self.level_matches());
-        let clause =
-            matches!(word, "if" | "solve" | "produce") && !self.items.is_empty() || is_let || case;
+        let clause = matches!(word, "if" | "solve" | "produce") && !self.items.is_empty() || is_let || case;
         // So is one with an arrow; and the head of a discrete rule may have been on the line before.
         let goes_on = self.items.last().is_some_and(|i| i.kind == ItemKind::Step) && !self.in_string;
         if arrow && !clause && !goes_on {
@@ -520,7 +519,9 @@ impl Scanner<'_> {
                 self.count_if(true);
                 Last::Operator
             }
-            "match" if in_expression && matches!(self.next, Some(Token::Word | Token::Number | Token::Open)) => {
+            "match"
+                if in_expression && matches!(self.next, Some(Token::Word | Token::Number | Token::Open)) =>
+            {
                 self.count_if(true);
                 self.level().matching = true;
                 Last::Operator
@@ -532,7 +533,7 @@ impl Scanner<'_> {
                 self.pending -= dropped;
                 Last::Operator
             }
-            "let" if in_rule && !inside && !self.in_string => {
+            "let" if in_rule && !inside && !self.in_string && self.next == Some(Token::Word) => {
                 self.forget_pending();
                 Last::Operator
             }

@@ -10,12 +10,14 @@
 mod appearance;
 pub mod ast;
 mod check;
+mod choice;
 mod curves;
 pub mod format;
 mod globals;
 mod include;
 mod layout;
 mod lexeme;
+mod locals;
 pub mod outline;
 pub mod parse;
 pub mod print;

@@ -95,9 +95,10 @@ pub fn expression(expressions: &Expressions, root: ExprId) -> String {
                 }
                 // Only a name, a call or a parenthesis can stand directly behind a number.
                 let first = leftmost(expressions, *a);
-                let bare = matches!(first, Expr::Name(_) | Expr::Call(..) | Expr::Index(..) | Expr::Parenthesis(_))
-                    && strength(expressions.get(*a)) >= own
-                    && !exponent_like(first);
+                let bare =
+                    matches!(first, Expr::Name(_) | Expr::Call(..) | Expr::Index(..) | Expr::Parenthesis(_))
+                        && strength(expressions.get(*a)) >= own
+                        && !exponent_like(first);
                 if bare {
                     parts.push(Task::Node(*a, own));
                 } else {

@@ -38,7 +38,7 @@ pub(super) struct Atoms {
 }
 
 impl RuleBuilder<'_> {
-    fn error(&mut self, error: Diagnostic) {
+    pub(super) fn error(&mut self, error: Diagnostic) {
         self.scope.diagnostics.push(error);
     }
 
@@ -163,7 +163,7 @@ impl RuleBuilder<'_> {
             names.insert(name.into(), node);
             count += 1;
         }
-        (Variables { names, no_time: None }, count as usize)
+        (Variables { names, ..Variables::default() }, count as usize)
     }
 
     fn not_a_bracket(&mut self, head: &HeadModule) -> bool {
@@ -320,50 +320,6 @@ impl RuleBuilder<'_> {
         Some((compiled, draft))
     }
 
-    /// Makes the names of `let` lines known, each to those after it; false if one is at fault.
-    fn locals(&mut self, rule: &ast::Rule, variables: &mut Variables) -> bool {
-        let mut good = true;
-        let mut seen: HashMap<&str, Span> = HashMap::new();
-        for (name, value) in &rule.locals {
-            let text = &name.text;
-            let node = self.scope.number(&self.document.expressions, *value, variables);
-            let error = if RESERVED.contains(&&**text) || Scope::is_built_in(text) {
-                let what =
-                    if RESERVED.contains(&&**text) { "stands for time in every rule" } else { "is built in" };
-                Some(Diagnostic::error(format!("`{text}` {what} and cannot be declared")))
-            } else if let Some(before) = seen.insert(text, name.span) {
-                let twice = Diagnostic::error(format!("two `let` lines of this rule are called `{text}`"));
-                Some(twice.at(name.span, "the second one").at(before, "the first one"))
-            } else if variables.names.contains_key(text) {
-                let error = Diagnostic::error(format!("`{text}` is a parameter of this rule already"));
-                Some(error.at(name.span, "this would hide it").at(rule.head, "the head of the rule"))
-            } else {
-                None
-            };
-            if let Some(error) = error {
-                let error = if error.labels.is_empty() { error.at(name.span, "this one") } else { error };
-                self.error(error.help("choose another name"));
-                good = false;
-            } else if let Some(node) = node {
-                variables.names.insert(text.clone(), node);
-            } else {
-                // What uses it is not to blame.
-                self.scope.poison(text.clone());
-                good = false;
-            }
-        }
-        let used = |name: &str| mentions_after(&self.document.expressions, rule, name);
-        for (name, _) in &rule.locals {
-            if good && !used(&name.text) {
-                self.scope.diagnostics.push(
-                    Diagnostic::warning(format!("nobody uses the name `{}`", name.text))
-                        .at(name.span, "declared here"),
-                );
-            }
-        }
-        good
-    }
-
     /// The derivatives of a `solve`, by parameter; those that are the constant 0 are left out.
     fn equations(
         &mut self,
@@ -503,19 +459,15 @@ impl RuleBuilder<'_> {
     }
 }
 
-/// True if an expression of a rule mentions a name. Expressions of one item stand together in the arena.
-fn mentions_after(all: &ast::Expressions, rule: &ast::Rule, name: &str) -> bool {
-    let Some((_, first)) = rule.locals.first() else { return false };
-    all.iter_within(first.first, rule.clauses.last().map(|c| c.span))
-        .any(|expr| matches!(expr, ast::Expr::Name(other) if &**other == name))
-}
-
 fn not_a_parameter(name: &ast::Name, head: &HeadModule, variables: &Variables) -> Diagnostic {
     let known = head.parameters.iter().map(|p| &*p.text);
     let error =
         Diagnostic::error(format!("`{}` is no parameter of `{}`", name.text, print::head_module(head)))
             .at(name.span, "only the parameters of the strict predecessor have equations")
             .at(head.span, "the strict predecessor");
+    if variables.lets.contains_key(&name.text) {
+        return error.help("a `let` names an expression; nothing is stored that could be solved");
+    }
     if variables.names.contains_key(&name.text) && !RESERVED.contains(&&*name.text) {
         return error
             .help("this is a parameter of a neighbour; its equation belongs into the neighbour's rule");

@@ -45,6 +45,8 @@ pub struct Variables {
     pub names: HashMap<Arc<str>, NodeId>,
     /// What to tell somebody who uses `t` or `age` where they mean nothing; None where they are in `names`.
     pub no_time: Option<&'static str>,
+    /// Names of the rule's `let` lines, those that are not known yet too, and where they are declared.
+    pub lets: HashMap<Arc<str>, Span>,
 }
 
 /// The global names of a model, and the graph that its expressions are built in.
@@ -169,7 +171,12 @@ impl Scope {
         None
     }
 
-    pub(super) fn expect_number(&mut self, all: &Expressions, id: ExprId, lowered: Lowered) -> Option<NodeId> {
+    pub(super) fn expect_number(
+        &mut self,
+        all: &Expressions,
+        id: ExprId,
+        lowered: Lowered,
+    ) -> Option<NodeId> {
         if !lowered.is_condition {
             return Some(lowered.node);
         }
@@ -241,34 +248,7 @@ impl Scope {
                 number(self.element(name, index, span)?)
             }
             Expr::Match(subject, cases, otherwise) => {
-                let node = self.expect_number(all, *subject, done(*subject)?);
-                let mut whole = self.expect_number(all, *otherwise, done(*otherwise)?);
-                let mut seen: Vec<(NodeId, ExprId)> = Vec::new();
-                let mut links = Vec::new();
-                for (value, then) in cases {
-                    let case = self.expect_number(all, *value, done(*value)?)?;
-                    let then = self.expect_number(all, *then, done(*then)?)?;
-                    if let Some((_, before)) = seen.iter().find(|(known, _)| *known == case) {
-                        self.diagnostics.push(
-                            Diagnostic::error("two cases of one `match` are alike")
-                                .at(all.span(*value), "this one never has its turn")
-                                .at(all.span(*before), "this one comes first")
-                                .help("take one of them out, or give it another value"),
-                        );
-                        return None;
-                    }
-                    seen.push((case, *value));
-                    links.push((case, then, *value));
-                }
-                let node = node?;
-                for (case, then, value) in links.into_iter().rev() {
-                    let link = self.compare(Comparison::Equal, node, case);
-                    let sides = [*subject, value].map(|id| print::expression(all, id));
-                    let at = (all.span(*subject).to(all.span(value)), sides.join(" = ").into());
-                    self.comparisons.entry(link).or_insert(at);
-                    whole = Some(self.graph.select(link, then, whole?));
-                }
-                number(whole?)
+                number(self.choice(all, (*subject, cases, *otherwise), done)?)
             }
             Expr::Parenthesis(a) => done(*a),
             Expr::Negate(a) => {
@@ -334,7 +314,7 @@ impl Scope {
         }
     }
 
-    fn compare(&mut self, comparison: Comparison, a: NodeId, b: NodeId) -> NodeId {
+    pub(super) fn compare(&mut self, comparison: Comparison, a: NodeId, b: NodeId) -> NodeId {
         match comparison {
             Comparison::Less => self.graph.binary(Binary::Lt, a, b),
             Comparison::LessOrEqual => self.graph.binary(Binary::Le, a, b),
@@ -389,6 +369,13 @@ impl Scope {
                 did_you_mean(name, known).or_else(|| Some(format!("declare it: `const {name} = …`"))),
             )
         };
+        let error = match variables.lets.get(name) {
+            Some(later) => Diagnostic::error(format!("`{name}` is not known yet"))
+                .at(span, "used here")
+                .at(*later, "declared here")
+                .help("a `let` is known to what stands after it: change their order"),
+            None => error,
+        };
         self.diagnostics.push(error);
         None
     }
@@ -415,7 +402,8 @@ impl Scope {
                     plural(wanted, "parameter"),
                     nodes.len()
                 ))
-                .at(span, format!("{} given", plural(nodes.len(), "argument"))),
+                .at(span, format!("{} given", plural(nodes.len(), "argument")))
+                .help_opt(me.usage(name)),
             );
             None
         };
@@ -463,6 +451,18 @@ impl Scope {
         };
         self.diagnostics.push(error);
         None
+    }
+
+    /// How a curve or a function of the library is called.
+    fn usage(&self, name: &str) -> Option<String> {
+        if self.curves.contains_key(name) {
+            return Some(format!("a curve is a function of one number: `{name}(x)`"));
+        }
+        let library = self.functions.get(name).is_some_and(|function| function.library);
+        let usage = super::include::library_usage(name).filter(|_| library)?;
+        Some(format!(
+            "this function of the library is called `{usage}`; a `def` of your own with its name would win"
+        ))
     }
 
     /// A function's body with the arguments in place of its formal parameters.

@@ -36,14 +36,18 @@ impl RuleBuilder<'_> {
             let graph = &mut self.scope.graph;
             let outside = outside_of_drivers(graph, rate, &still, time).into_iter().collect();
             let known = frozen.conditions.len();
-            let gentle = frozen.take_out(graph, rate, &still, Some(&outside), &mut self.scope.comparisons, span);
+            let gentle =
+                frozen.take_out(graph, rate, &still, Some(&outside), &mut self.scope.comparisons, span);
             let driven = gentle_is_driven(graph, parameter, gentle, rate, &still, time);
-            smoothed.push((parameter, if driven {
-                gentle
-            } else {
-                frozen.conditions.truncate(known);
-                frozen.take_out(graph, rate, &still, None, &mut self.scope.comparisons, span)
-            }));
+            smoothed.push((
+                parameter,
+                if driven {
+                    gentle
+                } else {
+                    frozen.conditions.truncate(known);
+                    frozen.take_out(graph, rate, &still, None, &mut self.scope.comparisons, span)
+                },
+            ));
         }
         let mut switches = Vec::new();
         for condition in frozen.conditions {
@@ -165,25 +169,22 @@ impl Frozen {
     }
 
     /// The whole number below an expression, frozen: a jump at every whole number, where the sine of π x changes sign.
-    /// Between two of them the even or odd one of the two nearest whole numbers is meant, however x is rounded at the
-    /// jump itself. Also the condition that changes there.
+    /// Between two of them it is the even, or the odd, number next to x - 1/2, however x is rounded at the jump itself.
+    /// Also the condition that changes there.
     fn level(&mut self, graph: &mut Graph, x: NodeId, rebuilt: NodeId) -> (NodeId, NodeId) {
-        let zero = graph.constant(0.0);
-        let (pi, half, two) =
-            (graph.constant(std::f64::consts::PI), graph.constant(0.5), graph.constant(2.0));
+        let [zero, half, one, two] = [0.0, 0.5, 1.0, 2.0].map(|x| graph.constant(x));
+        let pi = graph.constant(std::f64::consts::PI);
         let phase = graph.binary(Binary::Mul, pi, x);
         let sine = graph.unary(Unary::Sin, phase);
         let change = graph.binary(Binary::Lt, zero, sine);
         let even = self.flag(graph, change);
-        let shifted = graph.binary(Binary::Add, rebuilt, half);
-        let nearest = graph.unary(Unary::Floor, shifted);
-        let pairs = graph.binary(Binary::Div, nearest, two);
+        // 2 floor((x + 1/2 - odd) / 2) + odd: x stands in it once, so that bounds of it are as narrow as can be.
+        let odd = graph.select(even, zero, one);
+        let shift = graph.binary(Binary::Sub, half, odd);
+        let shifted = graph.binary(Binary::Add, rebuilt, shift);
+        let pairs = graph.binary(Binary::Div, shifted, two);
         let pairs = graph.unary(Unary::Floor, pairs);
         let pairs = graph.binary(Binary::Mul, two, pairs);
-        let odd = graph.binary(Binary::Sub, nearest, pairs);
-        let one = graph.constant(1.0);
-        let other = graph.binary(Binary::Sub, one, odd);
-        let over = graph.select(even, odd, other);
-        (graph.binary(Binary::Sub, nearest, over), change)
+        (graph.binary(Binary::Add, pairs, odd), change)
     }
 }

@@ -46,7 +46,11 @@ pub fn read(path: &str, column: Option<&str>, files: &dyn Files) -> Result<Vec<R
         ));
     }
     let bytes = files.read(Path::new(path), SIZE_LIMIT).map_err(|why| {
-        Fault::new(None, why, "paths begin at the folder of the model; other folders are searched with `--include-path DIR`")
+        Fault::new(
+            None,
+            why,
+            "paths begin at the folder of the model; other folders are searched with `--include-path DIR`",
+        )
     })?;
     parse(&String::from_utf8_lossy(&bytes), column)
 }
@@ -86,7 +90,8 @@ fn parse(text: &str, column: Option<&str>) -> Result<Vec<Row>, Fault> {
                 None,
                 format!("the file has no column \"{}\"", shown(wanted)),
                 super::suggest::did_you_mean(wanted, names.iter().map(String::as_str)).unwrap_or_else(|| {
-                    let known: Vec<String> = names.iter().take(12).map(|n| format!("\"{}\"", shown(n))).collect();
+                    let known: Vec<String> =
+                        names.iter().take(12).map(|n| format!("\"{}\"", shown(n))).collect();
                     format!("it has {}", known.join(", "))
                 }),
             );
@@ -114,11 +119,19 @@ fn parse(text: &str, column: Option<&str>) -> Result<Vec<Row>, Fault> {
         };
         rows.push(Row { line, point: [number(0)?, number(which)?] });
         if rows.len() > MAX_POINTS {
-            return Err(Fault::new(Some(line), format!("more than {MAX_POINTS} rows"), "leave out every second row"));
+            return Err(Fault::new(
+                Some(line),
+                format!("more than {MAX_POINTS} rows"),
+                "leave out every second row",
+            ));
         }
     }
     if rows.is_empty() {
-        return Err(Fault::new(None, "the file has no rows of numbers", "a row is two numbers, as in `0.5, 12.3`"));
+        return Err(Fault::new(
+            None,
+            "the file has no rows of numbers",
+            "a row is two numbers, as in `0.5, 12.3`",
+        ));
     }
     Ok(rows)
 }

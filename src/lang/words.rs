@@ -1,13 +1,18 @@
 //! The words of the language, for those who colour, complete or count them.
 
+use super::curves::FUNCTIONALS;
 use super::layout::DECLARATIONS;
 use crate::expr::{Binary, Unary};
 
 /// Words that begin a part of a rule. Also those of an expression, which may stand at the beginning of a line.
-pub const CLAUSES: [&str; 5] = ["if", "then", "else", "solve", "produce"];
+pub const CLAUSES: [&str; 6] = ["if", "then", "else", "solve", "produce", "let"];
 
 /// Words that mean something in certain places only.
-pub const PARTICLES: [&str; 5] = ["string", "in", "step", "from", "strength"];
+pub const PARTICLES: [&str; 11] =
+    ["string", "in", "step", "from", "strength", "column", "monotone", "spline", "linear", "match", "case"];
+
+/// Words that end a declaration.
+pub const ENDINGS: [&str; 1] = ["periodic"];
 
 /// Names of numbers that every expression, or every rule, may use.
 pub const VALUES: [&str; 4] = ["pi", "e", "t", "age"];
@@ -17,18 +22,23 @@ pub fn declarations() -> impl Iterator<Item = &'static str> {
     DECLARATIONS.iter().map(|(word, _)| *word)
 }
 
-/// Functions that are built in.
+/// Functions that are built in, and those of the library.
 pub fn functions() -> impl Iterator<Item = &'static str> {
-    Unary::NAMED.iter().map(|(name, _)| *name).chain(Binary::NAMED.iter().map(|(name, _)| *name))
+    let numbers =
+        Unary::NAMED.iter().map(|(name, _)| *name).chain(Binary::NAMED.iter().map(|(name, _)| *name));
+    numbers.chain(FUNCTIONALS.iter().map(|(name, _)| *name)).chain(super::include::library_names())
 }
 
 /// How a declaration goes on after its first word, for somebody who types it; empty for a word that begins none.
 pub fn usage(declaration: &str) -> &'static str {
     match declaration {
         "title" => "\"…\"",
-        "const" => "NAME = VALUE",
+        "include" => "\"FILE\"",
+        "const" => "NAME = VALUE, or NAME = [VALUE, …]",
         "param" => "NAME = VALUE in LOW .. HIGH",
         "def" => "NAME(x, …) = EXPRESSION",
+        "curve" => "monotone|spline|linear NAME = (x, y) (x, y) … periodic",
+        "table" => "NAME from \"FILE\" column \"COLUMN\"",
         "angle" => "DEGREES",
         "period" => "DURATION",
         "frames" => "FROM .. TO step STEP",
@@ -54,6 +64,7 @@ mod tests {
         for word in declarations() {
             assert!(!usage(word).is_empty(), "{word}");
         }
+        assert!(functions().any(|name| name == "integral") && functions().any(|name| name == "gompertz"));
         assert!(functions().any(|name| name == "sin") && functions().any(|name| name == "max"));
     }
 }

@@ -6,7 +6,7 @@
 
 use std::collections::HashSet;
 
-use super::{driven_form, Jacobian, Law, Linear, Model, Numeric, Obstacle, Rule, Watch};
+use super::{Jacobian, Law, Linear, Model, Numeric, Obstacle, Rule, Watch, driven_form};
 use crate::expr::{Binary, Graph, Monomial, Node, NodeId, Polynomial, Program, Unary};
 
 /// The expressions of a rule, before they are code.

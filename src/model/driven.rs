@@ -99,7 +99,8 @@ fn drivers(
     let mut seen = std::collections::HashSet::from([root]);
     while let Some(id) = stack.pop() {
         let reads = graph.variables(&[id]);
-        let timely = reads.iter().copied().any(is_time) && reads.iter().all(|v| is_time(*v) || is_constant(*v));
+        let timely =
+            reads.iter().copied().any(is_time) && reads.iter().all(|v| is_time(*v) || is_constant(*v));
         if timely
             && let Some(integral) = graph.integral_of(id)
             && let Some(speed) = speed(graph, integral.argument, is_constant, time)
@@ -119,7 +120,12 @@ fn drivers(
 }
 
 /// The rate of an argument that is linear in time, with a constant coefficient.
-fn speed(graph: &mut Graph, argument: NodeId, is_constant: &dyn Fn(u32) -> bool, time: u32) -> Option<NodeId> {
+fn speed(
+    graph: &mut Graph,
+    argument: NodeId,
+    is_constant: &dyn Fn(u32) -> bool,
+    time: u32,
+) -> Option<NodeId> {
     let polynomial = graph.polynomial(argument, |v| v == time || v == time + 1)?;
     let constant = |graph: &Graph, id: NodeId| graph.variables(&[id]).into_iter().all(is_constant);
     if polynomial.degree() != 1 || !polynomial.terms.values().all(|c| constant(graph, *c)) {
@@ -194,9 +200,8 @@ pub fn driven_form(
     if !driven && (flow == Flow::Quadratic || !(one_pace && of_time[0].is_empty())) {
         return None;
     }
-    let coefficients: Option<Vec<Vec<NodeId>>> = (0..of_x.len())
-        .map(|i| (0..of_time.len()).map(|j| table.get(&(i, j)).copied()).collect())
-        .collect();
+    let coefficients: Option<Vec<Vec<NodeId>>> =
+        (0..of_x.len()).map(|i| (0..of_time.len()).map(|j| table.get(&(i, j)).copied()).collect()).collect();
     let one = graph.constant(1.0);
     let (of_q, of_h): (Vec<NodeId>, Vec<NodeId>) = match (of_x.len(), of_time.len()) {
         (_, 1) => (coefficients?.into_iter().map(|row| row[0]).collect(), vec![one]),
@@ -227,7 +232,8 @@ pub fn driven_form(
         Some(Some((curve, part))) => curve.keeps_sign(*part),
         _ => false,
     };
-    let monotone = trivial || one_pace && of_time[0].first().is_some_and(|(v, _)| *v == FIRST_DRIVER) && steady;
+    let monotone =
+        trivial || one_pace && of_time[0].first().is_some_and(|(v, _)| *v == FIRST_DRIVER) && steady;
     let mut curves: Vec<Arc<Curve>> = known.into_iter().flatten().map(|(curve, _)| curve).collect();
     curves.dedup_by(|a, b| Arc::ptr_eq(a, b));
     Some(DrivenForm { flow, coefficients, pace, monotone, curves })
@@ -318,7 +324,9 @@ fn flow(x: u32, monomials: &[Monomial]) -> Option<(Flow, Vec<Option<usize>>)> {
         return Some((Flow::Gompertz, gompertz.to_vec()));
     }
     let higher = monomials.iter().position(|m| {
-        matches!(m[..], [(POWER, 1)]) || m[..] == [(x, 1), (POWER, 1)] || matches!(m[..], [(v, n)] if v == x && n > 1)
+        matches!(m[..], [(POWER, 1)])
+            || m[..] == [(x, 1), (POWER, 1)]
+            || matches!(m[..], [(v, n)] if v == x && n > 1)
     });
     let bernoulli = [power(1), higher];
     matched(&bernoulli).then(|| (Flow::Bernoulli, bernoulli.to_vec()))

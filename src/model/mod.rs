@@ -23,8 +23,8 @@ pub use analysis::{Draft, analyse};
 pub use appearance::{
     Appearance, BUILT_IN_COLORS, Contour, Gradient, NamedColor, Net, Rgb, SurfaceShape, Tropism,
 };
-pub use driven::{Driven, DrivenForm, Flow, driven_form, outside_of_drivers};
 pub use condition::{Comparison, Condition, Sign, Step, Truth};
+pub use driven::{Driven, DrivenForm, Flow, driven_form, outside_of_drivers};
 pub use invariance::never_reached;
 pub use kind::{
     BUILT_IN_SURFACES, COMMAND_SURFACES, CUT, Class, DRAWN_WORDS, Kind, KindId, Kinds, base_of, class_of,

@@ -2,14 +2,14 @@
 
 use super::dense::Dense;
 use super::error::Error;
-use super::motion::{Driven, Flow, Growth, Motion, Pace, Riccati, Terms};
+use super::motion::{Driven, Flow, Motion, Pace, Riccati, Terms};
 use super::plant::{Path, Plant};
 use super::queue::Who;
 use super::simulation::Simulation;
 use super::state::{Change, Next, What};
 use super::watch::needs_search;
 use crate::expr::Value;
-use crate::model::{self, Law, Sign, Solve};
+use crate::model::{Law, Sign, Solve};
 use crate::structure::{Instant, ModuleId};
 use smallvec::SmallVec;
 
@@ -140,11 +140,7 @@ impl Simulation<'_> {
             return None;
         }
         let x = self.variables[parameter];
-        let flow = match law.flow {
-            model::Flow::Quadratic => Flow::quadratic(x, c[0], c[1], c[2]),
-            model::Flow::Gompertz => Flow::Growth(Growth::gompertz(x, c[0], c[1])?),
-            model::Flow::Bernoulli => Flow::Growth(Growth::bernoulli(x, c[0], c[1], c[2])?),
-        };
+        let flow = Flow::new(law.flow, x, c)?;
         let pace = match &law.pace {
             Some(program) => Some(Pace::new(program.clone(), &self.variables, time)?),
             None => None,

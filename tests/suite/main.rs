@@ -6,6 +6,7 @@
 //! - [`language`]: text to model and back; hostile input.
 //! - [`gallery`]: every mistake in `tests/errors` and the message it gets.
 //! - [`discrete`]: derivation steps, against the models of a book; cuts.
+//! - [`blocks`]: curves, growth functions, arrays, `match` and `let` against exact values; [`files`]: includes and tables.
 //! - [`cli`]: the program as it is typed.
 //! - [`editing`]: layout, `new`, `render --watch`, completions.
 //! - [`inspect`]: what `explain`, `--events` and `check --continuity` say.
@@ -16,12 +17,14 @@
 //! - [`replay`]: any time after any other, to the bits of a run.
 //! - [`report`]: studies of methods, and hard cases with exact answers.
 
+mod blocks;
 mod book;
 mod cli;
 mod common;
 mod discrete;
 mod editing;
 mod export;
+mod files;
 mod gallery;
 mod inspect;
 mod language;

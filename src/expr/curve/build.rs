@@ -15,7 +15,10 @@ pub enum CurveFault {
     /// The x of this point is not greater than that of the one before.
     NotAscending(usize),
     /// A periodic curve whose last value is not its first.
-    NotClosed { first: f64, last: f64 },
+    NotClosed {
+        first: f64,
+        last: f64,
+    },
     /// Slopes or areas leave the range of numbers.
     TooLarge,
 }

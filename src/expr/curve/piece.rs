@@ -128,7 +128,11 @@ pub fn solve(f: impl Fn(f64) -> f64, slope: impl Fn(f64) -> f64) -> f64 {
     let mut u = 0.5;
     for _ in 0..80 {
         let value = f(u);
-        if value >= 0.0 { hi = u } else { lo = u }
+        if value >= 0.0 {
+            hi = u
+        } else {
+            lo = u
+        }
         if hi - lo <= f64::EPSILON * hi {
             break;
         }

@@ -13,7 +13,8 @@ use crate::lang::suggest::nearest;
 fn words(rule: Rule) -> Option<&'static str> {
     use Rule::*;
     Some(match rule {
-        expr | number | literal | ident | call | indexed | array | if_expr | match_expr | neg | not | coefficient => "an expression",
+        expr | number | literal | ident | call | indexed | array | if_expr | match_expr | neg | not
+        | coefficient => "an expression",
         or | and | le | ge | ne | lt | gt | eq | add | sub | mul | div | pow => "an operator",
         module | modules | successor | name => "a module",
         epsilon => "`ε` for nothing",
@@ -68,7 +69,13 @@ pub fn explain(item: Rule, error: &Error<Rule>, text: &str, offset: usize) -> Di
     // Wherever an expression can begin, an `if` can: that goes without saying.
     if expected.contains("an expression") {
         expected.remove("`if`");
+        expected.remove("`match`");
     }
+    // A clause is what a rule lacks, and not one more name.
+    if expected.contains("`if`, `solve` or `produce`") {
+        expected.remove("`let`");
+    }
+    let choice = expected.contains("`case`");
     // What a name is for depends on where it is asked for.
     if is_item_with_name(item)
         && text[..at].split_whitespace().count() <= 1
@@ -101,7 +108,11 @@ pub fn explain(item: Rule, error: &Error<Rule>, text: &str, offset: usize) -> Di
         Span::new(offset + at, offset + end)
     };
     let what = if end == at { format!("{what} after this") } else { what };
-    Diagnostic::error(message).at(span, what).help_opt(hint(item, text, at, found))
+    Diagnostic::error(message).at(span, what).help_opt(
+        hint(item, text, at, found).or_else(|| {
+            choice.then(|| "a choice is written `match n case 0: 1 case 1: 2 else 3`".to_owned())
+        }),
+    )
 }
 
 fn is_item_with_name(item: Rule) -> bool {
@@ -142,7 +153,35 @@ fn hint(item: Rule, text: &str, at: usize, found: &str) -> Option<String> {
     {
         return Some(format!("did you mean `{word}`?"));
     }
-    hint_by_symbol(item, text, at, found).or_else(|| hint_by_word(item, text, at, found))
+    let block = hint_for_block(item, &text[..at], found).map(str::to_owned);
+    block.or_else(|| hint_by_symbol(item, text, at, found)).or_else(|| hint_by_word(item, text, at, found))
+}
+
+/// Advice for curves, tables, arrays and names within rules.
+fn hint_for_block(item: Rule, before: &str, found: &str) -> Option<&'static str> {
+    let previous = before.trim_end().chars().next_back();
+    match item {
+        Rule::curve_item if before.contains('=') => {
+            Some("a curve is two points or more, of two numbers each: `curve g = (0, 0) (1, 0.3) (2, 1)`")
+        }
+        Rule::curve_item if before.split_whitespace().count() == 2 && found != "=" => {
+            Some("a curve is `linear`, `monotone` or `spline`: `curve linear g = (0, 0) (2, 1)`")
+        }
+        Rule::table_item if before.split_whitespace().count() > 1 => Some(
+            "a table is written `table g from \"file.csv\"`, or `table g from \"file.csv\" column \"name\"`",
+        ),
+        Rule::include_item => Some("the name of the file is a text in quotes: `include \"organs.dls\"`"),
+        Rule::const_item if previous == Some('[') && found == "]" => {
+            Some("an array has one element or more: `const a = [1, 2, 3]`")
+        }
+        Rule::const_item if found == "[" && matches!(previous, Some('[' | ',')) => {
+            Some("the elements of an array are numbers: `const a = [1, 2, 3]`")
+        }
+        Rule::rule_item if found == "let" => {
+            Some("a `let` stands between the head of its rule and the first clause")
+        }
+        _ => None,
+    }
 }
 
 /// Advice that the symbols around the place give.

@@ -2,12 +2,14 @@
 //!
 //! See `model/driven.rs` for the equations that are solved so.
 
+use std::cell::RefCell;
 use std::sync::Arc;
 
 use smallvec::SmallVec;
 
 use super::{Growth, Riccati};
-use crate::expr::{Dual, Interval, Program, Value};
+use crate::expr::{Dual, Interval, Program, Scratch, Value};
+use crate::model;
 
 /// A motion of one parameter, from one start.
 #[derive(Clone, Debug)]
@@ -35,6 +37,12 @@ pub struct Pace {
     start: f64,
 }
 
+thread_local! {
+    // A search evaluates a pace some ten times: not with an allocation each time.
+    static NUMBERS: RefCell<Scratch<f64>> = const { RefCell::new(Vec::new()) };
+    static RATES: RefCell<Scratch<Dual<f64>>> = const { RefCell::new(Vec::new()) };
+}
+
 /// Most evaluations of a pace in the search for an instant.
 const MOST: usize = 500;
 
@@ -46,23 +54,23 @@ impl Pace {
         (pace.start.is_finite() && pace.rate(0.0).is_finite()).then_some(pace)
     }
 
-    fn eval<T: Value>(&self, lift: impl Fn(f64) -> T, times: [T; 2]) -> T {
+    fn eval<T: Value>(&self, lift: impl Fn(f64) -> T, times: [T; 2], scratch: &mut Scratch<T>) -> T {
         let mut variables: SmallVec<[T; 8]> = self.variables.iter().map(|x| lift(*x)).collect();
         variables[self.time..self.time + 2].copy_from_slice(&times);
         let mut out = [T::constant(0.0)];
-        self.program.eval(&variables, &mut Vec::new(), &mut out);
+        self.program.eval(&variables, scratch, &mut out);
         out[0]
     }
 
     /// H from the start to a time.
     fn value(&self, tau: f64) -> f64 {
         let times = [0, 1].map(|i| self.variables[self.time + i] + tau);
-        self.eval(|x| x, times) - self.start
+        NUMBERS.with_borrow_mut(|scratch| self.eval(|x| x, times, scratch)) - self.start
     }
 
     fn rate(&self, tau: f64) -> f64 {
         let times = [0, 1].map(|i| Dual { value: self.variables[self.time + i] + tau, rate: 1.0 });
-        self.eval(Dual::constant, times).rate
+        RATES.with_borrow_mut(|scratch| self.eval(Dual::constant, times, scratch)).rate
     }
 
     fn over(&self, from: f64, to: f64) -> Dual<Interval> {
@@ -70,7 +78,7 @@ impl Pace {
             let now = self.variables[self.time + i];
             Dual { value: Interval::spanned(now + from, now + to), rate: Interval::constant(1.0) }
         });
-        let mut bounds = self.eval(Dual::constant, times);
+        let mut bounds = self.eval(Dual::constant, times, &mut Vec::new());
         bounds.value.lo -= self.start;
         bounds.value.hi -= self.start;
         // H is smooth enough: what it is the integral of may jump, but is bounded.
@@ -102,7 +110,11 @@ impl Pace {
         let mut tau = 0.5 * (lo + hi);
         for _ in 0..200 {
             let value = self.value(tau);
-            if beyond(value) { hi = tau } else { lo = tau }
+            if beyond(value) {
+                hi = tau
+            } else {
+                lo = tau
+            }
             if hi - lo <= f64::EPSILON * hi {
                 break;
             }
@@ -139,12 +151,17 @@ impl Pace {
 }
 
 impl Flow {
-    /// The solution of `dx/ds = c + b x + a x²` from `x`.
-    pub fn quadratic(x: f64, c: f64, b: f64, a: f64) -> Flow {
-        Flow::Riccati(Riccati::new(x, c, b, a), Riccati::new(x, -c, -b, -a))
+    /// The solution from `x` with the coefficients of a form; None where its formula does not hold.
+    pub fn new(form: model::Flow, x: f64, [c, b, a]: [f64; 3]) -> Option<Flow> {
+        Some(match form {
+            model::Flow::Quadratic => Flow::Riccati(Riccati::new(x, c, b, a), Riccati::new(x, -c, -b, -a)),
+            model::Flow::Gompertz => Flow::Growth(Growth::gompertz(x, c, b)?),
+            model::Flow::Bernoulli => Flow::Growth(Growth::bernoulli(x, c, b, a)?),
+        })
     }
 
-    fn value(&self, s: f64) -> f64 {
+    /// The displacement at s.
+    pub fn value(&self, s: f64) -> f64 {
         match self {
             Flow::Riccati(forward, _) if s >= 0.0 => forward.value(s),
             Flow::Riccati(_, backward) => backward.value(-s),

@@ -96,7 +96,8 @@ impl Growth {
         }
         let largest = LARGEST - self.x.ln().max(0.0);
         let above = self.bend.map_or(largest, |bend| (bend * largest).exp_m1());
-        let ends = [Some(above), self.bend.map(|_| -1.0)].into_iter().flatten().filter_map(|y| self.time_of(y));
+        let ends =
+            [Some(above), self.bend.map(|_| -1.0)].into_iter().flatten().filter_map(|y| self.time_of(y));
         let (mut before, mut after): (Option<f64>, Option<f64>) = (None, None);
         for s in ends {
             if s > 0.0 {
@@ -159,7 +160,9 @@ mod tests {
         assert!(close(law.ends().1.expect("a pole"), 0.5, 1e-14));
         let law = Growth::bernoulli(1.0, 0.0, -1.0, 0.5).expect("a solution");
         assert!(close(law.reach(-1.0).expect("reached"), 2.0, 1e-14));
-        assert!(Growth::gompertz(0.0, 1.0, 1.0).is_none() && Growth::bernoulli(-1.0, 1.0, 1.0, 0.5).is_none());
+        assert!(
+            Growth::gompertz(0.0, 1.0, 1.0).is_none() && Growth::bernoulli(-1.0, 1.0, 1.0, 0.5).is_none()
+        );
     }
 
     proptest! {

@@ -9,7 +9,7 @@ mod riccati;
 mod sum;
 
 pub use driven::{Driven, Flow, Pace};
-pub use growth::Growth;
+use growth::Growth;
 pub use riccati::Riccati;
 pub use sum::{Sum, Terms};
 
