@@ -20,7 +20,7 @@ use std::time::SystemTime;
 
 use crate::diagnostic::{Diagnostic, Source};
 use crate::lang::{self, Files, NoFiles, Setting};
-use crate::model::Model;
+use crate::model::{Measure, Model};
 use crate::sim::{self, Simulation};
 
 /// A model that was read, with its text.
@@ -32,6 +32,8 @@ pub struct Session {
     pub warnings: Vec<Diagnostic>,
     /// The files that were read: the model, unless it came from memory, and what it names.
     pub inputs: Vec<Input>,
+    /// Where these files were looked for.
+    folders: Vec<PathBuf>,
 }
 
 /// Why there is no session.
@@ -93,7 +95,8 @@ impl Session {
             Box::new(Refused { source, diagnostics: vec![diagnostic], settings: Vec::new(), inputs })
         };
         let bytes = std::fs::read(path).map_err(|error| {
-            let diagnostic = Diagnostic::error(format!("the model cannot be read: {error}"));
+            let diagnostic = Diagnostic::error(format!("the model cannot be read: {error}"))
+                .help("give the path of a model's file, `NAME.dls`; `dlsys new NAME` makes one");
             refuse(Source::new(&name, ""), diagnostic)
         })?;
         let source = Source::from_bytes(name, bytes).map_err(|e| refuse(e.0, e.1))?;
@@ -147,7 +150,9 @@ impl Session {
         let loaded = lang::load_with(&source, settings, files);
         let source = loaded.source.unwrap_or(source);
         match loaded.model {
-            Some(model) => Ok(Session { source, model, warnings: loaded.diagnostics, inputs: Vec::new() }),
+            Some(model) => {
+                Ok(Session { source, model, warnings: loaded.diagnostics, inputs: vec![], folders: vec![] })
+            }
             None => Err(Box::new(Refused {
                 source,
                 diagnostics: loaded.diagnostics,
@@ -155,6 +160,21 @@ impl Session {
                 inputs: Vec::new(),
             })),
         }
+    }
+
+    /// Reads what is to be measured of this model's strings: `F(x): x` is the sum of x over all modules `F(x)`, and `F(x)`
+    /// is their number. It may use the constants, params and functions of the model, `t` and `age`.
+    ///
+    /// # Errors
+    /// The messages, to be drawn with the returned source.
+    pub fn measure(&self, text: &str) -> Result<Measure, (Source, Vec<Diagnostic>)> {
+        let values = self.model.parameters.iter();
+        let settings: Vec<Setting> =
+            values.map(|p| Setting { name: p.name.clone(), value: p.value }).collect();
+        let source = Source::new("measure", text);
+        let folders = Folders { paths: self.folders.clone(), inputs: RefCell::default() };
+        let read = lang::measure(&self.source, &folders, &settings, &self.model, &source);
+        read.map_err(|said| (source, said))
     }
 
     /// Starts the model at t = 0.
@@ -181,7 +201,7 @@ impl Folders {
     /// Puts what was read into what came of it.
     fn note(self, mut read: Result<Session, Box<Refused>>) -> Result<Session, Box<Refused>> {
         match &mut read {
-            Ok(session) => session.inputs = self.inputs.into_inner(),
+            Ok(session) => (session.inputs, session.folders) = (self.inputs.into_inner(), self.paths),
             Err(refused) => refused.inputs = self.inputs.into_inner(),
         }
         read
@@ -224,7 +244,8 @@ impl Files for Folders {
                 return Ok(bytes);
             }
         }
+        let Some(own) = self.paths.first() else { return NoFiles.read(path, limit) };
         let others = if self.paths.len() > 1 { ", nor in the other folders" } else { "" };
-        Err(format!("there is no file {}{others}", self.paths[0].join(path).display()))
+        Err(format!("there is no file {}{others}", own.join(path).display()))
     }
 }

@@ -179,15 +179,40 @@ pub struct ExplainArgs {
 pub struct RunArgs {
     #[command(flatten)]
     pub shared: SharedArgs,
-    /// How strings are printed
+    /// How strings, or measures, are printed
     #[arg(long, value_enum, default_value_t = TextFormat::Text)]
     pub format: TextFormat,
+    /// Run specimens with these seeds, both ends included, and tell how what is measured of them is distributed, at each
+    /// time
+    ///
+    /// As text: number of specimens, mean, standard deviation (of a sample: divided by one less than their number),
+    /// quantiles (between the two nearest values by proportion). As JSON: one line for each specimen, in the order of seeds, with
+    /// seed, t (the times), and for each measure its values at these times.
+    #[arg(long, value_name = "A..B", value_parser = seeds, conflicts_with_all = ["seed", "events", "stats"])]
+    pub seeds: Option<Seeds>,
+    /// What is measured of each specimen: 'F(x): x' is the sum of x over all modules F(x), 'F(x)' their number; can be
+    /// repeated [default: the number of all modules]
+    #[arg(long = "measure", value_name = "HEAD: EXPR", requires = "seeds")]
+    pub measures: Vec<String>,
+    /// Write the distributions of the measures as CSV
+    #[arg(long, value_name = "FILE", requires = "seeds")]
+    pub csv: Option<PathBuf>,
+    /// Draw the distributions of the measures over time as SVG: median, mean, bands of 50 and 90 per cent of specimens
+    #[arg(long, value_name = "FILE", requires = "seeds")]
+    pub plot: Option<PathBuf>,
+    /// Specimens that are run at once; nothing depends on it [default: one for each core]
+    #[arg(long, value_name = "N", value_parser = threads, requires = "seeds")]
+    pub threads: Option<usize>,
 }
 
 #[derive(Debug, Args)]
 pub struct RenderArgs {
     #[command(flatten)]
     pub shared: SharedArgs,
+    /// Render specimens with these seeds, both ends included, each into a directory seed-N of its own; all are drawn to
+    /// one scale
+    #[arg(long, value_name = "A..B", value_parser = seeds, conflicts_with_all = ["seed", "events", "stats", "watch"])]
+    pub seeds: Option<Seeds>,
     /// Directory for the frames; made if it is not there
     #[arg(short, long = "out", value_name = "DIR")]
     pub out: PathBuf,
@@ -355,6 +380,9 @@ pub struct ReplArgs {
     /// Step of the methods with a fixed one (rk4, euler)
     #[arg(long, value_name = "H", allow_negative_numbers = true, value_parser = positive, required_if_eq_any([("method", "rk4"), ("method", "euler")]))]
     pub step_size: Option<f64>,
+    /// Seed of random numbers, for models that draw them: the same seed gives the same plant
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
     /// More modules than this are an error
     #[arg(long, value_name = "N", default_value_t = 10_000_000)]
     pub max_modules: usize,
@@ -400,7 +428,7 @@ pub struct SharedArgs {
     /// Length of the slices of time of the scheduler `local`; its error is of that order
     #[arg(long, value_name = "DT", allow_negative_numbers = true, value_parser = positive)]
     pub slice: Option<f64>,
-    /// Seed of random numbers, for models that draw them (none does yet)
+    /// Seed of random numbers, for models that draw them: the same seed gives the same plant
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
     /// More modules than this are an error
@@ -412,8 +440,8 @@ pub struct SharedArgs {
     /// Write every production that takes place, up to the last observed time, as a line of JSON
     ///
     /// In the order of time. Fields: t; group, the same number for simultaneous events; lineage and id of the module
-    /// that was replaced, and its name, module; rule, its head; clause, which `produce` of the rule, from 1; line of
-    /// that clause in the model; residual, by how much the two sides of an `=` differ at the located instant (null if
+    /// that was replaced, and its name, module; rule, its head; clause, which `produce` of the rule, from 1; successor,
+    /// where a clause has several, which of them, from 1; line of that clause in the model; residual, by how much the two sides of an `=` differ at the located instant (null if
     /// that is not finite). An error at t = 0 leaves the file empty, a later one leaves what happened before it.
     #[arg(long, value_name = "FILE")]
     pub events: Option<PathBuf>,
@@ -531,6 +559,37 @@ fn pixels(text: &str) -> Result<u32, String> {
 fn size(text: &str) -> Result<(u32, u32), String> {
     let (width, height) = text.split_once('x').ok_or("expected WIDTHxHEIGHT, such as 1280x720")?;
     Ok((pixels(width)?, pixels(height)?))
+}
+
+/// Seeds from one to another, both included.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Seeds {
+    pub first: u64,
+    pub last: u64,
+}
+
+impl Seeds {
+    pub fn count(self) -> usize {
+        (self.last - self.first) as usize + 1
+    }
+
+    pub fn iter(self) -> impl Iterator<Item = u64> {
+        self.first..=self.last
+    }
+}
+
+fn seeds(text: &str) -> Result<Seeds, String> {
+    const MOST: u64 = 10_000_000;
+    let wanted = "expected FIRST..LAST, such as 0..99";
+    let (first, last) = text.split_once("..").ok_or(wanted)?;
+    let number =
+        |text: &str| text.trim().trim_start_matches('=').parse::<u64>().map_err(|_| wanted.to_owned());
+    let (first, last) = (number(first)?, number(last)?);
+    match last.checked_sub(first) {
+        None => Err(format!("{last} is before {first}")),
+        Some(more) if more >= MOST => Err(format!("more than {MOST} specimens")),
+        Some(_) => Ok(Seeds { first, last }),
+    }
 }
 
 fn runs(text: &str) -> Result<usize, String> {

@@ -27,6 +27,18 @@ pub enum Failure {
     Stale,
 }
 
+impl Failure {
+    /// The same, with the seed of the specimen that failed.
+    pub fn of_seed(self, seed: u64) -> Failure {
+        match self {
+            Failure::Model(message) => {
+                Failure::Model(format!("{message}  = of the specimen with `--seed {seed}`\n"))
+            }
+            other => other,
+        }
+    }
+}
+
 /// What an error of standard output means.
 pub fn out_error(error: std::io::Error) -> Failure {
     match error.kind() {
@@ -114,6 +126,8 @@ struct StatsFile {
     simulate_s: f64,
     output_s: f64,
     frames: usize,
+    /// Of random numbers.
+    seed: u64,
     #[serde(flatten)]
     counts: Stats,
 }
@@ -197,6 +211,7 @@ impl Run {
             scheduler,
             tolerance: args.tolerance,
             step_size: args.step_size.unwrap_or(defaults.step_size),
+            seed: args.seed,
             max_modules: args.max_modules,
             log: args.events.is_some(),
             ..defaults
@@ -222,6 +237,7 @@ impl Run {
             simulate_s: clock.simulate.as_secs_f64(),
             output_s: clock.output.as_secs_f64(),
             frames: self.times.len(),
+            seed: self.settings.seed,
             counts,
         };
         let text = serde_json::to_string_pretty(&file).expect("numbers become JSON") + "\n";

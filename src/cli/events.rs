@@ -13,6 +13,7 @@
 //! | `module` | the name of its kind |
 //! | `rule` | the head of the rule |
 //! | `clause` | which of the rule's `produce` clauses, from 1 |
+//! | `successor` | of a clause with several successors: which of them, from 1 |
 //! | `line` | the clause's line in the model file |
 //! | `residual` | difference of the two sides of the condition at the located instant; `null` if not finite |
 
@@ -80,6 +81,7 @@ impl EventLog {
             self.group = (event.group, self.group.1 + 1);
         }
         let (rule, lines) = &self.rules[event.rule];
+        let successor = event.successor.map(|s| format!("\"successor\":{},", s + 1)).unwrap_or_default();
         let out = &mut self.text;
         out.clear();
         out.push_str("{\"t\":");
@@ -87,7 +89,7 @@ impl EventLog {
         // Writing to a string does not fail.
         let _ = write!(
             out,
-            ",\"group\":{},\"lineage\":\"{}\",\"id\":\"{}\",\"module\":{},\"rule\":{rule},\"clause\":{},\"line\":{},\"residual\":",
+            ",\"group\":{},\"lineage\":\"{}\",\"id\":\"{}\",\"module\":{},\"rule\":{rule},\"clause\":{},{successor}\"line\":{},\"residual\":",
             self.group.1,
             event.lineage,
             event.lineage.name(),

@@ -13,10 +13,12 @@ mod fmt;
 mod gallery;
 mod new;
 mod parallel;
+mod reel;
 mod render;
 mod report;
 pub(crate) mod run;
 mod shell;
+mod specimens;
 mod view;
 
 use clap::Parser;

@@ -35,6 +35,9 @@ pub fn check(args: &CheckArgs) -> Result<(), Failure> {
 /// Runs a model and prints its strings.
 pub fn run(args: &RunArgs) -> Result<(), Failure> {
     let run = Run::start(&args.shared)?;
+    if let Some(seeds) = args.seeds {
+        return super::specimens::summarise(args, &run, seeds);
+    }
     let mut clock = run.clock;
     let mut out = std::io::BufWriter::with_capacity(1 << 16, std::io::stdout().lock());
     let printer = Printer::new(&run.session.model);

@@ -3,15 +3,12 @@
 use std::io::Write;
 use std::path::Path;
 
-use indicatif::ProgressBar;
-
 use super::args::ViewArgs;
 use super::common::{Failure, Run, bar, out_error};
+use super::reel::{Pass, Shot, play};
 use crate::export::{self, Survey, View};
 use crate::scene::Scene;
 use crate::sim::Settings;
-use crate::structure::ModuleString;
-use crate::turtle;
 use crate::view::{Recorder, Recording, Stage, page};
 
 /// Most frames of a recording; a screen shows no more in five minutes.
@@ -57,57 +54,48 @@ fn spare(args: &ViewArgs, out: &Path) -> Result<(), Failure> {
     ))
 }
 
-/// Runs the model twice: what is recorded is in parts of its extent.
+/// Runs the model twice: what is recorded is in parts of its extent. Frames are drawn on all cores; the recording does not
+/// depend on how many there are.
 fn record(run: &Run, accuracy: Option<f64>) -> Result<Recording, Failure> {
-    let mut survey = Survey::new(View::FRONT);
-    let settings = Settings { log: false, ..run.settings };
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let mut clock = run.clock;
+    let nothing = Survey::new(View::FRONT);
+    let mut survey = nothing.clone();
+    let pass = Pass { settings: Settings { log: false, ..run.settings }, accuracy: 0.0 };
     let progress = bar("measuring", run.times.len());
-    each_frame(run, settings, 0.0, &progress, |_, scene, _| {
+    let of_frame = |_: &Shot, scene: &Scene| {
+        let mut survey = nothing.clone();
         survey.add(scene);
+        survey
+    };
+    play(run, pass, threads, &mut clock, None, of_frame, |frame| {
+        survey.merge(&frame);
+        progress.inc(1);
         Ok(())
     })?;
+    progress.finish_and_clear();
     let mut fit = survey.fit();
     fit.accuracy = accuracy.unwrap_or(fit.accuracy);
     let (model, source) = (&run.session.model, &run.session.source);
     let name =
         Path::new(&source.name).file_name().map_or(source.name.clone(), |n| n.to_string_lossy().into());
     let mut recorder = Recorder::new(model, &name, &fit);
-    let mut stage = Stage::default();
-    let settings = Settings { log: true, ..run.settings };
+    let pass = Pass { settings: Settings { log: true, ..run.settings }, accuracy: fit.accuracy };
     let progress = bar("recording", run.times.len());
-    each_frame(run, settings, fit.accuracy, &progress, |string, scene, events| {
+    let staged = |shot: &Shot, scene: &Scene| {
+        let mut stage = Stage::default();
+        stage.set(scene, fit.default_width);
+        (shot.time, shot.modules() as u64, shot.events().to_vec(), stage)
+    };
+    play(run, pass, threads, &mut clock, None, staged, |(time, modules, events, stage)| {
         recorder.history().add(&events, model, source);
-        stage.set(scene, fit.default_width, recorder.forms());
-        let modules = string.iter().filter(|m| !m.kind.is_bracket()).count() as u64;
-        recorder.add(string.time, modules, &stage).map_err(|error| {
+        progress.inc(1);
+        recorder.add(time, modules, &stage).map_err(|error| {
             Failure::Model(format!(
                 "error: {error}\n  help: take fewer frames with `--from A --to B --step S`\n"
             ))
         })
     })?;
-    Ok(recorder.finish())
-}
-
-/// Runs the model and draws it at each time.
-fn each_frame(
-    run: &Run,
-    settings: Settings,
-    accuracy: f64,
-    progress: &ProgressBar,
-    mut take: impl FnMut(&ModuleString, &Scene, Vec<crate::sim::Event>) -> Result<(), Failure>,
-) -> Result<(), Failure> {
-    let mut simulation = run.session.simulate(settings).map_err(|error| run.fault(&error))?;
-    let mut string = ModuleString::default();
-    let mut scene = turtle::blank(&run.session.model);
-    scene.accuracy = accuracy;
-    for &time in &run.times {
-        simulation.at(time, &mut string).map_err(|error| run.fault(&error))?;
-        scene.clear();
-        turtle::draw(&run.session.model, &string, &mut scene)
-            .map_err(|error| Failure::Model(format!("error: at t = {time}: {error}\n")))?;
-        take(&string, &scene, simulation.take_events())?;
-        progress.inc(1);
-    }
     progress.finish_and_clear();
-    Ok(())
+    Ok(recorder.finish())
 }

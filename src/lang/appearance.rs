@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::advice;
 use super::ast::{Document, Expression, Item, Name, Text};
 use super::scope::Scope;
 use super::suggest::did_you_mean;
@@ -75,9 +76,10 @@ pub fn build(document: &Document, scope: &mut Scope, files: &dyn Files) -> Appea
         appearance.contours.len(),
     ];
     if most.into_iter().any(|count| count > MAX_DECLARED) {
-        scope.diagnostics.push(Diagnostic::error(format!(
-            "more than {MAX_DECLARED} colours, gradients, surfaces or contours"
-        )));
+        scope.diagnostics.push(
+            Diagnostic::error(format!("more than {MAX_DECLARED} colours, gradients, surfaces or contours"))
+                .help("many shades of one colour are a gradient: `;(name, v)`, v from 0 to 1"),
+        );
     }
     appearance
 }
@@ -123,7 +125,8 @@ fn surface(
         scope.diagnostics.push(
             Diagnostic::error(format!("the surface `{}` is declared twice", name.text))
                 .at(name.span, "the second time")
-                .at(before.span, "the first time"),
+                .at(before.span, "the first time")
+                .help(advice::twice(&name.text)),
         );
         return None;
     }
@@ -135,7 +138,11 @@ fn surface(
                 None => fault.what,
             };
             let message = format!("the surface `{}` cannot be read", name.text);
-            scope.diagnostics.push(Diagnostic::error(message).at(file.span, place).help_opt(fault.help));
+            scope.diagnostics.push(
+                Diagnostic::error(message).at(file.span, place).help(fault.help.unwrap_or_else(|| {
+                    "export the file again, or mend the line in a text editor".to_owned()
+                })),
+            );
             None
         }
     }
@@ -159,18 +166,35 @@ fn contour(
             ax * by - ay * bx
         })
         .sum();
-    let fault = if values.len() < 3 {
-        "a closed curve has three points or more"
+    let (fault, help) = if values.len() < 3 {
+        (
+            "a closed curve has three points or more",
+            "add points: `(1, 0) (0, 1) (-1, 0) (0, -1)` is a round stem".to_owned(),
+        )
     } else if values.len() > MOST {
-        "this has more than 100 points"
+        (
+            "this has more than 100 points",
+            "leave some out: the points are joined by a smooth curve".to_owned(),
+        )
     } else if values.iter().flatten().any(|x| x.abs() > 1e6) {
-        "coordinates are in parts of the stem's radius, at most 1e6"
-    } else if area <= 0.0 || area.is_nan() {
-        "its points must go round the origin counter-clockwise"
+        (
+            "coordinates are in parts of the stem's radius, at most 1e6",
+            "a point on a round stem is `(1, 0)`".to_owned(),
+        )
+    } else if area < 0.0 {
+        let turned: Vec<String> = values.iter().rev().take(12).map(|[x, y]| format!("({x}, {y})")).collect();
+        let more = if values.len() > 12 { " …" } else { "" };
+        let help = format!("write them the other way round: `{}{more}`", turned.join(" "));
+        ("its points must go round the origin counter-clockwise", help)
+    } else if area == 0.0 || area.is_nan() {
+        (
+            "its points enclose nothing",
+            "spread them round the origin: `(1, 0) (0, 1) (-1, 0) (0, -1)`".to_owned(),
+        )
     } else {
         return Some(values);
     };
-    scope.diagnostics.push(Diagnostic::error("this contour cannot be").at(span, fault));
+    scope.diagnostics.push(Diagnostic::error("this contour cannot be").at(span, fault).help(help));
     None
 }
 
@@ -205,7 +229,8 @@ pub fn unused_surfaces(appearance: &Appearance, is_used: impl Fn(&str) -> bool, 
     for shape in appearance.surfaces.iter().filter(|shape| !is_used(&shape.name)) {
         scope.diagnostics.push(
             Diagnostic::warning(format!("nobody uses the surface `{}`", shape.name))
-                .at(shape.span, "declared here"),
+                .at(shape.span, "declared here")
+                .help(format!("draw it: `{}` in a string, or remove this line", shape.name)),
         );
     }
 }

@@ -146,6 +146,8 @@ pub struct Rule {
 #[derive(Clone, Debug)]
 pub struct Clause {
     pub guard: Option<Expression>,
+    /// `at rate …`, of a production.
+    pub hazard: Option<Expression>,
     pub action: Action,
     pub span: Span,
 }
@@ -153,7 +155,16 @@ pub struct Clause {
 #[derive(Clone, Debug)]
 pub enum Action {
     Solve(Vec<Equation>),
-    Produce(Vec<Module>),
+    /// One successor, or several with weights.
+    Produce(Vec<Alternative>),
+}
+
+/// A successor of a clause.
+#[derive(Clone, Debug)]
+pub struct Alternative {
+    /// `2:` before it.
+    pub weight: Option<Expression>,
+    pub modules: Vec<Module>,
 }
 
 /// `dx/dt = …`

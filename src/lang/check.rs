@@ -2,14 +2,15 @@
 
 use std::collections::{HashMap, HashSet};
 
+use super::advice;
 use super::appearance::surface_hint;
 use super::ast::{self, HeadModule};
 use super::print;
 use super::suggest::nearest;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::model::{
-    BUILT_IN_SURFACES, COMMAND_SURFACES, Class, Condition, DRAWN_WORDS, KindId, Kinds, Model, Pattern, Rule,
-    Step, base_of, class_of,
+    BUILT_IN_SURFACES, COMMAND_SURFACES, Class, Condition, DRAWN_WORDS, KindId, Kinds, Model, Pattern,
+    Remedy, Rule, Sign, Step, base_of, class_of,
 };
 
 /// Most rules that one strict predecessor can have.
@@ -72,10 +73,11 @@ fn resolve(
                 super::scope::plural(kind.arity, "parameter"),
                 pattern.arity
             ))
-            .at(head.span, "the number of parameters must agree, or the context is never there"),
+            .at(head.span, "the number of parameters must agree, or the context is never there")
+            .help(format!("name each of them, used or not: `{}`", advice::head_with(head, kind.arity))),
             None => Diagnostic::error(format!("there is no module `{name}`"))
                 .at(head.span, "this context is never there")
-                .help_opt(near_kind(kinds, name)),
+                .help(advice::no_such_module(kinds, name)),
         };
         diagnostics.push(error);
     } else if pattern.kinds.iter().all(|id| kinds.get(*id).skipped) {
@@ -91,11 +93,6 @@ fn resolve(
     }
 }
 
-fn near_kind(kinds: &Kinds, name: &str) -> Option<String> {
-    let known = kinds.iter().map(|(_, k)| k.name.as_str());
-    nearest(name, known).map(|near| format!("did you mean `{near}`?"))
-}
-
 /// `ignore` and `consider`.
 pub fn filter_contexts(
     kinds: &mut Kinds,
@@ -109,7 +106,7 @@ pub fn filter_contexts(
             diagnostics.push(
                 Diagnostic::warning(format!("there is no module `{}`", name.text))
                     .at(name.span, "nothing to skip or to consider")
-                    .help_opt(near_kind(kinds, &name.text)),
+                    .help(advice::no_such_module(kinds, &name.text)),
             );
         }
         found
@@ -149,7 +146,8 @@ pub fn reachability(
         {
             diagnostics.push(
                 Diagnostic::error(format!("more than {MAX_RULES} rules for one module"))
-                    .at(rule.span, "this one is too many"),
+                    .at(rule.span, "this one is too many")
+                    .help("write clauses with conditions under fewer heads"),
             );
         }
         shadowed_rule(model, i, own, diagnostics);
@@ -163,7 +161,8 @@ pub fn reachability(
     let mut queue: Vec<KindId> = model.axiom.kinds.clone();
     while let Some(kind) = queue.pop() {
         for rule in model.kinds.get(kind).all_rules() {
-            for made in model.rules[rule].produces.iter().flat_map(|p| &p.successor.kinds) {
+            let successors = model.rules[rule].produces.iter().flat_map(|p| &p.outcome.successors);
+            for made in successors.flat_map(|s| &s.kinds) {
                 if alive.insert(*made) {
                     queue.push(*made);
                 }
@@ -175,7 +174,11 @@ pub fn reachability(
         if own.iter().any(|k| occurs.contains_key(k)) && !own.iter().any(|k| alive.contains(k)) {
             diagnostics.push(
                 Diagnostic::warning("this rule is not used")
-                    .at(rule.span, "the initial string never grows into this module"),
+                    .at(rule.span, "the initial string never grows into this module")
+                    .help(match rules[i].predecessor.parameters.is_empty() {
+                        true => format!("make it in a successor, `produce … {}`, or begin with it in the initial string", rule.label),
+                        false => format!("make it in a successor, `produce … {}(…)`, or begin with it in the initial string", rules[i].predecessor.name.text),
+                    }),
             );
         }
     }
@@ -229,13 +232,14 @@ fn shadowed_rule(model: &Model, index: usize, own: &[KindId], diagnostics: &mut 
 
 fn clauses(rule: &Rule, diagnostics: &mut Vec<Diagnostic>) {
     let solves: Vec<(&Condition, Span)> = rule.solves.iter().map(|s| (&s.guard, s.span)).collect();
-    let produces: Vec<(&Condition, Span)> = rule.produces.iter().map(|p| (&p.guard, p.span)).collect();
+    let produces = rule.produces.iter().filter(|p| !p.is_fault).map(|p| (&p.guard, p.span)).collect();
     for (kind, clauses) in [("solve", solves), ("produce", produces)] {
         for (i, (guard, span)) in clauses.iter().enumerate() {
             if guard.0 == [Step::Constant(false)] {
                 diagnostics.push(
                     Diagnostic::error("this clause can never be reached")
-                        .at(*span, "its condition is always false"),
+                        .at(*span, "its condition is always false")
+                        .help(always_false(rule)),
                 );
             }
             let before = clauses[..i].iter().find(|(other, _)| other.is_always() || other == guard);
@@ -264,6 +268,12 @@ fn clauses(rule: &Rule, diagnostics: &mut Vec<Diagnostic>) {
     }
 }
 
+/// What a condition that is never met can be about instead.
+fn always_false(rule: &Rule) -> String {
+    let own: Vec<String> = rule.parameters.iter().map(|name| format!("`{name}`, ")).collect();
+    format!("compare something that changes, such as {}`age` or `t`; or remove the clause", own.concat())
+}
+
 /// A rule for a module that no string has. None if something else will be said about it: words with a wrong
 /// number of parameters, and misspelt ones, are reported where they stand.
 fn never_made(model: &Model, rule: &ast::Rule, occurs: &HashMap<KindId, Span>) -> Option<Diagnostic> {
@@ -280,10 +290,9 @@ fn never_made(model: &Model, rule: &ast::Rule, occurs: &HashMap<KindId, Span>) -
         if kind.class() == Class::Word {
             return None;
         }
-        return Some(error.at(
-            *span,
-            format!("here `{}` has {}", kind.name, super::scope::plural(kind.arity, "parameter")),
-        ));
+        let here = format!("here `{}` has {}", kind.name, super::scope::plural(kind.arity, "parameter"));
+        let right = advice::head_with(head, kind.arity);
+        return Some(error.at(*span, here).help(format!("write the head with as many: `{right}`")));
     }
     let known = occurs.keys().map(|id| model.kinds.get(*id).name.as_str());
     let near = nearest(name, known);
@@ -291,7 +300,10 @@ fn never_made(model: &Model, rule: &ast::Rule, occurs: &HashMap<KindId, Span>) -
     if class_of(name) == Class::Word && near.is_some_and(idle) {
         return None;
     }
-    Some(error.help_opt(near.map(|near| format!("did you mean `{near}`?"))))
+    Some(error.help(match near {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => format!("put `{name}` into the initial string or a successor, or remove the rule"),
+    }))
 }
 
 /// The period of the discrete rules.
@@ -320,7 +332,7 @@ pub fn coverage(model: &Model, diagnostics: &mut Vec<Diagnostic>) {
         }
         for (i, solve) in rule.solves.iter().enumerate() {
             let mut said = HashSet::new();
-            for (atom, _) in solve.guard.atoms() {
+            for (atom, comparison) in solve.guard.atoms() {
                 let others = rule.solves.iter().enumerate().filter(|(j, s)| *j != i && !s.guard.is_always());
                 let covered = rule.produces.iter().any(|p| p.guard.atoms().any(|(a, _)| a == atom))
                     || rule.solves.iter().any(|s| s.guard.is_always())
@@ -332,7 +344,15 @@ pub fn coverage(model: &Model, diagnostics: &mut Vec<Diagnostic>) {
                                 rule.atoms[atom],
                                 "when this stops being true, there is no equation and no production",
                             )
-                            .help("add a clause for it, such as `if … = … produce …`"),
+                            .help(match Remedy::new(&model.kinds, rule, atom, comparison, Sign::Zero) {
+                                Some(Remedy { produce: Some(clause), .. }) => {
+                                    format!("add a clause for it, such as `{clause}`")
+                                }
+                                Some(Remedy { rest: Some(clause), .. }) => {
+                                    format!("add a clause for it, such as `{clause}`")
+                                }
+                                _ => "add a clause for it, such as `if … = … produce …`".to_owned(),
+                            }),
                     );
                 }
             }
@@ -422,9 +442,9 @@ pub fn commands(model: &Model, diagnostics: &mut Vec<Diagnostic>, places: &HashM
             continue;
         };
         let usage = match name {
-            "@W" => "`@W(w)`: the width to which the stem tapers",
-            "@T" => "`@T(e)`: the strength of the tropism",
-            "@C" => "`@C(name)`: the contour of stems",
+            "@W" => "`@W(w)`, w the width to which the stem tapers",
+            "@T" => "`@T(e)`, e the strength of the tropism",
+            "@C" => "`@C(name)`, name that of a `contour`",
             "@PC" => "`@PC(n, row, column)`: a control point of patch n, row and column from 0 to 3",
             "@PS" => "`@PS(n)`: patch n begins",
             _ => "`@PD(n)`: patch n is drawn",
@@ -435,7 +455,8 @@ pub fn commands(model: &Model, diagnostics: &mut Vec<Diagnostic>, places: &HashM
                 super::scope::plural(needed, "parameter"),
                 kind.arity
             ))
-            .at(*span, usage),
+            .at(*span, format!("{} here", super::scope::plural(kind.arity, "parameter")))
+            .help(format!("write {usage}")),
         );
     }
 }

@@ -1,6 +1,7 @@
 //! `match`: one of several values, by a number.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use super::ast::{ExprId, Expressions};
 use super::print;
@@ -39,7 +40,7 @@ impl Scope {
         for (case, then, value) in links.into_iter().rev() {
             let link = self.compare(Comparison::Equal, node, case);
             let sides = [subject, value].map(|id| print::expression(all, id));
-            let at = (all.span(subject).to(all.span(value)), sides.join(" = ").into());
+            let at = (all.span(subject).to(all.span(value)), Arc::new(sides));
             self.comparisons.entry(link).or_insert(at);
             whole = Some(self.graph.select(link, then, whole?));
         }

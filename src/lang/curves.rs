@@ -253,7 +253,7 @@ impl Scope {
         };
         self.used.insert(name.clone());
         let ends = usize::from(what == "integral");
-        self.arguments(what, span, nodes.len(), function.parameters + ends)?;
+        self.arguments(what, span, nodes.len(), function.parameters.len() + ends)?;
         let related =
             function.library.then(|| self.functions.get(&*format!("{name}_{what}")).cloned()).flatten();
         match (what, related) {

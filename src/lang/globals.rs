@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use super::Setting;
+use super::advice;
 use super::appearance::first_gradient;
 use super::ast::{Document, Expr, ExprId, Expression, Item, Name};
 use super::scope::{RESERVED, Scope};
@@ -77,7 +78,11 @@ pub fn declare(
                     setting.name
                 ))
             } else {
-                error.help_opt(did_you_mean(&setting.name, known))
+                let all: Vec<String> = parameters.iter().map(|p| format!("`{}`", p.name)).take(8).collect();
+                error.help(did_you_mean(&setting.name, known).unwrap_or_else(|| match &all[..] {
+                    [] => "this model has no params; a constant becomes one when it is declared with `param`".to_owned(),
+                    all => format!("its params are {}", all.join(", ")),
+                }))
             };
             scope.refused_settings.push(error);
         }
@@ -117,7 +122,8 @@ fn collect<'d>(document: &'d Document, scope: &mut Scope) -> Vec<Global<'d>> {
                 if RESERVED.contains(&&**text) { "stands for time in every rule" } else { "is built in" };
             scope.diagnostics.push(
                 Diagnostic::error(format!("`{text}` {what} and cannot be declared"))
-                    .at(*span, "choose another name"),
+                    .at(*span, "this name is taken")
+                    .help(format!("choose another name, such as `{text}_0`")),
             );
             scope.poison(text.clone());
             continue;
@@ -126,7 +132,8 @@ fn collect<'d>(document: &'d Document, scope: &mut Scope) -> Vec<Global<'d>> {
             scope.diagnostics.push(
                 Diagnostic::error(format!("`{text}` is declared twice"))
                     .at(*span, "the second time")
-                    .at(before, "the first time"),
+                    .at(before, "the first time")
+                    .help(advice::twice(text)),
             );
             continue;
         }
@@ -150,10 +157,12 @@ fn parameter(
             let (low, high) = (scope.constant_value(all, from)?, scope.constant_value(all, to)?);
             if low > high {
                 scope.diagnostics.push(
-                    Diagnostic::error(format!("the range of `{}` is empty", name.text)).at(
-                        all.span(from.root).to(all.span(to.root)),
-                        format!("{low} is greater than {high}"),
-                    ),
+                    Diagnostic::error(format!("the range of `{}` is empty", name.text))
+                        .at(
+                            all.span(from.root).to(all.span(to.root)),
+                            format!("{low} is greater than {high}"),
+                        )
+                        .help(format!("write the smaller bound first: `in {high} .. {low}`")),
                 );
                 return None;
             }
@@ -164,7 +173,12 @@ fn parameter(
                         .at(
                             all.span(from.root).to(all.span(to.root)),
                             format!("the range is {low} .. {high}"),
-                        ),
+                        )
+                        .help(format!(
+                            "choose a value in the range, or widen it: `in {} .. {}`",
+                            low.min(declared),
+                            high.max(declared)
+                        )),
                 );
                 return None;
             }
@@ -177,10 +191,12 @@ fn parameter(
         if let Some((low, high)) = range
             && !(low..=high).contains(&setting.value)
         {
-            scope.refused_settings.push(Diagnostic::error(format!(
+            let message = format!(
                 "{} = {} is outside the range {low} .. {high} of this param",
                 setting.name, setting.value
-            )));
+            );
+            let help = format!("choose a value from {low} to {high}, or widen the range in the model");
+            scope.refused_settings.push(Diagnostic::error(message).help(help));
         }
         value = setting.value;
     }
@@ -264,14 +280,23 @@ fn order(
                         if path.len() > 8 {
                             path.splice(4..path.len() - 3, ["…"]);
                         }
-                        let what = match globals[to].kind {
-                            Kind::Def(..) => "calls itself",
-                            _ => "depends on itself",
+                        let name = &globals[to].name.text;
+                        let (what, help) = match globals[to].kind {
+                            Kind::Def(..) => (
+                                "calls itself",
+                                "write it without itself; what is repeated in time belongs into rules"
+                                    .to_owned(),
+                            ),
+                            _ => (
+                                "depends on itself",
+                                format!("give one of them a number, such as `const {name} = 1`"),
+                            ),
                         };
                         scope.diagnostics.push(
                             Diagnostic::error(format!("`{}` {what}", globals[to].name.text))
                                 .at(span, format!("this closes the circle {}", path.join(" → ")))
-                                .at(globals[to].name.span, "declared here"),
+                                .at(globals[to].name.span, "declared here")
+                                .help(help),
                         );
                     }
                     Mark::Done => {}

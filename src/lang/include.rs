@@ -70,12 +70,6 @@ pub fn library_names<'n>() -> impl Iterator<Item = &'n str> {
     names.map(|(name, _)| name)
 }
 
-/// How a function of the library is called.
-pub fn library_usage(name: &str) -> Option<&'static str> {
-    let mut calls = LIBRARY.lines().filter_map(|line| Some(line.strip_prefix("def ")?.split_once(" = ")?.0));
-    calls.find(|call| call.split_once('(').is_some_and(|(known, _)| known == name))
-}
-
 /// The global name that an item declares.
 fn declared(item: &Item) -> Option<&str> {
     match item {

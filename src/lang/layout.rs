@@ -9,6 +9,8 @@
 //! A line break ends an expression or a condition, except inside parentheses, after an operator or a
 //! comma, or before `then` and `else` (LANGUAGE, "Text"). Inside a string of modules it means nothing.
 
+mod ahead;
+
 use super::lexeme::{Lexeme, Token};
 use crate::diagnostic::{Diagnostic, Span};
 
@@ -122,6 +124,10 @@ struct Scanner<'t> {
     errors: Vec<Diagnostic>,
     /// In a string of modules, where line breaks mean nothing.
     in_string: bool,
+    /// In a string of several successors with weights, such as `produce 2: F or 1: G`.
+    weighted: bool,
+    /// The last token asks for a weight: `produce`, or an `or` between successors.
+    weight_next: bool,
     last: Last,
     levels: Vec<Level>,
     /// Sum over `levels`.
@@ -156,6 +162,8 @@ fn scan(text: &str, lexemes: Option<Vec<Lexeme>>) -> (Layout, Option<Vec<Lexeme>
         items: Vec::new(),
         errors: Vec::new(),
         in_string: false,
+        weighted: false,
+        weight_next: false,
         last: Last::Operand,
         levels: vec![Level::default()],
         pending: 0,
@@ -181,7 +189,8 @@ fn scan(text: &str, lexemes: Option<Vec<Lexeme>>) -> (Layout, Option<Vec<Lexeme>
             let message = format!("this declaration is longer than {} KiB", MAX_ITEM >> 10);
             errors.push(
                 Diagnostic::error(message)
-                    .at(Span::new(item.start, item.start + first_char(text, item.start)), "it begins here"),
+                    .at(Span::new(item.start, item.start + first_char(text, item.start)), "it begins here")
+                    .help("cut it into several: constants, functions, or rules with a head each"),
             );
         }
     }
@@ -244,7 +253,7 @@ impl Scanner<'_> {
             return;
         };
         let word = self.word(first).to_owned();
-        let colon = colon_outside_parentheses(tokens);
+        let colon = self.has_colon(tokens) && !self.goes_on_with_weight(tokens);
         let arrow = self.arrow_outside_parentheses(tokens);
         if arrow == Some(first.1) || arrow.is_some() && self.goes_on() {
             // What looked like the head of a rule is that of a discrete one, broken over lines.
@@ -271,7 +280,7 @@ impl Scanner<'_> {
                 cut.broken = true;
             }
             self.items.push(RawItem { kind, start: from, end: from, after_colon: None, broken: false });
-            self.in_string = false;
+            (self.in_string, self.weighted, self.weight_next) = (false, false, false);
             self.last = Last::Operator;
             self.held_break = None;
         } else if let Some(at) = self.held_break.take()
@@ -325,6 +334,7 @@ impl Scanner<'_> {
             && tokens.get(2).is_some_and(|t| &self.text[t.1..t.2] == "=");
         let case = word == "case" && (self.matching || self.level_matches());
         let clause = matches!(word, "if" | "solve" | "produce") && !self.items.is_empty() || is_let || case;
+        let clause = clause || tokens.first().is_some_and(|t| self.is_at_rate(t.1, t.2));
         // So is one with an arrow; and the head of a discrete rule may have been on the line before.
         let goes_on = self.items.last().is_some_and(|i| i.kind == ItemKind::Step) && !self.in_string;
         if arrow && !clause && !goes_on {
@@ -339,47 +349,11 @@ impl Scanner<'_> {
         }
         let continues = match current.kind {
             // What follows a line that is not understood is not to be complained about again.
-            ItemKind::Rule | ItemKind::Unknown => {
-                is_let || case || matches!(word, "if" | "solve" | "produce" | "then" | "else")
-            }
+            ItemKind::Rule | ItemKind::Unknown => clause || matches!(word, "then" | "else"),
             ItemKind::Axiom | ItemKind::Interpret | ItemKind::Step => true,
             _ => case || matches!(word, "then" | "else"),
         };
         (!continues).then_some(ItemKind::Unknown)
-    }
-
-    /// Where a line has the arrow of a discrete rule.
-    fn arrow_outside_parentheses(&self, tokens: &[(Token, usize, usize)]) -> Option<usize> {
-        let mut depth = 0i64;
-        for (i, &(token, start, end)) in tokens.iter().enumerate() {
-            match token {
-                Token::Open => depth += 1,
-                Token::Close => depth -= 1,
-                Token::Symbol if depth > 0 => {}
-                Token::Symbol if &self.text[start..end] == "→" => return Some(start),
-                Token::Symbol if self.ends_arrow(start) => {
-                    // `-->` is an arrow as well.
-                    let long = i > 1 && tokens[i - 2].2 + 1 == start && self.text[..start].ends_with("--");
-                    return Some(start - if long { 2 } else { 1 });
-                }
-                _ => {}
-            }
-        }
-        None
-    }
-
-    /// True for the `>` of an arrow.
-    fn ends_arrow(&self, at: usize) -> bool {
-        self.text[at..].starts_with('>') && self.text[..at].ends_with('-')
-    }
-
-    /// True where a rule's head, or its condition, cannot end with the line before.
-    fn goes_on(&self) -> bool {
-        let in_rule = self.items.last().is_some_and(|i| i.kind == ItemKind::Rule && i.after_colon.is_some());
-        in_rule
-            && !self.in_string
-            && self.levels.len() == 1
-            && matches!(self.last, Last::Colon | Last::Operator)
     }
 
     fn close_item(&mut self, end: usize) {
@@ -387,7 +361,8 @@ impl Scanner<'_> {
             let at = self.levels.last().expect("two levels").at;
             self.fault(
                 Diagnostic::error("this `(` is never closed")
-                    .at(Span::new(at, at + 1), "expected `)` for it"),
+                    .at(Span::new(at, at + 1), "expected `)` for it")
+                    .help("write the `)` where the parameters or the term end"),
             );
         }
         self.levels.truncate(1);
@@ -417,6 +392,7 @@ impl Scanner<'_> {
 
     fn token(&mut self, (token, start, end): (Token, usize, usize)) {
         let in_expression = !self.in_string || self.levels.len() > 1;
+        self.weight_next = false;
         let (after_operand, depth) = (self.last == Last::Operand, self.levels.len() - 1);
         let mut last = Last::Operand;
         match token {
@@ -435,7 +411,8 @@ impl Scanner<'_> {
                 } else {
                     self.fault(
                         Diagnostic::error("this `)` closes nothing")
-                            .at(Span::new(start, end), "there is no `(` before it"),
+                            .at(Span::new(start, end), "there is no `(` before it")
+                            .help("remove it, or write the `(` that it belongs to"),
                     );
                 }
             }
@@ -445,8 +422,11 @@ impl Scanner<'_> {
             }
             Token::Colon => {
                 last = Last::Colon;
+                let weight = self.in_successor();
+                self.weighted |= weight;
                 if self.levels.len() == 1
                     && !self.level().matching
+                    && !weight
                     && let Some(item) = self.items.last_mut()
                     && item.after_colon.is_none()
                 {
@@ -464,12 +444,12 @@ impl Scanner<'_> {
                     "]" => Last::Operand,
                     _ => Last::Operator,
                 };
-                if (symbol == "→" || self.ends_arrow(start))
+                if self.is_arrow(start, end)
                     && self.levels.len() == 1
                     && self.items.last().is_some_and(|i| i.kind == ItemKind::Step)
                 {
                     last = Last::Operator;
-                    self.in_string = true;
+                    (self.in_string, self.weighted, self.weight_next) = (true, false, true);
                     self.forget_pending();
                 } else if in_expression {
                     let level = self.levels.last_mut().expect("never empty");
@@ -506,9 +486,19 @@ impl Scanner<'_> {
         match &self.text[start..end] {
             "produce" if in_rule && !inside => {
                 self.forget_pending();
-                self.in_string = true;
+                (self.in_string, self.weighted, self.weight_next) = (true, false, true);
                 Last::Operator
             }
+            "or" if self.weighted && self.in_successor() => {
+                self.weight_next = true;
+                Last::Operator
+            }
+            "at" if !inside && self.is_at_rate(start, end) => {
+                self.forget_pending();
+                self.in_string = false;
+                Last::Operator
+            }
+            "rate" if in_rule && !inside && self.follows_at(start) => Last::Operator,
             word @ ("solve" | "if") if in_rule && !inside && (self.in_string || word == "solve") => {
                 self.forget_pending();
                 self.in_string = false;
@@ -581,18 +571,4 @@ impl Scanner<'_> {
         // The first break after the expression is the one that `then` or `else` would take back.
         self.held_break.get_or_insert(at);
     }
-}
-
-/// Whether a `:` stands on the line outside parentheses opened on it.
-fn colon_outside_parentheses(tokens: &[(Token, usize, usize)]) -> bool {
-    let mut depth = 0i64;
-    for (token, ..) in tokens {
-        match token {
-            Token::Open => depth += 1,
-            Token::Close => depth -= 1,
-            Token::Colon if depth <= 0 => return true,
-            _ => {}
-        }
-    }
-    false
 }

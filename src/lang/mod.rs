@@ -7,8 +7,10 @@
 //! [`load`] is the whole of it. Mistakes are collected, not thrown: a text with three mistakes gets three
 //! messages. Every pass is linear in the text, and none recurses deeper than a fixed bound.
 
+mod advice;
 mod appearance;
 pub mod ast;
+mod chance;
 mod check;
 mod choice;
 mod curves;
@@ -18,12 +20,14 @@ mod include;
 mod layout;
 mod lexeme;
 mod locals;
+mod measure;
 pub mod outline;
 pub mod parse;
 pub mod print;
 mod rules;
 mod scope;
 mod smooth;
+mod strings;
 mod suggest;
 mod surface;
 mod table;
@@ -34,6 +38,7 @@ use std::sync::Arc;
 
 pub use include::read;
 pub use layout::MAX_DEPTH;
+pub use measure::measure;
 pub use suggest::did_you_mean;
 pub use surface::{Files, NoFiles};
 
@@ -96,6 +101,7 @@ fn build(
         document,
         scope,
         kinds: &mut kinds,
+        clocks: chance::Clocks::new(document),
         occurs: HashMap::new(),
         drawn: HashMap::new(),
     };
@@ -150,13 +156,14 @@ fn build(
             }
             Item::Rule(rule) => {
                 for clause in &rule.clauses {
-                    if let Action::Produce(modules) = &clause.action {
-                        strings.push(modules);
+                    if let Action::Produce(successors) = &clause.action {
+                        strings.extend(successors.iter().map(|s| &s.modules[..]));
                     }
                 }
                 written.push(rule);
                 match builder.rule(rule) {
-                    Some((compiled, draft)) => {
+                    Some((mut compiled, draft)) => {
+                        compiled.index = rules.len();
                         rules.push(compiled);
                         drafts.push(draft);
                     }
@@ -176,7 +183,7 @@ fn build(
     if !unread {
         builder.check_interpretations(&heads);
     }
-    let (occurs, drawn) = (builder.occurs, builder.drawn);
+    let (occurs, drawn, clocks) = (builder.occurs, builder.drawn, builder.clocks);
     if !single.seen("the initial string") && !unread {
         scope.diagnostics.push(
             Diagnostic::error("the model has no initial string")
@@ -216,12 +223,14 @@ fn build(
             if rule.discrete { &mut kind.steps } else { &mut kind.rules }.push(i);
         }
     }
+    clocks.assign(&mut model.kinds);
     for (kind, interpretation) in interpretations {
         if let Some(before) = model.kinds.get(kind).interpretation {
             scope.diagnostics.push(
                 Diagnostic::error("two interpretations of one module")
                     .at(interpretation.span, "the second one")
-                    .at(model.interpretations[before].span, "the first one"),
+                    .at(model.interpretations[before].span, "the first one")
+                    .help("keep one of them; what both draw can stand in one string"),
             );
         }
         model.kinds.get_mut(kind).interpretation = Some(model.interpretations.len());
@@ -255,7 +264,11 @@ impl Singles {
             scope.diagnostics.push(
                 Diagnostic::error(format!("{what} is given twice"))
                     .at(first_line(span), "the second time")
-                    .at(first_line(*before), "the first time"),
+                    .at(first_line(*before), "the first time")
+                    .help(match what {
+                        "the initial string" => "keep one of them, with the modules of both",
+                        _ => "keep one of them, and remove the other",
+                    }),
             );
         }
         self.0.push((what, span));
@@ -269,40 +282,59 @@ fn first_line(span: Span) -> Span {
 
 fn check_frames(frames: Option<&Frames>, span: Span, scope: &mut Scope) {
     let Some(&Frames { from, to, step }) = frames else { return };
-    let fault = if from < 0.0 {
-        "time begins at 0".to_owned()
+    let written = |from: f64, to: f64, step: f64| format!("write `frames {from} .. {to} step {step}`");
+    let (fault, help) = if from < 0.0 {
+        ("time begins at 0".to_owned(), written(0.0, to.max(0.0), step))
     } else if to < from {
-        format!("{to} is before {from}")
+        (format!("{to} is before {from}"), written(to, from, step))
     } else if step <= 0.0 {
-        "the step must be greater than 0".to_owned()
+        let hundredth = if to > from { (to - from) / 100.0 } else { 1.0 };
+        let help = format!("{}, for example", written(from, to, hundredth));
+        ("the step must be greater than 0".to_owned(), help)
     } else if (to - from) / step >= Frames::LIMIT as f64 {
-        format!("more than {} frames", Frames::LIMIT)
+        let help = format!("choose a longer step: {}", written(from, to, (to - from) / 100.0));
+        (format!("more than {} frames", Frames::LIMIT), help)
     } else {
         return;
     };
-    scope.diagnostics.push(Diagnostic::error("these frames cannot be").at(span, fault));
+    scope.diagnostics.push(Diagnostic::error("these frames cannot be").at(span, fault).help(help));
 }
 
 /// Constants and functions that nothing uses.
 fn unused(document: &Document, scope: &mut Scope) {
     for (item, _) in document.own_items() {
-        let (what, name) = match item {
-            Item::Const { name, .. } => ("constant", name),
-            Item::Param { name, .. } => ("param", name),
-            Item::Def { name, .. } => ("function", name),
-            Item::Array { name, .. } => ("array", name),
-            Item::Curve { name, .. } => ("curve", name),
-            Item::Table { name, .. } => ("table", name),
-            Item::Color { name, .. } => ("colour", name),
-            Item::Gradient { name, .. } => ("gradient", name),
-            Item::Contour { name, .. } => ("contour", name),
+        let text = |name: &ast::Name| name.text.clone();
+        let (what, name, use_it) = match item {
+            Item::Const { name, .. } => {
+                ("constant", name, "use it in an equation, a condition or a string".into())
+            }
+            Item::Param { name, .. } => {
+                ("param", name, "use it in an equation, a condition or a string".into())
+            }
+            Item::Def { name, parameters, .. } => {
+                let formals: Vec<&str> = parameters.iter().map(|p| &*p.text).collect();
+                ("function", name, format!("call it, as in `{}({})`", text(name), formals.join(", ")))
+            }
+            Item::Array { name, .. } => ("array", name, format!("use an element, as in `{}[0]`", text(name))),
+            Item::Curve { name, .. } => ("curve", name, format!("use it, as in `{}(age)`", text(name))),
+            Item::Table { name, .. } => ("table", name, format!("use it, as in `{}(t)`", text(name))),
+            Item::Color { name, .. } => {
+                ("colour", name, format!("draw with it: `;({})` in a string", text(name)))
+            }
+            Item::Gradient { name, .. } => {
+                ("gradient", name, format!("draw with it: `;({}, v)` in a string, v from 0 to 1", text(name)))
+            }
+            Item::Contour { name, .. } => {
+                ("contour", name, format!("draw with it: `@C({})` in a string", text(name)))
+            }
             _ => continue,
         };
         let text: &Arc<str> = &name.text;
         if !scope.used.contains(text) {
             scope.diagnostics.push(
                 Diagnostic::warning(format!("nobody uses the {what} `{text}`"))
-                    .at(name.span, "declared here"),
+                    .at(name.span, "declared here")
+                    .help(format!("{use_it}, or remove this line")),
             );
         }
     }

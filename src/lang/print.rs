@@ -5,9 +5,10 @@
 
 use std::fmt::Write;
 
+use super::ast::{
+    Action, Alternative, Document, Expr, ExprId, Expressions, HeadModule, Item, Module, Name, Operator,
+};
 use crate::expr::Sort;
-
-use super::ast::{Action, Document, Expr, ExprId, Expressions, HeadModule, Item, Module, Name, Operator};
 
 /// How tightly a node binds; the loosest is 0.
 fn strength(expr: &Expr) -> u8 {
@@ -223,6 +224,17 @@ fn sort_word(sort: Sort, default: Sort) -> &'static str {
     }
 }
 
+/// The successors of a clause, with their weights.
+fn alternatives(expressions: &Expressions, all: &[Alternative]) -> Vec<String> {
+    let show = |a: &Alternative| match &a.weight {
+        Some(weight) => {
+            format!("{}: {}", expression(expressions, weight.root), modules(expressions, &a.modules))
+        }
+        None => modules(expressions, &a.modules),
+    };
+    all.iter().map(show).collect()
+}
+
 /// A discrete rule, on one line.
 fn discrete_rule(expressions: &Expressions, rule: &super::ast::Rule) -> String {
     let mut text = head(rule);
@@ -230,8 +242,8 @@ fn discrete_rule(expressions: &Expressions, rule: &super::ast::Rule) -> String {
         if let Some(guard) = &clause.guard {
             text += &format!(" : {}", expression(expressions, guard.root));
         }
-        if let Action::Produce(successor) = &clause.action {
-            text += &format!(" -> {}", modules(expressions, successor));
+        if let Action::Produce(all) = &clause.action {
+            text += &format!(" -> {}", alternatives(expressions, all).join(" or "));
         }
     }
     text
@@ -308,6 +320,9 @@ pub fn document(document: &Document) -> String {
                     if let Some(guard) = &clause.guard {
                         text += &format!("if {}\n    ", show(guard));
                     }
+                    if let Some(hazard) = &clause.hazard {
+                        text += &format!("at rate {}\n    ", show(hazard));
+                    }
                     match &clause.action {
                         Action::Solve(equations) => {
                             let all: Vec<String> = equations
@@ -316,8 +331,9 @@ pub fn document(document: &Document) -> String {
                                 .collect();
                             text += &format!("solve {}", all.join(", "));
                         }
-                        Action::Produce(successor) => {
-                            text += &format!("produce {}", modules(e, successor));
+                        Action::Produce(successors) => {
+                            let all = alternatives(e, successors);
+                            text += &format!("produce {}", all.join("\n      or "));
                         }
                     }
                 }

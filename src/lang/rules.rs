@@ -1,17 +1,18 @@
 //! Rules, strings and interpretations: from the syntax tree to the model.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::sync::Arc;
 
+use super::advice;
 use super::ast::{self, Action, Document, Expression, HeadModule};
+use super::chance::{Clocks, production_keys};
 use super::print;
-use super::scope::{RESERVED, Scope, Variables, plural};
-use super::suggest::did_you_mean;
+use super::scope::{RESERVED, Scope, Variables};
 use crate::diagnostic::{Diagnostic, Span};
 use crate::expr::{Binary, Node, NodeId, Program, Unary};
 use crate::model::{
-    CUT, Class, Comparison, Condition, Draft, Interpretation, Jacobian, KindId, Kinds, Pattern, Produce,
-    Rule, Solve, Step, Successor, class_of, never_reached,
+    Boundary, CUT, Clock, Comparison, Condition, Draft, Interpretation, Jacobian, KindId, Kinds, Pattern,
+    Produce, Rule, Solve, Step, never_reached,
 };
 
 /// Longest condition, in comparisons and connectives, after functions are put in.
@@ -22,6 +23,7 @@ pub struct RuleBuilder<'b> {
     pub document: &'b Document,
     pub scope: &'b mut Scope,
     pub kinds: &'b mut Kinds,
+    pub clocks: Clocks,
     /// Each kind that stands in a string, with the first place where it does.
     pub occurs: HashMap<KindId, Span>,
     /// The same of drawings, where they are not those of the kind itself.
@@ -33,7 +35,7 @@ pub struct RuleBuilder<'b> {
 pub(super) struct Atoms {
     sides: Vec<(NodeId, NodeId)>,
     spans: Vec<Span>,
-    boundaries: Vec<String>,
+    boundaries: Vec<Boundary>,
     index: HashMap<(NodeId, NodeId), u32>,
 }
 
@@ -42,96 +44,8 @@ impl RuleBuilder<'_> {
         self.scope.diagnostics.push(error);
     }
 
-    /// A string of modules over the given variables.
-    pub fn successor(
-        &mut self,
-        modules: &[ast::Module],
-        variables: &Variables,
-        count: usize,
-    ) -> Option<Successor> {
-        let mut kinds = Vec::with_capacity(modules.len());
-        let mut roots = Vec::new();
-        let mut open: Vec<Span> = Vec::new();
-        let mut good = true;
-        for module in modules {
-            let kind = self.kinds.intern(&module.name, module.arguments.len());
-            match &*module.name {
-                "[" | "]" if !module.arguments.is_empty() => {
-                    self.error(
-                        Diagnostic::error("a bracket has no parameters")
-                            .at(module.span, "a `(` cannot follow a bracket"),
-                    );
-                    good = false;
-                    if &*module.name == "[" {
-                        open.push(module.span);
-                    } else {
-                        open.pop();
-                    }
-                    continue;
-                }
-                "[" => open.push(module.span),
-                "]" if open.pop().is_none() => {
-                    self.error(
-                        Diagnostic::error("this `]` closes no branch")
-                            .at(module.span, "there is no `[` before it in this string")
-                            .help("brackets must match within each string"),
-                    );
-                    good = false;
-                }
-                _ => {}
-            }
-            self.occurs.entry(kind).or_insert(module.span);
-            kinds.push(kind);
-            for &argument in &module.arguments {
-                let known = self.scope.diagnostics.len();
-                let Some(node) = self.scope.number(&self.document.expressions, argument, variables) else {
-                    good = false;
-                    if count > 0
-                        && known < self.scope.diagnostics.len()
-                        && let Some(head) = self.looks_like_a_head(module)
-                    {
-                        let error = self.scope.diagnostics.last_mut().expect("one was added");
-                        error.help.push(format!("if `{head}` is the head of a rule, end it with `:`"));
-                    }
-                    continue;
-                };
-                if let Some(value) = self.scope.graph.as_constant(node).filter(|x| !x.is_finite()) {
-                    self.error(
-                        Diagnostic::error("this has no finite value")
-                            .at(self.document.expressions.span(argument.root), format!("it is {value}")),
-                    );
-                    good = false;
-                }
-                roots.push(node);
-            }
-        }
-        if let Some(bracket) = open.pop() {
-            self.error(
-                Diagnostic::error("this `[` is never closed")
-                    .at(bracket, "expected a `]` for it in this string")
-                    .help("brackets must match within each string"),
-            );
-            good = false;
-        }
-        if !good {
-            return None;
-        }
-        Some(Successor { kinds, arguments: Program::compile(&self.scope.graph, &roots, count) })
-    }
-
-    /// A module whose arguments are bare names, as a rule's head has them.
-    fn looks_like_a_head(&self, module: &ast::Module) -> Option<String> {
-        let names: Vec<&str> = (module.arguments.iter())
-            .map(|argument| match self.document.expressions.get(argument.root) {
-                ast::Expr::Name(name) => Some(&**name),
-                _ => None,
-            })
-            .collect::<Option<_>>()?;
-        Some(format!("{}({})", module.name, names.join(", ")))
-    }
-
     /// The variables of a head, and how many there are with `t` and `age`.
-    fn variables(
+    pub(super) fn variables(
         &mut self,
         own: &HeadModule,
         left: &[HeadModule],
@@ -140,20 +54,31 @@ impl RuleBuilder<'_> {
         let mut names: HashMap<Arc<str>, NodeId> = HashMap::new();
         let mut spans: HashMap<Arc<str>, Span> = HashMap::new();
         let mut count = 0;
-        for parameter in std::iter::once(own).chain(left).chain(right).flat_map(|m| &m.parameters) {
-            let node = self.scope.graph.var(count);
-            count += 1;
+        let mut parameters = Vec::new();
+        for module in std::iter::once(own).chain(left).chain(right) {
+            parameters.extend(module.parameters.iter().zip(count..));
+            // Behind those that are written, a module has hidden ones.
+            let hidden = self.clocks.width(&module.name.text, module.parameters.len());
+            count += (module.parameters.len() + hidden) as u32;
+        }
+        for (parameter, number) in parameters {
+            let node = self.scope.graph.var(number);
             if RESERVED.contains(&&*parameter.text) {
                 self.error(
                     Diagnostic::error(format!("a parameter cannot be called `{}`", parameter.text))
-                        .at(parameter.span, "this name stands for time in every rule"),
+                        .at(parameter.span, "this name stands for time in every rule")
+                        .help(match &*parameter.text {
+                            "age" => "`age`, the time since the module was made, is known without a parameter; for another time choose another name".to_owned(),
+                            name => format!("`{name}`, the time since the start, is known without a parameter; for another time choose another name"),
+                        }),
                 );
             }
             if let Some(before) = spans.insert(parameter.text.clone(), parameter.span) {
                 self.error(
                     Diagnostic::error(format!("two parameters of this head are called `{}`", parameter.text))
                         .at(parameter.span, "the second one")
-                        .at(before, "the first one"),
+                        .at(before, "the first one")
+                        .help(advice::other_name(&parameter.text, !left.is_empty(), !right.is_empty())),
                 );
             }
             names.insert(parameter.text.clone(), node);
@@ -171,14 +96,16 @@ impl RuleBuilder<'_> {
         if bracket {
             self.error(
                 Diagnostic::error("a bracket has no rules")
-                    .at(head.name.span, "brackets structure the string; they do not develop"),
+                    .at(head.name.span, "brackets structure the string; they do not develop")
+                    .help("to change a branch, write a rule for a module in it"),
             );
         }
         let cut = &*head.name.text == CUT;
         if cut {
             self.error(
                 Diagnostic::error("`%` has no rules and no context")
-                    .at(head.name.span, "it cuts off the rest of its branch, and is gone at once"),
+                    .at(head.name.span, "it cuts off the rest of its branch, and is gone at once")
+                    .help("write the rule for the module that makes it, as in `A(x): if x = 1 produce %`"),
             );
         }
         !bracket && !cut
@@ -192,8 +119,9 @@ impl RuleBuilder<'_> {
         if !self.not_a_bracket(head) {
             return None;
         }
+        // Who draws or measures a module sees what is written of it, and no clocks.
+        let clocks = std::mem::take(&mut self.clocks);
         let (variables, count) = self.variables(head, &[], &[]);
-        // What is only drawn does not develop: it makes no rule reachable.
         if let Some(cut) = drawn.iter().find(|module| &*module.name == CUT) {
             self.error(
                 Diagnostic::error("a drawing cuts nothing off")
@@ -201,8 +129,10 @@ impl RuleBuilder<'_> {
                     .help("to draw nothing, write `ε`"),
             );
         }
+        // What is only drawn does not develop: it makes no rule reachable.
         let before = std::mem::take(&mut self.occurs);
-        let drawn = self.successor(drawn, &variables, count);
+        let drawn = self.string(drawn, &variables, count);
+        self.clocks = clocks;
         let inside = std::mem::replace(&mut self.occurs, before);
         let kind = self.kinds.intern(&head.name.text, head.parameters.len());
         self.drawn.extend(inside.into_iter().filter(|(other, _)| *other != kind));
@@ -219,10 +149,11 @@ impl RuleBuilder<'_> {
             "±" => &["+", "-"],
             name => &[name],
         };
-        let own = rule.predecessor.parameters.len();
+        let hidden = |me: &Self, m: &HeadModule| me.clocks.width(&m.name.text, m.parameters.len());
         for name in names {
-            self.kinds.intern(name, own);
+            self.kinds.intern(name, rule.predecessor.parameters.len());
         }
+        let own = rule.predecessor.parameters.len() + hidden(self, &rule.predecessor);
         let (mut variables, count) = self.variables(&rule.predecessor, &rule.left, &rule.right);
         self.scope.comparisons.clear();
         good &= self.locals(rule, &mut variables);
@@ -231,36 +162,67 @@ impl RuleBuilder<'_> {
         let mut atoms = Atoms::default();
         let mut guards = Vec::new();
         for clause in &rule.clauses {
+            let mut node = None;
             let guard = match clause.guard {
                 None => Some(Condition::default()),
                 Some(guard) => {
-                    let node = self.scope.condition(&self.document.expressions, guard, &variables);
-                    node.and_then(|node| self.decompose(node, clause.span, &mut atoms))
+                    node = self.scope.condition(&self.document.expressions, guard, &variables);
+                    // Under a rate it is the clock that says when.
+                    match (node, &clause.hazard) {
+                        (Some(_), Some(_)) => Some(Condition::default()),
+                        (node, _) => node.and_then(|node| self.decompose(node, clause.span, &mut atoms)),
+                    }
                 }
             };
             good &= guard.is_some();
-            guards.push(guard.unwrap_or_default());
+            guards.push((guard.unwrap_or_default(), node));
         }
+        let mut clocks = Vec::new();
+        let mut hazards = Vec::new();
+        let mut faults = Vec::new();
         let mut drafts = Vec::new();
         let mut produces = Vec::new();
-        for (clause, guard) in rule.clauses.iter().zip(guards) {
-            match &clause.action {
-                Action::Produce(modules) => match self.successor(modules, &variables, count) {
-                    Some(successor) => produces.push(Produce { guard, span: clause.span, successor }),
+        let mut keys = production_keys(rule);
+        for (clause, (guard, node)) in rule.clauses.iter().zip(&guards) {
+            let Action::Produce(successors) = &clause.action else { continue };
+            let key = keys.next().map_or(0, |(_, key)| key);
+            let mut guard = guard.clone();
+            if clause.hazard.is_some() {
+                match self.hazard(clause, (&rule.predecessor, key), *node, &variables) {
+                    Some(hazard) => {
+                        guard = self.clock_is_down(&hazard, &mut atoms)?;
+                        faults.extend(self.negative_rate(&hazard, clause.span, count, &mut atoms));
+                        clocks.push(Clock { parameter: hazard.parameter, produce: produces.len() });
+                        hazards.push(hazard);
+                    }
                     None => good = false,
-                },
-                Action::Solve(equations) => {
-                    let rates = self.equations(equations, &rule.predecessor, &variables);
-                    let (rates, switches) = match rates {
-                        Some(rates) => self.smooth(rates, own, count, clause.span, &mut atoms)?,
-                        None => {
-                            good = false;
-                            continue;
-                        }
-                    };
-                    drafts.push((guard, clause.span, rates, switches));
                 }
             }
+            match self.outcome(successors, &variables, count) {
+                Some(outcome) => {
+                    produces.push(Produce { guard, span: clause.span, key, is_fault: false, outcome });
+                }
+                None => good = false,
+            }
+        }
+        produces.extend(faults);
+        for (clause, (guard, node)) in rule.clauses.iter().zip(&guards) {
+            let Action::Solve(equations) = &clause.action else { continue };
+            let rates = self.equations(equations, &rule.predecessor, &variables);
+            let Some(mut rates) = rates else {
+                good = false;
+                continue;
+            };
+            rates.extend(hazards.iter().filter_map(|hazard| self.clock_rate(hazard, *node)));
+            let (rates, switches) = self.smooth(rates, own, count, clause.span, &mut atoms)?;
+            drafts.push((guard.clone(), clause.span, rates, switches));
+        }
+        if let (true, Some(first)) = (drafts.is_empty(), clocks.first()) {
+            // Clocks run, though nothing else does.
+            let span = produces[first.produce].span;
+            let rates = hazards.iter().filter_map(|hazard| self.clock_rate(hazard, None)).collect();
+            let (rates, switches) = self.smooth(rates, own, count, span, &mut atoms)?;
+            drafts.push((Condition::default(), span, rates, switches));
         }
         if !good {
             return None;
@@ -291,14 +253,22 @@ impl RuleBuilder<'_> {
                     jacobian: Jacobian::default(),
                     watch: Vec::new(),
                     flashes: false,
+                    is_delicate: false,
                 }
             })
             .collect();
         let sides: Vec<NodeId> = atoms.sides.iter().flat_map(|(a, b)| [*a, *b]).collect();
         let sides = Program::compile(&self.scope.graph, &sides, count);
-        let pattern = |m: &HeadModule| Pattern { kinds: Vec::new(), arity: m.parameters.len() };
-        let names = |m: &HeadModule| m.parameters.iter().map(|p| p.text.to_string()).collect::<Vec<_>>();
+        let pattern = |m: &HeadModule| {
+            let arity = m.parameters.len();
+            Pattern { kinds: Vec::new(), arity, width: arity + hidden(self, m) }
+        };
+        let names = |m: &HeadModule| {
+            let clocks = std::iter::repeat_n("clock".to_owned(), hidden(self, m));
+            m.parameters.iter().map(|p| p.text.to_string()).chain(clocks).collect::<Vec<_>>()
+        };
         let compiled = Rule {
+            index: 0,
             label: print::head(rule),
             span: rule.head,
             discrete: rule.discrete,
@@ -313,6 +283,8 @@ impl RuleBuilder<'_> {
             boundaries: atoms.boundaries,
             solves,
             produces,
+            hidden: hidden(self, &rule.predecessor),
+            clocks,
             moving_context: Vec::new(),
             reads_context: false,
             watch_at_rest: Vec::new(),
@@ -333,7 +305,7 @@ impl RuleBuilder<'_> {
         for equation in equations {
             let name = &equation.parameter;
             let Some(parameter) = head.parameters.iter().position(|p| p.text == name.text) else {
-                self.error(not_a_parameter(name, head, variables));
+                self.error(advice::not_a_parameter(name, head, variables));
                 good = false;
                 continue;
             };
@@ -341,7 +313,11 @@ impl RuleBuilder<'_> {
                 self.error(
                     Diagnostic::error(format!("two equations for `{}` in one `solve`", name.text))
                         .at(name.span, "the second one")
-                        .at(before, "the first one"),
+                        .at(before, "the first one")
+                        .help(format!(
+                            "keep one of them; two contributions are added: `d{0}/dt = … + …`",
+                            name.text
+                        )),
                 );
                 good = false;
             }
@@ -366,7 +342,8 @@ impl RuleBuilder<'_> {
             if steps.len() > MAX_CONDITION {
                 self.error(
                     Diagnostic::error("this condition is too long")
-                        .at(span, format!("more than {MAX_CONDITION} comparisons and connectives")),
+                        .at(span, format!("more than {MAX_CONDITION} comparisons and connectives"))
+                        .help("functions that call functions multiply what they compare: compute a shared part once"),
                 );
                 return None;
             }
@@ -392,7 +369,7 @@ impl RuleBuilder<'_> {
                         _ => Comparison::NotEqual,
                     };
                     let known = self.scope.comparisons.get(&id);
-                    let (at, boundary) = known.map_or((span, ""), |(at, boundary)| (*at, boundary));
+                    let (at, boundary) = known.map_or((span, None), |(at, sides)| (*at, Some(&**sides)));
                     steps.push(atoms.step(a, b, comparison, at, boundary));
                 }
                 node => unreachable!("{node:?} is no condition"),
@@ -401,88 +378,28 @@ impl RuleBuilder<'_> {
         Some(Condition(steps))
     }
 
-    /// Wrong numbers of parameters: of words that have rules (or drawings), wherever they stand in a string (or a
-    /// drawing). `place` says where the right number is.
-    pub fn check_arities(&mut self, heads: &[&HeadModule], strings: &[&[ast::Module]], place: &str) {
-        let mut declared: HashMap<&str, Vec<&HeadModule>> = HashMap::new();
-        for &head in heads {
-            declared.entry(&head.name.text).or_default().push(head);
-        }
-        let mut reported: HashSet<(&str, usize)> = HashSet::new();
-        for module in strings.iter().copied().flatten() {
-            // A symbol or surface may leave its parameters to the turtle's defaults.
-            if class_of(&module.name) != Class::Word {
-                continue;
-            }
-            let Some(heads) = declared.get(&*module.name) else { continue };
-            let given = module.arguments.len();
-            if heads.iter().any(|h| h.parameters.len() == given) || !reported.insert((&module.name, given)) {
-                continue;
-            }
-            let error = Diagnostic::error(format!(
-                "`{}` has {}, not {given}",
-                module.name,
-                plural(heads[0].parameters.len(), "parameter"),
-            ))
-            .at(module.span, format!("{} here", plural(given, "parameter")))
-            .at(heads[0].span, format!("{} {place}", plural(heads[0].parameters.len(), "parameter")));
-            self.error(error);
-        }
-    }
-
-    /// Drawings of modules that neither the strings nor other drawings ever have.
-    pub fn check_interpretations(&mut self, heads: &[&HeadModule]) {
-        for head in heads {
-            let name = &*head.name.text;
-            let given = head.parameters.len();
-            let seen = |kind| self.occurs.contains_key(&kind) || self.drawn.contains_key(&kind);
-            if self.kinds.find(name, given).is_some_and(seen) {
-                continue;
-            }
-            let mut error =
-                Diagnostic::warning(format!("nothing is drawn as `{}`", print::head_module(head)))
-                    .at(head.span, "no string and no other drawing has this module");
-            let other = (self.occurs.iter().chain(&self.drawn))
-                .filter(|(kind, _)| self.kinds.get(**kind).name == name)
-                .min_by_key(|(_, span)| **span);
-            if let Some((kind, span)) = other {
-                let arity = self.kinds.get(*kind).arity;
-                error = error.at(*span, format!("here it has {}", plural(arity, "parameter")));
-            }
-            self.error(error);
-        }
-    }
-
     /// The value of an expression of constants, for declarations such as `angle`.
     pub fn constant(&mut self, expression: Expression) -> Option<f64> {
         self.scope.constant_value(&self.document.expressions, expression)
     }
 }
 
-fn not_a_parameter(name: &ast::Name, head: &HeadModule, variables: &Variables) -> Diagnostic {
-    let known = head.parameters.iter().map(|p| &*p.text);
-    let error =
-        Diagnostic::error(format!("`{}` is no parameter of `{}`", name.text, print::head_module(head)))
-            .at(name.span, "only the parameters of the strict predecessor have equations")
-            .at(head.span, "the strict predecessor");
-    if variables.lets.contains_key(&name.text) {
-        return error.help("a `let` names an expression; nothing is stored that could be solved");
-    }
-    if variables.names.contains_key(&name.text) && !RESERVED.contains(&&*name.text) {
-        return error
-            .help("this is a parameter of a neighbour; its equation belongs into the neighbour's rule");
-    }
-    error.help_opt(did_you_mean(&name.text, known))
-}
-
 impl Atoms {
     /// The step that compares two sides; each pair is kept once, whichever way round it is written.
-    fn step(&mut self, a: NodeId, b: NodeId, comparison: Comparison, span: Span, boundary: &str) -> Step {
+    fn step(
+        &mut self,
+        a: NodeId,
+        b: NodeId,
+        comparison: Comparison,
+        span: Span,
+        sides: Option<&[String; 2]>,
+    ) -> Step {
         let (pair, comparison) = if a <= b { ((a, b), comparison) } else { ((b, a), comparison.mirrored()) };
         let atom = *self.index.entry(pair).or_insert_with(|| {
             self.sides.push(pair);
             self.spans.push(span);
-            self.boundaries.push(boundary.to_owned());
+            let known = sides.map(|[left, right]| Boundary::new(left, right, a > b));
+            self.boundaries.push(known.unwrap_or_default());
             self.sides.len() as u32 - 1
         });
         Step::Atom(atom, comparison)

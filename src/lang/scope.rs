@@ -1,14 +1,17 @@
 //! Constants, parameters and functions of a model, and the lowering of expressions to the graph.
 
 use std::collections::{HashMap, HashSet};
+use std::ops::Range;
 use std::sync::Arc;
 
+use super::advice;
 use super::ast::{Expr, ExprId, Expression, Expressions, Name, Operator};
+use super::chance::{DRAW, Draws};
 use super::print;
 use super::suggest::did_you_mean;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::expr::{Binary, Graph, Integral, Lookup, Node, NodeId, Part, Unary};
-use crate::model::Comparison;
+use crate::model::{Comparison, Distribution};
 
 /// Most nodes that the functions of a model may expand to.
 const MAX_WORK: usize = 20_000_000;
@@ -30,9 +33,11 @@ pub struct Lowered {
 /// A function, as a graph over its formal parameters.
 #[derive(Clone, Debug)]
 pub(super) struct Function {
-    pub parameters: usize,
+    pub parameters: Vec<Arc<str>>,
     /// None if its own text is at fault, which has been reported.
     pub body: Option<Lowered>,
+    /// The random numbers that its body draws.
+    pub draws: Range<u32>,
     /// Of the library.
     pub library: bool,
     /// Parts of the body with a known antiderivative.
@@ -64,12 +69,12 @@ pub struct Scope {
     pub(super) poisoned: HashSet<Arc<str>>,
     /// Names that were already complained about.
     pub(super) unknown: HashSet<Arc<str>>,
-    /// Where the comparisons of the present rule are written, by their node, and their boundary as in
-    /// `x = s`. Rules number their variables alike, so one rule's nodes mean nothing in another.
-    pub comparisons: HashMap<NodeId, (Span, Arc<str>)>,
+    /// Where the comparisons of the present rule are written, by their node, and their two sides. Rules number their variables alike, so one rule's nodes mean nothing in another.
+    pub comparisons: HashMap<NodeId, (Span, Arc<[String; 2]>)>,
     /// The same for the bodies of functions.
-    function_comparisons: HashMap<NodeId, (Span, Arc<str>)>,
+    function_comparisons: HashMap<NodeId, (Span, Arc<[String; 2]>)>,
     pub diagnostics: Vec<Diagnostic>,
+    pub draws: Draws,
     /// What is wrong with the values given from outside, which is not the text's fault.
     pub refused_settings: Vec<Diagnostic>,
     work: usize,
@@ -120,17 +125,27 @@ impl Scope {
                         "`{}` has two parameters called `{}`",
                         name.text, parameter.text
                     ))
-                    .at(parameter.span, "the second one"),
+                    .at(parameter.span, "the second one")
+                    .help(format!(
+                        "give each a name of its own, such as `{}`",
+                        advice::numbered(&parameter.text)
+                    )),
                 );
             }
         }
+        let first = self.draws.all.len() as u32;
+        // Whether it may draw is asked where it is called.
+        self.draws.allowed = true;
         let body = self.lower(all, body, &variables);
+        self.draws.allowed = false;
         self.function_comparisons.extend(self.comparisons.drain());
+        let draws = first..self.draws.all.len() as u32;
+        let parameters = parameters.iter().map(|p| p.text.clone()).collect();
         let integrals = body.map_or_else(Vec::new, |body| {
             let parts = self.graph.reachable(&[body.node]);
             self.graph.noted_integrals(&parts)
         });
-        let function = Function { parameters: parameters.len(), body, library, integrals };
+        let function = Function { parameters, body, draws, library, integrals };
         self.functions.insert(name.text.clone(), function);
     }
 
@@ -166,7 +181,8 @@ impl Scope {
         }
         self.diagnostics.push(
             Diagnostic::error("this has no finite value")
-                .at(all.span(expression.root), format!("it is {value}")),
+                .at(all.span(expression.root), format!("it is {value}"))
+                .help(advice::not_finite(value)),
         );
         None
     }
@@ -294,7 +310,9 @@ impl Scope {
                     let link = self.compare(*comparison, left, right);
                     self.comparisons.entry(link).or_insert_with(|| {
                         let sides = [a_id, *operand].map(|id| print::expression(all, id));
-                        (all.span(a_id).to(all.span(*operand)), sides.join(" = ").into())
+                        // A choice binds loosest of all.
+                        let sides = sides.map(|s| if s.starts_with("if ") { format!("({s})") } else { s });
+                        (all.span(a_id).to(all.span(*operand)), sides.into())
                     });
                     whole = Some(match whole {
                         Some(before) => self.graph.binary(Binary::And, before, link),
@@ -342,16 +360,19 @@ impl Scope {
         let error = if RESERVED.contains(&&**name) {
             Diagnostic::error(format!("`{name}` has no meaning here"))
                 .at(span, "time is known in rules only")
-                .help_opt(variables.no_time.map(str::to_owned))
+                .help(variables.no_time.unwrap_or("use it in a rule"))
         } else if self.curves.contains_key(name) {
             Diagnostic::error(format!("`{name}` is a curve"))
-                .at(span, format!("expected its argument, as in `{name}(age)`"))
+                .at(span, "a function of one number")
+                .help(format!("give it its argument: `{name}(age)`"))
         } else if self.arrays.contains_key(name) {
             Diagnostic::error(format!("`{name}` is an array"))
-                .at(span, format!("expected the number of an element, as in `{name}[0]`"))
+                .at(span, "several numbers")
+                .help(format!("give the number of an element, the first one being 0: `{name}[0]`"))
         } else if self.functions.contains_key(name) || is_function(name) {
             Diagnostic::error(format!("`{name}` is a function"))
-                .at(span, format!("expected its arguments, as in `{name}(x)`"))
+                .at(span, "expected its arguments")
+                .help(format!("call it: `{}`", self.call_of(name)))
         } else {
             let known = variables
                 .names
@@ -403,14 +424,25 @@ impl Scope {
                     nodes.len()
                 ))
                 .at(span, format!("{} given", plural(nodes.len(), "argument")))
-                .help_opt(me.usage(name)),
+                .help(match &**name {
+                    "min" | "max" if nodes.len() > 2 => {
+                        let texts: Vec<String> =
+                            arguments.iter().map(|(id, _)| print::expression(all, *id)).collect();
+                        let nested = |inner: String, next: &String| format!("{name}({inner}, {next})");
+                        format!("write `{}`", texts[1..].iter().fold(texts[0].clone(), nested))
+                    }
+                    _ => format!("it is called as `{}`", me.call_of(name)),
+                }),
             );
             None
         };
         let number = |node| Some(Lowered { node, is_condition: false });
         if let Some(function) = self.functions.get(name).cloned() {
             self.used.insert(name.clone());
-            count(self, function.parameters)?;
+            count(self, function.parameters.len())?;
+            if !function.draws.is_empty() {
+                self.may_draw(name, span)?;
+            }
             let whole = self.inline(&function, &nodes, span)?;
             if function.library {
                 self.know_library_integral(name, whole.node, &nodes, span);
@@ -430,11 +462,15 @@ impl Scope {
             count(self, 2)?;
             return number(self.graph.binary(*op, nodes[0], nodes[1]));
         }
+        if let Some(distribution) = Distribution::named(name) {
+            return self.draw(distribution, span, nodes);
+        }
         if self.poisoned.contains(name) || !self.unknown.insert(name.clone()) {
             return None;
         }
         let built_in = Unary::NAMED.iter().map(|(n, _)| *n).chain(Binary::NAMED.iter().map(|(n, _)| *n));
         let own = self.functions.keys().chain(self.curves.keys()).filter(|_| self.suggests());
+        let built_in = built_in.chain(Distribution::NAMED.iter().map(|(n, ..)| *n));
         let known = own.map(|n| &**n).chain(built_in).chain(super::include::library_names());
         let mut error =
             Diagnostic::error(format!("unknown function `{name}`")).at(span, "no function has this name");
@@ -453,16 +489,13 @@ impl Scope {
         None
     }
 
-    /// How a curve or a function of the library is called.
-    fn usage(&self, name: &str) -> Option<String> {
-        if self.curves.contains_key(name) {
-            return Some(format!("a curve is a function of one number: `{name}(x)`"));
+    /// How a function is called.
+    fn call_of(&self, name: &str) -> String {
+        match self.functions.get(name) {
+            Some(function) => format!("{name}({})", function.parameters.join(", ")),
+            None if Binary::NAMED.iter().any(|(n, _)| *n == name) => format!("{name}(x, y)"),
+            None => format!("{name}(x)"),
         }
-        let library = self.functions.get(name).is_some_and(|function| function.library);
-        let usage = super::include::library_usage(name).filter(|_| library)?;
-        Some(format!(
-            "this function of the library is called `{usage}`; a `def` of your own with its name would win"
-        ))
     }
 
     /// A function's body with the arguments in place of its formal parameters.
@@ -472,8 +505,8 @@ impl Scope {
         arguments: &[NodeId],
         span: Span,
     ) -> Option<Lowered> {
-        let body = function.body?;
-        self.work += self.graph.reachable(&[body.node]).len();
+        let (body, draws) = (function.body?, function.draws.clone());
+        self.work += self.graph.reachable(&[body.node]).len() + draws.len();
         if self.work > MAX_WORK {
             if self.work < usize::MAX / 2 {
                 self.work = usize::MAX / 2;
@@ -485,13 +518,16 @@ impl Scope {
             }
             return None;
         }
+        let formal = |v: u32| (FORMAL..DRAW).contains(&v).then(|| arguments[(v - FORMAL) as usize]);
+        let drawn = self.draw_again(draws, &formal)?;
         let comparisons = &self.function_comparisons;
         let mut moved = Vec::new();
         let known = function.integrals.iter().flat_map(|(of, i)| [*of, i.whole, i.argument]);
         let roots: Vec<NodeId> = std::iter::once(body.node).chain(known).collect();
         let images = self.graph.rewrite(&roots, |graph, id, node| {
             let image = match node {
-                Node::Var(v) if v >= FORMAL => return Some(arguments[(v - FORMAL) as usize]),
+                Node::Var(v) if v >= DRAW => return drawn.get(&v).copied(),
+                Node::Var(v) => return formal(v),
                 Node::Binary(op @ (Binary::Lt | Binary::Le | Binary::Eq | Binary::Ne), a, b) => {
                     graph.binary(op, a, b)
                 }

@@ -94,7 +94,7 @@ impl Frozen {
         root: NodeId,
         still: &dyn Fn(u32) -> bool,
         outside: Option<&HashSet<NodeId>>,
-        comparisons: &mut HashMap<NodeId, (Span, Arc<str>)>,
+        comparisons: &mut HashMap<NodeId, (Span, Arc<[String; 2]>)>,
         span: Span,
     ) -> NodeId {
         graph.rewrite(&[root], |graph, id, rebuilt| {
@@ -119,7 +119,7 @@ impl Frozen {
         graph: &mut Graph,
         id: NodeId,
         rebuilt: Node,
-        comparisons: &mut HashMap<NodeId, (Span, Arc<str>)>,
+        comparisons: &mut HashMap<NodeId, (Span, Arc<[String; 2]>)>,
         span: Span,
     ) -> Option<NodeId> {
         let zero = graph.constant(0.0);
@@ -160,8 +160,8 @@ impl Frozen {
                 let phase = graph.curve(curve, Part::Phase, x);
                 let moved = graph.curve(curve, Part::Phase, a);
                 let (piece, change) = self.level(graph, phase, moved);
-                let boundary = format!("a knot of {}", graph.curve_of(curve).name);
-                comparisons.entry(change).or_insert((span, boundary.into()));
+                let sides = [graph.curve_of(curve).name.clone(), "its value at a knot".to_owned()];
+                comparisons.entry(change).or_insert((span, Arc::new(sides)));
                 Some(graph.piece(curve, part, piece, a))
             }
             _ => None,

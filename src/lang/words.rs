@@ -3,13 +3,16 @@
 use super::curves::FUNCTIONALS;
 use super::layout::DECLARATIONS;
 use crate::expr::{Binary, Unary};
+use crate::model::Distribution;
 
 /// Words that begin a part of a rule. Also those of an expression, which may stand at the beginning of a line.
-pub const CLAUSES: [&str; 6] = ["if", "then", "else", "solve", "produce", "let"];
+pub const CLAUSES: [&str; 8] = ["if", "then", "else", "solve", "produce", "or", "at", "let"];
 
 /// Words that mean something in certain places only.
-pub const PARTICLES: [&str; 11] =
-    ["string", "in", "step", "from", "strength", "column", "monotone", "spline", "linear", "match", "case"];
+pub const PARTICLES: [&str; 12] = [
+    "string", "in", "step", "from", "strength", "rate", "column", "monotone", "spline", "linear", "match",
+    "case",
+];
 
 /// Words that end a declaration.
 pub const ENDINGS: [&str; 1] = ["periodic"];
@@ -22,11 +25,13 @@ pub fn declarations() -> impl Iterator<Item = &'static str> {
     DECLARATIONS.iter().map(|(word, _)| *word)
 }
 
-/// Functions that are built in, and those of the library.
+/// Functions that are built in and those of the library, and distributions that are called like them.
 pub fn functions() -> impl Iterator<Item = &'static str> {
     let numbers =
         Unary::NAMED.iter().map(|(name, _)| *name).chain(Binary::NAMED.iter().map(|(name, _)| *name));
-    numbers.chain(FUNCTIONALS.iter().map(|(name, _)| *name)).chain(super::include::library_names())
+    let draws = Distribution::NAMED.iter().map(|(name, ..)| *name);
+    let curves = FUNCTIONALS.iter().map(|(name, _)| *name);
+    numbers.chain(draws).chain(curves).chain(super::include::library_names())
 }
 
 /// How a declaration goes on after its first word, for somebody who types it; empty for a word that begins none.

@@ -56,6 +56,9 @@ pub fn analyse(graph: &mut Graph, model: &mut Model, drafts: &[Draft]) {
             let roots: Vec<NodeId> = numeric.iter().map(|i| rates[*i].1).collect();
             solve.numeric_rates = Program::compile(graph, &roots, total);
             solve.linear = linear(graph, &roots, &constants, total);
+            let clocked =
+                rates.iter().any(|(parameter, _)| rule.clocks.iter().any(|c| c.parameter == *parameter));
+            solve.is_delicate = clocked && laws.iter().any(|law| !law.is_closed());
             solve.flashes = nodes.iter().any(|&rate| flashes(graph, rate, rule.variables - 2));
             solve.laws = laws;
             solve.numeric = numeric;
@@ -67,7 +70,7 @@ pub fn analyse(graph: &mut Graph, model: &mut Model, drafts: &[Draft]) {
 
 /// Per kind and parameter: whether some rule has an equation for it.
 fn moving_parameters(model: &Model) -> Vec<Vec<bool>> {
-    let mut all: Vec<Vec<bool>> = model.kinds.iter().map(|(_, kind)| vec![false; kind.arity]).collect();
+    let mut all: Vec<Vec<bool>> = model.kinds.iter().map(|(_, kind)| vec![false; kind.width()]).collect();
     for (id, kind) in model.kinds.iter() {
         for solve in kind.rules.iter().flat_map(|r| &model.rules[*r].solves) {
             for &parameter in &solve.of {
@@ -82,7 +85,7 @@ fn moving_parameters(model: &Model) -> Vec<Vec<bool>> {
 fn moving_context(kinds: &[Vec<bool>], rule: &Rule) -> Vec<bool> {
     (rule.left.iter().chain(&rule.right))
         .flat_map(|pattern| {
-            (0..pattern.arity).map(|p| pattern.kinds.iter().any(|kind| kinds[kind.index()][p]))
+            (0..pattern.width).map(|p| pattern.kinds.iter().any(|kind| kinds[kind.index()][p]))
         })
         .collect()
 }
@@ -356,18 +359,18 @@ fn mark_drawn_only(graph: &Graph, model: &mut Model, drafts: &[Draft]) {
             let others = graph.variables(&[*rate]).into_iter().map(|v| v as usize);
             variables.extend(others.filter(|v| v != parameter));
         }
-        variables.extend(rule.produces.iter().flat_map(|p| p.successor.arguments.reads()));
+        variables.extend(rule.produces.iter().flat_map(|p| p.outcome.reads()));
         for v in variables {
             if v < own {
                 read.extend(kinds_of[index].iter().map(|kind| (*kind, v)));
             } else if v < rule.time_variable() {
                 let mut first = own;
                 for pattern in rule.left.iter().chain(&rule.right) {
-                    if v < first + pattern.arity {
+                    if v < first + pattern.width {
                         read.extend(pattern.kinds.iter().map(|k| (k.index(), v - first)));
                         break;
                     }
-                    first += pattern.arity;
+                    first += pattern.width;
                 }
             }
         }

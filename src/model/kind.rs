@@ -49,9 +49,17 @@ pub struct Kind {
     /// Passed over in the search for context (LANGUAGE: symbols and surfaces unless a `consider` names
     /// them; whatever an `ignore` names).
     pub skipped: bool,
+    /// Hidden parameters, after those that are written: the clocks of events at a rate, by the keys of their clauses.
+    /// Kinds of one base name and number of parameters have the same number of them.
+    pub clocks: Vec<u64>,
 }
 
 impl Kind {
+    /// Number of parameters, hidden ones included.
+    pub fn width(&self) -> usize {
+        self.arity + self.clocks.len()
+    }
+
     /// Continuous and discrete rules.
     pub fn all_rules(&self) -> impl Iterator<Item = usize> + '_ {
         self.rules.iter().chain(&self.steps).copied()
@@ -140,6 +148,7 @@ impl Kinds {
             steps: Vec::new(),
             interpretation: None,
             skipped: class_of(name) != Class::Word,
+            clocks: Vec::new(),
         });
         self.ids.insert((name.to_owned(), arity), id);
         id

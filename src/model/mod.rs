@@ -12,17 +12,21 @@
 
 mod analysis;
 mod appearance;
+mod chance;
 mod condition;
 mod driven;
 mod invariance;
 mod kind;
 mod law;
+mod measure;
+mod remedy;
 mod rule;
 
 pub use analysis::{Draft, analyse};
 pub use appearance::{
     Appearance, BUILT_IN_COLORS, Contour, Gradient, NamedColor, Net, Rgb, SurfaceShape, Tropism,
 };
+pub use chance::{Clock, Distribution, Draw, NewClock, choose};
 pub use condition::{Comparison, Condition, Sign, Step, Truth};
 pub use driven::{Driven, DrivenForm, Flow, driven_form, outside_of_drivers};
 pub use invariance::never_reached;
@@ -30,7 +34,9 @@ pub use kind::{
     BUILT_IN_SURFACES, COMMAND_SURFACES, CUT, Class, DRAWN_WORDS, Kind, KindId, Kinds, base_of, class_of,
 };
 pub use law::{Jacobian, Law, Linear, Numeric, Obstacle, Watch};
-pub use rule::{Interpretation, Pattern, Produce, Rule, Solve, Successor, Switch};
+pub use measure::Measure;
+pub use remedy::{Boundary, Remedy};
+pub use rule::{Interpretation, Outcome, Pattern, Produce, Rule, Solve, Successor, Switch};
 
 use std::sync::Arc;
 

@@ -3,22 +3,24 @@
 //! # Variables of a rule
 //!
 //! All expressions of a rule read the same variables, in this order: the parameters of the strict
-//! predecessor; the parameters of the context modules, left to right as written; `t`; `age`; then one
-//! truth value for each [`Switch`].
+//! predecessor, then its hidden ones ([`Kind::clocks`](super::Kind::clocks)); the same of the context modules, left to
+//! right as written; `t`; `age`; then one truth value for each [`Switch`], or the [`Draw`]s of a successor.
 
-use super::{Condition, Jacobian, KindId, Law, Linear, Watch};
+use super::{Boundary, Clock, Condition, Draw, Jacobian, KindId, Law, Linear, NewClock, Watch};
 use crate::diagnostic::Span;
 use crate::expr::{Program, Scratch, Value};
 
 /// Context, equations and productions of one strict predecessor.
 #[derive(Clone, Debug)]
 pub struct Rule {
+    /// Its place among the rules of the model.
+    pub index: usize,
     /// The head as written.
     pub label: String,
     pub span: Span,
     /// It applies at the multiples of the model's period only, has no equations and one production.
     pub discrete: bool,
-    /// Names of the strict predecessor's parameters.
+    /// Names of the strict predecessor's parameters, hidden ones last.
     pub parameters: Vec<String>,
     /// Names of the context's parameters, in the order of the variables.
     pub context_names: Vec<String>,
@@ -35,11 +37,15 @@ pub struct Rule {
     /// Where each atom is written.
     pub atoms: Vec<Span>,
     /// The boundary of each atom, as in `x = s`, for messages.
-    pub boundaries: Vec<String>,
+    pub boundaries: Vec<Boundary>,
     /// In the order written: of those that hold, the first is active.
     pub solves: Vec<Solve>,
     /// In the order written: of those that hold at one instant, the first wins.
     pub produces: Vec<Produce>,
+    /// How many of them are hidden.
+    pub hidden: usize,
+    /// Of events at a rate.
+    pub clocks: Vec<Clock>,
     /// Variables of the context for which some rule has an equation.
     pub moving_context: Vec<usize>,
     /// Rates or conditions read some of them.
@@ -81,6 +87,8 @@ pub struct Pattern {
     pub kinds: Vec<KindId>,
     /// Number of parameters.
     pub arity: usize,
+    /// With those that are hidden.
+    pub width: usize,
 }
 
 impl Pattern {
@@ -117,6 +125,8 @@ pub struct Solve {
     pub watch: Vec<Watch>,
     /// Rates depend on time in a way that may be over before a step notices: not as polynomials.
     pub flashes: bool,
+    /// The clock of an event at a rate runs, and something is integrated numerically.
+    pub is_delicate: bool,
 }
 
 /// A condition inside an equation, replaced there by a variable, so that the equation is smooth between
@@ -131,7 +141,39 @@ pub struct Switch {
 pub struct Produce {
     pub guard: Condition,
     pub span: Span,
-    pub successor: Successor,
+    /// Tells the productions of a rule apart: [`key`](crate::structure::key).
+    pub key: u64,
+    /// No production: the rate of another clause has become negative.
+    pub is_fault: bool,
+    pub outcome: Outcome,
+}
+
+/// What takes a module's place.
+#[derive(Clone, Debug, Default)]
+pub struct Outcome {
+    /// The weight of each successor, if there are several.
+    pub weights: Option<Program>,
+    /// One, or as many as there are weights.
+    pub successors: Vec<Successor>,
+}
+
+impl Outcome {
+    /// True if what takes the place of two modules with the same values may differ.
+    pub fn is_random(&self) -> bool {
+        self.weights.is_some() || self.successors.iter().any(|s| !s.is_certain())
+    }
+
+    /// A number that tells the productions of a model apart that can replace one module.
+    pub fn production(key: u64, successor: usize) -> u64 {
+        key.wrapping_add(successor as u64)
+    }
+
+    /// What it reads.
+    pub fn reads(&self) -> impl Iterator<Item = usize> + '_ {
+        let draws = self.successors.iter().flat_map(|s| &s.draws).map(|draw| &draw.parameters);
+        let arguments = self.successors.iter().map(|s| &s.arguments);
+        arguments.chain(draws).chain(&self.weights).flat_map(Program::reads)
+    }
 }
 
 /// A string of modules whose arguments are computed when it is made.
@@ -139,16 +181,24 @@ pub struct Produce {
 pub struct Successor {
     /// In string order, with brackets.
     pub kinds: Vec<KindId>,
-    /// The arguments of all modules, one after another.
+    /// The arguments of all modules, one after another, clocks left out. They read the draws, too.
     pub arguments: Program,
+    pub draws: Vec<Draw>,
+    /// In the order of the modules.
+    pub clocks: Vec<NewClock>,
 }
 
 impl Successor {
-    /// Computes the arguments of all modules.
+    /// Computes the arguments of a string without chance.
     pub fn evaluate<T: Value>(&self, variables: &[T], scratch: &mut Scratch<T>, out: &mut Vec<T>) {
         out.clear();
         out.resize(self.arguments.outputs(), T::constant(0.0));
         self.arguments.eval(variables, scratch, out);
+    }
+
+    /// True if its arguments follow from the values of the predecessor.
+    pub fn is_certain(&self) -> bool {
+        self.draws.is_empty() && self.clocks.is_empty()
     }
 }
 

@@ -53,7 +53,8 @@ impl Names {
 pub fn parameter_names(model: &Model, kind: crate::model::KindId) -> Vec<String> {
     let kind = model.kinds.get(kind);
     match kind.rules.first() {
-        Some(rule) => model.rules[*rule].parameters.clone(),
+        // Behind those that are written, there may be hidden ones.
+        Some(rule) => model.rules[*rule].parameters[..kind.arity].to_vec(),
         None => (1..=kind.arity).map(|i| i.to_string()).collect(),
     }
 }

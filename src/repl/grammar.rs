@@ -3,7 +3,7 @@
 //! - `:word …` is a command, always, and so is `?`.
 //! - A line that begins with a word of the language (`param`, `interpret`, …), or that has a `:` outside parentheses,
 //!   is a declaration or a rule.
-//! - A line that begins with `if`, `solve` or `produce` is one more clause of the rule that was typed last.
+//! - A line that begins with `if`, `solve`, `produce`, `at` (rate) or `or` is one more clause of the rule that was typed last.
 //! - A line that begins with the name of a command is that command. A module may be called like a command: then its rule
 //!   is told by what follows the name, `(`, `<`, `>` or `:`.
 //!
@@ -102,7 +102,7 @@ pub fn is_open(text: &str) -> bool {
     let operator = end.ends_with([':', ',', '=', '*', '<', '>', '≤', '≥', '≠']) || end.ends_with("..");
     let clause = body.rmatch_indices(|c: char| !(c.is_alphanumeric() || c == '_')).count() > 0 && {
         let mut words = body.split(|c: char| !(c.is_alphanumeric() || c == '_')).rev();
-        words.find(|word| words::CLAUSES.contains(word)).is_some_and(|word| matches!(word, "if" | "let"))
+        matches!(words.find(|word| words::CLAUSES.contains(word)), Some("if" | "at" | "let"))
     };
     depth > 0 || waits || operator || clause && has_colon(&body)
 }

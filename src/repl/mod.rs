@@ -51,6 +51,7 @@ pub fn repl(args: &ReplArgs) -> Result<(), Failure> {
         scheduler: sim::Scheduler::Auto,
         tolerance: args.tolerance,
         step_size: args.step_size.unwrap_or(defaults.step_size),
+        seed: args.seed,
         max_modules: args.max_modules,
         ..defaults
     };

@@ -65,7 +65,8 @@ impl Stage<'_> {
             return Err(Fault::new(format!("{} .. {} is no stretch of time", brief(from, 9), brief(to, 9))));
         }
         let (subject, title) = self.subject(words)?;
-        let sheet_rows = (desk.screen.rows - 6).clamp(6, 16);
+        // An odd number, so that one row is the middle.
+        let sheet_rows = (desk.screen.rows - 6).clamp(6, 16) | 1;
         let mut sheet = Sheet::new(desk.screen.columns - MARGIN - 2, sheet_rows);
         let [width, height] = sheet.size();
         // What is to be seen, by column.
@@ -241,10 +242,7 @@ fn framed(rows: &[String], title: &str, [from, to]: [f64; 2], [low, high]: [f64;
         let number = match i {
             0 => brief(high, 5),
             i if i + 1 == rows.len() => brief(low, 5),
-            // The middle of the rows, not of the numbers: where its dots are.
-            i if i == middle && rows.len() > 8 => {
-                brief(high - (high - low) * (i as f64 + 0.5) / rows.len() as f64, 3)
-            }
+            i if i == middle && rows.len() > 8 => brief(0.5 * (high + low), 5),
             _ => String::new(),
         };
         let tick = if number.is_empty() { '│' } else { '┤' };

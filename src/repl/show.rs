@@ -129,7 +129,7 @@ impl Stage<'_> {
                 let n = number(word).unwrap_or(0);
                 found(
                     modules(replay).find(|m| m.number == n),
-                    format!("there are {count} modules, and no number {n},"),
+                    format!("no module has the number {n} (the last is {count})"),
                 )
             }
             [word]

@@ -11,11 +11,13 @@
 //! - `reference`: what is taken as the truth for a method, and how far that is to be trusted.
 //! - `study`: all points of all methods of a model; `order`: the slope that they show.
 //! - `table`, `files`, `plot` (with `axis`): a study for people, for programs, for print.
+//! - `spread`, `band`: how measures of many specimens are distributed, as tables and as a plot.
 //! - `case`, `hard`, `cases`: models with exact answers in their first lines.
 //!
 //! Runs are made one after another, never in parallel, because they are timed.
 
 mod axis;
+mod band;
 mod case;
 mod cases;
 mod compare;
@@ -25,9 +27,11 @@ mod order;
 mod plot;
 mod record;
 mod reference;
+mod spread;
 mod study;
 mod table;
 
+pub use band::band_svg;
 pub use case::{Case, CaseError, Expectation, Piece, Within};
 pub use cases::CASES;
 pub use compare::{Agreement, Comparison, Difference, compare};
@@ -37,5 +41,6 @@ pub use order::{nominal_order, observed_order};
 pub use plot::svg;
 pub use record::{Accuracy, Record, Setup, Stop, Task, method_name};
 pub use reference::{Reference, References};
+pub use spread::{Course, QUANTILES, Spread, spread_csv, spread_table};
 pub use study::{Outcome, Plan, Point, Series, Study, Wall, default_times, study};
 pub use table::{hard_table, mismatches, series_table, study_head, study_table};

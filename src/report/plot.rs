@@ -16,7 +16,7 @@ use super::table::order_text;
 use crate::sim::brief;
 
 /// Width of the picture, and of the space left of the panels and right of them.
-const WIDTH: f64 = 400.0;
+pub(super) const WIDTH: f64 = 400.0;
 const LEFT: f64 = 58.0;
 const RIGHT: f64 = 12.0;
 const TOP: f64 = 34.0;
@@ -26,18 +26,19 @@ const GAP: f64 = 14.0;
 const UNDER: f64 = 52.0;
 const LEGEND_LINE: f64 = 18.0;
 const CAPTION_LINE: f64 = 13.0;
-const FONT: f64 = 12.0;
-const SMALL: f64 = 10.0;
+pub(super) const FONT: f64 = 12.0;
+pub(super) const SMALL: f64 = 10.0;
 /// Characters of a line of the caption.
 const CAPTION_WIDTH: usize = 80;
-const FAMILY: &str = "Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif";
+pub(super) const FAMILY: &str = "Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif";
 
 /// Smaller errors are drawn as this one: they are rounding.
 const LEAST_ERROR: f64 = 1e-16;
 
 /// Okabe and Ito (2008), Color universal design; told apart by people who do not see all colours, and of
 /// different lightness. Yellow is left out: it is too light for lines on paper.
-const COLOURS: [&str; 7] = ["#000000", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
+pub(super) const COLOURS: [&str; 7] =
+    ["#000000", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
 const DASHES: [&str; 4] = ["none", "6 2.5", "2 2", "7 2 2 2"];
 
 /// The value of a point on a vertical axis, the least and the largest of it.
@@ -273,7 +274,7 @@ fn wrap(text: &str, width: usize) -> Vec<String> {
     lines
 }
 
-fn label(text: &str, x: f64, y: f64, anchor: &str) -> Text {
+pub(super) fn label(text: &str, x: f64, y: f64, anchor: &str) -> Text {
     Text::new(text).set("x", two(x)).set("y", two(y)).set("text-anchor", anchor)
 }
 
@@ -294,12 +295,12 @@ fn is_plain(ticks: &[Tick]) -> bool {
 }
 
 /// Without characters that XML cannot hold.
-fn plain(text: &str) -> String {
+pub(super) fn plain(text: &str) -> String {
     text.chars().filter(|c| !c.is_control()).collect()
 }
 
 /// To two decimals: a coordinate needs no more.
-fn two(x: f64) -> f64 {
+pub(super) fn two(x: f64) -> f64 {
     (x * 100.0).round() / 100.0
 }
 

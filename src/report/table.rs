@@ -9,16 +9,16 @@ use crate::sim::brief;
 
 /// A table whose columns are as wide as what stands in them. All but the first and last are set to the right.
 #[derive(Default)]
-struct Table {
+pub(super) struct Table {
     rows: Vec<Vec<String>>,
 }
 
 impl Table {
-    fn push<const N: usize>(&mut self, row: [String; N]) {
+    pub fn push<const N: usize>(&mut self, row: [String; N]) {
         self.rows.push(row.into());
     }
 
-    fn write(&self, indent: &str, out: &mut String) {
+    pub fn write(&self, indent: &str, out: &mut String) {
         let width = |column: usize| {
             let cells = self.rows.iter().filter_map(|row| row.get(column));
             cells.map(|cell| cell.chars().count()).max().unwrap_or(0)

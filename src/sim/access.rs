@@ -52,8 +52,11 @@ impl Simulation<'_> {
     /// A measure of the work done so far, in units of very roughly a tenth of a microsecond. It grows
     /// with time, and is the same in every run of the model.
     pub fn work(&self) -> u64 {
+        /// A step of a module alone; one of a repair, with what it takes to look at its neighbours.
+        const STEP: [u64; 2] = [10, 100];
         let stats = self.stats();
-        4 * (stats.events + self.passed) + stats.rhs_evaluations / 8
+        let steps = STEP[usize::from(self.looks_around)] * stats.steps;
+        4 * (stats.events + self.passed) + stats.rhs_evaluations / 8 + steps
     }
 
     /// Bytes that a copy takes, about.

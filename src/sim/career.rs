@@ -70,6 +70,8 @@ pub struct Life {
     pub replaced: Option<Instant>,
     /// Of the successor.
     pub arguments: Vec<f64>,
+    /// Which of the successors that the production has.
+    pub successor: usize,
     pub children: Vec<Child>,
     pub residual: f64,
 }

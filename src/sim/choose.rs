@@ -11,7 +11,7 @@ use super::settle::{Firing, open};
 use super::simulation::{SHORT_LIFE, Simulation};
 use super::state::{Signs, Switches};
 use crate::expr::Dual;
-use crate::model::{Condition, Rule, Sign, Step, Truth};
+use crate::model::{Condition, Remedy, Rule, Sign, Step, Truth};
 use crate::structure::ModuleId;
 
 /// Most times that the equations at one instant are chosen anew before the choice is called chattering.
@@ -281,6 +281,16 @@ impl Simulation<'_> {
         if trouble.chattering {
             return Error::Chattering { site };
         }
+        let (mut variables, mut scratch) = (Vec::new(), Vec::new());
+        let state = self.plant.state(id).expect("open modules have a state");
+        self.plant.variables(id, &state.context, self.now, &mut variables);
+        let mut sides = vec![0.0; rule.sides.outputs()];
+        rule.sides.eval(&variables, &mut scratch, &mut sides);
+        // The signs are those just behind the instant; a production is for what is met at it.
+        let meet = |atom: usize| {
+            let (a, b): (f64, f64) = (sides[2 * atom], sides[2 * atom + 1]);
+            (a - b).abs() <= 1e-9 * a.abs().max(b.abs()).max(1.0)
+        };
         let mut failing = Vec::new();
         for solve in &rule.solves {
             for (atom, comparison) in solve.guard.atoms() {
@@ -288,7 +298,9 @@ impl Simulation<'_> {
                 if alone.judge(|i| trouble.signs[i]) == Truth::No
                     && !failing.iter().any(|(s, _)| *s == rule.atoms[atom])
                 {
-                    failing.push((rule.atoms[atom], format!("if {}", rule.boundaries[atom])));
+                    let sign = if meet(atom) { Sign::Zero } else { trouble.signs[atom] };
+                    let remedy = Remedy::new(&self.model.kinds, rule, atom, comparison, sign);
+                    failing.push((rule.atoms[atom], remedy));
                 }
             }
         }

@@ -265,7 +265,8 @@ impl Simulation<'_> {
         let Coupled { system, y, integrator, control, .. } = &mut self.coupled;
         let mut equations = Equations::new(system, rules, None);
         let limit = self.settings.slice_end(from);
-        let step = integrator.step(&self.settings, control, &mut equations, y, from, limit, &mut self.stats);
+        let step =
+            integrator.step(&self.coupled_settings, control, &mut equations, y, from, limit, &mut self.stats);
         let end = step.map_err(|error| self.coupled_error(error, from))?;
         self.coupled.pending = true;
         self.plant.coupled = None;

@@ -1,6 +1,7 @@
 //! What can go wrong while a model runs.
 
 use crate::diagnostic::{Diagnostic, Span};
+use crate::model::{Distribution, Remedy};
 use crate::structure::Lineage;
 
 /// A module in trouble: what an error message says of it.
@@ -34,8 +35,8 @@ pub enum Error {
         site: Site,
         /// It never was inside.
         born: bool,
-        /// The comparisons that fail, with their places and how the production for them would begin.
-        failing: Vec<(Span, String)>,
+        /// The comparisons that fail, with their places and what could be written for them.
+        failing: Vec<(Span, Option<Remedy>)>,
     },
     #[error("the equations of {} push against each other at t = {}", .site.module, .site.when())]
     Chattering { site: Site },
@@ -47,6 +48,12 @@ pub enum Error {
     PeriodTooShort { site: Site, period: f64 },
     #[error("{what} of {} is not finite at t = {}", .site.module, .site.when())]
     NotFinite { site: Site, what: String },
+    #[error("`{distribution}` cannot be drawn from at t = {}: {why}", .site.when())]
+    BadDraw { site: Site, distribution: &'static str, why: String },
+    #[error("no successor can be chosen for {} at t = {}: {why}", .site.module, .site.when())]
+    BadWeights { site: Site, why: String },
+    #[error("the rate of an event of {} is negative at t = {}", .site.module, .site.when())]
+    NegativeRate { site: Site },
     #[error("the step size fell to nothing at t = {}", .site.when())]
     StepTooSmall { site: Site },
     #[error("more than {limit} modules at t = {}", .site.when())]
@@ -67,6 +74,9 @@ impl Error {
             | Error::Zeno { site }
             | Error::PeriodTooShort { site, .. }
             | Error::NotFinite { site, .. }
+            | Error::BadDraw { site, .. }
+            | Error::BadWeights { site, .. }
+            | Error::NegativeRate { site }
             | Error::StepTooSmall { site }
             | Error::TooManyModules { site, .. } => site,
         }
@@ -91,9 +101,18 @@ impl Error {
         d = d.note(format!("{} is {descent}; its rule is {}", site.module, site.rule));
         match self {
             Error::OutsideDomain { failing, .. } => {
-                let missing: Vec<String> =
-                    failing.iter().map(|(_, begin)| format!("`{begin} produce …`")).collect();
-                d.help_opt((!missing.is_empty()).then(|| format!("say what happens there: {}", missing.join(" or "))))
+                let remedies = || failing.iter().filter_map(|(_, remedy)| remedy.as_ref());
+                let clauses = |part: fn(&Remedy) -> &Option<String>| {
+                    let quoted = remedies().filter_map(|r| part(r).as_ref()).map(|clause| format!("`{clause}`"));
+                    quoted.collect::<Vec<_>>().join(" or ")
+                };
+                let (produce, rest) = (clauses(|r| &r.produce), clauses(|r| &r.rest));
+                if produce.is_empty() && rest.is_empty() {
+                    return d.help("write a clause for what happens there: `if … = … produce …`");
+                }
+                let made = format!("say what it becomes there, in a clause of this rule such as {produce}");
+                let d = d.help_opt((!produce.is_empty()).then_some(made));
+                d.help_opt((!rest.is_empty()).then(|| format!("or let it stay as it is: {rest}")))
             }
             Error::Chattering { .. } => d.help(
                 "let one side hold at the boundary with an equation of its own, for example `dx/dt = 0`",
@@ -109,6 +128,15 @@ impl Error {
             }
             Error::NotFinite { .. } => {
                 d.help("look for a division by zero, a root or logarithm of a negative number, an element or an inverse that is not there, or growth without bound")
+            }
+            Error::BadDraw { distribution, .. } => {
+                d.help_opt(Distribution::named(distribution).map(|d| d.demand().to_owned()))
+            }
+            Error::BadWeights { .. } => d.help(
+                "weights are at least 0, and one of them is greater; they need not add up to 1. To replace nothing at some values, say so in the clause's condition: `if … produce …`",
+            ),
+            Error::NegativeRate { .. } => {
+                d.help("a rate is at least 0: bound it, as in `at rate max(0, …)`, or say when there is none: `if … at rate … produce …`")
             }
             Error::StepTooSmall { .. } => d.help(
                 "the solution may become infinite here, or the equations jump in a way that no `if` shows; a fixed step (`--method rk4 --step-size H`) shows how it behaves",
@@ -130,6 +158,9 @@ impl Error {
             Error::Zeno { .. } => "this production comes sooner and sooner",
             Error::PeriodTooShort { .. } => "a discrete rule, which applies at the multiples of the period",
             Error::NotFinite { .. } => "computed here",
+            Error::BadDraw { .. } => "drawn here",
+            Error::BadWeights { .. } => "by the weights of this clause",
+            Error::NegativeRate { .. } => "the rate of this clause",
             Error::StepTooSmall { .. } => "these equations",
             Error::TooManyModules { .. } => "this production made the last of them",
         }

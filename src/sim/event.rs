@@ -15,6 +15,8 @@ pub struct Event {
     pub rule: usize,
     /// Index into the rule's `produces`.
     pub clause: usize,
+    /// Index of the successor that chance has chosen, where a clause has several.
+    pub successor: Option<usize>,
     /// How far the located instant is from the boundary: the largest difference between the two sides of a
     /// comparison that is met with equality there.
     pub residual: f64,

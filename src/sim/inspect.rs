@@ -58,6 +58,7 @@ impl Simulation<'_> {
         };
         let mut rates = Vec::new();
         probe.rates_ahead(id, 0.0, &mut rates);
+        rates.truncate(probe.plant.tree.shown(id));
         let skipped = |kind| self.model.kinds.get(kind).skipped;
         let left = probe.plant.tree.left(id, skipped);
         let right = probe.plant.tree.right(id, skipped);
@@ -78,6 +79,7 @@ impl Simulation<'_> {
         let mut parameters = Vec::new();
         self.plant.values(id, self.now, &mut parameters);
         let tree = &self.plant.tree;
+        parameters.truncate(tree.shown(id));
         Seen { kind: tree.kind(id), lineage: tree.lineage(id), parameters }
     }
 }

@@ -7,6 +7,7 @@
 use smallvec::SmallVec;
 
 use super::career::{Career, Child, End, Forecast, Life, REFUSED, same_bits};
+use super::chance::{self, Misfortune};
 use super::error::Error;
 use super::event::Event;
 use super::motion::Motion;
@@ -14,7 +15,7 @@ use super::quick::{First, Outlook, Prospect};
 use super::settle::Firing;
 use super::simulation::Simulation;
 use super::state::{Change, What};
-use crate::model::{Comparison, KindId, Sign};
+use crate::model::{Comparison, KindId, Outcome, Sign};
 use crate::structure::{Instant, ModuleId, NO_LABEL};
 
 impl Simulation<'_> {
@@ -172,18 +173,24 @@ impl Simulation<'_> {
         let label = self.plant.tree.label(id);
         let career = self.plant.careers.get(label).expect("a light module");
         let (rule, produce) = (career.rule, career.produce().expect("it is its event"));
-        let successor = &model.rules[rule].produces[produce].successor;
+        let clause = &model.rules[rule].produces[produce];
         let mut life = self.life(id, label);
-        if life.replaced != Some(self.now) {
-            self.succeed(&mut life, label, rule, produce);
-        }
         let fire = Firing { id, rule, produce };
-        if life.arguments.iter().any(|x| !x.is_finite()) {
+        // What chance decides, is another thing for each of them.
+        if (life.replaced != Some(self.now) || clause.outcome.is_random() || clause.is_fault)
+            && let Err(misfortune) = self.succeed(&mut life, id, rule, produce)
+        {
+            life.replaced = None;
             self.plant.careers.keep(label, life);
             self.stand_still(id);
-            let what = "a parameter of the successor".to_owned();
-            return Err(Error::NotFinite { site: self.site(&fire), what });
+            return Err(misfortune.error(self.site(&fire)));
         }
+        if clause.is_fault {
+            self.plant.careers.keep(label, life);
+            self.stand_still(id);
+            return Err(Error::NegativeRate { site: self.site(&fire) });
+        }
+        let successor = &clause.outcome.successors[life.successor];
         if self.plant.tree.len() + successor.kinds.len() > self.settings.max_modules {
             self.plant.careers.keep(label, life);
             self.stand_still(id);
@@ -199,12 +206,13 @@ impl Simulation<'_> {
                 kind: tree.kind(id),
                 rule,
                 clause: produce,
+                successor: clause.outcome.weights.is_some().then_some(life.successor),
                 residual: life.residual,
                 group: self.group,
                 transition: None,
             });
         }
-        let family = lineage.family(rule << 16 | produce);
+        let family = lineage.family(Outcome::production(clause.key, life.successor));
         let made = &mut self.made;
         made.clear();
         tree.replace(id, successor, &life.arguments, self.now, family, made);
@@ -231,31 +239,43 @@ impl Simulation<'_> {
     }
 
     /// Finds out what follows from the end of a life now.
-    fn succeed(&mut self, life: &mut Life, label: u16, rule: usize, produce: usize) {
+    fn succeed(
+        &mut self,
+        life: &mut Life,
+        id: ModuleId,
+        rule: usize,
+        produce: usize,
+    ) -> Result<(), Misfortune> {
         let model = self.model;
+        let (label, lineage) = (self.plant.tree.label(id), self.plant.tree.lineage(id));
         let compiled = &model.rules[rule];
         let clause = &compiled.produces[produce];
         self.variables.clear();
         values_at_event(life, self.now, &mut self.variables);
         self.variables.extend([self.now.to_f64(), self.now.since(life.birth)]);
-        life.arguments.clear();
-        life.arguments.resize(clause.successor.arguments.outputs(), 0.0);
-        clause.successor.arguments.eval(&self.variables, &mut self.scratch, &mut life.arguments);
         life.children.clear();
+        life.arguments.clear();
         life.replaced = Some(self.now);
-        if life.arguments.iter().any(|x| !x.is_finite()) {
-            return;
+        if clause.is_fault {
+            return Ok(());
         }
         if self.log.is_some() {
             life.residual = self.residual(label, rule, produce);
         }
+        let (seed, variables, scratch) = (self.seed, &mut self.variables, &mut self.scratch);
+        let which = chance::decide(seed, &clause.outcome, clause.key, lineage, variables, scratch)?;
+        let successor = &clause.outcome.successors[which];
+        life.successor = which;
+        let family = lineage.family(Outcome::production(clause.key, which));
+        chance::arguments(seed, successor, family, variables, scratch, &mut life.arguments)?;
         let mut rest = &life.arguments[..];
-        for &kind in clause.successor.kinds.iter().filter(|kind| !kind.is_bracket()) {
-            let (own, others) = rest.split_at(self.model.kinds.get(kind).arity);
+        for &kind in successor.kinds.iter().filter(|kind| !kind.is_bracket()) {
+            let (own, others) = rest.split_at(self.model.kinds.get(kind).width());
             rest = others;
             let child = self.child(kind, own);
             life.children.push(child);
         }
+        Ok(())
     }
 
     /// What a newborn module of a kind is going to do.

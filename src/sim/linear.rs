@@ -54,7 +54,7 @@ impl Linear {
             let sources = &system.sources[row.first_source..row.first_source + row.sources];
             let rule = &rules[row.rule];
             let own = rule.parameters.len();
-            let left: usize = rule.left.iter().map(|p| p.arity).sum();
+            let left: usize = rule.left.iter().map(|p| p.width).sum();
             let mut number = |source: &Source, state: &mut Vec<f64>, b: &mut Vec<f64>| -> Option<()> {
                 if let Source::Formula(i) = *source
                     && inputs[i as usize] == u32::MAX

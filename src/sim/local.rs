@@ -219,13 +219,14 @@ impl Simulation<'_> {
                 self.alone.restart(self.settings.method, y.len());
             }
             let fixed = self.settings.method.is_fixed_step();
+            let settings = self.settings.for_clocks(rule.solves[solve].is_delicate);
             // For stiff equations, bounds of rates say nothing.
             let stiff = control.stiff || self.settings.method == Method::Radau;
             let flashes = rule.solves[solve].flashes && !fixed && !stiff;
             let mut tries = 0;
             let step = loop {
                 let stats = &mut self.stats;
-                let step = self.alone.step(&self.settings, &mut control, &mut system, &y, from, None, stats);
+                let step = self.alone.step(&settings, &mut control, &mut system, &y, from, None, stats);
                 let step = step.map(|_| self.alone.dense(&mut system, &y));
                 let Ok(dense) = &step else { break step };
                 tries += 1;
@@ -311,6 +312,12 @@ impl Simulation<'_> {
         self.plant.values(id, at, &mut values);
         site.module = super::describe(self.model, self.plant.tree.kind(id), &values);
         let name = rule.parameters.get(parameter).cloned().unwrap_or_default();
+        if let Some(clock) = rule.clocks.iter().find(|clock| clock.parameter == parameter)
+            && !matches!(error, StepError::TooSmall(_))
+        {
+            site.span = rule.produces[clock.produce].span;
+            return Error::NotFinite { site, what: "the rate of an event".to_owned() };
+        }
         match error {
             StepError::TooSmall(_) => Error::StepTooSmall { site },
             StepError::Rate(_) => Error::NotFinite { site, what: format!("the rate of {name}") },

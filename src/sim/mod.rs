@@ -25,6 +25,7 @@
 mod access;
 mod agenda;
 mod career;
+mod chance;
 mod choose;
 mod coupled;
 mod course;
@@ -69,6 +70,10 @@ pub use inspect::{Inspection, Seen};
 pub use settle::MAX_ROUNDS;
 pub use simulation::{Simulation, brief, describe};
 pub use transition::{Stand, Transition};
+
+/// Rates of events that have no formula are integrated with at most this tolerance, so that their times are the same to
+/// nine digits whatever the tolerance is.
+const CLOCK_TOLERANCE: f64 = 1e-11;
 
 /// How equations are integrated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -131,6 +136,8 @@ pub struct Settings {
     pub tolerance: f64,
     /// Step of the methods that have a fixed one, in units of time. Steps end at its multiples.
     pub step_size: f64,
+    /// What random numbers follow from.
+    pub seed: u64,
     /// More modules than this are an error.
     pub max_modules: usize,
     /// Productions are recorded for [`Simulation::take_events`].
@@ -150,6 +157,7 @@ impl Default for Settings {
             scheduler: Scheduler::Auto,
             tolerance: 1e-6,
             step_size: 0.01,
+            seed: 0,
             max_modules: 10_000_000,
             log: false,
             slow: false,
@@ -162,6 +170,14 @@ impl Settings {
     /// The grid on which steps of fixed size end.
     fn grid(&self) -> Option<f64> {
         self.method.is_fixed_step().then_some(self.step_size)
+    }
+
+    /// For equations that decide by chance: there is no tolerance in when an event happens that has no time of its own.
+    fn for_clocks(&self, has_clocks: bool) -> Settings {
+        match has_clocks {
+            true => Settings { tolerance: self.tolerance.min(CLOCK_TOLERANCE), ..*self },
+            false => *self,
+        }
     }
 
     /// True if neighbours are seen as they were at the start of a slice of time.

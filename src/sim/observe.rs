@@ -58,6 +58,7 @@ impl Simulation<'_> {
         for &(id, to) in &gallery.others {
             gallery.values.clear();
             self.plant.values(id, now, &mut gallery.values);
+            gallery.values.truncate(self.plant.tree.shown(id));
             let place = &mut out.parameters_mut()[to..to + gallery.values.len()];
             place.copy_from_slice(&gallery.values);
             if let Some(at) = place.iter().position(|x| !x.is_finite()) {
@@ -119,6 +120,7 @@ impl Simulation<'_> {
         let rule = &self.model.rules[career.rule];
         let Some(clause) = career.solve.map(|solve| &rule.solves[solve]) else { return usize::MAX };
         let (arity, time) = (rule.parameters.len(), rule.time_variable());
+        let shown = arity - rule.hidden;
         let values = self.plant.tree.values();
         let mut bad = usize::MAX;
         let mut tau = [0.0; LANES];
@@ -133,6 +135,9 @@ impl Simulation<'_> {
             }
             registers[time + 1] = [0.0; LANES];
             for (law, &parameter) in clause.laws.iter().zip(&clause.of) {
+                if parameter >= shown {
+                    continue;
+                }
                 let moved: Lanes = match law {
                     // What is at rest is what it was in the frame before.
                     Law::Polynomial(program) if again && is_zero(program) => continue,
@@ -171,7 +176,7 @@ impl Simulation<'_> {
         let mut first = 0;
         for visit in self.plant.tree.walk() {
             let Visit::Module(id) = visit else { continue };
-            let arity = self.plant.tree.parameters(id).len();
+            let arity = self.plant.tree.shown(id);
             if place < first + arity {
                 return Some((id, place - first));
             }

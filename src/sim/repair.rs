@@ -209,7 +209,7 @@ impl Simulation<'_> {
             let mut equations = Equations::new(system, rules, Some(course));
             let end = Some(course.end);
             let stats = &mut self.stats;
-            let step = integrator.step(&self.settings, control, &mut equations, &y, from, end, stats);
+            let step = integrator.step(&self.coupled_settings, control, &mut equations, &y, from, end, stats);
             from = step.ok()?;
             stretches.push(integrator.dense(&mut equations, &y));
             integrator.advance(&mut y);
@@ -221,7 +221,7 @@ impl Simulation<'_> {
     /// The number of rings that a trial changes by more than may be neglected.
     fn reach(&self, region: &Region, trial: &Trial) -> usize {
         let Some(course) = &self.plant.coupled else { return 0 };
-        let tolerance = INNER_TOLERANCE * self.settings.tolerance;
+        let tolerance = INNER_TOLERANCE * self.coupled_settings.tolerance;
         let changes = |component: u32, number: usize| {
             trial.stretches.iter().any(|dense| {
                 [0.5, 1.0].into_iter().any(|position| {

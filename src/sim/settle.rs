@@ -14,12 +14,13 @@
 
 use smallvec::SmallVec;
 
+use super::chance;
 use super::error::Error;
 use super::event::Event;
 use super::plant::Plant;
 use super::simulation::Simulation;
 use super::state::{Change, Open};
-use crate::model::{Comparison, Model, Sign, Truth};
+use crate::model::{Comparison, Model, Outcome, Sign, Truth};
 use crate::structure::ModuleId;
 
 /// Most rounds of productions at one instant.
@@ -226,31 +227,39 @@ impl Simulation<'_> {
         let mut ends = std::mem::take(&mut self.argument_ends);
         ends.clear();
         let mut contexts = 0;
-        for fire in firing {
-            let context = context_of(model, &self.plant, &self.steps.contexts, fire, &mut contexts);
-            let successor = &model.rules[fire.rule].produces[fire.produce].successor;
-            self.plant.variables(fire.id, context, self.now, &mut self.variables);
-            let first = all.len();
-            all.resize(first + successor.arguments.outputs(), 0.0);
-            successor.arguments.eval(&self.variables, &mut self.scratch, &mut all[first..]);
-            if all[first..].iter().any(|x| !x.is_finite()) {
-                let what = "a parameter of the successor".to_owned();
-                return Err(Error::NotFinite { site: self.site(fire), what });
+        for (index, fire) in firing.iter().enumerate() {
+            let clause = &model.rules[fire.rule].produces[fire.produce];
+            if clause.is_fault {
+                return Err(Error::NegativeRate { site: self.site(fire) });
             }
-            ends.push(all.len());
+            let context = context_of(model, &self.plant, &self.steps.contexts, fire, &mut contexts);
+            self.plant.variables(fire.id, context, self.now, &mut self.variables);
+            let lineage = self.plant.tree.lineage(fire.id);
+            let (seed, variables, scratch) = (self.seed, &mut self.variables, &mut self.scratch);
+            let made = chance::decide(seed, &clause.outcome, clause.key, lineage, variables, scratch)
+                .and_then(|which| {
+                    let family = lineage.family(Outcome::production(clause.key, which));
+                    let successor = &clause.outcome.successors[which];
+                    chance::arguments(seed, successor, family, variables, scratch, &mut all)?;
+                    Ok((which, family))
+                });
+            match made {
+                Ok((which, family)) => {
+                    self.note_choice(firing.len() - index, &clause.outcome, which);
+                    ends.push((all.len(), which, family));
+                }
+                Err(misfortune) => return Err(misfortune.error(self.site(fire))),
+            }
         }
         let mut first = 0;
-        for (fire, &end) in firing.iter().zip(&ends) {
-            let lineage = self.plant.tree.lineage(fire.id);
-            let number = fire.rule << 16 | fire.produce;
-            let successor = &model.rules[fire.rule].produces[fire.produce].successor;
+        for (fire, &(end, which, family)) in firing.iter().zip(&ends) {
+            let successor = &model.rules[fire.rule].produces[fire.produce].outcome.successors[which];
             if self.plant.tree.len() + successor.kinds.len() > self.settings.max_modules {
                 let limit = self.settings.max_modules;
                 return Err(Error::TooManyModules { site: self.site(fire), limit, rounds });
             }
             let kind = self.plant.tree.kind(fire.id);
             self.forget(fire.id);
-            let family = lineage.family(number);
             let mut made = std::mem::take(&mut self.fresh);
             let known = made.len();
             self.plant.tree.replace(fire.id, successor, &all[first..end], self.now, family, &mut made);
@@ -268,6 +277,13 @@ impl Simulation<'_> {
         self.stats.events += firing.len() as u64;
         self.stats.peak_modules = self.stats.peak_modules.max(self.plant.tree.len() as u64);
         Ok(())
+    }
+
+    /// Tells the log, of the event that is so far from its end, which successor was chosen.
+    fn note_choice(&mut self, from_end: usize, outcome: &Outcome, which: usize) {
+        let Some(log) = &mut self.log else { return };
+        let at = log.len() - from_end;
+        log[at].successor = outcome.weights.is_some().then_some(which);
     }
 
     /// Writes productions that are about to take place into the log.
@@ -298,6 +314,7 @@ impl Simulation<'_> {
                 kind: self.plant.tree.kind(fire.id),
                 rule: fire.rule,
                 clause: fire.produce,
+                successor: None,
                 residual,
                 group: self.group,
                 transition: None,

@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::agenda::Agenda;
 use super::career::Careers;
+use super::chance;
 use super::coupled::Coupled;
 use super::derive::Steps;
 use super::error::{Error, Site};
@@ -24,7 +25,7 @@ use super::{Method, Settings, Stats};
 use crate::diagnostic::Span;
 use crate::expr::Scratch;
 use crate::model::{CUT, KindId, Model};
-use crate::structure::{Family, Instant, Lineage, ModuleId, ModuleString, Tree};
+use crate::structure::{Family, Instant, Lineage, ModuleId, ModuleString, Seed, Tree};
 
 /// A model developing in time; observe it with [`Simulation::at`].
 ///
@@ -35,6 +36,9 @@ use crate::structure::{Family, Instant, Lineage, ModuleId, ModuleString, Tree};
 pub struct Simulation<'m> {
     pub(super) model: &'m Model,
     pub(super) settings: Settings,
+    /// Of modules that are integrated together.
+    pub(super) coupled_settings: Settings,
+    pub(super) seed: Seed,
     /// Formulas are not used.
     pub(super) forced: bool,
     /// The common case is done quickly.
@@ -102,7 +106,8 @@ pub struct Simulation<'m> {
     pub(super) variables: Vec<f64>,
     pub(super) scratch: Scratch<f64>,
     pub(super) arguments: Vec<f64>,
-    pub(super) argument_ends: Vec<usize>,
+    /// Of each production: where its arguments end, which successor it has, and the lineage of that.
+    pub(super) argument_ends: Vec<(usize, usize, Family)>,
     /// Productions that are known to apply at the instant.
     pub(super) firing: Vec<Firing>,
     /// Slots of light modules whose event it is.
@@ -125,7 +130,9 @@ pub(super) const SHORT_LIFE: f64 = 64.0;
 impl<'m> Simulation<'m> {
     /// Makes the initial string at t = 0 and lets everything happen that happens there.
     pub fn new(model: &'m Model, settings: Settings) -> Result<Simulation<'m>, Error> {
-        let tree = Tree::new(model.kinds.iter().map(|(_, kind)| kind.arity as u32).collect());
+        let kinds = || model.kinds.iter().map(|(_, kind)| kind);
+        let tree =
+            Tree::new(kinds().map(|k| k.width() as u32).collect(), kinds().map(|k| k.arity as u32).collect());
         let has_context = |rule: &usize| {
             let rule = &model.rules[*rule];
             !rule.left.is_empty() || !rule.right.is_empty()
@@ -138,6 +145,9 @@ impl<'m> Simulation<'m> {
         let mut simulation = Simulation {
             model,
             settings,
+            coupled_settings: settings
+                .for_clocks(model.rules.iter().flat_map(|r| &r.solves).any(|s| s.is_delicate)),
+            seed: Seed::new(settings.seed),
             forced: settings.method != Method::Auto,
             quick: !settings.transitions && !settings.slow,
             plant: Plant { tree, states: Vec::new(), careers, coupled: None },
@@ -205,11 +215,10 @@ impl<'m> Simulation<'m> {
             span: Span::default(),
             time: 0.0,
         };
-        let mut arguments = Vec::new();
-        self.model.axiom.evaluate::<f64>(&[], &mut Vec::new(), &mut arguments);
-        if let Some(at) = arguments.iter().position(|x| !x.is_finite()) {
-            return Err(Error::NotFinite { site: site(), what: format!("parameter {}", at + 1) });
-        }
+        let (mut arguments, mut variables) = (Vec::new(), Vec::new());
+        let (axiom, scratch) = (&self.model.axiom, &mut self.scratch);
+        chance::arguments(self.seed, axiom, Family::AXIOM, &mut variables, scratch, &mut arguments)
+            .map_err(|misfortune| misfortune.error(site()))?;
         let tree = &mut self.plant.tree;
         tree.append(&self.model.axiom, &arguments, Instant::ZERO, Family::AXIOM, &mut self.fresh);
         if self.hands_on {
@@ -320,10 +329,14 @@ impl<'m> Simulation<'m> {
 
     pub(super) fn not_finite(&self, id: ModuleId, parameter: usize, at: Instant) -> Error {
         let (rule, solve) = self.plant.rule_and_clause(id);
-        let rule = rule.unwrap_or(0);
-        let compiled = &self.model.rules[rule];
+        let rule_index = rule.unwrap_or(0);
+        let compiled = &self.model.rules[rule_index];
         let span = solve.map_or(compiled.span, |s| compiled.solves[s].span);
-        let site = self.site_of(id, rule, span, at.to_f64());
+        let site = self.site_of(id, rule_index, span, at.to_f64());
+        if let Some(clock) = compiled.clocks.iter().find(|clock| clock.parameter == parameter) {
+            let span = compiled.produces[clock.produce].span;
+            return Error::NotFinite { site: Site { span, ..site }, what: "the rate of an event".to_owned() };
+        }
         Error::NotFinite { site, what: compiled.parameters.get(parameter).cloned().unwrap_or_default() }
     }
 
@@ -354,7 +367,9 @@ impl<'m> Simulation<'m> {
 
 /// A module as it is written, numbers to six digits: for people.
 pub fn describe(model: &Model, kind: KindId, parameters: &[f64]) -> String {
-    let name = &model.kinds.get(kind).name;
+    let (name, arity) = (&model.kinds.get(kind).name, model.kinds.get(kind).arity);
+    // Hidden parameters are no part of how it is written.
+    let parameters = &parameters[..parameters.len().min(arity)];
     if parameters.is_empty() {
         return name.clone();
     }

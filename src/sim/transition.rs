@@ -86,7 +86,9 @@ impl Simulation<'_> {
             let mut values = Vec::new();
             self.plant.values(fire.id, self.now, &mut values);
             let arrival = recorder.arrivals.get(&fire.id);
-            let rates = arrival.cloned().unwrap_or_else(|| vec![0.0; values.len()]);
+            let mut rates = arrival.cloned().unwrap_or_else(|| vec![0.0; values.len()]);
+            values.truncate(tree.shown(fire.id));
+            rates.truncate(values.len());
             let (kind, age) = (tree.kind(fire.id), self.now.since(tree.birth(fire.id)));
             let made = |f: &Fired| f.parts.iter().any(|(_, id)| *id == Some(fire.id));
             let fired = Fired {
@@ -126,6 +128,8 @@ impl Simulation<'_> {
                         let (mut values, mut rates) = (Vec::new(), Vec::new());
                         self.plant.values(id, self.now, &mut values);
                         self.rates_ahead(id, 0.0, &mut rates);
+                        values.truncate(self.plant.tree.shown(id));
+                        rates.truncate(values.len());
                         after.push(Stand { kind, values, rates, age: 0.0 });
                     }
                     Some(id) => {

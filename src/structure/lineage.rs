@@ -2,7 +2,7 @@
 //!
 //! A module is known by its place in the initial string, or by the production that made it, the parent
 //! that it replaced, and its place in the successor. That is the same whichever frames are asked for and
-//! however the simulation was scheduled, so exported names, messages and (later) random numbers hang on it.
+//! however the simulation was scheduled, so exported names, messages and random numbers hang on it.
 
 use std::fmt;
 
@@ -46,14 +46,14 @@ impl Lineage {
 
     /// The module at a place of the successor by which a production (a number that tells the
     /// productions of a model apart) replaced this module.
-    pub fn child(self, production: usize, place: usize) -> Lineage {
+    pub fn child(self, production: u64, place: usize) -> Lineage {
         self.family(production).child(place)
     }
 
     /// What all modules of the successor, by a production, have in common.
-    pub fn family(self, production: usize) -> Family {
+    pub fn family(self, production: u64) -> Family {
         Family {
-            mixed: mix(self.id, production as u64),
+            mixed: mix(self.id, production),
             generation: self.generation.saturating_add(1),
             trail: self.trail,
         }
@@ -72,7 +72,7 @@ fn trail(before: u64, place: usize) -> u64 {
 }
 
 /// The finalizer of SplitMix64 (Steele, Lea, Flood 2014) over a running value.
-fn mix(state: u64, value: u64) -> u64 {
+pub(super) fn mix(state: u64, value: u64) -> u64 {
     let mut z =
         state.wrapping_add(0x9e37_79b9_7f4a_7c15).wrapping_add(value.wrapping_mul(0xd6e8_feb8_6659_fd93));
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

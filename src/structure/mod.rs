@@ -4,15 +4,18 @@
 //! - [`ModuleString`]: the structure at one instant, written out in string order with brackets; what
 //!   an observer gets.
 //! - [`Lineage`]: who a module is, for as long as it lives, in every run.
+//! - [`Seed`]: random numbers, each of which belongs to a module.
 //! - [`Instant`]: when it was born, to more digits than a float has.
 
 mod brood;
+mod chance;
 mod instant;
 mod lineage;
 mod string;
 mod tree;
 mod walk;
 
+pub use chance::{Purpose, Seed, key};
 pub use instant::Instant;
 pub use lineage::{Family, Lineage};
 pub use string::{Module, ModuleString, Version};

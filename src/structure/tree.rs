@@ -81,12 +81,15 @@ pub struct Tree {
     /// Free blocks of `values`, by their length.
     free_values: Vec<Vec<u32>>,
     pub(super) arities: Vec<u32>,
+    /// Parameters of each kind that are shown to others: hidden ones are its last.
+    pub(super) shown: Vec<u32>,
     modules: usize,
 }
 
 impl Tree {
-    /// An empty structure; `arities` gives the number of parameters of each kind.
-    pub fn new(arities: Vec<u32>) -> Tree {
+    /// An empty structure; `arities` gives the number of parameters of each kind, and `shown` how many of them an
+    /// observer gets to see.
+    pub fn new(arities: Vec<u32>, shown: Vec<u32>) -> Tree {
         let trunk = Node {
             kind: KindId::OPEN,
             generation: 0,
@@ -104,6 +107,7 @@ impl Tree {
             values: Vec::new(),
             free_values: Vec::new(),
             arities,
+            shown,
             modules: 0,
         }
     }
@@ -186,6 +190,11 @@ impl Tree {
 
     pub fn parameters(&self, id: ModuleId) -> &[f64] {
         &self.values[self.places(id)]
+    }
+
+    /// Number of a module's parameters that an observer gets to see.
+    pub fn shown(&self, id: ModuleId) -> usize {
+        self.shown[self.node(id).kind.index()] as usize
     }
 
     /// All parameters of all modules; a module's stand at [`Tree::places`].
@@ -455,7 +464,8 @@ mod tests {
     /// A string of kinds without parameters, written with one letter each.
     fn string(kinds: &mut Kinds, text: &str) -> Successor {
         let ids = text.chars().map(|c| kinds.intern(&c.to_string(), 0)).collect();
-        Successor { kinds: ids, arguments: Program::compile(&Graph::default(), &[], 0) }
+        let arguments = Program::compile(&Graph::default(), &[], 0);
+        Successor { kinds: ids, arguments, ..Successor::default() }
     }
 
     fn show(kinds: &Kinds, tree: &Tree) -> String {
@@ -472,7 +482,7 @@ mod tests {
         let mut kinds = Kinds::default();
         let axiom = string(&mut kinds, text);
         let successors: Vec<_> = swaps.iter().map(|(at, s)| (*at, string(&mut kinds, s))).collect();
-        let mut tree = Tree::new(vec![0; kinds.len()]);
+        let mut tree = Tree::new(vec![0; kinds.len()], vec![0; kinds.len()]);
         tree.append(&axiom, &[], Instant::ZERO, Family::AXIOM, &mut Vec::new());
         for (at, successor) in successors {
             let ids: Vec<ModuleId> = tree

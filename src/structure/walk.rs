@@ -43,7 +43,7 @@ impl Tree {
                         next = Link(node.first);
                         continue;
                     }
-                    let places = node.places(&self.arities);
+                    let places = node.places(&self.shown);
                     let from = places.start;
                     let to = out.push_known(node.kind, node.brood, node.place, &self.values[places]);
                     let id = ModuleId::of_parts(next.0, node.generation);

@@ -118,7 +118,7 @@ fn interpret(
     let variables = [0, 1, 2].map(|i| graph.var(i));
     let roots = arguments(&mut graph, variables);
     let kinds = modules.iter().map(|&(name, arity)| model.kinds.intern(name, arity)).collect();
-    let drawn = Successor { kinds, arguments: Program::compile(&graph, &roots, 3) };
+    let drawn = Successor { kinds, arguments: Program::compile(&graph, &roots, 3), ..Successor::default() };
     let kind = model.kinds.intern(name, 1);
     model.kinds.get_mut(kind).interpretation = Some(model.interpretations.len());
     model.interpretations.push(Interpretation { span: Span::default(), drawn });

@@ -1,8 +1,11 @@
 //! The forms that things have in common: meshes, and how polygons are cut. Both are numbered as they are first seen.
+//!
+//! Each stage has its own, so that stages can be made side by side; a recording [adopts](Forms::adopt) them in order.
 
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use super::stage::{Form, Stage};
 use crate::export::{normal, triangulate};
 use crate::scene::{Color, Mesh, Palette, PatchSet, Point, Surface, Vector};
 
@@ -12,6 +15,16 @@ enum Source {
     Mesh(Arc<Mesh>),
     /// And the largest scale at which it has been placed.
     Patches(Arc<PatchSet>, f64),
+}
+
+impl Source {
+    /// Where it is in memory.
+    fn place(&self) -> usize {
+        match self {
+            Source::Mesh(mesh) => Arc::as_ptr(mesh) as usize,
+            Source::Patches(patches, _) => Arc::as_ptr(patches) as usize,
+        }
+    }
 }
 
 /// All forms that have been seen.
@@ -44,28 +57,32 @@ pub struct MeshForm {
 impl Forms {
     /// The number of a surface's mesh.
     pub(super) fn mesh(&mut self, surface: &Surface) -> u32 {
-        let place = match &surface.patches {
-            Some(patches) => Arc::as_ptr(patches) as usize,
-            None => Arc::as_ptr(&surface.mesh) as usize,
-        };
+        self.take_mesh(match &surface.patches {
+            Some(patches) => Source::Patches(patches.clone(), surface.placement.scale),
+            None => Source::Mesh(surface.mesh.clone()),
+        })
+    }
+
+    fn take_mesh(&mut self, source: Source) -> u32 {
         let meshes = &mut self.meshes;
-        let number = *self.numbers.entry(place).or_insert_with(|| {
-            meshes.push(match &surface.patches {
-                Some(patches) => Source::Patches(patches.clone(), 0.0),
-                None => Source::Mesh(surface.mesh.clone()),
-            });
-            (meshes.len() - 1) as u32
-        });
-        if let Source::Patches(_, largest) = &mut meshes[number as usize] {
-            *largest = largest.max(surface.placement.scale);
+        let next = meshes.len() as u32;
+        let number = *self.numbers.entry(source.place()).or_insert(next);
+        match (meshes.get_mut(number as usize), &source) {
+            (None, _) => meshes.push(source),
+            (Some(Source::Patches(_, largest)), Source::Patches(_, scale)) => *largest = largest.max(*scale),
+            _ => {}
         }
         number
     }
 
     /// The number of the way in which a polygon is cut into triangles.
     pub(super) fn triangulation(&mut self, vertices: &[Point]) -> u32 {
-        let cut: Vec<[u32; 3]> =
-            triangulate(vertices, normal(vertices)).into_iter().map(|t| t.map(|k| k as u32)).collect();
+        self.take_cut(
+            triangulate(vertices, normal(vertices)).into_iter().map(|t| t.map(|k| k as u32)).collect(),
+        )
+    }
+
+    fn take_cut(&mut self, cut: Vec<[u32; 3]>) -> u32 {
         if let Some(&number) = self.cut_numbers.get(&cut) {
             return number;
         }
@@ -73,6 +90,28 @@ impl Forms {
         self.cuts.push(cut.clone());
         self.cut_numbers.insert(cut, number);
         number
+    }
+
+    /// Takes in the forms of a stage, in the order of its things. Returns the numbers that they have here, by those that they
+    /// have there: of meshes, and of cuts.
+    pub(super) fn adopt(&mut self, stage: &Stage) -> [Vec<u32>; 2] {
+        let theirs = &stage.forms;
+        let mut meshes = vec![None; theirs.meshes.len()];
+        let mut cuts = vec![None; theirs.cuts.len()];
+        for item in &stage.items {
+            match item.key.form {
+                Form::Mesh(number) => {
+                    let source = &theirs.meshes[number as usize];
+                    meshes[number as usize].get_or_insert_with(|| self.take_mesh(source.clone()));
+                }
+                Form::Polygon(_) => {
+                    let number = item.look.variant as usize;
+                    cuts[number].get_or_insert_with(|| self.take_cut(theirs.cuts[number].clone()));
+                }
+                Form::Stem(_) | Form::Patch => {}
+            }
+        }
+        [meshes, cuts].map(|numbers| numbers.into_iter().map(Option::unwrap_or_default).collect())
     }
 
     /// Triangles of polygons, by number.

@@ -4,13 +4,14 @@
 //! Scene ──▶ Stage ──▶ Recording ──▶ page (one HTML file that plays it)
 //! ```
 //!
-//! - [`Stage`]: a scene as a graphics processor takes it. What repeats (a surface, the side of a stem, a patch) is a
+//! - [`Stage`]: a scene as things in their places. What repeats (a surface, the side of a stem, a patch) is a
 //!   form; each thing is a few numbers that place its form. All of them are points or differences of points, so halfway
 //!   between two stages is halfway between their numbers.
 //! - [`Recording`]: stages over time, each thing followed by the lineage of its module.
 //! - [`page`]: the recording, a player and the shaders in one file that needs no network.
 //!
-//! The shaders (`shaders/`) have no version line: whoever compiles them puts it first.
+//! The player makes triangles of what is to be seen at a time (`page/geometry.js`). The shaders (`shaders/`) have no version
+//! line: whoever compiles them puts it first.
 
 mod encode;
 mod forms;

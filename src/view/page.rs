@@ -8,34 +8,26 @@ use serde_json::{Value, json};
 use super::encode;
 use super::forms::MeshForm;
 use super::recording::Recording;
-use super::stage::Form;
 use crate::export::{GENERATOR, Spoke};
 use crate::scene::Material;
 
 const PAGE: &str = include_str!("page/page.html");
 const STYLE: &str = include_str!("page/style.css");
 /// In the order in which they need one another.
-const SCRIPTS: [&str; 4] = [
+const SCRIPTS: [&str; 5] = [
     include_str!("page/recording.js"),
     include_str!("page/camera.js"),
+    include_str!("page/geometry.js"),
     include_str!("page/painter.js"),
     include_str!("page/player.js"),
 ];
 
 /// The shaders, by name; without a version, which depends on where they run.
-pub const SHADERS: [(&str, &str); 5] = [
-    ("stem", include_str!("shaders/stem.vert")),
-    ("mesh", include_str!("shaders/mesh.vert")),
-    ("patch", include_str!("shaders/patch.vert")),
-    ("polygon", include_str!("shaders/polygon.vert")),
-    ("light", include_str!("shaders/light.frag")),
-];
+pub const SHADERS: [(&str, &str); 2] =
+    [("surface", include_str!("shaders/surface.vert")), ("light", include_str!("shaders/light.frag"))];
 
 /// With what every page of ours begins, so that nobody else's file is taken for one.
 pub const MARK: &str = "<!doctype html>\n<!-- dlsys view: a recorded plant -->\n";
-
-/// Triangles that all patches of a frame may have together, roughly.
-const PATCH_TRIANGLES: usize = 150_000;
 
 /// The document.
 pub fn document(recording: &Recording) -> String {
@@ -97,7 +89,6 @@ fn description(recording: &Recording, outlines: &[Vec<Spoke>]) -> Value {
         "outlines": outlines.iter().map(|outline| spokes(outline)).collect::<Vec<_>>(),
         "meshes": meshes.collect::<Vec<_>>(),
         "cuts": forms.cuts(),
-        "patchPieces": patch_pieces(recording),
         "unit": recording.unit,
         "extent": recording.extent,
         "size": [size.x, size.y, size.z],
@@ -134,36 +125,4 @@ fn mesh(form: &MeshForm) -> Value {
         "colors": colors.collect::<Vec<_>>(),
         "triangles": form.triangles,
     })
-}
-
-/// Pieces of an edge of a patch: all patches have as many, so that neighbours do not crack. As many as a picture a
-/// thousand pixels wide needs, or as can be drawn in time.
-fn patch_pieces(recording: &Recording) -> u32 {
-    let patches = || recording.tracks.iter().filter(|track| track.form == Form::Patch);
-    let mut bend = 0.0_f64;
-    for net in patches().flat_map(|track| track.samples.chunks_exact(48)) {
-        let point = |i: usize| [0, 1, 2].map(|k| f64::from(net[3 * i + k]));
-        let lines =
-            (0..4).flat_map(|i| [[4 * i, 4 * i + 1, 4 * i + 2, 4 * i + 3], [i, i + 4, i + 8, i + 12]]);
-        for [a, b, c, d] in lines {
-            for [p, q, r] in [[a, b, c], [b, c, d]].map(|three| three.map(point)) {
-                let second = [0, 1, 2].map(|k| p[k] - 2.0 * q[k] + r[k]);
-                bend = bend.max(second.iter().map(|x| x * x).sum());
-            }
-        }
-    }
-    let mut changes = vec![0_i64; recording.times.len() + 1];
-    for track in patches() {
-        changes[track.first as usize] += 1;
-        changes[track.last as usize + 1] -= 1;
-    }
-    let at_once = changes.iter().scan(0, |sum, change| {
-        *sum += change;
-        Some(*sum)
-    });
-    let most = at_once.max().unwrap_or(0).max(1) as f64;
-    let affordable = (PATCH_TRIANGLES as f64 / (2.0 * most)).sqrt();
-    // A chord over 1/n of a cubic is 6/8 of its second difference over n² away from it.
-    let wanted = (0.75 * bend.sqrt() * recording.unit / recording.accuracy).sqrt();
-    wanted.min(affordable).clamp(4.0, 16.0).ceil() as u32
 }

@@ -87,11 +87,6 @@ impl Recorder {
         Recorder { recording, open: HashMap::new(), numbers: 0 }
     }
 
-    /// What the stages of this recording share.
-    pub fn forms(&mut self) -> &mut Forms {
-        &mut self.recording.forms
-    }
-
     pub fn history(&mut self) -> &mut History {
         &mut self.recording.history
     }
@@ -106,8 +101,14 @@ impl Recorder {
         recording.times.push(time);
         recording.modules.push(modules);
         let mut open = HashMap::with_capacity(stage.items.len());
+        let [meshes, cuts] = recording.forms.adopt(stage);
         for item in &stage.items {
-            let Item { key, look, .. } = *item;
+            let Item { mut key, mut look, .. } = *item;
+            match &mut key.form {
+                Form::Mesh(number) => *number = meshes[*number as usize],
+                Form::Polygon(_) => look.variant = cuts[look.variant as usize],
+                Form::Stem(_) | Form::Patch => {}
+            }
             let number = *open.entry(key).or_insert_with(|| {
                 self.open.remove(&key).unwrap_or_else(|| {
                     recording.tracks.push(Track {

@@ -72,12 +72,14 @@ pub struct Stage {
     pub items: Vec<Item>,
     /// In scene units.
     pub numbers: Vec<f64>,
+    /// What its things have in common.
+    pub forms: Forms,
     counts: HashMap<(OwnerId, Form), u32>,
 }
 
 impl Stage {
     /// Takes the place of what was there before. `default_width` (scene units) is that of lines of default width.
-    pub fn set(&mut self, scene: &Scene, default_width: f64, forms: &mut Forms) {
+    pub fn set(&mut self, scene: &Scene, default_width: f64) {
         self.items.clear();
         self.numbers.clear();
         self.counts.clear();
@@ -94,14 +96,16 @@ impl Stage {
             }
         }
         for polygon in &scene.polygons {
-            let look =
-                Look { material: Some(polygon.material), variant: forms.triangulation(&polygon.vertices) };
+            let look = Look {
+                material: Some(polygon.material),
+                variant: self.forms.triangulation(&polygon.vertices),
+            };
             self.begin(scene, polygon.owner, Form::Polygon(polygon.vertices.len() as u32), look);
             self.place(&polygon.vertices);
         }
         for surface in &scene.surfaces {
             let placement = &surface.placement;
-            let form = Form::Mesh(forms.mesh(surface));
+            let form = Form::Mesh(self.forms.mesh(surface));
             self.begin(scene, surface.owner, form, Look { material: surface.tint, variant: 0 });
             self.numbers.extend(placement.origin.iter());
             for axis in &placement.axes[..2] {

@@ -12,6 +12,7 @@
 //! | `sh` | commands, a line each: those that begin with `dlsys` are run and must succeed |
 //! | `sh fails` | the last of them must fail with status 1 |
 //! | `sh unrun` | not run; subcommands and flags must be those of `--help` |
+//! | `repl` | a session, maybe with a model: lines that begin with `> ` or `  if` are typed, the others are the answers |
 //! | `output` | what the block of commands before it prints; a line `…` stands for any lines |
 //! | `KIND NAME.EXT` | any other file: saved |
 //! | `rust`, `lpy`, `cpfg`, `text`, `json` | nothing |
@@ -104,7 +105,7 @@ impl<'a> Reader<'a> {
     fn block(&mut self, block: &Block) {
         let words: Vec<&str> = block.info.split_whitespace().collect();
         let file = words.get(1..).unwrap_or_default().iter().find(|word| word.contains('.'));
-        if let Some(name) = file {
+        if let Some(name) = file.filter(|_| words[0] != "repl") {
             std::fs::write(self.scratch.join(name), &block.text).expect("saved");
         }
         match words[..] {
@@ -123,6 +124,7 @@ impl<'a> Reader<'a> {
                 self.model(block, file.copied())
             }
             ["sh", ref rest @ ..] if rest.len() <= 1 => self.commands(block, rest.first().copied()),
+            ["repl", ref rest @ ..] if rest.len() <= 1 => self.session(block, rest.first().copied()),
             ["output"] => self.output(block),
             ["rust" | "lpy" | "cpfg" | "text" | "json", ..] => {}
             _ if file.is_some() => {}
@@ -210,6 +212,25 @@ impl<'a> Reader<'a> {
         }
     }
 
+    /// A session at the prompt: the statements of the block are run, and give the whole of it.
+    fn session(&mut self, block: &Block, model: Option<&str>) {
+        // A clause on a line of its own belongs to the rule typed before it.
+        let typed = |line: &'_ str| line.starts_with("> ") || line.starts_with("  if ");
+        let script: String =
+            block.text.lines().filter(|line| typed(line)).flat_map(|line| [&line[2..], "\n"]).collect();
+        let script_file = self.scratch.join("session.txt");
+        std::fs::write(&script_file, script).expect("saved");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_dlsys"));
+        command.args(["repl", "--echo"]).args(model).current_dir(self.scratch);
+        command.stdin(std::fs::File::open(script_file).expect("readable"));
+        let done = command.output().expect("it starts");
+        self.printed = String::from_utf8_lossy(&[done.stdout, done.stderr].concat()).into_owned();
+        if done.status.code() != Some(0) {
+            self.complain(block.line, format!("the session ends with {}", done.status));
+        }
+        self.output(block);
+    }
+
     fn output(&mut self, block: &Block) {
         if matches(&block.text, &self.printed) {
             return;
@@ -218,7 +239,7 @@ impl<'a> Reader<'a> {
             self.renewed.push((block.line, self.printed.clone()));
             return;
         }
-        let what = format!("the commands before this print\n{}", self.printed);
+        let what = format!("what is run here prints\n{}", self.printed);
         self.complain(block.line, what);
     }
 
@@ -260,6 +281,9 @@ fn matches(shown: &str, text: &str) -> bool {
 
 /// Whether two pictures show the same: one size, and on average less than one of 255 levels apart.
 fn alike(a: &Path, b: &Path) -> bool {
+    if a.extension().is_some_and(|extension| extension == "svg") {
+        return std::fs::read(a).ok() == std::fs::read(b).ok();
+    }
     let read = |path: &Path| {
         let file = std::io::BufReader::new(std::fs::File::open(path).expect("readable"));
         let mut reader = png::Decoder::new(file).read_info().expect("a picture");

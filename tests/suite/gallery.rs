@@ -57,6 +57,10 @@ fn every_mistake_gets_its_message() {
         if warns {
             assert!(said.iter().all(|d| d.severity == Severity::Warning), "{name}");
         }
+        // Who meets a mistake wants to know what to do next.
+        for one in &said {
+            assert!(!one.help.is_empty(), "{name} gets no help:\n{}", one.render(&source, false));
+        }
         let stored = folder.join(name).with_extension("txt");
         if renew {
             std::fs::write(&stored, &message).expect("written");
@@ -67,4 +71,21 @@ fn every_mistake_gets_its_message() {
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// The production that a domain error suggests is pasted under the head, and the model runs.
+#[test]
+fn the_suggested_production_can_be_pasted() {
+    let model = "initial string: F_v(1, 0.5)\nF_v(x, c):\n  if x < 2 & c > 0 solve dx/dt = 1, dc/dt = 0.1\n";
+    let run = |text: &str| -> Result<(), Diagnostic> {
+        let session = Session::from_text("pasted.dls", text, &[]).expect("a model");
+        let mut simulation = session.simulate(Settings::default()).map_err(|e| e.diagnostic())?;
+        simulation.at(10.0, &mut ModuleString::default()).map_err(|e| e.diagnostic())
+    };
+    let said = run(model).expect_err("nothing is said about x = 2");
+    let clauses: Vec<&str> = said.help.iter().filter_map(|help| help.split('`').nth(1)).collect();
+    assert_eq!(clauses, ["if x = 2 produce F_end(x, c)", "if x >= 2 solve dx/dt = 0"]);
+    for clause in clauses {
+        run(&format!("{model}  {clause}\n")).expect(clause);
+    }
 }

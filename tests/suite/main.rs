@@ -5,6 +5,7 @@
 //! - [`semantics`]: what happens when (events, contexts, errors of a run), model by small model.
 //! - [`language`]: text to model and back; hostile input.
 //! - [`gallery`]: every mistake in `tests/errors` and the message it gets.
+//! - [`chance`]: times, draws and choices against their distributions; what they depend on.
 //! - [`discrete`]: derivation steps, against the models of a book; cuts.
 //! - [`blocks`]: curves, growth functions, arrays, `match` and `let` against exact values; [`files`]: includes and tables.
 //! - [`cli`]: the program as it is typed.
@@ -14,11 +15,14 @@
 //! - [`schedulers`]: local repair against one clock, remembered neighbours against the whole string.
 //! - [`pictures`]: pixels, perspective, and sheets of several frames.
 //! - [`plants`]: the paper's plants: order of flowering, continuity, the gallery.
+//! - [`repl`]: the interactive session, without a terminal and with one.
 //! - [`replay`]: any time after any other, to the bits of a run.
 //! - [`report`]: studies of methods, and hard cases with exact answers.
+//! - [`view`]: pages that play a recording, read back.
 
 mod blocks;
 mod book;
+mod chance;
 mod cli;
 mod common;
 mod discrete;
@@ -33,7 +37,9 @@ mod organs;
 mod pages;
 mod pictures;
 mod plants;
+mod repl;
 mod replay;
 mod report;
 mod schedulers;
 mod semantics;
+mod view;

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::curves::CurvePlan;
 use super::words;
 use crate::diagnostic::Source;
-use crate::model::{Condition, Kind, Law, Model, Rule, Solve, Watch};
+use crate::model::{Condition, Kind, Law, Model, Produce, Rule, Solve, Watch};
 use crate::session::Session;
 
 /// Everything that is said about a model. Field names are those of the JSON.
@@ -59,8 +59,11 @@ pub struct RulePlan {
 #[derive(Serialize)]
 pub struct ClausePlan {
     pub line: usize,
-    /// As it is written, on one line; empty for always.
+    /// As it is written, on one line, with the rate of an event at a rate; empty for always.
     pub condition: String,
+    /// Of a production: how many successors it has to choose from.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub successors: Option<usize>,
 }
 
 #[derive(Serialize)]
@@ -165,7 +168,7 @@ impl Plan {
 
 /// Names of a kind's parameters as its first rule has them.
 fn parameter_names(model: &Model, kind: &Kind) -> Vec<String> {
-    kind.rules.first().map_or_else(Vec::new, |rule| model.rules[*rule].parameters.clone())
+    kind.rules.first().map_or_else(Vec::new, |rule| model.rules[*rule].parameters[..kind.arity].to_vec())
 }
 
 /// True if some equation for a parameter of a kind is integrated numerically.
@@ -220,7 +223,13 @@ impl Facts<'_> {
         let clause = |guard: &Condition, span: crate::diagnostic::Span| ClausePlan {
             line: self.line(span.start),
             condition: if guard.is_always() { String::new() } else { self.guard(span) },
+            successors: None,
         };
+        let production = |p: &Produce| ClausePlan {
+            successors: p.outcome.weights.is_some().then_some(p.outcome.successors.len()),
+            ..clause(&p.guard, p.span)
+        };
+        let real = rule.produces.iter().filter(|p| !p.is_fault);
         RulePlan {
             head: rule.label.clone(),
             line: self.line(rule.span.start),
@@ -231,7 +240,7 @@ impl Facts<'_> {
                     parameters: self.parameters(index, solve),
                 })
                 .collect(),
-            produces: rule.produces.iter().map(|p| clause(&p.guard, p.span)).collect(),
+            produces: real.map(production).collect(),
             conditions: (0..rule.atoms.len()).map(|atom| self.condition(rule, atom)).collect(),
         }
     }
@@ -258,9 +267,12 @@ impl Facts<'_> {
         let compiled = &model.rules[rule];
         let mut kinds = model.kinds.iter().filter(|(_, kind)| kind.rules.contains(&rule));
         let coupled = kinds.any(|(id, _)| self.work[id.index()] == Work::Coupled);
-        (compiled.parameters.iter().enumerate())
-            .map(|(parameter, name)| {
-                let name = name.clone();
+        let shown = compiled.parameters.len() - compiled.hidden;
+        let is_named = |v: usize| v < shown || self.clock(compiled, v).is_some();
+        (0..compiled.parameters.len())
+            .filter(|v| is_named(*v))
+            .map(|parameter| {
+                let name = self.name(compiled, parameter).unwrap_or_default();
                 let Some(position) = solve.of.iter().position(|p| *p == parameter) else {
                     let why = "its rate here is 0".to_owned();
                     return ParameterPlan { name, class: "constant", law: None, why, reads: Vec::new() };
@@ -273,7 +285,7 @@ impl Facts<'_> {
                     _ => "closed form",
                 };
                 let reads = solve.rates.output_reads(position);
-                let reads = reads.into_iter().filter_map(|v| words::variable(compiled, v)).collect();
+                let reads = reads.into_iter().filter_map(|v| self.name(compiled, v)).collect();
                 let (law, why) = words::law(self, compiled, solve, position, coupled);
                 ParameterPlan { name, class, law, why, reads }
             })
@@ -293,7 +305,7 @@ impl Facts<'_> {
                 decides.push(Use { clause: "if in the equations", line });
             }
         }
-        let produces = rule.produces.iter().filter(|p| mentions(&p.guard));
+        let produces = rule.produces.iter().filter(|p| mentions(&p.guard) && !p.is_fault);
         decides.extend(produces.map(|p| Use { clause: "produce", line: self.line(p.span.start) }));
         let found = |solve: Option<usize>| {
             let (class, why) = self.watch(rule, solve, atom);
@@ -305,7 +317,23 @@ impl Facts<'_> {
             n => (0..n).map(|solve| found(Some(solve))).collect(),
         };
         let line = self.line(rule.atoms[atom].start);
-        ConditionPlan { boundary: rule.boundaries[atom].clone(), line, decides, found }
+        let mut boundary = rule.boundaries[atom].to_string();
+        let sides = [2 * atom, 2 * atom + 1].map(|side| rule.sides.output_reads(side)).concat();
+        if let Some(clock) = sides.into_iter().find_map(|v| self.clock(rule, v)) {
+            boundary = format!("{clock} = 0");
+        }
+        ConditionPlan { boundary, line, decides, found }
+    }
+
+    /// The name of a variable of a rule; None for truth values.
+    fn name(&self, rule: &Rule, variable: usize) -> Option<String> {
+        self.clock(rule, variable).or_else(|| words::variable(rule, variable))
+    }
+
+    /// What the clock of an event at a rate is called, if a variable is one.
+    fn clock(&self, rule: &Rule, variable: usize) -> Option<String> {
+        let clock = rule.clocks.iter().find(|clock| clock.parameter == variable)?;
+        Some(format!("clock of line {}", self.line(rule.produces[clock.produce].span.start)))
     }
 
     fn watch(&self, rule: &Rule, solve: Option<usize>, atom: usize) -> (&'static str, String) {
@@ -317,13 +345,21 @@ impl Facts<'_> {
         if solve.is_some_and(|s| s.unreachable[atom]) {
             return ("never met", "the equations approach it and never arrive".to_owned());
         }
+        if let Watch::Crossing { variable, .. } = watch
+            && self.clock(rule, *variable).is_some()
+        {
+            return (
+                "closed-form time",
+                "a formula tells when the integral of the rate is what was drawn".to_owned(),
+            );
+        }
         if let Watch::Crossing { variable, level } = watch {
             return ("closed-form time", words::crossing(rule, *variable, level));
         }
         let mut reads = rule.sides.output_reads(2 * atom);
         reads.extend(rule.sides.output_reads(2 * atom + 1));
         let integrated = reads.iter().filter(|v| self.is_integrated(rule, solve, **v));
-        let mut integrated: Vec<String> = integrated.filter_map(|v| words::variable(rule, *v)).collect();
+        let mut integrated: Vec<String> = integrated.filter_map(|v| self.name(rule, *v)).collect();
         integrated.dedup();
         if integrated.is_empty() {
             (
@@ -346,11 +382,11 @@ impl Facts<'_> {
         }
         let mut first = rule.parameters.len();
         for pattern in rule.left.iter().chain(&rule.right) {
-            if variable < first + pattern.arity {
+            if variable < first + pattern.width {
                 let kinds = pattern.kinds.iter().map(|kind| self.model.kinds.get(*kind));
                 return { kinds }.any(|kind| is_numeric(self.model, kind, Some(variable - first)));
             }
-            first += pattern.arity;
+            first += pattern.width;
         }
         false
     }

@@ -55,9 +55,11 @@ fn line(text: &str, out: &mut String) {
 fn clause(action: &str, clause: &ClausePlan, out: &mut String) {
     let condition = match clause.condition.as_str() {
         "" => "always".to_owned(),
+        rate if rate.starts_with("at rate ") => rate.to_owned(),
         condition => format!("if {condition}"),
     };
-    line(&format!("    {action}, line {}, {condition}", clause.line), out);
+    let choice = clause.successors.map_or(String::new(), |n| format!(", one of {n} successors"));
+    line(&format!("    {action}, line {}, {condition}{choice}", clause.line), out);
 }
 
 fn kind_line(plan: &Plan, group: &[&KindPlan]) -> String {

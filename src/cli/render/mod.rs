@@ -6,25 +6,25 @@
 //! threads; a file does not depend on how many there are.
 
 mod flags;
-mod reel;
 mod watch;
 
 use std::io::Write;
+use std::path::Path;
 use std::time::Instant;
 
 use indicatif::ProgressBar;
 use serde_json::json;
 
-use super::args::RenderArgs;
+use super::args::{RenderArgs, Seeds};
 use super::common::{Clock, Failure, Run, bar, count_of, out_error, size_of};
 use super::events::EventLog;
+use super::reel::{Pass, Shot, play};
 use crate::export::{
     self, Fit, Format, FrameDirectory, FrameRecord, FrameWriter, Layout, Manifest, Page, Sheet, SheetWriter,
     Survey,
 };
 use crate::scene::Scene;
 use crate::sim::{Method, Settings, Stats};
-use reel::{Pass, Shot, play};
 
 /// Runs a model and writes its frames; with `--watch`, again and again.
 pub fn render(args: &RenderArgs) -> Result<(), Failure> {
@@ -35,7 +35,49 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
 fn once(args: &RenderArgs, stale: &(dyn Fn() -> bool + Sync)) -> Result<(), Failure> {
     flags::survey(args)?;
     flags::agree(args)?;
-    render_run(args, Run::start(&args.shared)?, stale)
+    let run = Run::start(&args.shared)?;
+    match args.seeds {
+        Some(seeds) => specimens(args, run, seeds),
+        None => render_run(args, run, stale),
+    }
+}
+
+/// Renders specimens with several seeds, to one scale. All are measured before anything is written.
+fn specimens(args: &RenderArgs, mut run: Run, seeds: Seeds) -> Result<(), Failure> {
+    let begun = Instant::now();
+    let never = || false;
+    let threads = flags::threads(args);
+    let mut survey = flags::survey(args)?;
+    let mut parts = Vec::new();
+    for seed in seeds.iter() {
+        run.settings.seed = seed;
+        let mut render =
+            Render { args, run: &run, out: &args.out, threads, frames: Vec::new(), stale: &never };
+        survey = render.measure(survey, &mut Clock::default()).map_err(|why| why.of_seed(seed))?;
+        parts.push(render.frames);
+    }
+    let mut fit = survey.fit();
+    fit.accuracy = args.accuracy.unwrap_or(fit.accuracy);
+    let width = seeds.last.to_string().len();
+    let mut bytes = 0;
+    for (seed, frames) in seeds.iter().zip(parts) {
+        run.settings.seed = seed;
+        let out = args.out.join(format!("seed-{seed:0width$}"));
+        let render = Render { args, run: &run, out: &out, threads, frames, stale: &never };
+        bytes += render.write(fit.clone(), &mut Clock::default())?.1.bytes;
+    }
+    if args.quiet {
+        return Ok(());
+    }
+    let line = format!(
+        "{}, {} of each, {}, in {:.2} s: {}\n",
+        count_of(seeds.count(), "specimen"),
+        count_of(run.times.len(), "frame"),
+        size_of(bytes),
+        begun.elapsed().as_secs_f64(),
+        args.out.display()
+    );
+    std::io::stdout().write_all(line.as_bytes()).map_err(out_error)
 }
 
 /// The same of a model that was read.
@@ -44,13 +86,11 @@ pub fn render_run(args: &RenderArgs, run: Run, stale: &(dyn Fn() -> bool + Sync)
     let survey = flags::survey(args)?;
     flags::agree(args)?;
     let mut clock = run.clock;
-    let mut render = Render { args, run: &run, threads: flags::threads(args), frames: Vec::new(), stale };
+    let threads = flags::threads(args);
+    let mut render = Render { args, run: &run, out: &args.out, threads, frames: Vec::new(), stale };
     let mut fit = render.measure(survey, &mut clock)?.fit();
     fit.accuracy = args.accuracy.unwrap_or(fit.accuracy);
-    let (stats, written) = match args.layout {
-        Layout::Frames => render.frames(fit, &mut clock)?,
-        layout => render.sheet(layout, fit, &mut clock)?,
-    };
+    let (stats, written) = render.write(fit, &mut clock)?;
     run.write_stats(&args.shared, clock, stats)?;
     if args.quiet {
         return Ok(());
@@ -76,6 +116,8 @@ struct Written {
 struct Render<'r> {
     args: &'r RenderArgs,
     run: &'r Run,
+    /// Where to write.
+    out: &'r Path,
     threads: usize,
     /// Every frame's survey, where the layout asks for it.
     frames: Vec<Survey>,
@@ -84,6 +126,14 @@ struct Render<'r> {
 }
 
 impl Render<'_> {
+    /// The second pass.
+    fn write(&self, fit: Fit, clock: &mut Clock) -> Result<(Stats, Written), Failure> {
+        match self.args.layout {
+            Layout::Frames => self.frames(fit, clock),
+            layout => self.sheet(layout, fit, clock),
+        }
+    }
+
     /// The first pass.
     fn measure(&mut self, mut survey: Survey, clock: &mut Clock) -> Result<Survey, Failure> {
         let progress = self.bar("measuring", self.run.times.len());
@@ -113,8 +163,7 @@ impl Render<'_> {
         let mut writer = FrameWriter::new(flags::format(self.args), fit);
         writer.page = flags::page(self.args, writer.page.picture)?;
         // Only now that the run is known to be good, the directory is touched.
-        let mut directory =
-            FrameDirectory::create(&self.args.out, self.args.force).map_err(out_of_directory)?;
+        let mut directory = FrameDirectory::create(self.out, self.args.force).map_err(out_of_directory)?;
         let mut manifest = self.manifest(&writer.fit, &writer.page);
         let count = self.run.times.len();
         // Frames side by side; threads that have none help with those of others.
@@ -146,9 +195,9 @@ impl Render<'_> {
             },
         )?;
         let names = match &manifest.frames[..] {
-            [] => self.args.out.display().to_string(),
-            [only] => self.args.out.join(&only.file).display().to_string(),
-            [first, .., last] => format!("{} to {}", self.args.out.join(&first.file).display(), last.file),
+            [] => self.out.display().to_string(),
+            [only] => self.out.join(&only.file).display().to_string(),
+            [first, .., last] => format!("{} to {}", self.out.join(&first.file).display(), last.file),
         };
         let written = Written { bytes: directory.bytes(), names };
         directory.finish(&manifest).map_err(out_of_directory)?;
@@ -167,8 +216,7 @@ impl Render<'_> {
         let page = flags::page(self.args, sheet.picture)?;
         let refuse = |error: export::SheetError| Failure::Usage(format!("error: {error}\n"));
         let writer = SheetWriter::new(flags::format(self.args), fit.clone(), sheet, page).map_err(refuse)?;
-        let mut directory =
-            FrameDirectory::create(&self.args.out, self.args.force).map_err(out_of_directory)?;
+        let mut directory = FrameDirectory::create(self.out, self.args.force).map_err(out_of_directory)?;
         let mut manifest = self.manifest(&fit, writer.page());
         let work = |shot: &Shot, scene: &Scene| {
             (record(&fit, shot, scene, writer.file()), writer.part(shot.index, scene))
@@ -194,7 +242,7 @@ impl Render<'_> {
             [first, .., last] => format!("{}, t = {first} to {last}", self.title()),
         };
         directory.write(&writer.file(), &assembly.finish(&title)).map_err(out_of_directory)?;
-        let names = self.args.out.join(writer.file()).display().to_string();
+        let names = self.out.join(writer.file()).display().to_string();
         let written = Written { bytes: directory.bytes(), names };
         directory.finish(&manifest).map_err(out_of_directory)?;
         progress.finish_and_clear();
@@ -243,7 +291,7 @@ impl Render<'_> {
             "accuracy": fit.accuracy,
             "method": method,
             "parameters": parameters,
-            "seed": args.shared.seed,
+            "seed": run.settings.seed,
         });
         if settings.method.is_fixed_step() {
             described["step_size"] = settings.step_size.into();

@@ -104,10 +104,10 @@ fn roles(lines: &[Line<'_>]) -> Vec<Role> {
             }
             if keyword {
                 role.keywords.push(i);
-                if i > 0 && guarded && piece.text != "if" && line.pieces[0].text == "if" {
+                if i > 0 && guarded && piece.text != "if" && matches!(line.pieces[0].text, "if" | "at") {
                     role.action.get_or_insert(i);
                 }
-                guarded = piece.text == "if";
+                guarded = matches!(piece.text, "if" | "at");
             }
             before = Some(piece);
         }
@@ -127,7 +127,7 @@ fn is_body(piece: &Piece<'_>) -> bool {
 fn is_keyword(piece: &Piece<'_>, before: Option<&Piece<'_>>) -> bool {
     let begins = match piece.text {
         "solve" | "produce" | "let" => true,
-        "if" => before.is_some_and(|b| b.place == Place::Colon || b.in_string || !b.operator),
+        "if" | "at" => before.is_some_and(|b| b.place == Place::Colon || b.in_string || !b.operator),
         _ => false,
     };
     begins && is_body(piece) && piece.operator
@@ -277,7 +277,7 @@ fn space(before: &Piece<'_>, after: &Piece<'_>) -> bool {
     let kept = !after.touches;
     let word = |piece: &Piece<'_>| {
         piece.token == Token::Word && piece.operator && !piece.grouped
-            || matches!(piece.text, "if" | "solve" | "produce") && piece.operator
+            || matches!(piece.text, "if" | "solve" | "produce" | "or" | "at" | "rate") && piece.operator
     };
     let bracket = |piece: &Piece<'_>, symbol: &str| piece.text == symbol && !piece.grouped;
     let element = before.token == Token::Word && !before.operator && bracket(after, "[");

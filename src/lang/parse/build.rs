@@ -10,10 +10,13 @@ use crate::diagnostic::{Diagnostic, Span};
 use crate::expr::Sort;
 use crate::lang::ast;
 use crate::lang::ast::{
-    Action, Clause, Equation, Expr, ExprId, Expression, Expressions, HeadModule, Item, Module, Name,
-    Operator, Text,
+    Action, Alternative, Clause, Equation, Expr, ExprId, Expression, Expressions, HeadModule, Item, Module,
+    Name, Operator, Text,
 };
 use crate::model::Comparison;
+
+/// Most symbols and names of a weight outside parentheses.
+const MAX_WEIGHT: usize = 200;
 
 type Built<T> = Result<T, Box<Diagnostic>>;
 
@@ -185,11 +188,11 @@ impl Builder<'_> {
                     span = span.to(self.span(&part));
                     match part.as_rule() {
                         Rule::expr => guard = Some(self.expression(part)?),
-                        Rule::successor => made = self.successor(part)?,
+                        Rule::successor | Rule::choice => made = self.alternatives(part)?,
                         _ => {}
                     }
                 }
-                rule.clauses.push(Clause { guard, action: Action::Produce(made), span });
+                rule.clauses.push(Clause { guard, hazard: None, action: Action::Produce(made), span });
                 Item::Rule(rule)
             }
             other => unreachable!("{other:?} is no item"),
@@ -256,6 +259,7 @@ impl Builder<'_> {
     fn clause(&mut self, pair: Pair) -> Built<Clause> {
         let span = self.span(&pair);
         let mut guard = None;
+        let mut hazard = None;
         let mut action = None;
         for part in pair.into_inner() {
             match part.as_rule() {
@@ -267,14 +271,52 @@ impl Builder<'_> {
                     }
                     action = Some(Action::Solve(equations));
                 }
+                Rule::hazard => {
+                    let rate = part.into_inner().find(|p| p.as_rule() == Rule::expr);
+                    hazard = Some(self.expression(rate.expect("the grammar has a rate here"))?);
+                }
                 Rule::produce => {
-                    let successor = part.into_inner().find(|p| p.as_rule() == Rule::successor);
-                    action = Some(Action::Produce(self.successor(successor.expect("a successor"))?));
+                    let mut inner = part.into_inner();
+                    let successor = inner.find(|p| matches!(p.as_rule(), Rule::successor | Rule::choice));
+                    action = Some(Action::Produce(self.alternatives(successor.expect("a successor"))?));
                 }
                 _ => {}
             }
         }
-        Ok(Clause { guard, action: action.expect("a clause solves or produces"), span })
+        Ok(Clause { guard, hazard, action: action.expect("a clause solves or produces"), span })
+    }
+
+    /// The successors of a clause: one, or several with weights.
+    pub fn alternatives(&mut self, pair: Pair) -> Built<Vec<Alternative>> {
+        if pair.as_rule() == Rule::successor {
+            return Ok(vec![Alternative { weight: None, modules: self.successor(pair)? }]);
+        }
+        let mut all = Vec::new();
+        for weighted in pair.into_inner().filter(|p| p.as_rule() == Rule::weighted) {
+            let mut inner = weighted.into_inner().filter(|p| !is_punctuation(p.as_rule()));
+            let mut next = || inner.next().expect("the grammar has a part here");
+            let weight = next();
+            // The layout bounds nesting in expressions, and takes this for a part of a string.
+            let symbols = weight.clone().into_inner().count();
+            if symbols > MAX_WEIGHT {
+                return Err(Box::new(
+                    Diagnostic::error("this weight is too long")
+                        .at(self.span(&weight), format!("more than {MAX_WEIGHT} symbols"))
+                        .help("name it: `const w = …` or `def w(x) = …`"),
+                ));
+            }
+            let weight = Some(self.expression(weight)?);
+            all.push(Alternative { weight, modules: self.successor(next())? });
+        }
+        Ok(all)
+    }
+
+    /// A head, and the expression behind its colon.
+    pub fn measure(&mut self, pair: Pair) -> Built<(HeadModule, Option<Expression>)> {
+        let mut inner = pair.into_inner().filter(|p| matches!(p.as_rule(), Rule::head_module | Rule::expr));
+        let head = self.head_module(inner.next().expect("the grammar has a head here"));
+        let expression = inner.next().map(|expression| self.expression(expression)).transpose()?;
+        Ok((head, expression))
     }
 
     fn equation(&mut self, pair: Pair) -> Built<Equation> {
@@ -395,7 +437,8 @@ impl Builder<'_> {
         }
         Err(Box::new(
             Diagnostic::error("this number is too large")
-                .at(self.span(pair), format!("the greatest number is {:e}", f64::MAX)),
+                .at(self.span(pair), format!("the greatest number is {:e}", f64::MAX))
+                .help("choose larger units of length or time, so that numbers stay small"),
         ))
     }
 

@@ -6,6 +6,7 @@ use pest::error::{Error, ErrorVariant, InputLocation};
 
 use super::Rule;
 use crate::diagnostic::{Diagnostic, Span};
+use crate::lang::advice;
 use crate::lang::layout::{DECLARATIONS, RawItem};
 use crate::lang::suggest::nearest;
 
@@ -16,7 +17,7 @@ fn words(rule: Rule) -> Option<&'static str> {
         expr | number | literal | ident | call | indexed | array | if_expr | match_expr | neg | not
         | coefficient => "an expression",
         or | and | le | ge | ne | lt | gt | eq | add | sub | mul | div | pow => "an operator",
-        module | modules | successor | name => "a module",
+        module | modules | successor | alternative | name => "a module",
         epsilon => "`ε` for nothing",
         arguments => "`(` and parameters",
         formals => "`(` and the names of parameters",
@@ -33,6 +34,9 @@ fn words(rule: Rule) -> Option<&'static str> {
         kw_column => "`column` and its name",
         periodic => "`periodic`",
         sort => "`linear`, `monotone` or `spline`",
+        kw_or => "`or` and another successor",
+        hazard | kw_at => "`at rate`",
+        kw_rate => "`rate`",
         solve | kw_solve => "`solve`",
         produce | kw_produce => "`produce`",
         kw_if => "`if`",
@@ -108,11 +112,9 @@ pub fn explain(item: Rule, error: &Error<Rule>, text: &str, offset: usize) -> Di
         Span::new(offset + at, offset + end)
     };
     let what = if end == at { format!("{what} after this") } else { what };
-    Diagnostic::error(message).at(span, what).help_opt(
-        hint(item, text, at, found).or_else(|| {
-            choice.then(|| "a choice is written `match n case 0: 1 case 1: 2 else 3`".to_owned())
-        }),
-    )
+    let choice = choice.then_some("a choice is written `match n case 0: 1 case 1: 2 else 3`");
+    let advice = hint(item, text, at, found).or_else(|| choice.map(str::to_owned));
+    Diagnostic::error(message).at(span, what).help(advice.unwrap_or_else(|| advice::usage(item).to_owned()))
 }
 
 fn is_item_with_name(item: Rule) -> bool {
@@ -153,33 +155,50 @@ fn hint(item: Rule, text: &str, at: usize, found: &str) -> Option<String> {
     {
         return Some(format!("did you mean `{word}`?"));
     }
-    let block = hint_for_block(item, &text[..at], found).map(str::to_owned);
-    block.or_else(|| hint_by_symbol(item, text, at, found)).or_else(|| hint_by_word(item, text, at, found))
+    if let Some(advice) = advice::for_block(item, &text[..at], found) {
+        return Some(advice.to_owned());
+    }
+    if let Some(advice) = hint_of_chance(item, text, at, found) {
+        return Some(advice.to_owned());
+    }
+    hint_by_symbol(item, text, at, found).or_else(|| hint_by_word(item, text, at, found))
 }
 
-/// Advice for curves, tables, arrays and names within rules.
-fn hint_for_block(item: Rule, before: &str, found: &str) -> Option<&'static str> {
-    let previous = before.trim_end().chars().next_back();
-    match item {
-        Rule::curve_item if before.contains('=') => {
-            Some("a curve is two points or more, of two numbers each: `curve g = (0, 0) (1, 0.3) (2, 1)`")
+/// Advice for successors with weights and for events at a rate.
+fn hint_of_chance(item: Rule, text: &str, at: usize, found: &str) -> Option<&'static str> {
+    const WEIGHTS: &str = "several successors each have a weight before them: `produce 2: F(x) or 1: G(x)`";
+    const STEP: &str = "several successors each have a weight before them: `A -> 2: F A or 1: F`";
+    if !matches!(item, Rule::rule_item | Rule::step_item) {
+        return None;
+    }
+    let before = text[..at].trim_end();
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    let words: Vec<&str> = before.split(|c| !is_word(c)).filter(|w| !w.is_empty()).collect();
+    let last = words.last().copied().unwrap_or_default().trim_start();
+    let last = if before.ends_with(is_word) { last } else { "" };
+    let arrow = before.rfind("->").max(before.rfind('→'));
+    // From the beginning of the successor on.
+    let successor = match item {
+        Rule::step_item => arrow.map(|at| &before[at..])?,
+        _ => before.rfind("produce").map_or("", |at| &before[at..]),
+    };
+    let weights = if item == Rule::step_item { STEP } else { WEIGHTS };
+    let has_or = successor.split(|c| !is_word(c)).any(|word| word == "or");
+    let number = found.starts_with(|c: char| c.is_ascii_digit());
+    let begins = last == "produce" || successor.trim_end_matches(['>', '→', '-']).is_empty();
+    match found {
+        "or" if !successor.is_empty() => Some(weights),
+        _ if last == "or" || has_or && matches!(found, "" | "\n" | "or" | ":") => Some(weights),
+        _ if number && begins && !successor.is_empty() => Some(weights),
+        "produce" | "solve" if last == "rate" => {
+            Some("behind `at rate` stands the rate: `at rate 0.5 produce …`")
         }
-        Rule::curve_item if before.split_whitespace().count() == 2 && found != "=" => {
-            Some("a curve is `linear`, `monotone` or `spline`: `curve linear g = (0, 0) (2, 1)`")
+        "solve" if before.rsplit('\n').next().is_some_and(|line| line.contains("at rate")) => {
+            Some("what happens at a rate is a production: `at rate 0.5 produce …`")
         }
-        Rule::table_item if before.split_whitespace().count() > 1 => Some(
-            "a table is written `table g from \"file.csv\"`, or `table g from \"file.csv\" column \"name\"`",
+        _ if last == "rate" && words.len() > 1 && words[words.len() - 2] != "at" => Some(
+            "a production at a rate is written `at rate 0.5 produce …`, with `if …` before it if it has a condition",
         ),
-        Rule::include_item => Some("the name of the file is a text in quotes: `include \"organs.dls\"`"),
-        Rule::const_item if previous == Some('[') && found == "]" => {
-            Some("an array has one element or more: `const a = [1, 2, 3]`")
-        }
-        Rule::const_item if found == "[" && matches!(previous, Some('[' | ',')) => {
-            Some("the elements of an array are numbers: `const a = [1, 2, 3]`")
-        }
-        Rule::rule_item if found == "let" => {
-            Some("a `let` stands between the head of its rule and the first clause")
-        }
         _ => None,
     }
 }
@@ -328,6 +347,10 @@ fn hint_by_word(item: Rule, text: &str, at: usize, found: &str) -> Option<String
         }
         "else" if in_rule => "every clause has a condition of its own: `if … solve …`, `if … produce …`",
         "if" if in_rule => "after its condition a clause has `solve` or `produce`",
+        _ if ended && before.ends_with(['+', '-', '*', '/', '^', '=', '<', '>', '&', '|']) => {
+            "an operator has something on both sides: add what is missing, or remove the sign"
+        }
+        _ if has_open_if(line) => "in an expression `if` has three parts: `if x < 1 then 0.5 else 0`",
         _ if ended && before.ends_with("produce") => "to produce nothing, write `produce ε`",
         _ if ended && in_rule && before.ends_with(':') => {
             "under its head a rule has clauses: `solve dx/dt = …`, `if x = 1 produce …`"
@@ -338,6 +361,7 @@ fn hint_by_word(item: Rule, text: &str, at: usize, found: &str) -> Option<String
         _ if in_rule && !has_head && before.ends_with(|c: char| c.is_alphanumeric()) && is_word => {
             "the names of parameters are separated by commas"
         }
+        _ if in_rule && last_word == "dt" => "a derivative is followed by `=`, as in `dx/dt = 0.1*x`",
         _ if in_rule && line.ends_with("solve") => "a `solve` gives derivatives: `solve dx/dt = …`",
         _ if in_rule && is_word && is_derivative(rest) => {
             if line.contains("solve") {
@@ -369,6 +393,16 @@ fn hint_by_word(item: Rule, text: &str, at: usize, found: &str) -> Option<String
 fn last_keyword(text: &str) -> Option<&str> {
     let words = text.rsplit(|c: char| !(c.is_alphanumeric() || c == '_'));
     words.into_iter().find(|word| matches!(*word, "if" | "solve" | "produce"))
+}
+
+/// Whether a line ends inside an `if` that is part of an expression.
+fn has_open_if(line: &str) -> bool {
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    let Some(at) = ["if ", "if("].iter().filter_map(|word| line.rfind(word)).max() else { return false };
+    let before = line[..at].trim_end();
+    let inside = before.ends_with(['=', '+', '-', '*', '/', '^', '(', ',', '<', '>'])
+        || ["then", "else"].iter().any(|word| before.ends_with(word));
+    !line[..at].ends_with(is_word) && inside && !line[at..].split(|c| !is_word(c)).any(|word| word == "else")
 }
 
 /// Whether a text begins with something like `dx/dt`.
@@ -417,5 +451,7 @@ pub fn unknown_line(text: &str, item: &RawItem) -> Diagnostic {
         return diagnostic.help("a constant is declared with `const NAME = VALUE`");
     }
     let known: Vec<&str> = DECLARATIONS.iter().map(|(name, _)| *name).collect();
-    diagnostic.note(format!("declarations begin with {}", known.join(", ")))
+    diagnostic
+        .note(format!("declarations begin with {}", known.join(", ")))
+        .help("a rule has a head with a colon, and clauses: `A(x): solve dx/dt = 1`")
 }

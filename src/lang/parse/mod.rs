@@ -11,9 +11,10 @@ mod expected;
 
 use pest::Parser;
 
-use super::ast::{Document, Expression, Item, Module};
+use super::ast::{Document, Expression, HeadModule, Item, Module};
 use super::layout::{ItemKind, RawItem, layout};
 use crate::diagnostic::{Diagnostic, Source, Span};
+use crate::lang::advice;
 
 /// The pest parser of `grammars/dlsys.pest`.
 #[derive(pest_derive::Parser)]
@@ -109,6 +110,24 @@ pub fn parse_expression(source: &Source) -> Result<(Document, Expression), Vec<D
     Ok((document, expression))
 }
 
+/// Reads what is to be measured: the head of a module, and the expression that is added up, if it is not just counted.
+pub fn parse_measure(source: &Source) -> Result<(Document, HeadModule, Option<Expression>), Vec<Diagnostic>> {
+    let cut = layout(&format!("const it =\n{}", source.text));
+    if !cut.errors.is_empty() {
+        return Err(vec![Diagnostic::error("this cannot be measured").help(MEASURE)]);
+    }
+    let mut document = Document::default();
+    let mut interner = build::Interner::default();
+    let mut builder =
+        build::Builder { expressions: &mut document.expressions, interner: &mut interner, offset: 0 };
+    let pair = pest_parse(Rule::measure, &source.text, 0).map_err(|e| vec![(*e).help(MEASURE)])?;
+    let (head, expression) = builder.measure(pair).map_err(|e| vec![*e])?;
+    Ok((document, head, expression))
+}
+
+/// How a measure is written.
+pub const MEASURE: &str = "a measure is a module, with names for its parameters, and what is added up over all of them: `F(x): x`; without that they are counted: `F(x)`";
+
 fn trimmed(text: &str, item: &RawItem) -> Span {
     let body = text[item.start..item.end].trim_end();
     Span::new(item.start, item.start + body.len())
@@ -159,10 +178,16 @@ fn read_axiom(text: &str, item: &RawItem, builder: &mut build::Builder) -> Resul
     let Some(mut at) = item.after_colon.filter(|_| matches!(words[..], ["axiom"] | ["initial", "string"]))
     else {
         return Err(Box::new(
-            Diagnostic::error("the initial string is written `initial string: …` or `axiom: …`").at(
-                Span::new(item.start, item.start + head.lines().next().unwrap_or("").len()),
-                "expected a `:` after this",
-            ),
+            Diagnostic::error("the initial string is written `initial string: …` or `axiom: …`")
+                .at(
+                    Span::new(item.start, item.start + head.lines().next().unwrap_or("").len()),
+                    if words == ["initial"] {
+                        "expected `string:` after this"
+                    } else {
+                        "expected a `:` after this"
+                    },
+                )
+                .help(advice::initial_string(text[item.start..item.end].lines().next().unwrap_or_default())),
         ));
     };
     let mut modules: Vec<Module> = Vec::new();
@@ -182,7 +207,8 @@ fn read_axiom(text: &str, item: &RawItem, builder: &mut build::Builder) -> Resul
         if modules.len() > MAX_AXIOM {
             return Err(Box::new(
                 Diagnostic::error(format!("the initial string has more than {MAX_AXIOM} modules"))
-                    .at(modules[MAX_AXIOM].span, "this one is too many"),
+                    .at(modules[MAX_AXIOM].span, "this one is too many")
+                    .help("begin with fewer, and let rules make the others"),
             ));
         }
         at = end;

@@ -80,7 +80,9 @@ pub fn read(path: &str, files: &dyn Files) -> Result<SurfaceShape, Fault> {
                 .help("known are `.s` (Bézier patches) and `.obj` (Wavefront meshes)"));
         }
     };
-    let bytes = files.read(Path::new(path), SIZE_LIMIT).map_err(Fault::whole)?;
+    let bytes = files.read(Path::new(path), SIZE_LIMIT).map_err(|what| {
+        Fault::whole(what).help("put it into the folder of the model's file or below; the path begins there")
+    })?;
     parse(&String::from_utf8_lossy(&bytes))
 }
 

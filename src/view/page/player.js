@@ -5,6 +5,15 @@ const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8];
 const SHORTEST = 6;
 const LONGEST = 30;
 
+// What is drawn while something moves: how far patches may be from their surfaces (pixels), and the pixels of the canvas for each
+// of the page. A slow machine gets as much as it draws in time.
+const QUALITIES = [[0.35, 1], [0.7, 1], [1.2, 1], [2, 1], [3, 1], [3, 0.7], [3, 0.5]];
+// Milliseconds between two pictures above which there is to be less, and below which there may be more.
+const SLOW = 27;
+const FAST = 18;
+// Milliseconds after which what stands still is drawn as well as can be.
+const STILL = 250;
+
 class Player {
   constructor(recording) {
     this.recording = recording;
@@ -24,6 +33,9 @@ class Player {
     this.listen();
     new ResizeObserver(() => this.resize()).observe(this.elements.plant);
     this.stale = true;
+    this.quality = 0;
+    // Milliseconds between pictures, and pictures since the quality has changed.
+    [this.interval, this.since] = [16, 0];
     this.step = this.step.bind(this);
     requestAnimationFrame(this.step);
   }
@@ -32,8 +44,10 @@ class Player {
 
   describe() {
     const { recording, elements } = this;
-    elements.notice.hidden = true;
-    elements.notice.style.display = "none";
+    const empty = recording.tracks.length === 0;
+    elements.notice.hidden = !empty;
+    elements.notice.style.display = empty ? "" : "none";
+    elements.notice.textContent = "Nothing is drawn in this recording: the turtle knows none of its modules, nor does an “interpret” rule say what they look like.";
     elements.origin.textContent = recording.source;
     elements.time.min = this.from;
     elements.time.max = this.to;
@@ -165,19 +179,57 @@ class Player {
       }
       this.seek(time);
     }
-    if (!this.stale) return;
-    this.stale = false;
-    this.paint();
+    if (this.stale) {
+      this.measure(now);
+      this.moved = now;
+      this.stale = this.sharp = false;
+      this.paint();
+    } else if (!this.sharp && now - this.moved > STILL) {
+      this.sharp = true;
+      this.paint();
+    }
+  }
+
+  // Learns how fast this machine is.
+  measure(now) {
+    const passed = now - this.moved;
+    // The first picture after a rest says nothing.
+    if (!(passed < STILL) || this.sharp) return;
+    this.interval += (passed - this.interval) * 0.25;
+    this.since++;
+    if (this.interval > SLOW && this.since > 5 && this.quality < QUALITIES.length - 1) {
+      this.quality++;
+      this.since = 0;
+    } else if (this.interval < FAST && this.since > 90 && this.quality > 0) {
+      this.quality--;
+      this.since = 0;
+    }
+  }
+
+  // Gives the canvas the pixels that it is to have; returns how far patches may be from their surfaces, in pixels.
+  prepare() {
+    const { plant } = this.elements;
+    const screen = Math.min(2, devicePixelRatio || 1);
+    let [slack, ratio] = [QUALITIES[0][0], this.painter.software ? 2 : 1];
+    if (!this.sharp) [slack, ratio] = QUALITIES[this.quality];
+    const sides = [plant.clientWidth, plant.clientHeight].map((side) => Math.max(1, Math.round(side * screen * ratio)));
+    // Setting them empties the canvas.
+    if (plant.width !== sides[0]) plant.width = sides[0];
+    if (plant.height !== sides[1]) plant.height = sides[1];
+    return slack;
   }
 
   paint() {
     const { recording, elements, time } = this;
     const frame = frameOf(recording.times, time);
-    if (frame !== this.staged) {
-      this.painter.stage(frame);
-      this.staged = frame;
+    const slack = this.prepare();
+    const { width, height } = elements.plant;
+    const detail = height / (2 * this.camera.reach(width / height)) / slack;
+    if (frame !== this.staged || detail !== this.detail) {
+      this.painter.stage(frame, detail);
+      [this.staged, this.detail] = [frame, detail];
     }
-    this.painter.paint(this.camera, elements.plant.width, elements.plant.height);
+    this.painter.paint(this.camera, width, height);
     elements.time.value = time;
     elements.clock.textContent = `t = ${shown(time)}`;
     const count = recording.modules[Math.floor(frame)];
@@ -203,13 +255,8 @@ class Player {
   }
 
   resize() {
-    const { plant } = this.elements;
-    const ratio = Math.min(2, devicePixelRatio || 1);
-    plant.width = Math.max(1, Math.round(plant.clientWidth * ratio));
-    plant.height = Math.max(1, Math.round(plant.clientHeight * ratio));
     this.graph();
-    // At once: the new canvas is empty.
-    this.paint();
+    this.stale = true;
   }
 
   // ---- Hands.

@@ -3,9 +3,9 @@
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use crate::cli::common::{Clock, Failure, Run};
-use crate::cli::events::EventLog;
-use crate::cli::parallel;
+use super::common::{Clock, Failure, Run};
+use super::events::EventLog;
+use super::parallel;
 use crate::interrupt;
 use crate::scene::Scene;
 use crate::sim::{Event, Settings, Simulation, Stats};
@@ -26,6 +26,11 @@ impl Shot {
     pub fn modules(&self) -> usize {
         let string = self.string.as_ref().ok();
         string.map_or(0, |string| string.iter().filter(|m| !m.kind.is_bracket()).count())
+    }
+
+    /// What has happened since the shot before, if the settings ask for a log.
+    pub fn events(&self) -> &[Event] {
+        &self.events
     }
 }
 
@@ -97,12 +102,11 @@ pub fn play<Done: Send>(
     };
     let draw = |mut shot: Shot| -> (Vec<Event>, Result<Done, Failure>, Duration) {
         let before = Instant::now();
-        let events = std::mem::take(&mut shot.events);
         let pooled = pool().pop();
         let mut scene = pooled.unwrap_or_else(|| blank.clone());
         let done = draw_shot(run, &mut shot, &mut scene).map(|()| work(&shot, &scene));
         pool().push(scene);
-        (events, done, before.elapsed())
+        (shot.events, done, before.elapsed())
     };
     let taken = parallel::in_order(threads, make, draw, |(events, done, spent)| {
         if let Some(log) = &mut log {

@@ -1,4 +1,4 @@
-// A corner of a polygon.
+// A corner of a triangle, in its place. Host: version and precision stand before this.
 
 in vec3 corner;
 in vec3 normal;
