@@ -32,7 +32,11 @@ impl Scope {
         let array = values.filter(|values| {
             if values.len() > MAX_ELEMENTS {
                 let error = format!("the array `{}` has more than {MAX_ELEMENTS} elements", name.text);
-                self.diagnostics.push(Diagnostic::error(error).at(name.span, "this one"));
+                self.diagnostics.push(
+                    Diagnostic::error(error)
+                        .at(name.span, "this one")
+                        .help("numbers in such numbers are a `table` from a file"),
+                );
             }
             values.len() <= MAX_ELEMENTS
         });
@@ -119,7 +123,9 @@ impl Scope {
             Err(CurveFault::TooFew(least)) => error
                 .at(span, format!("`{}` needs {least} {what}s or more", name.text))
                 .help("a spline has four control points or more, a periodic curve three points, any other two"),
-            Err(CurveFault::TooMany) => error.at(name.span, format!("more than {MAX_POINTS} {what}s")),
+            Err(CurveFault::TooMany) => error
+                .at(name.span, format!("more than {MAX_POINTS} {what}s"))
+                .help("every tenth will show the same course"),
             Err(CurveFault::NotAscending(i)) => error
                 .at(at(i), "its x is not greater than that of the point before")
                 .at(at(i - 1), "the point before")

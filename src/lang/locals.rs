@@ -46,7 +46,8 @@ impl RuleBuilder<'_> {
             if good && !used(&name.text) {
                 self.scope.diagnostics.push(
                     Diagnostic::warning(format!("nobody uses the name `{}`", name.text))
-                        .at(name.span, "declared here"),
+                        .at(name.span, "declared here")
+                        .help("use it in a clause of this rule, or leave the line out"),
                 );
             }
         }
