@@ -15,7 +15,8 @@ const VIGOUR: [f64; 4] = [1.0, 1.3, 1.1, 0.8];
 /// The two plants agree to this part of themselves.
 pub const AGREEMENT: f64 = 1e-9;
 
-/// Some axes, each with an apex that makes internodes and leaves.
+/// Some axes, each with an apex that makes internodes and leaves. They begin with different sizes, so that no two lives are
+/// the same.
 pub fn with_blocks(axes: usize) -> String {
     let list = |values: [f64; 4]| values.map(|x| x.to_string()).join(", ");
     let points = DRIVE.map(|[x, y]| format!("({x}, {y})")).join(" ");
@@ -27,21 +28,21 @@ pub fn with_blocks(axes: usize) -> String {
          initial string: {}\n\
          A(x, n):\n  let limit = final[n]\n\
          \x20 if x < limit solve dx/dt = vigour(n)*drive(age)\n\
-         \x20 if x = limit produce F(x) [ +(spread[n]) L(0.05, n) ] A(0, next(n))\n\
+         \x20 if x = limit produce F(x) [ +(spread[n]) L(0.05, n) ] A(x/20, next(n))\n\
          L(s, n):\n  let limit = final[n]/2\n\
          \x20 if s < 0.9limit solve ds/dt = logistic_rate(s, limit, 2)\n\
-         \x20 if s = 0.9limit produce M(s)\n",
+         \x20 if s = 0.9limit produce M(s)\n{MARK}",
         list(SPREAD),
         list(FINAL),
         VIGOUR[3],
         FINAL.len() - 1,
-        axis(axes, "A(0, 0)"),
+        axis(axes, |x| format!("A({x}, 0)")),
     )
 }
 
 /// The same by hand.
 pub fn by_hand(axes: usize) -> String {
-    let mut text = format!("initial string: {}\n", axis(axes, "A_0(0)"));
+    let mut text = format!("initial string: {}\n{MARK}", axis(axes, |x| format!("A_0({x})")));
     for n in 0..4 {
         let mut rate = String::new();
         for pair in DRIVE.windows(2) {
@@ -55,7 +56,7 @@ pub fn by_hand(axes: usize) -> String {
         let _ = write!(
             text,
             "A_{n}(x):\n  if x < {limit} solve dx/dt = {rate}\n\
-             \x20 if x = {limit} produce F(x) [ +({}) L_{n}(0.05) ] A_{next}(0)\n\
+             \x20 if x = {limit} produce F(x) [ +({}) L_{n}(0.05) ] A_{next}(x/20)\n\
              L_{n}(s):\n  if s < {} solve ds/dt = 2*s*(1 - s/{})\n  if s = {} produce M(s)\n",
             SPREAD[n],
             0.9 * (limit / 2.0),
@@ -66,8 +67,11 @@ pub fn by_hand(axes: usize) -> String {
     text
 }
 
-fn axis(axes: usize, apex: &str) -> String {
-    format!("[ {apex} ] ").repeat(axes)
+/// A grown leaf marks a place.
+const MARK: &str = "interpret M(s): F(s)\n";
+
+fn axis(axes: usize, apex: impl Fn(f64) -> String) -> String {
+    (0..axes).map(|i| format!("[ {} ] ", apex(0.5 * i as f64 / axes as f64))).collect()
 }
 
 /// The number of modules without brackets, and the sum of their first parameters.

@@ -11,7 +11,7 @@ use dlsys_benches::solver;
 use crate::{Outcome, ROUNDS, line};
 
 /// Axes, and how long they grow: 10^5 modules in the end.
-const AXES: usize = 1_600;
+const AXES: usize = 2_200;
 const END: f64 = 30.0;
 
 pub fn blocks() -> Outcome {
