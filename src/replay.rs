@@ -11,6 +11,8 @@
 //! is that of checkpointing in reverse mode differentiation: Griewank and Walther 2000, *Revolve*). Marks lie densely where the present is and ever more
 //! thinly away from it, and together take no more than the memory that they are given.
 //!
+//! # Examples
+//!
 //! ```
 //! use dlsys::replay::{Replay, Stop};
 //! use dlsys::session::Session;

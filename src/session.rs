@@ -1,5 +1,7 @@
 //! From a file to a running simulation: the pipeline that every front end uses.
 //!
+//! # Examples
+//!
 //! ```
 //! use dlsys::session::Session;
 //! use dlsys::sim::Settings;

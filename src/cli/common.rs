@@ -1,18 +1,23 @@
 //! What the commands share: reading the model, times, settings, statistics, failures.
 
+use std::collections::HashSet;
 use std::io::IsTerminal;
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 use super::args::{IncludeArgs, Scheduler, SharedArgs};
-use crate::diagnostic::Diagnostic;
+use crate::diagnostic::{Diagnostic, Span};
 use crate::lang::Setting;
 use crate::model::Frames;
+use crate::report::method_name;
+use crate::scene::Scene;
 use crate::session::Session;
 use crate::sim::{self, Settings, Simulation, Stats};
+use crate::structure::ModuleString;
+use crate::turtle;
 
 /// Why a command ends without success; its exit status.
 #[derive(Debug)]
@@ -32,7 +37,10 @@ impl Failure {
     pub fn of_seed(self, seed: u64) -> Failure {
         match self {
             Failure::Model(message) => {
-                Failure::Model(format!("{message}  = of the specimen with `--seed {seed}`\n"))
+                let message = message.trim_end();
+                Failure::Model(format!(
+                    "{message}\n  = note: this happens to the specimen of `--seed {seed}`\n\n"
+                ))
             }
             other => other,
         }
@@ -113,10 +121,19 @@ pub struct Clock {
 /// A model that was read, and what is to be done with it.
 pub struct Run {
     pub session: Session,
+    /// What has been said of its drawings, and what is still to be said.
+    remarks: Mutex<Remarks>,
     pub times: Vec<f64>,
     pub settings: Settings,
     /// Time spent on reading the model.
     pub clock: Clock,
+}
+
+/// Warnings of frames, each kept once.
+#[derive(Default)]
+struct Remarks {
+    known: HashSet<(String, Option<Span>)>,
+    waiting: Vec<Diagnostic>,
 }
 
 /// What `--stats` writes.
@@ -157,11 +174,54 @@ fn spare_files(args: &SharedArgs) -> Result<(), Failure> {
 fn ready(args: &SharedArgs) -> Result<(), Failure> {
     if args.method.is_fixed_step() && args.step_size.is_none() {
         return Err(Failure::Usage(
-            "error: this method has a fixed step: give it with `--step-size H`\n".to_owned(),
+            "error: this method has a fixed step\n\n  = help: give its length, in the model's unit of time: `--step-size H`\n".to_owned(),
         ));
+    }
+    if let Some(h) = args.step_size.filter(|_| !args.method.is_fixed_step()) {
+        return Err(Failure::Usage(format!(
+            "error: `--step-size {h}` is for methods with a fixed step, and `{}` chooses its own\n\n  \
+             = help: say how accurate it has to be with `--tolerance TOL`, or choose `--method rk4` or `--method euler`\n",
+            method_name(args.method)
+        )));
+    }
+    for (flag, path) in [("--stats", &args.stats), ("--events", &args.events)] {
+        if let Some(path) = path.as_ref().filter(|path| path.is_dir()) {
+            return Err(Failure::Usage(format!(
+                "error: `{flag} {0}` is a directory\n\n  = help: name a file in it, such as `{flag} {1}`\n",
+                path.display(),
+                path.join(if flag == "--stats" { "stats.json" } else { "events.jsonl" }).display()
+            )));
+        }
+        // Found out now, not when a long run is over.
+        let folder = path.as_ref().and_then(|path| path.parent()).filter(|f| !f.as_os_str().is_empty());
+        if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
+            return Err(Failure::Usage(format!(
+                "error: there is no directory {0} for the file of `{flag}`\n\n  = help: make it first: `mkdir -p {0}`\n",
+                folder.display()
+            )));
+        }
     }
     scheduler(args)?;
     spare_files(args)
+}
+
+/// The settings that the flags say.
+///
+/// # Errors
+/// What is wrong with them, whatever the model says.
+pub fn settings(args: &SharedArgs) -> Result<Settings, Failure> {
+    ready(args)?;
+    let defaults = Settings::default();
+    Ok(Settings {
+        method: args.method,
+        scheduler: scheduler(args)?,
+        tolerance: args.tolerance,
+        step_size: args.step_size.unwrap_or(defaults.step_size),
+        seed: args.seed,
+        max_modules: args.max_modules,
+        log: args.events.is_some(),
+        ..defaults
+    })
 }
 
 /// The scheduler that the flags say.
@@ -194,10 +254,9 @@ impl Run {
 
     /// Of a model that was read.
     pub fn of(session: Session, args: &SharedArgs) -> Result<Run, Failure> {
-        ready(args)?;
-        let scheduler = scheduler(args)?;
+        let settings = settings(args)?;
         let times = times(args, &session)?;
-        if let (sim::Scheduler::Local { slice }, Some(end)) = (scheduler, times.last())
+        if let (sim::Scheduler::Local { slice }, Some(end)) = (settings.scheduler, times.last())
             && end / slice > MAX_SLICES
         {
             return Err(Failure::Usage(format!(
@@ -205,18 +264,7 @@ impl Run {
                 end / slice
             )));
         }
-        let defaults = Settings::default();
-        let settings = Settings {
-            method: args.method,
-            scheduler,
-            tolerance: args.tolerance,
-            step_size: args.step_size.unwrap_or(defaults.step_size),
-            seed: args.seed,
-            max_modules: args.max_modules,
-            log: args.events.is_some(),
-            ..defaults
-        };
-        Ok(Run { session, times, settings, clock: Clock::default() })
+        Ok(Run { session, remarks: Mutex::default(), times, settings, clock: Clock::default() })
     }
 
     /// Starts a simulation.
@@ -227,6 +275,37 @@ impl Run {
     /// An error of the run, drawn.
     pub fn fault(&self, error: &sim::Error) -> Failure {
         Failure::Model(error.diagnostic().render(&self.session.source, coloured()))
+    }
+
+    /// Draws a frame.
+    ///
+    /// # Errors
+    /// That of the turtle, with its place in the text.
+    pub fn draw(&self, string: &ModuleString, scene: &mut Scene) -> Result<(), Failure> {
+        turtle::draw(&self.session.model, string, scene)
+            .map_err(|error| Failure::Model(error.diagnostic().render(&self.session.source, coloured())))
+    }
+
+    /// Takes the warnings of a frame; those that no frame before had are kept for [`Run::warn`].
+    pub fn note(&self, warnings: Vec<Diagnostic>) {
+        if warnings.is_empty() {
+            return;
+        }
+        let mut remarks = self.remarks.lock().unwrap_or_else(PoisonError::into_inner);
+        for warning in warnings {
+            let key = (warning.message.clone(), warning.labels.first().map(|label| label.0));
+            if remarks.known.insert(key) {
+                remarks.waiting.push(warning);
+            }
+        }
+    }
+
+    /// Prints what was noted.
+    pub fn warn(&self) {
+        let mut remarks = self.remarks.lock().unwrap_or_else(PoisonError::into_inner);
+        for warning in remarks.waiting.drain(..).take(MOST_SHOWN) {
+            tell(&warning.render(&self.session.source, coloured()));
+        }
     }
 
     /// Writes the file that `--stats` asks for.
@@ -273,12 +352,4 @@ fn times(args: &SharedArgs, session: &Session) -> Result<Vec<f64>, Failure> {
         })?,
     };
     Ok(frames.times().collect())
-}
-
-/// A progress bar with rate and remaining time; it hides itself where standard error is no terminal.
-pub fn bar(what: &'static str, count: usize) -> ProgressBar {
-    let style = ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} {per_sec}, {eta} left");
-    ProgressBar::new(count as u64)
-        .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
-        .with_message(what)
 }

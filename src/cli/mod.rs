@@ -13,6 +13,7 @@ mod fmt;
 mod gallery;
 mod new;
 mod parallel;
+mod progress;
 mod reel;
 mod render;
 mod report;
@@ -36,6 +37,9 @@ pub fn main() -> u8 {
             return u8::try_from(error.exit_code()).unwrap_or(2);
         }
     };
+    if command.progress {
+        progress::ask();
+    }
     let done = match &command.action {
         Action::New(args) => new::new(args),
         Action::Fmt(args) => fmt::fmt(args),

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use super::common::{Clock, Failure, Run};
 use super::events::EventLog;
 use super::parallel;
+use crate::diagnostic::Diagnostic;
 use crate::interrupt;
 use crate::scene::Scene;
 use crate::sim::{Event, Settings, Simulation, Stats};
@@ -100,18 +101,20 @@ pub fn play<Done: Send>(
         simulate += before.elapsed();
         shot
     };
-    let draw = |mut shot: Shot| -> (Vec<Event>, Result<Done, Failure>, Duration) {
+    let draw = |mut shot: Shot| -> (Vec<Event>, Vec<Diagnostic>, Result<Done, Failure>, Duration) {
         let before = Instant::now();
         let pooled = pool().pop();
         let mut scene = pooled.unwrap_or_else(|| blank.clone());
         let done = draw_shot(run, &mut shot, &mut scene).map(|()| work(&shot, &scene));
+        let warnings = std::mem::take(&mut scene.warnings);
         pool().push(scene);
-        (shot.events, done, before.elapsed())
+        (shot.events, warnings, done, before.elapsed())
     };
-    let taken = parallel::in_order(threads, make, draw, |(events, done, spent)| {
+    let taken = parallel::in_order(threads, make, draw, |(events, warnings, done, spent)| {
         if let Some(log) = &mut log {
             log.write(&events)?;
         }
+        run.note(warnings);
         let before = Instant::now();
         take(done?)?;
         output += spent + before.elapsed();
@@ -125,8 +128,7 @@ pub fn play<Done: Send>(
 fn draw_shot(run: &Run, shot: &mut Shot, scene: &mut Scene) -> Result<(), Failure> {
     scene.clear();
     match &mut shot.string {
-        Ok(string) => turtle::draw(&run.session.model, string, scene)
-            .map_err(|error| Failure::Model(format!("error: at t = {}: {error}\n", shot.time))),
+        Ok(string) => run.draw(string, scene),
         failed => std::mem::replace(failed, Ok(ModuleString::default())).map(|_| ()),
     }
 }

@@ -1,14 +1,14 @@
 //! `dlsys report`: work-precision studies of models, and the hard cases.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use indicatif::{ProgressBar, ProgressStyle};
-
 use super::args::ReportArgs;
-use super::common::{Failure, open, out_error};
+use super::common::{Failure, count_of, open, out_error};
+use super::progress::Progress;
 use crate::export;
 use crate::model::Frames;
 use crate::report::{self, CASES, Case, HardPlan, Plan, Row};
@@ -49,23 +49,27 @@ pub fn study(args: &ReportArgs, session: &Session, name: &str) -> Result<(), Fai
         time_limit: args.time_limit,
         max_modules: args.max_modules,
     };
-    let progress = spinner();
+    let progress = RefCell::new(Progress::of_printed(name, plan.points(session)));
     // Each method's block is printed when it is there.
     let mut printed = Ok(());
     let study = report::study(
         session,
         name,
         &plan,
-        &mut |what| progress.set_message(format!("{name}: {what}")),
+        &mut |what| {
+            let mut progress = progress.borrow_mut();
+            progress.say(format!("{name}: {what}"));
+            progress.inc();
+        },
         &mut |study| {
             let head = if study.series.len() == 1 { report::study_head(study) } else { String::new() };
             let block = study.series.last().map(report::series_table).unwrap_or_default();
             if printed.is_ok() {
-                printed = progress.suspend(|| print(&format!("{head}{block}")));
+                printed = progress.borrow().suspend(|| print(&format!("{head}{block}")));
             }
         },
     );
-    progress.finish_and_clear();
+    drop(progress);
     printed?;
     let study = study.map_err(|why| {
         Failure::Model(format!(
@@ -116,13 +120,14 @@ fn hard(args: &ReportArgs, folder: Option<&Path>) -> Result<(), Failure> {
         tolerances: args.tolerances.clone(),
         time_limit: args.time_limit,
     };
-    let progress = spinner();
+    let mut progress = Progress::new("hard cases", cases.len());
     let mut rows: Vec<Row> = Vec::new();
     for case in &cases {
-        let run = report::run_case(case, &plan, &mut |what| progress.set_message(what.to_owned()));
+        let run = report::run_case(case, &plan, &mut |what| progress.say(what));
         rows.extend(run.map_err(fault)?);
+        progress.inc();
     }
-    progress.finish_and_clear();
+    drop(progress);
     print(&report::hard_table(&rows))?;
     if let Some(out) = &args.out {
         write(out, "hard.csv", &report::hard_csv(&rows))?;
@@ -131,9 +136,12 @@ fn hard(args: &ReportArgs, folder: Option<&Path>) -> Result<(), Failure> {
     let failed = rows.iter().filter(|row| !row.passes()).count();
     if failed > 0 {
         let text = report::mismatches(&rows);
-        return Err(Failure::Model(format!("{text}\nerror: {failed} of {} runs failed\n", rows.len())));
+        return Err(Failure::Model(format!(
+            "{text}\nerror: {failed} of {} failed\n",
+            count_of(rows.len(), "run")
+        )));
     }
-    print(&format!("{} runs of {} cases, all passed\n", rows.len(), cases.len()))
+    print(&format!("{} of {}, all passed\n", count_of(rows.len(), "run"), count_of(cases.len(), "case")))
 }
 
 /// The model files of a folder, in the order of their names.
@@ -191,16 +199,6 @@ const MOST_TIMES: usize = 10_000;
 fn print(text: &str) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(out_error)
-}
-
-/// What is being done, on a terminal; nothing in a pipe.
-fn spinner() -> ProgressBar {
-    let progress = ProgressBar::new_spinner();
-    if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}") {
-        progress.set_style(style);
-    }
-    progress.enable_steady_tick(std::time::Duration::from_millis(200));
-    progress
 }
 
 /// Writes a file of the report; an earlier report of the same name is replaced.

@@ -4,8 +4,9 @@ use std::io::Write;
 use std::time::Instant;
 
 use super::args::{CheckArgs, RunArgs, TextFormat};
-use super::common::{Failure, Run, out_error};
+use super::common::{Failure, Run, count_of, out_error};
 use super::events::EventLog;
+use super::progress::Progress;
 use crate::model::Model;
 use crate::sim::describe;
 use crate::structure::ModuleString;
@@ -17,16 +18,12 @@ pub fn check(args: &CheckArgs) -> Result<(), Failure> {
     let title = model.title.as_ref().map_or(String::new(), |t| format!("{t}: "));
     let warnings = session.warnings.len();
     let summary = format!(
-        "{title}{} rules, {} kinds of modules, {} params, {}",
-        model.rules.len(),
+        "{title}{}, {} of modules, {}, {}",
+        count_of(model.rules.len(), "rule"),
         // Brackets are kinds, but nobody counts them.
-        model.kinds.len() - 2,
-        model.parameters.len(),
-        match warnings {
-            0 => "no warnings".to_owned(),
-            1 => "1 warning".to_owned(),
-            n => format!("{n} warnings"),
-        }
+        count_of(model.kinds.len() - 2, "kind"),
+        count_of(model.parameters.len(), "param"),
+        if warnings == 0 { "no warnings".to_owned() } else { count_of(warnings, "warning") }
     );
     writeln!(std::io::stdout(), "{summary}").map_err(out_error)?;
     if args.continuity { super::continuity::check(args, &session) } else { Ok(()) }
@@ -46,6 +43,7 @@ pub fn run(args: &RunArgs) -> Result<(), Failure> {
         let mut simulation = run.simulate()?;
         let mut string = ModuleString::default();
         let mut text = String::new();
+        let mut progress = Progress::of_printed("running", run.times.len());
         for &t in &run.times {
             let before = Instant::now();
             let done = simulation.at(t, &mut string);
@@ -62,6 +60,7 @@ pub fn run(args: &RunArgs) -> Result<(), Failure> {
             }
             out.write_all(text.as_bytes()).map_err(out_error)?;
             clock.output += before.elapsed();
+            progress.inc();
         }
         Ok(simulation.stats())
     })();

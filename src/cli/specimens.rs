@@ -9,8 +9,9 @@ use std::path::Path;
 use serde_json::json;
 
 use super::args::{RunArgs, Seeds, TextFormat};
-use super::common::{Failure, Run, bar, coloured, out_error};
+use super::common::{Failure, Run, coloured, out_error};
 use super::parallel;
+use super::progress::Progress;
 use crate::model::Measure;
 use crate::report::{Course, Spread, band_svg, spread_csv, spread_table};
 use crate::sim::Settings;
@@ -39,7 +40,7 @@ pub fn summarise(args: &RunArgs, run: &Run, seeds: Seeds) -> Result<(), Failure>
         )));
     }
     let threads = args.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, |n| n.get()));
-    let progress = bar("specimens", seeds.count());
+    let mut progress = Progress::of_printed("specimens", seeds.count());
     let mut out = std::io::BufWriter::new(std::io::stdout().lock());
     // By measure and time; of each, the specimens in the order of seeds.
     let mut values: Vec<Vec<f64>> = vec![Vec::with_capacity(seeds.count()); width * times];
@@ -53,7 +54,7 @@ pub fn summarise(args: &RunArgs, run: &Run, seeds: Seeds) -> Result<(), Failure>
             for (all, value) in values.iter_mut().zip(&row) {
                 all.push(*value);
             }
-            progress.inc(1);
+            progress.inc();
             match args.format {
                 TextFormat::Json => {
                     let courses: serde_json::Map<String, serde_json::Value> = names
@@ -68,7 +69,7 @@ pub fn summarise(args: &RunArgs, run: &Run, seeds: Seeds) -> Result<(), Failure>
             }
         },
     );
-    progress.finish_and_clear();
+    drop(progress);
     out.flush().map_err(out_error)?;
     done?;
     let mut values = values.into_iter();

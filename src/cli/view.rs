@@ -1,10 +1,11 @@
-//! `dlsys view`: a page for the browser that plays the growth.
+//! `dlsys view`: the growing plant in a window, or as a page for the browser that plays it.
 
 use std::io::Write;
 use std::path::Path;
 
 use super::args::ViewArgs;
-use super::common::{Failure, Run, bar, out_error};
+use super::common::{Failure, Run, out_error};
+use super::progress::Progress;
 use super::reel::{Pass, Shot, play};
 use crate::export::{self, Survey, View};
 use crate::scene::Scene;
@@ -14,9 +15,60 @@ use crate::view::{Recorder, Recording, Stage, page};
 /// Most frames of a recording; a screen shows no more in five minutes.
 const MOST_FRAMES: usize = 20_000;
 
-/// Writes the page of a model.
+/// Opens the window, or writes a page.
 pub fn view(args: &ViewArgs) -> Result<(), Failure> {
-    let out = args.out.as_path();
+    match &args.out {
+        Some(out) => write(args, out),
+        None => open(args),
+    }
+}
+
+#[cfg(not(feature = "viewer"))]
+fn open(args: &ViewArgs) -> Result<(), Failure> {
+    let model = args.shared.model.display();
+    Err(Failure::Usage(format!(
+        "error: this dlsys was built without the window\n  help: `dlsys view {model} -o plant.html` writes a page that plays the growth in a browser;\n        `cargo install --path . --features viewer` builds the window too (minutes; no system packages)\n"
+    )))
+}
+
+#[cfg(feature = "viewer")]
+fn open(args: &ViewArgs) -> Result<(), Failure> {
+    use super::common::settings;
+    use crate::view::window::{Error, Options, Trial, open};
+    let shared = &args.shared;
+    let model = shared.model.clone();
+    if !model.is_file() {
+        // The message of everybody else.
+        return super::common::open(&model, &shared.settings).map(drop);
+    }
+    let range = shared.from.zip(shared.to).map(|(from, to)| [from, to]);
+    if let Some([from, to]) = range.filter(|[from, to]| to < from) {
+        return Err(Failure::Usage(format!("error: --to {to} is before --from {from}\n")));
+    }
+    let options = Options {
+        model,
+        set: shared.settings.clone(),
+        settings: settings(shared)?,
+        range,
+        at: shared.at.as_ref().and_then(|at| at.iter().copied().reduce(f64::min)),
+        trial: Trial {
+            delay: args.delay,
+            slide: args.slide.clone(),
+            play: args.play,
+            screenshot: args.screenshot.clone(),
+        },
+    };
+    open(options).map_err(|error| {
+        let help = match error {
+            Error::Screen(_) => "\n  help: `-o plant.html` writes a page that plays the growth in a browser",
+            Error::Trial(_) => "",
+        };
+        Failure::Model(format!("error: {error}{help}\n"))
+    })
+}
+
+/// Writes the page of a model.
+fn write(args: &ViewArgs, out: &Path) -> Result<(), Failure> {
     spare(args, out)?;
     let run = Run::start(&args.shared)?;
     let count = run.times.len();
@@ -62,7 +114,7 @@ fn record(run: &Run, accuracy: Option<f64>) -> Result<Recording, Failure> {
     let nothing = Survey::new(View::FRONT);
     let mut survey = nothing.clone();
     let pass = Pass { settings: Settings { log: false, ..run.settings }, accuracy: 0.0 };
-    let progress = bar("measuring", run.times.len());
+    let mut progress = Progress::new("measuring", run.times.len());
     let of_frame = |_: &Shot, scene: &Scene| {
         let mut survey = nothing.clone();
         survey.add(scene);
@@ -70,10 +122,11 @@ fn record(run: &Run, accuracy: Option<f64>) -> Result<Recording, Failure> {
     };
     play(run, pass, threads, &mut clock, None, of_frame, |frame| {
         survey.merge(&frame);
-        progress.inc(1);
+        progress.inc();
         Ok(())
     })?;
-    progress.finish_and_clear();
+    drop(progress);
+    run.warn();
     let mut fit = survey.fit();
     fit.accuracy = accuracy.unwrap_or(fit.accuracy);
     let (model, source) = (&run.session.model, &run.session.source);
@@ -81,7 +134,7 @@ fn record(run: &Run, accuracy: Option<f64>) -> Result<Recording, Failure> {
         Path::new(&source.name).file_name().map_or(source.name.clone(), |n| n.to_string_lossy().into());
     let mut recorder = Recorder::new(model, &name, &fit);
     let pass = Pass { settings: Settings { log: true, ..run.settings }, accuracy: fit.accuracy };
-    let progress = bar("recording", run.times.len());
+    let mut progress = Progress::new("recording", run.times.len());
     let staged = |shot: &Shot, scene: &Scene| {
         let mut stage = Stage::default();
         stage.set(scene, fit.default_width);
@@ -89,13 +142,13 @@ fn record(run: &Run, accuracy: Option<f64>) -> Result<Recording, Failure> {
     };
     play(run, pass, threads, &mut clock, None, staged, |(time, modules, events, stage)| {
         recorder.history().add(&events, model, source);
-        progress.inc(1);
+        progress.inc();
         recorder.add(time, modules, &stage).map_err(|error| {
             Failure::Model(format!(
                 "error: {error}\n  help: take fewer frames with `--from A --to B --step S`\n"
             ))
         })
     })?;
-    progress.finish_and_clear();
+    drop(progress);
     Ok(recorder.finish())
 }

@@ -81,7 +81,7 @@ pub(super) fn draw(size: [u32; 2], lines: &[Line], color: Color) -> Image {
             }
         }
     }
-    raster::draw(size, triangles.len(), |n| triangles[n], |_, _| color)
+    raster::draw(&raster::SIXTEEN, 1, size, triangles.len(), |n| triangles[n], |_, _| color)
 }
 
 /// The places that a stroke goes through.

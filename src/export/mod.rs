@@ -15,6 +15,32 @@
 //! ```
 //!
 //! Nothing but [`FrameDirectory`] and its [`Staging`] touches the file system.
+//!
+//! # Examples
+//!
+//! Three frames of a growing stem, all on one scale:
+//!
+//! ```
+//! use dlsys::export::{Format, FrameWriter, Survey, View};
+//! use dlsys::session::Session;
+//!
+//! let session = Session::from_text("stem.dls", "initial string: F(1)\nF(x): solve dx/dt = x", &[]).unwrap();
+//! let mut simulation = session.simulate(Default::default()).expect("it starts");
+//! let (mut survey, mut scenes) = (Survey::new(View::FRONT), Vec::new());
+//! for time in [0.0, 1.0, 2.0] {
+//!     let mut string = Default::default();
+//!     simulation.at(time, &mut string).expect("it runs");
+//!     let mut scene = dlsys::turtle::blank(&session.model);
+//!     dlsys::turtle::draw(&session.model, &string, &mut scene).expect("it can be drawn");
+//!     survey.add(&scene);
+//!     scenes.push(scene);
+//! }
+//! let mut writer = FrameWriter::new(Format::Svg, survey.fit());
+//! let pictures: Vec<Vec<u8>> = scenes.iter().map(|scene| writer.write(scene, "a stem")).collect();
+//! writer.format = Format::Obj;
+//! let mesh = String::from_utf8(writer.write(&scenes[2], "a stem, t = 2")).unwrap();
+//! assert!(pictures[0].starts_with(b"<svg") && mesh.contains("\nusemtl stem\n"));
+//! ```
 
 mod camera;
 mod extent;
@@ -153,11 +179,31 @@ impl FrameWriter {
     }
 }
 
+/// How smooth edges are in pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Smoothness {
+    /// As in files: sixteen samples to a pixel.
+    Fine,
+    /// Four samples, for what moves.
+    Quick,
+}
+
 /// The pixels of a scene on a page, row by row from the top: red, green and blue, each times the opacity, and the opacity;
 /// 0 where nothing is drawn, whatever the page's background.
 pub fn pixels(scene: &Scene, fit: &Fit, page: &Page) -> Vec<[u8; 4]> {
+    pixels_by(scene, fit, page, Smoothness::Fine, 1)
+}
+
+/// The same, as smooth as it should be, made by so many threads; the pixels do not depend on that.
+pub fn pixels_by(
+    scene: &Scene,
+    fit: &Fit,
+    page: &Page,
+    smoothness: Smoothness,
+    threads: usize,
+) -> Vec<[u8; 4]> {
     let scene = &*scene.tessellated(fit.accuracy);
-    png::picture(scene, fit, page.pixels, page.placement()).pixels
+    png::picture(scene, fit, page.pixels, page.placement(), smoothness, threads).pixels
 }
 
 #[cfg(test)]

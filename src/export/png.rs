@@ -1,7 +1,7 @@
 //! A scene as a PNG picture: stems as the tubes of the OBJ format, everything lit smoothly, what is nearer in front.
 
 use super::raster::{self, Corner, Image};
-use super::{Fit, Page, triangles};
+use super::{Fit, Page, Smoothness, triangles};
 use crate::scene::{Color, Scene, Vector};
 
 /// How far a tube's outline may be from a circle, in pixels.
@@ -14,7 +14,7 @@ const MOST_TRIANGLES: usize = 4_000_000;
 /// The file of one frame.
 pub(super) fn document(scene: &Scene, fit: &Fit, page: &Page, title: &str) -> Vec<u8> {
     let [scale, right, down] = page.placement();
-    let image = picture(scene, fit, page.pixels, [scale, right, down]);
+    let image = picture(scene, fit, page.pixels, [scale, right, down], Smoothness::Fine, 1);
     let mut canvas = Canvas::new(page);
     canvas.add(&image, [0, 0], 1.0, Meeting::Over);
     canvas.encode(title)
@@ -22,7 +22,15 @@ pub(super) fn document(scene: &Scene, fit: &Fit, page: &Page, title: &str) -> Ve
 
 /// Pixels of a scene, transparent where nothing is. A point that the camera sees at x, y is at `a x + b` and `c - a y`
 /// pixels from the upper left corner.
-pub(super) fn picture(scene: &Scene, fit: &Fit, size: [u32; 2], [a, b, c]: [f64; 3]) -> Image {
+/// The pixels do not depend on the number of threads.
+pub(super) fn picture(
+    scene: &Scene,
+    fit: &Fit,
+    size: [u32; 2],
+    [a, b, c]: [f64; 3],
+    smoothness: Smoothness,
+    threads: usize,
+) -> Image {
     let mesh = triangles::triangles(scene, fit, sides(scene, fit, a));
     let scale = if fit.extent > 0.0 { 1.0 / fit.extent } else { 1.0 };
     let places: Vec<[f64; 3]> = mesh
@@ -54,7 +62,11 @@ pub(super) fn picture(scene: &Scene, fit: &Fit, size: [u32; 2], [a, b, c]: [f64;
         let normal = normal.try_normalize(1e-12).unwrap_or_else(Vector::z) * if facing { 1.0 } else { -1.0 };
         scene.palette.get(face.material).color.lit(fit.light.strength(normal, depth))
     };
-    raster::draw(size, mesh.faces.len(), corners, shade)
+    let count = mesh.faces.len();
+    match smoothness {
+        Smoothness::Fine => raster::draw(&raster::SIXTEEN, threads, size, count, corners, shade),
+        Smoothness::Quick => raster::draw(&raster::FOUR, threads, size, count, corners, shade),
+    }
 }
 
 /// Sides of tubes that look round at so many pixels for a scene unit.

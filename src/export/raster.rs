@@ -1,21 +1,23 @@
 //! Triangles as pixels, with a depth buffer and smooth edges.
 //!
-//! Each pixel has sixteen samples, no two in one row or column (the usual pattern for 16 samples), so that edges of any
-//! direction come out smooth and a line thinner than a pixel is as faint as it is thin. A sample holds what is nearest there; where
-//! two things are equally near, the later one, as painters do. A triangle is shaded once in each pixel.
+//! Each pixel has sixteen samples, or four where it must be quick, no two in one row or column (the usual patterns for so many),
+//! so that edges of any direction come out smooth and a line thinner than a pixel is as faint as it is thin. A sample holds
+//! what is nearest there; where two things are equally near, the later one, as painters do. A triangle is shaded once in each
+//! pixel.
 //!
 //! Corners are rounded to 1/256 pixel and the rest is integers, so triangles that share an edge leave no gap, and pictures are
-//! the same bytes on every machine. A band of rows is done at a time: memory is that of the triangles and of the
-//! picture, whatever the number of samples.
+//! the same bytes on every machine and any number of threads. A band of rows is done at a time: memory is that of the triangles
+//! and of the picture, whatever the number of samples.
+
+use std::sync::{Mutex, PoisonError};
 
 use crate::scene::Color;
 
 /// Rows in a band.
 const BAND: usize = 16;
-/// Samples in a pixel.
-const SAMPLES: usize = 16;
-/// Places of the samples, in sixteenths of a pixel from its middle.
-const PATTERN: [(i64, i64); SAMPLES] = [
+/// Places of the samples in a pixel, in sixteenths of it from its middle.
+pub(super) type Pattern<const N: usize> = [(i64, i64); N];
+pub(super) const SIXTEEN: Pattern<16> = [
     (1, 1),
     (-1, -3),
     (-3, 2),
@@ -33,6 +35,7 @@ const PATTERN: [(i64, i64); SAMPLES] = [
     (6, 7),
     (-7, -8),
 ];
+pub(super) const FOUR: Pattern<4> = [(-2, -6), (6, -2), (-6, 2), (2, 6)];
 /// Steps of a coordinate in a pixel.
 const STEPS: i64 = 256;
 /// Corners further away than this many pixels are moved in.
@@ -59,40 +62,64 @@ pub(super) struct Image {
 
 /// Draws `count` triangles, the n-th with corners `corners(n)` and the colour `shade(n, weights)` at a place between
 /// them, in a picture of this size.
-pub(super) fn draw(
+pub(super) fn draw<const N: usize>(
+    pattern: &Pattern<N>,
+    threads: usize,
     [width, height]: [u32; 2],
     count: usize,
-    corners: impl Fn(usize) -> [Corner; 3],
-    shade: impl Fn(usize, [f64; 3]) -> Color,
+    corners: impl Fn(usize) -> [Corner; 3] + Sync,
+    shade: impl Fn(usize, [f64; 3]) -> Color + Sync,
 ) -> Image {
     let [width, height] = [width as usize, height as usize];
-    let mut begin: Vec<Vec<u32>> = vec![Vec::new(); height.div_ceil(BAND)];
+    // Triangles that each band may show, in order.
+    let mut bands: Vec<Vec<u32>> = vec![Vec::new(); height.div_ceil(BAND)];
     for number in 0..count {
-        if let Some(triangle) = Triangle::new(number, corners(number), width, height) {
-            begin[triangle.rows[0] / BAND].push(number as u32);
+        let at = corners(number).map(|corner| snap(corner.y));
+        if let Some([first, last]) = range(at, height) {
+            bands[first / BAND..=last / BAND].iter_mut().for_each(|band| band.push(number as u32));
         }
     }
-    let mut image = Image { width, height, pixels: Vec::with_capacity(width * height) };
-    let mut active: Vec<Triangle> = Vec::new();
-    let mut band = Band::new(width);
-    for (index, new) in begin.into_iter().enumerate() {
-        let top = index * BAND;
-        active.retain(|triangle| triangle.rows[1] >= top);
-        let added = new.iter().filter_map(|&n| Triangle::new(n as usize, corners(n as usize), width, height));
-        active.extend(added);
-        active.sort_unstable_by_key(|triangle| triangle.number);
-        band.clear();
-        let rows = BAND.min(height - top);
-        for triangle in &active {
-            band.fill(triangle, top, rows, &shade);
+    let mut pixels = vec![[0; 4]; width * height];
+    let work = Mutex::new(pixels.chunks_mut((BAND * width).max(1)).zip(&bands).enumerate());
+    let draw_bands = || {
+        let mut band = Band::new(pattern, width);
+        let next = || work.lock().unwrap_or_else(PoisonError::into_inner).next();
+        while let Some((index, (pixels, numbers))) = next() {
+            let top = index * BAND;
+            let rows = BAND.min(height - top);
+            band.clear();
+            for &number in numbers {
+                let number = number as usize;
+                if let Some(triangle) = Triangle::new(pattern, number, corners(number), width, height) {
+                    band.fill(&triangle, top, rows, &shade);
+                }
+            }
+            band.resolve(pixels);
         }
-        band.resolve(rows, &mut image.pixels);
-    }
-    image
+    };
+    std::thread::scope(|scope| {
+        for _ in 1..threads.min(bands.len()) {
+            scope.spawn(draw_bands);
+        }
+        draw_bands();
+    });
+    Image { width, height, pixels }
+}
+
+/// A coordinate in steps.
+fn snap(x: f64) -> i64 {
+    (x.clamp(-FARTHEST, FARTHEST) * STEPS as f64).round() as i64
+}
+
+/// First and last of `end` rows or columns that what has these coordinates, in steps, may touch.
+fn range(at: [i64; 3], end: usize) -> Option<[usize; 2]> {
+    let low = at[0].min(at[1]).min(at[2]).div_euclid(STEPS).max(0);
+    let high = at[0].max(at[1]).max(at[2]).div_euclid(STEPS).min(end as i64 - 1);
+    (low <= high).then_some([low as usize, high as usize])
 }
 
 /// A triangle, made ready.
-struct Triangle {
+struct Triangle<const N: usize> {
     number: usize,
     /// First and last column and row of pixels that it may touch.
     columns: [usize; 2],
@@ -102,7 +129,7 @@ struct Triangle {
     sides: [[i64; 3]; 3],
     bias: [i64; 3],
     /// Value of each side's function at the samples, beside that at the upper left corner of the pixel.
-    at_samples: [[i64; SAMPLES]; 3],
+    at_samples: [[i64; N]; 3],
     /// Twice the area.
     area: f64,
     /// Depth at the upper left corner of the picture, its growth for a pixel to the right and down, and its bounds.
@@ -112,10 +139,15 @@ struct Triangle {
     turned: bool,
 }
 
-impl Triangle {
+impl<const N: usize> Triangle<N> {
     /// `None` if no sample can be in it.
-    fn new(number: usize, corners: [Corner; 3], width: usize, height: usize) -> Option<Triangle> {
-        let snap = |x: f64| (x.clamp(-FARTHEST, FARTHEST) * STEPS as f64).round() as i64;
+    fn new(
+        pattern: &Pattern<N>,
+        number: usize,
+        corners: [Corner; 3],
+        width: usize,
+        height: usize,
+    ) -> Option<Triangle<N>> {
         let mut at = corners.map(|corner| [snap(corner.x), snap(corner.y)]);
         let mut depths = corners.map(|corner| corner.depth);
         let [[ax, ay], [bx, by], [cx, cy]] = at;
@@ -128,12 +160,8 @@ impl Triangle {
             at.swap(1, 2);
             depths.swap(1, 2);
         }
-        let range = |axis: usize, end: usize| {
-            let low = at.iter().map(|p| p[axis]).min()?.div_euclid(STEPS).max(0);
-            let high = at.iter().map(|p| p[axis]).max()?.div_euclid(STEPS).min(end as i64 - 1);
-            (low <= high).then_some([low as usize, high as usize])
-        };
-        let (columns, rows) = (range(0, width)?, range(1, height)?);
+        let columns = range(at.map(|p| p[0]), width)?;
+        let rows = range(at.map(|p| p[1]), height)?;
         // The side opposite of each corner.
         let sides = [0, 1, 2].map(|k| {
             let ([px, py], [qx, qy]) = (at[(k + 1) % 3], at[(k + 2) % 3]);
@@ -142,7 +170,7 @@ impl Triangle {
         });
         let bias = sides.map(|[a, b, _]| if a > 0 || (a == 0 && b > 0) { 0 } else { -1 });
         let at_samples = sides.map(|[a, b, _]| {
-            PATTERN.map(|(x, y)| {
+            pattern.map(|(x, y)| {
                 let place = |k: i64| (k + 8) * (STEPS / 16) + STEPS / 32;
                 a * place(x) + b * place(y)
             })
@@ -179,17 +207,18 @@ impl Triangle {
 }
 
 /// The samples of some rows.
-struct Band {
+struct Band<'p, const N: usize> {
+    pattern: &'p Pattern<N>,
     width: usize,
     depths: Vec<f32>,
     /// `0xffrrggbb`, or 0 where there is nothing.
     colors: Vec<u32>,
 }
 
-impl Band {
-    fn new(width: usize) -> Band {
-        let samples = width * BAND * SAMPLES;
-        Band { width, depths: vec![f32::NEG_INFINITY; samples], colors: vec![0; samples] }
+impl<const N: usize> Band<'_, N> {
+    fn new(pattern: &Pattern<N>, width: usize) -> Band<'_, N> {
+        let samples = width * BAND * N;
+        Band { pattern, width, depths: vec![f32::NEG_INFINITY; samples], colors: vec![0; samples] }
     }
 
     fn clear(&mut self) {
@@ -200,14 +229,14 @@ impl Band {
     /// Draws what of a triangle is in the `rows` rows from `top`.
     fn fill(
         &mut self,
-        triangle: &Triangle,
+        triangle: &Triangle<N>,
         top: usize,
         rows: usize,
         shade: &impl Fn(usize, [f64; 3]) -> Color,
     ) {
         let place = |k: i64| (k as f64 + 8.5) / 16.0;
         let [origin, right, down] = triangle.depth;
-        let depth_at = PATTERN.map(|(x, y)| right * place(x) + down * place(y));
+        let depth_at = self.pattern.map(|(x, y)| right * place(x) + down * place(y));
         let largest = triangle.at_samples.map(|at| at.iter().copied().max().unwrap_or(0));
         for row in triangle.rows[0].max(top)..=triangle.rows[1].min(top + rows - 1) {
             for column in triangle.columns[0]..=triangle.columns[1] {
@@ -221,9 +250,9 @@ impl Band {
                     continue;
                 }
                 let base = origin + right * column as f64 + down * row as f64;
-                let first = ((row - top) * self.width + column) * SAMPLES;
+                let first = ((row - top) * self.width + column) * N;
                 let mut color = None;
-                for s in 0..SAMPLES {
+                for s in 0..N {
                     let at = &triangle.at_samples;
                     if (corner[0] + at[0][s]) | (corner[1] + at[1][s]) | (corner[2] + at[2][s]) < 0 {
                         continue;
@@ -245,9 +274,9 @@ impl Band {
         }
     }
 
-    /// Appends the pixels of the first rows: the means of their samples.
-    fn resolve(&self, rows: usize, pixels: &mut Vec<[u8; 4]>) {
-        for samples in self.colors[..rows * self.width * SAMPLES].chunks_exact(SAMPLES) {
+    /// The pixels of the first rows: the means of their samples.
+    fn resolve(&self, pixels: &mut [[u8; 4]]) {
+        for (pixel, samples) in pixels.iter_mut().zip(self.colors.chunks_exact(N)) {
             let mut sum = [0_u32; 4];
             for sample in samples {
                 let [opacity, red, green, blue] = sample.to_be_bytes();
@@ -255,8 +284,7 @@ impl Band {
                     *total += u32::from(channel);
                 }
             }
-            let half = SAMPLES as u32 / 2;
-            pixels.push(sum.map(|total| ((total + half) / SAMPLES as u32) as u8));
+            *pixel = sum.map(|total| ((total + N as u32 / 2) / N as u32) as u8);
         }
     }
 }
@@ -273,7 +301,11 @@ mod tests {
     }
 
     fn drawn(size: [u32; 2], triangles: &[([Corner; 3], Color)]) -> Image {
-        draw(size, triangles.len(), |n| triangles[n].0, |n, _| triangles[n].1)
+        let threads = |threads| {
+            draw(&SIXTEEN, threads, size, triangles.len(), |n| triangles[n].0, |n, _| triangles[n].1)
+        };
+        assert_eq!(threads(1), threads(3));
+        threads(1)
     }
 
     #[test]
@@ -313,7 +345,7 @@ mod tests {
             let byte = |w: f64| (w * 255.0).round() as u8;
             Color { red: byte(a), green: byte(b), blue: byte(c) }
         };
-        let image = draw([100, 100], 1, |_| corners, shade);
+        let image = draw(&FOUR, 2, [100, 100], 1, |_| corners, shade);
         let [red, green, blue, opacity] = image.pixels[20 * 100 + 50];
         // At (50.5, 20.5): weights 0.29, 0.505, 0.205.
         assert_eq!([red, green, blue, opacity], [74, 129, 52, 255]);

@@ -6,7 +6,7 @@ use super::layout::{Caption, Cell};
 use super::painter::{self, text};
 use super::png::{self, Canvas, Meeting};
 use super::raster::Image;
-use super::{Fit, Format, Layout, Page, Sheet, glyphs, svg};
+use super::{Fit, Format, Layout, Page, Sheet, Smoothness, glyphs, svg};
 use crate::scene::{Color, Scene};
 
 /// Colour of captions.
@@ -82,7 +82,7 @@ impl SheetWriter {
         Part(match self.format {
             Format::Png => {
                 let (size, corner, placement) = self.window(cell);
-                Content::Image(png::picture(scene, &self.fit, size, placement), corner)
+                Content::Image(png::picture(scene, &self.fit, size, placement, Smoothness::Fine, 1), corner)
             }
             _ => {
                 let style = svg::style(&self.fit, &self.page);

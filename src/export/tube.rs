@@ -20,7 +20,9 @@ const SHARPEST: f64 = -0.173_648_177_666_930_3;
 /// Sides of a prism whose faces are no further from its cylinder than that. Few numbers are used, so that a
 /// stem that grows does not change all the time.
 pub(super) fn sides_for(radius: f64, accuracy: f64) -> usize {
-    const STEPS: [usize; 7] = [8, 12, 16, 24, 32, 48, 64];
+    // With the last, a face is three parts in ten million of the radius from its cylinder.
+    const STEPS: [usize; 19] =
+        [8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024, 1536, 2048, 3072, 4096];
     let deviation = |sides: usize| radius * (1.0 - sin_cos_degrees(180.0 / sides as f64).1);
     STEPS.into_iter().find(|&sides| deviation(sides) <= accuracy).unwrap_or(STEPS[STEPS.len() - 1])
 }
@@ -70,7 +72,7 @@ struct Profile {
 
 impl Profile {
     fn new(spokes: Vec<Spoke>) -> Profile {
-        let steps = (spokes.len() / 8).clamp(1, 8) + 1;
+        let steps = (spokes.len() / 8).max(1) + 1;
         let latitude = |step| sin_cos_degrees(90.0 * step as f64 / steps as f64);
         Profile { latitudes: (1..steps).map(latitude).collect(), spokes }
     }

@@ -23,6 +23,7 @@
 mod curve;
 mod derivative;
 mod dual;
+mod elimination;
 mod graph;
 mod interval;
 mod ops;
@@ -33,6 +34,7 @@ mod tests;
 
 pub use curve::{Array, Curve, CurveFault, MAX_POINTS, Part, Sort};
 pub use dual::Dual;
+pub use elimination::eliminate;
 pub use graph::{Graph, Integral, Lookup, Node, NodeId};
 pub use interval::Interval;
 pub use ops::{Binary, Unary, Value};

@@ -3,7 +3,7 @@
 //! A message says what is wrong where it is found; what to do about it often takes more of the text than the place
 //! itself. That part is here, so that the passes stay readable.
 
-use super::ast::{HeadModule, Module, Name};
+use super::ast::{Expr, Expressions, HeadModule, Module, Name};
 use super::parse::Rule;
 use super::print;
 use super::scope::{RESERVED, Variables};
@@ -154,6 +154,23 @@ pub fn for_block(item: Rule, before: &str, found: &str) -> Option<&'static str> 
             Some("a `let` stands between the head of its rule and the first clause")
         }
         _ => None,
+    }
+}
+
+/// Of `;(rose)` and `@C(square)` where nothing has that name: what to declare is no constant.
+pub fn of_look(module: &Module, all: &Expressions, said: &mut [Diagnostic]) {
+    let example = match &*module.name {
+        ";" => "color NAME = \"#e573a5\"",
+        "@C" => "contour NAME = (1, 1) (-1, 1) (-1, -1) (1, -1)",
+        _ => return,
+    };
+    let Some(Expr::Name(name)) = module.arguments.first().map(|a| all.get(a.root)) else { return };
+    let message = format!("unknown name `{name}`");
+    for unknown in said.iter_mut().filter(|d| d.message == message) {
+        let declare = unknown.help.iter().position(|help| help.starts_with("declare it"));
+        if let Some(at) = declare {
+            unknown.help[at] = format!("declare it: `{}`", example.replace("NAME", name));
+        }
     }
 }
 

@@ -7,10 +7,10 @@ use std::sync::Arc;
 
 use crate::diagnostic::Span;
 use crate::expr::Sort;
-use crate::model::Comparison;
+use crate::model::{Comparison, Fold, Turn};
 
 /// A name and where it stands.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Name {
     pub text: Arc<str>,
     pub span: Span,
@@ -57,6 +57,17 @@ pub enum Expr {
     /// `a[i]`
     Index(Arc<str>, ExprId),
     Parenthesis(ExprId),
+    /// `sum(B(x, c): D*(c - c_0))`
+    Aggregate(Box<Aggregate>),
+}
+
+/// Something of all modules attached to one that match.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Aggregate {
+    pub fold: Fold,
+    pub head: HeadModule,
+    /// What is added up; its nodes stand before that of the aggregate. None for a number of modules.
+    pub term: Option<Expression>,
 }
 
 /// The arena of all expressions of a document.
@@ -121,7 +132,7 @@ pub struct Module {
 }
 
 /// A module of a rule's head: a name and the names of its parameters.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct HeadModule {
     pub name: Name,
     pub parameters: Vec<Name>,
@@ -134,6 +145,8 @@ pub struct Rule {
     /// The strict predecessor; its name is `±` where one rule stands for both turns.
     pub predecessor: HeadModule,
     pub right: Vec<HeadModule>,
+    /// How its modules stand: one after another, or on branches.
+    pub right_shape: Vec<Turn>,
     /// The whole head.
     pub head: Span,
     /// `let` lines.
@@ -141,6 +154,8 @@ pub struct Rule {
     /// Written with `->`: applied at the multiples of the period. It has one clause, which produces.
     pub discrete: bool,
     pub clauses: Vec<Clause>,
+    /// The expressions of the whole rule: from the first to before the second.
+    pub nodes: (ExprId, ExprId),
 }
 
 #[derive(Clone, Debug)]
@@ -167,12 +182,26 @@ pub struct Alternative {
     pub modules: Vec<Module>,
 }
 
-/// `dx/dt = …`
+/// An equation of a `solve`.
 #[derive(Clone, Debug)]
-pub struct Equation {
-    /// The parameter, without the `d`.
-    pub parameter: Name,
-    pub rate: Expression,
+pub enum Equation {
+    /// `dx/dt = …`; the parameter is without the `d`.
+    Rate { parameter: Name, rate: Expression },
+    /// `x = …`
+    Value { parameter: Name, value: Expression },
+    /// `0 = …`, and maybe for which parameter it is to be solved; the place is that of the whole.
+    Zero { residual: Expression, unknown: Option<Name>, span: Span },
+}
+
+impl Equation {
+    /// The one expression of it.
+    pub fn expression(&self) -> Expression {
+        match self {
+            Equation::Rate { rate: it, .. }
+            | Equation::Value { value: it, .. }
+            | Equation::Zero { residual: it, .. } => *it,
+        }
+    }
 }
 
 /// A text in quotes, without them, and where it stands.

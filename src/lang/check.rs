@@ -10,7 +10,7 @@ use super::suggest::nearest;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::model::{
     BUILT_IN_SURFACES, COMMAND_SURFACES, Class, Condition, DRAWN_WORDS, KindId, Kinds, Model, Pattern,
-    Remedy, Rule, Sign, Step, base_of, class_of,
+    Remedy, Rule, Sign, Step, Turn, base_of, class_of,
 };
 
 /// Most rules that one strict predecessor can have.
@@ -43,14 +43,23 @@ impl<'k> ByName<'k> {
 }
 
 /// Matches the modules of contexts to kinds; a context that nothing can match is an error.
-pub fn resolve_contexts(model: &mut Model, rules: &[&ast::Rule], diagnostics: &mut Vec<Diagnostic>) {
+pub fn resolve_contexts(
+    model: &mut Model,
+    rules: &[&ast::Rule],
+    gathered: &[Vec<HeadModule>],
+    diagnostics: &mut Vec<Diagnostic>,
+) {
     let names = ByName::new(&model.kinds);
-    for (rule, written) in model.rules.iter_mut().zip(rules) {
+    for ((rule, written), gathered) in model.rules.iter_mut().zip(rules).zip(gathered) {
         let sides = [(&mut rule.left, &written.left), (&mut rule.right, &written.right)];
         for (patterns, heads) in sides {
             for (pattern, head) in patterns.iter_mut().zip(heads) {
-                resolve(&model.kinds, &names, pattern, head, diagnostics);
+                resolve(&model.kinds, &names, pattern, head, "this context is never there", diagnostics);
             }
+        }
+        for (aggregate, head) in rule.aggregates.iter_mut().zip(gathered) {
+            let never = "nothing of this name is ever attached to a module";
+            resolve(&model.kinds, &names, &mut aggregate.pattern, head, never, diagnostics);
         }
     }
 }
@@ -60,6 +69,7 @@ fn resolve(
     names: &ByName,
     pattern: &mut Pattern,
     head: &HeadModule,
+    never: &str,
     diagnostics: &mut Vec<Diagnostic>,
 ) {
     let name = &*head.name.text;
@@ -76,14 +86,14 @@ fn resolve(
             .at(head.span, "the number of parameters must agree, or the context is never there")
             .help(format!("name each of them, used or not: `{}`", advice::head_with(head, kind.arity))),
             None => Diagnostic::error(format!("there is no module `{name}`"))
-                .at(head.span, "this context is never there")
+                .at(head.span, never)
                 .help(advice::no_such_module(kinds, name)),
         };
         diagnostics.push(error);
     } else if pattern.kinds.iter().all(|id| kinds.get(*id).skipped) {
         diagnostics.push(
             Diagnostic::error(format!("`{name}` is passed over in the search for context"))
-                .at(head.span, "this context is never there")
+                .at(head.span, never)
                 .help(if class_of(name) == Class::Word {
                     format!("take `{name}` out of `ignore`, or name it in `consider`")
                 } else {
@@ -195,6 +205,9 @@ fn shadowed_rule(model: &Model, index: usize, own: &[KindId], diagnostics: &mut 
         holds(before)
             && own.iter().all(|k| model.kinds.get(*k).rules_like(rule).contains(j))
             && before.left.len() <= rule.left.len()
+            // What stands on branches is found one way or another.
+            && before.right_shape.iter().all(|turn| *turn == Turn::Module)
+            && rule.right_shape.iter().all(|turn| *turn == Turn::Module)
             && before.right.len() <= rule.right.len()
             && before.left.iter().rev().zip(rule.left.iter().rev()).all(|(a, b)| wider(a, b))
             && before.right.iter().zip(&rule.right).all(|(a, b)| wider(a, b))
@@ -365,7 +378,7 @@ pub fn inert_modules(model: &Model, occurs: &HashMap<KindId, Span>, diagnostics:
     let in_context: HashSet<KindId> = model
         .rules
         .iter()
-        .flat_map(|r| r.left.iter().chain(&r.right))
+        .flat_map(|r| r.left.iter().chain(&r.right).chain(r.aggregates.iter().map(|a| &a.pattern)))
         .flat_map(|p| p.kinds.iter().copied())
         .collect();
     let with_rules: HashSet<&str> = model

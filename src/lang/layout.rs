@@ -12,6 +12,7 @@
 mod ahead;
 
 use super::lexeme::{Lexeme, Token};
+use super::words::FOLDS;
 use crate::diagnostic::{Diagnostic, Span};
 
 /// Deepest nesting of parentheses, signs, powers and `if` that an expression may have.
@@ -115,6 +116,8 @@ struct Level {
     ifs: usize,
     /// A `match` has begun, so that `case` may go on with it.
     matching: bool,
+    /// Opened by a word over neighbours, `sum(`: a colon belongs to it.
+    is_sum: bool,
 }
 
 struct Scanner<'t> {
@@ -253,7 +256,8 @@ impl Scanner<'_> {
             return;
         };
         let word = self.word(first).to_owned();
-        let colon = self.has_colon(tokens) && !self.goes_on_with_weight(tokens);
+        let in_sum = self.levels.last().is_some_and(|level| level.is_sum);
+        let colon = !in_sum && self.has_colon(tokens) && !self.goes_on_with_weight(tokens);
         let arrow = self.arrow_outside_parentheses(tokens);
         if arrow == Some(first.1) || arrow.is_some() && self.goes_on() {
             // What looked like the head of a rule is that of a discrete one, broken over lines.
@@ -401,7 +405,10 @@ impl Scanner<'_> {
             }
             Token::Number | Token::Text => {}
             Token::Open => {
-                self.levels.push(Level { at: start, ..Level::default() });
+                let outside = |c: char| !c.is_alphanumeric() && c != '_';
+                let word = self.text[..start].trim_end().rsplit(outside).next().unwrap_or_default();
+                let is_sum = FOLDS.contains(&word);
+                self.levels.push(Level { at: start, is_sum, ..Level::default() });
                 last = Last::Operator;
             }
             Token::Close => {
@@ -422,6 +429,7 @@ impl Scanner<'_> {
             }
             Token::Colon => {
                 last = Last::Colon;
+                self.level().is_sum = false;
                 let weight = self.in_successor();
                 self.weighted |= weight;
                 if self.levels.len() == 1
@@ -537,6 +545,7 @@ impl Scanner<'_> {
                 Last::Operator
             }
             "step" | "in" | "string" => Last::Operator,
+            "for" if in_rule && !inside && !self.in_string && self.last == Last::Operand => Last::Operator,
             "strength" if self.items.last().is_some_and(|i| i.kind == ItemKind::Tropism) => Last::Operator,
             _ => Last::Operand,
         }

@@ -32,9 +32,11 @@ pub fn measure(
         kinds: &mut kinds,
         clocks: Clocks::default(),
         occurs: HashMap::new(),
+        gathered: Vec::new(),
         drawn: HashMap::new(),
     };
-    let (variables, count) = builder.variables(&head, &[], &[]);
+    let (mut variables, count) = builder.variables(&head, &[], &[], 0);
+    variables.aggregates = None;
     let value = match expression {
         Some(expression) => scope.number(&document.expressions, expression, &variables),
         None => Some(scope.graph.constant(1.0)),

@@ -14,7 +14,9 @@ mod chance;
 mod check;
 mod choice;
 mod curves;
+mod equations;
 pub mod format;
+mod gather;
 mod globals;
 mod include;
 mod layout;
@@ -48,7 +50,7 @@ use ast::{Action, Document, Item};
 use scope::{Scope, Variables};
 
 /// A value for a `param`, given from outside.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
     pub name: String,
     pub value: f64,
@@ -103,6 +105,7 @@ fn build(
         kinds: &mut kinds,
         clocks: chance::Clocks::new(document),
         occurs: HashMap::new(),
+        gathered: Vec::new(),
         drawn: HashMap::new(),
     };
     let (mut rules, mut drafts, mut written) = (vec![], vec![], vec![]);
@@ -110,7 +113,7 @@ fn build(
     let mut heads = Vec::new();
     let (mut axiom, mut ignored, mut considered) = (None, Vec::new(), Vec::new());
     let (mut title, mut angle, mut frames) = (None, 90.0, None);
-    let mut period = None;
+    let (mut period, mut axiom_span) = (None, Span::default());
     let mut whole = true;
     for (item, span) in &document.items {
         match item {
@@ -143,6 +146,7 @@ fn build(
                     no_time: Some("the initial string is made at t = 0"),
                     ..Variables::default()
                 };
+                axiom_span = *span;
                 axiom = builder.successor(modules, &variables, 0);
                 whole &= axiom.is_some();
             }
@@ -183,7 +187,7 @@ fn build(
     if !unread {
         builder.check_interpretations(&heads);
     }
-    let (occurs, drawn, clocks) = (builder.occurs, builder.drawn, builder.clocks);
+    let (occurs, drawn, gathered, clocks) = (builder.occurs, builder.drawn, builder.gathered, builder.clocks);
     if !single.seen("the initial string") && !unread {
         scope.diagnostics.push(
             Diagnostic::error("the model has no initial string")
@@ -206,6 +210,7 @@ fn build(
         parameters,
         kinds,
         axiom: axiom.unwrap_or_else(Successor::default),
+        axiom_span,
         rules,
         interpretations: Vec::new(),
         appearance: Arc::new(appearance),
@@ -238,7 +243,7 @@ fn build(
     }
     let diagnostics = &mut scope.diagnostics;
     check::filter_contexts(&mut model.kinds, &ignored, &considered, diagnostics);
-    check::resolve_contexts(&mut model, &written, diagnostics);
+    check::resolve_contexts(&mut model, &written, &gathered, diagnostics);
     if single.seen("the initial string") {
         check::reachability(&model, &written, &occurs, diagnostics);
     }

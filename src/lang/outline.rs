@@ -3,6 +3,7 @@
 use super::ast::{HeadModule, Item, Rule};
 use super::parse;
 use crate::diagnostic::{Source, Span};
+use crate::model::Turn;
 
 /// A declaration or rule of a text.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -63,7 +64,15 @@ fn pattern(module: &HeadModule) -> String {
 
 fn head(rule: &Rule) -> String {
     let all = |modules: &[HeadModule]| modules.iter().map(pattern).collect::<Vec<_>>().join(" ");
-    format!("{} < {} > {}", all(&rule.left), pattern(&rule.predecessor), all(&rule.right))
+    let mut following = rule.right.iter().map(pattern);
+    let right: Vec<String> = (rule.right_shape.iter())
+        .filter_map(|turn| match turn {
+            Turn::Module => following.next(),
+            Turn::Open => Some("[".to_owned()),
+            Turn::Close => Some("]".to_owned()),
+        })
+        .collect();
+    format!("{} < {} > {}", all(&rule.left), pattern(&rule.predecessor), right.join(" "))
 }
 
 #[cfg(test)]

@@ -6,9 +6,11 @@
 use std::fmt::Write;
 
 use super::ast::{
-    Action, Alternative, Document, Expr, ExprId, Expressions, HeadModule, Item, Module, Name, Operator,
+    Action, Alternative, Document, Equation, Expr, ExprId, Expressions, HeadModule, Item, Module, Name,
+    Operator,
 };
 use crate::expr::Sort;
+use crate::model::Turn;
 
 /// How tightly a node binds; the loosest is 0.
 fn strength(expr: &Expr) -> u8 {
@@ -23,7 +25,8 @@ fn strength(expr: &Expr) -> u8 {
         Expr::Negate(_) => 7,
         Expr::Scale(..) => 8,
         Expr::Binary(Operator::Pow, ..) => 9,
-        Expr::Number(_) | Expr::Name(_) | Expr::Call(..) | Expr::Index(..) | Expr::Parenthesis(_) => 10,
+        Expr::Number(_) | Expr::Name(_) | Expr::Call(..) | Expr::Index(..) => 10,
+        Expr::Parenthesis(_) | Expr::Aggregate(_) => 10,
     }
 }
 
@@ -43,6 +46,7 @@ impl Operator {
 
 enum Task<'e> {
     Text(&'e str),
+    Owned(String),
     /// A node, in parentheses unless it binds at least this tightly.
     Node(ExprId, u8),
 }
@@ -55,6 +59,10 @@ pub fn expression(expressions: &Expressions, root: ExprId) -> String {
         let (id, needed) = match task {
             Task::Text(text) => {
                 out.push_str(text);
+                continue;
+            }
+            Task::Owned(text) => {
+                out.push_str(&text);
                 continue;
             }
             Task::Node(id, needed) => (id, needed),
@@ -140,6 +148,13 @@ pub fn expression(expressions: &Expressions, root: ExprId) -> String {
                 }
                 parts.extend([Task::Text(" else "), Task::Node(*otherwise, 0)]);
             }
+            Expr::Aggregate(all) => {
+                parts.push(Task::Owned(format!("{}({}", all.fold.name(), head_module(&all.head))));
+                if let Some(term) = all.term {
+                    parts.extend([Task::Text(": "), Task::Node(term.root, 0)]);
+                }
+                parts.push(Task::Text(")"));
+            }
             Expr::Parenthesis(a) => parts.extend([Task::Text("("), Task::Node(*a, 0), Task::Text(")")]),
         }
         if enclosed {
@@ -209,7 +224,15 @@ pub fn head(rule: &super::ast::Rule) -> String {
     }
     out += &head_module(&rule.predecessor);
     if !rule.right.is_empty() {
-        out += &(" > ".to_owned() + &side(&rule.right));
+        let mut right = rule.right.iter();
+        out += " >";
+        for turn in &rule.right_shape {
+            out += &match turn {
+                Turn::Open => " [".to_owned(),
+                Turn::Close => " ]".to_owned(),
+                Turn::Module => right.next().map_or_else(String::new, |m| " ".to_owned() + &head_module(m)),
+            };
+        }
     }
     out
 }
@@ -327,7 +350,20 @@ pub fn document(document: &Document) -> String {
                         Action::Solve(equations) => {
                             let all: Vec<String> = equations
                                 .iter()
-                                .map(|q| format!("d{}/dt = {}", q.parameter.text, show(&q.rate)))
+                                .map(|q| match q {
+                                    Equation::Rate { parameter, rate } => {
+                                        format!("d{}/dt = {}", parameter.text, show(rate))
+                                    }
+                                    Equation::Value { parameter, value } => {
+                                        format!("{} = {}", parameter.text, show(value))
+                                    }
+                                    Equation::Zero { residual, unknown: None, .. } => {
+                                        format!("0 = {}", show(residual))
+                                    }
+                                    Equation::Zero { residual, unknown: Some(name), .. } => {
+                                        format!("0 = {} for {}", show(residual), name.text)
+                                    }
+                                })
                                 .collect();
                             text += &format!("solve {}", all.join(", "));
                         }

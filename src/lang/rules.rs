@@ -6,6 +6,8 @@ use std::sync::Arc;
 use super::advice;
 use super::ast::{self, Action, Document, Expression, HeadModule};
 use super::chance::{Clocks, production_keys};
+use super::equations::Equations;
+use super::gather::watched;
 use super::print;
 use super::scope::{RESERVED, Scope, Variables};
 use crate::diagnostic::{Diagnostic, Span};
@@ -26,6 +28,8 @@ pub struct RuleBuilder<'b> {
     pub clocks: Clocks,
     /// Each kind that stands in a string, with the first place where it does.
     pub occurs: HashMap<KindId, Span>,
+    /// The heads of the aggregates of each rule.
+    pub gathered: Vec<Vec<HeadModule>>,
     /// The same of drawings, where they are not those of the kind itself.
     pub drawn: HashMap<KindId, Span>,
 }
@@ -50,6 +54,7 @@ impl RuleBuilder<'_> {
         own: &HeadModule,
         left: &[HeadModule],
         right: &[HeadModule],
+        aggregates: u32,
     ) -> (Variables, usize) {
         let mut names: HashMap<Arc<str>, NodeId> = HashMap::new();
         let mut spans: HashMap<Arc<str>, Span> = HashMap::new();
@@ -83,21 +88,28 @@ impl RuleBuilder<'_> {
             }
             names.insert(parameter.text.clone(), node);
         }
+        let first_aggregate = count;
+        count += aggregates;
         for name in RESERVED {
             let node = self.scope.graph.var(count);
             names.insert(name.into(), node);
             count += 1;
         }
-        (Variables { names, ..Variables::default() }, count as usize)
+        let aggregates = Some((first_aggregate, count));
+        (Variables { names, aggregates, ..Variables::default() }, count as usize)
     }
 
-    fn not_a_bracket(&mut self, head: &HeadModule) -> bool {
+    fn not_a_bracket(&mut self, head: &HeadModule, is_context: bool) -> bool {
         let bracket = matches!(&*head.name.text, "[" | "]");
         if bracket {
             self.error(
                 Diagnostic::error("a bracket has no rules")
                     .at(head.name.span, "brackets structure the string; they do not develop")
-                    .help("to change a branch, write a rule for a module in it"),
+                    .help(if is_context {
+                        "in a context after `>` brackets stand in pairs around a branch: `A > [ B ] C`"
+                    } else {
+                        "to change a branch, write a rule for a module in it"
+                    }),
             );
         }
         let cut = &*head.name.text == CUT;
@@ -116,12 +128,14 @@ impl RuleBuilder<'_> {
         head: &HeadModule,
         drawn: &[ast::Module],
     ) -> Option<(KindId, Interpretation)> {
-        if !self.not_a_bracket(head) {
+        if !self.not_a_bracket(head, false) {
             return None;
         }
         // Who draws or measures a module sees what is written of it, and no clocks.
         let clocks = std::mem::take(&mut self.clocks);
-        let (variables, count) = self.variables(head, &[], &[]);
+        let (mut variables, count) = self.variables(head, &[], &[], 0);
+        // And one module after another.
+        variables.aggregates = None;
         if let Some(cut) = drawn.iter().find(|module| &*module.name == CUT) {
             self.error(
                 Diagnostic::error("a drawing cuts nothing off")
@@ -141,9 +155,9 @@ impl RuleBuilder<'_> {
 
     /// A rule, and the kinds it is for. `PatternNames` are matched to kinds once all kinds are known.
     pub fn rule(&mut self, rule: &ast::Rule) -> Option<(Rule, Draft)> {
-        let mut good = self.not_a_bracket(&rule.predecessor);
+        let mut good = self.not_a_bracket(&rule.predecessor, false);
         for context in rule.left.iter().chain(&rule.right) {
-            good &= self.not_a_bracket(context);
+            good &= self.not_a_bracket(context, true);
         }
         let names: &[&str] = match &*rule.predecessor.name.text {
             "±" => &["+", "-"],
@@ -153,9 +167,11 @@ impl RuleBuilder<'_> {
         for name in names {
             self.kinds.intern(name, rule.predecessor.parameters.len());
         }
+        let written = self.aggregates_in(rule);
         let own = rule.predecessor.parameters.len() + hidden(self, &rule.predecessor);
-        let (mut variables, count) = self.variables(&rule.predecessor, &rule.left, &rule.right);
+        let (mut variables, count) = self.variables(&rule.predecessor, &rule.left, &rule.right, written);
         self.scope.comparisons.clear();
+        self.scope.gathered.clear();
         good &= self.locals(rule, &mut variables);
 
         // All conditions first: they share their atoms.
@@ -208,36 +224,46 @@ impl RuleBuilder<'_> {
         produces.extend(faults);
         for (clause, (guard, node)) in rule.clauses.iter().zip(&guards) {
             let Action::Solve(equations) = &clause.action else { continue };
-            let rates = self.equations(equations, &rule.predecessor, &variables);
-            let Some(mut rates) = rates else {
+            let equations = self.equations(equations, &rule.predecessor, &variables, clause.span);
+            let Some(mut equations) = equations else {
                 good = false;
                 continue;
             };
-            rates.extend(hazards.iter().filter_map(|hazard| self.clock_rate(hazard, *node)));
-            let (rates, switches) = self.smooth(rates, own, count, clause.span, &mut atoms)?;
-            drafts.push((guard.clone(), clause.span, rates, switches));
+            equations.rates.extend(hazards.iter().filter_map(|hazard| self.clock_rate(hazard, *node)));
+            let (smooth, switches) = self.smooth(equations.all(), own, count, clause.span, &mut atoms)?;
+            equations.set_all(smooth);
+            drafts.push((guard.clone(), clause.span, equations, switches));
         }
         if let (true, Some(first)) = (drafts.is_empty(), clocks.first()) {
             // Clocks run, though nothing else does.
             let span = produces[first.produce].span;
             let rates = hazards.iter().filter_map(|hazard| self.clock_rate(hazard, None)).collect();
             let (rates, switches) = self.smooth(rates, own, count, span, &mut atoms)?;
-            drafts.push((Condition::default(), span, rates, switches));
+            drafts.push((Condition::default(), span, Equations { rates, algebraic: Vec::new() }, switches));
         }
         if !good {
             return None;
         }
         let context = count - own - 2;
-        let mut draft = Draft { rates: Vec::new(), sides: atoms.sides.clone() };
+        let (aggregates, terms) = self.aggregates(count);
+        let sides = atoms.sides.clone();
+        let mut draft = Draft { rates: Vec::new(), algebraic: Vec::new(), sides, terms };
         let solves = drafts
             .into_iter()
-            .map(|(guard, span, rates, switches)| {
+            .map(|(guard, span, Equations { rates, algebraic }, switches)| {
                 let total = count + switches.len();
+                let graph = &self.scope.graph;
+                // A value that has no rate is not known to approach anything.
+                let given = |(a, b): (NodeId, NodeId)| {
+                    let read = graph.variables(&[a, b]);
+                    algebraic.iter().any(|entry| read.contains(&(entry.parameter as u32)))
+                };
                 let unreachable = (atoms.sides.iter())
-                    .map(|&sides| never_reached(&self.scope.graph, sides, &rates, own, context, total))
+                    .map(|&sides| !given(sides) && never_reached(graph, sides, &rates, own, context, total))
                     .collect();
                 let roots: Vec<NodeId> = rates.iter().map(|(_, node)| *node).collect();
                 draft.rates.push(rates.clone());
+                draft.algebraic.push(algebraic);
                 Solve {
                     guard,
                     span,
@@ -251,6 +277,7 @@ impl RuleBuilder<'_> {
                     numeric_rates: Program::default(),
                     linear: None,
                     jacobian: Jacobian::default(),
+                    algebraic: Default::default(),
                     watch: Vec::new(),
                     flashes: false,
                     is_delicate: false,
@@ -259,6 +286,7 @@ impl RuleBuilder<'_> {
             .collect();
         let sides: Vec<NodeId> = atoms.sides.iter().flat_map(|(a, b)| [*a, *b]).collect();
         let sides = Program::compile(&self.scope.graph, &sides, count);
+        let first = count - 2 - written as usize;
         let pattern = |m: &HeadModule| {
             let arity = m.parameters.len();
             Pattern { kinds: Vec::new(), arity, width: arity + hidden(self, m) }
@@ -276,8 +304,11 @@ impl RuleBuilder<'_> {
             context_names: rule.left.iter().chain(&rule.right).flat_map(names).collect(),
             left: rule.left.iter().map(pattern).collect(),
             right: rule.right.iter().map(pattern).collect(),
+            right_shape: rule.right_shape.clone(),
             variables: count,
-            watched: (0..count).map(|v| sides.reads().binary_search(&v).is_ok()).collect(),
+            watched: watched(&sides, &aggregates, count, first),
+            aggregates,
+            first_aggregate: first,
             sides,
             atoms: atoms.spans,
             boundaries: atoms.boundaries,
@@ -290,44 +321,6 @@ impl RuleBuilder<'_> {
             watch_at_rest: Vec::new(),
         };
         Some((compiled, draft))
-    }
-
-    /// The derivatives of a `solve`, by parameter; those that are the constant 0 are left out.
-    fn equations(
-        &mut self,
-        equations: &[ast::Equation],
-        head: &HeadModule,
-        variables: &Variables,
-    ) -> Option<Vec<(usize, NodeId)>> {
-        let mut rates: Vec<(usize, NodeId)> = Vec::new();
-        let mut seen: HashMap<usize, Span> = HashMap::new();
-        let mut good = true;
-        for equation in equations {
-            let name = &equation.parameter;
-            let Some(parameter) = head.parameters.iter().position(|p| p.text == name.text) else {
-                self.error(advice::not_a_parameter(name, head, variables));
-                good = false;
-                continue;
-            };
-            if let Some(before) = seen.insert(parameter, name.span) {
-                self.error(
-                    Diagnostic::error(format!("two equations for `{}` in one `solve`", name.text))
-                        .at(name.span, "the second one")
-                        .at(before, "the first one")
-                        .help(format!(
-                            "keep one of them; two contributions are added: `d{0}/dt = … + …`",
-                            name.text
-                        )),
-                );
-                good = false;
-            }
-            match self.scope.number(&self.document.expressions, equation.rate, variables) {
-                Some(rate) if self.scope.graph.as_constant(rate) == Some(0.0) => {}
-                Some(rate) => rates.push((parameter, rate)),
-                None => good = false,
-            }
-        }
-        good.then_some(rates)
     }
 
     /// Takes a condition apart into comparisons of two sides.

@@ -5,13 +5,13 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::advice;
-use super::ast::{Expr, ExprId, Expression, Expressions, Name, Operator};
+use super::ast::{Aggregate, Expr, ExprId, Expression, Expressions, HeadModule, Name, Operator};
 use super::chance::{DRAW, Draws};
 use super::print;
 use super::suggest::did_you_mean;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::expr::{Binary, Graph, Integral, Lookup, Node, NodeId, Part, Unary};
-use crate::model::{Comparison, Distribution};
+use crate::model::{Comparison, Distribution, Fold};
 
 /// Most nodes that the functions of a model may expand to.
 const MAX_WORK: usize = 20_000_000;
@@ -52,6 +52,16 @@ pub struct Variables {
     pub no_time: Option<&'static str>,
     /// Names of the rule's `let` lines, those that are not known yet too, and where they are declared.
     pub lets: HashMap<Arc<str>, Span>,
+    /// In a rule: the number of the variable of its first aggregate, and that of all its variables.
+    pub aggregates: Option<(u32, u32)>,
+}
+
+/// An aggregate of the present rule.
+pub struct Gathered {
+    pub fold: Fold,
+    pub head: HeadModule,
+    /// The parameters of the child are variables from the number of the rule's variables on.
+    pub term: NodeId,
 }
 
 /// The global names of a model, and the graph that its expressions are built in.
@@ -69,8 +79,11 @@ pub struct Scope {
     pub(super) poisoned: HashSet<Arc<str>>,
     /// Names that were already complained about.
     pub(super) unknown: HashSet<Arc<str>>,
-    /// Where the comparisons of the present rule are written, by their node, and their two sides. Rules number their variables alike, so one rule's nodes mean nothing in another.
+    /// Where the comparisons of the present rule are written, by their node, and their two sides. Rules number their
+    /// variables alike, so one rule's nodes mean nothing in another.
     pub comparisons: HashMap<NodeId, (Span, Arc<[String; 2]>)>,
+    /// The aggregates of the present rule, in the order of their variables.
+    pub gathered: Vec<Gathered>,
     /// The same for the bodies of functions.
     function_comparisons: HashMap<NodeId, (Span, Arc<[String; 2]>)>,
     pub diagnostics: Vec<Diagnostic>,
@@ -222,8 +235,11 @@ impl Scope {
         // Operands stand before their users, so this is a loop however deep the expression is.
         let mut done: Vec<Option<Lowered>> = Vec::with_capacity((last - first + 1) as usize);
         let named = self.functional_names(all, expression);
+        let inside = terms(all, first, last);
         for id in first..=last {
-            if named.contains(&ExprId(id)) {
+            // The term of an aggregate has names of its own: it is lowered with that.
+            let inside = inside.get((id - first) as usize).is_some_and(|inside| *inside);
+            if inside || named.contains(&ExprId(id)) {
                 done.push(None);
                 continue;
             }
@@ -267,6 +283,7 @@ impl Scope {
                 number(self.choice(all, (*subject, cases, *otherwise), done)?)
             }
             Expr::Parenthesis(a) => done(*a),
+            Expr::Aggregate(aggregate) => number(self.aggregate(all, aggregate, span, variables)?),
             Expr::Negate(a) => {
                 let a = self.expect_number(all, *a, done(*a)?)?;
                 number(self.graph.unary(Unary::Neg, a))
@@ -330,6 +347,48 @@ impl Scope {
                 number(self.graph.select(test?, then?, otherwise?))
             }
         }
+    }
+
+    /// The variable of an aggregate.
+    fn aggregate(
+        &mut self,
+        all: &Expressions,
+        aggregate: &Aggregate,
+        span: Span,
+        variables: &Variables,
+    ) -> Option<NodeId> {
+        let Some((first, count)) = variables.aggregates else {
+            let name = aggregate.fold.name();
+            self.diagnostics.push(
+                Diagnostic::error(format!("`{name}` has no meaning here"))
+                    .at(span, "what is attached to a module is known in rules only")
+                    .help(format!(
+                        "write `{name}` in an equation, a condition or a successor, and hand its value on"
+                    )),
+            );
+            return None;
+        };
+        let mut names = variables.names.clone();
+        for (i, parameter) in aggregate.head.parameters.iter().enumerate() {
+            let node = self.graph.var(count + i as u32);
+            names.insert(parameter.text.clone(), node);
+        }
+        let inner = Variables { names, ..Variables::default() };
+        let term = match aggregate.term {
+            Some(term) => self.number(all, term, &inner)?,
+            None => self.graph.constant(1.0),
+        };
+        let same = |known: &Gathered| {
+            let names = known.head.name.text == aggregate.head.name.text
+                && known.head.parameters.len() == aggregate.head.parameters.len();
+            known.fold == aggregate.fold && known.term == term && names
+        };
+        let place = self.gathered.iter().position(same).unwrap_or_else(|| {
+            let (fold, head) = (aggregate.fold, aggregate.head.clone());
+            self.gathered.push(Gathered { fold, head, term });
+            self.gathered.len() - 1
+        });
+        Some(self.graph.var(first + place as u32))
     }
 
     pub(super) fn compare(&mut self, comparison: Comparison, a: NodeId, b: NodeId) -> NodeId {
@@ -548,6 +607,20 @@ impl Scope {
         }
         Some(Lowered { node, is_condition: body.is_condition })
     }
+}
+
+/// For each node of an expression whether it belongs to the term of an aggregate; empty if there is none.
+fn terms(all: &Expressions, first: u32, last: u32) -> Vec<bool> {
+    let mut inside = Vec::new();
+    for id in first..=last {
+        if let Expr::Aggregate(aggregate) = all.get(ExprId(id))
+            && let Some(term) = aggregate.term
+        {
+            inside.resize((last - first + 1) as usize, false);
+            inside[(term.first.0 - first) as usize..=(term.root.0 - first) as usize].fill(true);
+        }
+    }
+    inside
 }
 
 fn is_function(name: &str) -> bool {

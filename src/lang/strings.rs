@@ -111,6 +111,7 @@ impl RuleBuilder<'_> {
                 let known = self.scope.diagnostics.len();
                 let Some(node) = self.scope.number(&self.document.expressions, argument, variables) else {
                     good = false;
+                    advice::of_look(module, &self.document.expressions, &mut self.scope.diagnostics[known..]);
                     if count > 0
                         && known < self.scope.diagnostics.len()
                         && let Some(head) = self.looks_like_a_head(module)

@@ -9,13 +9,16 @@ use crate::model::Distribution;
 pub const CLAUSES: [&str; 8] = ["if", "then", "else", "solve", "produce", "or", "at", "let"];
 
 /// Words that mean something in certain places only.
-pub const PARTICLES: [&str; 12] = [
-    "string", "in", "step", "from", "strength", "rate", "column", "monotone", "spline", "linear", "match",
-    "case",
+pub const PARTICLES: [&str; 13] = [
+    "string", "in", "step", "from", "strength", "rate", "for", "column", "monotone", "spline", "linear",
+    "match", "case",
 ];
 
 /// Words that end a declaration.
 pub const ENDINGS: [&str; 1] = ["periodic"];
+
+/// Words for what becomes of the modules attached to one: `sum(B(x): x)`.
+pub const FOLDS: [&str; 4] = ["sum", "count", "largest", "smallest"];
 
 /// Names of numbers that every expression, or every rule, may use.
 pub const VALUES: [&str; 4] = ["pi", "e", "t", "age"];
@@ -25,13 +28,13 @@ pub fn declarations() -> impl Iterator<Item = &'static str> {
     DECLARATIONS.iter().map(|(word, _)| *word)
 }
 
-/// Functions that are built in and those of the library, and distributions that are called like them.
+/// Functions that are built in and those of the library, and what is written like them.
 pub fn functions() -> impl Iterator<Item = &'static str> {
     let numbers =
         Unary::NAMED.iter().map(|(name, _)| *name).chain(Binary::NAMED.iter().map(|(name, _)| *name));
     let draws = Distribution::NAMED.iter().map(|(name, ..)| *name);
     let curves = FUNCTIONALS.iter().map(|(name, _)| *name);
-    numbers.chain(draws).chain(curves).chain(super::include::library_names())
+    numbers.chain(draws).chain(FOLDS).chain(curves).chain(super::include::library_names())
 }
 
 /// How a declaration goes on after its first word, for somebody who types it; empty for a word that begins none.

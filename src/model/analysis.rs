@@ -5,8 +5,11 @@
 //! a constant to it, and so is a neighbour's parameter for which no rule has an equation.
 
 use std::collections::HashSet;
+use std::sync::Arc;
 
-use super::{Jacobian, Law, Linear, Model, Numeric, Obstacle, Rule, Watch, driven_form};
+use super::need::{drawn_only, needed};
+use super::{Algebraic, Jacobian, Law, Linear, Model, Numeric, Obstacle, Pattern, Rule, Watch, driven_form};
+use crate::diagnostic::Span;
 use crate::expr::{Binary, Graph, Monomial, Node, NodeId, Polynomial, Program, Unary};
 
 /// The expressions of a rule, before they are code.
@@ -14,8 +17,22 @@ use crate::expr::{Binary, Graph, Monomial, Node, NodeId, Polynomial, Program, Un
 pub struct Draft {
     /// Per `solve`: its parameters with their rates.
     pub rates: Vec<Vec<(usize, NodeId)>>,
+    /// Per `solve`: what has a value or an equation instead of a rate, explicit parameters first.
+    pub algebraic: Vec<Vec<AlgebraicDraft>>,
     /// Per atom.
     pub sides: Vec<(NodeId, NodeId)>,
+    /// Of the aggregates.
+    pub terms: Vec<NodeId>,
+}
+
+/// `x = f`, or `0 = g` to be solved for x.
+#[derive(Clone, Debug)]
+pub struct AlgebraicDraft {
+    pub parameter: usize,
+    /// f or g.
+    pub node: NodeId,
+    pub explicit: bool,
+    pub span: Span,
 }
 
 /// Highest degree in `age` of a rate that is integrated as a polynomial.
@@ -23,8 +40,19 @@ const MAX_AGE_DEGREE: u32 = 3;
 
 /// Classifies everything in the model. `drafts` stand in the order of its rules.
 pub fn analyse(graph: &mut Graph, model: &mut Model, drafts: &[Draft]) {
+    for (rule, draft) in model.rules.iter_mut().zip(drafts) {
+        for (solve, algebraic) in rule.solves.iter_mut().zip(&draft.algebraic) {
+            solve.algebraic.of = algebraic.iter().map(|entry| entry.parameter).collect();
+        }
+    }
     let kinds = moving_parameters(model);
-    let moving: Vec<Vec<bool>> = model.rules.iter().map(|rule| moving_context(&kinds, rule)).collect();
+    let all_terms = || drafts.iter().map(|draft| &draft.terms[..]);
+    let moving: Vec<Vec<bool>> = (model.rules.iter().zip(all_terms()))
+        .map(|(rule, terms)| moving_context(graph, &kinds, rule, terms))
+        .collect();
+    for ((rule, terms), moving) in model.rules.iter_mut().zip(all_terms()).zip(&moving) {
+        gather(graph, &kinds, rule, terms, moving);
+    }
     for ((rule, draft), moving) in model.rules.iter_mut().zip(drafts).zip(&moving) {
         let own = rule.parameters.len();
         let all = 0..rule.variables;
@@ -33,24 +61,29 @@ pub fn analyse(graph: &mut Graph, model: &mut Model, drafts: &[Draft]) {
         rule.watch_at_rest =
             draft.sides.iter().map(|&s| watch(graph, s, &still, &|_| true, all.len())).collect();
         let mut reads_context = draft.sides.iter().any(|(a, b)| still.reads_context(graph, &[*a, *b]));
-        for (solve, rates) in rule.solves.iter_mut().zip(&draft.rates) {
+        for ((solve, rates), algebraic) in rule.solves.iter_mut().zip(&draft.rates).zip(&draft.algebraic) {
             let total = rule.variables + solve.switches.len();
-            let constants =
-                Constants { of: rates.iter().map(|(parameter, _)| *parameter).collect(), ..still.clone() };
+            let moved = rates.iter().map(|r| r.0).chain(algebraic.iter().map(|entry| entry.parameter));
+            let constants = Constants { of: moved.collect(), ..still.clone() };
             let laws = laws(graph, rates, &constants, total);
             let monotone = |variable: usize| {
                 let position = rates.iter().position(|(p, _)| *p == variable);
-                position.is_none_or(|i| match &laws[i] {
-                    Law::Polynomial(coefficients) => coefficients.outputs() == 1,
-                    Law::Quadratic(_) => true,
-                    Law::Driven(driven) => driven.monotone,
-                    _ => false,
-                })
+                let given = algebraic.iter().any(|entry| entry.parameter == variable);
+                !given
+                    && position.is_none_or(|i| match &laws[i] {
+                        Law::Polynomial(coefficients) => coefficients.outputs() == 1,
+                        Law::Quadratic(_) => true,
+                        Law::Driven(driven) => driven.monotone,
+                        _ => false,
+                    })
             };
             solve.watch =
                 draft.sides.iter().map(|&s| watch(graph, s, &constants, &monotone, all.len())).collect();
             let nodes: Vec<NodeId> = rates.iter().map(|r| r.1).collect();
             reads_context |= constants.reads_context(graph, &nodes);
+            let given: Vec<NodeId> = algebraic.iter().map(|entry| entry.node).collect();
+            reads_context |= constants.reads_context(graph, &given);
+            solve.algebraic = self::algebraic(graph, algebraic, rates, &laws, &constants, total);
             solve.jacobian = jacobian(graph, rates, &constants, total);
             let numeric: Vec<usize> = (0..rates.len()).filter(|i| !laws[*i].is_closed()).collect();
             let roots: Vec<NodeId> = numeric.iter().map(|i| rates[*i].1).collect();
@@ -65,7 +98,16 @@ pub fn analyse(graph: &mut Graph, model: &mut Model, drafts: &[Draft]) {
         }
         rule.reads_context = reads_context;
     }
-    mark_drawn_only(graph, model, drafts);
+    let needed = needed(graph, model, drafts);
+    for rule in 0..model.rules.len() {
+        let kinds: Vec<usize> =
+            model.kinds.iter().filter(|(_, k)| k.rules.contains(&rule)).map(|(id, _)| id.index()).collect();
+        for algebraic in model.rules[rule].solves.iter_mut().map(|s| &mut s.algebraic) {
+            let is_needed = |p: &usize| kinds.iter().any(|kind| needed.contains(&(*kind, *p)));
+            algebraic.needed = algebraic.of.iter().map(is_needed).collect();
+        }
+    }
+    model.drawn_only = drawn_only(graph, model, drafts);
 }
 
 /// Per kind and parameter: whether some rule has an equation for it.
@@ -73,7 +115,7 @@ fn moving_parameters(model: &Model) -> Vec<Vec<bool>> {
     let mut all: Vec<Vec<bool>> = model.kinds.iter().map(|(_, kind)| vec![false; kind.width()]).collect();
     for (id, kind) in model.kinds.iter() {
         for solve in kind.rules.iter().flat_map(|r| &model.rules[*r].solves) {
-            for &parameter in &solve.of {
+            for &parameter in solve.of.iter().chain(&solve.algebraic.of) {
                 all[id.index()][parameter] = true;
             }
         }
@@ -81,13 +123,97 @@ fn moving_parameters(model: &Model) -> Vec<Vec<bool>> {
     all
 }
 
-/// For each parameter of the context: whether it moves in any kind that matches.
-fn moving_context(kinds: &[Vec<bool>], rule: &Rule) -> Vec<bool> {
-    (rule.left.iter().chain(&rule.right))
-        .flat_map(|pattern| {
-            (0..pattern.width).map(|p| pattern.kinds.iter().any(|kind| kinds[kind.index()][p]))
+/// For each parameter of the context: whether it moves in any kind that matches; then the same for each aggregate.
+fn moving_context(graph: &Graph, kinds: &[Vec<bool>], rule: &Rule, terms: &[NodeId]) -> Vec<bool> {
+    let mut all: Vec<bool> = (rule.left.iter().chain(&rule.right))
+        .flat_map(|pattern| (0..pattern.width).map(|p| moves(kinds, pattern, p)))
+        .collect();
+    let context = rule.parameters.len() + all.len();
+    let moving: Vec<bool> = (rule.aggregates.iter().zip(terms))
+        .map(|(aggregate, term)| {
+            graph.variables(&[*term]).into_iter().any(|v| match v as usize {
+                v if v >= rule.variables => moves(kinds, &aggregate.pattern, v - rule.variables),
+                v if v < rule.parameters.len() => is_own(rule, v),
+                v if v < context => all[v - rule.parameters.len()],
+                _ => true,
+            })
         })
-        .collect()
+        .collect();
+    all.extend(moving);
+    all.resize(rule.variables - 2 - rule.parameters.len(), false);
+    all
+}
+
+fn moves(kinds: &[Vec<bool>], pattern: &Pattern, parameter: usize) -> bool {
+    pattern.kinds.iter().any(|kind| kinds[kind.index()][parameter])
+}
+
+/// True if the rule has an equation for a parameter of its own.
+fn is_own(rule: &Rule, parameter: usize) -> bool {
+    rule.solves.iter().any(|s| s.of.contains(&parameter) || s.algebraic.of.contains(&parameter))
+}
+
+/// Finds out what changes in the aggregates of a rule.
+fn gather(graph: &mut Graph, kinds: &[Vec<bool>], rule: &mut Rule, terms: &[NodeId], moving: &[bool]) {
+    let (own, count, first) = (rule.parameters.len(), rule.variables, rule.first_aggregate);
+    for i in 0..rule.aggregates.len() {
+        let pattern = &rule.aggregates[i].pattern;
+        let changes = |v: usize| match v {
+            v if v >= count => moves(kinds, pattern, v - count),
+            v if v < own => is_own(rule, v),
+            v if v < first => moving[v - own],
+            _ => false,
+        };
+        let total = count + pattern.width;
+        let (mut entries, mut roots) = (Vec::new(), Vec::new());
+        for v in graph.variables(&[terms[i]]) {
+            if changes(v as usize) {
+                entries.push((0, v as usize));
+                roots.push(graph.derivative(terms[i], v));
+            }
+        }
+        let values = Program::compile(graph, &roots, total);
+        let aggregate = &mut rule.aggregates[i];
+        aggregate.jacobian = Jacobian { entries, values };
+        aggregate.moves = moving[first - own + i];
+    }
+}
+
+/// What is known of the parameters that have a value or an equation instead of a rate.
+fn algebraic(
+    graph: &mut Graph,
+    drafts: &[AlgebraicDraft],
+    rates: &[(usize, NodeId)],
+    laws: &[Law],
+    constants: &Constants,
+    total: usize,
+) -> Algebraic {
+    let nodes: Vec<NodeId> = drafts.iter().map(|entry| entry.node).collect();
+    let follows_formula = |v: u32| {
+        let v = v as usize;
+        let by_law = rates.iter().position(|(p, _)| *p == v).is_some_and(|i| laws[i].is_closed());
+        constants.is_constant(v as u32) || v == constants.time || v == constants.time + 1 || by_law
+    };
+    let closed: Vec<bool> = (drafts.iter())
+        .map(|entry| entry.explicit && graph.variables(&[entry.node]).into_iter().all(follows_formula))
+        .collect();
+    let formulas = (nodes.iter().zip(&closed))
+        .map(|(node, closed)| match closed {
+            true => Arc::new(Program::compile(graph, &[*node], total)),
+            false => Arc::default(),
+        })
+        .collect();
+    let rows: Vec<(usize, NodeId)> = drafts.iter().map(|entry| (entry.parameter, entry.node)).collect();
+    Algebraic {
+        of: rows.iter().map(|row| row.0).collect(),
+        explicit: drafts.iter().map(|entry| entry.explicit).collect(),
+        closed,
+        needed: Vec::new(),
+        values: Program::compile(graph, &nodes, total),
+        formulas,
+        jacobian: jacobian(graph, &rows, constants, total),
+        spans: drafts.iter().map(|entry| entry.span).collect(),
+    }
 }
 
 /// Which variables stand still while one clause is active.
@@ -340,43 +466,4 @@ fn watch(
         }
         _ => Watch::Root,
     }
-}
-
-/// Finds the parameters that nothing but the drawing reads.
-fn mark_drawn_only(graph: &Graph, model: &mut Model, drafts: &[Draft]) {
-    let mut read: HashSet<(usize, usize)> = HashSet::new();
-    let mut kinds_of: Vec<Vec<usize>> = vec![Vec::new(); model.rules.len()];
-    for (id, kind) in model.kinds.iter() {
-        for rule in kind.all_rules() {
-            kinds_of[rule].push(id.index());
-        }
-    }
-    for (index, (rule, draft)) in model.rules.iter().zip(drafts).enumerate() {
-        let own = rule.parameters.len();
-        let sides: Vec<NodeId> = draft.sides.iter().flat_map(|(a, b)| [*a, *b]).collect();
-        let mut variables: Vec<usize> = graph.variables(&sides).into_iter().map(|v| v as usize).collect();
-        for (parameter, rate) in draft.rates.iter().flatten() {
-            let others = graph.variables(&[*rate]).into_iter().map(|v| v as usize);
-            variables.extend(others.filter(|v| v != parameter));
-        }
-        variables.extend(rule.produces.iter().flat_map(|p| p.outcome.reads()));
-        for v in variables {
-            if v < own {
-                read.extend(kinds_of[index].iter().map(|kind| (*kind, v)));
-            } else if v < rule.time_variable() {
-                let mut first = own;
-                for pattern in rule.left.iter().chain(&rule.right) {
-                    if v < first + pattern.width {
-                        read.extend(pattern.kinds.iter().map(|k| (k.index(), v - first)));
-                        break;
-                    }
-                    first += pattern.width;
-                }
-            }
-        }
-    }
-    let drawn_only: Vec<Vec<bool>> = (model.kinds.iter())
-        .map(|(id, kind)| (0..kind.arity).map(|p| !read.contains(&(id.index(), p))).collect())
-        .collect();
-    model.drawn_only = drawn_only;
 }

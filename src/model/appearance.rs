@@ -66,6 +66,10 @@ pub struct SurfaceShape {
     /// One for each vertex, or none at all if the file has none.
     pub normals: Vec<[f64; 3]>,
     pub triangles: Vec<[u32; 3]>,
+    /// Colours that the file gives, with their names.
+    pub materials: Vec<NamedColor>,
+    /// Which of them a triangle has; the list is empty, or there is one for each triangle.
+    pub painted: Vec<Option<u32>>,
     /// Where it is declared.
     pub span: Span,
 }

@@ -40,7 +40,7 @@ pub fn never_reached(
     let roots: Vec<NodeId> = rates.iter().map(|(_, rate)| *rate).collect();
     let flow = Program::compile(graph, &roots, variables);
 
-    let mut random = Random(0x5eed);
+    let mut random = Random::new();
     let (mut defined, mut scratch, mut dual_scratch) = (0, Vec::new(), Vec::new());
     let mut derivative = vec![0.0; roots.len()];
     let mut difference = |point: &[f64]| {
@@ -137,9 +137,13 @@ fn solve(sides: &Program, point: &mut [f64], pivot: usize) -> Option<(f64, f64)>
 }
 
 /// SplitMix64 (Steele, Lea, Flood 2014): the points are the same in every run.
-struct Random(u64);
+pub(super) struct Random(u64);
 
 impl Random {
+    pub fn new() -> Random {
+        Random(0x5eed)
+    }
+
     fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -149,7 +153,7 @@ impl Random {
     }
 
     /// A number of either sign, most often positive, between 1/100 and 100.
-    fn magnitude(&mut self) -> f64 {
+    pub fn magnitude(&mut self) -> f64 {
         let unit = (self.next() >> 11) as f64 / (1u64 << 53) as f64;
         let size = 10f64.powf(4.0 * unit - 2.0);
         if self.next().is_multiple_of(4) { -size } else { size }

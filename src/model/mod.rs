@@ -9,7 +9,27 @@
 //! - [`Law`], [`Watch`]: how much work an equation or a comparison is; found by [`analyse`].
 //! - [`Condition`]: the logic of an `if`, over the signs of differences, because the simulation knows
 //!   better than a comparison of two rounded numbers whether two sides have met.
+//!
+//! # Examples
+//!
+//! ```
+//! use dlsys::model::Law;
+//! use dlsys::session::Session;
+//!
+//! let text = "
+//!     param r = 0.5 in 0 .. 1
+//!     initial string: F(1) A
+//!     F(x): solve dx/dt = r*x
+//! ";
+//! let model = Session::from_text("stem.dls", text, &[]).expect("a good model").model;
+//! assert_eq!((&*model.parameters[0].name, model.parameters[0].value), ("r", 0.5));
+//! let kind = model.kinds.find("F", 1).expect("it is in the initial string");
+//! let rule = &model.rules[model.kinds.get(kind).rules[0]];
+//! // Growth at a constant relative rate has a formula: nothing is integrated.
+//! assert!(!matches!(rule.solves[0].laws[0], Law::Numeric(_)));
+//! ```
 
+mod algebraic;
 mod analysis;
 mod appearance;
 mod chance;
@@ -19,10 +39,13 @@ mod invariance;
 mod kind;
 mod law;
 mod measure;
+mod need;
+mod rank;
 mod remedy;
 mod rule;
 
-pub use analysis::{Draft, analyse};
+pub use algebraic::{Aggregate, Algebraic, Fold, Turn};
+pub use analysis::{AlgebraicDraft, Draft, analyse};
 pub use appearance::{
     Appearance, BUILT_IN_COLORS, Contour, Gradient, NamedColor, Net, Rgb, SurfaceShape, Tropism,
 };
@@ -35,6 +58,7 @@ pub use kind::{
 };
 pub use law::{Jacobian, Law, Linear, Numeric, Obstacle, Watch};
 pub use measure::Measure;
+pub use rank::is_singular;
 pub use remedy::{Boundary, Remedy};
 pub use rule::{Interpretation, Outcome, Pattern, Produce, Rule, Solve, Successor, Switch};
 
@@ -59,6 +83,8 @@ pub struct Model {
     pub kinds: Kinds,
     /// The initial string; its arguments read no variables.
     pub axiom: Successor,
+    /// Where it is written.
+    pub axiom_span: Span,
     pub rules: Vec<Rule>,
     pub interpretations: Vec<Interpretation>,
     pub appearance: Arc<Appearance>,
@@ -71,7 +97,8 @@ pub struct Model {
 impl Model {
     /// True if every parameter of every rule follows a formula: nothing is ever integrated numerically.
     pub fn is_closed_form(&self) -> bool {
-        self.rules.iter().flat_map(|r| &r.solves).flat_map(|s| &s.laws).all(Law::is_closed)
+        let mut solves = self.rules.iter().flat_map(|r| &r.solves);
+        solves.all(|s| s.laws.iter().all(Law::is_closed) && s.algebraic.closed.iter().all(|closed| *closed))
     }
 }
 
@@ -86,6 +113,7 @@ impl Default for Model {
             parameters: Vec::new(),
             kinds: Kinds::default(),
             axiom: Successor::default(),
+            axiom_span: Span::default(),
             rules: Vec::new(),
             interpretations: Vec::new(),
             appearance: Arc::default(),

@@ -4,9 +4,13 @@
 //!
 //! All expressions of a rule read the same variables, in this order: the parameters of the strict
 //! predecessor, then its hidden ones ([`Kind::clocks`](super::Kind::clocks)); the same of the context modules, left to
-//! right as written; `t`; `age`; then one truth value for each [`Switch`], or the [`Draw`]s of a successor.
+//! right as written; one value for each [`Aggregate`]; `t`; `age`; then one truth value for each [`Switch`], or the
+//! [`Draw`]s of a successor.
 
-use super::{Boundary, Clock, Condition, Draw, Jacobian, KindId, Law, Linear, NewClock, Watch};
+use super::{
+    Aggregate, Algebraic, Boundary, Clock, Condition, Draw, Jacobian, KindId, Law, Linear, NewClock, Turn,
+    Watch,
+};
 use crate::diagnostic::Span;
 use crate::expr::{Program, Scratch, Value};
 
@@ -28,11 +32,17 @@ pub struct Rule {
     pub left: Vec<Pattern>,
     /// Right context in reading order: the first one is the nearest.
     pub right: Vec<Pattern>,
+    /// How the right context stands: one after another, or on branches.
+    pub right_shape: Vec<Turn>,
+    /// Values of the modules attached to this one.
+    pub aggregates: Vec<Aggregate>,
+    /// The variable of the first of them. There may be more variables than aggregates; nobody reads those.
+    pub first_aggregate: usize,
     /// Number of variables, switches excluded.
     pub variables: usize,
     /// Both sides of every comparison: `a` of atom i is output 2i, `b` is output 2i + 1.
     pub sides: Program,
-    /// Which variables they read.
+    /// Which variables they read, by themselves or through aggregates.
     pub watched: Vec<bool>,
     /// Where each atom is written.
     pub atoms: Vec<Span>,
@@ -72,6 +82,16 @@ impl Rule {
     /// How each atom is watched under a clause.
     pub fn watch(&self, solve: Option<usize>) -> &[Watch] {
         solve.map_or(&self.watch_at_rest, |s| &self.solves[s].watch)
+    }
+
+    /// True if some parameter is given by a value or an equation instead of a rate.
+    pub fn is_algebraic(&self) -> bool {
+        self.solves.iter().any(|s| !s.algebraic.is_empty())
+    }
+
+    /// True if it looks at neighbours of the module.
+    pub fn looks_around(&self) -> bool {
+        !self.left.is_empty() || !self.right.is_empty() || !self.aggregates.is_empty()
     }
 
     /// Index of the variable `t`; `age` is the next one.
@@ -122,6 +142,8 @@ pub struct Solve {
     pub linear: Option<Linear>,
     /// Derivatives of all rates.
     pub jacobian: Jacobian,
+    /// Parameters with a value or an equation instead of a rate.
+    pub algebraic: Algebraic,
     pub watch: Vec<Watch>,
     /// Rates depend on time in a way that may be over before a step notices: not as polynomials.
     pub flashes: bool,

@@ -6,7 +6,6 @@ use super::desk::{Desk, Fault};
 use super::stage::{Stage, misused};
 use crate::export::{Fit, Page, Size, Survey, View, pixels};
 use crate::scene::Scene;
-use crate::sim::brief;
 use crate::turtle;
 
 /// A dot is set where so much of it (of 255) is covered; stems may be thinner than a dot.
@@ -19,7 +18,7 @@ impl Stage<'_> {
         let replay = self.replay()?;
         let mut scene = turtle::blank(model);
         turtle::draw(model, replay.string(), &mut scene)
-            .map_err(|error| Fault::new(format!("at t = {}: {error}", brief(replay.time(), 9))))?;
+            .map_err(|error| Fault::Said(error.diagnostic().render(&self.session.source, false)))?;
         Ok(scene)
     }
 
@@ -39,6 +38,9 @@ impl Stage<'_> {
             return Err(misused(commands::find("draw").expect("it is one")));
         }
         let scene = self.scene()?;
+        for warning in &scene.warnings {
+            desk.complain(&warning.render(&self.session.source, false));
+        }
         let mut survey = Survey::new(view);
         survey.add(&scene);
         let mut fit = survey.fit();

@@ -78,6 +78,26 @@ impl Wall {
     }
 }
 
+impl Plan {
+    /// How often [`study`] tells what it is about to do, if nothing is left out.
+    pub fn points(&self, session: &Session) -> usize {
+        let steps = |given: &Option<Vec<f64>>, order| {
+            given.as_ref().map_or_else(|| Plan::default_step_sizes(1.0, order).len(), Vec::len)
+        };
+        let of_method = |method: &Method| match method.is_fixed_step() {
+            true => 1 + steps(&self.step_sizes, nominal_order(method_name(*method))),
+            false => 1 + self.tolerances.len(),
+        };
+        let local = if reads_context(session) { 1 + steps(&self.slices, None) } else { 0 };
+        self.methods.iter().map(of_method).sum::<usize>() + local
+    }
+}
+
+/// What neighbours do matters only if somebody reads them.
+fn reads_context(session: &Session) -> bool {
+    session.model.rules.iter().any(|rule| rule.reads_context)
+}
+
 /// What came of a point.
 #[derive(Clone, Debug)]
 pub struct Outcome {
@@ -156,8 +176,7 @@ pub fn study(
         runs: plan.runs,
         series: Vec::new(),
     };
-    // What neighbours do matters only if somebody reads them.
-    let local = session.model.rules.iter().any(|rule| rule.reads_context).then_some((Method::Auto, LOCAL));
+    let local = reads_context(session).then_some((Method::Auto, LOCAL));
     let all = plan.methods.iter().map(|&method| (method, method_name(method))).chain(local);
     for (method, name) in all {
         watch(&format!("{name}: reference"));

@@ -147,6 +147,13 @@ impl Palette {
         palette
     }
 
+    /// Adds a material without a number, such as a surface brings with it.
+    pub fn add(&mut self, name: &str, color: Color) -> MaterialId {
+        let name = self.free_name(name);
+        self.materials.push(Material { name: name.into(), color });
+        MaterialId(self.materials.len() as u32 - 1)
+    }
+
     /// A name in ASCII that no material has, and none of a gradient of that name would.
     fn free_name(&self, name: &str) -> String {
         let plain: String = (name.chars())
@@ -194,6 +201,11 @@ impl Palette {
             self.colors + (place - self.colors) * GRADIENT_STEPS + step
         };
         Some(MaterialId((MaterialId::NAMED + offset) as u32))
+    }
+
+    /// How many colours have a number, and how many gradients have one after them.
+    pub fn counts(&self) -> [usize; 2] {
+        [self.colors, self.gradients]
     }
 
     /// The material of the colour of this number; the beginning of a gradient.

@@ -80,15 +80,14 @@ impl Mesh {
         }
     }
 
-    /// A mesh of triangles. Where there are no normals, each vertex gets the mean of its triangles'.
+    /// A mesh of triangles, each with its corners and its material. Where there are no normals, each vertex gets the mean of its triangles'.
     pub fn of_triangles(
         vertices: Vec<Point>,
         normals: &[Vector],
-        triangles: &[[u32; 3]],
-        material: MaterialId,
+        triangles: impl IntoIterator<Item = ([u32; 3], MaterialId)>,
     ) -> Mesh {
         let mut mesh = Mesh { normals: vec![Vector::zeros(); vertices.len()], vertices, faces: Vec::new() };
-        for &corners in triangles {
+        for (corners, material) in triangles {
             let [p, q, r] = corners.map(|i| mesh.vertices[i as usize]);
             let area = (q - p).cross(&(r - p));
             if area == Vector::zeros() {

@@ -31,6 +31,7 @@ pub use patch::{Net, Patch, PatchFace, PatchSet};
 use std::borrow::Cow;
 use std::sync::Arc;
 
+use crate::diagnostic::Diagnostic;
 use crate::model::Appearance;
 use crate::structure::Lineage;
 
@@ -97,6 +98,8 @@ pub struct Scene {
     pub polygons: Vec<Polygon>,
     pub surfaces: Vec<Surface>,
     pub patches: Vec<Patch>,
+    /// What is drawn, but hardly as it was meant.
+    pub warnings: Vec<Diagnostic>,
 }
 
 impl Scene {
@@ -107,6 +110,7 @@ impl Scene {
         self.polygons.clear();
         self.surfaces.clear();
         self.patches.clear();
+        self.warnings.clear();
     }
 
     /// True if there is nothing to be seen.

@@ -136,7 +136,8 @@ impl Careers {
     pub fn new(model: &Model, kinds_with_context: &[bool]) -> Careers {
         let mut seen = vec![false; model.kinds.len()];
         for rule in &model.rules {
-            for pattern in rule.left.iter().chain(&rule.right) {
+            let children = rule.aggregates.iter().map(|aggregate| &aggregate.pattern);
+            for pattern in rule.left.iter().chain(&rule.right).chain(children) {
                 pattern.kinds.iter().for_each(|kind| seen[kind.index()] = true);
             }
         }

@@ -9,7 +9,7 @@ use smallvec::SmallVec;
 use super::error::{Error, Site};
 use crate::diagnostic::Span;
 use crate::expr::Scratch;
-use crate::model::{Outcome, Successor, choose};
+use crate::model::{Distribution, Outcome, Successor, choose};
 use crate::structure::{Family, Lineage, Purpose, Seed};
 
 /// Why there is no successor.
@@ -18,7 +18,7 @@ pub enum Misfortune {
     /// A distribution has parameters that it cannot have.
     Draw {
         span: Span,
-        distribution: &'static str,
+        distribution: Distribution,
         why: String,
     },
     Weights {
@@ -32,7 +32,7 @@ impl Misfortune {
     pub fn error(self, site: Site) -> Error {
         match self {
             Misfortune::Draw { span, distribution, why } => {
-                Error::BadDraw { site: Site { span, ..site }, distribution, why }
+                Error::BadDraw { site: Site { span, ..site }, distribution, why: why.into() }
             }
             Misfortune::Weights { why } => Error::BadWeights { site, why },
             Misfortune::NotFinite => {
@@ -74,7 +74,7 @@ pub fn arguments(
         if !draw.conditional
             && let Some(why) = draw.distribution.fault(&parameters)
         {
-            return Err(Misfortune::Draw { span: draw.span, distribution: draw.distribution.name(), why });
+            return Err(Misfortune::Draw { span: draw.span, distribution: draw.distribution, why });
         }
         let u = seed.unit_of_child(family, draw.place, Purpose::Parameter(draw.number));
         variables.push(draw.distribution.quantile(&parameters, u));
@@ -105,7 +105,7 @@ fn why_not_finite(successor: &Successor, variables: &[f64], scratch: &mut Scratc
         let mut parameters: SmallVec<[f64; 4]> = smallvec::smallvec![0.0; draw.parameters.outputs()];
         draw.parameters.eval(variables, scratch, &mut parameters);
         if let Some(why) = draw.distribution.fault(&parameters) {
-            return Misfortune::Draw { span: draw.span, distribution: draw.distribution.name(), why };
+            return Misfortune::Draw { span: draw.span, distribution: draw.distribution, why };
         }
     }
     Misfortune::NotFinite

@@ -5,6 +5,7 @@
 
 use smallvec::SmallVec;
 
+use super::around::{Around, gather};
 use super::error::Error;
 use super::lookup::NEAR;
 use super::settle::{Firing, open};
@@ -16,6 +17,9 @@ use crate::structure::ModuleId;
 
 /// Most times that the equations at one instant are chosen anew before the choice is called chattering.
 const MAX_CHOICES: usize = 8;
+
+/// How many neighbours in a row are asked for the rate of a value that depends on them.
+const DEPTH: usize = 2;
 
 /// A rate of no more than this part of the value, over the length of a step, is rounding.
 const NOISE: f64 = 16.0 * f64::EPSILON;
@@ -196,31 +200,70 @@ impl Simulation<'_> {
         out.clear();
         let state = self.plant.state(id).expect("open modules have a state");
         let rule = &self.model.rules[state.rule.expect("open modules have a rule")];
-        let context = state.context.clone();
+        let around = state.context.clone();
+        self.variables_ahead(rule, id, &around, tau, rule.reads_context, DEPTH, out);
+    }
+
+    /// The variables of a rule, given the rates of the module's own parameters.
+    #[allow(clippy::too_many_arguments)]
+    pub(super) fn neighbours_ahead(
+        &mut self,
+        rule: &Rule,
+        id: ModuleId,
+        around: &Around,
+        tau: f64,
+        depth: usize,
+        own: &[f64],
+        out: &mut Vec<Dual<f64>>,
+    ) {
+        self.variables_ahead(rule, id, around, tau, rule.reads_context, depth - 1, out);
+        for (variable, &rate) in out.iter_mut().zip(own) {
+            variable.rate = rate;
+        }
+    }
+
+    /// The variables of a rule with their rates; those of neighbours are 0 if they are not read.
+    #[allow(clippy::too_many_arguments)]
+    fn variables_ahead(
+        &mut self,
+        rule: &Rule,
+        id: ModuleId,
+        around: &Around,
+        tau: f64,
+        reads_context: bool,
+        depth: usize,
+        out: &mut Vec<Dual<f64>>,
+    ) {
+        out.clear();
         let (mut values, mut rates) = (Vec::new(), Vec::new());
-        for (i, module) in std::iter::once(id).chain(context).enumerate() {
-            if i > 0 && !rule.reads_context {
+        let mut append = |me: &mut Self, module: ModuleId, out: &mut Vec<Dual<f64>>| {
+            if module != id && !reads_context {
                 values.clear();
-                self.plant.values(module, self.now, &mut values);
+                me.plant.values(module, me.now, &mut values);
                 out.extend(values.iter().map(|&value| Dual { value, rate: 0.0 }));
-                continue;
+                return;
             }
-            self.ahead(module, tau, &mut values);
-            self.rates_ahead(module, tau, &mut rates);
+            me.ahead(module, tau, depth, &mut values);
+            me.rates_to(module, tau, depth, &mut rates);
             out.extend(values.iter().zip(&rates).map(|(&value, &rate)| Dual { value, rate }));
+        };
+        for &module in std::iter::once(&id).chain(around.context()) {
+            append(self, module, out);
         }
         let now = self.now.to_f64() + tau;
         let age = self.now.since(self.plant.tree.birth(id)) + tau;
-        out.extend([now, age].map(|value| Dual { value, rate: 1.0 }));
+        let times = [now, age].map(|value| Dual { value, rate: 1.0 });
+        let child = |child, out: &mut Vec<Dual<f64>>| append(self, child, out);
+        gather(rule, around, times, out, &mut Vec::new(), |_| true, child);
     }
 
     /// A module's parameters a little ahead.
-    fn ahead(&mut self, id: ModuleId, tau: f64, out: &mut Vec<f64>) {
+    fn ahead(&mut self, id: ModuleId, tau: f64, depth: usize, out: &mut Vec<f64>) {
         out.clear();
         self.plant.values(id, self.now, out);
         if tau != 0.0 {
             let mut rates = Vec::new();
-            self.rates_ahead(id, 0.0, &mut rates);
+            self.rates_to(id, 0.0, depth, &mut rates);
             for (value, rate) in out.iter_mut().zip(&rates) {
                 *value += tau * rate;
             }
@@ -229,6 +272,11 @@ impl Simulation<'_> {
 
     /// The rates of a module's parameters a little ahead, by its present equations.
     pub(super) fn rates_ahead(&mut self, id: ModuleId, tau: f64, out: &mut Vec<f64>) {
+        self.rates_to(id, tau, DEPTH, out);
+    }
+
+    /// The same; rates of algebraic parameters go back to neighbours so many times.
+    fn rates_to(&mut self, id: ModuleId, tau: f64, depth: usize, out: &mut Vec<f64>) {
         out.clear();
         out.resize(self.plant.tree.parameters(id).len(), 0.0);
         let model = self.model;
@@ -236,20 +284,24 @@ impl Simulation<'_> {
         let (Some(rule), Some(solve)) = (state.rule, state.solve) else { return };
         let solve = &model.rules[rule].solves[solve];
         if solve.of.is_empty() {
-            return;
+            return self.algebraic_rates(id, tau, depth, out);
         }
         let mut variables = Vec::new();
         if tau == 0.0 {
-            self.plant.variables(id, &state.context, self.now, &mut variables);
+            self.plant.variables(&model.rules[rule], id, &state.context, self.now, &mut variables);
         } else {
-            let context = state.context.clone();
+            let around = state.context.clone();
             let mut values = Vec::new();
-            for module in std::iter::once(id).chain(context) {
-                self.ahead(module, tau, &mut values);
+            for &module in std::iter::once(&id).chain(around.context()) {
+                self.ahead(module, tau, depth, &mut values);
                 variables.extend_from_slice(&values);
             }
-            variables.push(self.now.to_f64() + tau);
-            variables.push(self.now.since(self.plant.tree.birth(id)) + tau);
+            let times = [self.now.to_f64() + tau, self.now.since(self.plant.tree.birth(id)) + tau];
+            let child = |child, out: &mut Vec<f64>| {
+                self.ahead(child, tau, depth, &mut values);
+                out.extend_from_slice(&values);
+            };
+            gather(&model.rules[rule], &around, times, &mut variables, &mut Vec::new(), |_| true, child);
         }
         let state = self.plant.state(id).expect("seen above");
         variables.extend(state.switches.iter().map(|&on| f64::from(u8::from(on))));
@@ -259,6 +311,7 @@ impl Simulation<'_> {
         for (&parameter, rate) in solve.of.iter().zip(rates) {
             out[parameter] = rate;
         }
+        self.algebraic_rates(id, tau, depth, out);
     }
 
     /// The size of a module's parameters, against which a tiny one is as good as zero.
@@ -283,7 +336,7 @@ impl Simulation<'_> {
         }
         let (mut variables, mut scratch) = (Vec::new(), Vec::new());
         let state = self.plant.state(id).expect("open modules have a state");
-        self.plant.variables(id, &state.context, self.now, &mut variables);
+        self.plant.variables(rule, id, &state.context, self.now, &mut variables);
         let mut sides = vec![0.0; rule.sides.outputs()];
         rule.sides.eval(&variables, &mut scratch, &mut sides);
         // The signs are those just behind the instant; a production is for what is met at it.

@@ -5,6 +5,7 @@
 //! it is repaired there (`repair`), or ends it for all.
 
 use super::course::Course;
+use super::equations::Equations;
 use super::error::Error;
 use super::integrator::{Integrator, StepError, foresee};
 use super::linear::Linear;
@@ -14,12 +15,13 @@ use super::queue::Who;
 use super::repair::Repairer;
 use super::simulation::Simulation;
 use super::state::{Control, Next, State, What};
-use super::system::{Equations, System};
+use super::system::System;
 use super::watch::needs_search;
 use super::{Method, Scheduler};
 use crate::model::Model;
 use crate::structure::{Instant, ModuleId, Visit};
 use smallvec::SmallVec;
+use std::collections::HashSet;
 
 /// The coupled modules and their common step.
 #[derive(Clone, Default)]
@@ -46,6 +48,9 @@ pub struct Coupled {
     mark: Instant,
     since_mark: usize,
 }
+
+/// Most times that a step is tried whose algebraic components cannot be followed.
+const MAX_TRIES: usize = 100;
 
 /// Solving without steps begins anew, for all modules, at every event: after so many of them steps are made.
 const MAX_CUTS: u32 = 2;
@@ -112,11 +117,15 @@ impl Simulation<'_> {
     /// Looks at the modules that have begun new motions, and at their neighbours.
     fn affected(&mut self, begun: &[ModuleId]) -> Affected {
         let mut near = std::mem::take(&mut self.coupled.loosened);
+        // Whose many neighbours are there already.
+        let mut known = HashSet::new();
         for &id in begun {
             near.push(id);
             self.readers(id, |reader, context| {
                 near.push(reader);
-                near.extend_from_slice(context);
+                if context.len() < 8 || known.insert(reader) {
+                    near.extend_from_slice(context);
+                }
             });
             if let Some(state) = self.plant.state(id) {
                 near.extend_from_slice(&state.context);
@@ -156,6 +165,14 @@ impl Simulation<'_> {
         let Some(rule) = state.rule else { return false };
         let numeric = |id: &ModuleId| self.plant.state(*id).is_some_and(|s| s.is_numeric());
         if self.model.rules[rule].reads_context && (state.is_numeric() || state.context.iter().any(numeric)) {
+            return true;
+        }
+        // What is solved for is solved for here.
+        let solved = |s: usize| {
+            let algebraic = &self.model.rules[rule].solves[s].algebraic;
+            (0..algebraic.of.len()).any(|place| algebraic.is_solved(place, state.forced))
+        };
+        if state.solve.is_some_and(solved) {
             return true;
         }
         let mut read = false;
@@ -265,11 +282,41 @@ impl Simulation<'_> {
         let Coupled { system, y, integrator, control, .. } = &mut self.coupled;
         let mut equations = Equations::new(system, rules, None);
         let limit = self.settings.slice_end(from);
-        let step =
-            integrator.step(&self.coupled_settings, control, &mut equations, y, from, limit, &mut self.stats);
-        let end = step.map_err(|error| self.coupled_error(error, from))?;
-        self.coupled.pending = true;
-        self.plant.coupled = None;
+        let (mut course, mut tries) = (None, 0);
+        let settings = &self.coupled_settings;
+        let step = loop {
+            let stats = &mut self.stats;
+            let step = integrator.step(settings, control, &mut equations, y, from, limit, stats);
+            if step.is_err() || system.algebra.is_empty() {
+                break step;
+            }
+            match integrator.blended(&mut equations, y, settings, control) {
+                Ok(stretches) => {
+                    course = Some(Course::of(stretches));
+                    break step;
+                }
+                Err(fault) => {
+                    tries += 1;
+                    stats.rejected += 1;
+                    if tries > MAX_TRIES || settings.method.is_fixed_step() {
+                        break Err(StepError::NotFinite(fault.component()));
+                    }
+                }
+            }
+        };
+        let end = match step {
+            Ok(end) => end,
+            Err(error) => {
+                // What cannot be solved for says more than that no step goes on.
+                let fault = equations.make_consistent(0.0, &mut y.clone()).err();
+                return Err(match fault {
+                    Some(fault) => self.unsolved(fault, self.coupled.system.owner(fault.component()), from),
+                    None => self.coupled_error(error, from),
+                });
+            }
+        };
+        self.coupled.pending = course.is_none();
+        self.plant.coupled = course;
         let members = std::mem::take(&mut self.coupled.members);
         for &id in &members {
             self.search_member(id, from);
@@ -370,15 +417,25 @@ impl Simulation<'_> {
     }
 
     fn coupled_error(&self, error: StepError, at: Instant) -> Error {
-        let owner = |component: usize| self.coupled.system.owner(component);
+        let Coupled { system, y, .. } = &self.coupled;
+        let owner = |component: usize| system.owner(component);
+        if matches!(error, StepError::TooSmall(_))
+            && let Some(fault) = Equations::new(system, &self.model.rules, None).fading(y)
+        {
+            return self.unsolved(fault, owner(fault.component()), at);
+        }
         self.step_error(error, at, owner)
     }
 }
 
-/// The parameters of a coupled module that are integrated, in the order of their components.
+/// The parameters of a coupled module that are integrated, then those that are solved for, in the order of their
+/// components.
 pub(super) fn integrated(model: &Model, state: &State) -> SmallVec<[usize; 4]> {
     let Some((rule, solve)) = state.rule.zip(state.solve) else { return SmallVec::new() };
     let solve = &model.rules[rule].solves[solve];
     let numeric = |i: &usize| state.forced || solve.numeric.contains(i);
-    (0..solve.of.len()).filter(numeric).map(|i| solve.of[i]).collect()
+    let algebraic = &solve.algebraic;
+    let solved = |place: &usize| algebraic.is_solved(*place, state.forced);
+    let given = (0..algebraic.of.len()).filter(solved).map(|place| algebraic.of[place]);
+    (0..solve.of.len()).filter(numeric).map(|i| solve.of[i]).chain(given).collect()
 }

@@ -39,6 +39,16 @@ impl Course {
         Course { stretches: vec![step], tracks: Vec::new(), end }
     }
 
+    /// The components of a common step that is several stretches.
+    pub fn of(stretches: Vec<Dense>) -> Course {
+        let end = stretches.last().expect("one at least").end;
+        let count = stretches.len() as u32;
+        let track = |component: u32| Track { first: 0, count, component };
+        let tracks =
+            if count == 1 { Vec::new() } else { (0..stretches[0].len() as u32).map(track).collect() };
+        Course { stretches, tracks, end }
+    }
+
     /// The start of the common step.
     pub fn start(&self) -> Instant {
         self.stretches[0].start

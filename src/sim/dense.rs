@@ -30,6 +30,11 @@ impl Dense {
         Dense { start, end: end.unwrap_or_else(|| start.after(h)), h, degree, coefficients }
     }
 
+    /// Number of components.
+    pub fn len(&self) -> usize {
+        self.coefficients.len() / (self.degree + 1)
+    }
+
     /// Position of an instant in the step: 0 at its start, 1 at its end.
     pub fn position(&self, at: Instant) -> f64 {
         if self.h == 0.0 { 0.0 } else { (at.since(self.start) / self.h).clamp(0.0, 1.0) }
@@ -49,6 +54,44 @@ impl Dense {
             }
         }
         c[0]
+    }
+
+    /// The value of a polynomial of the highest degree.
+    pub fn at(coefficients: &[f64; MAX_DEGREE + 1], position: f64) -> f64 {
+        let mut c = *coefficients;
+        for level in (1..=MAX_DEGREE).rev() {
+            for i in 0..level {
+                c[i] = mix(c[i], c[i + 1], position);
+            }
+        }
+        c[0]
+    }
+
+    /// The stretch from `lo` to `hi`, with other polynomials for some components.
+    pub fn with(&self, lo: f64, hi: f64, components: &[usize], others: &[[f64; MAX_DEGREE + 1]]) -> Dense {
+        let count = self.len();
+        let mut all = Vec::with_capacity(count * (MAX_DEGREE + 1));
+        for component in 0..count {
+            let mut c: Coefficients = [0.0; MAX_DEGREE + 1];
+            c[..=self.degree].copy_from_slice(self.of(component));
+            cut(&mut c[..=self.degree], lo, hi);
+            // The same polynomial, written as one of a higher degree.
+            for degree in self.degree..MAX_DEGREE {
+                for i in (0..=degree + 1).rev() {
+                    let s = i as f64 / (degree + 1) as f64;
+                    let before = if i > 0 { c[i - 1] } else { 0.0 };
+                    c[i] = if i > degree { before } else { mix(c[i], before, s) };
+                }
+            }
+            all.extend(c);
+        }
+        for (component, other) in components.iter().zip(others) {
+            all[component * (MAX_DEGREE + 1)..][..=MAX_DEGREE].copy_from_slice(other);
+        }
+        let start = if lo == 0.0 { self.start } else { self.start.after(lo * self.h) };
+        let end = if hi == 1.0 { self.end } else { self.start.after(hi * self.h) };
+        let h = if lo == 0.0 && hi == 1.0 { self.h } else { end.since(start) };
+        Dense { start, end, h, degree: MAX_DEGREE, coefficients: all }
     }
 
     /// One component at a position, and its rate there per unit of position.
@@ -76,22 +119,7 @@ impl Dense {
         let mut c: Coefficients = [0.0; MAX_DEGREE + 1];
         c[..=self.degree].copy_from_slice(self.of(component));
         let c = &mut c[..=self.degree];
-        // Cut off what is after `hi`, then what is before `lo`.
-        if hi < 1.0 {
-            for level in 1..=self.degree {
-                for i in (level..=self.degree).rev() {
-                    c[i] = mix(c[i - 1], c[i], hi);
-                }
-            }
-        }
-        if lo > 0.0 {
-            let cut = lo / hi;
-            for level in (1..=self.degree).rev() {
-                for i in 0..level {
-                    c[i] = mix(c[i], c[i + 1], cut);
-                }
-            }
-        }
+        cut(c, lo, hi);
         let width = hi - lo;
         let mut rate = Interval::constant(0.0);
         if self.degree > 0 {
@@ -102,6 +130,26 @@ impl Dense {
             rate = hull(&slopes[..self.degree]);
         }
         Dual { value: hull(c), rate }
+    }
+}
+
+/// Cuts off what is after `hi`, then what is before `lo`.
+fn cut(c: &mut [f64], lo: f64, hi: f64) {
+    let degree = c.len() - 1;
+    if hi < 1.0 {
+        for level in 1..=degree {
+            for i in (level..=degree).rev() {
+                c[i] = mix(c[i - 1], c[i], hi);
+            }
+        }
+    }
+    if lo > 0.0 {
+        let cut = lo / hi;
+        for level in (1..=degree).rev() {
+            for i in 0..level {
+                c[i] = mix(c[i], c[i + 1], cut);
+            }
+        }
     }
 }
 

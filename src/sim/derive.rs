@@ -11,6 +11,7 @@ use std::collections::HashMap;
 
 use smallvec::SmallVec;
 
+use super::around::Around;
 use super::error::Error;
 use super::lookup::sign_at_birth;
 use super::queue::Who;
@@ -32,7 +33,7 @@ pub(super) struct Steps {
     /// Productions of the present step.
     pub firing: Vec<Firing>,
     /// Their contexts, one after another.
-    pub contexts: Vec<ModuleId>,
+    pub contexts: Vec<Around>,
     /// By kind: there are discrete rules for it.
     pub has_rules: Vec<bool>,
     /// By kind: if no rule applies to a module at its first step, none ever does.
@@ -42,7 +43,7 @@ pub(super) struct Steps {
 impl Steps {
     pub fn new(model: &Model) -> Steps {
         let reads_itself = |rule: &Rule| {
-            rule.context_len() == 0 && rule.sides.reads().iter().all(|v| *v < rule.parameters.len())
+            !rule.looks_around() && rule.sides.reads().iter().all(|v| *v < rule.parameters.len())
         };
         let has_rules = model.kinds.iter().map(|(_, kind)| !kind.steps.is_empty());
         let is_settled = (model.kinds.iter()).map(|(_, kind)| {
@@ -121,7 +122,7 @@ impl Simulation<'_> {
                     if others.contains_key(&id) {
                         first.push(id);
                     }
-                    self.steps.contexts.extend_from_slice(&context);
+                    self.steps.contexts.push(context);
                     found.push(Firing { id, rule, produce: 0 });
                     false
                 }
@@ -133,9 +134,9 @@ impl Simulation<'_> {
     }
 
     /// The first discrete rule whose context is there and whose condition holds, with that context.
-    fn applying(&mut self, id: ModuleId) -> Option<(usize, SmallVec<[ModuleId; 2]>)> {
+    fn applying(&mut self, id: ModuleId) -> Option<(usize, Around)> {
         let model = self.model;
-        let mut context = SmallVec::new();
+        let mut context = Around::default();
         for &index in &model.kinds.get(self.plant.tree.kind(id)).steps {
             let rule = &model.rules[index];
             if !self.context(id, rule, false, &mut context) {
@@ -149,12 +150,12 @@ impl Simulation<'_> {
     }
 
     /// Judges the condition of a discrete rule by the values of now.
-    fn holds_now(&mut self, id: ModuleId, rule: &Rule, context: &[ModuleId]) -> bool {
+    fn holds_now(&mut self, id: ModuleId, rule: &Rule, context: &Around) -> bool {
         let guard = &rule.produces[0].guard;
         if guard.is_always() {
             return true;
         }
-        self.plant.variables(id, context, self.now, &mut self.variables);
+        self.plant.variables(rule, id, context, self.now, &mut self.variables);
         let mut sides: SmallVec<[f64; 16]> = smallvec::smallvec![0.0; rule.sides.outputs()];
         rule.sides.eval(&self.variables, &mut self.scratch, &mut sides);
         guard.judge(|atom| sign_at_birth(sides[2 * atom], sides[2 * atom + 1])) == Truth::Yes

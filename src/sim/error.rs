@@ -24,6 +24,28 @@ impl Site {
     }
 }
 
+/// Why a parameter cannot be solved for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unsolved {
+    Singular,
+    Nothing,
+    NotFinite,
+    Fading,
+    Rough,
+}
+
+impl Unsolved {
+    fn message(self) -> &'static str {
+        match self {
+            Unsolved::Singular => "is not determined by its equations, which are singular,",
+            Unsolved::Nothing => "has no value that solves its equations",
+            Unsolved::NotFinite => "has no value: its equations are undefined",
+            Unsolved::Fading => "is hardly determined any more by its equations, which become singular,",
+            Unsolved::Rough => "changes too fast to be followed",
+        }
+    }
+}
+
 /// An error of a run. All name the rule, the module with its lineage, and the time.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum Error {
@@ -48,14 +70,20 @@ pub enum Error {
     PeriodTooShort { site: Site, period: f64 },
     #[error("{what} of {} is not finite at t = {}", .site.module, .site.when())]
     NotFinite { site: Site, what: String },
-    #[error("`{distribution}` cannot be drawn from at t = {}: {why}", .site.when())]
-    BadDraw { site: Site, distribution: &'static str, why: String },
+    #[error("`{}` cannot be drawn from at t = {}: {why}", .distribution.name(), .site.when())]
+    BadDraw { site: Site, distribution: Distribution, why: Box<str> },
     #[error("no successor can be chosen for {} at t = {}: {why}", .site.module, .site.when())]
     BadWeights { site: Site, why: String },
     #[error("the rate of an event of {} is negative at t = {}", .site.module, .site.when())]
     NegativeRate { site: Site },
     #[error("the step size fell to nothing at t = {}", .site.when())]
     StepTooSmall { site: Site },
+    #[error("{} of {} {} at t = {}", .unknown.0, .site.module, .unknown.1.message(), .site.when())]
+    Unsolved {
+        site: Site,
+        /// The parameter that is solved for, and why that fails.
+        unknown: Box<(String, Unsolved)>,
+    },
     #[error("more than {limit} modules at t = {}", .site.when())]
     TooManyModules {
         site: Site,
@@ -78,6 +106,7 @@ impl Error {
             | Error::BadWeights { site, .. }
             | Error::NegativeRate { site }
             | Error::StepTooSmall { site }
+            | Error::Unsolved { site, .. }
             | Error::TooManyModules { site, .. } => site,
         }
     }
@@ -130,7 +159,7 @@ impl Error {
                 d.help("look for a division by zero, a root or logarithm of a negative number, an element or an inverse that is not there, or growth without bound")
             }
             Error::BadDraw { distribution, .. } => {
-                d.help_opt(Distribution::named(distribution).map(|d| d.demand().to_owned()))
+                d.help(distribution.demand())
             }
             Error::BadWeights { .. } => d.help(
                 "weights are at least 0, and one of them is greater; they need not add up to 1. To replace nothing at some values, say so in the clause's condition: `if … produce …`",
@@ -141,6 +170,12 @@ impl Error {
             Error::StepTooSmall { .. } => d.help(
                 "the solution may become infinite here, or the equations jump in a way that no `if` shows; a fixed step (`--method rk4 --step-size H`) shows how it behaves",
             ),
+            Error::Unsolved { unknown, .. } => d.help(match unknown.1 {
+                Unsolved::Singular | Unsolved::Fading => "there the equations do not say how the parameter goes on: a double root, or two solutions that meet. Change the equations before this, or end the module's life at a condition that holds earlier",
+                Unsolved::Nothing => "the search begins with the value that the module was written with, or had just before: write one closer to the solution, or see whether there is one",
+                Unsolved::NotFinite => "look for a division by zero, or a root or logarithm of a negative number, at the written value too: the search begins there",
+                Unsolved::Rough => "it jumps, or turns without end, in a way that no `if` shows",
+            }),
             Error::TooManyModules { rounds, .. } if *rounds > 8 => d
                 .note(format!("{rounds} productions followed one another without time going on"))
                 .help("a successor that meets the condition again is replaced again at once: change the condition, or the successor's parameters"),
@@ -162,6 +197,7 @@ impl Error {
             Error::BadWeights { .. } => "by the weights of this clause",
             Error::NegativeRate { .. } => "the rate of this clause",
             Error::StepTooSmall { .. } => "these equations",
+            Error::Unsolved { .. } => "solved for here",
             Error::TooManyModules { .. } => "this production made the last of them",
         }
     }

@@ -52,6 +52,7 @@ impl Simulation<'_> {
         let now = probe.now;
         probe.show_coupled(now);
         probe.promote(id);
+        probe.refresh(now).ok()?;
         let (rule, solve, context) = match probe.plant.state(id) {
             Some(state) => (state.rule, state.solve, state.context.to_vec()),
             None => (None, None, Vec::new()),

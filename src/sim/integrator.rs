@@ -1,6 +1,8 @@
 //! Steps of controlled error.
 
+use super::algebra::Fault;
 use super::dense::Dense;
+use super::equations::Equations;
 use super::implicit::Implicit;
 use super::runge_kutta::{Rates, Trial, Workspace};
 use super::state::Control;
@@ -33,6 +35,11 @@ pub enum StepError {
 /// The tolerance of a single step, as a part of the tolerance asked for: errors of steps add up, and move
 /// the times of events, which move what comes after them.
 pub const INNER_TOLERANCE: f64 = 0.1;
+
+/// A step is long enough that takes so many stretches.
+const MANY_STRETCHES: f64 = 4.0;
+/// How much shorter a step is tried when what is solved for along with it cannot be followed.
+const SHORTER: f64 = 0.1;
 
 /// The same for the implicit method: between the ends of its long steps the solution is known less well than there.
 const INNER_TOLERANCE_IMPLICIT: f64 = 0.01;
@@ -190,6 +197,32 @@ impl Integrator {
         }
         self.workspace.finish(self.method, system, y, h);
         self.workspace.dense(self.method, start, Some(end), y, h)
+    }
+
+    /// The dense output of the step just made from `y`, with what is solved for along with it. Where that cannot be
+    /// followed, the next step to be tried is shorter.
+    pub fn blended(
+        &mut self,
+        equations: &mut Equations,
+        y: &[f64],
+        settings: &Settings,
+        control: &mut Control,
+    ) -> Result<Vec<Dense>, Fault> {
+        let dense = self.dense(equations, y);
+        let h = dense.h;
+        let blended = equations.blend(&dense, y, INNER_TOLERANCE * settings.tolerance);
+        match &blended {
+            Ok(stretches) => {
+                // What it looks like may matter more than the rates.
+                control.size = control.size.min(h * (MANY_STRETCHES / stretches.len() as f64).max(SHORTER));
+                let last = stretches.last().expect("one at least");
+                for (c, end) in self.workspace.end.iter_mut().enumerate() {
+                    *end = last.value(c, 1.0);
+                }
+            }
+            Err(_) => control.size = SHORTER * h,
+        }
+        blended
     }
 
     /// Makes the end of the step just made the start of the next.

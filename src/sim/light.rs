@@ -6,6 +6,7 @@
 
 use smallvec::SmallVec;
 
+use super::around::Around;
 use super::career::{Career, Child, End, Forecast, Life, REFUSED, same_bits};
 use super::chance::{self, Misfortune};
 use super::error::Error;
@@ -23,7 +24,8 @@ impl Simulation<'_> {
     pub(super) fn begin_lightly(&mut self, id: ModuleId, rule: usize) -> bool {
         let mut label = self.plant.tree.label(id);
         if label == NO_LABEL {
-            self.plant.variables(id, &[], self.now, &mut self.variables);
+            let around = Around::default();
+            self.plant.variables(&self.model.rules[rule], id, &around, self.now, &mut self.variables);
             let child = self.foresee(rule);
             label = child.label;
             self.plant.tree.set_label(id, label);

@@ -41,6 +41,9 @@ impl Linear {
     /// The equations of coupled modules, if they are linear and so is everything that they read, and if all eigenvalues
     /// are certainly real.
     pub fn new(system: &System, rules: &[Rule], y: &[f64]) -> Option<Linear> {
+        if !system.algebra.is_empty() {
+            return None;
+        }
         let mut unknown = vec![u32::MAX; y.len()];
         let mut inputs = vec![u32::MAX; system.formulas.len()];
         let (mut state, mut b) = (Vec::new(), Vec::new());
@@ -97,7 +100,7 @@ impl Linear {
         let (mut variables, mut scratch, mut out): (Vec<f64>, Scratch<f64>, Vec<f64>) = Default::default();
         for row in &system.rows {
             let linear = rules[row.rule].solves[row.solve].linear.as_ref()?;
-            system.variables(row, 0.0, y, &[], &mut variables);
+            system.variables(rules, row, 0.0, y, &[], &mut variables);
             out.resize(linear.coefficients.outputs(), 0.0);
             linear.coefficients.eval(&variables, &mut scratch, &mut out);
             let mut next = out.iter();
@@ -111,7 +114,7 @@ impl Linear {
                         Source::State(component) => {
                             entries.push((n, unknown[component as usize], coefficient))
                         }
-                        Source::Input(_) => return None,
+                        Source::Input(_) | Source::Sum(_) => return None,
                         Source::Formula(input) => entries.push((n, inputs[input as usize], coefficient)),
                     }
                 }

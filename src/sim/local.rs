@@ -58,15 +58,11 @@ impl<'a> Alone<'a> {
         scratch: Scratch<f64>,
         y: &mut Vec<f64>,
     ) -> Alone<'a> {
-        variables.clear();
         y.clear();
         let own = plant.tree.parameters(state.id);
-        variables.extend_from_slice(own);
-        for module in &state.context {
-            plant.values(*module, from, &mut variables);
-        }
+        plant.variables(rule, state.id, &state.context, from, &mut variables);
+        variables[..own.len()].copy_from_slice(own);
         let (t, age) = (from.to_f64(), from.since(plant.tree.birth(state.id)));
-        variables.extend([t, age]);
         variables.extend(state.switches.iter().map(|&on| f64::from(u8::from(on))));
         let solve = &rule.solves[state.solve.expect("numeric motions have equations")];
         let program = if state.forced { &solve.rates } else { &solve.numeric_rates };

@@ -3,13 +3,16 @@
 //! The first rule whose context is present applies, looked up again whenever the structure has changed
 //! (LANGUAGE, "Rules").
 
+use std::collections::HashSet;
+
 use smallvec::SmallVec;
 
+use super::around::Around;
 use super::settle::clear;
 use super::simulation::Simulation;
 use super::state::{Signs, State};
 use super::watch::{TOUCH, opposite};
-use crate::model::{Pattern, Rule, Sign};
+use crate::model::{Pattern, Rule, Sign, Turn};
 use crate::structure::{ModuleId, Visit};
 
 /// Two numbers are equal if they differ by no more than this part of the larger.
@@ -23,6 +26,20 @@ pub(super) fn sign_at_birth(a: f64, b: f64) -> Sign {
     let (difference, size) = (a - b, a.abs().max(b.abs()));
     let equal = size.is_finite() && difference.abs() <= EQUAL * size;
     if equal { Sign::Zero } else { Sign::of(difference) }
+}
+
+/// The place of the bracket that closes the first one.
+fn closing(shape: &[Turn]) -> usize {
+    let mut depth = 0;
+    for (i, turn) in shape.iter().enumerate() {
+        match turn {
+            Turn::Open => depth += 1,
+            Turn::Close if depth == 1 => return i,
+            Turn::Close => depth -= 1,
+            Turn::Module => {}
+        }
+    }
+    shape.len()
 }
 
 impl Simulation<'_> {
@@ -45,7 +62,7 @@ impl Simulation<'_> {
             } else if let Some(&rule) = model.kinds.get(kind).rules.first()
                 && !self.begin_quickly(id, rule)
             {
-                self.take_up(id, rule, &[]);
+                self.take_up(id, rule, &Around::default());
             }
         }
         clear(&mut fresh);
@@ -72,7 +89,12 @@ impl Simulation<'_> {
     fn look_around(&mut self) {
         let model = self.model;
         let mut to_look = std::mem::take(&mut self.to_look);
-        let mut context = SmallVec::new();
+        let mut context = Around::default();
+        if self.gathers {
+            // A module with many children has been put in by each of them that is new.
+            let mut seen = HashSet::new();
+            to_look.retain(|id| seen.insert(*id));
+        }
         for id in to_look.drain(..) {
             if !self.plant.tree.is_alive(id) {
                 continue;
@@ -100,7 +122,7 @@ impl Simulation<'_> {
     }
 
     /// Gives a module its rule and opens it.
-    fn take_up(&mut self, id: ModuleId, rule: usize, context: &[ModuleId]) {
+    pub(super) fn take_up(&mut self, id: ModuleId, rule: usize, context: &Around) {
         let compiled = &self.model.rules[rule];
         self.plant.materialise(id, self.now);
         let now = self.now;
@@ -129,7 +151,7 @@ impl Simulation<'_> {
             self.coupled.loosened.extend_from_slice(&state.context);
         }
         state.rule = Some(rule);
-        state.context = SmallVec::from_slice(context);
+        state.context = context.clone();
         state.solve = None;
         state.signs = signs;
         state.switches.clear();
@@ -150,13 +172,7 @@ impl Simulation<'_> {
 
     /// Collects the context that a rule asks for, in the order of the rule's variables; false if it is
     /// not there. `lasting` says that the module goes on looking at what it has found.
-    pub(super) fn context(
-        &mut self,
-        id: ModuleId,
-        rule: &Rule,
-        lasting: bool,
-        out: &mut SmallVec<[ModuleId; 2]>,
-    ) -> bool {
+    pub(super) fn context(&mut self, id: ModuleId, rule: &Rule, lasting: bool, out: &mut Around) -> bool {
         out.clear();
         let skipped = |kind| self.model.kinds.get(kind).skipped;
         let (tree, neighbours) = (&self.plant.tree, &mut self.neighbours);
@@ -178,26 +194,102 @@ impl Simulation<'_> {
             return false;
         }
         at = id;
-        if !rule.right.iter().all(|pattern| look(&mut at, pattern, false)) {
+        if rule.right_shape.iter().all(|turn| *turn == Turn::Module) {
+            if !rule.right.iter().all(|pattern| look(&mut at, pattern, false)) {
+                return false;
+            }
+        } else if self.follow((id, lasting), id, &rule.right_shape, &mut rule.right.iter(), out).is_none() {
             return false;
         }
-        out[..rule.left.len()].reverse();
+        out.reverse(rule.left.len());
+        if !rule.aggregates.is_empty() {
+            self.attached_to((id, lasting), id);
+            let tree = &self.plant.tree;
+            for aggregate in &rule.aggregates {
+                let matching = |child: &&ModuleId| aggregate.pattern.matches(tree.kind(**child));
+                out.push_children(self.attached.iter().filter(matching).copied());
+            }
+        }
         true
+    }
+
+    /// Finds the modules attached to one, and notes, if that is to last, that somebody has looked at them. Tells whether the last is on its
+    /// axis.
+    fn attached_to(&mut self, (looker, lasting): (ModuleId, bool), id: ModuleId) -> bool {
+        let (tree, neighbours) = (&self.plant.tree, &mut self.neighbours);
+        self.attached.clear();
+        let on_axis = tree.children(id, |kind| self.model.kinds.get(kind).skipped, &mut self.attached);
+        for child in self.attached.iter().filter(|_| lasting) {
+            neighbours.note(tree, looker, *child);
+        }
+        on_axis
+    }
+
+    /// Collects a right context with branches, as seen from a module: each branch stands for the first one, after those
+    /// before it, that begins with what is written. None if it is not there. No deeper than brackets in a text.
+    fn follow(
+        &mut self,
+        looker: (ModuleId, bool),
+        from: ModuleId,
+        shape: &[Turn],
+        patterns: &mut std::slice::Iter<Pattern>,
+        out: &mut Around,
+    ) -> Option<()> {
+        let mut on_axis = self.attached_to(looker, from);
+        let mut around = self.attached.clone();
+        let mut next_branch = 0;
+        let mut turns = 0;
+        while turns < shape.len() {
+            if shape[turns] == Turn::Module {
+                let next = around.last().copied().filter(|_| on_axis)?;
+                let pattern = patterns.next()?;
+                if !pattern.matches(self.plant.tree.kind(next)) {
+                    return None;
+                }
+                out.push(next);
+                turns += 1;
+                if turns < shape.len() {
+                    on_axis = self.attached_to(looker, next);
+                    around = self.attached.clone();
+                    next_branch = 0;
+                }
+                continue;
+            }
+            let inside = &shape[turns + 1..turns + closing(&shape[turns..])];
+            let branches = around.len() - usize::from(on_axis);
+            let known = out.context().len();
+            let found = (next_branch..branches).find_map(|branch| {
+                let mut inner = patterns.clone();
+                let first = inner.next()?;
+                out.truncate(known);
+                if !first.matches(self.plant.tree.kind(around[branch])) {
+                    return None;
+                }
+                out.push(around[branch]);
+                self.follow(looker, around[branch], &inside[1..], &mut inner, out)?;
+                Some((branch, inner))
+            });
+            let (branch, inner) = found?;
+            next_branch = branch + 1;
+            *patterns = inner;
+            turns += inside.len() + 2;
+        }
+        Some(())
     }
 
     /// The signs of a rule's atoms by the values of now, and whether all are far from zero. `followed` are the signs
     /// that the module was followed with.
-    fn signs_of_values(
+    pub(super) fn signs_of_values(
         &mut self,
         id: ModuleId,
         rule: &Rule,
-        context: &[ModuleId],
+        context: &Around,
         followed: Option<Signs>,
     ) -> (Signs, bool) {
         if rule.atoms.is_empty() {
             return (Signs::new(), true);
         }
-        self.plant.variables(id, context, self.now, &mut self.variables);
+        self.plant.variables(rule, id, context, self.now, &mut self.variables);
         let mut out: SmallVec<[f64; 16]> = smallvec::smallvec![0.0; rule.sides.outputs()];
         rule.sides.eval(&self.variables, &mut self.scratch, &mut out);
         let scale = self.plant.tree.parameters(id).iter().fold(1.0, |m: f64, x| m.max(x.abs()));

@@ -21,19 +21,57 @@
 //! neighbours keeps a clock of its own. Equations are integrated as if their `if`s did not exist: within a step every
 //! condition inside them is frozen, and its change is an event. So the methods keep their order at the end of a
 //! growth function, and a discontinuous rate costs no accuracy.
+//!
+//! # Examples
+//!
+//! What happens, and when: the productions of a cell that grows by the logistic equation and divides at half its limit.
+//!
+//! ```
+//! use dlsys::session::Session;
+//! use dlsys::sim::Settings;
+//!
+//! let text = "initial string: C(0.25)\nC(x): if x < 0.5 solve dx/dt = x*(1 - x)\n if x = 0.5 produce C(x/2) C(x/2)";
+//! let session = Session::from_text("cells.dls", text, &[]).expect("a good model");
+//! let settings = Settings { tolerance: 1e-9, log: true, ..Settings::default() };
+//! let mut simulation = session.simulate(settings).expect("it starts");
+//! let mut string = Default::default();
+//! simulation.at(3.0, &mut string).expect("it runs");
+//! let events = simulation.take_events();
+//! // The logistic goes from 1/4 to 1/2 in ln 3 units of time.
+//! assert_eq!((events.len(), string.len()), (3, 4));
+//! assert!((events[0].time - 3f64.ln()).abs() < 1e-9 && (events[2].time - 9f64.ln()).abs() < 1e-9);
+//! ```
+//!
+//! A run that goes wrong says where, and what to try:
+//!
+//! ```
+//! # use dlsys::session::Session;
+//! let session = Session::from_text("cell.dls", "initial string: C(1)\nC(x): if x < 2 solve dx/dt = 1", &[]).unwrap();
+//! let mut simulation = session.simulate(Default::default()).expect("it starts");
+//! let error = simulation.at(5.0, &mut Default::default()).expect_err("nothing is said of x = 2");
+//! let message = error.diagnostic().render(&session.source, false);
+//! assert!(message.starts_with("error: C(2) left its domain at t = 1"));
+//! assert!(message.contains("`if x = 2 produce C_end(x)`"));
+//! ```
 
 mod access;
 mod agenda;
+mod algebra;
+mod around;
+mod blend;
 mod career;
 mod chance;
 mod choose;
+mod consistent;
 mod coupled;
 mod course;
 mod cut;
 mod dense;
 mod derive;
+mod equations;
 mod error;
 mod event;
+mod gather;
 mod implicit;
 mod inspect;
 mod integrator;
@@ -64,7 +102,7 @@ mod transition;
 mod watch;
 
 pub use access::Passed;
-pub use error::{Error, Site};
+pub use error::{Error, Site, Unsolved};
 pub use event::Event;
 pub use inspect::{Inspection, Seen};
 pub use settle::MAX_ROUNDS;

@@ -15,6 +15,9 @@ use super::simulation::Simulation;
 use crate::model::{KindId, Successor};
 use crate::structure::{ModuleId, Tree};
 
+/// A module with more neighbours than this is taken to read all that it has looked at.
+const MANY: usize = 32;
+
 /// A neighbour, as far as it is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Link {
@@ -220,7 +223,9 @@ impl Simulation<'_> {
         for &looker in self.neighbours.lookers(id) {
             let Some(state) = self.plant.state(looker) else { continue };
             let reads = |rule: usize| self.model.rules[rule].reads_context;
-            if state.context.contains(&id) && state.rule.is_some_and(reads) {
+            // Who has looked at many has looked at children, and reads them.
+            let sees = state.context.len() > MANY || state.context.contains(&id);
+            if sees && state.rule.is_some_and(reads) {
                 each(looker, &state.context);
             }
         }

@@ -43,6 +43,7 @@ struct Row {
 impl Simulation<'_> {
     /// Writes the structure into a string.
     pub(super) fn observe(&mut self, t: f64, now: Instant, out: &mut ModuleString) -> Result<(), Error> {
+        self.refresh(now)?;
         let mut gallery = std::mem::take(&mut self.gallery);
         let version = Version { source: self.source, structure: self.structure };
         let again = gallery.version == Some(version) && out.version() == Some(version);

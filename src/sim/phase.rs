@@ -2,7 +2,7 @@
 
 use super::dense::Dense;
 use super::error::Error;
-use super::motion::{Driven, Flow, Motion, Pace, Riccati, Terms};
+use super::motion::{Driven, Flow, Function, Motion, Pace, Riccati, Terms};
 use super::plant::{Path, Plant};
 use super::queue::Who;
 use super::simulation::Simulation;
@@ -33,7 +33,7 @@ impl Simulation<'_> {
                 self.start_motions(id, self.forced);
             }
         }
-        if self.looks_around {
+        if self.looks_around || self.algebra.any {
             self.note_resting(&opened);
             self.couple(&opened)?;
         }
@@ -58,7 +58,7 @@ impl Simulation<'_> {
             self.set_motions(id, false, &[]);
             return;
         };
-        if solve.of.is_empty() {
+        if solve.of.is_empty() && solve.algebraic.is_empty() {
             self.set_motions(id, false, &[]);
             return;
         }
@@ -70,10 +70,12 @@ impl Simulation<'_> {
             for (component, &parameter) in solve.of.iter().enumerate() {
                 motions[parameter] = Motion::Step(component as u32);
             }
+            self.solved(solve, true, &mut motions);
         } else {
-            self.plant.variables(id, &state.context, self.now, &mut self.variables);
+            self.plant.variables(rule, id, &state.context, self.now, &mut self.variables);
             self.variables.extend(state.switches.iter().map(|&on| f64::from(u8::from(on))));
-            refused = !self.formulas(solve, rule.time_variable(), &mut motions);
+            refused = !self.formulas(solve, rule.time_variable(), &mut motions)
+                || !self.functions(solve, rule.time_variable(), &mut motions);
         }
         if refused {
             self.motions = motions;
@@ -146,6 +148,33 @@ impl Simulation<'_> {
             None => None,
         };
         Some(Motion::Driven(Box::new(Driven::new(flow, pace))))
+    }
+
+    /// The motions of explicit parameters that are formulas, and components for those that are solved for.
+    fn functions(&mut self, solve: &Solve, time: usize, motions: &mut [Motion]) -> bool {
+        let algebraic = &solve.algebraic;
+        for (place, &parameter) in algebraic.of.iter().enumerate() {
+            if !algebraic.closed[place] {
+                continue;
+            }
+            let program = &algebraic.formulas[place];
+            let moves = |v: &usize| *v < motions.len() && !matches!(motions[*v], Motion::Rest);
+            let moving = program.reads().into_iter().filter(moves).map(|v| (v, motions[v].clone())).collect();
+            let Some(function) = Function::new(program, &self.variables, moving, time) else { return false };
+            motions[parameter] = Motion::Function(Box::new(function));
+        }
+        self.solved(solve, false, motions);
+        true
+    }
+
+    /// Components for the algebraic parameters that are solved for, after those that are integrated.
+    fn solved(&self, solve: &Solve, forced: bool, motions: &mut [Motion]) {
+        let algebraic = &solve.algebraic;
+        let first = if forced { solve.of.len() } else { solve.numeric.len() };
+        let places = (0..algebraic.of.len()).filter(|place| algebraic.is_solved(*place, forced));
+        for (component, place) in (first..).zip(places) {
+            motions[algebraic.of[place]] = Motion::Step(component as u32);
+        }
     }
 
     /// The motions that are sums, those that others depend on first.
@@ -236,7 +265,7 @@ impl Simulation<'_> {
         let model = self.model;
         let state = self.plant.state(id)?;
         let rule = &model.rules[state.rule?];
-        self.plant.variables(id, &state.context, at, &mut self.variables);
+        self.plant.variables(rule, id, &state.context, at, &mut self.variables);
         let mut sides = vec![0.0; rule.sides.outputs()];
         rule.sides.eval(&self.variables, &mut self.scratch, &mut sides);
         let near = |atom: &usize| {

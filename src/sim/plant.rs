@@ -1,5 +1,6 @@
 //! The modules and how they move: values at any instant, and along a stretch of time.
 
+use super::around::{Around, gather};
 use super::career::Careers;
 use super::course::{Course, Piece};
 use super::motion::Motion;
@@ -112,14 +113,21 @@ impl Plant {
         }
     }
 
-    /// The variables of a rule at an instant: parameters, those of the context, `t` and `age`.
-    pub fn variables(&self, id: ModuleId, context: &[ModuleId], at: Instant, out: &mut Vec<f64>) {
+    /// The variables of a rule at an instant: parameters, those of the context, aggregates, `t` and `age`.
+    pub fn variables(&self, rule: &Rule, id: ModuleId, around: &Around, at: Instant, out: &mut Vec<f64>) {
         out.clear();
         self.values(id, at, out);
-        for module in context {
+        for module in around.context() {
             self.values(*module, at, out);
         }
-        out.extend([at.to_f64(), at.since(self.tree.birth(id))]);
+        let time = [at.to_f64(), at.since(self.tree.birth(id))];
+        if rule.aggregates.is_empty() {
+            out.resize(rule.variables - 2, 0.0);
+            out.extend(time);
+            return;
+        }
+        let values = |child, out: &mut Vec<f64>| self.values(child, at, out);
+        gather(rule, around, time, out, &mut Vec::new(), |_| true, values);
     }
 }
 
@@ -155,7 +163,7 @@ impl<'p> Path<'p> {
 
     /// Gives each variable that conditions read to one of three functions: values that rest, pieces of dense output, and formulas
     /// with their start value and the time since it.
-    fn each<T>(
+    fn each<T: Value>(
         &self,
         out: &mut Vec<T>,
         rest: impl Fn(f64) -> T,
@@ -165,17 +173,14 @@ impl<'p> Path<'p> {
     ) {
         out.clear();
         let watched = &self.rule.watched;
-        for &id in std::iter::once(&self.state.id).chain(&self.state.context) {
+        let append = |id: ModuleId, reads: &dyn Fn(usize) -> bool, out: &mut Vec<T>| {
             let values = self.plant.tree.parameters(id);
-            let reads = |i: usize| watched[i];
             if !(out.len()..out.len() + values.len()).any(reads) {
                 // Any value will do.
-                out.extend(values.iter().map(|x| rest(*x)));
-                continue;
+                return out.extend(values.iter().map(|x| rest(*x)));
             }
             let Some(state) = self.plant.state(id).filter(|s| !s.motions.is_empty()) else {
-                out.extend(values.iter().map(|x| rest(*x)));
-                continue;
+                return out.extend(values.iter().map(|x| rest(*x)));
             };
             let offset = self.start.since(state.since);
             for (&x, motion) in values.iter().zip(&state.motions) {
@@ -190,14 +195,23 @@ impl<'p> Path<'p> {
                     motion => formula(motion, x, offset),
                 });
             }
+        };
+        for &id in std::iter::once(&self.state.id).chain(self.state.context.context()) {
+            append(id, &|i| watched[i], out);
         }
-        out.push(time(self.start.to_f64()));
-        out.push(time(self.age));
+        let times = [time(self.start.to_f64()), time(self.age)];
+        if self.rule.aggregates.is_empty() {
+            out.resize(self.rule.variables - 2, T::constant(0.0));
+            out.extend(times);
+            return;
+        }
+        let child = |id, out: &mut Vec<T>| append(id, &|_| true, out);
+        gather(self.rule, &self.state.context, times, out, &mut Vec::new(), |i| watched[i], child);
     }
 
     /// All variables at the start.
     pub fn start(&self, out: &mut Vec<f64>) {
-        self.plant.variables(self.state.id, &self.state.context, self.start, out);
+        self.plant.variables(self.rule, self.state.id, &self.state.context, self.start, out);
     }
 
     pub fn at(&self, position: f64, out: &mut Vec<f64>) {

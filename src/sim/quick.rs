@@ -6,6 +6,7 @@
 
 use smallvec::SmallVec;
 
+use super::around::Around;
 use super::lookup::{NEAR, sign_at_birth};
 use super::motion::Motion;
 use super::queue::Who;
@@ -55,13 +56,15 @@ pub(super) struct Meeting {
 impl Simulation<'_> {
     /// Begins the life of a module whose kind has no contexts; false if that takes more than is done here.
     pub(super) fn begin_quickly(&mut self, id: ModuleId, index: usize) -> bool {
-        if self.forced || !self.quick {
+        // What has a value or an equation must be made consistent first.
+        if self.forced || !self.quick || self.model.rules[index].is_algebraic() {
             return false;
         }
         if self.plant.careers.rule(self.plant.tree.kind(id)).is_some() {
             return self.begin_lightly(id, index);
         }
-        self.plant.variables(id, &[], self.now, &mut self.variables);
+        let around = Around::default();
+        self.plant.variables(&self.model.rules[index], id, &around, self.now, &mut self.variables);
         let Some(Outlook::Lives(outlook)) = self.outlook(&self.model.rules[index]) else { return false };
         let who = Who::Module(id.slot() as u32);
         let event = outlook.first.event;

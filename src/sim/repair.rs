@@ -20,12 +20,13 @@
 use super::coupled::integrated;
 use super::course::Course;
 use super::dense::Dense;
+use super::equations::Equations;
 use super::integrator::{INNER_TOLERANCE, Integrator};
 use super::motion::Motion;
 use super::queue::Who;
 use super::simulation::Simulation;
 use super::state::{Control, Next};
-use super::system::{Equations, System};
+use super::system::System;
 use crate::structure::{Instant, ModuleId};
 
 /// What repairs have learnt, and their memory.
@@ -56,6 +57,11 @@ const MAX_RINGS: usize = 64;
 const MAX_STEPS: usize = 64;
 /// A region of more than this part of all modules is no region.
 const MOST: f64 = 0.5;
+
+/// What flows along branches is to be conserved whatever the tolerance: what the edge of a region sends to the outside,
+/// the outside gets only as it was before. In models that add up over branches no more than this may be neglected, for
+/// its size.
+const CONSERVED: f64 = 1e-11;
 
 const NOT_HERE: u32 = u32::MAX;
 
@@ -211,7 +217,12 @@ impl Simulation<'_> {
             let stats = &mut self.stats;
             let step = integrator.step(&self.coupled_settings, control, &mut equations, &y, from, end, stats);
             from = step.ok()?;
-            stretches.push(integrator.dense(&mut equations, &y));
+            if system.algebra.is_empty() {
+                stretches.push(integrator.dense(&mut equations, &y));
+            } else {
+                stretches
+                    .extend(integrator.blended(&mut equations, &y, &self.coupled_settings, control).ok()?);
+            }
             integrator.advance(&mut y);
             system.advance(from);
         }
@@ -222,6 +233,7 @@ impl Simulation<'_> {
     fn reach(&self, region: &Region, trial: &Trial) -> usize {
         let Some(course) = &self.plant.coupled else { return 0 };
         let tolerance = INNER_TOLERANCE * self.coupled_settings.tolerance;
+        let tolerance = if self.gathers { tolerance.min(CONSERVED) } else { tolerance };
         let changes = |component: u32, number: usize| {
             trial.stretches.iter().any(|dense| {
                 [0.5, 1.0].into_iter().any(|position| {

@@ -17,6 +17,17 @@ pub trait Rates {
 
     /// Number of modules whose equations one evaluation evaluates.
     fn modules(&self) -> u64;
+
+    /// The error of what is solved for along with the components, in units of what is tolerated, given the components at
+    /// `tau` and their errors.
+    fn algebraic_error(&mut self, _tau: f64, _end: &[f64], _errors: &[f64], _tolerance: f64) -> f64 {
+        0.0
+    }
+
+    /// True if there is something that is solved for along with the components.
+    fn is_algebraic(&self) -> bool {
+        false
+    }
 }
 
 /// Errors below the tolerated part of this are none, whatever they are errors of.
@@ -170,7 +181,11 @@ impl Workspace {
                         self.end.copy_from_slice(&self.stage);
                     }
                 }
-                let (error, rounding) = self.error(tableau, y, h, tolerance);
+                let (mut error, rounding) = self.error(tableau, y, h, tolerance);
+                if system.is_algebraic() {
+                    let errors: Vec<f64> = (0..y.len()).map(|j| self.estimate(tableau, h, j)).collect();
+                    error = error.max(system.algebraic_error(h, &self.end, &errors, tolerance));
+                }
                 self.finite(error, rounding, tableau.stages - 1)
             }
         }
@@ -246,6 +261,15 @@ impl Workspace {
             }
         }
         (error, rounding)
+    }
+
+    /// The estimated error of one component at the end of the step, with its sign.
+    fn estimate(&self, tableau: &Tableau, h: f64, component: usize) -> f64 {
+        let high = h * weighed(tableau.e[0], &self.k, component);
+        match tableau.e.get(1) {
+            None => high,
+            Some(low) => dop853_error(high, h * weighed(low, &self.k, component)).copysign(high),
+        }
     }
 
     fn finite(&self, error: f64, rounding: f64, last: usize) -> Trial {

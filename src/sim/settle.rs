@@ -12,8 +12,11 @@
 //! any was replaced; then the string is examined again at the same instant, until nothing holds. Only the modules
 //! that the instant concerns are *open*; the rest go on as they were.
 
+use std::sync::LazyLock;
+
 use smallvec::SmallVec;
 
+use super::around::Around;
 use super::chance;
 use super::error::Error;
 use super::event::Event;
@@ -44,11 +47,13 @@ impl Simulation<'_> {
         self.group += 1;
         self.note_arrivals();
         self.open_resting();
+        self.begin_levelling();
         let mut rounds = 0;
         let mut hurried = false;
         loop {
             if !self.fresh.is_empty() || std::mem::take(&mut self.changed) {
                 self.look_up();
+                self.level(false)?;
             }
             let mut firing = self.judge();
             let mut light = std::mem::take(&mut self.firing_light);
@@ -63,6 +68,10 @@ impl Simulation<'_> {
                 self.choose_equations(&mut hurried, &mut firing)?;
             }
             if firing.is_empty() && light.is_empty() {
+                if self.level(true)? {
+                    (self.firing, self.firing_light) = (firing, light);
+                    continue;
+                }
                 (self.firing, self.firing_light) = (firing, light);
                 break;
             }
@@ -221,6 +230,9 @@ impl Simulation<'_> {
     /// Replaces all modules in parallel: every successor is computed before any is put in.
     fn replace(&mut self, firing: &[Firing], rounds: usize) -> Result<(), Error> {
         let model = self.model;
+        if self.reads_lazily() {
+            self.refresh(self.now)?;
+        }
         self.record(firing);
         let mut all = std::mem::take(&mut self.arguments);
         all.clear();
@@ -228,12 +240,13 @@ impl Simulation<'_> {
         ends.clear();
         let mut contexts = 0;
         for (index, fire) in firing.iter().enumerate() {
-            let clause = &model.rules[fire.rule].produces[fire.produce];
+            let rule = &model.rules[fire.rule];
+            let clause = &rule.produces[fire.produce];
             if clause.is_fault {
                 return Err(Error::NegativeRate { site: self.site(fire) });
             }
-            let context = context_of(model, &self.plant, &self.steps.contexts, fire, &mut contexts);
-            self.plant.variables(fire.id, context, self.now, &mut self.variables);
+            let around = context_of(model, &self.plant, &self.steps.contexts, fire, &mut contexts);
+            self.plant.variables(rule, fire.id, around, self.now, &mut self.variables);
             let lineage = self.plant.tree.lineage(fire.id);
             let (seed, variables, scratch) = (self.seed, &mut self.variables, &mut self.scratch);
             let made = chance::decide(seed, &clause.outcome, clause.key, lineage, variables, scratch)
@@ -293,8 +306,8 @@ impl Simulation<'_> {
         let (mut contexts, model) = (0, self.model);
         for fire in firing {
             let rule = &model.rules[fire.rule];
-            let context = context_of(model, &self.plant, &self.steps.contexts, fire, &mut contexts);
-            self.plant.variables(fire.id, context, self.now, &mut self.variables);
+            let around = context_of(model, &self.plant, &self.steps.contexts, fire, &mut contexts);
+            self.plant.variables(rule, fire.id, around, self.now, &mut self.variables);
             let mut sides: SmallVec<[f64; 16]> = smallvec::smallvec![0.0; rule.sides.outputs()];
             rule.sides.eval(&self.variables, &mut self.scratch, &mut sides);
             let state = self.plant.state(fire.id).filter(|_| !rule.discrete);
@@ -328,18 +341,19 @@ impl Simulation<'_> {
 fn context_of<'c>(
     model: &Model,
     plant: &'c Plant,
-    steps: &'c [ModuleId],
+    steps: &'c [Around],
     fire: &Firing,
     passed: &mut usize,
-) -> &'c [ModuleId] {
-    let rule = &model.rules[fire.rule];
-    if !rule.discrete {
-        return plant.state(fire.id).map_or(&[], |state| &state.context);
+) -> &'c Around {
+    if !model.rules[fire.rule].discrete {
+        return plant.state(fire.id).map_or(&NOBODY, |state| &state.context);
     }
-    let first = *passed;
-    *passed += rule.context_len();
-    &steps[first..*passed]
+    *passed += 1;
+    &steps[*passed - 1]
 }
+
+/// What a module looks at that looks at nobody.
+static NOBODY: LazyLock<Around> = LazyLock::new(Around::default);
 
 /// Empties a list, and gives back its memory if that is much.
 pub(super) fn clear<T>(list: &mut Vec<T>) {

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use super::agenda::Agenda;
 use super::career::Careers;
 use super::chance;
+use super::consistent::Consistency;
 use super::coupled::Coupled;
 use super::derive::Steps;
 use super::error::{Error, Site};
@@ -73,6 +74,10 @@ pub struct Simulation<'m> {
     /// Discrete rules.
     pub(super) steps: Steps,
     pub(super) neighbours: Neighbours,
+    /// Some rule has an aggregate.
+    pub(super) gathers: bool,
+    /// Modules attached to the one that looks.
+    pub(super) attached: Vec<ModuleId>,
     /// Modules whose neighbours have changed.
     pub(super) to_look: Vec<ModuleId>,
     /// What is known of neighbours may be wrong.
@@ -80,6 +85,7 @@ pub struct Simulation<'m> {
     /// Modules that rest on a boundary and have a context: neighbours may move it.
     pub(super) resting: Vec<ModuleId>,
     pub(super) coupled: Coupled,
+    pub(super) algebra: Consistency,
     pub(super) alone: Integrator,
     /// Whose step it made last, and to when.
     pub(super) alone_last: Option<(ModuleId, Instant)>,
@@ -133,10 +139,7 @@ impl<'m> Simulation<'m> {
         let kinds = || model.kinds.iter().map(|(_, kind)| kind);
         let tree =
             Tree::new(kinds().map(|k| k.width() as u32).collect(), kinds().map(|k| k.arity as u32).collect());
-        let has_context = |rule: &usize| {
-            let rule = &model.rules[*rule];
-            !rule.left.is_empty() || !rule.right.is_empty()
-        };
+        let has_context = |rule: &usize| model.rules[*rule].looks_around();
         let kinds_with_context: Vec<bool> =
             model.kinds.iter().map(|(_, kind)| kind.rules.iter().any(has_context)).collect();
         let looks_around = kinds_with_context.contains(&true);
@@ -167,6 +170,9 @@ impl<'m> Simulation<'m> {
             hands_on,
             steps: Steps::new(model),
             neighbours: Neighbours::default(),
+            gathers: model.rules.iter().any(|rule| !rule.aggregates.is_empty()),
+            attached: Vec::new(),
+            algebra: Consistency::new(model),
             to_look: Vec::new(),
             lost: false,
             resting: Vec::new(),

@@ -2,6 +2,7 @@
 
 use smallvec::SmallVec;
 
+use super::around::Around;
 use super::dense::Dense;
 use super::motion::Motion;
 use crate::model::Sign;
@@ -18,7 +19,7 @@ pub struct State {
     pub is_alive: bool,
     /// The rule that applies; None where no rule's context is there.
     pub rule: Option<usize>,
-    pub context: SmallVec<[ModuleId; 2]>,
+    pub context: Around,
     pub solve: Option<usize>,
     /// Conditions inside the active equations.
     pub switches: Switches,
@@ -134,7 +135,7 @@ impl State {
             id,
             is_alive: true,
             rule: None,
-            context: SmallVec::new(),
+            context: Around::default(),
             solve: None,
             switches: SmallVec::new(),
             signs: SmallVec::new(),

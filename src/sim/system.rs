@@ -1,16 +1,20 @@
 //! The equations of the coupled modules between two changes of structure.
 
+use super::algebra::Algebra;
 use super::course::Course;
+use super::gather::Partial;
 use super::motion::Motion;
 use super::plant::Plant;
-use super::runge_kutta::Rates;
-use crate::expr::{LANES, Lanes, Program, Scratch};
-use crate::model::Rule;
+use crate::expr::{LANES, Lanes};
+use crate::model::{Rule, Solve};
 use crate::structure::{Instant, ModuleId};
 use smallvec::SmallVec;
 
 /// Rule, clause and whether all is integrated, and the rows for which that is so.
 type Batch = ((usize, usize, bool), SmallVec<[u32; 16]>);
+
+/// A rule and one of its aggregates.
+type Term = (usize, usize);
 
 /// Where a variable of a rule comes from.
 #[derive(Clone, Copy, Debug)]
@@ -23,6 +27,8 @@ pub enum Source {
     Formula(u32),
     /// A component of the coupled modules that is no unknown here: it is known already how it moves.
     Input(u32),
+    /// An aggregate.
+    Sum(u32),
 }
 
 /// The equations of the coupled modules.
@@ -31,10 +37,18 @@ pub struct System {
     pub rows: Vec<Row>,
     pub sources: Vec<Source>,
     pub formulas: Vec<Formula>,
+    /// Aggregates, and what their children are.
+    pub sums: Vec<Sum>,
+    pub children: Vec<Source>,
+    /// Numbers of aggregates with their children, as many as are worked on together, by rule and number of the aggregate.
+    pub folds: Vec<(Term, Vec<(u32, u32)>)>,
+    pub algebra: Algebra,
+    /// Of each algebraic component of each row: its place among the algebraic parameters of the clause.
+    given: Vec<u32>,
     /// Components of the coupled modules that are read.
     inputs: Vec<u32>,
-    chunks: Vec<Chunk>,
-    switches: Vec<f64>,
+    pub chunks: Vec<Chunk>,
+    pub switches: Vec<f64>,
     /// Place in the tree's values, and owner with its parameter, of each component.
     pub places: Vec<(usize, ModuleId, usize)>,
     pub start: Instant,
@@ -61,35 +75,52 @@ pub struct Row {
     first_switch: usize,
     switches: usize,
     pub first_rate: usize,
+    /// Components that are integrated; after them come those that are solved for.
+    pub rates: usize,
+    pub algebraic: usize,
+    first_given: usize,
     birth: Instant,
-    age: f64,
+    pub age: f64,
+}
+
+/// An aggregate of a row.
+#[derive(Clone, Copy, Debug)]
+pub struct Sum {
+    pub row: u32,
+    /// Number among the aggregates of the rule.
+    pub aggregate: usize,
+    /// Where the parameters of the children begin, one child after another.
+    pub first: usize,
+    pub count: usize,
 }
 
 /// Rows that are evaluated at once: at most [`LANES`], with the same program.
 #[derive(Clone, Debug)]
-struct Chunk {
-    rows: Vec<u32>,
+pub struct Chunk {
+    pub rows: Vec<u32>,
     /// Registers of the rule's variables.
-    registers: usize,
+    pub registers: usize,
     /// What the program reads, and from where.
-    columns: Vec<(usize, Column)>,
+    pub columns: Vec<(usize, Column)>,
     /// Places of the first rate of each row.
-    rates: Places,
+    pub rates: Places,
 }
 
 /// One variable of all rows of a chunk.
 #[derive(Clone, Debug)]
-enum Column {
+pub enum Column {
     Time,
     Age,
     Fixed(Vec<f64>),
     State(Places),
+    /// Aggregates, by their numbers.
+    Sum(Vec<u32>),
     Mixed(Vec<Source>),
 }
 
 /// Places in a vector; mostly one after another, because rows stand in string order.
 #[derive(Clone, Debug)]
-enum Places {
+pub enum Places {
     Run { first: usize, count: usize },
     Any(Vec<u32>),
 }
@@ -103,7 +134,7 @@ impl Places {
         }
     }
 
-    fn gather(&self, from: &[f64], to: &mut Lanes) {
+    pub fn gather(&self, from: &[f64], to: &mut Lanes) {
         match self {
             &Places::Run { first, count } => to[..count].copy_from_slice(&from[first..first + count]),
             Places::Any(all) => {
@@ -115,7 +146,7 @@ impl Places {
     }
 
     /// Writes to the places, all moved by `offset`.
-    fn scatter(&self, from: &Lanes, offset: usize, to: &mut [f64]) {
+    pub fn scatter(&self, from: &Lanes, offset: usize, to: &mut [f64]) {
         match self {
             &Places::Run { first, count } => {
                 to[first + offset..first + offset + count].copy_from_slice(&from[..count])
@@ -164,6 +195,9 @@ impl System {
         system.inputs.clear();
         system.switches.clear();
         system.places.clear();
+        system.sums.clear();
+        system.children.clear();
+        system.given.clear();
         let mut values_then = Vec::new();
         for &id in members {
             let state = plant.state(id).expect("members have states");
@@ -182,17 +216,19 @@ impl System {
             let first_rate = system.places.len();
             system.places.extend(own.iter().map(|&(_, parameter)| (first + parameter, id, parameter)));
             let first_source = system.sources.len();
-            for &module in std::iter::once(&id).chain(&state.context) {
+            let compiled = &rules[rule];
+            let mut add = |system: &mut System, module: ModuleId, child: bool| {
                 if frozen && module != id {
                     values_then.clear();
                     plant.values(module, start, &mut values_then);
-                    system.sources.extend(values_then.iter().map(|x| Source::Fixed(*x)));
-                    continue;
+                    let to = if child { &mut system.children } else { &mut system.sources };
+                    to.extend(values_then.iter().map(|x| Source::Fixed(*x)));
+                    return;
                 }
                 let values = plant.tree.parameters(module);
                 let neighbour = plant.state(module).filter(|s| !s.motions.is_empty());
                 for (i, &x) in values.iter().enumerate() {
-                    system.sources.push(match neighbour.map(|s| (&s.motions[i], s.since)) {
+                    let source = match neighbour.map(|s| (&s.motions[i], s.since)) {
                         None | Some((Motion::Rest | Motion::Step(_), _)) => Source::Fixed(x),
                         Some((Motion::Coupled(c), _)) => match unknown(*c) {
                             Some(number) => Source::State(number),
@@ -206,9 +242,24 @@ impl System {
                             system.formulas.push(Formula { motion: motion.clone(), x, since, offset });
                             Source::Formula(system.formulas.len() as u32 - 1)
                         }
-                    });
+                    };
+                    if child { system.children.push(source) } else { system.sources.push(source) }
                 }
+            };
+            for &module in std::iter::once(&id).chain(state.context.context()) {
+                add(system, module, false);
             }
+            let row = system.rows.len() as u32;
+            for aggregate in 0..compiled.aggregates.len() {
+                let children = state.context.children(aggregate);
+                let first = system.children.len();
+                children.iter().for_each(|child| add(system, *child, true));
+                system.sums.push(Sum { row, aggregate, first, count: children.len() });
+                system.sources.push(Source::Sum(system.sums.len() as u32 - 1));
+            }
+            system.sources.resize(first_source + compiled.variables - 2, Source::Fixed(0.0));
+            let clause = &rules[rule].solves[solve];
+            let integrated = rates(clause, state.forced);
             let first_switch = system.switches.len();
             system.switches.extend(state.switches.iter().map(|&on| f64::from(u8::from(on))));
             let birth = plant.tree.birth(id);
@@ -221,17 +272,70 @@ impl System {
                 first_switch,
                 switches: system.switches.len() - first_switch,
                 first_rate,
+                rates: integrated,
+                algebraic: own.len() - integrated,
+                first_given: system.given.len(),
                 birth,
                 age: start.since(birth),
             });
+            let solved = |place: &usize| clause.algebraic.is_solved(*place, state.forced);
+            let given = (0..clause.algebraic.of.len()).filter(solved);
+            system.given.extend(given.map(|place| place as u32));
         }
-        system.batch(rules);
+        system.finish(rules);
+    }
+
+    /// A system without rows.
+    pub fn at(start: Instant) -> System {
+        System { start, ..System::default() }
+    }
+
+    /// Completes a system of rows.
+    pub fn finish(&mut self, rules: &[Rule]) {
+        self.algebra = Algebra::new(self, rules);
+        self.put_together();
+        self.batch(rules);
+    }
+
+    /// Adds the equations of algebraic parameters of a module alone, of which are given their first component and their
+    /// places. The sources of the row, and the children, have been added.
+    pub fn push_instant(
+        &mut self,
+        (rule, solve): (usize, usize),
+        (first_source, sources): (usize, usize),
+        switches: impl Iterator<Item = f64>,
+        (first_rate, given): (usize, &[u32]),
+        birth: Instant,
+    ) {
+        let first_switch = self.switches.len();
+        self.switches.extend(switches);
+        self.rows.push(Row {
+            rule,
+            solve,
+            forced: false,
+            first_source,
+            sources,
+            first_switch,
+            switches: self.switches.len() - first_switch,
+            first_rate,
+            rates: 0,
+            algebraic: given.len(),
+            first_given: self.given.len(),
+            birth,
+            age: self.start.since(birth),
+        });
+        self.given.extend_from_slice(given);
+    }
+
+    /// The place of each algebraic component of a row among the algebraic parameters of its clause.
+    pub fn given(&self, row: &Row) -> &[u32] {
+        &self.given[row.first_given..row.first_given + row.algebraic]
     }
 
     /// Puts rows with the same program together, a chunk of them for each evaluation.
     fn batch(&mut self, rules: &[Rule]) {
         let mut batches: SmallVec<[Batch; 4]> = SmallVec::new();
-        for (n, row) in self.rows.iter().enumerate() {
+        for (n, row) in self.rows.iter().enumerate().filter(|(_, row)| row.rates > 0) {
             let key = (row.rule, row.solve, row.forced);
             match batches.iter_mut().find(|(k, _)| *k == key) {
                 Some((_, rows)) => rows.push(n as u32),
@@ -242,7 +346,7 @@ impl System {
         chunks.clear();
         for (_, rows) in &batches {
             let first = &self.rows[rows[0] as usize];
-            let program = program(rules, first);
+            let program = super::equations::program(rules, first);
             let reads = program.reads();
             for rows in rows.chunks(LANES) {
                 let columns = reads.iter().map(|&variable| (variable, self.column(rows, variable))).collect();
@@ -281,6 +385,13 @@ impl System {
         if let Some(components) = all.iter().map(state).collect() {
             return Column::State(Places::new(components));
         }
+        let sum = |source: &Source| match source {
+            Source::Sum(number) => Some(*number),
+            _ => None,
+        };
+        if let Some(sums) = all.iter().map(sum).collect() {
+            return Column::Sum(sums);
+        }
         match all.iter().map(fixed).collect() {
             Some(values) => Column::Fixed(values),
             None => Column::Mixed(all),
@@ -288,7 +399,7 @@ impl System {
     }
 
     /// What the components that are read are at a time after the start; NaN where that is not known.
-    fn read(&self, course: Option<&Course>, tau: f64, out: &mut Vec<f64>) {
+    pub fn read(&self, course: Option<&Course>, tau: f64, out: &mut Vec<f64>) {
         out.clear();
         if !self.inputs.is_empty() {
             let at = self.start.after(tau);
@@ -297,8 +408,10 @@ impl System {
         }
     }
 
-    fn value(&self, source: Source, tau: f64, y: &[f64], inputs: &[f64]) -> f64 {
+    /// What a source is; an aggregate is none.
+    pub fn value(&self, source: Source, tau: f64, y: &[f64], inputs: &[f64]) -> f64 {
         match source {
+            Source::Sum(_) => 0.0,
             Source::Input(i) => inputs[i as usize],
             Source::Fixed(x) => x,
             Source::State(component) => y[component as usize],
@@ -307,6 +420,11 @@ impl System {
                 x + motion.value(offset + tau)
             }
         }
+    }
+
+    /// `t`, or the age of a row's module.
+    pub fn time(&self, row: &Row, which: usize, tau: f64) -> f64 {
+        if which == 0 { self.start.to_f64() + tau } else { row.age + tau }
     }
 
     /// Moves the start of the step.
@@ -321,33 +439,36 @@ impl System {
     }
 
     /// The variables of a row's rule, `inputs` being what it reads besides.
-    pub fn variables(&self, row: &Row, tau: f64, y: &[f64], inputs: &[f64], out: &mut Vec<f64>) {
+    pub fn variables(
+        &self,
+        rules: &[Rule],
+        row: &Row,
+        tau: f64,
+        y: &[f64],
+        inputs: &[f64],
+        out: &mut Vec<f64>,
+    ) {
         out.clear();
         let sources = &self.sources[row.first_source..row.first_source + row.sources];
         out.extend(sources.iter().map(|source| self.value(*source, tau, y, inputs)));
         out.extend([self.start.to_f64() + tau, row.age + tau]);
+        self.gather(rules, row, tau, y, inputs, out);
         out.extend_from_slice(&self.switches[row.first_switch..row.first_switch + row.switches]);
     }
 
-    /// Row, column and entry in the clause's Jacobian, of each partial derivative of one module's rates.
-    fn row_partials<'s>(
-        &'s self,
-        rules: &'s [Rule],
-        row: &'s Row,
-    ) -> impl Iterator<Item = (u32, u32, usize)> + 's {
+    /// Calls a function with each partial derivative of one module's rates by a component that is integrated.
+    pub fn row_partials(&self, rules: &[Rule], row: &Row, mut each: impl FnMut(u32, Partial)) {
         let solve = &rules[row.rule].solves[row.solve];
-        (solve.jacobian.entries.iter().enumerate()).filter_map(move |(entry, &(position, variable))| {
+        self.visit_partials(rules, row, &solve.jacobian, |partial| {
+            let position = solve.jacobian.entries[partial.entry].0;
             let rate =
                 if row.forced { Some(position) } else { solve.numeric.iter().position(|p| *p == position) };
-            match self.sources[row.first_source + variable] {
-                Source::State(column) => Some(((row.first_rate + rate?) as u32, column, entry)),
-                _ => None,
+            if let Some(rate) = rate
+                && !self.algebra.is_solved(partial.component)
+            {
+                each((row.first_rate + rate) as u32, partial);
             }
-        })
-    }
-
-    fn partials<'s>(&'s self, rules: &'s [Rule]) -> impl Iterator<Item = (u32, u32, usize)> + 's {
-        self.rows.iter().flat_map(|row| self.row_partials(rules, row))
+        });
     }
 
     /// The module, and its parameter, that a component belongs to.
@@ -356,90 +477,7 @@ impl System {
     }
 }
 
-/// The code of a row's rates.
-fn program<'s>(rules: &'s [Rule], row: &Row) -> &'s Program {
-    let solve = &rules[row.rule].solves[row.solve];
-    if row.forced { &solve.rates } else { &solve.numeric_rates }
-}
-
-/// The right-hand side of a [`System`].
-pub struct Equations<'s> {
-    system: &'s System,
-    rules: &'s [Rule],
-    /// How the components move that are inputs.
-    course: Option<&'s Course>,
-    inputs: Vec<f64>,
-    variables: Vec<f64>,
-    scratch: Scratch<f64>,
-    registers: Vec<Lanes>,
-}
-
-impl<'s> Equations<'s> {
-    pub fn new(system: &'s System, rules: &'s [Rule], course: Option<&'s Course>) -> Equations<'s> {
-        let (inputs, variables, scratch, registers) = Default::default();
-        Equations { system, rules, course, inputs, variables, scratch, registers }
-    }
-
-    /// The rates of a few rows that have the same program.
-    fn lanes(&mut self, chunk: &Chunk, tau: f64, y: &[f64], out: &mut [f64]) {
-        let system = self.system;
-        let program = program(self.rules, &system.rows[chunk.rows[0] as usize]);
-        self.registers.resize(chunk.registers, [0.0; LANES]);
-        for (variable, column) in &chunk.columns {
-            let register = &mut self.registers[*variable];
-            match column {
-                Column::Time => *register = [system.start.to_f64() + tau; LANES],
-                Column::Age => {
-                    for (lane, row) in register.iter_mut().zip(&chunk.rows) {
-                        *lane = system.rows[*row as usize].age + tau;
-                    }
-                }
-                Column::Fixed(values) => register[..values.len()].copy_from_slice(values),
-                Column::State(places) => places.gather(y, register),
-                Column::Mixed(sources) => {
-                    for (lane, source) in register.iter_mut().zip(sources) {
-                        *lane = system.value(*source, tau, y, &self.inputs);
-                    }
-                }
-            }
-        }
-        for (output, register) in program.eval_lanes(&mut self.registers).enumerate() {
-            chunk.rates.scatter(&self.registers[register], output, out);
-        }
-    }
-}
-
-impl Rates for Equations<'_> {
-    fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]) {
-        let system = self.system;
-        system.read(self.course, tau, &mut self.inputs);
-        for chunk in &system.chunks {
-            self.lanes(chunk, tau, y, out);
-        }
-    }
-
-    fn couplings(&self) -> Vec<(u32, u32)> {
-        self.system.partials(self.rules).map(|(row, column, _)| (row, column)).collect()
-    }
-
-    fn partials(&mut self, tau: f64, y: &[f64], out: &mut Vec<f64>) {
-        let mut variables = std::mem::take(&mut self.variables);
-        let mut scratch = std::mem::take(&mut self.scratch);
-        let mut values = Vec::new();
-        out.clear();
-        self.system.read(self.course, tau, &mut self.inputs);
-        for row in &self.system.rows {
-            let jacobian = &self.rules[row.rule].solves[row.solve].jacobian;
-            self.system.variables(row, tau, y, &self.inputs, &mut variables);
-            values.resize(jacobian.values.outputs(), 0.0);
-            jacobian.values.eval(&variables, &mut scratch, &mut values);
-            out.extend(self.system.row_partials(self.rules, row).map(|(.., entry)| values[entry]));
-        }
-        self.variables = variables;
-        self.scratch = scratch;
-    }
-
-    fn modules(&self) -> u64 {
-        self.system.rows.len() as u64
-    }
+/// The number of components of a clause that are integrated.
+fn rates(solve: &Solve, forced: bool) -> usize {
+    if forced { solve.of.len() } else { solve.numeric.len() }
 }

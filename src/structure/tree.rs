@@ -432,6 +432,33 @@ impl Tree {
         None
     }
 
+    /// The modules attached to this one, in string order, appended to `out`: the first of each side branch, then the next
+    /// on the same axis, modules of skipped kinds passed over. Also tells whether the last is on the axis.
+    pub fn children(&self, id: ModuleId, skipped: impl Fn(KindId) -> bool, out: &mut Vec<ModuleId>) -> bool {
+        let mut at = self.node(id).after;
+        // The branches that are open.
+        let mut branches: SmallVec<[u32; 8]> = SmallVec::new();
+        loop {
+            if at.ended().is_some() {
+                let Some(branch) = branches.pop() else { return false };
+                at = self.nodes[branch as usize].after;
+                continue;
+            }
+            let node = &self.nodes[at.0 as usize];
+            if node.kind == KindId::OPEN {
+                branches.push(at.0);
+                at = Link(node.first);
+            } else if skipped(node.kind) {
+                at = node.after;
+            } else {
+                out.push(self.id(at.0));
+                // What follows on the axis of this one is attached to it.
+                let Some(branch) = branches.pop() else { return true };
+                at = self.nodes[branch as usize].after;
+            }
+        }
+    }
+
     /// True if a module of a certain kind stands after this one on its axis, or on a branch of that.
     pub fn is_followed(&self, id: ModuleId, wanted: impl Fn(KindId) -> bool) -> bool {
         let mut depth = 0usize;
@@ -503,6 +530,22 @@ mod tests {
         let (kinds, tree) = grown("AB[C[D]E]F", &[(2, "X[Y]"), (0, ""), (0, "PQ")]);
         assert_eq!(show(&kinds, &tree), "PQ[X[Y][D]E]F");
         assert_eq!(tree.len(), 7);
+    }
+
+    #[test]
+    fn children_are_the_first_of_each_branch_and_the_next_on_the_axis() {
+        let children = |text: &str| {
+            let (kinds, tree) = grown(text, &[]);
+            let Some(Visit::Module(first)) = tree.walk().next() else { panic!("a module comes first") };
+            let mut all = Vec::new();
+            let on_axis = tree.children(first, |kind| kinds.get(kind).name == "x", &mut all);
+            let names: String = all.iter().map(|id| kinds.get(tree.kind(*id)).name.clone()).collect();
+            (names, on_axis)
+        };
+        let is = |names: &str, on_axis| (names.to_owned(), on_axis);
+        assert_eq!(children("A[B[C]D][xE[F]][]xG[H]I"), is("BEG", true));
+        assert_eq!(children("A[[B]C][x][[xD]]"), is("BCD", false));
+        assert_eq!(children("A"), is("", false));
     }
 
     #[test]

@@ -6,7 +6,7 @@
 use super::command::Command;
 use super::prepare::prepare;
 use super::walk::{Source, Walk};
-use super::{DEPTH_LIMIT, Error, MODULE_LIMIT, Pose};
+use super::{DEPTH_LIMIT, Error, Fault, MODULE_LIMIT, Pose};
 use crate::model::{KindId, Model};
 use crate::scene::Scene;
 use crate::structure::{Module, ModuleString};
@@ -26,7 +26,7 @@ struct Level<'m> {
 pub(super) fn trace(model: &Model, string: &ModuleString, scene: &mut Scene) -> Result<Pose, Error> {
     let commands = Command::table(model);
     prepare(model, scene);
-    let mut walk = Walk::new(model, scene);
+    let mut walk = Walk::new(model, scene, string.time);
     let mut expander = Expander::new(model, &commands, string);
     for module in string.iter() {
         let source = Source { kind: module.kind, lineage: module.lineage };
@@ -36,6 +36,7 @@ pub(super) fn trace(model: &Model, string: &ModuleString, scene: &mut Scene) -> 
             command => walk.obey(command, module.parameters, module.kind)?,
         }
     }
+    walk.finish();
     Ok(walk.pose())
 }
 
@@ -81,16 +82,17 @@ impl<'a> Expander<'a> {
                 continue;
             };
             let arity = self.model.kinds.get(kind).arity;
+            walk.inside = Some(level.index);
             let from = level.next;
             level.next += arity;
             self.drawn += 1;
             if self.drawn > MODULE_LIMIT {
-                return Err(walk.complain(|name, lineage| Error::TooMany { name, lineage }));
+                return Err(walk.complain(Fault::TooMany));
             }
             match self.commands[kind.index()] {
                 Command::Interpret(index) if !self.levels.iter().any(|level| level.index == index) => {
                     if self.levels.len() >= DEPTH_LIMIT {
-                        return Err(walk.complain(|name, lineage| Error::TooDeep { name, lineage }));
+                        return Err(walk.complain(Fault::TooDeep));
                     }
                     self.variables.clear();
                     self.variables.extend_from_slice(&self.arguments[from..from + arity]);
@@ -104,6 +106,7 @@ impl<'a> Expander<'a> {
                 command => walk.obey(command, &self.arguments[from..from + arity], kind)?,
             }
         }
+        walk.inside = None;
         Ok(())
     }
 

@@ -26,9 +26,25 @@
 //!
 //! A kind with an interpretation is drawn as that says, in place of its own meaning; what the interpretation
 //! does to the turtle stays.
+//!
+//! # Examples
+//!
+//! ```
+//! use dlsys::session::Session;
+//!
+//! let session = Session::from_text("hook.dls", "initial string: F(3) +(90) F(4) @C(7) F(1)", &[]).unwrap();
+//! let mut string = Default::default();
+//! session.simulate(Default::default()).unwrap().at(0.0, &mut string).expect("it runs");
+//! let mut scene = dlsys::turtle::blank(&session.model);
+//! let end = dlsys::turtle::trace(&session.model, &string, &mut scene).expect("it can be drawn").position;
+//! assert!((end.x + 5.0).abs() < 1e-12 && (end.y - 3.0).abs() < 1e-12);
+//! // Nothing is called contour 7: it is drawn as a circle, and said.
+//! assert_eq!(scene.warnings[0].message, "there is no such contour");
+//! ```
 
 mod bend;
 mod command;
+mod error;
 mod frame;
 mod interpret;
 mod patch;
@@ -44,7 +60,8 @@ mod tests;
 
 use crate::model::Model;
 use crate::scene::{Point, Scene, Vector};
-use crate::structure::{Lineage, ModuleString};
+use crate::structure::ModuleString;
+pub use error::{Error, Fault};
 
 /// Most modules that one frame may draw, those that interpretations make included.
 pub const MODULE_LIMIT: usize = 10_000_000;
@@ -52,35 +69,6 @@ pub const MODULE_LIMIT: usize = 10_000_000;
 pub const DEPTH_LIMIT: usize = 100;
 /// Coordinates and sizes beyond this are a mistake of the model.
 pub const COORDINATE_LIMIT: f64 = 1e100;
-
-/// What can go wrong in drawing. Lineages say which module of the string it was.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum Error {
-    #[error("cannot draw `{name}` (module {lineage}): its parameter is {value}")]
-    NotFinite { name: String, lineage: Lineage, value: f64 },
-    #[error(
-        "cannot draw `{name}` (module {lineage}): it goes beyond the greatest coordinate, {COORDINATE_LIMIT:e}"
-    )]
-    TooFar { name: String, lineage: Lineage },
-    #[error(
-        "too much to draw: interpreting `{name}` (module {lineage}) brings the frame to more than {MODULE_LIMIT} modules"
-    )]
-    TooMany { name: String, lineage: Lineage },
-    #[error("interpretations of `{name}` (module {lineage}) are nested more than {DEPTH_LIMIT} deep")]
-    TooDeep { name: String, lineage: Lineage },
-    #[error(
-        "`{name}` (module {lineage}) uses patch {patch}, which is not begun; `@PS({patch})` comes before its points"
-    )]
-    PatchNotBegun { name: String, lineage: Lineage, patch: i64 },
-    #[error("`{name}` (module {lineage}) sets row {row}, column {column} of a patch; both are 0, 1, 2 or 3")]
-    NoControlPoint { name: String, lineage: Lineage, row: f64, column: f64 },
-    #[error(
-        "`{name}` (module {lineage}) draws patch {patch}, which has no control point at (row, column) {missing}"
-    )]
-    PatchIncomplete { name: String, lineage: Lineage, patch: i64, missing: String },
-    #[error("`{name}` (module {lineage}) begins more patches than a frame may have")]
-    TooManyPatches { name: String, lineage: Lineage },
-}
 
 /// Where a turtle stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -98,7 +86,8 @@ pub fn blank(model: &Model) -> Scene {
     scene
 }
 
-/// Draws a string of modules of this model, adding to the scene.
+/// Draws a string of modules of this model, adding to the scene. What is drawn but hardly meant goes to its
+/// [`warnings`](Scene::warnings).
 ///
 /// # Errors
 /// See [`Error`]. The scene then holds what was drawn before.

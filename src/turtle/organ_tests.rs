@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::*;
 use crate::model::{Appearance, Tropism};
 use crate::scene::{Point, Scene, Vector, Width};
+use crate::structure::Lineage;
 
 fn string(model: &mut Model, modules: &[(&str, &[f64])]) -> ModuleString {
     let mut string = ModuleString::default();

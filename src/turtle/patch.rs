@@ -3,9 +3,8 @@
 
 use std::collections::HashMap;
 
-use super::Error;
+use super::Fault;
 use crate::scene::{Net, Point};
-use crate::structure::Lineage;
 
 /// Most numbers of patches that one frame may use.
 const MOST: usize = 1_000_000;
@@ -14,55 +13,42 @@ const MOST: usize = 1_000_000;
 #[derive(Default)]
 pub(super) struct OpenPatches(HashMap<i64, [Option<Point>; 16]>);
 
-/// Makes an error about the present module of its name and lineage.
-type Complain<'c> = &'c dyn Fn(&dyn Fn(String, Lineage) -> Error) -> Error;
-
 impl OpenPatches {
     /// Begins a patch; one of this number that was begun before is forgotten.
-    pub(super) fn begin(&mut self, number: f64, complain: Complain) -> Result<(), Error> {
+    pub(super) fn begin(&mut self, number: f64) -> Result<(), Fault> {
         if self.0.len() >= MOST {
-            return Err(complain(&|name, lineage| Error::TooManyPatches { name, lineage }));
+            return Err(Fault::TooManyPatches);
         }
         self.0.insert(rounded(number), [None; 16]);
         Ok(())
     }
 
     /// Sets a control point.
-    pub(super) fn set(
-        &mut self,
-        [number, row, column]: [f64; 3],
-        point: Point,
-        complain: Complain,
-    ) -> Result<(), Error> {
+    pub(super) fn set(&mut self, [number, row, column]: [f64; 3], point: Point) -> Result<(), Fault> {
         // What was computed may be a rounding away from what was meant, but no more.
         let place = |x: f64| (x - x.round()).abs() < 1e-9 && (0.0..=3.0).contains(&x.round());
         if !place(row) || !place(column) {
-            return Err(complain(&|name, lineage| Error::NoControlPoint { name, lineage, row, column }));
+            return Err(Fault::NoControlPoint { row, column });
         }
         let patch = rounded(number);
         let Some(points) = self.0.get_mut(&patch) else {
-            return Err(complain(&|name, lineage| Error::PatchNotBegun { name, lineage, patch }));
+            return Err(Fault::PatchNotBegun { patch });
         };
         points[row.round() as usize * 4 + column.round() as usize] = Some(point);
         Ok(())
     }
 
     /// The control points of a patch. They stay, so that it can be drawn again.
-    pub(super) fn net(&self, number: f64, complain: Complain) -> Result<Net, Error> {
+    pub(super) fn net(&self, number: f64) -> Result<Net, Fault> {
         let patch = rounded(number);
         let Some(points) = self.0.get(&patch) else {
-            return Err(complain(&|name, lineage| Error::PatchNotBegun { name, lineage, patch }));
+            return Err(Fault::PatchNotBegun { patch });
         };
         let missing: Vec<String> =
             (0..16).filter(|&i| points[i].is_none()).map(|i| format!("({}, {})", i / 4, i % 4)).collect();
         if !missing.is_empty() {
             let missing = missing.join(" ");
-            return Err(complain(&|name, lineage| Error::PatchIncomplete {
-                name,
-                lineage,
-                patch,
-                missing: missing.clone(),
-            }));
+            return Err(Fault::PatchIncomplete { patch, missing });
         }
         let point = |i: usize| points[i].unwrap_or_else(Point::origin);
         Ok([0, 4, 8, 12].map(|row| [0, 1, 2, 3].map(|column| point(row + column))))

@@ -4,9 +4,11 @@ use std::sync::Arc;
 
 use super::bend::Bend;
 use super::command::Command;
+use super::error::{self, Error, Fault, Remark, Remarks};
 use super::frame::{Axis, Frame};
 use super::patch::OpenPatches;
-use super::{COORDINATE_LIMIT, Error, Pose, shapes};
+use super::{COORDINATE_LIMIT, Pose, shapes};
+use crate::diagnostic::Span;
 use crate::model::{KindId, Model};
 use crate::scene::{
     MaterialId, Owner, OwnerId, Patch, Placement, Point, Polygon, Scene, Segment, Shape, Surface, Vector,
@@ -44,14 +46,23 @@ struct State {
     run: usize,
 }
 
+/// A polygon that is open.
+struct Outline {
+    vertices: Vec<Point>,
+    /// How many were made, those in one place with the one before included.
+    made: usize,
+    /// The interpretation and the module that began it.
+    begun: (Option<usize>, Source),
+}
+
 /// A turtle that walks through a string and draws into a scene.
 pub(super) struct Walk<'a> {
     model: &'a Model,
     scene: &'a mut Scene,
     state: State,
     stack: Vec<State>,
-    /// Vertices of the polygons that are open, innermost last.
-    polygons: Vec<Vec<Point>>,
+    /// The polygons that are open, innermost last.
+    polygons: Vec<Outline>,
     patches: OpenPatches,
     /// Direction of the tropism.
     target: Vector,
@@ -60,10 +71,14 @@ pub(super) struct Walk<'a> {
     owner: Option<OwnerId>,
     /// Names of the kinds that have drawn something, shared among their modules.
     names: Vec<Option<Arc<str>>>,
+    /// The interpretation that is being drawn.
+    pub(super) inside: Option<usize>,
+    time: f64,
+    remarks: Remarks,
 }
 
 impl<'a> Walk<'a> {
-    pub(super) fn new(model: &'a Model, scene: &'a mut Scene) -> Walk<'a> {
+    pub(super) fn new(model: &'a Model, scene: &'a mut Scene, time: f64) -> Walk<'a> {
         let tropism = model.appearance.tropism;
         Walk {
             model,
@@ -88,6 +103,9 @@ impl<'a> Walk<'a> {
             source: Source { kind: KindId::OPEN, lineage: Lineage::of_axiom(0) },
             owner: None,
             names: vec![None; model.kinds.len()],
+            inside: None,
+            time,
+            remarks: Remarks::default(),
         }
     }
 
@@ -102,8 +120,29 @@ impl<'a> Walk<'a> {
     }
 
     /// An error about the present source.
-    pub(super) fn complain(&self, error: impl FnOnce(String, Lineage) -> Error) -> Error {
-        error(self.model.kinds.get(self.source.kind).name.clone(), self.source.lineage)
+    pub(super) fn complain(&self, fault: Fault) -> Error {
+        let Source { kind, lineage } = self.source;
+        let name = self.model.kinds.get(kind).name.clone();
+        Error { fault, name, lineage, span: self.written(), time: self.time }
+    }
+
+    /// A warning about the present source.
+    fn remark(&mut self, remark: Remark) {
+        let span = self.written();
+        self.scene.warnings.extend(self.remarks.add(remark, self.model, span, self.time));
+    }
+
+    /// Where the text says how the present source is drawn.
+    fn written(&self) -> Option<Span> {
+        error::place(self.model, self.source.kind, self.source.lineage, self.inside)
+    }
+
+    /// The string is at its end.
+    pub(super) fn finish(&mut self) {
+        if let Some(open) = self.polygons.pop() {
+            (self.inside, self.source) = open.begun;
+            self.remark(Remark::PolygonNotClosed);
+        }
     }
 
     /// Does what a module of this kind says.
@@ -111,7 +150,7 @@ impl<'a> Walk<'a> {
         let read = &parameters[..parameters.len().min(command.parameters())];
         if let Some(&value) = read.iter().find(|value| !value.is_finite()) {
             let name = self.model.kinds.get(kind).name.clone();
-            return Err(self.complain(|_, lineage| Error::NotFinite { name, lineage, value }));
+            return Err(Error { name, ..self.complain(Fault::NotFinite { value }) });
         }
         let given = read.first().copied();
         match command {
@@ -131,6 +170,7 @@ impl<'a> Walk<'a> {
             Command::TurnBack => self.state.frame.turn(Axis::Up, 180.0),
             Command::Level => self.state.frame.level(),
             Command::Width => {
+                self.check_width(given);
                 self.state.width = match given {
                     Some(width) => Width::Set(self.in_range(width.max(0.0))?),
                     None => self.state.width.scaled(THINNING),
@@ -138,6 +178,7 @@ impl<'a> Walk<'a> {
                 self.state.run = 0;
             }
             Command::Taper => {
+                self.check_width(given);
                 let width = Width::Set(self.in_range(given.unwrap_or(0.0).max(0.0))?);
                 self.taper(width);
                 self.state.width = width;
@@ -147,10 +188,16 @@ impl<'a> Walk<'a> {
             Command::Contour => {
                 // 0, and what is no contour, is a circle.
                 let number = given.unwrap_or(0.0).round();
-                let count = self.model.appearance.contours.len() as f64;
-                self.state.contour = (1.0..=count).contains(&number).then(|| number as u32 - 1);
+                let count = self.model.appearance.contours.len();
+                if number != 0.0 && !(1.0..=count as f64).contains(&number) {
+                    self.remark(Remark::NoContour(number, count));
+                }
+                self.state.contour = (1.0..=count as f64).contains(&number).then(|| number as u32 - 1);
             }
             Command::Color => {
+                if let Some(number) = given {
+                    self.check_color(number.round(), read.len() > 1);
+                }
                 self.state.color = match given {
                     Some(number) => (number, read.get(1).copied().unwrap_or(0.0)),
                     None => (self.state.color.0 + 1.0, 0.0),
@@ -167,7 +214,10 @@ impl<'a> Walk<'a> {
                     self.state = state;
                 }
             }
-            Command::BeginPolygon => self.polygons.push(Vec::new()),
+            Command::BeginPolygon => {
+                let begun = (self.inside, self.source);
+                self.polygons.push(Outline { vertices: Vec::new(), made: 0, begun });
+            }
             Command::Vertex => self.record_vertex(),
             Command::EndPolygon => self.end_polygon(),
             Command::Leaf => self.place(&shapes::LEAF, given)?,
@@ -186,18 +236,15 @@ impl<'a> Walk<'a> {
 
     /// Begins a patch, sets a point of it, or draws it.
     fn patch(&mut self, command: Command, parameters: &[f64]) -> Result<(), Error> {
-        let Source { kind, lineage } = self.source;
-        let complain = |error: &dyn Fn(String, Lineage) -> Error| {
-            error(self.model.kinds.get(kind).name.clone(), lineage)
-        };
         let given = |i: usize| parameters.get(i).copied().unwrap_or(0.0);
         match command {
-            Command::BeginPatch => self.patches.begin(given(0), &complain)?,
+            Command::BeginPatch => self.patches.begin(given(0)).map_err(|fault| self.complain(fault))?,
             Command::ControlPoint => {
-                self.patches.set([0, 1, 2].map(given), self.state.position, &complain)?
+                let set = self.patches.set([0, 1, 2].map(given), self.state.position);
+                set.map_err(|fault| self.complain(fault))?;
             }
             _ => {
-                let net = self.patches.net(given(0), &complain)?;
+                let net = self.patches.net(given(0)).map_err(|fault| self.complain(fault))?;
                 let material = self.chosen().unwrap_or(MaterialId::PETAL);
                 let owner = self.owner();
                 // All in one place there is nothing to see, as at the birth of an organ.
@@ -210,11 +257,7 @@ impl<'a> Walk<'a> {
     }
 
     fn in_range(&self, x: f64) -> Result<f64, Error> {
-        if x.abs() <= COORDINATE_LIMIT {
-            Ok(x)
-        } else {
-            Err(self.complain(|name, lineage| Error::TooFar { name, lineage }))
-        }
+        if x.abs() <= COORDINATE_LIMIT { Ok(x) } else { Err(self.complain(Fault::TooFar)) }
     }
 
     /// A step along the heading, drawn if `draw` and if no polygon is open; along an arc where there is a
@@ -309,15 +352,41 @@ impl<'a> Walk<'a> {
     }
 
     fn record_vertex(&mut self) {
-        if let Some(vertices) = self.polygons.last_mut()
-            && vertices.last() != Some(&self.state.position)
-        {
-            vertices.push(self.state.position);
+        if let Some(open) = self.polygons.last_mut() {
+            open.made += 1;
+            if open.vertices.last() != Some(&self.state.position) {
+                open.vertices.push(self.state.position);
+            }
+        }
+    }
+
+    fn check_width(&mut self, given: Option<f64>) {
+        /// What is nearer to 0 is the rounding of something that is 0.
+        const ROUNDING: f64 = -1e-9;
+        if let Some(width) = given.filter(|w| *w < ROUNDING) {
+            self.remark(Remark::NegativeWidth(width));
+        }
+    }
+
+    /// Looks at the number of a colour that was given, with or without a place in a gradient.
+    fn check_color(&mut self, number: f64, has_place: bool) {
+        let [colors, gradients] = self.scene.palette.counts();
+        let count = colors + gradients;
+        if !(0.0..=count as f64).contains(&number) {
+            self.remark(Remark::NoColor(number, count));
+        } else if !has_place && number > colors as f64 {
+            self.remark(Remark::GradientWithoutPlace(number as usize - colors - 1));
         }
     }
 
     fn end_polygon(&mut self) {
-        let Some(mut vertices) = self.polygons.pop() else { return };
+        let Some(Outline { mut vertices, made, .. }) = self.polygons.pop() else {
+            return self.remark(Remark::PolygonNotOpen);
+        };
+        // One that has yet to grow has all its vertices in one place.
+        if made < 3 {
+            self.remark(Remark::FewVertices(made));
+        }
         while vertices.len() > 1 && vertices.first() == vertices.last() {
             vertices.pop();
         }

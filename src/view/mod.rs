@@ -20,6 +20,8 @@ pub mod page;
 mod recording;
 mod stage;
 mod track;
+#[cfg(feature = "viewer")]
+pub mod window;
 
 pub use forms::{Forms, MeshForm, MeshVertex};
 pub use history::{Happening, History};

@@ -462,5 +462,5 @@ fn a_specimen_that_fails_is_named() {
     let done = dlsys(&["run", &model, "--at", "9", "--seeds", "0..40"]);
     let said = String::from_utf8_lossy(&done.stderr).into_owned();
     assert_eq!(done.status.code(), Some(1), "{said}");
-    assert!(said.contains("of the specimen with `--seed"), "{said}");
+    assert!(said.contains("the specimen of `--seed 1`"), "{said}");
 }

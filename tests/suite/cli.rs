@@ -216,3 +216,74 @@ fn all_models_render() {
         good(&["render", &file, "--at", "0,4", "-o", path, "--format", "obj"]);
     }
 }
+
+#[test]
+fn flags_that_mean_nothing_and_files_that_cannot_be_are_refused_before_the_run() {
+    let leaf = "tests/paper-models/leaf.dls";
+    let folder = tempfile::tempdir().expect("a folder");
+    let there = folder.path().to_str().expect("UTF-8");
+    let lost = format!("{there}/lost/stats.json");
+    for (arguments, said) in [
+        (&["run", leaf, "--step-size", "0.1"][..], "`auto` chooses its own"),
+        (&["run", leaf, "--method", "dopri5", "--step-size", "0.1"], "`dopri5` chooses its own"),
+        (&["run", leaf, "--method", "rk4"], "`--step-size H`"),
+        (&["run", leaf, "--stats", there], "stats.json"),
+        (&["run", leaf, "--events", there], "events.jsonl"),
+        (&["run", leaf, "--stats", &lost], "there is no directory"),
+        (&["gallery", "-o", there, "--figure", "abc"], "the number of a figure"),
+    ] {
+        let (status, message) = bad(arguments);
+        assert_eq!(status, 2, "{message}");
+        assert!(message.contains(said), "{arguments:?}: {message}");
+    }
+}
+
+#[test]
+fn things_are_counted_in_words() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let model = folder.path().join("line.dls");
+    std::fs::write(&model, "initial string: F(1)\nF(x): solve dx/dt = 1\n").expect("written");
+    let said = good(&["check", model.to_str().expect("UTF-8")]);
+    assert_eq!(said, "1 rule, 1 kind of modules, 0 params, no warnings\n");
+}
+
+#[test]
+fn drawings_that_are_hardly_meant_are_said_once() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let model = folder.path().join("odd.dls");
+    let text = "initial string: A(0)\nA(x): solve dx/dt = 1\ninterpret A(x): ;(31) F(x)\n";
+    std::fs::write(&model, text).expect("written");
+    let (model, out) = (model.to_str().expect("UTF-8"), folder.path().join("out"));
+    let output =
+        dlsys(&["render", model, "--at", "1,2,3", "-o", out.to_str().expect("UTF-8"), "--threads", "2"]);
+    let said = text_of(&output);
+    assert_eq!((output.status.code(), said.matches("warning").count()), (Some(0), 1), "{said}");
+    assert!(said.contains("odd.dls:3:11") && said.contains("at t = 1"), "{said}");
+}
+
+#[test]
+fn an_error_of_drawing_names_the_line() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let model = folder.path().join("root.dls");
+    let text = "initial string: A(0)\nA(x): solve dx/dt = 1\ninterpret A(x): F(sqrt(2 - x))\n";
+    std::fs::write(&model, text).expect("written");
+    let (model, out) = (model.to_str().expect("UTF-8"), folder.path().join("out"));
+    let (status, said) = bad(&["render", model, "--at", "1,2,3", "-o", out.to_str().expect("UTF-8")]);
+    assert_eq!(status, 1, "{said}");
+    assert!(said.starts_with("error: cannot draw `F` at t = 3: its parameter is NaN"), "{said}");
+    assert!(said.contains("root.dls:3:11") && said.contains("help"), "{said}");
+}
+
+#[test]
+fn progress_is_written_where_it_is_asked_for() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("out");
+    let out = out.to_str().expect("UTF-8");
+    // Quick work shows none, whoever asks.
+    assert_eq!(good(&["run", "tests/paper-models/leaf.dls", "--at", "1", "--progress"]).lines().count(), 2);
+    good(&["render", "tests/paper-models/leaf.dls", "--at", "1", "--progress", "-q", "-o", out]);
+}
+
+fn text_of(output: &Output) -> String {
+    text(&output.stderr)
+}

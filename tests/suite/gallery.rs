@@ -1,10 +1,12 @@
 //! The error gallery: one small model per mistake in `tests/errors`, its message beside it.
 //!
 //! `NAME.dls` is a mistake that reading finds; `warn_NAME.dls` gets a warning and passes; `run_NAME.dls`
-//! reads well and fails when it runs. `NAME.txt` is what a user sees. To renew the messages after a
+//! reads well and fails when it runs; `draw_NAME.dls` fails when it is drawn, and `warn_draw_NAME.dls` gets a warning
+//! there. `NAME.txt` is what a user sees. To renew the messages after a
 //! change that is meant, run the tests with `DLSYS_RENEW_GOLDEN=1`, and read every difference.
 
 use dlsys::diagnostic::{Diagnostic, Severity, Source};
+use dlsys::scene::Scene;
 use dlsys::session::Session;
 use dlsys::sim::Settings;
 use dlsys::structure::ModuleString;
@@ -22,16 +24,25 @@ fn judge(name: &str, text: &[u8]) -> (Vec<Diagnostic>, Source, bool) {
         Ok(session) => session,
     };
     let mut said = session.warnings.clone();
-    if !name.starts_with("run_") {
+    let draws = name.trim_start_matches("warn_").starts_with("draw_");
+    if !name.starts_with("run_") && !draws {
         return (said, source, false);
     }
     let settings = Settings { max_modules: 1000, ..Settings::default() };
+    let mut string = ModuleString::default();
     let fault = match session.simulate(settings) {
         Err(fault) => Some(fault),
-        Ok(mut simulation) => simulation.at(10.0, &mut ModuleString::default()).err(),
+        Ok(mut simulation) => simulation.at(10.0, &mut string).err(),
     };
+    let mut fault = fault.map(|fault| fault.diagnostic());
+    if fault.is_none() && draws {
+        let mut scene = Scene::default();
+        fault =
+            dlsys::turtle::draw(&session.model, &string, &mut scene).err().map(|fault| fault.diagnostic());
+        said.append(&mut scene.warnings);
+    }
     let failed = fault.is_some();
-    said.extend(fault.map(|f| f.diagnostic()));
+    said.extend(fault);
     (said, source, failed)
 }
 

@@ -292,6 +292,10 @@ fn shape(all: &Expressions, id: ExprId) -> String {
             format!("(match {} {} {})", shape(subject), cases.join(" "), shape(otherwise))
         }
         Expr::If(c, a, b) => format!("(if {} {} {})", shape(all, *c), shape(all, *a), shape(all, *b)),
+        Expr::Aggregate(of) => {
+            let term = of.term.map_or(String::new(), |term| shape(all, term.root));
+            format!("({} {} {term})", of.fold.name(), of.head.name.text)
+        }
     }
 }
 

@@ -1,7 +1,9 @@
 //! The test suite, in one binary, because linking takes longer than running.
 //!
 //! - [`book`]: the book in `docs/`, followed literally; [`pages`] reads its Markdown.
+//! - [`light`]: modules with formulas only, the quick way against the general one.
 //! - [`listings`]: the paper's models against results of an independent program.
+//! - [`algebraic`], [`signals`]: values and equations instead of rates; sums over what is attached; contexts with branches.
 //! - [`semantics`]: what happens when (events, contexts, errors of a run), model by small model.
 //! - [`language`]: text to model and back; hostile input.
 //! - [`gallery`]: every mistake in `tests/errors` and the message it gets.
@@ -20,6 +22,7 @@
 //! - [`report`]: studies of methods, and hard cases with exact answers.
 //! - [`view`]: pages that play a recording, read back.
 
+mod algebraic;
 mod blocks;
 mod book;
 mod chance;
@@ -32,6 +35,7 @@ mod files;
 mod gallery;
 mod inspect;
 mod language;
+mod light;
 mod listings;
 mod organs;
 mod pages;
@@ -42,4 +46,5 @@ mod replay;
 mod report;
 mod schedulers;
 mod semantics;
+mod signals;
 mod view;

@@ -92,7 +92,7 @@ fn tracks(page: &str) -> Vec<Track> {
             let head = [(); 6].map(|()| natural());
             // Looks: not looked at here.
             (0..3 * natural()).for_each(|_| {
-                let _ = natural();
+                natural();
             });
             head
         })
@@ -119,7 +119,6 @@ fn tracks(page: &str) -> Vec<Track> {
         }
         tracks.push(Track { kind, first, last: first + span, stride: 1 << log2, samples });
     }
-    drop(natural);
     assert_eq!(at, bytes.len(), "nothing is left over");
     tracks
 }
@@ -271,4 +270,18 @@ fn files_of_others_are_not_written_over() {
         bad(&["view", "models/leaf.dls", "-o", path, "--from", "0", "--to", "9", "--step", "1e-4"]);
     assert!(status == 2 && message.contains("too many for a page"), "{message}");
     assert_eq!(dlsys(&["view", "no-such-model.dls", "-o", path]).status.code(), Some(1));
+}
+
+#[test]
+fn without_the_window_one_is_told_how_to_get_it() {
+    if cfg!(feature = "viewer") {
+        return;
+    }
+    let (status, message) = bad(&["view", "models/leaf.dls"]);
+    assert_eq!(status, 2);
+    for part in ["without the window", "dlsys view models/leaf.dls -o plant.html", "--features viewer"] {
+        assert!(message.contains(part), "{message}");
+    }
+    let (status, message) = bad(&["view", "models/leaf.dls", "--force"]);
+    assert!(status == 2 && message.contains("--out"), "{message}");
 }

@@ -13,7 +13,8 @@
 //!   or `coupled`; `rules` are positions in the list `rules`; `drawn_only` the parameters that only drawing reads.
 //! - `rules`: `{head, line, kinds, solves, produces, conditions}`;
 //!   - a solve is `{line, condition, parameters}`, a parameter `{name, class, law, why, reads}`; `class` is `constant`,
-//!     `closed form`, `local`, `coupled and linear` or `coupled`; `law` is the form of the solution, or null;
+//!     `closed form`, `local`, `coupled and linear` or `coupled`, or, of one that has no rate but a value or an equation,
+//!     `explicit formula`, `explicit` or `implicit`; `law` is the form of the solution, or null;
 //!   - a produce is `{line, condition}`;
 //!   - a condition is `{boundary, line, decides, found}`: `decides` says of which clauses (`{clause, line}`), `found`
 //!     how its instant is found under each `solve`: `{line, class, why}`, line null if the rule has none; `class` is
@@ -24,6 +25,7 @@
 //! - `summary`: names of kinds by `work`, and `closed_form`: true if nothing is ever integrated numerically.
 
 mod curves;
+mod given;
 mod plan;
 #[cfg(test)]
 mod tests;

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::curves::CurvePlan;
-use super::words;
+use super::{given, words};
 use crate::diagnostic::Source;
 use crate::model::{Condition, Kind, Law, Model, Produce, Rule, Solve, Watch};
 use crate::session::Session;
@@ -171,11 +171,14 @@ fn parameter_names(model: &Model, kind: &Kind) -> Vec<String> {
     kind.rules.first().map_or_else(Vec::new, |rule| model.rules[*rule].parameters[..kind.arity].to_vec())
 }
 
-/// True if some equation for a parameter of a kind is integrated numerically.
+/// True if some equation for a parameter of a kind is integrated numerically, or solved for along with those.
 fn is_numeric(model: &Model, kind: &Kind, parameter: Option<usize>) -> bool {
+    let is_meant = |p: usize| parameter.is_none_or(|wanted| wanted == p);
     kind.rules.iter().flat_map(|rule| &model.rules[*rule].solves).any(|solve| {
         let mut laws = solve.of.iter().zip(&solve.laws);
-        laws.any(|(p, law)| parameter.is_none_or(|wanted| wanted == *p) && !law.is_closed())
+        let mut given = solve.algebraic.of.iter().enumerate();
+        laws.any(|(p, law)| is_meant(*p) && !law.is_closed())
+            || given.any(|(place, p)| is_meant(*p) && solve.algebraic.is_solved(place, false))
     })
 }
 
@@ -189,14 +192,15 @@ fn works(model: &Model) -> Vec<Work> {
             match () {
                 () if kind.rules.is_empty() => Work::NoRules,
                 () if numeric[id.index()] => Work::Alone,
-                () if solves.all(|solve| solve.of.is_empty()) => Work::AtRest,
+                () if solves.all(|solve| solve.of.is_empty() && solve.algebraic.is_empty()) => Work::AtRest,
                 () => Work::Formulas,
             }
         })
         .collect();
     for (id, kind) in model.kinds.iter() {
         for rule in kind.rules.iter().map(|rule| &model.rules[*rule]).filter(|rule| rule.reads_context) {
-            let neighbours: Vec<usize> = (rule.left.iter().chain(&rule.right))
+            let patterns = rule.aggregates.iter().map(|aggregate| &aggregate.pattern);
+            let neighbours: Vec<usize> = (rule.left.iter().chain(&rule.right).chain(patterns))
                 .flat_map(|pattern| &pattern.kinds)
                 .map(|kind| kind.index())
                 .filter(|kind| numeric[*kind])
@@ -213,7 +217,7 @@ fn works(model: &Model) -> Vec<Work> {
 }
 
 impl Facts<'_> {
-    fn line(&self, byte: u32) -> usize {
+    pub fn line(&self, byte: u32) -> usize {
         self.source.position(byte).0
     }
 
@@ -273,6 +277,9 @@ impl Facts<'_> {
             .filter(|v| is_named(*v))
             .map(|parameter| {
                 let name = self.name(compiled, parameter).unwrap_or_default();
+                if let Some(place) = solve.algebraic.of.iter().position(|p| *p == parameter) {
+                    return given::parameter(self, compiled, solve, place);
+                }
                 let Some(position) = solve.of.iter().position(|p| *p == parameter) else {
                     let why = "its rate here is 0".to_owned();
                     return ParameterPlan { name, class: "constant", law: None, why, reads: Vec::new() };
@@ -368,8 +375,9 @@ impl Facts<'_> {
             )
         } else {
             let verb = if integrated.len() == 1 { "is" } else { "are" };
-            let why =
-                format!("{} {verb} integrated; the root is searched in each step", words::list(&integrated));
+            let is_given = |v: &usize| solve.is_some_and(|s| s.algebraic.of.contains(v));
+            let how = if reads.iter().any(is_given) { "computed step by step" } else { "integrated" };
+            let why = format!("{} {verb} {how}; the root is searched in each step", words::list(&integrated));
             ("root on dense output", why)
         }
     }
@@ -377,8 +385,19 @@ impl Facts<'_> {
     /// True if a variable of a rule is, or may be, integrated numerically.
     pub fn is_integrated(&self, rule: &Rule, solve: Option<&Solve>, variable: usize) -> bool {
         if variable < rule.parameters.len() {
-            let position = solve.and_then(|s| s.of.iter().position(|p| *p == variable));
-            return position.is_some_and(|i| solve.is_some_and(|s| !s.laws[i].is_closed()));
+            let Some(solve) = solve else { return false };
+            let by_law =
+                solve.of.iter().position(|p| *p == variable).is_some_and(|i| !solve.laws[i].is_closed());
+            let given = solve.algebraic.of.iter().position(|p| *p == variable);
+            return by_law || given.is_some_and(|place| !solve.algebraic.closed[place]);
+        }
+        if let Some(aggregate) =
+            variable.checked_sub(rule.first_aggregate).and_then(|i| rule.aggregates.get(i))
+        {
+            let of_child = |v: usize| v.checked_sub(rule.variables);
+            let read = aggregate.term.reads().into_iter().filter_map(of_child);
+            let kinds = || aggregate.pattern.kinds.iter().map(|kind| self.model.kinds.get(*kind));
+            return { read }.any(|p| kinds().any(|kind| is_numeric(self.model, kind, Some(p))));
         }
         let mut first = rule.parameters.len();
         for pattern in rule.left.iter().chain(&rule.right) {

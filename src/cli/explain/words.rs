@@ -22,6 +22,9 @@ pub fn variable(rule: &Rule, variable: usize) -> Option<String> {
     let own = rule.parameters.len();
     match variable {
         v if v < own => Some(rule.parameters[v].clone()),
+        v if v >= rule.first_aggregate && v < rule.time_variable() => {
+            rule.aggregates.get(v - rule.first_aggregate).map(|aggregate| aggregate.label.clone())
+        }
         v if v < rule.time_variable() => rule.context_names.get(v - own).cloned(),
         v if v == rule.time_variable() => Some("t".to_owned()),
         v if v == rule.time_variable() + 1 => Some("age".to_owned()),

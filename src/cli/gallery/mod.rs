@@ -17,6 +17,7 @@ use clap::Parser;
 
 use super::args::{Action, Command, FrameFormat, GalleryArgs, RenderArgs};
 use super::common::{Failure, out_error};
+use super::progress::Progress;
 use super::render::render;
 use figures::{FIGURES, Picture, models};
 
@@ -51,12 +52,14 @@ fn draw(wanted: &[&Picture], out: &Path, args: &GalleryArgs) -> Result<(), Failu
         write(&folder.join(name), text)?;
     }
     let mut drawn = Vec::new();
+    let mut progress = Progress::of_printed("pictures", wanted.len());
     for picture in wanted {
         let target = out.join(picture.name);
         render(&typed(picture, out, &target, args)?)?;
         let file = picture.file(args.format);
         say(&format!("figure {:2}  {}\n", picture.figure, target.join(&file).display()))?;
         drawn.push((*picture, file));
+        progress.inc();
     }
     let index = out.join("index.html");
     write(&index, &page::page(&drawn))?;

@@ -12,19 +12,19 @@ use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
 
-use indicatif::ProgressBar;
 use serde_json::json;
 
 use super::args::{RenderArgs, Seeds};
-use super::common::{Clock, Failure, Run, bar, count_of, out_error, size_of};
+use super::common::{Clock, Failure, Run, count_of, out_error, size_of};
 use super::events::EventLog;
+use super::progress::Progress;
 use super::reel::{Pass, Shot, play};
 use crate::export::{
     self, Fit, Format, FrameDirectory, FrameRecord, FrameWriter, Layout, Manifest, Page, Sheet, SheetWriter,
     Survey,
 };
 use crate::scene::Scene;
-use crate::sim::{Method, Settings, Stats};
+use crate::sim::{Method, Settings, Stats, brief};
 
 /// Runs a model and writes its frames; with `--watch`, again and again.
 pub fn render(args: &RenderArgs) -> Result<(), Failure> {
@@ -136,7 +136,7 @@ impl Render<'_> {
 
     /// The first pass.
     fn measure(&mut self, mut survey: Survey, clock: &mut Clock) -> Result<Survey, Failure> {
-        let progress = self.bar("measuring", self.run.times.len());
+        let mut progress = self.bar("measuring", self.run.times.len());
         let mut events = EventLog::create(self.args.shared.events.as_deref(), self.run)?;
         let nothing = survey.clone();
         let of_frame = |_: &Shot, scene: &Scene| {
@@ -150,10 +150,11 @@ impl Render<'_> {
             if self.args.layout != Layout::Frames {
                 self.frames.push(frame);
             }
-            progress.inc(1);
+            progress.inc();
             if (self.stale)() { Err(Failure::Stale) } else { Ok(()) }
         });
-        progress.finish_and_clear();
+        drop(progress);
+        self.run.warn();
         events.map_or(Ok(()), EventLog::finish)?;
         measured.map(|_| survey)
     }
@@ -176,7 +177,7 @@ impl Render<'_> {
             let staged = staging.write(|file| writer.write_to(scene, &title, file));
             (record(&writer.fit, shot, scene, file), companion, staged)
         };
-        let progress = self.bar("writing", count);
+        let mut progress = self.bar("writing", count);
         let stats = play(
             self.run,
             self.writing(&writer.fit),
@@ -190,7 +191,7 @@ impl Render<'_> {
                 }
                 staged.and_then(|staged| directory.put(&record.file, staged)).map_err(out_of_directory)?;
                 manifest.frames.push(record);
-                progress.inc(1);
+                progress.inc();
                 Ok(())
             },
         )?;
@@ -201,7 +202,6 @@ impl Render<'_> {
         };
         let written = Written { bytes: directory.bytes(), names };
         directory.finish(&manifest).map_err(out_of_directory)?;
-        progress.finish_and_clear();
         Ok((stats, written))
     }
 
@@ -209,7 +209,9 @@ impl Render<'_> {
     fn sheet(&self, layout: Layout, fit: Fit, clock: &mut Clock) -> Result<(Stats, Written), Failure> {
         let times = &self.run.times;
         let captions: Vec<String> = match layout {
-            Layout::Grid if !self.args.no_captions => times.iter().map(|t| format!("t = {t}")).collect(),
+            Layout::Grid if !self.args.no_captions => {
+                times.iter().map(|&t| format!("t = {}", brief(t, 9))).collect()
+            }
             _ => Vec::new(),
         };
         let sheet = Sheet::new(layout, &fit, &self.frames, &captions, flags::spacing(self.args));
@@ -222,7 +224,7 @@ impl Render<'_> {
             (record(&fit, shot, scene, writer.file()), writer.part(shot.index, scene))
         };
         let mut assembly = writer.begin();
-        let progress = self.bar("drawing", times.len());
+        let mut progress = self.bar("drawing", times.len());
         let stats = play(
             self.run,
             self.writing(&fit),
@@ -232,7 +234,7 @@ impl Render<'_> {
             work,
             |(record, part)| {
                 manifest.frames.push(record);
-                progress.inc(1);
+                progress.inc();
                 assembly.add(part).map_err(refuse)
             },
         )?;
@@ -245,16 +247,11 @@ impl Render<'_> {
         let names = self.out.join(writer.file()).display().to_string();
         let written = Written { bytes: directory.bytes(), names };
         directory.finish(&manifest).map_err(out_of_directory)?;
-        progress.finish_and_clear();
         Ok((stats, written))
     }
 
-    /// A progress bar; it hides itself where standard error is no terminal.
-    fn bar(&self, what: &'static str, count: usize) -> ProgressBar {
-        if self.args.quiet {
-            return ProgressBar::hidden();
-        }
-        bar(what, count)
+    fn bar(&self, what: &str, count: usize) -> Progress {
+        if self.args.quiet { Progress::quiet() } else { Progress::new(what, count) }
     }
 
     /// Threads that draw on pages of this size: of large ones not so many are in memory at once.

@@ -1,6 +1,6 @@
 //! From pest's pairs to the syntax tree.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, LazyLock};
 
 use pest::pratt_parser::{Assoc, Op, PrattParser};
@@ -10,10 +10,11 @@ use crate::diagnostic::{Diagnostic, Span};
 use crate::expr::Sort;
 use crate::lang::ast;
 use crate::lang::ast::{
-    Action, Alternative, Clause, Equation, Expr, ExprId, Expression, Expressions, HeadModule, Item, Module,
-    Name, Operator, Text,
+    Action, Aggregate, Alternative, Clause, Equation, Expr, ExprId, Expression, Expressions, HeadModule,
+    Item, Module, Name, Operator, Text,
 };
-use crate::model::Comparison;
+use crate::lang::words::FOLDS;
+use crate::model::{Comparison, Fold, Turn};
 
 /// Most symbols and names of a weight outside parentheses.
 const MAX_WEIGHT: usize = 200;
@@ -60,6 +61,8 @@ pub struct Builder<'d> {
     pub interner: &'d mut Interner,
     /// Where the parsed piece begins in the file.
     pub offset: usize,
+    /// Names of the model's own functions.
+    pub defined: Option<&'d HashSet<String>>,
 }
 
 impl Builder<'_> {
@@ -166,6 +169,7 @@ impl Builder<'_> {
             }
             Rule::rule_item => {
                 let head = next();
+                let first = self.expressions.next();
                 let mut rule = self.head(head);
                 for part in inner {
                     if part.as_rule() == Rule::local {
@@ -177,10 +181,13 @@ impl Builder<'_> {
                         rule.clauses.push(self.clause(part)?);
                     }
                 }
+                rule.nodes = (first, self.expressions.next());
                 Item::Rule(rule)
             }
             Rule::step_item => {
-                let mut rule = self.head(next());
+                let head = next();
+                let first = self.expressions.next();
+                let mut rule = self.head(head);
                 rule.discrete = true;
                 let (mut guard, mut made) = (None, Vec::new());
                 let mut span = rule.head;
@@ -193,6 +200,7 @@ impl Builder<'_> {
                     }
                 }
                 rule.clauses.push(Clause { guard, hazard: None, action: Action::Produce(made), span });
+                rule.nodes = (first, self.expressions.next());
                 Item::Rule(rule)
             }
             other => unreachable!("{other:?} is no item"),
@@ -240,12 +248,22 @@ impl Builder<'_> {
     fn head(&mut self, pair: Pair) -> ast::Rule {
         let head = self.span(&pair);
         let (mut left, mut right, mut predecessor) = (Vec::new(), Vec::new(), None);
+        let mut right_shape = Vec::new();
         for part in pair.into_inner() {
             match part.as_rule() {
                 Rule::context | Rule::step_context => {
-                    let side = if predecessor.is_none() { &mut left } else { &mut right };
-                    for module in part.into_inner() {
-                        side.push(self.head_module(module));
+                    left.extend(part.into_inner().map(|module| self.head_module(module)));
+                }
+                Rule::right_context | Rule::step_right => {
+                    for part in part.into_inner() {
+                        right_shape.push(match part.as_rule() {
+                            Rule::bracket_open => Turn::Open,
+                            Rule::bracket_close => Turn::Close,
+                            _ => {
+                                right.push(self.head_module(part));
+                                Turn::Module
+                            }
+                        });
                     }
                 }
                 Rule::plus_minus | Rule::head_module => predecessor = Some(self.head_module(part)),
@@ -253,7 +271,9 @@ impl Builder<'_> {
             }
         }
         let predecessor = predecessor.expect("the grammar has a predecessor here");
-        ast::Rule { left, predecessor, right, head, discrete: false, locals: Vec::new(), clauses: Vec::new() }
+        let nodes = (ExprId(0), ExprId(0));
+        let (locals, clauses) = (Vec::new(), Vec::new());
+        ast::Rule { left, predecessor, right, right_shape, head, discrete: false, locals, clauses, nodes }
     }
 
     fn clause(&mut self, pair: Pair) -> Built<Clause> {
@@ -320,18 +340,28 @@ impl Builder<'_> {
     }
 
     fn equation(&mut self, pair: Pair) -> Built<Equation> {
+        let span = self.span(&pair);
         let mut inner = pair.into_inner().filter(|p| !is_punctuation(p.as_rule()));
-        let derivative = inner.next().expect("an equation has a left side");
-        let rate = derivative.into_inner().next().expect("a derivative has a name");
+        let side = inner.next().expect("an equation has a left side");
+        let mut right = || inner.next().expect("an equation has a right side");
+        match side.as_rule() {
+            Rule::zero => {
+                let residual = self.expression(right())?;
+                let unknown = inner.next().map(|name| self.name(&name));
+                return Ok(Equation::Zero { residual, unknown, span });
+            }
+            Rule::ident => {
+                return Ok(Equation::Value { parameter: self.name(&side), value: self.expression(right())? });
+            }
+            _ => {}
+        }
+        let rate = side.into_inner().next().expect("a derivative has a name");
         let whole = self.span(&rate);
         let parameter = Name {
             text: self.interner.get(&rate.as_str()[1..]),
             span: Span { start: whole.start + 1, end: whole.end },
         };
-        Ok(Equation {
-            parameter,
-            rate: self.expression(inner.next().expect("an equation has a right side"))?,
-        })
+        Ok(Equation::Rate { parameter, rate: self.expression(right())? })
     }
 
     fn successor(&mut self, pair: Pair) -> Built<Vec<Module>> {
@@ -456,9 +486,24 @@ impl Builder<'_> {
             Rule::call => {
                 let mut inner = pair.into_inner().filter(|p| !is_punctuation(p.as_rule()));
                 let name = self.interner.get(inner.next().expect("a call has a name").as_str());
+                if FOLDS.contains(&&*name) && self.defined.is_some_and(|defined| !defined.contains(&*name)) {
+                    return Err(Box::new(
+                        Diagnostic::error(format!("`{name}` is not over numbers"))
+                            .at(span, "expected a module, with names for its parameters")
+                            .help(match &*name {
+                                "count" => {
+                                    "it counts what is attached to this module: `count(B(x))`".to_owned()
+                                }
+                                _ => {
+                                    format!("it goes over what is attached to this module: `{name}(B(x): x)`")
+                                }
+                            }),
+                    ));
+                }
                 let arguments = inner.map(|p| self.expr(p)).collect::<Built<Vec<_>>>()?;
                 Ok(self.expressions.push(Expr::Call(name, arguments), span))
             }
+            Rule::aggregate => self.aggregate(pair),
             Rule::if_expr => {
                 let parts = pair.into_inner().filter(|p| p.as_rule() == Rule::expr);
                 let mut parts = parts.map(|p| self.expr(p)).collect::<Built<Vec<_>>>()?;
@@ -498,6 +543,45 @@ impl Builder<'_> {
     }
 }
 
+impl Builder<'_> {
+    /// Something of all modules attached to one.
+    fn aggregate(&mut self, pair: Pair) -> Built<ExprId> {
+        let span = self.span(&pair);
+        let mut inner = pair.into_inner().filter(|p| !is_punctuation(p.as_rule()));
+        let mut next = || inner.next().expect("the grammar has a part here");
+        let fold = match next().as_str().trim_end() {
+            "sum" => Fold::Sum,
+            "largest" => Fold::Largest,
+            "smallest" => Fold::Smallest,
+            _ => Fold::Count,
+        };
+        let module = next();
+        // A function of the model's own called `count` is what it was.
+        if fold == Fold::Count && self.defined.is_none_or(|defined| defined.contains("count")) {
+            let argument = self.as_call(module)?;
+            let name = self.interner.get("count");
+            return Ok(self.expressions.push(Expr::Call(name, vec![argument]), span));
+        }
+        let head = self.head_module(module);
+        let term = inner.next().map(|term| self.expression(term)).transpose()?;
+        Ok(self.expressions.push(Expr::Aggregate(Box::new(Aggregate { fold, head, term })), span))
+    }
+
+    /// What was read as a module with the names of its parameters, as a name or the call of a function.
+    fn as_call(&mut self, module: Pair) -> Built<ExprId> {
+        let span = self.span(&module);
+        let head = self.head_module(module);
+        let arguments: Vec<ExprId> = head
+            .parameters
+            .iter()
+            .map(|p| self.expressions.push(Expr::Name(p.text.clone()), p.span))
+            .collect();
+        let bare = arguments.is_empty();
+        let node = if bare { Expr::Name(head.name.text) } else { Expr::Call(head.name.text, arguments) };
+        Ok(self.expressions.push(node, span))
+    }
+}
+
 fn is_punctuation(rule: Rule) -> bool {
     matches!(
         rule,
@@ -528,6 +612,7 @@ fn is_punctuation(rule: Rule) -> bool {
             | Rule::kw_ignore
             | Rule::kw_consider
             | Rule::kw_interpret
+            | Rule::kw_for
             | Rule::EOI
     )
 }

@@ -9,6 +9,8 @@
 mod build;
 mod expected;
 
+use std::collections::HashSet;
+
 use pest::Parser;
 
 use super::ast::{Document, Expression, HeadModule, Item, Module};
@@ -46,6 +48,8 @@ pub(super) struct Reader {
     pub document: Document,
     pub errors: Vec<Diagnostic>,
     interner: build::Interner,
+    /// Functions of the texts so far.
+    defined: HashSet<String>,
 }
 
 impl Reader {
@@ -53,6 +57,8 @@ impl Reader {
     pub fn read(&mut self, text: &str) -> Vec<(Item, Span)> {
         let cut = layout(text);
         self.errors.extend(cut.errors);
+        let functions = cut.items.iter().filter(|item| item.kind == ItemKind::Def);
+        self.defined.extend(functions.filter_map(|item| declared_word(&cut.text, item).map(str::to_owned)));
         let mut items = Vec::new();
         for item in &cut.items {
             if self.errors.len() >= MAX_ERRORS {
@@ -63,7 +69,8 @@ impl Reader {
                 continue;
             }
             let (expressions, interner) = (&mut self.document.expressions, &mut self.interner);
-            let mut builder = build::Builder { expressions, interner, offset: 0 };
+            let mut builder =
+                build::Builder { expressions, interner, offset: 0, defined: Some(&self.defined) };
             match read_item(&cut.text, item, &mut builder) {
                 Ok(read) => items.push((read, trimmed(&cut.text, item))),
                 Err(error) => {
@@ -78,6 +85,10 @@ impl Reader {
 
 /// The name that an item declares, or seems to: `const k …`, but also `cosnt k …` and `k = …`.
 fn declared_name(text: &str, item: &RawItem) -> Option<std::sync::Arc<str>> {
+    Some(declared_word(text, item)?.into())
+}
+
+fn declared_word<'t>(text: &'t str, item: &RawItem) -> Option<&'t str> {
     let line = text[item.start..item.end].lines().next()?;
     let mut words = line.split(|c: char| !(c.is_alphanumeric() || c == '_')).filter(|w| !w.is_empty());
     let first = words.next()?;
@@ -91,7 +102,7 @@ fn declared_name(text: &str, item: &RawItem) -> Option<std::sync::Arc<str>> {
         ItemKind::Unknown => words.next()?,
         _ => return None,
     };
-    Some(name.into())
+    Some(name)
 }
 
 /// Reads one expression.
@@ -102,8 +113,12 @@ pub fn parse_expression(source: &Source) -> Result<(Document, Expression), Vec<D
     }
     let mut document = Document::default();
     let mut interner = build::Interner::default();
-    let mut builder =
-        build::Builder { expressions: &mut document.expressions, interner: &mut interner, offset: 0 };
+    let mut builder = build::Builder {
+        expressions: &mut document.expressions,
+        interner: &mut interner,
+        offset: 0,
+        defined: None,
+    };
     let pair = pest_parse(Rule::lone_expr, &source.text, 0).map_err(|e| vec![*e])?;
     let inner = pair.into_inner().next().expect("the grammar has an expression here");
     let expression = builder.expression(inner).map_err(|e| vec![*e])?;
@@ -118,8 +133,12 @@ pub fn parse_measure(source: &Source) -> Result<(Document, HeadModule, Option<Ex
     }
     let mut document = Document::default();
     let mut interner = build::Interner::default();
-    let mut builder =
-        build::Builder { expressions: &mut document.expressions, interner: &mut interner, offset: 0 };
+    let mut builder = build::Builder {
+        expressions: &mut document.expressions,
+        interner: &mut interner,
+        offset: 0,
+        defined: None,
+    };
     let pair = pest_parse(Rule::measure, &source.text, 0).map_err(|e| vec![(*e).help(MEASURE)])?;
     let (head, expression) = builder.measure(pair).map_err(|e| vec![*e])?;
     Ok((document, head, expression))

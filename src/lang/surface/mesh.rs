@@ -1,4 +1,5 @@
-//! Triangle meshes from Wavefront OBJ: `v`, `vn` and `f`; other lines mean nothing here.
+//! Triangle meshes from Wavefront OBJ: `v`, `vn` and `f`, with the colours that `mtllib` and `usemtl` name; other lines
+//! mean nothing here.
 //!
 //! Axes are those of our own OBJ files, so that what was exported reads back as it was drawn: the turtle
 //! stands at the origin and heads along `+Y`, its up is `+Z`, and left is `-X`. Faces with more than three
@@ -6,16 +7,19 @@
 
 use std::collections::HashMap;
 
-use super::{Fault, PART_LIMIT, number, shown};
+use super::materials::Library;
+use super::{Fault, Files, PART_LIMIT, number, shown};
 use crate::model::SurfaceShape;
 
 /// A corner of a face: vertex and, perhaps, normal, by number from 0.
 type Corner = (u32, Option<u32>);
 
-/// Reads the mesh of a file.
-pub(super) fn parse(text: &str) -> Result<SurfaceShape, Fault> {
+/// Reads the mesh of a file, and the material libraries beside it.
+pub(super) fn parse(text: &str, path: &str, files: &dyn Files) -> Result<SurfaceShape, Fault> {
+    let mut library = Library::default();
+    let mut material = None;
     let (mut points, mut directions): (Vec<[f64; 3]>, Vec<[f64; 3]>) = (Vec::new(), Vec::new());
-    let mut faces: Vec<[Corner; 3]> = Vec::new();
+    let mut faces: Vec<([Corner; 3], Option<u32>)> = Vec::new();
     let mut corners: Vec<Corner> = Vec::new();
     let mut lines = text.lines().enumerate();
     let mut joined = String::new();
@@ -38,6 +42,8 @@ pub(super) fn parse(text: &str) -> Result<SurfaceShape, Fault> {
         match words.next() {
             Some("v") => points.push(turned(&mut words, at)?),
             Some("vn") => directions.push(turned(&mut words, at)?),
+            Some("mtllib") => words.try_for_each(|name| library.add(name, path, files))?,
+            Some("usemtl") => material = words.next().and_then(|name| library.find(name)),
             Some("f") => {
                 corners.clear();
                 for word in words.take_while(|word| !word.starts_with('#')) {
@@ -47,7 +53,7 @@ pub(super) fn parse(text: &str) -> Result<SurfaceShape, Fault> {
                     return Err(Fault::at(at, "a face has three corners or more"));
                 }
                 for k in 2..corners.len() {
-                    faces.push([corners[0], corners[k - 1], corners[k]]);
+                    faces.push(([corners[0], corners[k - 1], corners[k]], material));
                 }
                 if faces.len() > PART_LIMIT {
                     return Err(Fault::at(at, format!("more than {PART_LIMIT} triangles")));
@@ -59,7 +65,8 @@ pub(super) fn parse(text: &str) -> Result<SurfaceShape, Fault> {
     if faces.is_empty() {
         return Err(Fault::whole("the file has no faces").help("faces are lines such as `f 1 2 3`"));
     }
-    Ok(build(&points, &directions, &faces))
+    let shape = build(&points, &directions, &faces);
+    Ok(SurfaceShape { materials: library.into_colors(), ..shape })
 }
 
 /// Three numbers, turned into the turtle's axes.
@@ -96,11 +103,11 @@ fn corner(word: &str, points: usize, directions: usize, line: usize) -> Result<C
 }
 
 /// One vertex for each pair of point and normal that some face has.
-fn build(points: &[[f64; 3]], directions: &[[f64; 3]], faces: &[[Corner; 3]]) -> SurfaceShape {
-    let smooth = faces.iter().flatten().any(|(_, normal)| normal.is_none());
+fn build(points: &[[f64; 3]], directions: &[[f64; 3]], faces: &[([Corner; 3], Option<u32>)]) -> SurfaceShape {
+    let smooth = faces.iter().flat_map(|(face, _)| face).any(|(_, normal)| normal.is_none());
     let mut numbers: HashMap<Corner, u32> = HashMap::new();
     let mut shape = SurfaceShape::default();
-    for face in faces {
+    for (face, material) in faces {
         let triangle = face.map(|(vertex, normal)| {
             // Where some corners have no normal, none counts: all are made from the faces.
             let normal = normal.filter(|_| !smooth);
@@ -114,6 +121,7 @@ fn build(points: &[[f64; 3]], directions: &[[f64; 3]], faces: &[[Corner; 3]]) ->
         });
         if triangle[0] != triangle[1] && triangle[1] != triangle[2] && triangle[2] != triangle[0] {
             shape.triangles.push(triangle);
+            shape.painted.push(*material);
         }
     }
     shape
@@ -121,7 +129,35 @@ fn build(points: &[[f64; 3]], directions: &[[f64; 3]], faces: &[[Corner; 3]]) ->
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::*;
+    use crate::lang::NoFiles;
+
+    fn parse(text: &str) -> Result<SurfaceShape, Fault> {
+        super::parse(text, "mesh.obj", &NoFiles)
+    }
+
+    /// A folder with one file in it.
+    struct Beside(&'static str, &'static str);
+
+    impl Files for Beside {
+        fn read(&self, path: &Path, _: u64) -> Result<Vec<u8>, String> {
+            if path == Path::new(self.0) { Ok(self.1.into()) } else { Err("not there".to_owned()) }
+        }
+    }
+
+    #[test]
+    fn faces_have_the_colours_of_the_library_beside_the_mesh() {
+        let text = "mtllib lost.mtl colours.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n\
+                    usemtl red\nf 1 2 3\nusemtl none\nf 1 2 3\nusemtl green\nf 1 2 3\n";
+        let library = "newmtl red\nKa 0 0 0\nKd 1 0 0\nnewmtl green\nKd 0 0.5 0\n";
+        let shape =
+            super::parse(text, "organs/mesh.obj", &Beside("organs/colours.mtl", library)).expect("a mesh");
+        assert_eq!(shape.painted, [None, Some(0), None, Some(1)]);
+        assert_eq!(shape.materials.iter().map(|m| m.rgb).collect::<Vec<_>>(), [0xff0000, 0x008000]);
+        assert_eq!(parse(text).expect("a mesh without colours").materials, []);
+    }
 
     #[test]
     fn polygons_become_triangles_and_negative_numbers_count_back() {

@@ -3,6 +3,7 @@
 //!
 //! The language reads no file itself; it asks a [`Files`], which whoever has the model's text provides.
 
+mod materials;
 mod mesh;
 mod patches;
 
@@ -73,7 +74,7 @@ pub fn read(path: &str, files: &dyn Files) -> Result<SurfaceShape, Fault> {
     }
     let extension = Path::new(path).extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
     let parse = match extension.as_deref() {
-        Some("s") => patches::parse,
+        Some("s") => |text: &str, _: &str, _: &dyn Files| patches::parse(text),
         Some("obj") => mesh::parse,
         _ => {
             return Err(Fault::whole("this is no kind of surface file")
@@ -83,7 +84,7 @@ pub fn read(path: &str, files: &dyn Files) -> Result<SurfaceShape, Fault> {
     let bytes = files.read(Path::new(path), SIZE_LIMIT).map_err(|what| {
         Fault::whole(what).help("put it into the folder of the model's file or below; the path begins there")
     })?;
-    parse(&String::from_utf8_lossy(&bytes))
+    parse(&String::from_utf8_lossy(&bytes), path, files)
 }
 
 /// A number of a surface file.

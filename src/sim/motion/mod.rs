@@ -4,11 +4,13 @@
 //! at t = 1e9 moves as precisely as one born at 0.
 
 mod driven;
+mod function;
 mod growth;
 mod riccati;
 mod sum;
 
 pub use driven::{Driven, Flow, Pace};
+pub use function::Function;
 use growth::Growth;
 pub use riccati::Riccati;
 pub use sum::{Sum, Terms};
@@ -26,6 +28,7 @@ pub enum Motion {
     Riccati(Riccati),
     Sum(Box<Sum>),
     Driven(Box<Driven>),
+    Function(Box<Function>),
     /// Dense output of a step of the module itself: the number of the component.
     Step(u32),
     /// Dense output of the coupled modules: the number of the component.
@@ -46,6 +49,7 @@ impl Motion {
             Motion::Riccati(law) => law.value(tau),
             Motion::Sum(sum) => sum.value(tau),
             Motion::Driven(driven) => driven.value(tau),
+            Motion::Function(function) => function.value(tau),
             Motion::Step(_) | Motion::Coupled(_) => f64::NAN,
         }
     }
@@ -57,6 +61,7 @@ impl Motion {
             Motion::Riccati(law) => law.rate(law.value(tau)),
             Motion::Sum(sum) => sum.rate(tau),
             Motion::Driven(driven) => driven.rate(tau),
+            Motion::Function(function) => function.rate(tau),
             Motion::Step(_) | Motion::Coupled(_) => f64::NAN,
         }
     }
@@ -69,6 +74,7 @@ impl Motion {
             Motion::Riccati(law) => law.over(from, to),
             Motion::Sum(sum) => sum.over(from, to),
             Motion::Driven(driven) => driven.over(from, to),
+            Motion::Function(function) => function.over(from, to),
             Motion::Step(_) | Motion::Coupled(_) => Dual { value: Interval::ENTIRE, rate: Interval::ENTIRE },
         }
     }
@@ -106,7 +112,7 @@ impl Motion {
                 if d == 0.0 { Terms::affine(x, f) } else { Terms::exponential(x - f / d, f / d, d) }
             }),
             Motion::Sum(sum) => Some(sum.terms(x)),
-            Motion::Driven(_) | Motion::Step(_) | Motion::Coupled(_) => None,
+            Motion::Driven(_) | Motion::Function(_) | Motion::Step(_) | Motion::Coupled(_) => None,
         }
     }
 }

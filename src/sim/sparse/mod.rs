@@ -264,7 +264,6 @@ impl Pattern {
     }
 
     /// `out = A x`. Does nothing if the lengths do not agree.
-    #[cfg(test)]
     pub fn multiply(&self, values: &[f64], x: &[f64], out: &mut [f64]) {
         let n = self.unknowns();
         if values.len() != self.entries() || x.len() != n || out.len() != n {

@@ -1,0 +1,477 @@
+//! The window: takes in what the worker tells, what hands do, and says what is to be shown next.
+
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use eframe::egui::{self, Color32, Key, RichText, Sense, TextureHandle, TextureOptions};
+
+use super::life::Life;
+use super::look::{Look, Space};
+use super::player::{Player, SPEEDS};
+use super::trial::{Outcome, Runner};
+use super::worker::{Desk, Facts, News, Order, Shot, work};
+use super::{Options, panel, timeline};
+use crate::export::Page;
+use crate::lang::Setting;
+
+/// After so long, what stands still is drawn as well as can be.
+const STILL: Duration = Duration::from_millis(180);
+/// After so long without a picture, the window says that it waits.
+const LONG: Duration = Duration::from_millis(400);
+/// So long a run may take before a slider that moves on ends it.
+const LEAST: Duration = Duration::from_millis(250);
+/// Most pixels of a picture that moves, and of one that stands still; the screen makes up the rest.
+const MOST_PIXELS: [f64; 2] = [1.2e6, 8e6];
+/// Parts of the screen's pixels, each way, that what moves is drawn with: fewer where drawing takes longer than the first of these
+/// times, more where it takes less than the second.
+const COARSE: [f64; 3] = [1.0, 0.7, 0.5];
+const TOO_LONG: Duration = Duration::from_millis(22);
+const SHORT: Duration = Duration::from_millis(7);
+/// Of the panel at the side, in points.
+const WIDTH: f32 = 270.0;
+/// Degrees for a drag over the height of the picture.
+const TURN: [f64; 2] = [250.0, 180.0];
+
+/// The window.
+pub struct Window {
+    pub(super) desk: Arc<Desk>,
+    news: Receiver<News>,
+    worker: Option<JoinHandle<()>>,
+    file: String,
+    start: Option<f64>,
+    pub(super) facts: Option<Facts>,
+    /// What is wrong, as long as it is.
+    pub(super) trouble: Option<String>,
+    pub(super) life: Option<Life>,
+    /// Values of params that hands have changed, or the command line.
+    pub(super) set: Vec<Setting>,
+    pub(super) player: Player,
+    look: Option<Look>,
+    space: Space,
+    /// Somebody has turned or moved the plant.
+    touched: bool,
+    texture: Option<TextureHandle>,
+    /// What the texture shows, its modules, and how long it took to run and to draw it.
+    pub(super) shown: Option<(Order, u64, [Duration; 2])>,
+    /// The last order, and when it was given.
+    pub(super) ordered: Option<(Order, Instant)>,
+    /// Which of [`COARSE`].
+    coarse: usize,
+    info: bool,
+    last: Instant,
+    moved: Instant,
+    trial: Runner,
+}
+
+impl Window {
+    pub fn new(context: &egui::Context, options: Options, outcome: Outcome) -> Window {
+        style(context);
+        let desk = Arc::<Desk>::default();
+        let (sender, news) = channel();
+        let file = options.model.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let (set, start) = (options.set.clone(), options.at);
+        let trial = Runner::new(options.trial.clone(), outcome);
+        let worker = {
+            let (desk, context) = (desk.clone(), context.clone());
+            std::thread::spawn(move || {
+                work(&desk, &options, |news| {
+                    // Nobody listens any more when the window is closed.
+                    let _ = sender.send(news);
+                    context.request_repaint();
+                });
+            })
+        };
+        Window {
+            desk,
+            news,
+            worker: Some(worker),
+            file,
+            start,
+            facts: None,
+            trouble: None,
+            life: None,
+            set,
+            player: Player::new([0.0, 0.0], 0.0),
+            look: None,
+            space: Space::default(),
+            touched: false,
+            texture: None,
+            shown: None,
+            ordered: None,
+            coarse: 0,
+            info: true,
+            last: Instant::now(),
+            moved: Instant::now(),
+            trial,
+        }
+    }
+
+    /// Takes in what has become known.
+    fn hear(&mut self, context: &egui::Context) {
+        while let Ok(news) = self.news.try_recv() {
+            match news {
+                News::Read(facts) => {
+                    let first = self.facts.is_none();
+                    self.player.set_range(facts.range, facts.step);
+                    self.set.retain(|s| facts.parameters.iter().any(|p| p.name == s.name));
+                    self.facts = Some(*facts);
+                    self.trouble = None;
+                    if first {
+                        self.player.time = self.player.range[0];
+                        match self.start {
+                            Some(time) => self.player.seek(time),
+                            None => self.player.play(true),
+                        }
+                    }
+                }
+                News::Trouble(message) => self.trouble = Some(message),
+                News::Life(life) => {
+                    if self.look.is_none() || !self.touched && !self.life.as_ref().is_some_and(|l| l.whole) {
+                        self.space = life.space.clone();
+                        let (azimuth, elevation, perspective) = (0.0, 0.0, true);
+                        self.look = Some(Look::at(&self.space, azimuth, elevation, perspective));
+                    }
+                    self.life = Some(*life);
+                }
+                News::Picture(picture) => {
+                    let picture = *picture;
+                    let options = TextureOptions::LINEAR;
+                    match &mut self.texture {
+                        Some(texture) => texture.set(picture.image, options),
+                        None => self.texture = Some(context.load_texture("plant", picture.image, options)),
+                    }
+                    self.trouble = None;
+                    let drawn = picture.spent[1];
+                    if picture.order.shot.as_ref().is_some_and(|shot| !shot.fine) {
+                        if drawn > TOO_LONG {
+                            self.coarse = (self.coarse + 1).min(COARSE.len() - 1);
+                        } else if drawn < SHORT {
+                            self.coarse = self.coarse.saturating_sub(1);
+                        }
+                    }
+                    self.shown = Some((picture.order, picture.modules, picture.spent));
+                }
+            }
+        }
+    }
+
+    /// Shows the whole plant from a side, as large as it becomes with the params that are set now.
+    fn look_at(&mut self, azimuth: f64, elevation: f64) {
+        if let Some(life) = &self.life {
+            self.space = life.space.clone();
+        }
+        let perspective = self.look.as_ref().is_none_or(|look| look.perspective);
+        self.look = Some(Look::at(&self.space, azimuth, elevation, perspective));
+        self.touched = true;
+    }
+
+    fn toggle_perspective(&mut self) {
+        if let Some(look) = &self.look {
+            self.look = Some(Look::at(&self.space, look.azimuth, look.elevation, !look.perspective));
+        }
+    }
+
+    /// Gives a param another value.
+    pub(super) fn set(&mut self, name: &str, value: f64) {
+        self.set.retain(|s| s.name != name);
+        let own = self.facts.iter().flat_map(|f| &f.parameters).find(|p| p.name == name);
+        if own.is_some() {
+            self.set.push(Setting { name: name.to_owned(), value });
+        }
+    }
+
+    /// Orders what is to be seen now.
+    fn order(&mut self, pixels: [f64; 2]) {
+        let fine = !self.player.playing && self.moved.elapsed() >= STILL;
+        let most = MOST_PIXELS[usize::from(fine)];
+        let coarse = if fine { 1.0 } else { COARSE[self.coarse] };
+        let less = (most / (pixels[0] * pixels[1]).max(1.0)).sqrt().min(1.0) * coarse;
+        let shot = self.look.clone().filter(|_| self.facts.is_some()).map(|look| Shot {
+            time: self.player.time,
+            look,
+            space: self.space.clone(),
+            pixels: pixels.map(|side| (side * less).round().max(1.0) as u32),
+            fine,
+        });
+        let order = Order { set: self.set.clone(), shot };
+        let Some((last, _)) = &self.ordered else {
+            // The worker has begun with this.
+            if order.shot.is_some() || self.facts.is_some() {
+                self.give(order, false);
+            }
+            return;
+        };
+        if *last == order {
+            return;
+        }
+        // How it is drawn is not what is moved.
+        let plain =
+            |order: &Order| order.shot.clone().map(|shot| Shot { fine: false, pixels: [0; 2], ..shot });
+        if order.set != last.set || plain(&order) != plain(last) {
+            self.moved = Instant::now();
+        }
+        // What plays takes one picture after the other; hands want the last one only, but a slider that is being dragged
+        // should show something on its way.
+        let slides = order.set != last.set;
+        let young = self.ordered.as_ref().is_some_and(|(_, since)| since.elapsed() < LEAST);
+        let hurry = if slides { !(young && self.waits()) } else { !self.player.playing };
+        if hurry || !self.waits() {
+            self.give(order, hurry);
+        }
+    }
+
+    fn give(&mut self, order: Order, hurry: bool) {
+        self.desk.put(order.clone(), hurry);
+        self.ordered = Some((order, Instant::now()));
+    }
+
+    /// Whether the last order is still to be fulfilled.
+    pub(super) fn waits(&self) -> bool {
+        let shown = self.shown.as_ref().map(|(order, ..)| order);
+        self.trouble.is_none() && self.ordered.as_ref().is_some_and(|(order, _)| Some(order) != shown)
+    }
+
+    /// Everything that was asked for is on the screen, as good as it gets, and the life is known.
+    pub(super) fn is_settled(&self) -> bool {
+        let fine = self.shown.as_ref().and_then(|(order, ..)| order.shot.as_ref()).is_some_and(|s| s.fine);
+        self.trouble.is_some()
+            || (!self.player.playing && fine && !self.waits() && self.life.as_ref().is_some_and(|l| l.whole))
+    }
+
+    fn keys(&mut self, context: &egui::Context) {
+        if context.wants_keyboard_input() {
+            return;
+        }
+        let pressed = |key| context.input(|input| input.key_pressed(key));
+        let many = context.input(|input| if input.modifiers.shift { 10 } else { 1 });
+        let turned = |w: &mut Window, right, up| {
+            w.touched = true;
+            w.look.iter_mut().for_each(|look| look.orbit(right, up));
+        };
+        let sized = |w: &mut Window, factor| {
+            w.touched = true;
+            w.look.iter_mut().for_each(|look| look.magnify(factor, 0.0, 0.0, 1.0));
+        };
+        let actions: [(Key, &dyn Fn(&mut Window)); 24] = [
+            (Key::Space, &|w| w.player.play(!w.player.playing)),
+            (Key::ArrowLeft, &|w| w.player.frames(-many)),
+            (Key::ArrowRight, &|w| w.player.frames(many)),
+            (Key::OpenBracket, &|w| w.production(false)),
+            (Key::CloseBracket, &|w| w.production(true)),
+            (Key::Home, &|w| w.player.seek(w.player.range[0])),
+            (Key::End, &|w| w.player.seek(w.player.range[1])),
+            (Key::Minus, &|w| w.player.faster(-1)),
+            (Key::Plus, &|w| w.player.faster(1)),
+            (Key::Equals, &|w| w.player.faster(1)),
+            (Key::L, &|w| w.player.loops = !w.player.loops),
+            (Key::P, &Window::toggle_perspective),
+            (Key::I, &|w| w.info = !w.info),
+            (Key::A, &|w| turned(w, -5.0, 0.0)),
+            (Key::D, &|w| turned(w, 5.0, 0.0)),
+            (Key::W, &|w| turned(w, 0.0, 5.0)),
+            (Key::S, &|w| turned(w, 0.0, -5.0)),
+            (Key::Q, &|w| sized(w, 1.0 / 1.15)),
+            (Key::E, &|w| sized(w, 1.15)),
+            (Key::Num1, &|w| w.look_at(0.0, 0.0)),
+            (Key::Num2, &|w| w.look_at(90.0, 0.0)),
+            (Key::Num3, &|w| w.look_at(0.0, 90.0)),
+            (Key::Num0, &Window::whole),
+            (Key::R, &|w| w.set.clear()),
+        ];
+        for (key, action) in actions {
+            if pressed(key) {
+                action(self);
+            }
+        }
+    }
+
+    /// The whole plant, from where it is looked at.
+    fn whole(&mut self) {
+        if let Some(look) = &self.look {
+            self.look_at(look.azimuth, look.elevation);
+        }
+    }
+
+    /// To the production after now, or before.
+    fn production(&mut self, after: bool) {
+        let now = self.player.time;
+        let times = || self.life.iter().flat_map(|life| &life.history.happenings).map(|h| h.t);
+        let slack = 1e-12 * now.abs();
+        let found =
+            if after { times().find(|t| *t > now + slack) } else { times().rev().find(|t| *t < now - slack) };
+        if let Some(time) = found {
+            self.player.seek(time);
+        }
+    }
+
+    fn controls(&mut self, ui: &mut egui::Ui) {
+        ui.horizontal(|ui| {
+            let play = if self.player.playing { "⏸ Pause" } else { "▶ Play" };
+            if ui.add(egui::Button::new(play).min_size([76.0, 0.0].into())).on_hover_text("space").clicked() {
+                self.player.play(!self.player.playing);
+            }
+            ui.toggle_value(&mut self.player.loops, "Loop").on_hover_text("L");
+            ui.label("Speed");
+            egui::ComboBox::from_id_salt("speed")
+                .width(64.0)
+                .selected_text(format!("{} ×", self.player.speed))
+                .show_ui(ui, |ui| {
+                    for speed in SPEEDS {
+                        ui.selectable_value(&mut self.player.speed, speed, format!("{speed} ×"));
+                    }
+                });
+            ui.strong(format!("t = {}", timeline::shown(self.player.time)));
+            if let Some((_, modules, _)) = &self.shown {
+                let s = if *modules == 1 { "" } else { "s" };
+                ui.weak(format!("{modules} module{s}"));
+            }
+            if self.waits() && self.ordered.as_ref().is_some_and(|(_, since)| since.elapsed() > LONG) {
+                ui.spinner();
+                ui.weak("running …");
+            }
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                ui.toggle_value(&mut self.info, "Info").on_hover_text("I");
+                let mut perspective = self.look.as_ref().is_some_and(|look| look.perspective);
+                if ui.toggle_value(&mut perspective, "Perspective").on_hover_text("P").clicked() {
+                    self.toggle_perspective();
+                }
+                for (name, azimuth, elevation, key) in
+                    [("Top", 0.0, 90.0, "3"), ("Side", 90.0, 0.0, "2"), ("Front", 0.0, 0.0, "1")]
+                {
+                    if ui.button(name).on_hover_text(key).clicked() {
+                        self.look_at(azimuth, elevation);
+                    }
+                }
+            });
+        });
+    }
+
+    /// The plant, and the hands on it. Returns the pixels that it has on the screen.
+    fn plant(&mut self, ui: &mut egui::Ui) -> [f64; 2] {
+        let (response, painter) = ui.allocate_painter(ui.available_size(), Sense::click_and_drag());
+        let area = response.rect;
+        if let Some(texture) = &self.texture {
+            // Stretched as little as it may be while the window changes its size.
+            let size = texture.size_vec2();
+            let scale = (area.width() / size.x).min(area.height() / size.y);
+            let whole = egui::Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
+            painter.image(
+                texture.id(),
+                egui::Rect::from_center_size(area.center(), size * scale),
+                whole,
+                Color32::WHITE,
+            );
+        }
+        let title = self.facts.as_ref().map_or("", |facts| &facts.title);
+        let (title, file) =
+            if title.is_empty() { (self.file.as_str(), "") } else { (title, self.file.as_str()) };
+        let ink = ui.visuals().text_color();
+        let corner = area.min + egui::vec2(14.0, 10.0);
+        let below =
+            painter.text(corner, egui::Align2::LEFT_TOP, title, egui::FontId::proportional(18.0), ink);
+        let faint = ui.visuals().weak_text_color();
+        painter.text(
+            below.left_bottom(),
+            egui::Align2::LEFT_TOP,
+            file,
+            egui::FontId::proportional(13.0),
+            faint,
+        );
+        let [width, height] = [f64::from(area.width()), f64::from(area.height().max(1.0))];
+        if let Some(look) = &mut self.look {
+            let drag = response.drag_delta();
+            let [x, y] = [f64::from(drag.x), f64::from(drag.y)].map(|d| d / height);
+            let shift = ui.input(|input| input.modifiers.shift);
+            if drag != egui::Vec2::ZERO {
+                self.touched = true;
+                if response.dragged_by(egui::PointerButton::Primary) && !shift {
+                    look.orbit(x * TURN[0], y * TURN[1]);
+                } else {
+                    look.pan(x, -y, width / height);
+                }
+            }
+            if let Some(pointer) = response.hover_pos() {
+                let (scroll, pinch) = ui.input(|input| (input.smooth_scroll_delta.y, input.zoom_delta()));
+                let factor = f64::from((scroll * 0.004).exp() * pinch);
+                if factor != 1.0 {
+                    self.touched = true;
+                    let at = (pointer - area.center()) / height as f32;
+                    look.magnify(factor, f64::from(at.x), f64::from(-at.y), width / height);
+                }
+            }
+        }
+        if response.double_clicked() {
+            self.whole();
+        }
+        let ratio = f64::from(ui.ctx().pixels_per_point());
+        let most = ui.ctx().input(|input| input.max_texture_side) as f64;
+        [width, height].map(|side| (side * ratio).min(most))
+    }
+}
+
+impl eframe::App for Window {
+    fn update(&mut self, context: &egui::Context, _: &mut eframe::Frame) {
+        self.hear(context);
+        let now = Instant::now();
+        self.player.pass((now - self.last).as_secs_f64());
+        self.last = now;
+        self.keys(context);
+        if self.info {
+            egui::SidePanel::right("info")
+                .default_width(WIDTH)
+                .width_range(WIDTH..=2.0 * WIDTH)
+                .show(context, |ui| panel::show(self, ui));
+        }
+        egui::TopBottomPanel::bottom("controls").show(context, |ui| {
+            ui.add_space(4.0);
+            timeline::show(ui, &mut self.player, self.life.as_ref());
+            self.controls(ui);
+            ui.add_space(4.0);
+        });
+        if let Some(trouble) = &self.trouble {
+            egui::TopBottomPanel::bottom("trouble").show(context, |ui| {
+                egui::ScrollArea::both().max_height(240.0).auto_shrink([false, true]).show(ui, |ui| {
+                    let text = RichText::new(trouble.trim_end())
+                        .monospace()
+                        .color(Color32::from_rgb(0xa0, 0x1c, 0x1c));
+                    ui.add(egui::Label::new(text).extend().selectable(true));
+                });
+            });
+        }
+        let frame = egui::Frame::new().fill(background());
+        let pixels = egui::CentralPanel::default().frame(frame).show(context, |ui| self.plant(ui)).inner;
+        let mut trial = std::mem::take(&mut self.trial);
+        trial.step(self, context);
+        self.trial = trial;
+        self.order(pixels);
+        if self.player.playing {
+            context.request_repaint();
+        } else if !self.is_settled() {
+            context.request_repaint_after(STILL / 2);
+        }
+    }
+
+    fn on_exit(&mut self, _: Option<&eframe::glow::Context>) {
+        self.desk.close();
+        // A worker that has failed has said so.
+        let _ = self.worker.take().map(JoinHandle::join);
+    }
+}
+
+fn background() -> Color32 {
+    let crate::scene::Color { red, green, blue } = Page::BACKGROUND;
+    Color32::from_rgb(red, green, blue)
+}
+
+fn style(context: &egui::Context) {
+    let mut visuals = egui::Visuals::light();
+    visuals.panel_fill = Color32::from_rgb(0xff, 0xfe, 0xfb);
+    visuals.override_text_color = Some(Color32::from_rgb(0x2c, 0x33, 0x26));
+    visuals.selection.bg_fill = Color32::from_rgb(0xcf, 0xe3, 0xbf);
+    visuals.selection.stroke.color = Color32::from_rgb(0x2c, 0x33, 0x26);
+    visuals.slider_trailing_fill = true;
+    context.set_visuals_of(egui::Theme::Light, visuals);
+    context.set_theme(egui::Theme::Light);
+}

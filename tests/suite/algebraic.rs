@@ -1,0 +1,174 @@
+//! Parameters given by values and by equations to be solved, and sums over what is attached: against exact answers.
+
+use dlsys::sim::{Error, Method, Scheduler, Settings};
+
+use crate::common::{Plain, run};
+
+/// Every parameter of every module is to be what it is in truth, within 100 tolerances (LANGUAGE, "Accuracy"), at
+/// several tolerances, with both schedulers.
+fn follows(text: &str, times: &[f64], truth: impl Fn(f64) -> Vec<Vec<f64>>) {
+    for tolerance in [1e-4, 1e-6, 1e-9] {
+        for scheduler in [Scheduler::Auto, Scheduler::Global] {
+            let settings = Settings { tolerance, scheduler, ..Settings::default() };
+            let states = run(text, settings, times).unwrap_or_else(|e| panic!("{e}\n{text}"));
+            for (&t, state) in times.iter().zip(&states) {
+                let modules: Vec<&Plain> = state.iter().filter(|m| !m.1.is_empty()).collect();
+                let truth = truth(t);
+                assert_eq!(modules.len(), truth.len(), "at {t}\n{text}");
+                for ((name, found), wanted) in modules.iter().zip(&truth).map(|(m, w)| ((&m.0, &m.1), w)) {
+                    for (&x, &y) in found.iter().zip(wanted) {
+                        let error = (x - y).abs() / y.abs().max(1.0) / tolerance;
+                        assert!(error < 100.0, "{name} at {t}: {x}, not {y}: {error} tolerances\n{text}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The root of a function that rises, between two numbers.
+fn root(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+    for _ in 0..200 {
+        let middle = 0.5 * (low + high);
+        *(if f(middle) < 0.0 { &mut low } else { &mut high }) = middle;
+    }
+    0.5 * (low + high)
+}
+
+const TIMES: [f64; 4] = [0.0, 0.3, 1.0, 2.0];
+
+#[test]
+fn a_square_root_that_is_an_equation() {
+    let text = "initial string: A(1, 1)\nA(x, y): solve dx/dt = y, 0 = y^2 - x";
+    follows(text, &TIMES, |t| vec![vec![(1.0 + t / 2.0).powi(2), 1.0 + t / 2.0]]);
+}
+
+#[test]
+fn two_equations_in_two_unknowns() {
+    // u = 2x/3 and v = x/3; their written values are far from that.
+    let text = "initial string: A(1, 5, -7)\nA(x, u, v): solve dx/dt = -u*v, 0 = u + v - x, 0 = u - 2v";
+    follows(text, &TIMES, |t| {
+        let x = 1.0 / (1.0 + 2.0 * t / 9.0);
+        vec![vec![x, 2.0 * x / 3.0, x / 3.0]]
+    });
+}
+
+#[test]
+fn an_equation_with_a_logarithm() {
+    let text = "initial string: A(1, 0.9)\nA(x, y): solve dx/dt = y + 1, 0 = y + ln(y) - x";
+    follows(text, &TIMES, |t| vec![vec![t.exp() + t, t.exp()]]);
+}
+
+#[test]
+fn an_enzyme_in_its_quasi_steady_state() {
+    // s + ln s falls at the rate 1.
+    let text = "initial string: A(2, 0.5)\nA(s, c): solve ds/dt = -c, 0 = (1 - c)*s - c";
+    follows(text, &TIMES, |t| {
+        let s = root(|s| s + s.ln() - (2.0 + 2.0f64.ln() - t), 1e-9, 3.0);
+        vec![vec![s, s / (1.0 + s)]]
+    });
+}
+
+#[test]
+fn a_pressure_that_neighbours_share() {
+    // Between two ends the pressure is linear in the place, at every instant; all unknowns hang together.
+    let rule = "solve dq/dt = p, 0 = p_l + p_r - 2p";
+    let text = format!(
+        "initial string: In(0, 0) P(0, 0) P(0, 0) P(0, 0) P(0, 0) Out(0, 0)\nIn(p, q): solve p = sin(t)\n\
+         P(p_l, q_l) < P(p, q) > P(p_r, q_r): {rule}\nIn(p_l, q_l) < P(p, q) > P(p_r, q_r): {rule}\n\
+         P(p_l, q_l) < P(p, q) > Out(p_r, q_r): {rule}"
+    );
+    follows(&text, &TIMES, |t| {
+        let part = |i: u32| f64::from(5 - i) / 5.0;
+        let inner = (1..5).map(|i| vec![part(i) * t.sin(), part(i) * (1.0 - t.cos())]);
+        [vec![t.sin(), 0.0]].into_iter().chain(inner).chain([vec![0.0; 2]]).collect()
+    });
+}
+
+#[test]
+fn a_stiff_system() {
+    // x follows y = cos t at a distance that is known.
+    let text =
+        "initial string: A(1, 0)\nA(x, y): solve dx/dt = -1e4*(x - y), 0 = y^3 + y - cos(t)^3 - cos(t)";
+    follows(text, &TIMES, |t| {
+        let l: f64 = 1e4;
+        let steady = |t: f64| (l * l * t.cos() + l * t.sin()) / (l * l + 1.0);
+        vec![vec![steady(t) + (1.0 - steady(0.0)) * (-l * t).exp(), t.cos()]]
+    });
+}
+
+#[test]
+fn flows_that_add_up_to_what_the_root_gives() {
+    // m = sum f + p and f = w p: the share of the root is solved for, with those of its branches in it.
+    let text = "initial string: R(4, 1) [ L(1, 0, 0) ] [ L(2, 0, 0) ] L(3, 0, 0)\n\
+        R(p, m): solve dm/dt = -sum(L(w, f, q): f), 0 = sum(L(w, f, q): f) + p - m\n\
+        R(p, m) < L(w, f, q): solve f = w*p, dq/dt = f";
+    follows(text, &TIMES, |t| {
+        let m = (-6.0 / 7.0 * t).exp();
+        let branch = |w: f64| vec![w, w * m / 7.0, w * (1.0 - m) / 6.0];
+        vec![vec![m / 7.0, m], branch(1.0), branch(2.0), branch(3.0)]
+    });
+}
+
+#[test]
+fn a_value_found_again_at_every_birth() {
+    // The event is located on the unknown; the successor's equations are another root's.
+    let text = "initial string: A(0)\nA(y):\n  if y < 0.5 solve 0 = y^3 + y - t\n  if y = 0.5 produce B(0, t, 0)\n\
+        B(x, s, z): solve dx/dt = z, 0 = exp(z) - 1 - age";
+    let event = 0.625;
+    follows(text, &[0.0, 0.3, 0.624, 0.626, 1.0, 3.0], |t| {
+        if t < event {
+            return vec![vec![root(|y| y.powi(3) + y - t, -1.0, 2.0)]];
+        }
+        let a = 1.0 + (t - event);
+        vec![vec![a * a.ln() - a + 1.0, event, a.ln()]]
+    });
+}
+
+#[test]
+fn values_are_formulas_where_they_can_be() {
+    // The paper's cubic growth function as the function of time that it is; nothing is integrated, ever.
+    let text = "const T = 4\ndef G(a) = if a < T then 3*(a/T)^2 - 2*(a/T)^3 else 1\n\
+        initial string: F(0, 0)\nF(x, w):\n  if x < 0.9 solve x = G(age), w = sqrt(x)\n  if x = 0.9 produce H(t, w)";
+    let g = |t: f64| 3.0 * (t / 4.0).powi(2) - 2.0 * (t / 4.0).powi(3);
+    let event = root(|t| g(t) - 0.9, 0.0, 4.0);
+    follows(text, &[0.0, 1.0, 3.0, 3.2, 5.0], |t| match t < event {
+        true => vec![vec![g(t), g(t).sqrt()]],
+        false => vec![vec![event, 0.9f64.sqrt()]],
+    });
+    let session = crate::common::session(text);
+    let mut simulation = session.simulate(Settings::default()).expect("begins");
+    simulation.at(5.0, &mut Default::default()).expect("runs");
+    assert_eq!(simulation.stats().rhs_evaluations, 0);
+}
+
+fn fails(text: &str) -> Error {
+    run(text, Settings::default(), &[10.0]).expect_err("fails")
+}
+
+#[test]
+fn singular_equations_say_so() {
+    // Two solutions meet at t = π/2; the circle says no more.
+    let circle = fails("initial string: A(0, 1)\nA(x, y): solve dx/dt = y, 0 = x^2 + y^2 - 1");
+    assert!(circle.to_string().contains("become singular"), "{circle}");
+    assert!((circle.site().time - std::f64::consts::FRAC_PI_2).abs() < 1e-3, "{circle}");
+    // A fold that time brings about.
+    let fold = fails("initial string: A(1)\nA(y): solve 0 = y^2 - 1 + t");
+    assert!(fold.to_string().contains("singular"), "{fold}");
+    assert!((fold.site().time - 1.0).abs() < 1e-3, "{fold}");
+    // A double root at birth; no root at all.
+    let double = fails("initial string: A(1, 1)\nA(x, y): solve dx/dt = y, 0 = (y - x)^2");
+    assert!(double.to_string().contains("singular"), "{double}");
+    let nothing = fails("initial string: A(1, 1)\nA(x, y): solve dx/dt = y, 0 = exp(y) + x");
+    assert!(nothing.to_string().contains("no value that solves"), "{nothing}");
+    assert_eq!(nothing.site().time, 0.0);
+}
+
+#[test]
+fn steps_of_a_fixed_length_know_values_too() {
+    let text = "initial string: A(1, 1)\nA(x, y): solve dx/dt = y, 0 = y^2 - x";
+    let settings = Settings { method: Method::Rk4, step_size: 0.01, ..Settings::default() };
+    let states = run(text, settings, &[2.0]).expect("runs");
+    assert!((states[0][0].1[0] - 4.0).abs() < 1e-6, "{states:?}");
+    assert!((states[0][0].1[1] - 2.0).abs() < 1e-6, "{states:?}");
+}

@@ -1,0 +1,104 @@
+//! The quick way against the general way: random models of formulas must give the same bits, the same log of events and the
+//! same errors, whichever frames are asked for.
+
+use dlsys::sim::Settings;
+use dlsys::structure::ModuleString;
+use proptest::prelude::*;
+
+const LAWS: [&str; 8] = ["1", "0.5", "2", "2*(1 - x/3)*x", "x", "0.25 + age", "3 - x", "1 + 0.5*age^2 - x*0"];
+/// What follows, with `n` generations to go.
+const SUCCESSORS: [&str; 8] = [
+    "A(0.5, n - 1) B(0.25, n - 1)",
+    "B(0.5, n - 1) [ + C(0.5, n - 1) ] A(0.25, n - 1)",
+    "C(0.25, n - 1) - A(0.5, n - 1)",
+    "A(x/4, n - 1) + A(x/4, n - 1)",
+    "[ B(0.25, n - 1) ] [ B(0.5, n - 1) ]",
+    // Over as soon as it is there.
+    "A(2, n - 1) B(1.5, n - 1)",
+    "D(t) C(0.5, n - 1)",
+    "",
+];
+const HEIGHTS: [&str; 4] = ["1", "1.5", "2", "1 + n/8"];
+/// Contexts: none, one that only has to be there, one whose motion is read, one read by equations.
+const CONTEXTS: [&str; 4] = [
+    "",
+    "D(b) < A(x, n):\n if x < 1 solve dx/dt = 1, dn/dt = 0\n if x >= 1 produce D(b)\n",
+    "C(y, m) < B(x, n):\n if x < y + 0.5 solve dx/dt = 2, dn/dt = 0\n if x >= y + 0.5 produce D(y)\n",
+    "A(x, n) > B(y, m):\n if x < 1 solve dx/dt = 0.5 + 0.1*y, dn/dt = 0\n if x >= 1 produce D(y)\n",
+];
+
+fn rule(kind: &str, law: usize, height: usize, successor: usize) -> String {
+    let (law, height, successor) = (LAWS[law], HEIGHTS[height], SUCCESSORS[successor]);
+    let successor = if successor.is_empty() { "ε" } else { successor };
+    format!(
+        "{kind}(x, n):\n if x < {height} solve dx/dt = {law}, dn/dt = 0\n if x >= {height} & n > 0 produce {successor}\n \
+         if x >= {height} & n <= 0 produce D(x) E(x, 0)\n"
+    )
+}
+
+/// All that can be seen of a run: at each time the modules with the bits of their numbers, then the log.
+fn seen(text: &str, settings: Settings, times: &[f64], shown: &[f64]) -> Vec<String> {
+    let session = crate::common::session(text);
+    let mut all = Vec::new();
+    let mut simulation = match session.simulate(settings) {
+        Ok(simulation) => simulation,
+        Err(error) => return vec![error.to_string()],
+    };
+    let (mut string, mut other) = (ModuleString::default(), ModuleString::default());
+    for (i, &t) in times.iter().enumerate() {
+        // Two strings that are filled again, in turns.
+        let string = if i % 3 == 0 { &mut other } else { &mut string };
+        if let Err(error) = simulation.at(t, string) {
+            all.push(error.to_string());
+            break;
+        }
+        if !shown.contains(&t) {
+            continue;
+        }
+        all.push(format!("t = {t}"));
+        all.extend(string.iter().map(|m| {
+            let bits: Vec<u64> = m.parameters.iter().map(|x| x.to_bits()).collect();
+            let name = &session.model.kinds.get(m.kind).name;
+            format!("{name} {bits:x?} {:x} {} {}", m.age.to_bits(), m.lineage.name(), m.lineage)
+        }));
+    }
+    // Within an instant the quick way comes first.
+    let mut events = simulation.take_events();
+    events.sort_by_key(|event| (event.group, event.lineage.id));
+    all.extend(events.iter().map(|event| format!("{event:?}")));
+    all
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 150, ..ProptestConfig::default() })]
+    #[test]
+    fn light_modules_do_what_others_do(
+        rules in proptest::collection::vec((0..LAWS.len(), 0..HEIGHTS.len(), 0..SUCCESSORS.len()), 3),
+        context in 0..CONTEXTS.len(),
+        generations in 1..5u32,
+        frames in proptest::collection::vec(0.0..6.0f64, 1..5),
+        between in proptest::collection::vec(0.0..6.0f64, 0..20),
+    ) {
+        let mut text = format!(
+            "initial string: A(0.25, {generations}) C(0.5, {generations}) [ - A(0.25, {generations}) ] B(0.5, {generations})\n"
+        );
+        text += CONTEXTS[context];
+        for (kind, (law, height, successor)) in ["A", "B", "C"].iter().zip(&rules) {
+            text += &rule(kind, *law, *height, *successor);
+        }
+        // Growth by pieces, and a part that only grows.
+        text += "E(x, y):\n if age < 0.5 solve dx/dt = 1, dy/dt = -y\n if age >= 0.5 solve dx/dt = -0.5, dy/dt = y + 1\n";
+        let mut shown = frames;
+        shown.extend([0.0, 1.0, 3.0]);
+        shown.sort_by(f64::total_cmp);
+        shown.dedup();
+        let mut times: Vec<f64> = shown.iter().chain(&between).copied().collect();
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        let general = Settings { log: true, slow: true, max_modules: 5000, ..Settings::default() };
+        let quick = Settings { slow: false, ..general };
+        let known = seen(&text, general, &shown, &shown);
+        prop_assert_eq!(&seen(&text, quick, &shown, &shown), &known, "{}", &text);
+        prop_assert_eq!(&seen(&text, quick, &times, &shown), &known, "{}", &text);
+    }
+}
