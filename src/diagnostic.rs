@@ -30,7 +30,8 @@ impl Span {
     }
 }
 
-/// A model's text and where it came from.
+/// A model's text and where it came from. Texts that it includes stand behind it, so that a [`Span`] is a place in any of
+/// them.
 #[derive(Clone, Debug)]
 pub struct Source {
     /// The file as the user named it.
@@ -38,6 +39,8 @@ pub struct Source {
     pub text: String,
     /// Byte at which each line starts.
     lines: Vec<u32>,
+    /// Included texts: where each begins, its first line, and its name.
+    included: Vec<(u32, usize, String)>,
 }
 
 impl Source {
@@ -49,7 +52,7 @@ impl Source {
         let text = text.into();
         let mut lines = vec![0];
         lines.extend(text.bytes().enumerate().filter(|(_, b)| *b == b'\n').map(|(i, _)| i as u32 + 1));
-        Source { name: name.into(), text, lines }
+        Source { name: name.into(), text, lines, included: Vec::new() }
     }
 
     /// Takes the bytes of a file: drops a byte-order mark, rejects what is not UTF-8.
@@ -83,12 +86,46 @@ impl Source {
         }
     }
 
-    /// Line and column of a byte, both from 1; columns count characters.
+    /// Puts a text that the model includes behind what there is, and returns where it begins.
+    pub fn include(&mut self, name: impl Into<String>, text: &str) -> usize {
+        if !self.text.ends_with('\n') {
+            self.text.push('\n');
+            self.lines.push(self.text.len() as u32);
+        }
+        let start = self.text.len();
+        self.included.push((start as u32, self.lines.len() - 1, name.into()));
+        self.text.push_str(text);
+        let breaks = text.bytes().enumerate().filter(|(_, b)| *b == b'\n');
+        self.lines.extend(breaks.map(|(i, _)| (start + i) as u32 + 1));
+        start
+    }
+
+    /// The model's own text, without what it includes.
+    pub fn own_text(&self) -> &str {
+        self.included.first().map_or(&self.text, |first| &self.text[..first.0 as usize])
+    }
+
+    fn part(&self, byte: u32) -> Option<&(u32, usize, String)> {
+        self.included[..self.included.partition_point(|part| part.0 <= byte)].last()
+    }
+
+    /// The file that a byte stands in.
+    pub fn name_of(&self, byte: u32) -> &str {
+        self.part(byte).map_or(&self.name, |part| &part.2)
+    }
+
+    /// The line that a byte stands in, of all texts together.
+    fn line_of(&self, byte: u32) -> usize {
+        self.lines.partition_point(|&start| start <= byte) - 1
+    }
+
+    /// Line and column of a byte in its file, both from 1; columns count characters.
     pub fn position(&self, byte: u32) -> (usize, usize) {
-        let line = self.lines.partition_point(|&start| start <= byte) - 1;
+        let line = self.line_of(byte);
         let column = self.text[self.lines[line] as usize..].char_indices();
         let offset = (byte - self.lines[line]) as usize;
-        (line + 1, column.take_while(|(i, _)| *i < offset).count() + 1)
+        let first = self.part(byte).map_or(0, |part| part.1);
+        (line - first + 1, column.take_while(|(i, _)| *i < offset).count() + 1)
     }
 
     /// The text of a span.
@@ -176,23 +213,23 @@ impl Diagnostic {
         let mut excerpts = Vec::new();
         let mut labels: Vec<&(Span, String)> = self.labels.iter().collect();
         while let Some((span, remark)) = labels.first().copied() {
-            let (first, _) = source.position(span.start);
-            let (last, _) = source.position(span.end.saturating_sub(1).max(span.start));
-            let mut range = source.line_range(first - 1);
-            range.end = range.end.max(source.line_range(last - 1).end).min(source.text.len());
+            let last = source.line_of(span.end.saturating_sub(1).max(span.start));
+            let mut range = source.line_range(source.line_of(span.start));
+            range.end = range.end.max(source.line_range(last).end).min(source.text.len());
             if range.len() > LONG {
                 let (line, column) = source.position(span.start);
                 let excerpt: String = source.text[span.range()].chars().take(60).collect();
                 excerpts.push(format!(
                     "{}:{line}:{column}: {remark} (at `{}`)",
-                    source.name,
+                    source.name_of(span.start),
                     excerpt.trim_end()
                 ));
                 labels.remove(0);
                 continue;
             }
-            let mut snippet =
-                Snippet::source(&source.text[range.clone()]).line_start(first).path(&source.name);
+            let mut snippet = Snippet::source(&source.text[range.clone()])
+                .line_start(source.position(span.start).0)
+                .path(source.name_of(span.start));
             let first_label = std::ptr::eq(*labels.first().expect("not empty"), &self.labels[0]);
             let mut kind = if first_label { AnnotationKind::Primary } else { AnnotationKind::Context };
             labels.retain(|(other, remark)| {

@@ -34,6 +34,8 @@ pub struct Session {
     pub warnings: Vec<Diagnostic>,
     /// The files that were read: the model, unless it came from memory, and what it names.
     pub inputs: Vec<Input>,
+    /// Where these files were looked for.
+    folders: Vec<PathBuf>,
 }
 
 /// Why there is no session.
@@ -75,8 +77,19 @@ impl Input {
 }
 
 impl Session {
-    /// Reads a model file.
+    /// Reads a model file. What it names, included texts, tables and surfaces, is looked for in its folder.
+    ///
+    /// # Errors
+    /// What is wrong with the file, its text or the settings.
     pub fn open(path: &Path, settings: &[Setting]) -> Result<Session, Box<Refused>> {
+        Session::open_with(path, settings, &[])
+    }
+
+    /// Reads a model file. What it names and what is not in its folder is looked for in others, in their order.
+    ///
+    /// # Errors
+    /// As of [`Session::open`].
+    pub fn open_with(path: &Path, settings: &[Setting], others: &[PathBuf]) -> Result<Session, Box<Refused>> {
         let name = path.display().to_string();
         let model = Input::now(path);
         let refuse = |source, diagnostic| {
@@ -89,16 +102,10 @@ impl Session {
             refuse(Source::new(&name, ""), diagnostic)
         })?;
         let source = Source::from_bytes(name, bytes).map_err(|e| refuse(e.0, e.1))?;
-        let folder = Folder {
-            path: path.parent().unwrap_or(Path::new("")).to_owned(),
-            inputs: RefCell::new(vec![model.clone()]),
-        };
-        let mut read = Session::from_source(source, settings, &folder);
-        match &mut read {
-            Ok(session) => session.inputs = folder.inputs.into_inner(),
-            Err(refused) => refused.inputs = folder.inputs.into_inner(),
-        }
-        read
+        let folders = Folders::new(path.parent().unwrap_or(Path::new("")), others);
+        folders.inputs.borrow_mut().push(model.clone());
+        let read = Session::from_source(source, settings, &folders);
+        folders.note(read)
     }
 
     /// Takes a model's text from memory; `name` stands for the file in messages. Surfaces that it names are
@@ -124,30 +131,30 @@ impl Session {
         Session::from_source(source, settings, files)
     }
 
-    /// Takes a model's text from memory; the surfaces that it names come from a folder, as if the text were a file
-    /// there. `name` stands for the file in messages.
+    /// Takes a model's text from memory; the files that it names come from a folder, as if the text were a file there, or
+    /// from `others`. `name` stands for the file in messages.
     ///
     /// # Errors
     /// As of [`Session::open`].
     pub fn from_text_in(
         folder: &Path,
+        others: &[PathBuf],
         name: &str,
         text: &str,
         settings: &[Setting],
     ) -> Result<Session, Box<Refused>> {
-        let folder = Folder { path: folder.to_owned(), inputs: RefCell::default() };
-        let mut read = Session::read_text(name, text, settings, &folder);
-        match &mut read {
-            Ok(session) => session.inputs = folder.inputs.into_inner(),
-            Err(refused) => refused.inputs = folder.inputs.into_inner(),
-        }
-        read
+        let folders = Folders::new(folder, others);
+        let read = Session::read_text(name, text, settings, &folders);
+        folders.note(read)
     }
 
     fn from_source(source: Source, settings: &[Setting], files: &dyn Files) -> Result<Session, Box<Refused>> {
         let loaded = lang::load_with(&source, settings, files);
+        let source = loaded.source.unwrap_or(source);
         match loaded.model {
-            Some(model) => Ok(Session { source, model, warnings: loaded.diagnostics, inputs: Vec::new() }),
+            Some(model) => {
+                Ok(Session { source, model, warnings: loaded.diagnostics, inputs: vec![], folders: vec![] })
+            }
             None => Err(Box::new(Refused {
                 source,
                 diagnostics: loaded.diagnostics,
@@ -167,7 +174,9 @@ impl Session {
         let settings: Vec<Setting> =
             values.map(|p| Setting { name: p.name.clone(), value: p.value }).collect();
         let source = Source::new("measure", text);
-        lang::measure(&self.source, &settings, &self.model, &source).map_err(|said| (source, said))
+        let folders = Folders { paths: self.folders.clone(), inputs: RefCell::default() };
+        let read = lang::measure(&self.source, &folders, &settings, &self.model, &source);
+        read.map_err(|said| (source, said))
     }
 
     /// Starts the model at t = 0.
@@ -176,26 +185,43 @@ impl Session {
     }
 }
 
-/// The folder of a model, with the files that it may read.
-struct Folder {
-    path: PathBuf,
+/// The folder of a model and others, with the files that it may read.
+struct Folders {
+    /// The model's own is the first.
+    paths: Vec<PathBuf>,
     /// What was asked for.
     inputs: RefCell<Vec<Input>>,
 }
 
-impl Files for Folder {
-    fn read(&self, path: &Path, limit: u64) -> Result<Vec<u8>, String> {
-        let folder = if self.path.as_os_str().is_empty() { Path::new(".") } else { &self.path };
+impl Folders {
+    fn new(own: &Path, others: &[PathBuf]) -> Folders {
+        let own = if own.as_os_str().is_empty() { Path::new(".") } else { own };
+        let paths = std::iter::once(own.to_owned()).chain(others.iter().cloned()).collect();
+        Folders { paths, inputs: RefCell::default() }
+    }
+
+    /// Puts what was read into what came of it.
+    fn note(self, mut read: Result<Session, Box<Refused>>) -> Result<Session, Box<Refused>> {
+        match &mut read {
+            Ok(session) => (session.inputs, session.folders) = (self.inputs.into_inner(), self.paths),
+            Err(refused) => refused.inputs = self.inputs.into_inner(),
+        }
+        read
+    }
+
+    /// The bytes of a file of one folder; `None` if there is none.
+    fn read_from(&self, folder: &Path, path: &Path, limit: u64) -> Result<Option<Vec<u8>>, String> {
         let file = folder.join(path);
         self.inputs.borrow_mut().push(Input::now(&file));
-        let failed = |error: std::io::Error| match error.kind() {
-            std::io::ErrorKind::NotFound => format!("there is no file {}", file.display()),
-            _ => format!("{}: {error}", file.display()),
+        let failed = |error: std::io::Error| format!("{}: {error}", file.display());
+        let real = match file.canonicalize() {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+            real => real.map_err(failed)?,
         };
         // A link must not lead out of the folder either.
-        let (home, real) = (folder.canonicalize().map_err(failed)?, file.canonicalize().map_err(failed)?);
-        if !real.starts_with(&home) {
-            return Err(format!("{} leads out of the model's folder", file.display()));
+        if !real.starts_with(folder.canonicalize().map_err(failed)?) {
+            let whose = if *folder == *self.paths[0] { "the model's folder" } else { "its folder" };
+            return Err(format!("{} leads out of {whose}", file.display()));
         }
         if !real.metadata().map_err(failed)?.is_file() {
             return Err(format!("{} is not a file", file.display()));
@@ -209,6 +235,19 @@ impl Files for Folder {
         if bytes.len() as u64 > limit {
             return Err(format!("{} has more than {} MB", file.display(), limit >> 20));
         }
-        Ok(bytes)
+        Ok(Some(bytes))
+    }
+}
+
+impl Files for Folders {
+    fn read(&self, path: &Path, limit: u64) -> Result<Vec<u8>, String> {
+        for folder in &self.paths {
+            if let Some(bytes) = self.read_from(folder, path, limit)? {
+                return Ok(bytes);
+            }
+        }
+        let Some(own) = self.paths.first() else { return NoFiles.read(path, limit) };
+        let others = if self.paths.len() > 1 { ", nor in the other folders" } else { "" };
+        Err(format!("there is no file {}{others}", own.join(path).display()))
     }
 }

@@ -6,6 +6,7 @@
 //! then are the two timed, alternating, so that noise of the machine hits both.
 
 pub mod anabaena;
+pub mod blocks;
 pub mod chain;
 pub mod filament;
 pub mod measure;

@@ -113,6 +113,9 @@ JSON fields:
       found       for each `solve`: its line, why, and
         class       nothing to find | never met | closed-form time
                     | root on a closed form | root on dense output
+  curves      a list of name, sort (linear | monotone | spline), points,
+              from, to (arguments), least, greatest (values), periodic,
+              inverse (it rises throughout, or falls throughout)
   summary     kinds by work; closed_form: nothing is ever integrated";
 
 #[derive(Debug, Args)]
@@ -122,6 +125,8 @@ pub struct CheckArgs {
     /// Set a `param` of the model; can be repeated
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     pub settings: Vec<Setting>,
+    #[command(flatten)]
+    pub include: IncludeArgs,
     /// Run the model, too, and say which productions make what is drawn jump (C0), or its speed (C1)
     ///
     /// At every production that fires, the predecessor just before is drawn against all that stands in its place just
@@ -144,6 +149,15 @@ pub struct CheckArgs {
     pub deny: Option<Order>,
 }
 
+/// Where else files are looked for that a model names.
+#[derive(Debug, Args)]
+pub struct IncludeArgs {
+    /// Look in this folder, too, for files that a model names (`include`, `table`, `surface`) and that are not in its own;
+    /// can be repeated
+    #[arg(long = "include-path", value_name = "DIR")]
+    pub folders: Vec<PathBuf>,
+}
+
 /// Orders of continuity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
 pub enum Order {
@@ -160,6 +174,8 @@ pub struct ExplainArgs {
     /// Set a `param` of the model; can be repeated
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     pub settings: Vec<Setting>,
+    #[command(flatten)]
+    pub include: IncludeArgs,
     /// How it is printed; JSON is one object, with `kinds`, `rules` and `summary`
     #[arg(long, value_enum, default_value_t = TextFormat::Text)]
     pub format: TextFormat,
@@ -350,6 +366,8 @@ pub struct ReportArgs {
     /// Set a `param` of every model; can be repeated
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting, conflicts_with = "hard")]
     pub settings: Vec<Setting>,
+    #[command(flatten)]
+    pub include: IncludeArgs,
     /// Timed runs of each point, of which the median is shown; fewer where they take more than 3 seconds
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = runs)]
     pub runs: usize,
@@ -375,6 +393,8 @@ pub struct ReplArgs {
     /// Set a `param` of the model; can be repeated
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting, requires = "model")]
     pub settings: Vec<Setting>,
+    #[command(flatten)]
+    pub include: IncludeArgs,
     /// Error aimed at in every parameter, relative to max(1, |value|)
     #[arg(long, value_name = "TOL", allow_negative_numbers = true, default_value = "1e-6", value_parser = tolerance)]
     pub tolerance: f64,
@@ -415,6 +435,8 @@ pub struct SharedArgs {
     /// Set a `param` of the model; can be repeated
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     pub settings: Vec<Setting>,
+    #[command(flatten)]
+    pub include: IncludeArgs,
     /// Error aimed at in every parameter, relative to max(1, |value|)
     #[arg(long, value_name = "TOL", allow_negative_numbers = true, default_value = "1e-6", value_parser = tolerance)]
     pub tolerance: f64,

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use super::args::{Scheduler, SharedArgs};
+use super::args::{IncludeArgs, Scheduler, SharedArgs};
 use crate::diagnostic::{Diagnostic, Span};
 use crate::lang::Setting;
 use crate::model::Frames;
@@ -85,8 +85,8 @@ pub fn coloured() -> bool {
 const MOST_SHOWN: usize = 50;
 
 /// Reads a model, prints its warnings.
-pub fn open(path: &Path, settings: &[Setting]) -> Result<Session, Failure> {
-    match Session::open(path, settings) {
+pub fn open(path: &Path, settings: &[Setting], include: &IncludeArgs) -> Result<Session, Failure> {
+    match Session::open_with(path, settings, &include.folders) {
         Ok(session) => {
             for warning in session.warnings.iter().take(MOST_SHOWN) {
                 tell(&warning.render(&session.source, coloured()));
@@ -246,7 +246,7 @@ impl Run {
     pub fn start(args: &SharedArgs) -> Result<Run, Failure> {
         let before = Instant::now();
         ready(args)?;
-        let session = open(&args.model, &args.settings)?;
+        let session = open(&args.model, &args.settings, &args.include)?;
         let mut run = Run::of(session, args)?;
         run.clock.parse = before.elapsed();
         Ok(run)

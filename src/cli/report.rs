@@ -26,7 +26,7 @@ pub fn report(args: &ReportArgs) -> Result<(), Failure> {
     }
     let mut names: BTreeMap<String, usize> = BTreeMap::new();
     for model in &args.models {
-        let session = open(model, &args.settings)?;
+        let session = open(model, &args.settings, &args.include)?;
         let stem = model.file_stem().map_or("model".to_owned(), |s| s.to_string_lossy().into_owned());
         // Two models of the same name have two sets of files.
         let count = names.entry(stem.clone()).or_insert(0);

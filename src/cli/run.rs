@@ -13,7 +13,7 @@ use crate::structure::ModuleString;
 
 /// Reads a model and reports on it.
 pub fn check(args: &CheckArgs) -> Result<(), Failure> {
-    let session = super::common::open(&args.model, &args.settings)?;
+    let session = super::common::open(&args.model, &args.settings, &args.include)?;
     let model = &session.model;
     let title = model.title.as_ref().map_or(String::new(), |t| format!("{t}: "));
     let warnings = session.warnings.len();

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::{Binary, Graph, Node, NodeId, Unary};
+use super::{Binary, Graph, Node, NodeId, Part, Unary};
 
 impl Graph {
     /// The partial derivative of an expression by a variable. Functions that jump (`floor`, `sign`, comparisons)
@@ -34,6 +34,24 @@ impl Graph {
                     let (da, db) = (of(&known, a), of(&known, b));
                     self.select(c, da, db)
                 }
+                Node::Curve(curve, part, x) => {
+                    let dx = of(&known, x);
+                    if dx == zero {
+                        zero
+                    } else if part == Part::Inverse {
+                        let slope = self.curve(curve, Part::Slope, id);
+                        self.binary(Binary::Div, dx, slope)
+                    } else {
+                        let slope = part.derivative().map_or(zero, |slope| self.curve(curve, slope, x));
+                        self.times(slope, dx)
+                    }
+                }
+                Node::Piece(curve, part, index, x) => {
+                    let dx = of(&known, x);
+                    let slope = part.derivative().map_or(zero, |slope| self.piece(curve, slope, index, x));
+                    self.times(slope, dx)
+                }
+                Node::Element(..) => zero,
             };
             known.insert(id, rate);
         }

@@ -1,6 +1,6 @@
 //! Values with their derivative along a trajectory (forward differentiation).
 
-use super::{Binary, Interval, Unary, Value};
+use super::{Array, Binary, Curve, Interval, Part, Unary, Value};
 
 /// A value and its rate of change.
 #[derive(Clone, Copy, Debug)]
@@ -129,5 +129,38 @@ impl<T: Differentiable> Value for Dual<T> {
             value: T::select(condition.value, a.value, b.value),
             rate: T::select_rate(condition.value, a.rate, b.rate),
         }
+    }
+
+    fn curve(curve: &Curve, part: Part, x: Dual<T>) -> Dual<T> {
+        let value = T::curve(curve, part, x.value);
+        let zero = T::constant(0.0);
+        if x.rate.is_zero() {
+            return Dual { value, rate: zero };
+        }
+        let slope = match part.derivative() {
+            Some(slope) => T::curve(curve, slope, x.value),
+            None if part == Part::Inverse => {
+                let slope = T::curve(curve, Part::Slope, value);
+                T::binary(Binary::Div, T::constant(1.0), slope)
+            }
+            None => return Dual { value, rate: T::rate_of_steps(value) },
+        };
+        Dual { value, rate: T::binary(Binary::Mul, slope, x.rate) }
+    }
+
+    fn piece(curve: &Curve, part: Part, index: Dual<T>, x: Dual<T>) -> Dual<T> {
+        let value = T::piece(curve, part, index.value, x.value);
+        let rate = match part.derivative() {
+            Some(_) if x.rate.is_zero() => T::constant(0.0),
+            Some(slope) => T::binary(Binary::Mul, T::piece(curve, slope, index.value, x.value), x.rate),
+            None => T::constant(0.0),
+        };
+        Dual { value, rate }
+    }
+
+    fn element(array: &Array, index: Dual<T>) -> Dual<T> {
+        let value = T::element(array, index.value);
+        let still = index.rate.is_zero();
+        Dual { value, rate: if still { T::constant(0.0) } else { T::rate_of_steps(value) } }
     }
 }

@@ -1,8 +1,9 @@
 //! Hash-consed expression graphs.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
-use super::{Binary, Unary, Value};
+use super::{Array, Binary, Curve, Part, Unary, Value};
 
 /// An expression in a [`Graph`]. Two expressions of the same graph that are built alike are equal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -26,13 +27,34 @@ pub enum Node {
     Binary(Binary, NodeId, NodeId),
     /// `Select(condition, then, else)`.
     Select(NodeId, NodeId, NodeId),
+    /// A part of a curve at an argument.
+    Curve(Lookup, Part, NodeId),
+    /// `Piece(curve, part, index, argument)`: one piece of a curve, continued beyond its knots.
+    Piece(Lookup, Part, NodeId, NodeId),
+    /// An element of an array, by number.
+    Element(Lookup, NodeId),
 }
+
+/// A curve or an array of a [`Graph`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Lookup(u32);
 
 /// An arena of expressions in which equal expressions are stored once.
 #[derive(Clone, Debug, Default)]
 pub struct Graph {
     nodes: Vec<Node>,
     ids: HashMap<Node, NodeId>,
+    curves: Vec<Arc<Curve>>,
+    arrays: Vec<Arc<Array>>,
+    /// Expressions whose antiderivative by another one is known.
+    integrals: HashMap<NodeId, Integral>,
+}
+
+/// `derivative of whole by argument = the expression that this is said of`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Integral {
+    pub whole: NodeId,
+    pub argument: NodeId,
 }
 
 impl Graph {
@@ -53,6 +75,89 @@ impl Graph {
         self.nodes.push(node);
         self.ids.insert(node, id);
         id
+    }
+
+    /// Takes a curve in.
+    pub fn add_curve(&mut self, curve: Arc<Curve>) -> Lookup {
+        self.curves.push(curve);
+        Lookup(self.curves.len() as u32 - 1)
+    }
+
+    /// Takes an array in.
+    pub fn add_array(&mut self, array: Arc<Array>) -> Lookup {
+        self.arrays.push(array);
+        Lookup(self.arrays.len() as u32 - 1)
+    }
+
+    pub fn curve_of(&self, lookup: Lookup) -> &Arc<Curve> {
+        &self.curves[lookup.0 as usize]
+    }
+
+    pub fn array_of(&self, lookup: Lookup) -> &Arc<Array> {
+        &self.arrays[lookup.0 as usize]
+    }
+
+    /// All curves, in the order in which they were taken in.
+    pub fn curves(&self) -> &[Arc<Curve>] {
+        &self.curves
+    }
+
+    /// Notes the antiderivative of an expression.
+    pub fn know_integral(&mut self, of: NodeId, integral: Integral) {
+        if self.as_constant(of).is_none() {
+            self.integrals.insert(of, integral);
+        }
+    }
+
+    /// The antiderivative of an expression, if it is known: of curves and their slopes, and of what has been noted.
+    pub fn integral_of(&mut self, id: NodeId) -> Option<Integral> {
+        if let Some(known) = self.integrals.get(&id) {
+            return Some(*known);
+        }
+        let Node::Curve(curve, part, argument) = self.node(id) else { return None };
+        let whole = match part {
+            Part::Value => Part::Integral,
+            Part::Slope => Part::Value,
+            Part::Second => Part::Slope,
+            Part::PhaseSlope => Part::Phase,
+            _ => return None,
+        };
+        Some(Integral { whole: self.curve(curve, whole, argument), argument })
+    }
+
+    /// True if [`Graph::integral_of`] knows an antiderivative.
+    pub fn integral_is_known(&self, id: NodeId) -> bool {
+        let part = |part| matches!(part, Part::Value | Part::Slope | Part::Second | Part::PhaseSlope);
+        self.integrals.contains_key(&id) || matches!(self.node(id), Node::Curve(_, p, _) if part(p))
+    }
+
+    /// Those of the given expressions of which [`Graph::know_integral`] was told.
+    pub fn noted_integrals(&self, among: &[NodeId]) -> Vec<(NodeId, Integral)> {
+        if self.integrals.is_empty() {
+            return Vec::new();
+        }
+        among.iter().filter_map(|id| Some((*id, *self.integrals.get(id)?))).collect()
+    }
+
+    pub fn curve(&mut self, curve: Lookup, part: Part, x: NodeId) -> NodeId {
+        match self.as_constant(x) {
+            Some(x) => self.constant(self.curve_of(curve).eval(part, x)),
+            None => self.intern(Node::Curve(curve, part, x)),
+        }
+    }
+
+    pub fn piece(&mut self, curve: Lookup, part: Part, index: NodeId, x: NodeId) -> NodeId {
+        match (self.as_constant(index), self.as_constant(x)) {
+            (Some(index), Some(x)) => self.constant(self.curve_of(curve).continued(part, index, x)),
+            _ => self.intern(Node::Piece(curve, part, index, x)),
+        }
+    }
+
+    pub fn element(&mut self, array: Lookup, index: NodeId) -> NodeId {
+        match self.as_constant(index) {
+            Some(index) => self.constant(self.array_of(array).element(index)),
+            None => self.intern(Node::Element(array, index)),
+        }
     }
 
     pub fn constant(&mut self, x: f64) -> NodeId {
@@ -114,6 +219,9 @@ impl Graph {
                 Node::Unary(op, a) => Node::Unary(op, new[&a]),
                 Node::Binary(op, a, b) => Node::Binary(op, new[&a], new[&b]),
                 Node::Select(c, a, b) => Node::Select(new[&c], new[&a], new[&b]),
+                Node::Curve(curve, part, x) => Node::Curve(curve, part, new[&x]),
+                Node::Piece(curve, part, i, x) => Node::Piece(curve, part, new[&i], new[&x]),
+                Node::Element(array, i) => Node::Element(array, new[&i]),
             };
             let image = match replace(self, id, rebuilt) {
                 Some(image) => image,
@@ -122,6 +230,9 @@ impl Graph {
                     Node::Unary(op, a) => self.unary(op, a),
                     Node::Binary(op, a, b) => self.binary(op, a, b),
                     Node::Select(c, a, b) => self.select(c, a, b),
+                    Node::Curve(curve, part, x) => self.curve(curve, part, x),
+                    Node::Piece(curve, part, i, x) => self.piece(curve, part, i, x),
+                    Node::Element(array, i) => self.element(array, i),
                 },
             };
             new.insert(id, image);
@@ -166,8 +277,8 @@ impl Node {
     pub fn operands(self) -> [Option<NodeId>; 3] {
         match self {
             Node::Const(_) | Node::Var(_) => [None; 3],
-            Node::Unary(_, a) => [Some(a), None, None],
-            Node::Binary(_, a, b) => [Some(a), Some(b), None],
+            Node::Unary(_, a) | Node::Curve(_, _, a) | Node::Element(_, a) => [Some(a), None, None],
+            Node::Binary(_, a, b) | Node::Piece(_, _, a, b) => [Some(a), Some(b), None],
             Node::Select(c, a, b) => [Some(c), Some(a), Some(b)],
         }
     }

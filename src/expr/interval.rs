@@ -5,7 +5,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use super::{Binary, Unary, Value};
+use super::{Array, Binary, Curve, Part, Unary, Value};
 
 /// The numbers from `lo` to `hi`, or nothing where the expression is undefined on the whole set.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -229,5 +229,17 @@ impl Value for Interval {
         } else {
             a.hull(b).flagged(true)
         }
+    }
+
+    fn curve(curve: &Curve, part: Part, x: Interval) -> Interval {
+        curve.over(part, x)
+    }
+
+    fn piece(curve: &Curve, part: Part, index: Interval, x: Interval) -> Interval {
+        curve.continued_over(part, index, x)
+    }
+
+    fn element(array: &Array, index: Interval) -> Interval {
+        array.over(index)
     }
 }

@@ -20,6 +20,7 @@
 //! assert_eq!(program.eval_one(&[3.0]), 1.5);
 //! ```
 
+mod curve;
 mod derivative;
 mod dual;
 mod elimination;
@@ -31,9 +32,10 @@ mod program;
 #[cfg(test)]
 mod tests;
 
+pub use curve::{Array, Curve, CurveFault, MAX_POINTS, Part, Sort};
 pub use dual::Dual;
 pub use elimination::eliminate;
-pub use graph::{Graph, Node, NodeId};
+pub use graph::{Graph, Integral, Lookup, Node, NodeId};
 pub use interval::Interval;
 pub use ops::{Binary, Unary, Value};
 pub use polynomial::{Monomial, Polynomial};

@@ -2,6 +2,8 @@
 //!
 //! Truth values are numbers: 1 is true, 0 is false. A comparison with NaN is false, as in IEEE 754.
 
+use super::{Array, Curve, Part};
+
 /// Functions and operators of one operand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Unary {
@@ -83,6 +85,12 @@ pub trait Value: Copy {
     fn binary(op: Binary, a: Self, b: Self) -> Self;
     /// `a` where `condition` is true, else `b`.
     fn select(condition: Self, a: Self, b: Self) -> Self;
+    /// A part of a curve.
+    fn curve(curve: &Curve, part: Part, x: Self) -> Self;
+    /// The same of one piece, continued beyond its knots; see [`Curve::continued`].
+    fn piece(curve: &Curve, part: Part, index: Self, x: Self) -> Self;
+    /// An element of an array.
+    fn element(array: &Array, index: Self) -> Self;
 }
 
 fn truth(b: bool) -> f64 {
@@ -164,5 +172,17 @@ impl Value for f64 {
     #[inline]
     fn select(condition: f64, a: f64, b: f64) -> f64 {
         if condition != 0.0 { a } else { b }
+    }
+
+    fn curve(curve: &Curve, part: Part, x: f64) -> f64 {
+        curve.eval(part, x)
+    }
+
+    fn piece(curve: &Curve, part: Part, index: f64, x: f64) -> f64 {
+        curve.continued(part, index, x)
+    }
+
+    fn element(array: &Array, index: f64) -> f64 {
+        array.element(index)
     }
 }

@@ -1,8 +1,9 @@
 //! Straight-line code for expressions.
 
 use std::collections::{BTreeSet, HashMap};
+use std::sync::Arc;
 
-use super::{Binary, Graph, Node, NodeId, Unary, Value};
+use super::{Array, Binary, Curve, Graph, Lookup, Node, NodeId, Part, Unary, Value};
 
 /// A register: variables come first, then temporaries.
 type Register = u32;
@@ -14,6 +15,10 @@ enum Instruction {
     Unary(Unary, Register, Register),
     Binary(Binary, Register, Register, Register),
     Select(Register, Register, Register, Register),
+    /// The first number says which of the program's curves, or arrays.
+    Curve(u32, Part, Register, Register),
+    Piece(u32, Part, Register, Register, Register),
+    Element(u32, Register, Register),
 }
 
 impl Instruction {
@@ -22,15 +27,20 @@ impl Instruction {
             Instruction::Const(to, _)
             | Instruction::Unary(_, to, _)
             | Instruction::Binary(_, to, ..)
-            | Instruction::Select(to, ..) => to,
+            | Instruction::Select(to, ..)
+            | Instruction::Curve(_, _, to, _)
+            | Instruction::Piece(_, _, to, ..)
+            | Instruction::Element(_, to, _) => to,
         }
     }
 
     fn operands(self) -> [Option<Register>; 3] {
         match self {
             Instruction::Const(..) => [None; 3],
-            Instruction::Unary(_, _, a) => [Some(a), None, None],
-            Instruction::Binary(_, _, a, b) => [Some(a), Some(b), None],
+            Instruction::Unary(_, _, a) | Instruction::Curve(.., a) | Instruction::Element(.., a) => {
+                [Some(a), None, None]
+            }
+            Instruction::Binary(_, _, a, b) | Instruction::Piece(.., a, b) => [Some(a), Some(b), None],
             Instruction::Select(_, c, a, b) => [Some(c), Some(a), Some(b)],
         }
     }
@@ -72,6 +82,16 @@ pub struct Program {
     registers: usize,
     /// The outputs, if they depend on nothing.
     constants: Option<Vec<f64>>,
+    curves: Vec<Arc<Curve>>,
+    arrays: Vec<Arc<Array>>,
+}
+
+/// The place of something in a list, to which it is added if it is new.
+fn listed<T>(list: &mut Vec<Arc<T>>, known: &mut HashMap<Lookup, u32>, lookup: Lookup, item: &Arc<T>) -> u32 {
+    *known.entry(lookup).or_insert_with(|| {
+        list.push(item.clone());
+        list.len() as u32 - 1
+    })
 }
 
 impl Program {
@@ -96,6 +116,8 @@ impl Program {
         let mut free: Vec<Register> = Vec::new();
         let mut registers = variables as Register;
         let mut code = Vec::new();
+        let (mut curves, mut arrays) = (Vec::new(), Vec::new());
+        let (mut known_curves, mut known_arrays) = (HashMap::new(), HashMap::new());
         for id in order {
             let node = graph.node(id);
             if let Node::Var(v) = node {
@@ -121,12 +143,26 @@ impl Program {
                 (Node::Unary(op, _), [Some(a), ..]) => Instruction::Unary(op, to, a),
                 (Node::Binary(op, ..), [Some(a), Some(b), _]) => Instruction::Binary(op, to, a, b),
                 (Node::Select(..), [Some(c), Some(a), Some(b)]) => Instruction::Select(to, c, a, b),
+                (Node::Curve(curve, part, _), [Some(a), ..]) => {
+                    let which = listed(&mut curves, &mut known_curves, curve, graph.curve_of(curve));
+                    Instruction::Curve(which, part, to, a)
+                }
+                (Node::Piece(curve, part, ..), [Some(i), Some(a), _]) => {
+                    let which = listed(&mut curves, &mut known_curves, curve, graph.curve_of(curve));
+                    Instruction::Piece(which, part, to, i, a)
+                }
+                (Node::Element(array, _), [Some(i), ..]) => {
+                    let which = listed(&mut arrays, &mut known_arrays, array, graph.array_of(array));
+                    Instruction::Element(which, to, i)
+                }
                 _ => unreachable!("a node has the operands of its kind"),
             });
         }
         let constants = roots.iter().map(|root| graph.as_constant(*root)).collect();
         Program {
             constants,
+            curves,
+            arrays,
             code,
             outputs: roots.iter().map(|r| place[r]).collect(),
             variables,
@@ -204,6 +240,16 @@ impl Program {
                 Instruction::Select(to, c, a, b) => {
                     (to, T::select(scratch[c as usize], scratch[a as usize], scratch[b as usize]))
                 }
+                Instruction::Curve(curve, part, to, a) => {
+                    (to, T::curve(&self.curves[curve as usize], part, scratch[a as usize]))
+                }
+                Instruction::Piece(curve, part, to, i, a) => {
+                    let (i, a) = (scratch[i as usize], scratch[a as usize]);
+                    (to, T::piece(&self.curves[curve as usize], part, i, a))
+                }
+                Instruction::Element(array, to, i) => {
+                    (to, T::element(&self.arrays[array as usize], scratch[i as usize]))
+                }
             };
             scratch[to as usize] = value;
         }
@@ -233,6 +279,18 @@ impl Program {
                 Instruction::Select(to, c, a, b) => {
                     let (c, a, b) = (registers[c as usize], registers[a as usize], registers[b as usize]);
                     registers[to as usize] = std::array::from_fn(|i| f64::select(c[i], a[i], b[i]));
+                }
+                Instruction::Curve(curve, part, to, a) => {
+                    let curve = &self.curves[curve as usize];
+                    each(registers, [to, a, a], |x, _| curve.eval(part, x));
+                }
+                Instruction::Piece(curve, part, to, i, a) => {
+                    let curve = &self.curves[curve as usize];
+                    each(registers, [to, i, a], |i, x| curve.continued(part, i, x));
+                }
+                Instruction::Element(array, to, i) => {
+                    let array = &self.arrays[array as usize];
+                    each(registers, [to, i, i], |i, _| array.element(i));
                 }
             }
         }

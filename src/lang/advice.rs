@@ -77,6 +77,9 @@ pub fn not_a_parameter(name: &Name, head: &HeadModule, variables: &Variables) ->
         Diagnostic::error(format!("`{}` is no parameter of `{}`", name.text, print::head_module(head)))
             .at(name.span, "only the parameters of the strict predecessor have equations")
             .at(head.span, "the strict predecessor");
+    if variables.lets.contains_key(&name.text) {
+        return error.help("a `let` names an expression; nothing is stored that could be solved");
+    }
     if variables.names.contains_key(&name.text) && !RESERVED.contains(&&*name.text) {
         return error
             .help("this is a parameter of a neighbour; its equation belongs into the neighbour's rule");
@@ -127,6 +130,33 @@ pub fn wrong_arity(module: &Module, head: &HeadModule, place: &str) -> String {
     format!("{first}; or write {other} for `{}` with {own}", module.name)
 }
 
+/// Advice for curves, tables, arrays and names within rules, by the text before the place and what was found there.
+pub fn for_block(item: Rule, before: &str, found: &str) -> Option<&'static str> {
+    let previous = before.trim_end().chars().next_back();
+    match item {
+        Rule::curve_item if before.contains('=') => {
+            Some("a curve is two points or more, of two numbers each: `curve g = (0, 0) (1, 0.3) (2, 1)`")
+        }
+        Rule::curve_item if before.split_whitespace().count() == 2 && found != "=" => {
+            Some("a curve is `linear`, `monotone` or `spline`: `curve linear g = (0, 0) (2, 1)`")
+        }
+        Rule::table_item if before.split_whitespace().count() > 1 => Some(
+            "a table is written `table g from \"file.csv\"`, or `table g from \"file.csv\" column \"name\"`",
+        ),
+        Rule::include_item => Some("the name of the file is a text in quotes: `include \"organs.dls\"`"),
+        Rule::const_item if previous == Some('[') && found == "]" => {
+            Some("an array has one element or more: `const a = [1, 2, 3]`")
+        }
+        Rule::const_item if found == "[" && matches!(previous, Some('[' | ',')) => {
+            Some("the elements of an array are numbers: `const a = [1, 2, 3]`")
+        }
+        Rule::rule_item if found == "let" => {
+            Some("a `let` stands between the head of its rule and the first clause")
+        }
+        _ => None,
+    }
+}
+
 /// Of `;(rose)` and `@C(square)` where nothing has that name: what to declare is no constant.
 pub fn of_look(module: &Module, all: &Expressions, said: &mut [Diagnostic]) {
     let example = match &*module.name {
@@ -151,6 +181,9 @@ pub fn usage(item: Rule) -> &'static str {
         Rule::const_item => "a constant is written `const k = 0.5`",
         Rule::param_item => "a param is written `param r = 0.5`, or with a range `param r = 0.5 in 0 .. 1`",
         Rule::def_item => "a function is written `def growth(x, r) = r*x`",
+        Rule::include_item => "other texts are taken in by `include \"organs.dls\"`",
+        Rule::curve_item => "a curve is written `curve g = (0, 0) (1, 0.3) (2, 1)`",
+        Rule::table_item => "a table is written `table g from \"file.csv\"`",
         Rule::angle_item => "the angle is written `angle 45`, in degrees",
         Rule::period_item => "the period of discrete rules is written `period 1`",
         Rule::frames_item => "frames are written `frames 0 .. 10 step 0.1`",

@@ -6,6 +6,7 @@
 use std::sync::Arc;
 
 use crate::diagnostic::Span;
+use crate::expr::Sort;
 use crate::model::{Comparison, Fold, Turn};
 
 /// A name and where it stands.
@@ -51,6 +52,10 @@ pub enum Expr {
     Compare(ExprId, Vec<(Comparison, ExprId)>),
     /// Condition, then, else.
     If(ExprId, ExprId, ExprId),
+    /// A number, what it is compared with and the value then, and the value otherwise.
+    Match(ExprId, Vec<(ExprId, ExprId)>, ExprId),
+    /// `a[i]`
+    Index(Arc<str>, ExprId),
     Parenthesis(ExprId),
     /// `sum(B(x, c): D*(c - c_0))`
     Aggregate(Box<Aggregate>),
@@ -96,6 +101,22 @@ impl Expressions {
         self.spans[id.0 as usize]
     }
 
+    /// All nodes, operands before their users.
+    pub fn iter(&self) -> impl Iterator<Item = &Expr> {
+        self.nodes.iter()
+    }
+
+    /// Nodes from one on, as long as they stand in the text before an end.
+    pub fn iter_within(&self, first: ExprId, last: Option<Span>) -> impl Iterator<Item = &Expr> {
+        let end = last.map_or(u32::MAX, |span| span.end);
+        let from = first.0 as usize;
+        self.nodes[from..]
+            .iter()
+            .zip(&self.spans[from..])
+            .take_while(move |(_, s)| s.start < end)
+            .map(|n| n.0)
+    }
+
     /// Widens the place of a node in the text, as parentheses do.
     pub fn widen(&mut self, id: ExprId, span: Span) {
         self.spans[id.0 as usize] = self.spans[id.0 as usize].to(span);
@@ -128,6 +149,8 @@ pub struct Rule {
     pub right_shape: Vec<Turn>,
     /// The whole head.
     pub head: Span,
+    /// `let` lines.
+    pub locals: Vec<(Name, Expression)>,
     /// Written with `->`: applied at the multiples of the period. It has one clause, which produces.
     pub discrete: bool,
     pub clauses: Vec<Clause>,
@@ -192,6 +215,24 @@ pub struct Text {
 #[derive(Clone, Debug)]
 pub enum Item {
     Title(String),
+    Array {
+        name: Name,
+        values: Vec<Expression>,
+    },
+    Curve {
+        name: Name,
+        sort: Sort,
+        points: Vec<[Expression; 2]>,
+        periodic: bool,
+    },
+    Table {
+        name: Name,
+        sort: Sort,
+        file: Text,
+        column: Option<Text>,
+        periodic: bool,
+    },
+    Include(Text),
     Const {
         name: Name,
         value: Expression,
@@ -252,4 +293,14 @@ pub struct Document {
     pub expressions: Expressions,
     /// Names of global declarations that could not be read: whoever uses them is not to blame.
     pub unread: Vec<Arc<str>>,
+    /// Items from here on are of the library: names that the model declares itself win over them, and nobody has to
+    /// use them.
+    pub library: Option<usize>,
+}
+
+impl Document {
+    /// The items that somebody wrote for this model.
+    pub fn own_items(&self) -> &[(Item, Span)] {
+        &self.items[..self.library.unwrap_or(self.items.len())]
+    }
 }

@@ -9,6 +9,7 @@ use super::appearance::first_gradient;
 use super::ast::{Document, Expr, ExprId, Expression, Item, Name};
 use super::scope::{RESERVED, Scope};
 use super::suggest::did_you_mean;
+use super::surface::Files;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::model::{BUILT_IN_COLORS, Parameter};
 
@@ -16,6 +17,7 @@ use crate::model::{BUILT_IN_COLORS, Parameter};
 struct Global<'d> {
     name: &'d Name,
     kind: Kind<'d>,
+    library: bool,
 }
 
 enum Kind<'d> {
@@ -24,10 +26,17 @@ enum Kind<'d> {
     Def(&'d [Name], Expression),
     /// A colour, a gradient or a contour: its number.
     Number(usize),
+    Array(&'d [Expression]),
+    Curve(&'d Item, Span),
 }
 
 /// Declares all global names in `scope` and returns the `param`s with the values in force.
-pub fn declare(document: &Document, settings: &[Setting], scope: &mut Scope) -> Vec<Parameter> {
+pub fn declare(
+    document: &Document,
+    settings: &[Setting],
+    scope: &mut Scope,
+    files: &dyn Files,
+) -> Vec<Parameter> {
     let globals = collect(document, scope);
     let index: HashMap<&str, usize> = globals.iter().enumerate().map(|(i, g)| (&*g.name.text, i)).collect();
     for name in &document.unread {
@@ -37,9 +46,13 @@ pub fn declare(document: &Document, settings: &[Setting], scope: &mut Scope) -> 
     }
     let mut parameters = Vec::new();
     for i in order(document, &globals, &index, scope) {
-        let Global { name, kind } = &globals[i];
+        let Global { name, kind, library } = &globals[i];
         match kind {
-            Kind::Def(formals, body) => scope.define_function(name, formals, &document.expressions, *body),
+            Kind::Def(formals, body) => {
+                scope.define_function(name, formals, &document.expressions, *body, *library);
+            }
+            Kind::Array(values) => scope.define_array(name, &document.expressions, values),
+            Kind::Curve(item, span) => scope.define_curve(item, *span, &document.expressions, files),
             Kind::Number(number) => scope.define_constant(name.text.clone(), Some(*number as f64)),
             Kind::Const(body) => {
                 let value = scope.constant_value(&document.expressions, *body);
@@ -87,17 +100,23 @@ fn collect<'d>(document: &'d Document, scope: &mut Scope) -> Vec<Global<'d>> {
         *next += 1;
         Kind::Number(*next - 1)
     };
-    for (item, _) in &document.items {
-        let global = match item {
-            Item::Const { name, value } => Global { name, kind: Kind::Const(*value) },
-            Item::Param { name, value, range } => Global { name, kind: Kind::Param(*value, *range) },
-            Item::Def { name, parameters, body } => Global { name, kind: Kind::Def(parameters, *body) },
-            Item::Color { name, .. } => Global { name, kind: count(&mut next_color) },
-            Item::Gradient { name, .. } => Global { name, kind: count(&mut next_gradient) },
-            Item::Contour { name, .. } => Global { name, kind: count(&mut next_contour) },
+    for (i, (item, span)) in document.items.iter().enumerate() {
+        let library = document.library.is_some_and(|from| i >= from);
+        let (name, kind) = match item {
+            Item::Const { name, value } => (name, Kind::Const(*value)),
+            Item::Array { name, values } => (name, Kind::Array(values)),
+            Item::Curve { name, .. } | Item::Table { name, .. } => (name, Kind::Curve(item, *span)),
+            Item::Param { name, value, range } => (name, Kind::Param(*value, *range)),
+            Item::Def { name, parameters, body } => (name, Kind::Def(parameters, *body)),
+            Item::Color { name, .. } => (name, count(&mut next_color)),
+            Item::Gradient { name, .. } => (name, count(&mut next_gradient)),
+            Item::Contour { name, .. } => (name, count(&mut next_contour)),
             _ => continue,
         };
-        let Name { text, span } = global.name;
+        let Name { text, span } = name;
+        if library && first.contains_key(&**text) {
+            continue;
+        }
         if Scope::is_built_in(text) {
             let what =
                 if RESERVED.contains(&&**text) { "stands for time in every rule" } else { "is built in" };
@@ -118,7 +137,7 @@ fn collect<'d>(document: &'d Document, scope: &mut Scope) -> Vec<Global<'d>> {
             );
             continue;
         }
-        globals.push(global);
+        globals.push(Global { name, kind, library });
     }
     globals
 }
@@ -187,7 +206,9 @@ fn parameter(
 /// The global names that an expression mentions, in order.
 fn mentions(document: &Document, expression: Expression) -> impl Iterator<Item = (&Arc<str>, Span)> {
     (expression.first.0..=expression.root.0).filter_map(|id| match document.expressions.get(ExprId(id)) {
-        Expr::Name(name) | Expr::Call(name, _) => Some((name, document.expressions.span(ExprId(id)))),
+        Expr::Name(name) | Expr::Call(name, _) | Expr::Index(name, _) => {
+            Some((name, document.expressions.span(ExprId(id))))
+        }
         _ => None,
     })
 }
@@ -215,6 +236,9 @@ fn order(
                 Kind::Const(body) | Kind::Param(body, None) => (&[], vec![body]),
                 Kind::Param(body, Some((from, to))) => (&[], vec![body, from, to]),
                 Kind::Number(_) => (&[], Vec::new()),
+                Kind::Array(values) => (&[], values.to_vec()),
+                Kind::Curve(Item::Curve { points, .. }, _) => (&[], points.concat()),
+                Kind::Curve(..) => (&[], Vec::new()),
             };
             (bodies.into_iter())
                 .flat_map(|e| mentions(document, e))

@@ -25,6 +25,9 @@ const MAX_ITEM: usize = 1 << 20;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ItemKind {
     Title,
+    Include,
+    Curve,
+    Table,
     Const,
     Param,
     Def,
@@ -48,11 +51,14 @@ pub enum ItemKind {
 }
 
 /// The words that begin a declaration.
-pub const DECLARATIONS: [(&str, ItemKind); 17] = [
+pub const DECLARATIONS: [(&str, ItemKind); 20] = [
     ("title", ItemKind::Title),
+    ("include", ItemKind::Include),
     ("const", ItemKind::Const),
     ("param", ItemKind::Param),
     ("def", ItemKind::Def),
+    ("curve", ItemKind::Curve),
+    ("table", ItemKind::Table),
     ("angle", ItemKind::Angle),
     ("period", ItemKind::Period),
     ("frames", ItemKind::Frames),
@@ -108,6 +114,8 @@ struct Level {
     right: usize,
     /// `if` without its `else`.
     ifs: usize,
+    /// A `match` has begun, so that `case` may go on with it.
+    matching: bool,
     /// Opened by a word over neighbours, `sum(`: a colon belongs to it.
     is_sum: bool,
 }
@@ -131,6 +139,10 @@ struct Scanner<'t> {
     held_break: Option<usize>,
     /// Start of a run of lines that each end with `<` or `>`.
     run_of_angles: Option<usize>,
+    /// The token after the present one on its line.
+    next: Option<Token>,
+    /// The expression before the last line break has a `match`.
+    matching: bool,
     /// All tokens, where somebody wants them.
     lexemes: Option<Vec<Lexeme>>,
 }
@@ -160,6 +172,8 @@ fn scan(text: &str, lexemes: Option<Vec<Lexeme>>) -> (Layout, Option<Vec<Lexeme>
         pending: 0,
         held_break: None,
         run_of_angles: None,
+        next: None,
+        matching: false,
         lexemes,
     };
     let mut tokens = Vec::new();
@@ -274,16 +288,17 @@ impl Scanner<'_> {
             self.last = Last::Operator;
             self.held_break = None;
         } else if let Some(at) = self.held_break.take()
-            && matches!(word.as_str(), "then" | "else")
+            && (matches!(word.as_str(), "then" | "else") || word == "case" && self.matching)
         {
-            // `then` and `else` take back the break before them, and any empty lines.
+            // `then`, `else` and `case` take back the break before them, and any empty lines.
             for byte in &mut self.out[at..start] {
                 if *byte == b'\n' {
                     *byte = b' ';
                 }
             }
         }
-        for &token in tokens {
+        for (i, &token) in tokens.iter().enumerate() {
+            self.next = tokens.get(i + 1).map(|next| next.0);
             self.token(token);
         }
         self.run_of_angles = match (self.last, self.run_of_angles) {
@@ -304,7 +319,12 @@ impl Scanner<'_> {
     ) -> Option<ItemKind> {
         let declared = DECLARATIONS.iter().find(|(name, _)| *name == word).map(|(_, kind)| *kind);
         let inside = self.levels.len() > 1;
-        if let Some(kind) = declared {
+        // Words that came later may be names of modules in older models: they begin a declaration only where they
+        // cannot be the head of a rule.
+        let newer = matches!(word, "include" | "curve" | "table");
+        let follows = |i: usize| tokens.get(i).map(|t| t.0);
+        let plain = !colon && matches!(follows(1), Some(Token::Word | Token::Text));
+        if let Some(kind) = declared.filter(|_| !newer || plain) {
             // Inside parentheses that somebody forgot to close, a declaration still begins one; but an
             // identifier that happens to be called `angle` does not.
             let next_is_word = matches!(tokens.get(1), Some((Token::Word | Token::Text, ..)));
@@ -313,7 +333,11 @@ impl Scanner<'_> {
             }
         }
         // A clause with a colon too many is still a clause.
-        let clause = matches!(word, "if" | "solve" | "produce") && !self.items.is_empty();
+        let is_let = word == "let"
+            && follows(1) == Some(Token::Word)
+            && tokens.get(2).is_some_and(|t| &self.text[t.1..t.2] == "=");
+        let case = word == "case" && (self.matching || self.level_matches());
+        let clause = matches!(word, "if" | "solve" | "produce") && !self.items.is_empty() || is_let || case;
         let clause = clause || tokens.first().is_some_and(|t| self.is_at_rate(t.1, t.2));
         // So is one with an arrow; and the head of a discrete rule may have been on the line before.
         let goes_on = self.items.last().is_some_and(|i| i.kind == ItemKind::Step) && !self.in_string;
@@ -331,7 +355,7 @@ impl Scanner<'_> {
             // What follows a line that is not understood is not to be complained about again.
             ItemKind::Rule | ItemKind::Unknown => clause || matches!(word, "then" | "else"),
             ItemKind::Axiom | ItemKind::Interpret | ItemKind::Step => true,
-            _ => matches!(word, "then" | "else"),
+            _ => case || matches!(word, "then" | "else"),
         };
         (!continues).then_some(ItemKind::Unknown)
     }
@@ -360,6 +384,10 @@ impl Scanner<'_> {
             }
             item.broken = true;
         }
+    }
+
+    fn level_matches(&self) -> bool {
+        self.levels.iter().any(|level| level.matching)
     }
 
     fn level(&mut self) -> &mut Level {
@@ -405,6 +433,7 @@ impl Scanner<'_> {
                 let weight = self.in_successor();
                 self.weighted |= weight;
                 if self.levels.len() == 1
+                    && !self.level().matching
                     && !weight
                     && let Some(item) = self.items.last_mut()
                     && item.after_colon.is_none()
@@ -417,7 +446,12 @@ impl Scanner<'_> {
             Token::Symbol => {
                 let symbol = &self.text[start..end];
                 let binary = self.last == Last::Operand;
-                last = if matches!(symbol, "<" | ">") { Last::Angle } else { Last::Operator };
+                last = match symbol {
+                    "<" | ">" => Last::Angle,
+                    // The end of an element, or of an array.
+                    "]" => Last::Operand,
+                    _ => Last::Operator,
+                };
                 if self.is_arrow(start, end)
                     && self.levels.len() == 1
                     && self.items.last().is_some_and(|i| i.kind == ItemKind::Step)
@@ -455,6 +489,7 @@ impl Scanner<'_> {
     /// Keywords that begin a string or an expression; returns what the word counts as.
     fn keyword(&mut self, start: usize, end: usize) -> Last {
         let inside = self.levels.len() > 1;
+        let in_expression = !self.in_string || inside;
         let in_rule = self.items.last().is_some_and(|i| i.kind == ItemKind::Rule && i.after_colon.is_some());
         match &self.text[start..end] {
             "produce" if in_rule && !inside => {
@@ -480,6 +515,24 @@ impl Scanner<'_> {
             }
             "if" => {
                 self.count_if(true);
+                Last::Operator
+            }
+            "match"
+                if in_expression && matches!(self.next, Some(Token::Word | Token::Number | Token::Open)) =>
+            {
+                self.count_if(true);
+                self.level().matching = true;
+                Last::Operator
+            }
+            "case" if in_expression && (self.level_matches() || self.matching) => {
+                self.level().matching = true;
+                let level = self.level();
+                let dropped = std::mem::take(&mut level.right);
+                self.pending -= dropped;
+                Last::Operator
+            }
+            "let" if in_rule && !inside && !self.in_string && self.next == Some(Token::Word) => {
+                self.forget_pending();
                 Last::Operator
             }
             "then" | "else" => {
@@ -508,7 +561,7 @@ impl Scanner<'_> {
     fn forget_pending(&mut self) {
         let level = self.levels.last_mut().expect("never empty");
         self.pending -= level.right + level.ifs;
-        (level.right, level.ifs) = (0, 0);
+        (level.right, level.ifs, level.matching) = (0, 0, false);
     }
 
     /// Keeps the line break at `at` if it ends an expression, else blanks it.
@@ -519,6 +572,9 @@ impl Scanner<'_> {
         if self.in_string || self.levels.len() > 1 || self.last != Last::Operand {
             self.out[at] = b' ';
             return;
+        }
+        if self.held_break.is_none() {
+            self.matching = self.level_matches();
         }
         self.forget_pending();
         // The first break after the expression is the one that `then` or `else` would take back.

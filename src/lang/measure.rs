@@ -6,14 +6,15 @@ use super::chance::Clocks;
 use super::rules::RuleBuilder;
 use super::scope::{Scope, plural};
 use super::suggest::did_you_mean;
-use super::{Setting, globals, parse};
+use super::{Files, Setting, globals, include, parse};
 use crate::diagnostic::{Diagnostic, Source};
 use crate::expr::Program;
 use crate::model::{Measure, Model};
 
-/// Compiles a measure over the modules of a model, which was read from `model_text` with these settings.
+/// Compiles a measure over the modules of a model, which was read from `model_text` and `files` with these settings.
 pub fn measure(
     model_text: &Source,
+    files: &dyn Files,
     settings: &[Setting],
     model: &Model,
     source: &Source,
@@ -21,7 +22,8 @@ pub fn measure(
     let (document, head, expression) = parse::parse_measure(source)?;
     // The model was good when it was read; it says nothing new.
     let mut scope = Scope::default();
-    globals::declare(&parse::parse(model_text).0, settings, &mut scope);
+    let own = Source::new(&*model_text.name, model_text.own_text());
+    globals::declare(&include::read(&own, files).1, settings, &mut scope, files);
     scope.diagnostics.clear();
     let mut kinds = model.kinds.clone();
     let mut builder = RuleBuilder {

@@ -12,12 +12,16 @@ mod appearance;
 pub mod ast;
 mod chance;
 mod check;
+mod choice;
+mod curves;
 mod equations;
 pub mod format;
 mod gather;
 mod globals;
+mod include;
 mod layout;
 mod lexeme;
+mod locals;
 mod measure;
 pub mod outline;
 pub mod parse;
@@ -28,11 +32,13 @@ mod smooth;
 mod strings;
 mod suggest;
 mod surface;
+mod table;
 pub mod words;
 
 use std::collections::HashMap;
 use std::sync::Arc;
 
+pub use include::read;
 pub use layout::MAX_DEPTH;
 pub use measure::measure;
 pub use suggest::did_you_mean;
@@ -54,6 +60,8 @@ pub struct Setting {
 #[derive(Debug)]
 pub struct Loaded {
     pub model: Option<Model>,
+    /// The text with all that it includes, if that is more than was given: places in messages are places in it.
+    pub source: Option<Source>,
     pub diagnostics: Vec<Diagnostic>,
     /// What is wrong with the settings; then there is no model either.
     pub refused_settings: Vec<Diagnostic>,
@@ -66,7 +74,7 @@ pub fn load(source: &Source, settings: &[Setting]) -> Loaded {
 
 /// Reads, checks and compiles a model. The surfaces that it names come from `files`.
 pub fn load_with(source: &Source, settings: &[Setting], files: &dyn Files) -> Loaded {
-    let (document, mut diagnostics) = parse::parse(source);
+    let (whole, document, mut diagnostics) = include::read(source, files);
     let unread = !diagnostics.is_empty();
     let mut scope = Scope::default();
     let model = build(&document, settings, &mut scope, unread, files);
@@ -75,7 +83,7 @@ pub fn load_with(source: &Source, settings: &[Setting], files: &dyn Files) -> Lo
     diagnostics.sort_by_key(|d| (d.severity == Severity::Warning, d.labels.first().map(|l| l.0)));
     let refused_settings = scope.refused_settings;
     let model = model.filter(|_| !failed && refused_settings.is_empty());
-    Loaded { model, diagnostics, refused_settings }
+    Loaded { model, source: whole, diagnostics, refused_settings }
 }
 
 /// Builds the model; errors go to the scope. `unread` tells that parts of the text are missing, so that
@@ -87,7 +95,7 @@ fn build(
     unread: bool,
     files: &dyn Files,
 ) -> Option<Model> {
-    let parameters = globals::declare(document, settings, scope);
+    let parameters = globals::declare(document, settings, scope, files);
     let appearance = appearance::build(document, scope, files);
     let mut kinds = Kinds::default();
     let mut single = Singles::default();
@@ -207,6 +215,7 @@ fn build(
         interpretations: Vec::new(),
         appearance: Arc::new(appearance),
         drawn_only: Vec::new(),
+        curves: scope.graph.curves().to_vec(),
     };
     for (i, rule) in written.iter().enumerate() {
         let names: &[&str] = match &*rule.predecessor.name.text {
@@ -298,7 +307,7 @@ fn check_frames(frames: Option<&Frames>, span: Span, scope: &mut Scope) {
 
 /// Constants and functions that nothing uses.
 fn unused(document: &Document, scope: &mut Scope) {
-    for (item, _) in &document.items {
+    for (item, _) in document.own_items() {
         let text = |name: &ast::Name| name.text.clone();
         let (what, name, use_it) = match item {
             Item::Const { name, .. } => {
@@ -311,6 +320,9 @@ fn unused(document: &Document, scope: &mut Scope) {
                 let formals: Vec<&str> = parameters.iter().map(|p| &*p.text).collect();
                 ("function", name, format!("call it, as in `{}({})`", text(name), formals.join(", ")))
             }
+            Item::Array { name, .. } => ("array", name, format!("use an element, as in `{}[0]`", text(name))),
+            Item::Curve { name, .. } => ("curve", name, format!("use it, as in `{}(age)`", text(name))),
+            Item::Table { name, .. } => ("table", name, format!("use it, as in `{}(t)`", text(name))),
             Item::Color { name, .. } => {
                 ("colour", name, format!("draw with it: `;({})` in a string", text(name)))
             }

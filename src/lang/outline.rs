@@ -26,7 +26,6 @@ pub fn outline(text: &str) -> Vec<Entry> {
 
 fn entry(item: &Item, span: Span, source: &Source) -> Entry {
     let single = |word: &str| (Some(word.to_owned()), word.to_owned());
-    // Constants, parameters and functions share their names; so do colours and gradients.
     let named = |sort: &str, name: &str| (Some(format!("{sort} {name}")), name.to_owned());
     let (key, name) = match item {
         Item::Title(_) => single("title"),
@@ -35,9 +34,13 @@ fn entry(item: &Item, span: Span, source: &Source) -> Entry {
         Item::Frames { .. } => single("frames"),
         Item::Tropism { .. } => single("tropism"),
         Item::Axiom(_) => single("initial string"),
-        Item::Const { name, .. } | Item::Param { name, .. } | Item::Def { name, .. } => {
-            named("value", &name.text)
-        }
+        // Constants, parameters, functions, curves and arrays share their names; so do colours and gradients.
+        Item::Const { name, .. }
+        | Item::Param { name, .. }
+        | Item::Def { name, .. }
+        | Item::Array { name, .. }
+        | Item::Curve { name, .. }
+        | Item::Table { name, .. } => named("value", &name.text),
         Item::Color { name, .. } | Item::Gradient { name, .. } => named("color", &name.text),
         Item::Contour { name, .. } => named("contour", &name.text),
         Item::Surface { name, .. } => named("surface", &name.text),
@@ -46,6 +49,7 @@ fn entry(item: &Item, span: Span, source: &Source) -> Entry {
             format!("interpret {}", source.slice(head.span).trim()),
         ),
         Item::Rule(rule) => (Some(head(rule)), source.slice(rule.head).trim().to_owned()),
+        Item::Include(file) => (Some(format!("include {}", file.text)), format!("include \"{}\"", file.text)),
         Item::Ignore(_) => (None, "ignore".to_owned()),
         Item::Consider(_) => (None, "consider".to_owned()),
     };

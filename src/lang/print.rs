@@ -9,12 +9,13 @@ use super::ast::{
     Action, Alternative, Document, Equation, Expr, ExprId, Expressions, HeadModule, Item, Module, Name,
     Operator,
 };
+use crate::expr::Sort;
 use crate::model::Turn;
 
 /// How tightly a node binds; the loosest is 0.
 fn strength(expr: &Expr) -> u8 {
     match expr {
-        Expr::If(..) => 0,
+        Expr::If(..) | Expr::Match(..) => 0,
         Expr::Binary(Operator::Or, ..) => 1,
         Expr::Binary(Operator::And, ..) => 2,
         Expr::Not(_) => 3,
@@ -24,7 +25,8 @@ fn strength(expr: &Expr) -> u8 {
         Expr::Negate(_) => 7,
         Expr::Scale(..) => 8,
         Expr::Binary(Operator::Pow, ..) => 9,
-        Expr::Number(_) | Expr::Name(_) | Expr::Call(..) | Expr::Parenthesis(_) | Expr::Aggregate(_) => 10,
+        Expr::Number(_) | Expr::Name(_) | Expr::Call(..) | Expr::Index(..) => 10,
+        Expr::Parenthesis(_) | Expr::Aggregate(_) => 10,
     }
 }
 
@@ -90,6 +92,9 @@ pub fn expression(expressions: &Expressions, root: ExprId) -> String {
                 }
                 parts.push(Task::Text(")"));
             }
+            Expr::Index(name, index) => {
+                parts.extend([Task::Text(name), Task::Text("["), Task::Node(*index, 0), Task::Text("]")]);
+            }
             Expr::Negate(a) => parts.extend([Task::Text("-"), Task::Node(*a, own)]),
             Expr::Not(a) => parts.extend([Task::Text("!"), Task::Node(*a, own)]),
             Expr::Scale(factor, a) => {
@@ -99,9 +104,10 @@ pub fn expression(expressions: &Expressions, root: ExprId) -> String {
                 }
                 // Only a name, a call or a parenthesis can stand directly behind a number.
                 let first = leftmost(expressions, *a);
-                let bare = matches!(first, Expr::Name(_) | Expr::Call(..) | Expr::Parenthesis(_))
-                    && strength(expressions.get(*a)) >= own
-                    && !exponent_like(first);
+                let bare =
+                    matches!(first, Expr::Name(_) | Expr::Call(..) | Expr::Index(..) | Expr::Parenthesis(_))
+                        && strength(expressions.get(*a)) >= own
+                        && !exponent_like(first);
                 if bare {
                     parts.push(Task::Node(*a, own));
                 } else {
@@ -133,6 +139,15 @@ pub fn expression(expressions: &Expressions, root: ExprId) -> String {
                 Task::Text(" else "),
                 Task::Node(*otherwise, 0),
             ]),
+            Expr::Match(subject, cases, otherwise) => {
+                parts.extend([Task::Text("match "), Task::Node(*subject, 1)]);
+                for (value, then) in cases {
+                    // An inner `match` would take the cases that follow.
+                    parts.extend([Task::Text(" case "), Task::Node(*value, 1), Task::Text(": ")]);
+                    parts.push(Task::Node(*then, 1));
+                }
+                parts.extend([Task::Text(" else "), Task::Node(*otherwise, 0)]);
+            }
             Expr::Aggregate(all) => {
                 parts.push(Task::Owned(format!("{}({}", all.fold.name(), head_module(&all.head))));
                 if let Some(term) = all.term {
@@ -163,7 +178,7 @@ fn leftmost(expressions: &Expressions, mut id: ExprId) -> &Expr {
 
 /// A name that a number before it would swallow: `2e3` is 2000, not 2 times `e3`.
 fn exponent_like(expr: &Expr) -> bool {
-    matches!(expr, Expr::Name(name) | Expr::Call(name, _) if name.starts_with(['e', 'E']))
+    matches!(expr, Expr::Name(name) | Expr::Call(name, _) | Expr::Index(name, _) if name.starts_with(['e', 'E']))
 }
 
 /// Modules as text.
@@ -222,6 +237,16 @@ pub fn head(rule: &super::ast::Rule) -> String {
     out
 }
 
+/// The word for a sort of curve, which the default does not need.
+fn sort_word(sort: Sort, default: Sort) -> &'static str {
+    match sort {
+        sort if sort == default => "",
+        Sort::Linear => "linear ",
+        Sort::Monotone => "monotone ",
+        Sort::Spline => "spline ",
+    }
+}
+
 /// The successors of a clause, with their weights.
 fn alternatives(expressions: &Expressions, all: &[Alternative]) -> Vec<String> {
     let show = |a: &Alternative| match &a.weight {
@@ -256,6 +281,23 @@ pub fn document(document: &Document) -> String {
         out += &match item {
             Item::Title(text) => format!("title \"{text}\""),
             Item::Const { name, value } => format!("const {} = {}", name.text, show(value)),
+            Item::Include(file) => format!("include \"{}\"", file.text),
+            Item::Array { name, values } => {
+                let values: Vec<String> = values.iter().map(show).collect();
+                format!("const {} = [{}]", name.text, values.join(", "))
+            }
+            Item::Curve { name, sort, points, periodic } => {
+                let points: Vec<String> =
+                    points.iter().map(|[x, y]| format!("({}, {})", show(x), show(y))).collect();
+                let end = if *periodic { " periodic" } else { "" };
+                format!("curve {}{} = {}{end}", sort_word(*sort, Sort::Monotone), name.text, points.join(" "))
+            }
+            Item::Table { name, sort, file, column, periodic } => {
+                let column = column.as_ref().map(|c| format!(" column \"{}\"", c.text)).unwrap_or_default();
+                let end = if *periodic { " periodic" } else { "" };
+                let sort = sort_word(*sort, Sort::Linear);
+                format!("table {sort}{} from \"{}\"{column}{end}", name.text, file.text)
+            }
             Item::Param { name, value, range: None } => format!("param {} = {}", name.text, show(value)),
             Item::Param { name, value, range: Some((a, b)) } => {
                 format!("param {} = {} in {} .. {}", name.text, show(value), show(a), show(b))
@@ -293,6 +335,9 @@ pub fn document(document: &Document) -> String {
             Item::Rule(rule) if rule.discrete => discrete_rule(e, rule),
             Item::Rule(rule) => {
                 let mut text = head(rule) + ":";
+                for (name, value) in &rule.locals {
+                    text += &format!("\n  let {} = {}", name.text, show(value));
+                }
                 for clause in &rule.clauses {
                     text += "\n  ";
                     if let Some(guard) = &clause.guard {

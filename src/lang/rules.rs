@@ -96,7 +96,7 @@ impl RuleBuilder<'_> {
             count += 1;
         }
         let aggregates = Some((first_aggregate, count));
-        (Variables { names, no_time: None, aggregates }, count as usize)
+        (Variables { names, aggregates, ..Variables::default() }, count as usize)
     }
 
     fn not_a_bracket(&mut self, head: &HeadModule, is_context: bool) -> bool {
@@ -169,9 +169,10 @@ impl RuleBuilder<'_> {
         }
         let written = self.aggregates_in(rule);
         let own = rule.predecessor.parameters.len() + hidden(self, &rule.predecessor);
-        let (variables, count) = self.variables(&rule.predecessor, &rule.left, &rule.right, written);
+        let (mut variables, count) = self.variables(&rule.predecessor, &rule.left, &rule.right, written);
         self.scope.comparisons.clear();
         self.scope.gathered.clear();
+        good &= self.locals(rule, &mut variables);
 
         // All conditions first: they share their atoms.
         let mut atoms = Atoms::default();
@@ -229,7 +230,7 @@ impl RuleBuilder<'_> {
                 continue;
             };
             equations.rates.extend(hazards.iter().filter_map(|hazard| self.clock_rate(hazard, *node)));
-            let (smooth, switches) = self.smooth(equations.all(), count, clause.span, &mut atoms)?;
+            let (smooth, switches) = self.smooth(equations.all(), own, count, clause.span, &mut atoms)?;
             equations.set_all(smooth);
             drafts.push((guard.clone(), clause.span, equations, switches));
         }
@@ -237,7 +238,7 @@ impl RuleBuilder<'_> {
             // Clocks run, though nothing else does.
             let span = produces[first.produce].span;
             let rates = hazards.iter().filter_map(|hazard| self.clock_rate(hazard, None)).collect();
-            let (rates, switches) = self.smooth(rates, count, span, &mut atoms)?;
+            let (rates, switches) = self.smooth(rates, own, count, span, &mut atoms)?;
             drafts.push((Condition::default(), span, Equations { rates, algebraic: Vec::new() }, switches));
         }
         if !good {

@@ -10,14 +10,14 @@ use super::chance::{DRAW, Draws};
 use super::print;
 use super::suggest::did_you_mean;
 use crate::diagnostic::{Diagnostic, Span};
-use crate::expr::{Binary, Graph, Node, NodeId, Unary};
+use crate::expr::{Binary, Graph, Integral, Lookup, Node, NodeId, Part, Unary};
 use crate::model::{Comparison, Distribution, Fold};
 
 /// Most nodes that the functions of a model may expand to.
 const MAX_WORK: usize = 20_000_000;
 
 /// Variables at and above this number are parameters of functions.
-const FORMAL: u32 = 1 << 24;
+pub(super) const FORMAL: u32 = 1 << 24;
 
 /// Names that mean something everywhere in a rule.
 pub const RESERVED: [&str; 2] = ["t", "age"];
@@ -32,12 +32,16 @@ pub struct Lowered {
 
 /// A function, as a graph over its formal parameters.
 #[derive(Clone, Debug)]
-struct Function {
-    parameters: Vec<Arc<str>>,
+pub(super) struct Function {
+    pub parameters: Vec<Arc<str>>,
     /// None if its own text is at fault, which has been reported.
-    body: Option<Lowered>,
+    pub body: Option<Lowered>,
     /// The random numbers that its body draws.
-    draws: Range<u32>,
+    pub draws: Range<u32>,
+    /// Of the library.
+    pub library: bool,
+    /// Parts of the body with a known antiderivative.
+    pub integrals: Vec<(NodeId, Integral)>,
 }
 
 /// Names that an expression can use besides the global ones.
@@ -46,6 +50,8 @@ pub struct Variables {
     pub names: HashMap<Arc<str>, NodeId>,
     /// What to tell somebody who uses `t` or `age` where they mean nothing; None where they are in `names`.
     pub no_time: Option<&'static str>,
+    /// Names of the rule's `let` lines, those that are not known yet too, and where they are declared.
+    pub lets: HashMap<Arc<str>, Span>,
     /// In a rule: the number of the variable of its first aggregate, and that of all its variables.
     pub aggregates: Option<(u32, u32)>,
 }
@@ -63,13 +69,16 @@ pub struct Gathered {
 pub struct Scope {
     pub graph: Graph,
     /// Values; None if the declaration is at fault, which has been reported.
-    constants: HashMap<Arc<str>, Option<f64>>,
-    functions: HashMap<Arc<str>, Function>,
+    pub(super) constants: HashMap<Arc<str>, Option<f64>>,
+    pub(super) functions: HashMap<Arc<str>, Function>,
+    /// None as for constants.
+    pub(super) curves: HashMap<Arc<str>, Option<Lookup>>,
+    pub(super) arrays: HashMap<Arc<str>, Option<Lookup>>,
     /// Global names that some expression has used.
     pub used: HashSet<Arc<str>>,
-    poisoned: HashSet<Arc<str>>,
+    pub(super) poisoned: HashSet<Arc<str>>,
     /// Names that were already complained about.
-    unknown: HashSet<Arc<str>>,
+    pub(super) unknown: HashSet<Arc<str>>,
     /// Where the comparisons of the present rule are written, by their node, and their two sides. Rules number their
     /// variables alike, so one rule's nodes mean nothing in another.
     pub comparisons: HashMap<NodeId, (Span, Arc<[String; 2]>)>,
@@ -99,7 +108,7 @@ impl Scope {
 
     /// Whether a suggestion is worth its time: it looks at every known name, and after so many errors
     /// nobody reads it.
-    fn suggests(&self) -> bool {
+    pub(super) fn suggests(&self) -> bool {
         self.diagnostics.len() < 50
     }
 
@@ -109,7 +118,14 @@ impl Scope {
     }
 
     /// Lowers the body of a function and makes it known.
-    pub fn define_function(&mut self, name: &Name, parameters: &[Name], all: &Expressions, body: Expression) {
+    pub fn define_function(
+        &mut self,
+        name: &Name,
+        parameters: &[Name],
+        all: &Expressions,
+        body: Expression,
+        library: bool,
+    ) {
         let mut variables = Variables {
             no_time: Some("a function sees only its parameters: pass it on, as in `G(x, age)`"),
             ..Variables::default()
@@ -138,7 +154,12 @@ impl Scope {
         self.function_comparisons.extend(self.comparisons.drain());
         let draws = first..self.draws.all.len() as u32;
         let parameters = parameters.iter().map(|p| p.text.clone()).collect();
-        self.functions.insert(name.text.clone(), Function { parameters, body, draws });
+        let integrals = body.map_or_else(Vec::new, |body| {
+            let parts = self.graph.reachable(&[body.node]);
+            self.graph.noted_integrals(&parts)
+        });
+        let function = Function { parameters, body, draws, library, integrals };
+        self.functions.insert(name.text.clone(), function);
     }
 
     /// Lowers an expression that must be a number.
@@ -179,7 +200,12 @@ impl Scope {
         None
     }
 
-    fn expect_number(&mut self, all: &Expressions, id: ExprId, lowered: Lowered) -> Option<NodeId> {
+    pub(super) fn expect_number(
+        &mut self,
+        all: &Expressions,
+        id: ExprId,
+        lowered: Lowered,
+    ) -> Option<NodeId> {
         if !lowered.is_condition {
             return Some(lowered.node);
         }
@@ -208,10 +234,12 @@ impl Scope {
         let (first, last) = (expression.first.0, expression.root.0);
         // Operands stand before their users, so this is a loop however deep the expression is.
         let mut done: Vec<Option<Lowered>> = Vec::with_capacity((last - first + 1) as usize);
+        let named = self.functional_names(all, expression);
         let inside = terms(all, first, last);
         for id in first..=last {
             // The term of an aggregate has names of its own: it is lowered with that.
-            if inside.get((id - first) as usize).is_some_and(|inside| *inside) {
+            let inside = inside.get((id - first) as usize).is_some_and(|inside| *inside);
+            if inside || named.contains(&ExprId(id)) {
                 done.push(None);
                 continue;
             }
@@ -236,10 +264,23 @@ impl Scope {
             Expr::Name(name) => number(self.name(name, span, variables)?),
             Expr::Call(name, arguments) => {
                 let mut nodes = Vec::with_capacity(arguments.len());
+                if self.is_functional(name) {
+                    for &argument in arguments.iter().skip(1) {
+                        nodes.push((argument, done(argument)?));
+                    }
+                    return self.functional(all, name, span, arguments.first().copied(), &nodes);
+                }
                 for &argument in arguments {
                     nodes.push((argument, done(argument)?));
                 }
                 self.call(all, name, span, &nodes, variables)
+            }
+            Expr::Index(name, index) => {
+                let index = self.expect_number(all, *index, done(*index)?)?;
+                number(self.element(name, index, span)?)
+            }
+            Expr::Match(subject, cases, otherwise) => {
+                number(self.choice(all, (*subject, cases, *otherwise), done)?)
             }
             Expr::Parenthesis(a) => done(*a),
             Expr::Aggregate(aggregate) => number(self.aggregate(all, aggregate, span, variables)?),
@@ -350,7 +391,7 @@ impl Scope {
         Some(self.graph.var(first + place as u32))
     }
 
-    fn compare(&mut self, comparison: Comparison, a: NodeId, b: NodeId) -> NodeId {
+    pub(super) fn compare(&mut self, comparison: Comparison, a: NodeId, b: NodeId) -> NodeId {
         match comparison {
             Comparison::Less => self.graph.binary(Binary::Lt, a, b),
             Comparison::LessOrEqual => self.graph.binary(Binary::Le, a, b),
@@ -379,6 +420,14 @@ impl Scope {
             Diagnostic::error(format!("`{name}` has no meaning here"))
                 .at(span, "time is known in rules only")
                 .help(variables.no_time.unwrap_or("use it in a rule"))
+        } else if self.curves.contains_key(name) {
+            Diagnostic::error(format!("`{name}` is a curve"))
+                .at(span, "a function of one number")
+                .help(format!("give it its argument: `{name}(age)`"))
+        } else if self.arrays.contains_key(name) {
+            Diagnostic::error(format!("`{name}` is an array"))
+                .at(span, "several numbers")
+                .help(format!("give the number of an element, the first one being 0: `{name}[0]`"))
         } else if self.functions.contains_key(name) || is_function(name) {
             Diagnostic::error(format!("`{name}` is a function"))
                 .at(span, "expected its arguments")
@@ -399,6 +448,13 @@ impl Scope {
             Diagnostic::error(format!("unknown name `{name}`")).at(span, what).help_opt(
                 did_you_mean(name, known).or_else(|| Some(format!("declare it: `const {name} = …`"))),
             )
+        };
+        let error = match variables.lets.get(name) {
+            Some(later) => Diagnostic::error(format!("`{name}` is not known yet"))
+                .at(span, "used here")
+                .at(*later, "declared here")
+                .help("a `let` is known to what stands after it: change their order"),
+            None => error,
         };
         self.diagnostics.push(error);
         None
@@ -446,7 +502,16 @@ impl Scope {
             if !function.draws.is_empty() {
                 self.may_draw(name, span)?;
             }
-            return self.inline(function.body?, function.draws, &nodes, span);
+            let whole = self.inline(&function, &nodes, span)?;
+            if function.library {
+                self.know_library_integral(name, whole.node, &nodes, span);
+            }
+            return Some(whole);
+        }
+        if let Some(curve) = self.curves.get(name).copied() {
+            self.used.insert(name.clone());
+            count(self, 1)?;
+            return number(self.graph.curve(curve?, Part::Value, nodes[0]));
         }
         if let Some((_, op)) = Unary::NAMED.iter().find(|(n, _)| **n == **name) {
             count(self, 1)?;
@@ -463,13 +528,17 @@ impl Scope {
             return None;
         }
         let built_in = Unary::NAMED.iter().map(|(n, _)| *n).chain(Binary::NAMED.iter().map(|(n, _)| *n));
+        let own = self.functions.keys().chain(self.curves.keys()).filter(|_| self.suggests());
         let built_in = built_in.chain(Distribution::NAMED.iter().map(|(n, ..)| *n));
-        let known = self.functions.keys().filter(|_| self.suggests()).map(|n| &**n).chain(built_in);
+        let known = own.map(|n| &**n).chain(built_in).chain(super::include::library_names());
         let mut error =
             Diagnostic::error(format!("unknown function `{name}`")).at(span, "no function has this name");
         error = match did_you_mean(name, known) {
             _ if &**name == "log" => error.help("the natural logarithm is `ln`, the decimal one `log10`"),
             Some(help) => error.help(help),
+            None if self.arrays.contains_key(name) => {
+                error.help(format!("`{name}` is an array, and its elements are written `{name}[i]`"))
+            }
             None if self.constants.contains_key(name) || variables.names.contains_key(name) => {
                 error.help(format!("to multiply, write `{name}*(…)`"))
             }
@@ -489,13 +558,13 @@ impl Scope {
     }
 
     /// A function's body with the arguments in place of its formal parameters.
-    fn inline(
+    pub(super) fn inline(
         &mut self,
-        body: Lowered,
-        draws: Range<u32>,
+        function: &Function,
         arguments: &[NodeId],
         span: Span,
     ) -> Option<Lowered> {
+        let (body, draws) = (function.body?, function.draws.clone());
         self.work += self.graph.reachable(&[body.node]).len() + draws.len();
         if self.work > MAX_WORK {
             if self.work < usize::MAX / 2 {
@@ -512,7 +581,9 @@ impl Scope {
         let drawn = self.draw_again(draws, &formal)?;
         let comparisons = &self.function_comparisons;
         let mut moved = Vec::new();
-        let node = self.graph.rewrite(&[body.node], |graph, id, node| {
+        let known = function.integrals.iter().flat_map(|(of, i)| [*of, i.whole, i.argument]);
+        let roots: Vec<NodeId> = std::iter::once(body.node).chain(known).collect();
+        let images = self.graph.rewrite(&roots, |graph, id, node| {
             let image = match node {
                 Node::Var(v) if v >= DRAW => return drawn.get(&v).copied(),
                 Node::Var(v) => return formal(v),
@@ -525,7 +596,12 @@ impl Scope {
                 moved.push((image, at.clone()));
             }
             Some(image)
-        })[0];
+        });
+        for integral in images[1..].chunks(3) {
+            let [of, whole, argument] = integral[..] else { unreachable!("threes") };
+            self.graph.know_integral(of, Integral { whole, argument });
+        }
+        let node = images[0];
         for (image, at) in moved {
             self.comparisons.entry(image).or_insert(at);
         }

@@ -8,7 +8,7 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use super::need::{drawn_only, needed};
-use super::{Algebraic, Jacobian, Law, Linear, Model, Numeric, Obstacle, Pattern, Rule, Watch};
+use super::{Algebraic, Jacobian, Law, Linear, Model, Numeric, Obstacle, Pattern, Rule, Watch, driven_form};
 use crate::diagnostic::Span;
 use crate::expr::{Binary, Graph, Monomial, Node, NodeId, Polynomial, Program, Unary};
 
@@ -73,6 +73,7 @@ pub fn analyse(graph: &mut Graph, model: &mut Model, drafts: &[Draft]) {
                     && position.is_none_or(|i| match &laws[i] {
                         Law::Polynomial(coefficients) => coefficients.outputs() == 1,
                         Law::Quadratic(_) => true,
+                        Law::Driven(driven) => driven.monotone,
                         _ => false,
                     })
             };
@@ -260,7 +261,9 @@ fn laws(graph: &mut Graph, rates: &[(usize, NodeId)], constants: &Constants, tot
             if laws[i].is_some() {
                 continue;
             }
-            if let Some((law, is_sum)) = closed(graph, parameter as u32, rate, constants, &sums, total) {
+            let law = closed(graph, parameter as u32, rate, constants, &sums, total)
+                .or_else(|| Some((driven(graph, parameter as u32, rate, constants, total)?, false)));
+            if let Some((law, is_sum)) = law {
                 laws[i] = Some(law);
                 if is_sum {
                     sums.insert(parameter as u32);
@@ -339,6 +342,19 @@ fn closed(
         let factor = Program::compile(graph, &[factor], total);
         (Law::Sum { factor, inflow: Program::compile(graph, &[inflow], total) }, true)
     })
+}
+
+/// The law of a parameter that follows curves, growth functions of time, or a growth law.
+fn driven(
+    graph: &mut Graph,
+    parameter: u32,
+    rate: NodeId,
+    constants: &Constants,
+    total: usize,
+) -> Option<Law> {
+    let is_constant = |v: u32| constants.is_constant(v);
+    let form = driven_form(graph, parameter, rate, &is_constant, constants.time as u32)?;
+    Some(Law::Driven(Box::new(form.compile(graph, total))))
 }
 
 /// True if an expression is made of constants, time, exponentials, sines and cosines of time, and parameters that are

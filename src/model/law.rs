@@ -4,6 +4,7 @@
 //! is a formula is never searched for. The classes are facts about the mathematics of a rule; the simulation
 //! looks them up.
 
+use super::Driven;
 use crate::expr::Program;
 
 /// How the equation of a parameter is solved. Coefficients are computed when a module takes the equation up,
@@ -22,6 +23,9 @@ pub enum Law {
         /// g
         inflow: Program,
     },
+    /// `x' = h(time) q(x)`, with the integral of h known: curves, growth functions of time, and the growth laws of
+    /// Gompertz, Richards and von Bertalanffy.
+    Driven(Box<Driven>),
     /// Integrated numerically.
     Numeric(Numeric),
 }

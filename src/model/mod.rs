@@ -34,6 +34,7 @@ mod analysis;
 mod appearance;
 mod chance;
 mod condition;
+mod driven;
 mod invariance;
 mod kind;
 mod law;
@@ -50,6 +51,7 @@ pub use appearance::{
 };
 pub use chance::{Clock, Distribution, Draw, NewClock, choose};
 pub use condition::{Comparison, Condition, Sign, Step, Truth};
+pub use driven::{Driven, DrivenForm, Flow, driven_form, outside_of_drivers};
 pub use invariance::never_reached;
 pub use kind::{
     BUILT_IN_SURFACES, COMMAND_SURFACES, CUT, Class, DRAWN_WORDS, Kind, KindId, Kinds, base_of, class_of,
@@ -63,6 +65,7 @@ pub use rule::{Interpretation, Outcome, Pattern, Produce, Rule, Solve, Successor
 use std::sync::Arc;
 
 use crate::diagnostic::Span;
+use crate::expr::Curve;
 
 /// A checked model, ready to run.
 #[derive(Clone, Debug)]
@@ -87,6 +90,8 @@ pub struct Model {
     pub appearance: Arc<Appearance>,
     /// Per kind and parameter: no rule reads it, so that only drawing and output do.
     pub drawn_only: Vec<Vec<bool>>,
+    /// Curves and tables, in the order of their declarations.
+    pub curves: Vec<Arc<Curve>>,
 }
 
 impl Model {
@@ -113,6 +118,7 @@ impl Default for Model {
             interpretations: Vec::new(),
             appearance: Arc::default(),
             drawn_only: Vec::new(),
+            curves: Vec::new(),
         }
     }
 }

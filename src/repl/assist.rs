@@ -118,6 +118,7 @@ impl Assistant {
         }
         let mut all =
             owned(&mut words::CLAUSES.into_iter().chain(words::functions()).chain(words::PARTICLES));
+        all.extend(owned(&mut words::ENDINGS.into_iter()));
         all.extend(names.kinds.iter().chain(&names.others).cloned());
         all.extend(owned(&mut words::declarations()));
         Some((word_start("@"), all))

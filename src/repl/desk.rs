@@ -80,6 +80,8 @@ pub struct Desk {
     pub draft: Draft,
     /// Values of params.
     pub set: Vec<Setting>,
+    /// Folders besides the model's own in which files are looked for.
+    include: Vec<PathBuf>,
     pub settings: Settings,
     pub screen: Screen,
     /// For completion.
@@ -93,9 +95,9 @@ pub struct Desk {
 }
 
 impl Desk {
-    pub fn new(settings: Settings, screen: Screen) -> Desk {
+    pub fn new(settings: Settings, include: Vec<PathBuf>, screen: Screen) -> Desk {
         let (draft, set, names, written, warned) = Default::default();
-        Desk { draft, set, settings, screen, names, written, warned, waiting: Vec::new() }
+        Desk { draft, set, include, settings, screen, names, written, warned, waiting: Vec::new() }
     }
 
     /// Prints an answer.
@@ -133,8 +135,9 @@ impl Desk {
 
     /// Reads a model file.
     pub fn load(&mut self, path: &Path, set: &[Setting]) -> Result<Flow, Fault> {
-        let session = Session::open(path, set).map_err(|refused| self.refusal(&refused))?;
-        self.draft = Draft::of_file(path, session.source.text.clone());
+        let session =
+            Session::open_with(path, set, &self.include).map_err(|refused| self.refusal(&refused))?;
+        self.draft = Draft::of_file(path, session.source.own_text().to_owned());
         self.set = set.to_vec();
         self.warned.clear();
         self.welcome(&session)?;
@@ -148,8 +151,9 @@ impl Desk {
                 "this model has no file yet; `save FILE` gives it one, `load FILE` reads one",
             ));
         };
-        let session = Session::open(&path, &self.set).map_err(|refused| self.refusal(&refused))?;
-        let text = session.source.text.clone();
+        let session =
+            Session::open_with(&path, &self.set, &self.include).map_err(|refused| self.refusal(&refused))?;
+        let text = session.source.own_text().to_owned();
         if text != self.draft.text {
             let change = Change::whole(text);
             self.draft.accept(change);
@@ -201,12 +205,14 @@ impl Desk {
         };
         // A param that was set and is no more is no mistake of what was typed.
         let declared = |setting: &&Setting| {
-            crate::lang::outline::outline(text).iter().any(|entry| entry.name == setting.name)
+            // It may be declared in a file that the text includes.
+            let mut entries = crate::lang::outline::outline(text).into_iter();
+            entries.any(|entry| entry.name == setting.name || entry.name.starts_with("include "))
         };
         let kept: Vec<Setting> = set.iter().filter(declared).cloned().collect();
         let set = if text == self.draft.text { set } else { &kept[..] };
         let name = self.draft.name();
-        let read = Session::from_text_in(&self.draft.folder(), &name, &whole, set);
+        let read = Session::from_text_in(&self.draft.folder(), &self.include, &name, &whole, set);
         read.map_err(|refused| self.refusal(&refused))
     }
 

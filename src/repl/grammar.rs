@@ -102,7 +102,7 @@ pub fn is_open(text: &str) -> bool {
     let operator = end.ends_with([':', ',', '=', '*', '<', '>', '≤', '≥', '≠']) || end.ends_with("..");
     let clause = body.rmatch_indices(|c: char| !(c.is_alphanumeric() || c == '_')).count() > 0 && {
         let mut words = body.split(|c: char| !(c.is_alphanumeric() || c == '_')).rev();
-        matches!(words.find(|word| words::CLAUSES.contains(word)), Some("if" | "at"))
+        matches!(words.find(|word| words::CLAUSES.contains(word)), Some("if" | "at" | "let"))
     };
     depth > 0 || waits || operator || clause && has_colon(&body)
 }

@@ -55,7 +55,7 @@ pub fn repl(args: &ReplArgs) -> Result<(), Failure> {
         max_modules: args.max_modules,
         ..defaults
     };
-    let mut desk = Desk::new(settings, screen);
+    let mut desk = Desk::new(settings, args.include.folders.clone(), screen);
     let mut log = Log { echo: args.echo, interactive, ..Log::default() };
     let mut input = match interactive {
         true => Input::terminal(desk.names.clone(), screen.coloured)

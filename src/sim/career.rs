@@ -205,6 +205,7 @@ fn is_timeless(rule: &Rule) -> bool {
     let blind = |program: &Program| !program.reads().contains(&time);
     let law_is_blind = |law: &Law| match law {
         Law::Polynomial(program) | Law::Quadratic(program) => blind(program),
+        Law::Driven(law) => blind(&law.coefficients) && law.pace.as_ref().is_none_or(|pace| blind(pace)),
         Law::Sum { .. } | Law::Numeric(_) => false,
     };
     let watch_is_blind = |watch: &Watch| match watch {

@@ -156,7 +156,7 @@ impl Error {
                 d.help("times have 16 digits: choose a longer `period`, or stop the discrete rules before this time")
             }
             Error::NotFinite { .. } => {
-                d.help("look for a division by zero, a root or logarithm of a negative number, or growth without bound")
+                d.help("look for a division by zero, a root or logarithm of a negative number, an element or an inverse that is not there, or growth without bound")
             }
             Error::BadDraw { distribution, .. } => {
                 d.help(distribution.demand())

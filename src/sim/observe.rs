@@ -7,10 +7,10 @@
 
 use super::career::Career;
 use super::error::Error;
-use super::motion::Riccati;
+use super::motion::{Flow, Riccati};
 use super::simulation::Simulation;
 use crate::expr::{LANES, Lanes, Program};
-use crate::model::Law;
+use crate::model::{Driven, Law};
 use crate::structure::{Instant, ModuleId, ModuleString, Version, Visit};
 
 /// Who moves, in the structure of some version.
@@ -154,6 +154,7 @@ impl Simulation<'_> {
                         }
                         moved
                     }
+                    Law::Driven(law) => driven(law, registers, [parameter, time], &tau, rows.len()),
                     Law::Sum { .. } | Law::Numeric(_) => continue,
                 };
                 for (row, &x) in rows.iter().zip(&moved) {
@@ -189,6 +190,41 @@ impl Simulation<'_> {
 /// True for a rate that is 0 at all times.
 fn is_zero(program: &Program) -> bool {
     program.outputs() == 1 && program.constant_output(0) == Some(0.0)
+}
+
+/// The values that follow a law `x' = h(time) q(x)`, some times after the births whose variables the registers hold.
+fn driven(
+    law: &Driven,
+    registers: &mut Vec<Lanes>,
+    [parameter, time]: [usize; 2],
+    tau: &Lanes,
+    count: usize,
+) -> Lanes {
+    let mut c = [[0.0; LANES]; 3];
+    for (i, register) in law.coefficients.eval_lanes(registers).enumerate() {
+        c[i] = registers[register];
+    }
+    let mut s = *tau;
+    if let Some(pace) = &law.pace {
+        let whole = |registers: &mut Vec<Lanes>| -> Lanes {
+            let place = pace.eval_lanes(registers).next();
+            place.map_or([f64::NAN; LANES], |place| registers[place])
+        };
+        let before = whole(registers);
+        let births = [registers[time], registers[time + 1]];
+        for k in 0..2 {
+            registers[time + k] = std::array::from_fn(|i| births[k][i] + tau[i]);
+        }
+        let after = whole(registers);
+        (registers[time], registers[time + 1]) = (births[0], births[1]);
+        s = std::array::from_fn(|i| after[i] - before[i]);
+    }
+    let mut moved = registers[parameter];
+    for (i, x) in moved.iter_mut().enumerate().take(count) {
+        let flow = Flow::new(law.flow, *x, c.map(|c| c[i]));
+        *x += if tau[i] == 0.0 { 0.0 } else { flow.map_or(f64::NAN, |flow| flow.value(s[i])) };
+    }
+    moved
 }
 
 /// A parameter with a polynomial rate at the time `tau` after birth, for each lane: as `Motion::value` has it.

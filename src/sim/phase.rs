@@ -2,7 +2,7 @@
 
 use super::dense::Dense;
 use super::error::Error;
-use super::motion::{Function, Motion, Riccati, Terms};
+use super::motion::{Driven, Flow, Function, Motion, Pace, Riccati, Terms};
 use super::plant::{Path, Plant};
 use super::queue::Who;
 use super::simulation::Simulation;
@@ -117,6 +117,10 @@ impl Simulation<'_> {
                     motions[parameter] = Motion::Riccati(riccati);
                 }
                 Law::Sum { .. } => sums_follow = true,
+                Law::Driven(driven) => match self.driven(driven, parameter, time) {
+                    Some(motion) => motions[parameter] = motion,
+                    None => return false,
+                },
                 Law::Numeric(_) => {}
             }
         }
@@ -127,6 +131,23 @@ impl Simulation<'_> {
             motions[solve.of[position]] = Motion::Step(component as u32);
         }
         motions.iter().zip(&self.variables).all(|(m, _)| !m.is_formula() || m.rate(0.0).is_finite())
+    }
+
+    /// The motion of a parameter at a pace; None if its formula does not hold for these numbers.
+    fn driven(&mut self, law: &crate::model::Driven, parameter: usize, time: usize) -> Option<Motion> {
+        let mut c = [0.0; 3];
+        let coefficients = &mut c[..law.coefficients.outputs()];
+        law.coefficients.eval(&self.variables, &mut self.scratch, coefficients);
+        if coefficients.iter().any(|c| !c.is_finite()) {
+            return None;
+        }
+        let x = self.variables[parameter];
+        let flow = Flow::new(law.flow, x, c)?;
+        let pace = match &law.pace {
+            Some(program) => Some(Pace::new(program.clone(), &self.variables, time)?),
+            None => None,
+        };
+        Some(Motion::Driven(Box::new(Driven::new(flow, pace))))
     }
 
     /// The motions of explicit parameters that are formulas, and components for those that are solved for.

@@ -121,7 +121,7 @@ impl Simulation<'_> {
     ) -> Option<SmallVec<[Motion; 2]>> {
         let mut motions = SmallVec::new();
         let Some(clause) = clause.filter(|s| !s.of.is_empty()) else { return Some(motions) };
-        let simple = |law: &Law| matches!(law, Law::Polynomial(_) | Law::Quadratic(_));
+        let simple = |law: &Law| matches!(law, Law::Polynomial(_) | Law::Quadratic(_) | Law::Driven(_));
         if !clause.switches.is_empty() || !clause.laws.iter().all(simple) {
             return None;
         }

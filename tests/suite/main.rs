@@ -9,6 +9,7 @@
 //! - [`gallery`]: every mistake in `tests/errors` and the message it gets.
 //! - [`chance`]: times, draws and choices against their distributions; what they depend on.
 //! - [`discrete`]: derivation steps, against the models of a book; cuts.
+//! - [`blocks`]: curves, growth functions, arrays, `match` and `let` against exact values; [`files`]: includes and tables.
 //! - [`cli`]: the program as it is typed.
 //! - [`editing`]: layout, `new`, `render --watch`, completions.
 //! - [`inspect`]: what `explain`, `--events` and `check --continuity` say.
@@ -22,6 +23,7 @@
 //! - [`view`]: pages that play a recording, read back.
 
 mod algebraic;
+mod blocks;
 mod book;
 mod chance;
 mod cli;
@@ -29,6 +31,7 @@ mod common;
 mod discrete;
 mod editing;
 mod export;
+mod files;
 mod gallery;
 mod inspect;
 mod language;

@@ -474,14 +474,13 @@ fn the_quick_way_is_the_general_way() {
     for file in
         files.map(|f| f.expect("readable").path()).filter(|p| p.extension().is_some_and(|e| e == "dls"))
     {
-        let text = std::fs::read_to_string(&file).expect("a model");
         let big = ["h01-", "h03-"];
         if big.iter().any(|b| file.file_name().is_some_and(|n| n.to_string_lossy().starts_with(b))) {
             continue;
         }
         let bits = |slow| -> Vec<Vec<(String, Vec<u64>)>> {
             let settings = Settings { slow, ..Settings::default() };
-            let session = crate::common::session(&text);
+            let session = dlsys::session::Session::open(&file, &[]).expect("a good model");
             let Ok(mut simulation) = session.simulate(settings) else { return Vec::new() };
             let mut string = Default::default();
             let mut all = Vec::new();

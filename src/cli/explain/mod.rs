@@ -19,8 +19,12 @@
 //!   - a condition is `{boundary, line, decides, found}`: `decides` says of which clauses (`{clause, line}`), `found`
 //!     how its instant is found under each `solve`: `{line, class, why}`, line null if the rule has none; `class` is
 //!     `nothing to find`, `never met`, `closed-form time`, `root on a closed form` or `root on dense output`.
+//! - `curves`: a list of `{name, sort, points, from, to, least, greatest, periodic, inverse}`; `sort` is `linear`,
+//!   `monotone` or `spline`; `from` and `to` are arguments, `least` and `greatest` values; `inverse` tells that it rises
+//!   throughout, or falls throughout;
 //! - `summary`: names of kinds by `work`, and `closed_form`: true if nothing is ever integrated numerically.
 
+mod curves;
 mod given;
 mod plan;
 #[cfg(test)]
@@ -36,7 +40,7 @@ use crate::session::Session;
 
 /// Prints the classes of work of a model.
 pub fn explain(args: &ExplainArgs) -> Result<(), Failure> {
-    show(args, &open(&args.model, &args.settings)?)
+    show(args, &open(&args.model, &args.settings, &args.include)?)
 }
 
 /// The same of a model that was read.

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::curves::CurvePlan;
 use super::{given, words};
 use crate::diagnostic::Source;
 use crate::model::{Condition, Kind, Law, Model, Produce, Rule, Solve, Watch};
@@ -14,6 +15,7 @@ pub struct Plan {
     pub title: Option<String>,
     pub kinds: Vec<KindPlan>,
     pub rules: Vec<RulePlan>,
+    pub curves: Vec<CurvePlan>,
     pub summary: Summary,
 }
 
@@ -158,6 +160,7 @@ impl Plan {
             title: model.title.clone(),
             kinds,
             rules: (0..model.rules.len()).map(|rule| facts.rule(rule)).collect(),
+            curves: model.curves.iter().map(|curve| CurvePlan::new(curve)).collect(),
             summary,
         }
     }

@@ -19,7 +19,7 @@ fn every_obstacle_is_named() {
     let plan = plan(
         "initial string: A(1, 1, 1, 1, 1) B(1) C(1) B(1)
              A(u, v, w, x, y):
-               solve du/dt = sin(u), dv/dt = v^3, dw/dt = u*w, dx/dt = u - x, dy/dt = y*age
+               solve du/dt = sin(u), dv/dt = v^3 + 1, dw/dt = u*w, dx/dt = u - x, dy/dt = y*age
              B(b) < C(c): solve dc/dt = b*c
              B(b): solve db/dt = b*sin(b)",
     );

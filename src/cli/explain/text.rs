@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use super::curves::CurvePlan;
 use super::plan::{ClausePlan, ConditionPlan, KindPlan, Plan, RulePlan, Work};
 use super::words::SUM;
 
@@ -146,6 +147,11 @@ pub fn show(plan: &Plan) -> String {
             };
             let _ = writeln!(out, "    only drawing reads {only}{when}");
         }
+        out.push('\n');
+    }
+    if !plan.curves.is_empty() {
+        let _ = writeln!(out, "Curves");
+        Table(plan.curves.iter().map(CurvePlan::row).collect()).show(2, &mut out);
         out.push('\n');
     }
     let _ = writeln!(out, "Summary");

@@ -2,7 +2,7 @@
 
 use super::plan::Facts;
 use crate::expr::Program;
-use crate::model::{Law, Numeric, Obstacle, Rule, Solve};
+use crate::model::{Driven, Flow, Law, Numeric, Obstacle, Rule, Solve};
 use crate::sim::brief;
 
 /// The form of solutions that a run may refuse.
@@ -72,6 +72,7 @@ pub fn law(
                 format!("its rate is linear in {x}, driven by {} by a formula{piecewise}", list(&driven));
             (Some(SUM.to_owned()), why)
         }
+        Law::Driven(law) => driven(rule, x, law, piecewise),
         Law::Numeric(numeric) => (None, obstacle(facts, rule, solve, position, *numeric, coupled)),
     }
 }
@@ -99,6 +100,39 @@ fn quadratic(coefficients: &Program) -> (String, &'static str) {
         _ => "quadratic (tanh, tan or a hyperbola, by its numbers)".to_owned(),
     };
     (name, "a quadratic")
+}
+
+/// The form of the solution of `x' = h(time) q(x)`, and why there is one.
+fn driven(rule: &Rule, x: &str, law: &Driven, piecewise: &str) -> (Option<String>, String) {
+    let curves: Vec<String> = law.curves.iter().map(|curve| curve.name.clone()).collect();
+    let pace = match (curves.len(), &law.pace) {
+        (0, None) => String::new(),
+        (0, Some(pace)) => {
+            let time = |v: &usize| *v >= rule.time_variable() && *v < rule.variables;
+            let times: Vec<String> =
+                pace.reads().into_iter().filter(time).filter_map(|v| variable(rule, v)).collect();
+            format!("a function of {}", list(&times))
+        }
+        (1, _) => format!("the curve {}", curves[0]),
+        _ => format!("the curves {}", list(&curves)),
+    };
+    let name = match law.flow {
+        Flow::Quadratic if [1, 2].iter().all(|i| law.coefficients.constant_output(*i) == Some(0.0)) => {
+            let why = format!("its rate is made of {pace}, whose integral is known{piecewise}");
+            return (Some(format!("integral of {pace}")), why);
+        }
+        Flow::Quadratic => quadratic(&law.coefficients).0,
+        Flow::Gompertz => "Gompertz growth".to_owned(),
+        Flow::Bernoulli => "Bernoulli's equation (Richards, von Bertalanffy)".to_owned(),
+    };
+    if pace.is_empty() {
+        return (
+            Some(name),
+            format!("its rate is a growth law of {x} with constant coefficients{piecewise}"),
+        );
+    }
+    let why = format!("its rate is one of {x} alone times {pace}, whose integral is known{piecewise}");
+    (Some(format!("{name}, at the pace of {pace}")), why)
 }
 
 /// Why a parameter is integrated numerically.

@@ -47,7 +47,7 @@ pub fn watch(args: &RenderArgs) -> Result<(), Failure> {
 
 /// The files that the model is made of, as they are now.
 fn inputs(args: &RenderArgs) -> Vec<Input> {
-    match Session::open(&args.shared.model, &args.shared.settings) {
+    match Session::open_with(&args.shared.model, &args.shared.settings, &args.shared.include.folders) {
         Ok(session) => session.inputs,
         Err(refused) => refused.inputs,
     }

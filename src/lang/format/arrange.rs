@@ -126,7 +126,7 @@ fn is_body(piece: &Piece<'_>) -> bool {
 /// Whether a piece begins a clause or its action, and not, say, an `if` in an expression.
 fn is_keyword(piece: &Piece<'_>, before: Option<&Piece<'_>>) -> bool {
     let begins = match piece.text {
-        "solve" | "produce" => true,
+        "solve" | "produce" | "let" => true,
         "if" | "at" => before.is_some_and(|b| b.place == Place::Colon || b.in_string || !b.operator),
         _ => false,
     };
@@ -279,6 +279,11 @@ fn space(before: &Piece<'_>, after: &Piece<'_>) -> bool {
         piece.token == Token::Word && piece.operator && !piece.grouped
             || matches!(piece.text, "if" | "solve" | "produce" | "or" | "at" | "rate") && piece.operator
     };
+    let bracket = |piece: &Piece<'_>, symbol: &str| piece.text == symbol && !piece.grouped;
+    let element = before.token == Token::Word && !before.operator && bracket(after, "[");
+    if element || bracket(before, "[") || bracket(after, "]") {
+        return false;
+    }
     if before.token == Token::Open || matches!(after.token, Token::Close | Token::Comma | Token::Colon) {
         return false;
     }

@@ -7,6 +7,7 @@ use pest::pratt_parser::{Assoc, Op, PrattParser};
 
 use super::{Pair, Rule};
 use crate::diagnostic::{Diagnostic, Span};
+use crate::expr::Sort;
 use crate::lang::ast;
 use crate::lang::ast::{
     Action, Aggregate, Alternative, Clause, Equation, Expr, ExprId, Expression, Expressions, HeadModule,
@@ -61,7 +62,7 @@ pub struct Builder<'d> {
     /// Where the parsed piece begins in the file.
     pub offset: usize,
     /// Names of the model's own functions.
-    pub defined: Option<&'d HashSet<&'d str>>,
+    pub defined: Option<&'d HashSet<String>>,
 }
 
 impl Builder<'_> {
@@ -90,7 +91,39 @@ impl Builder<'_> {
                 let text = next().into_inner().next().expect("the grammar has a text here");
                 Item::Title(text.as_str().to_owned())
             }
-            Rule::const_item => Item::Const { name: self.name(&next()), value: self.expression(next())? },
+            Rule::include_item => Item::Include(self.text(&next())),
+            Rule::const_item => {
+                let (name, value) = (self.name(&next()), next());
+                if value.as_rule() == Rule::array {
+                    let values = value.into_inner().map(|p| self.expression(p)).collect::<Built<_>>()?;
+                    Item::Array { name, values }
+                } else {
+                    Item::Const { name, value: self.expression(value)? }
+                }
+            }
+            Rule::curve_item => {
+                let (sort, name) = self.sorted_name(&mut inner, Sort::Monotone);
+                let (mut points, mut periodic) = (Vec::new(), false);
+                for part in inner {
+                    match part.as_rule() {
+                        Rule::point => points.push(self.point(part)?),
+                        _ => periodic = true,
+                    }
+                }
+                Item::Curve { name, sort, points, periodic }
+            }
+            Rule::table_item => {
+                let (sort, name) = self.sorted_name(&mut inner, Sort::Linear);
+                let file = self.text(&inner.next().expect("the grammar has a file here"));
+                let (mut column, mut periodic) = (None, false);
+                for part in inner {
+                    match part.as_rule() {
+                        Rule::text => column = Some(self.text(&part)),
+                        _ => periodic = true,
+                    }
+                }
+                Item::Table { name, sort, file, column, periodic }
+            }
             Rule::param_item => {
                 let (name, value) = (self.name(&next()), self.expression(next())?);
                 let range = match inner.next() {
@@ -121,13 +154,7 @@ impl Builder<'_> {
             Rule::surface_item => Item::Surface { name: self.name(&next()), file: self.text(&next()) },
             Rule::contour_item => {
                 let name = self.name(&next());
-                let points = inner.map(|point| {
-                    let mut ends = point.into_inner().filter(|p| p.as_rule() == Rule::expr);
-                    let mut coordinate =
-                        || self.expression(ends.next().expect("a point has two coordinates"));
-                    Ok([coordinate()?, coordinate()?])
-                });
-                Item::Contour { name, points: points.collect::<Built<Vec<_>>>()? }
+                Item::Contour { name, points: inner.map(|p| self.point(p)).collect::<Built<Vec<_>>>()? }
             }
             Rule::tropism_item => {
                 let direction =
@@ -144,8 +171,15 @@ impl Builder<'_> {
                 let head = next();
                 let first = self.expressions.next();
                 let mut rule = self.head(head);
-                for clause in inner {
-                    rule.clauses.push(self.clause(clause)?);
+                for part in inner {
+                    if part.as_rule() == Rule::local {
+                        let mut inner = part.into_inner().filter(|p| !is_punctuation(p.as_rule()));
+                        let mut next = || inner.next().expect("a name and its meaning");
+                        let name = self.name(&next());
+                        rule.locals.push((name, self.expression(next())?));
+                    } else {
+                        rule.clauses.push(self.clause(part)?);
+                    }
                 }
                 rule.nodes = (first, self.expressions.next());
                 Item::Rule(rule)
@@ -171,6 +205,25 @@ impl Builder<'_> {
             }
             other => unreachable!("{other:?} is no item"),
         })
+    }
+
+    /// The name of a curve, after the word for its sort if there is one.
+    fn sorted_name<'i>(&mut self, inner: &mut impl Iterator<Item = Pair<'i>>, default: Sort) -> (Sort, Name) {
+        let mut next = || inner.next().expect("the grammar has a name here");
+        let first = next();
+        let sort = match (first.as_rule(), first.as_str()) {
+            (Rule::sort, "linear") => Sort::Linear,
+            (Rule::sort, "spline") => Sort::Spline,
+            (Rule::sort, _) => Sort::Monotone,
+            _ => return (default, self.name(&first)),
+        };
+        (sort, self.name(&next()))
+    }
+
+    fn point(&mut self, pair: Pair) -> Built<[Expression; 2]> {
+        let mut ends = pair.into_inner().filter(|p| p.as_rule() == Rule::expr);
+        let mut coordinate = || self.expression(ends.next().expect("a point has two coordinates"));
+        Ok([coordinate()?, coordinate()?])
     }
 
     fn formals(&mut self, pair: Pair) -> Vec<Name> {
@@ -219,7 +272,8 @@ impl Builder<'_> {
         }
         let predecessor = predecessor.expect("the grammar has a predecessor here");
         let nodes = (ExprId(0), ExprId(0));
-        ast::Rule { left, predecessor, right, right_shape, head, discrete: false, clauses: Vec::new(), nodes }
+        let (locals, clauses) = (Vec::new(), Vec::new());
+        ast::Rule { left, predecessor, right, right_shape, head, discrete: false, locals, clauses, nodes }
     }
 
     fn clause(&mut self, pair: Pair) -> Built<Clause> {
@@ -462,6 +516,23 @@ impl Builder<'_> {
                 self.expressions.widen(otherwise, span);
                 Ok(otherwise)
             }
+            Rule::indexed => {
+                let mut inner = pair.into_inner();
+                let name = self.interner.get(inner.next().expect("an array has a name").as_str());
+                let index = self.expr(inner.next().expect("an element has a number"))?;
+                Ok(self.expressions.push(Expr::Index(name, index), span))
+            }
+            Rule::match_expr => {
+                let parts = pair.into_inner().filter(|p| p.as_rule() == Rule::expr);
+                let mut parts = parts.map(|p| self.expr(p)).collect::<Built<Vec<_>>>()?.into_iter();
+                let subject = parts.next().expect("a `match` has a number");
+                let otherwise = parts.next_back().expect("a `match` has an else");
+                let mut cases = Vec::new();
+                while let (Some(value), Some(then)) = (parts.next(), parts.next()) {
+                    cases.push((value, then));
+                }
+                Ok(self.expressions.push(Expr::Match(subject, cases, otherwise), span))
+            }
             // A parenthesis: pest leaves only its inside.
             Rule::expr => {
                 let inner = self.expr(pair)?;
@@ -518,6 +589,11 @@ fn is_punctuation(rule: Rule) -> bool {
             | Rule::colon
             | Rule::close
             | Rule::range
+            | Rule::kw_include
+            | Rule::kw_curve
+            | Rule::kw_table
+            | Rule::kw_column
+            | Rule::kw_let
             | Rule::kw_const
             | Rule::kw_param
             | Rule::kw_def

@@ -14,7 +14,8 @@ use crate::lang::suggest::nearest;
 fn words(rule: Rule) -> Option<&'static str> {
     use Rule::*;
     Some(match rule {
-        expr | number | literal | ident | call | if_expr | neg | not | coefficient => "an expression",
+        expr | number | literal | ident | call | indexed | array | if_expr | match_expr | neg | not
+        | coefficient => "an expression",
         or | and | le | ge | ne | lt | gt | eq | add | sub | mul | div | pow => "an operator",
         module | modules | successor | alternative | name => "a module",
         epsilon => "`ε` for nothing",
@@ -27,6 +28,12 @@ fn words(rule: Rule) -> Option<&'static str> {
         left_of => "`<` after the left context",
         right_of => "`>` and the right context",
         clause => "`if`, `solve` or `produce`",
+        local | kw_let => "`let`",
+        kw_match => "`match`",
+        kw_case => "`case`",
+        kw_column => "`column` and its name",
+        periodic => "`periodic`",
+        sort => "`linear`, `monotone` or `spline`",
         kw_or => "`or` and another successor",
         hazard | kw_at => "`at rate`",
         kw_rate => "`rate`",
@@ -71,7 +78,13 @@ pub fn explain(item: Rule, error: &Error<Rule>, text: &str, offset: usize) -> Di
     // Wherever an expression can begin, an `if` can: that goes without saying.
     if expected.contains("an expression") {
         expected.remove("`if`");
+        expected.remove("`match`");
     }
+    // A clause is what a rule lacks, and not one more name.
+    if expected.contains("`if`, `solve` or `produce`") {
+        expected.remove("`let`");
+    }
+    let choice = expected.contains("`case`");
     // What a name is for depends on where it is asked for.
     if is_item_with_name(item)
         && text[..at].split_whitespace().count() <= 1
@@ -104,9 +117,9 @@ pub fn explain(item: Rule, error: &Error<Rule>, text: &str, offset: usize) -> Di
         Span::new(offset + at, offset + end)
     };
     let what = if end == at { format!("{what} after this") } else { what };
-    Diagnostic::error(message)
-        .at(span, what)
-        .help(hint(item, text, at, found).unwrap_or_else(|| advice::usage(item).to_owned()))
+    let choice = choice.then_some("a choice is written `match n case 0: 1 case 1: 2 else 3`");
+    let advice = hint(item, text, at, found).or_else(|| choice.map(str::to_owned));
+    Diagnostic::error(message).at(span, what).help(advice.unwrap_or_else(|| advice::usage(item).to_owned()))
 }
 
 fn is_item_with_name(item: Rule) -> bool {
@@ -118,6 +131,8 @@ fn is_item_with_name(item: Rule) -> bool {
             | Rule::color_item
             | Rule::gradient_item
             | Rule::contour_item
+            | Rule::curve_item
+            | Rule::table_item
     )
 }
 
@@ -144,6 +159,9 @@ fn hint(item: Rule, text: &str, at: usize, found: &str) -> Option<String> {
         && first.len() > 3
     {
         return Some(format!("did you mean `{word}`?"));
+    }
+    if let Some(advice) = advice::for_block(item, &text[..at], found) {
+        return Some(advice.to_owned());
     }
     if let Some(advice) = hint_of_chance(item, text, at, found) {
         return Some(advice.to_owned());

@@ -9,6 +9,8 @@
 mod build;
 mod expected;
 
+use std::collections::HashSet;
+
 use pest::Parser;
 
 use super::ast::{Document, Expression, HeadModule, Item, Module};
@@ -31,36 +33,54 @@ const MAX_AXIOM: usize = 10_000_000;
 
 /// Reads a model's text. What could be read is returned even if there are errors; of global declarations
 /// that could not be read, the names are in [`Document::unread`].
+///
+/// Texts that it includes are not read: see [`read`](super::read).
 pub fn parse(source: &Source) -> (Document, Vec<Diagnostic>) {
-    let cut = layout(&source.text);
-    let mut errors = cut.errors;
-    let mut document = Document::default();
-    let mut interner = build::Interner::default();
-    let functions = cut.items.iter().filter(|item| item.kind == ItemKind::Def);
-    let defined = functions.filter_map(|item| declared_word(&cut.text, item)).collect();
-    for item in &cut.items {
-        if errors.len() >= MAX_ERRORS {
-            break;
-        }
-        if item.broken {
-            document.unread.extend(declared_name(&cut.text, item));
-            continue;
-        }
-        let mut builder = build::Builder {
-            expressions: &mut document.expressions,
-            interner: &mut interner,
-            offset: 0,
-            defined: Some(&defined),
-        };
-        match read_item(&cut.text, item, &mut builder) {
-            Ok(read) => document.items.push((read, trimmed(&cut.text, item))),
-            Err(error) => {
-                errors.push(*error);
-                document.unread.extend(declared_name(&cut.text, item));
+    let mut reader = Reader::default();
+    reader.document.items = reader.read(&source.text);
+    (reader.document, reader.errors)
+}
+
+/// Reads texts one after another into one document.
+#[derive(Default)]
+pub(super) struct Reader {
+    /// The items are for the caller to put together.
+    pub document: Document,
+    pub errors: Vec<Diagnostic>,
+    interner: build::Interner,
+    /// Functions of the texts so far.
+    defined: HashSet<String>,
+}
+
+impl Reader {
+    /// The items of a text.
+    pub fn read(&mut self, text: &str) -> Vec<(Item, Span)> {
+        let cut = layout(text);
+        self.errors.extend(cut.errors);
+        let functions = cut.items.iter().filter(|item| item.kind == ItemKind::Def);
+        self.defined.extend(functions.filter_map(|item| declared_word(&cut.text, item).map(str::to_owned)));
+        let mut items = Vec::new();
+        for item in &cut.items {
+            if self.errors.len() >= MAX_ERRORS {
+                break;
+            }
+            if item.broken {
+                self.document.unread.extend(declared_name(&cut.text, item));
+                continue;
+            }
+            let (expressions, interner) = (&mut self.document.expressions, &mut self.interner);
+            let mut builder =
+                build::Builder { expressions, interner, offset: 0, defined: Some(&self.defined) };
+            match read_item(&cut.text, item, &mut builder) {
+                Ok(read) => items.push((read, trimmed(&cut.text, item))),
+                Err(error) => {
+                    self.errors.push(*error);
+                    self.document.unread.extend(declared_name(&cut.text, item));
+                }
             }
         }
+        items
     }
-    (document, errors)
 }
 
 /// The name that an item declares, or seems to: `const k …`, but also `cosnt k …` and `k = …`.
@@ -75,6 +95,9 @@ fn declared_word<'t>(text: &'t str, item: &RawItem) -> Option<&'t str> {
     let name = match item.kind {
         ItemKind::Const | ItemKind::Param | ItemKind::Def => words.next()?,
         ItemKind::Color | ItemKind::Gradient | ItemKind::Contour => words.next()?,
+        ItemKind::Curve | ItemKind::Table => {
+            words.find(|word| !matches!(*word, "linear" | "monotone" | "spline"))?
+        }
         ItemKind::Unknown if line.strip_prefix(first)?.trim_start().starts_with('=') => first,
         ItemKind::Unknown => words.next()?,
         _ => return None,
@@ -139,6 +162,9 @@ fn pest_parse(rule: Rule, text: &str, offset: usize) -> Result<Pair<'_>, Box<Dia
 fn read_item(text: &str, item: &RawItem, builder: &mut build::Builder) -> Result<Item, Box<Diagnostic>> {
     let rule = match item.kind {
         ItemKind::Title => Rule::title_item,
+        ItemKind::Include => Rule::include_item,
+        ItemKind::Curve => Rule::curve_item,
+        ItemKind::Table => Rule::table_item,
         ItemKind::Const => Rule::const_item,
         ItemKind::Param => Rule::param_item,
         ItemKind::Def => Rule::def_item,

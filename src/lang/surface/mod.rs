@@ -60,6 +60,12 @@ impl Fault {
     }
 }
 
+/// True if a path goes down from where it begins, and never up.
+pub fn is_inside(path: &str) -> bool {
+    let inside = Path::new(path).components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
+    !path.is_empty() && inside && !path.contains('\\')
+}
+
 /// Reads a surface; its name and place are left empty.
 pub fn read(path: &str, files: &dyn Files) -> Result<SurfaceShape, Fault> {
     if !is_inside(path) {
@@ -79,12 +85,6 @@ pub fn read(path: &str, files: &dyn Files) -> Result<SurfaceShape, Fault> {
         Fault::whole(what).help("put it into the folder of the model's file or below; the path begins there")
     })?;
     parse(&String::from_utf8_lossy(&bytes), path, files)
-}
-
-/// Whether a path stays in the model's folder.
-fn is_inside(path: &str) -> bool {
-    let inside = Path::new(path).components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
-    inside && !path.is_empty() && !path.contains('\\')
 }
 
 /// A number of a surface file.

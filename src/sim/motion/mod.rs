@@ -3,11 +3,15 @@
 //! Time is counted from the start of the motion, values as displacements from the value there, so that a module born
 //! at t = 1e9 moves as precisely as one born at 0.
 
+mod driven;
 mod function;
+mod growth;
 mod riccati;
 mod sum;
 
+pub use driven::{Driven, Flow, Pace};
 pub use function::Function;
+use growth::Growth;
 pub use riccati::Riccati;
 pub use sum::{Sum, Terms};
 
@@ -23,6 +27,7 @@ pub enum Motion {
     Polynomial([f64; 4]),
     Riccati(Riccati),
     Sum(Box<Sum>),
+    Driven(Box<Driven>),
     Function(Box<Function>),
     /// Dense output of a step of the module itself: the number of the component.
     Step(u32),
@@ -43,6 +48,7 @@ impl Motion {
             Motion::Polynomial(c) => tau * (c[0] + tau * (c[1] + tau * (c[2] + tau * c[3]))),
             Motion::Riccati(law) => law.value(tau),
             Motion::Sum(sum) => sum.value(tau),
+            Motion::Driven(driven) => driven.value(tau),
             Motion::Function(function) => function.value(tau),
             Motion::Step(_) | Motion::Coupled(_) => f64::NAN,
         }
@@ -54,6 +60,7 @@ impl Motion {
             Motion::Polynomial(c) => c[0] + tau * (2.0 * c[1] + tau * (3.0 * c[2] + tau * 4.0 * c[3])),
             Motion::Riccati(law) => law.rate(law.value(tau)),
             Motion::Sum(sum) => sum.rate(tau),
+            Motion::Driven(driven) => driven.rate(tau),
             Motion::Function(function) => function.rate(tau),
             Motion::Step(_) | Motion::Coupled(_) => f64::NAN,
         }
@@ -66,6 +73,7 @@ impl Motion {
             Motion::Polynomial(c) => bound_polynomial(c, from, to),
             Motion::Riccati(law) => law.over(from, to),
             Motion::Sum(sum) => sum.over(from, to),
+            Motion::Driven(driven) => driven.over(from, to),
             Motion::Function(function) => function.over(from, to),
             Motion::Step(_) | Motion::Coupled(_) => Dual { value: Interval::ENTIRE, rate: Interval::ENTIRE },
         }
@@ -80,6 +88,7 @@ impl Motion {
                 (tau > 0.0 && tau.is_finite()).then_some(tau)
             }
             Motion::Riccati(law) => law.reach(u, rate),
+            Motion::Driven(driven) => driven.reach(u, rate),
             _ => None,
         }
     }
@@ -88,6 +97,7 @@ impl Motion {
     pub fn end(&self) -> Option<f64> {
         match self {
             Motion::Riccati(law) => law.pole(),
+            Motion::Driven(driven) => driven.end(),
             _ => None,
         }
     }
@@ -102,7 +112,7 @@ impl Motion {
                 if d == 0.0 { Terms::affine(x, f) } else { Terms::exponential(x - f / d, f / d, d) }
             }),
             Motion::Sum(sum) => Some(sum.terms(x)),
-            Motion::Function(_) | Motion::Step(_) | Motion::Coupled(_) => None,
+            Motion::Driven(_) | Motion::Function(_) | Motion::Step(_) | Motion::Coupled(_) => None,
         }
     }
 }

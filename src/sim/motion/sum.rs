@@ -4,7 +4,7 @@
 //! [`Terms::solve`] integrates the result. A solution that cannot be had accurately in this form (too many terms,
 //! near resonance) is refused; then the module is integrated numerically.
 
-use crate::expr::{Binary, Dual, Interval, Unary, Value};
+use crate::expr::{Array, Binary, Curve, Dual, Interval, Part, Unary, Value};
 
 /// Re (re + i im) τ^power exp((growth + i frequency) τ)
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -280,6 +280,19 @@ impl Value for Terms {
             }
             None => Terms::REFUSED,
         }
+    }
+
+    fn curve(curve: &Curve, part: Part, x: Terms) -> Terms {
+        x.as_constant().map_or(Terms::REFUSED, |x| Terms::constant(curve.eval(part, x)))
+    }
+
+    fn piece(curve: &Curve, part: Part, index: Terms, x: Terms) -> Terms {
+        let both = index.as_constant().zip(x.as_constant());
+        both.map_or(Terms::REFUSED, |(index, x)| Terms::constant(curve.continued(part, index, x)))
+    }
+
+    fn element(array: &Array, index: Terms) -> Terms {
+        index.as_constant().map_or(Terms::REFUSED, |index| Terms::constant(array.element(index)))
     }
 }
 

@@ -1,9 +1,10 @@
 //! Prints the table of ratios at scale: `cargo run --release --bin scale [NAME…]`.
 //!
-//! Names: productions, dragon, filament, branches, busy, growing, frames, parsing, memory, start; all of them without
+//! Names: productions, dragon, filament, branches, busy, growing, frames, blocks, parsing, memory, start; all of them without
 //! one. Ratios are of one run on one machine. What is measured in memory or in starting time runs in processes of
 //! its own: this program, with an argument that no user gives.
 
+mod blocks;
 mod cells;
 mod formulas;
 
@@ -24,7 +25,7 @@ type Outcome = Result<(), String>;
 /// What is measured, by name.
 type Part = (&'static str, fn() -> Outcome);
 
-const PARTS: [Part; 10] = [
+const PARTS: [Part; 11] = [
     ("parsing", formulas::parsing),
     ("productions", formulas::productions),
     ("dragon", formulas::dragon),
@@ -33,6 +34,7 @@ const PARTS: [Part; 10] = [
     ("busy", cells::busy),
     ("growing", cells::growing),
     ("frames", formulas::frames),
+    ("blocks", blocks::blocks),
     ("memory", memory),
     ("start", starting),
 ];
