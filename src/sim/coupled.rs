@@ -419,7 +419,7 @@ impl Simulation<'_> {
     fn coupled_error(&self, error: StepError, at: Instant) -> Error {
         let Coupled { system, y, .. } = &self.coupled;
         let owner = |component: usize| system.owner(component);
-        if matches!(error, StepError::TooSmall(_))
+        if matches!(error, StepError::TooSmall(_) | StepError::NotFinite(_))
             && let Some(fault) = Equations::new(system, &self.model.rules, None).fading(y)
         {
             return self.unsolved(fault, owner(fault.component()), at);
