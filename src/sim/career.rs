@@ -132,7 +132,8 @@ pub struct Careers {
 }
 
 impl Careers {
-    /// No careers yet. A kind can have some if its rule needs no context and no rule looks for it as a context.
+    /// No careers yet. A kind can have some if its rule needs no context and has rates only, and no rule looks for it as
+    /// a context.
     pub fn new(model: &Model, kinds_with_context: &[bool]) -> Careers {
         let mut seen = vec![false; model.kinds.len()];
         for rule in &model.rules {
@@ -144,7 +145,8 @@ impl Careers {
         let rules = (model.kinds.iter())
             .map(|(id, kind)| {
                 let alone = !kinds_with_context[id.index()] && !seen[id.index()] && kind.steps.is_empty();
-                kind.rules.first().copied().filter(|_| alone)
+                // What has a value or an equation must be made consistent first.
+                kind.rules.first().copied().filter(|rule| alone && !model.rules[*rule].is_algebraic())
             })
             .collect();
         let of_rule = vec![Vec::new(); model.rules.len()];

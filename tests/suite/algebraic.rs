@@ -142,6 +142,20 @@ fn values_are_formulas_where_they_can_be() {
     assert_eq!(simulation.stats().rhs_evaluations, 0);
 }
 
+#[test]
+fn modules_made_by_productions_have_their_values_too() {
+    // With nothing else, beside a rate, and read by a condition.
+    let text = "initial string: A(1)\n\
+        A(n): if age < n solve dn/dt = 0\n if age = n produce F(0, n) G(0, n) H(7)\n\
+        F(x, n): solve x = 2*age\n\
+        G(x, n): solve x = age^2 + n, dn/dt = 1\n\
+        H(x): if age < 10 solve x = age\n if x = 0.5 produce F(0, t)";
+    follows(text, &[1.25, 3.0], |t| {
+        let (age, last) = (t - 1.0, if t < 1.5 { vec![t - 1.0] } else { vec![2.0 * (t - 1.5), 1.5] });
+        vec![vec![2.0 * age, 1.0], vec![age * age + t, t], last]
+    });
+}
+
 fn fails(text: &str) -> Error {
     run(text, Settings::default(), &[10.0]).expect_err("fails")
 }
