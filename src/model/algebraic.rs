@@ -43,7 +43,7 @@ impl Algebraic {
     /// True if the place is one whose parameter is solved for along with those that are integrated: `forced` if no
     /// formulas are used.
     pub fn is_solved(&self, place: usize, forced: bool) -> bool {
-        self.needed[place] && (forced || !self.closed[place])
+        if forced { !self.is_lazy(place) } else { self.needed[place] && !self.closed[place] }
     }
 
     /// True if the parameter is computed only when somebody looks.

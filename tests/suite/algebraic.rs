@@ -156,6 +156,20 @@ fn modules_made_by_productions_have_their_values_too() {
     });
 }
 
+#[test]
+fn methods_without_formulas_know_values_that_nobody_reads() {
+    let text = "initial string: F(0) G(1, 0)\nF(x): solve x = 2*age\nG(y, x): solve dy/dt = y, x = y^2 + t";
+    for method in [Method::Auto, Method::Dopri5, Method::Dop853, Method::Radau, Method::Rk4] {
+        let settings = Settings { method, step_size: 1e-3, ..Settings::default() };
+        for (t, state) in [0.5_f64, 2.0].into_iter().zip(run(text, settings, &[0.5, 2.0]).expect("runs")) {
+            let truth = [2.0 * t, t.exp(), (2.0 * t).exp() + t];
+            for (x, y) in state.iter().flat_map(|m| &m.1).zip(truth) {
+                assert!((x - y).abs() < 1e-4 * y.max(1.0), "{method:?} at {t}: {x}, not {y}");
+            }
+        }
+    }
+}
+
 fn fails(text: &str) -> Error {
     run(text, Settings::default(), &[10.0]).expect_err("fails")
 }
