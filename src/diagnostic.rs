@@ -204,6 +204,8 @@ impl Diagnostic {
     pub fn render(&self, source: &Source, coloured: bool) -> String {
         /// Lines longer than this are quoted in part: nobody reads a line of 50 MB.
         const LONG: usize = 400;
+        /// Up to this column lines are quoted from their beginning, so that places in them have their number.
+        const FAR: usize = 10_000;
 
         let level = match self.severity {
             Severity::Error => Level::ERROR,
@@ -216,7 +218,12 @@ impl Diagnostic {
             let last = source.line_of(span.end.saturating_sub(1).max(span.start));
             let mut range = source.line_range(source.line_of(span.start));
             range.end = range.end.max(source.line_range(last).end).min(source.text.len());
-            if range.len() > LONG {
+            let near = span.range().end < range.start + FAR && span.range().len() < LONG / 2;
+            if range.len() > LONG && near {
+                let wanted = range.end.min(span.range().end + LONG / 2);
+                range.end =
+                    (wanted..range.end).find(|i| source.text.is_char_boundary(*i)).unwrap_or(range.end);
+            } else if range.len() > LONG {
                 let (line, column) = source.position(span.start);
                 let excerpt: String = source.text[span.range()].chars().take(60).collect();
                 excerpts.push(format!(

@@ -502,7 +502,12 @@ pub enum FrameFormat {
 fn number(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
         Ok(x) if x.is_finite() => Ok(x),
-        _ => Err("not a number".to_owned()),
+        _ => Err(match text.trim().replacen(',', ".", 1) {
+            point if text.contains(',') && point.parse::<f64>().is_ok() => {
+                format!("not a number; the decimal sign is a point: {point}")
+            }
+            _ => "not a number".to_owned(),
+        }),
     }
 }
 

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::curves::CurvePlan;
 use super::{given, words};
 use crate::diagnostic::Source;
-use crate::model::{Condition, Kind, Law, Model, Produce, Rule, Solve, Watch};
+use crate::model::{Class, Condition, DRAWN_WORDS, Kind, Law, Model, Produce, Rule, Solve, Watch};
 use crate::session::Session;
 
 /// Everything that is said about a model. Field names are those of the JSON.
@@ -26,6 +26,9 @@ pub struct KindPlan {
     pub work: Work,
     pub rules: Vec<usize>,
     pub drawn_only: Vec<String>,
+    /// The turtle does something for it.
+    #[serde(skip)]
+    pub is_drawn: bool,
 }
 
 /// How the modules of a kind go through time.
@@ -146,7 +149,9 @@ impl Plan {
             if !list.contains(&kind.name) {
                 list.push(kind.name.clone());
             }
+            let named = kind.class() != Class::Word || DRAWN_WORDS.contains(&kind.base());
             kinds.push(KindPlan {
+                is_drawn: kind.interpretation.is_some() || named,
                 name: kind.name.clone(),
                 arity: kind.arity,
                 work,

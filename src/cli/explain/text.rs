@@ -145,7 +145,8 @@ pub fn show(plan: &Plan) -> String {
                 Work::Formulas => ": evaluated at frames only",
                 _ => "",
             };
-            let _ = writeln!(out, "    only drawing reads {only}{when}");
+            let reader = if group[0].is_drawn { "only drawing" } else { "nothing" };
+            let _ = writeln!(out, "    {reader} reads {only}{when}");
         }
         out.push('\n');
     }
