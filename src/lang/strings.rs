@@ -9,6 +9,7 @@ use super::chance::Drawn;
 use super::print;
 use super::rules::RuleBuilder;
 use super::scope::{Variables, plural};
+use super::suggest::{looks_like, meant};
 use crate::diagnostic::{Diagnostic, Span};
 use crate::expr::Program;
 use crate::model::{Class, Outcome, Successor, choose, class_of};
@@ -69,7 +70,7 @@ impl RuleBuilder<'_> {
     ) -> Option<Successor> {
         let mut drawn = Drawn::default();
         let mut clocks = Vec::new();
-        let mut place = 0;
+        let (mut place, mut places) = (0, Vec::new());
         let mut kinds = Vec::with_capacity(modules.len());
         let mut roots = Vec::new();
         let mut open: Vec<Span> = Vec::new();
@@ -137,6 +138,9 @@ impl RuleBuilder<'_> {
             }
             clocks.extend(self.clocks.for_new(&module.name, module.arguments.len(), place, roots.len()));
             place += usize::from(!kind.is_bracket());
+            if !kind.is_bracket() && places.len() < Successor::PLACES {
+                places.push((kind, module.span));
+            }
         }
         if let Some(bracket) = open.pop() {
             self.error(
@@ -150,7 +154,7 @@ impl RuleBuilder<'_> {
             return None;
         }
         let (arguments, draws) = drawn.compile(self.scope, roots, count);
-        Some(Successor { kinds, arguments, draws, clocks })
+        Some(Successor { kinds, arguments, draws, clocks, places })
     }
 
     /// A module whose arguments are bare names, as a rule's head has them.
@@ -189,6 +193,14 @@ impl RuleBuilder<'_> {
             ))
             .at(module.span, format!("{} here", plural(given, "parameter")))
             .at(heads[0].span, format!("{} {place}", plural(heads[0].parameters.len(), "parameter")))
+            .help_opt(
+                advice::decimal_comma(
+                    &self.document.expressions,
+                    module.arguments.iter().map(|a| a.root),
+                    heads[0].parameters.len(),
+                )
+                .map(|meant| format!("the decimal sign is a point: `{}({meant})`", module.name)),
+            )
             .help(advice::wrong_arity(module, heads[0], place));
             self.error(error);
         }
@@ -215,7 +227,11 @@ impl RuleBuilder<'_> {
                     .at(*span, format!("here it has {}", plural(arity, "parameter")))
                     .help(format!("write the head with as many: `{}`", advice::head_with(head, arity)));
             } else {
-                error = error.help(format!("put `{name}` into a string, or remove this line"));
+                let mut others = (self.occurs.keys()).map(|kind| self.kinds.get(*kind).name.as_str());
+                error = error.help(match others.find(|other| looks_like(name, other)) {
+                    Some(other) => meant(name, other),
+                    None => format!("put `{name}` into a string, or remove this line"),
+                });
             }
             self.error(error);
         }

@@ -17,7 +17,7 @@ pub fn nearest<'c>(name: &str, candidates: impl IntoIterator<Item = &'c str>) ->
         .filter(|c| !c.chars().eq(name.iter().copied()))
         .filter_map(|c| {
             let other: Vec<char> = c.chars().collect();
-            if lower(&mut c.chars()) == folded {
+            if lower(&mut c.chars()) == folded || look_alike(c, &name) {
                 return Some((0, c));
             }
             let close = name.len().abs_diff(other.len()) <= allowed;
@@ -31,7 +31,51 @@ pub fn nearest<'c>(name: &str, candidates: impl IntoIterator<Item = &'c str>) ->
 
 /// The nearest candidate, as a sentence.
 pub fn did_you_mean<'c>(name: &str, candidates: impl IntoIterator<Item = &'c str>) -> Option<String> {
-    nearest(name, candidates).map(|c| format!("did you mean `{c}`?"))
+    nearest(name, candidates).map(|c| meant(name, c))
+}
+
+/// That another name is meant, as a sentence.
+pub fn meant(name: &str, other: &str) -> String {
+    if looks_like(name, other) {
+        return format!(
+            "there is a `{other}` that looks the same and is written in other characters: a letter with a mark may be one character, or a letter and a mark; write both alike"
+        );
+    }
+    format!("did you mean `{other}`?")
+}
+
+/// Whether two names differ only in how letters with marks are composed, as far as that can be told without tables:
+/// where one has letters and marks, the other has as many characters beyond ASCII.
+pub fn looks_like(name: &str, other: &str) -> bool {
+    name != other && look_alike(other, &name.chars().collect::<Vec<_>>())
+}
+
+fn look_alike(other: &str, name: &[char]) -> bool {
+    fn is_mark(c: char) -> bool {
+        matches!(c, '\u{300}'..='\u{36f}' | '\u{1ab0}'..='\u{1aff}' | '\u{1dc0}'..='\u{1dff}' | '\u{20d0}'..='\u{20ff}')
+    }
+    /// Letters, each with the number of its marks.
+    fn letters(text: impl Iterator<Item = char>) -> Vec<(char, usize)> {
+        let mut letters: Vec<(char, usize)> = Vec::new();
+        for c in text {
+            match letters.last_mut() {
+                Some(last) if is_mark(c) => last.1 += 1,
+                _ => letters.push((c, 0)),
+            }
+        }
+        letters
+    }
+    if other.is_ascii() || !other.chars().chain(name.iter().copied()).any(is_mark) {
+        return false;
+    }
+    let (ours, theirs) = (letters(name.iter().copied()), letters(other.chars()));
+    ours.len() == theirs.len()
+        && ours.iter().zip(&theirs).all(|(a, b)| match (a.1, b.1) {
+            (0, 0) => a.0 == b.0,
+            (0, _) => !a.0.is_ascii(),
+            (_, 0) => !b.0.is_ascii(),
+            _ => a.0 == b.0 || a.1 != b.1,
+        })
 }
 
 fn distance(a: &[char], b: &[char]) -> usize {
@@ -62,5 +106,15 @@ mod tests {
         assert_eq!(nearest("volume", ["const", "param"]), None);
         assert_eq!(nearest("x", ["y", "z"]), None);
         assert_eq!(nearest("Sin", ["min", "sin"]), Some("sin"));
+    }
+
+    #[test]
+    fn names_that_look_alike_are_told_so() {
+        let (composed, with_mark) = ("Bl\u{fc}te", "Blu\u{308}te");
+        assert!(looks_like(composed, with_mark) && looks_like(with_mark, composed));
+        assert!(!looks_like(with_mark, with_mark) && !looks_like(with_mark, "Blute"));
+        assert!(!looks_like(composed, "Bl\u{f6}te") && !looks_like("Bluete", "Blute"));
+        assert!(did_you_mean(composed, [with_mark]).is_some_and(|said| said.contains("looks the same")));
+        assert_eq!(did_you_mean("Blut", ["Blute"]).as_deref(), Some("did you mean `Blute`?"));
     }
 }

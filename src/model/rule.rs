@@ -208,9 +208,19 @@ pub struct Successor {
     pub draws: Vec<Draw>,
     /// In the order of the modules.
     pub clocks: Vec<NewClock>,
+    /// The first modules, brackets left out, and where they stand in the text.
+    pub places: Vec<(KindId, Span)>,
 }
 
 impl Successor {
+    /// Of how many modules the place is kept: as many as a lineage tells apart.
+    pub const PLACES: usize = 254;
+
+    /// Where the module at a place stands in the text, if it is of this kind.
+    pub fn place_of(&self, place: usize, kind: KindId) -> Option<Span> {
+        self.places.get(place).filter(|(known, _)| *known == kind).map(|(_, span)| *span)
+    }
+
     /// Computes the arguments of a string without chance.
     pub fn evaluate<T: Value>(&self, variables: &[T], scratch: &mut Scratch<T>, out: &mut Vec<T>) {
         out.clear();

@@ -59,6 +59,12 @@ impl Lineage {
         }
     }
 
+    /// The place in the successor that made it, or in the initial string; None if it is one of the larger ones, which
+    /// are not told apart.
+    pub fn place(self) -> Option<usize> {
+        (self.trail & 255).checked_sub(1).filter(|place| *place < 254).map(|place| place as usize)
+    }
+
     /// A name for files: 13 characters, lower case and digits.
     pub fn name(self) -> String {
         const DIGITS: &[u8; 32] = b"0123456789abcdefghjkmnpqrstvwxyz";

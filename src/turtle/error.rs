@@ -5,7 +5,7 @@
 
 use super::{COORDINATE_LIMIT, DEPTH_LIMIT, MODULE_LIMIT};
 use crate::diagnostic::{Diagnostic, Span};
-use crate::model::{KindId, Model, Produce};
+use crate::model::{KindId, Model, Produce, Successor};
 use crate::structure::Lineage;
 
 /// Most warnings of one frame.
@@ -181,17 +181,37 @@ fn warning(remark: Remark, model: &Model, span: Option<Span>, time: f64) -> Diag
     warning.help(help)
 }
 
-/// Where the text says how a module is drawn: the `interpret` that is being drawn; or the production, the only one or
-/// the first, that makes such modules; or the initial string.
-pub(super) fn place(model: &Model, kind: KindId, lineage: Lineage, inside: Option<usize>) -> Option<Span> {
+/// Where the text says how a module is drawn: in the `interpret` that is being drawn, in the production that makes such
+/// modules, or in the initial string. Where it cannot be told which module of that it is, the whole; of several productions
+/// the first.
+pub(super) fn place(
+    model: &Model,
+    kind: KindId,
+    lineage: Lineage,
+    inside: Option<(usize, KindId)>,
+) -> Option<Span> {
     let known = |span: Span| (span != Span::default()).then_some(span);
-    if let Some(interpretation) = inside.and_then(|index| model.interpretations.get(index)) {
-        return known(interpretation.span);
+    if let Some((index, part)) = inside
+        && let Some(interpretation) = model.interpretations.get(index)
+    {
+        return only_one(&interpretation.drawn, part).or(known(interpretation.span));
     }
+    let of = |successor: &Successor| successor.place_of(lineage.place()?, kind);
     if lineage.generation == 0 {
-        return known(model.axiom_span);
+        return of(&model.axiom).or(known(model.axiom_span));
     }
     let productions = model.rules.iter().flat_map(|rule| &rule.produces);
     let makes = |p: &&Produce| p.outcome.successors.iter().any(|s| s.kinds.contains(&kind));
-    productions.filter(makes).map(|p| p.span).next().and_then(known)
+    let mut productions = productions.filter(makes);
+    let first = productions.next()?;
+    match (&first.outcome.successors[..], productions.next()) {
+        ([successor], None) => of(successor).or(known(first.span)),
+        _ => known(first.span),
+    }
+}
+
+/// The place of the module of this kind in a drawing that has no other.
+fn only_one(drawn: &Successor, kind: KindId) -> Option<Span> {
+    let (_, span) = drawn.places.iter().find(|(known, _)| *known == kind)?;
+    (drawn.kinds.iter().filter(|known| **known == kind).count() == 1).then_some(*span)
 }

@@ -82,7 +82,7 @@ impl<'a> Expander<'a> {
                 continue;
             };
             let arity = self.model.kinds.get(kind).arity;
-            walk.inside = Some(level.index);
+            walk.inside = Some((level.index, kind));
             let from = level.next;
             level.next += arity;
             self.drawn += 1;

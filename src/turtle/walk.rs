@@ -52,7 +52,7 @@ struct Outline {
     /// How many were made, those in one place with the one before included.
     made: usize,
     /// The interpretation and the module that began it.
-    begun: (Option<usize>, Source),
+    begun: (Option<(usize, KindId)>, Source),
 }
 
 /// A turtle that walks through a string and draws into a scene.
@@ -71,8 +71,8 @@ pub(super) struct Walk<'a> {
     owner: Option<OwnerId>,
     /// Names of the kinds that have drawn something, shared among their modules.
     names: Vec<Option<Arc<str>>>,
-    /// The interpretation that is being drawn.
-    pub(super) inside: Option<usize>,
+    /// The interpretation that is being drawn, and the kind of the part of it.
+    pub(super) inside: Option<(usize, KindId)>,
     time: f64,
     remarks: Remarks,
 }

@@ -258,7 +258,7 @@ fn drawings_that_are_hardly_meant_are_said_once() {
         dlsys(&["render", model, "--at", "1,2,3", "-o", out.to_str().expect("UTF-8"), "--threads", "2"]);
     let said = text_of(&output);
     assert_eq!((output.status.code(), said.matches("warning").count()), (Some(0), 1), "{said}");
-    assert!(said.contains("odd.dls:3:11") && said.contains("at t = 1"), "{said}");
+    assert!(said.contains("odd.dls:3:17") && said.contains("at t = 1"), "{said}");
 }
 
 #[test]
@@ -271,7 +271,7 @@ fn an_error_of_drawing_names_the_line() {
     let (status, said) = bad(&["render", model, "--at", "1,2,3", "-o", out.to_str().expect("UTF-8")]);
     assert_eq!(status, 1, "{said}");
     assert!(said.starts_with("error: cannot draw `F` at t = 3: its parameter is NaN"), "{said}");
-    assert!(said.contains("root.dls:3:11") && said.contains("help"), "{said}");
+    assert!(said.contains("root.dls:3:17") && said.contains("help"), "{said}");
 }
 
 #[test]
