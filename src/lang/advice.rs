@@ -3,11 +3,11 @@
 //! A message says what is wrong where it is found; what to do about it often takes more of the text than the place
 //! itself. That part is here, so that the passes stay readable.
 
-use super::ast::{Expr, Expressions, HeadModule, Module, Name};
+use super::ast::{Expr, ExprId, Expressions, HeadModule, Module, Name};
 use super::parse::Rule;
 use super::print;
 use super::scope::{RESERVED, Variables};
-use super::suggest::{did_you_mean, nearest};
+use super::suggest::{did_you_mean, meant, nearest};
 use crate::diagnostic::Diagnostic;
 use crate::model::{Class, Kinds};
 
@@ -50,7 +50,7 @@ pub fn known_words(kinds: &Kinds) -> Option<String> {
 pub fn no_such_module(kinds: &Kinds, nowhere: &str) -> String {
     let others = || kinds.iter().map(|(_, k)| k.name.as_str()).filter(|name| *name != nowhere);
     if let Some(near) = nearest(nowhere, others()) {
-        return format!("did you mean `{near}`?");
+        return meant(nowhere, near);
     }
     let advice =
         format!("put `{nowhere}` into the initial string or a successor, or name a module that is there");
@@ -128,6 +128,39 @@ pub fn wrong_arity(module: &Module, head: &HeadModule, place: &str) -> String {
     let other = if place == "in its rule" { "a rule" } else { "an `interpret`" };
     let own = super::scope::plural(given, "parameter");
     format!("{first}; or write {other} for `{}` with {own}", module.name)
+}
+
+/// Arguments as they are meant where the right number of them, and no other, comes of commas for decimal points: `0,5` is two
+/// numbers with nothing but the comma between them.
+pub fn decimal_comma(
+    all: &Expressions,
+    arguments: impl Iterator<Item = ExprId>,
+    wanted: usize,
+) -> Option<String> {
+    let digits = |id: ExprId| match all.get(id) {
+        Expr::Number(x) if x.fract() == 0.0 => Some(all.span(id)),
+        _ => None,
+    };
+    let mut meant: Vec<(String, Option<u32>)> = Vec::new();
+    let mut joined = false;
+    for id in arguments {
+        let text = print::expression(all, id);
+        let whole = digits(match all.get(id) {
+            Expr::Negate(inner) => *inner,
+            _ => id,
+        });
+        match (meant.last_mut(), digits(id)) {
+            (Some((before, end)), Some(span)) if end.is_some_and(|end| end + 1 == span.start) => {
+                // The zeros of `0,05` are no part of the number.
+                let width = (span.end - span.start) as usize;
+                before.push_str(&format!(".{text:0>width$}"));
+                (*end, joined) = (None, true);
+            }
+            _ => meant.push((text, whole.map(|span| span.end))),
+        }
+    }
+    let texts: Vec<String> = meant.into_iter().map(|(text, _)| text).collect();
+    (joined && texts.len() == wanted).then(|| texts.join(", "))
 }
 
 /// Advice for curves, tables, arrays and names within rules, by the text before the place and what was found there.

@@ -143,7 +143,8 @@ fn surface(
                     "export the file again, or mend the line in a text editor".to_owned()
                 })),
             );
-            None
+            // It is declared all the same.
+            Some(SurfaceShape { name: name.text.to_string(), span, ..SurfaceShape::default() })
         }
     }
 }

@@ -293,6 +293,8 @@ pub struct Document {
     pub expressions: Expressions,
     /// Names of global declarations that could not be read: whoever uses them is not to blame.
     pub unread: Vec<Arc<str>>,
+    /// What comments such as `#define K 0.5` would define elsewhere: names, and their meanings.
+    pub commented: Vec<(Arc<str>, String)>,
     /// Items from here on are of the library: names that the model declares itself win over them, and nobody has to
     /// use them.
     pub library: Option<usize>,

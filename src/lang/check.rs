@@ -6,7 +6,7 @@ use super::advice;
 use super::appearance::surface_hint;
 use super::ast::{self, HeadModule};
 use super::print;
-use super::suggest::nearest;
+use super::suggest::{meant, nearest};
 use crate::diagnostic::{Diagnostic, Span};
 use crate::model::{
     BUILT_IN_SURFACES, COMMAND_SURFACES, Class, Condition, DRAWN_WORDS, KindId, Kinds, Model, Pattern,
@@ -314,7 +314,7 @@ fn never_made(model: &Model, rule: &ast::Rule, occurs: &HashMap<KindId, Span>) -
         return None;
     }
     Some(error.help(match near {
-        Some(near) => format!("did you mean `{near}`?"),
+        Some(near) => meant(name, near),
         None => format!("put `{name}` into the initial string or a successor, or remove the rule"),
     }))
 }
@@ -427,7 +427,7 @@ pub fn inert_modules(model: &Model, occurs: &HashMap<KindId, Span>, diagnostics:
                     diagnostics.push(
                         Diagnostic::error(format!("unknown module `{name}`"))
                             .at(first(), "no rule, no drawing")
-                            .help(format!("did you mean `{near}`?"))
+                            .help(meant(name, near))
                             .help(format!(
                                 "a module that only marks a place is declared with `interpret {name}: ε`"
                             )),

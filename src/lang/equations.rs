@@ -78,6 +78,8 @@ impl RuleBuilder<'_> {
             let parameter = match name.map(|name| self.parameter(name, head, variables, equation)) {
                 Some(None) => {
                     good = false;
+                    // What is wrong with the other side is another mistake.
+                    self.number(equation.expression(), variables);
                     continue;
                 }
                 known => known.flatten(),

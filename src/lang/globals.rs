@@ -44,6 +44,7 @@ pub fn declare(
             scope.poison(name.clone());
         }
     }
+    scope.commented.extend(document.commented.iter().cloned());
     let mut parameters = Vec::new();
     for i in order(document, &globals, &index, scope) {
         let Global { name, kind, library } = &globals[i];
@@ -204,7 +205,10 @@ fn parameter(
 }
 
 /// The global names that an expression mentions, in order.
-fn mentions(document: &Document, expression: Expression) -> impl Iterator<Item = (&Arc<str>, Span)> {
+pub(super) fn mentions(
+    document: &Document,
+    expression: Expression,
+) -> impl Iterator<Item = (&Arc<str>, Span)> {
     (expression.first.0..=expression.root.0).filter_map(|id| match document.expressions.get(ExprId(id)) {
         Expr::Name(name) | Expr::Call(name, _) | Expr::Index(name, _) => {
             Some((name, document.expressions.span(ExprId(id))))

@@ -10,6 +10,8 @@
 //! comma, or before `then` and `else` (LANGUAGE, "Text"). Inside a string of modules it means nothing.
 
 mod ahead;
+mod forgotten;
+mod keywords;
 
 use super::lexeme::{Lexeme, Token};
 use super::words::FOLDS;
@@ -139,6 +141,8 @@ struct Scanner<'t> {
     held_break: Option<usize>,
     /// Start of a run of lines that each end with `<` or `>`.
     run_of_angles: Option<usize>,
+    /// The line before, if it may be the head of a rule that lacks its colon.
+    head_before: Option<(usize, usize)>,
     /// The token after the present one on its line.
     next: Option<Token>,
     /// The expression before the last line break has a `match`.
@@ -172,6 +176,7 @@ fn scan(text: &str, lexemes: Option<Vec<Lexeme>>) -> (Layout, Option<Vec<Lexeme>
         pending: 0,
         held_break: None,
         run_of_angles: None,
+        head_before: None,
         next: None,
         matching: false,
         lexemes,
@@ -261,12 +266,17 @@ impl Scanner<'_> {
         let arrow = self.arrow_outside_parentheses(tokens);
         if arrow == Some(first.1) || arrow.is_some() && self.goes_on() {
             // What looked like the head of a rule is that of a discrete one, broken over lines.
-            if let Some(item) = self.items.last_mut().filter(|i| i.kind == ItemKind::Rule) {
-                item.kind = ItemKind::Step;
-                self.held_break = None;
-            }
+            self.goes_on_discrete(start, arrow == Some(first.1));
         }
-        if let Some(kind) = self.starts_item(&word, colon, arrow.is_some(), tokens) {
+        let in_string = self.in_string && self.levels.len() == 1;
+        let starts = self.starts_item(&word, colon, arrow.is_some(), tokens);
+        if let Some(head) = self.head_without_colon(starts, colon, tokens) {
+            let kind = if starts == Some(ItemKind::Step) { ItemKind::Step } else { ItemKind::Rule };
+            self.begin_without_colon(head, kind);
+            (self.in_string, self.weighted, self.weight_next) = (false, false, false);
+            self.last = Last::Colon;
+            self.held_break = None;
+        } else if let Some(kind) = starts {
             let mut from = first.1;
             if matches!(kind, ItemKind::Rule | ItemKind::Step)
                 && self.last == Last::Angle
@@ -297,6 +307,7 @@ impl Scanner<'_> {
                 }
             }
         }
+        self.head_before = self.remembered_head(starts, in_string, tokens);
         for (i, &token) in tokens.iter().enumerate() {
             self.next = tokens.get(i + 1).map(|next| next.0);
             self.token(token);
@@ -348,6 +359,9 @@ impl Scanner<'_> {
             return Some(ItemKind::Rule);
         }
         let Some(current) = self.items.last() else { return Some(ItemKind::Unknown) };
+        if self.is_no_string(tokens) {
+            return Some(ItemKind::Unknown);
+        }
         if inside || self.in_string || self.last != Last::Operand {
             return None;
         }
@@ -484,100 +498,5 @@ impl Scanner<'_> {
                     .help("name a part of it: `const part = …` or `def part(x) = …`"),
             );
         }
-    }
-
-    /// Keywords that begin a string or an expression; returns what the word counts as.
-    fn keyword(&mut self, start: usize, end: usize) -> Last {
-        let inside = self.levels.len() > 1;
-        let in_expression = !self.in_string || inside;
-        let in_rule = self.items.last().is_some_and(|i| i.kind == ItemKind::Rule && i.after_colon.is_some());
-        match &self.text[start..end] {
-            "produce" if in_rule && !inside => {
-                self.forget_pending();
-                (self.in_string, self.weighted, self.weight_next) = (true, false, true);
-                Last::Operator
-            }
-            "or" if self.weighted && self.in_successor() => {
-                self.weight_next = true;
-                Last::Operator
-            }
-            "at" if !inside && self.is_at_rate(start, end) => {
-                self.forget_pending();
-                self.in_string = false;
-                Last::Operator
-            }
-            "rate" if in_rule && !inside && self.follows_at(start) => Last::Operator,
-            word @ ("solve" | "if") if in_rule && !inside && (self.in_string || word == "solve") => {
-                self.forget_pending();
-                self.in_string = false;
-                self.count_if(word == "if");
-                Last::Operator
-            }
-            "if" => {
-                self.count_if(true);
-                Last::Operator
-            }
-            "match"
-                if in_expression && matches!(self.next, Some(Token::Word | Token::Number | Token::Open)) =>
-            {
-                self.count_if(true);
-                self.level().matching = true;
-                Last::Operator
-            }
-            "case" if in_expression && (self.level_matches() || self.matching) => {
-                self.level().matching = true;
-                let level = self.level();
-                let dropped = std::mem::take(&mut level.right);
-                self.pending -= dropped;
-                Last::Operator
-            }
-            "let" if in_rule && !inside && !self.in_string && self.next == Some(Token::Word) => {
-                self.forget_pending();
-                Last::Operator
-            }
-            "then" | "else" => {
-                let is_else = &self.text[start..end] == "else";
-                let level = self.level();
-                let dropped = level.right + usize::from(is_else && level.ifs > 0);
-                level.right = 0;
-                level.ifs -= usize::from(is_else && level.ifs > 0);
-                self.pending -= dropped;
-                Last::Operator
-            }
-            "step" | "in" | "string" => Last::Operator,
-            "for" if in_rule && !inside && !self.in_string && self.last == Last::Operand => Last::Operator,
-            "strength" if self.items.last().is_some_and(|i| i.kind == ItemKind::Tropism) => Last::Operator,
-            _ => Last::Operand,
-        }
-    }
-
-    fn count_if(&mut self, yes: bool) {
-        if yes {
-            self.level().ifs += 1;
-            self.pending += 1;
-        }
-    }
-
-    fn forget_pending(&mut self) {
-        let level = self.levels.last_mut().expect("never empty");
-        self.pending -= level.right + level.ifs;
-        (level.right, level.ifs, level.matching) = (0, 0, false);
-    }
-
-    /// Keeps the line break at `at` if it ends an expression, else blanks it.
-    fn line_break(&mut self, at: usize) {
-        if at >= self.out.len() {
-            return;
-        }
-        if self.in_string || self.levels.len() > 1 || self.last != Last::Operand {
-            self.out[at] = b' ';
-            return;
-        }
-        if self.held_break.is_none() {
-            self.matching = self.level_matches();
-        }
-        self.forget_pending();
-        // The first break after the expression is the one that `then` or `else` would take back.
-        self.held_break.get_or_insert(at);
     }
 }

@@ -10,14 +10,17 @@
 mod advice;
 mod appearance;
 pub mod ast;
+mod call;
 mod chance;
 mod check;
 mod choice;
 mod curves;
 mod equations;
+mod foreign;
 pub mod format;
 mod gather;
 mod globals;
+mod idle;
 mod include;
 mod layout;
 mod lexeme;
@@ -249,6 +252,7 @@ fn build(
     }
     check::period(period, &model, diagnostics);
     check::coverage(&model, diagnostics);
+    idle::rules(&model, &written, document, diagnostics);
     check::inert_modules(&model, &occurs, diagnostics);
     check::commands(&model, diagnostics, &drawn.into_iter().chain(occurs).collect());
     analyse(&mut scope.graph, &mut model, &drafts);

@@ -13,8 +13,8 @@ use super::scope::{RESERVED, Scope, Variables};
 use crate::diagnostic::{Diagnostic, Span};
 use crate::expr::{Binary, Node, NodeId, Program, Unary};
 use crate::model::{
-    Boundary, CUT, Clock, Comparison, Condition, Draft, Interpretation, Jacobian, KindId, Kinds, Pattern,
-    Produce, Rule, Solve, Step, never_reached,
+    Boundary, CUT, Class, Clock, Comparison, Condition, DRAWN_WORDS, Draft, Interpretation, Jacobian, KindId,
+    Kinds, Pattern, Produce, Rule, Solve, Step, base_of, class_of, never_reached,
 };
 
 /// Longest condition, in comparisons and connectives, after functions are put in.
@@ -142,6 +142,9 @@ impl RuleBuilder<'_> {
                     .at(cut.span, "`%` belongs into the successors of rules")
                     .help("to draw nothing, write `ε`"),
             );
+        }
+        if let Some(again) = drawn.iter().find(|module| is_head(module, head)) {
+            self.error(draws_nothing(again, head));
         }
         // What is only drawn does not develop: it makes no rule reachable.
         let before = std::mem::take(&mut self.occurs);
@@ -375,6 +378,23 @@ impl RuleBuilder<'_> {
     pub fn constant(&mut self, expression: Expression) -> Option<f64> {
         self.scope.constant_value(&self.document.expressions, expression)
     }
+}
+
+/// Whether a module of a drawing is of the kind that is drawn, and says nothing to the turtle by its name.
+fn is_head(module: &ast::Module, head: &HeadModule) -> bool {
+    let same = module.name == head.name.text && module.arguments.len() == head.parameters.len();
+    same && class_of(&module.name) == Class::Word && !DRAWN_WORDS.contains(&base_of(&module.name))
+}
+
+fn draws_nothing(module: &ast::Module, head: &HeadModule) -> Diagnostic {
+    let name = &module.name;
+    let arguments = if head.parameters.is_empty() { "" } else { "(…)" };
+    Diagnostic::warning(format!("`{name}` draws nothing in its own drawing"))
+        .at(module.span, format!("inside its own drawing a module is what its name says, and `{name}` says nothing to the turtle"))
+        .help(format!(
+            "drawings do not repeat themselves: let a rule make the parts, `{}: … produce F(1) {name}{arguments}`, or draw a module with another name",
+            print::head_module(head)
+        ))
 }
 
 impl Atoms {

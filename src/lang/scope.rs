@@ -6,15 +6,12 @@ use std::sync::Arc;
 
 use super::advice;
 use super::ast::{Aggregate, Expr, ExprId, Expression, Expressions, HeadModule, Name, Operator};
-use super::chance::{DRAW, Draws};
+use super::chance::Draws;
 use super::print;
 use super::suggest::did_you_mean;
 use crate::diagnostic::{Diagnostic, Span};
-use crate::expr::{Binary, Graph, Integral, Lookup, Node, NodeId, Part, Unary};
-use crate::model::{Comparison, Distribution, Fold};
-
-/// Most nodes that the functions of a model may expand to.
-const MAX_WORK: usize = 20_000_000;
+use crate::expr::{Binary, Graph, Integral, Lookup, NodeId, Unary};
+use crate::model::{Comparison, Fold};
 
 /// Variables at and above this number are parameters of functions.
 pub(super) const FORMAL: u32 = 1 << 24;
@@ -85,12 +82,14 @@ pub struct Scope {
     /// The aggregates of the present rule, in the order of their variables.
     pub gathered: Vec<Gathered>,
     /// The same for the bodies of functions.
-    function_comparisons: HashMap<NodeId, (Span, Arc<[String; 2]>)>,
+    pub(super) function_comparisons: HashMap<NodeId, (Span, Arc<[String; 2]>)>,
     pub diagnostics: Vec<Diagnostic>,
+    /// What only comments define: names, and their meanings.
+    pub(super) commented: HashMap<Arc<str>, String>,
     pub draws: Draws,
     /// What is wrong with the values given from outside, which is not the text's fault.
     pub refused_settings: Vec<Diagnostic>,
-    work: usize,
+    pub(super) work: usize,
 }
 
 impl Scope {
@@ -445,9 +444,10 @@ impl Scope {
                 None => "this is no parameter of the rule and no constant",
                 Some(_) => "this is no constant",
             };
-            Diagnostic::error(format!("unknown name `{name}`")).at(span, what).help_opt(
-                did_you_mean(name, known).or_else(|| Some(format!("declare it: `const {name} = …`"))),
-            )
+            let help = self.in_a_comment(name).or_else(|| did_you_mean(name, known));
+            Diagnostic::error(format!("unknown name `{name}`"))
+                .at(span, what)
+                .help(help.unwrap_or_else(|| format!("declare it: `const {name} = …`")))
         };
         let error = match variables.lets.get(name) {
             Some(later) => Diagnostic::error(format!("`{name}` is not known yet"))
@@ -458,154 +458,6 @@ impl Scope {
         };
         self.diagnostics.push(error);
         None
-    }
-
-    fn call(
-        &mut self,
-        all: &Expressions,
-        name: &Arc<str>,
-        span: Span,
-        arguments: &[(ExprId, Lowered)],
-        variables: &Variables,
-    ) -> Option<Lowered> {
-        let mut nodes = Vec::with_capacity(arguments.len());
-        for &(id, lowered) in arguments {
-            nodes.push(self.expect_number(all, id, lowered)?);
-        }
-        let count = |me: &mut Scope, wanted: usize| {
-            if nodes.len() == wanted {
-                return Some(());
-            }
-            me.diagnostics.push(
-                Diagnostic::error(format!(
-                    "`{name}` has {}, not {}",
-                    plural(wanted, "parameter"),
-                    nodes.len()
-                ))
-                .at(span, format!("{} given", plural(nodes.len(), "argument")))
-                .help(match &**name {
-                    "min" | "max" if nodes.len() > 2 => {
-                        let texts: Vec<String> =
-                            arguments.iter().map(|(id, _)| print::expression(all, *id)).collect();
-                        let nested = |inner: String, next: &String| format!("{name}({inner}, {next})");
-                        format!("write `{}`", texts[1..].iter().fold(texts[0].clone(), nested))
-                    }
-                    _ => format!("it is called as `{}`", me.call_of(name)),
-                }),
-            );
-            None
-        };
-        let number = |node| Some(Lowered { node, is_condition: false });
-        if let Some(function) = self.functions.get(name).cloned() {
-            self.used.insert(name.clone());
-            count(self, function.parameters.len())?;
-            if !function.draws.is_empty() {
-                self.may_draw(name, span)?;
-            }
-            let whole = self.inline(&function, &nodes, span)?;
-            if function.library {
-                self.know_library_integral(name, whole.node, &nodes, span);
-            }
-            return Some(whole);
-        }
-        if let Some(curve) = self.curves.get(name).copied() {
-            self.used.insert(name.clone());
-            count(self, 1)?;
-            return number(self.graph.curve(curve?, Part::Value, nodes[0]));
-        }
-        if let Some((_, op)) = Unary::NAMED.iter().find(|(n, _)| **n == **name) {
-            count(self, 1)?;
-            return number(self.graph.unary(*op, nodes[0]));
-        }
-        if let Some((_, op)) = Binary::NAMED.iter().find(|(n, _)| **n == **name) {
-            count(self, 2)?;
-            return number(self.graph.binary(*op, nodes[0], nodes[1]));
-        }
-        if let Some(distribution) = Distribution::named(name) {
-            return self.draw(distribution, span, nodes);
-        }
-        if self.poisoned.contains(name) || !self.unknown.insert(name.clone()) {
-            return None;
-        }
-        let built_in = Unary::NAMED.iter().map(|(n, _)| *n).chain(Binary::NAMED.iter().map(|(n, _)| *n));
-        let own = self.functions.keys().chain(self.curves.keys()).filter(|_| self.suggests());
-        let built_in = built_in.chain(Distribution::NAMED.iter().map(|(n, ..)| *n));
-        let known = own.map(|n| &**n).chain(built_in).chain(super::include::library_names());
-        let mut error =
-            Diagnostic::error(format!("unknown function `{name}`")).at(span, "no function has this name");
-        error = match did_you_mean(name, known) {
-            _ if &**name == "log" => error.help("the natural logarithm is `ln`, the decimal one `log10`"),
-            Some(help) => error.help(help),
-            None if self.arrays.contains_key(name) => {
-                error.help(format!("`{name}` is an array, and its elements are written `{name}[i]`"))
-            }
-            None if self.constants.contains_key(name) || variables.names.contains_key(name) => {
-                error.help(format!("to multiply, write `{name}*(…)`"))
-            }
-            None => error.help(format!("declare it: `def {name}(…) = …`")),
-        };
-        self.diagnostics.push(error);
-        None
-    }
-
-    /// How a function is called.
-    fn call_of(&self, name: &str) -> String {
-        match self.functions.get(name) {
-            Some(function) => format!("{name}({})", function.parameters.join(", ")),
-            None if Binary::NAMED.iter().any(|(n, _)| *n == name) => format!("{name}(x, y)"),
-            None => format!("{name}(x)"),
-        }
-    }
-
-    /// A function's body with the arguments in place of its formal parameters.
-    pub(super) fn inline(
-        &mut self,
-        function: &Function,
-        arguments: &[NodeId],
-        span: Span,
-    ) -> Option<Lowered> {
-        let (body, draws) = (function.body?, function.draws.clone());
-        self.work += self.graph.reachable(&[body.node]).len() + draws.len();
-        if self.work > MAX_WORK {
-            if self.work < usize::MAX / 2 {
-                self.work = usize::MAX / 2;
-                self.diagnostics.push(
-                    Diagnostic::error("the functions of this model expand without bound")
-                        .at(span, format!("more than {MAX_WORK} operations"))
-                        .help("a function that calls another twice doubles it; compute a shared part once"),
-                );
-            }
-            return None;
-        }
-        let formal = |v: u32| (FORMAL..DRAW).contains(&v).then(|| arguments[(v - FORMAL) as usize]);
-        let drawn = self.draw_again(draws, &formal)?;
-        let comparisons = &self.function_comparisons;
-        let mut moved = Vec::new();
-        let known = function.integrals.iter().flat_map(|(of, i)| [*of, i.whole, i.argument]);
-        let roots: Vec<NodeId> = std::iter::once(body.node).chain(known).collect();
-        let images = self.graph.rewrite(&roots, |graph, id, node| {
-            let image = match node {
-                Node::Var(v) if v >= DRAW => return drawn.get(&v).copied(),
-                Node::Var(v) => return formal(v),
-                Node::Binary(op @ (Binary::Lt | Binary::Le | Binary::Eq | Binary::Ne), a, b) => {
-                    graph.binary(op, a, b)
-                }
-                _ => return None,
-            };
-            if let Some(at) = comparisons.get(&id) {
-                moved.push((image, at.clone()));
-            }
-            Some(image)
-        });
-        for integral in images[1..].chunks(3) {
-            let [of, whole, argument] = integral[..] else { unreachable!("threes") };
-            self.graph.know_integral(of, Integral { whole, argument });
-        }
-        let node = images[0];
-        for (image, at) in moved {
-            self.comparisons.entry(image).or_insert(at);
-        }
-        Some(Lowered { node, is_condition: body.is_condition })
     }
 }
 

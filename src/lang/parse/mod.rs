@@ -8,6 +8,7 @@
 
 mod build;
 mod expected;
+mod hints;
 
 use std::collections::HashSet;
 
@@ -16,7 +17,7 @@ use pest::Parser;
 use super::ast::{Document, Expression, HeadModule, Item, Module};
 use super::layout::{ItemKind, RawItem, layout};
 use crate::diagnostic::{Diagnostic, Source, Span};
-use crate::lang::advice;
+use crate::lang::{advice, foreign};
 
 /// The pest parser of `grammars/dlsys.pest`.
 #[derive(pest_derive::Parser)]
@@ -57,6 +58,10 @@ impl Reader {
     pub fn read(&mut self, text: &str) -> Vec<(Item, Span)> {
         let cut = layout(text);
         self.errors.extend(cut.errors);
+        if text.contains("#define") {
+            let known = foreign::commented_definitions(text);
+            self.document.commented.extend(known.map(|(name, meaning)| (name.into(), meaning.to_owned())));
+        }
         let functions = cut.items.iter().filter(|item| item.kind == ItemKind::Def);
         self.defined.extend(functions.filter_map(|item| declared_word(&cut.text, item).map(str::to_owned)));
         let mut items = Vec::new();
