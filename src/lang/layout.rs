@@ -400,14 +400,6 @@ impl Scanner<'_> {
         }
     }
 
-    fn level_matches(&self) -> bool {
-        self.levels.iter().any(|level| level.matching)
-    }
-
-    fn level(&mut self) -> &mut Level {
-        self.levels.last_mut().expect("never empty")
-    }
-
     fn token(&mut self, (token, start, end): (Token, usize, usize)) {
         let in_expression = !self.in_string || self.levels.len() > 1;
         self.weight_next = false;

@@ -1,6 +1,6 @@
 //! Words that begin a string or an expression, what is open behind them, and line breaks, which may end it.
 
-use super::{ItemKind, Last, Scanner};
+use super::{ItemKind, Last, Level, Scanner};
 use crate::lang::lexeme::Token;
 
 impl Scanner<'_> {
@@ -97,5 +97,13 @@ impl Scanner<'_> {
         self.forget_pending();
         // The first break after the expression is the one that `then` or `else` would take back.
         self.held_break.get_or_insert(at);
+    }
+
+    pub(super) fn level_matches(&self) -> bool {
+        self.levels.iter().any(|level| level.matching)
+    }
+
+    pub(super) fn level(&mut self) -> &mut Level {
+        self.levels.last_mut().expect("never empty")
     }
 }
