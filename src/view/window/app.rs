@@ -54,7 +54,9 @@ pub struct Window {
     pub(super) quick: Duration,
     /// Everything that was asked for was on the screen, as good as it gets, and the life known, when the window was drawn last.
     pub(super) settled: bool,
-    /// Which of [`COARSE`].
+    /// The time that the list of productions was scrolled to last.
+    pub(super) listed: f64,
+    /// Which of the sizes that moving pictures have.
     pub(super) coarse: usize,
     info: bool,
     last: Instant,
@@ -100,6 +102,7 @@ impl Window {
             ordered: None,
             quick: Duration::ZERO,
             settled: false,
+            listed: f64::NAN,
             coarse: 0,
             info: true,
             last: Instant::now(),
@@ -141,6 +144,7 @@ impl Window {
                 }
                 self.life = Some(*life);
                 self.aged = false;
+                self.listed = f64::NAN;
             }
             News::Picture(picture) => {
                 let Shown { order, image, part, modules, spent } = *picture;

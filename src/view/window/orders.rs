@@ -17,10 +17,10 @@ const AWAITED: Duration = Duration::from_millis(25);
 /// Most pixels of a picture that moves, and of one that stands still; the screen makes up the rest.
 const MOST_PIXELS: [f64; 2] = [1.2e6, 8e6];
 /// Parts of the screen's pixels, each way, that what moves is drawn with: fewer where drawing takes longer than the first of these
-/// times, more where it takes less than the second.
+/// times, more where it takes less than the second, for a step doubles the pixels at most.
 const COARSE: [f64; 3] = [1.0, 0.7, 0.5];
-const TOO_LONG: Duration = Duration::from_millis(22);
-const SHORT: Duration = Duration::from_millis(7);
+const TOO_LONG: Duration = Duration::from_millis(28);
+const SHORT: Duration = Duration::from_millis(12);
 
 impl Window {
     /// Orders what is to be seen now. True if hands ask for it, who should not wait.

@@ -6,15 +6,17 @@ use super::app::Window;
 use super::timeline::shown;
 use crate::model::Parameter;
 
-const KEYS: [(&str, &str); 11] = [
+const KEYS: [(&str, &str); 13] = [
     ("space", "play, pause"),
-    ("← →", "a frame back, on; with shift ten"),
+    ("← →", "a frame back, on; shift: ten"),
     ("[ ]", "the production before, after"),
     ("home end", "first time, last time"),
     ("- +", "slower, faster"),
     ("L", "loop"),
-    ("W A S D, Q E", "turn, size"),
-    ("1 2 3, P", "front, side, top; perspective"),
+    ("W A S D", "turn"),
+    ("Q E", "smaller, larger"),
+    ("1 2 3", "front, side, top"),
+    ("P", "perspective"),
     ("0", "the whole plant"),
     ("R", "all params as in the file"),
     ("I", "this panel"),
@@ -93,7 +95,7 @@ fn sliders(window: &mut Window, ui: &mut egui::Ui, parameters: &[Parameter]) {
         ui.label(RichText::new(&parameter.name).monospace());
         let changed = match parameter.range {
             Some((low, high)) => {
-                ui.spacing_mut().slider_width = (ui.available_width() - 80.0).max(60.0);
+                ui.spacing_mut().slider_width = (ui.available_width() - 66.0).max(60.0);
                 ui.add(egui::Slider::new(&mut value, low..=high).smart_aim(true)).changed()
             }
             None => {
@@ -117,6 +119,7 @@ fn productions(window: &mut Window, ui: &mut egui::Ui) {
             ui.spinner();
         }
     });
+    ui.add_space(3.0);
     let rows = &history.happenings;
     let now = window.player.time;
     let past = rows.partition_point(|h| h.t <= now);
@@ -124,10 +127,10 @@ fn productions(window: &mut Window, ui: &mut egui::Ui) {
     let mut chosen = None;
     let most = ui.available_height().max(120.0);
     let area = egui::ScrollArea::vertical().max_height(most).auto_shrink([false, true]);
-    // Where one is stays in the middle while time goes on.
+    // Where one is comes to the middle when the time has become another; else the list stays where hands have left it.
     let spacing = ui.spacing().item_spacing.y;
     let middle = (past as f32 - 0.5) * (height + spacing) - most / 2.0;
-    let area = if window.player.playing { area.vertical_scroll_offset(middle.max(0.0)) } else { area };
+    let area = if now == window.listed { area } else { area.vertical_scroll_offset(middle.max(0.0)) };
     area.show_rows(ui, height, rows.len() + usize::from(history.left_out > 0), |ui, range| {
         ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Truncate);
         ui.set_min_width(ui.available_width());
@@ -149,7 +152,10 @@ fn productions(window: &mut Window, ui: &mut egui::Ui) {
             }
         }
     });
+    window.listed = now;
     if let Some(time) = chosen {
         window.player.seek(time);
+        // What was clicked on stays under the pointer.
+        window.listed = window.player.time;
     }
 }
