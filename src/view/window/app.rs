@@ -24,6 +24,9 @@ const WIDTH: f32 = 270.0;
 /// Degrees for a drag over the height of the picture.
 const TURN: [f64; 2] = [250.0, 180.0];
 
+/// What a key does.
+type Action<'a> = &'a dyn Fn(&mut Window);
+
 /// The window.
 pub struct Window {
     pub(super) desk: Arc<Desk>,
@@ -204,7 +207,7 @@ impl Window {
             w.touched = true;
             w.look.iter_mut().for_each(|look| look.magnify(factor, 0.0, 0.0, 1.0));
         };
-        let actions: [(Key, &dyn Fn(&mut Window)); 24] = [
+        let actions: [(Key, Action<'_>); 24] = [
             (Key::Space, &|w| w.player.play(!w.player.playing)),
             (Key::ArrowLeft, &|w| w.player.frames(-many)),
             (Key::ArrowRight, &|w| w.player.frames(many)),
