@@ -5,7 +5,8 @@
 //! the simulation, where it is now                               ▲ seek(t): the last mark before t, then on from there
 //! ```
 //!
-//! Between two events nothing is run at all: formulas and dense output are evaluated. To go further back, the last mark
+//! Between two events nothing is run at all: formulas and dense output are evaluated. One event back is no more than a
+//! look into the list of what has happened: the structure of that time is formed when somebody wants to see it. Then the last mark
 //! before that time is copied and run on. While it runs new marks are set, each half as far from the goal
 //! as the one before, because whoever goes back goes back again: 1,000 steps back cost some runs, not 1,000 (the idea
 //! is that of checkpointing in reverse mode differentiation: Griewank and Walther 2000, *Revolve*). Marks lie densely where the present is and ever more
@@ -21,11 +22,12 @@
 //! let session = Session::from_text("stem.dls", text, &[]).expect("a good model");
 //! let mut replay = Replay::new(&session.model, Default::default()).expect("it starts");
 //! assert_eq!(replay.seek(10.5).expect("it runs"), Stop::There);
-//! assert_eq!(replay.string().len(), 11);
+//! assert_eq!(replay.string().expect("it runs").len(), 11);
 //! replay.seek(2.5).expect("it runs");
-//! assert_eq!(replay.string().len(), 3);
+//! assert_eq!(replay.string().expect("it runs").len(), 3);
 //! assert_eq!(replay.seek_event(9.0).expect("it runs"), Stop::There);
-//! assert_eq!((replay.time(), replay.string().len()), (3.0, 4));
+//! assert_eq!((replay.time(), replay.modules()), (3.0, 4));
+//! assert_eq!(replay.string().expect("it runs").len(), 4);
 //! ```
 
 use std::collections::VecDeque;
@@ -33,13 +35,18 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::model::Model;
-use crate::sim::{Error, Event, Passed, Settings, Simulation};
-use crate::structure::{Lineage, ModuleString};
+use crate::sim::{Error, Event, Passed, Settings, Simulation, happens_by};
+use crate::structure::{Instant, Lineage, ModuleString};
 
 /// A model in time, with everything that is needed to go to any time at once.
 pub struct Replay<'m> {
     live: Simulation<'m>,
     time: f64,
+    /// The simulation is at `time`; if not, it is put there before anybody looks.
+    placed: bool,
+    /// Productions up to `time`, and modules then.
+    happened: usize,
+    modules: usize,
     string: ModuleString,
     /// The string is that of `time`.
     shown: bool,
@@ -48,12 +55,22 @@ pub struct Replay<'m> {
     memory: usize,
     /// The most work that has been done on the way to any time: so far the way is known.
     known: u64,
+    /// The latest time that was the present: up to there all that happens is known.
+    seen: f64,
     interrupt: Option<Arc<AtomicBool>>,
     /// All work that was ever done.
     spent: u64,
     /// The productions up to the latest time that was seen, but for the first so many, which are forgotten.
-    events: VecDeque<Event>,
+    events: VecDeque<Past>,
     forgotten: usize,
+}
+
+/// A production, and what is known of the time just after it.
+struct Past {
+    event: Event,
+    at: Instant,
+    /// Modules after all that happens at that instant.
+    modules: usize,
 }
 
 /// A copy of the simulation as it was at some time.
@@ -74,7 +91,7 @@ pub enum Stop {
     Interrupted,
 }
 
-/// Entries that are passed before somebody looks at the flag and at the marks.
+/// Entries that are passed before somebody looks at the flag, where nobody wants to know what each of them changes.
 const STRIDE: usize = 16;
 /// Most marks, whatever their size.
 const MOST_MARKS: usize = 256;
@@ -101,17 +118,22 @@ impl<'m> Replay<'m> {
         let mut replay = Replay {
             live,
             time: 0.0,
+            placed: true,
+            happened: 0,
+            modules: 0,
             string: ModuleString::default(),
             shown: false,
             marks: Vec::new(),
             memory: Replay::MEMORY,
             known: 0,
+            seen: 0.0,
             interrupt: None,
             spent: 0,
             events: VecDeque::new(),
             forgotten: 0,
         };
         replay.take_events();
+        replay.arrive();
         replay.mark();
         replay.show()?;
         Ok(replay)
@@ -135,20 +157,39 @@ impl<'m> Replay<'m> {
         self.time
     }
 
+    /// Modules at present, brackets not counted.
+    pub fn modules(&self) -> usize {
+        self.modules
+    }
+
+    /// Productions up to the present.
+    pub fn productions(&self) -> usize {
+        self.happened
+    }
+
     /// The structure at present.
-    pub fn string(&self) -> &ModuleString {
-        &self.string
+    ///
+    /// # Errors
+    /// If it cannot be formed; [`Replay::seek`] has tried, events that were sought are not looked at before.
+    pub fn string(&mut self) -> Result<&ModuleString, Error> {
+        self.there()?;
+        self.show()?;
+        Ok(&self.string)
     }
 
     /// The simulation; it may have been further than the present, but not past anything that happens after it.
-    pub fn simulation(&self) -> &Simulation<'m> {
-        &self.live
+    ///
+    /// # Errors
+    /// As of [`Replay::string`].
+    pub fn simulation(&mut self) -> Result<&Simulation<'m>, Error> {
+        self.there()?;
+        Ok(&self.live)
     }
 
     /// The productions up to the present, in the order of time; of very many, the last.
     pub fn events(&self) -> impl DoubleEndedIterator<Item = &Event> + ExactSizeIterator {
-        let happened = self.live.stats().events as usize;
-        self.events.range(..happened.saturating_sub(self.forgotten).min(self.events.len()))
+        let remembered = self.happened.saturating_sub(self.forgotten).min(self.events.len());
+        self.events.range(..remembered).map(|past| &past.event)
     }
 
     /// Number of productions that took place before those that are remembered.
@@ -184,15 +225,46 @@ impl<'m> Replay<'m> {
         self.go(limit, true)
     }
 
-    /// Makes the last event before the present the present; if there is none that is remembered, the start.
+    /// Makes the last event before the present the present; if there is none that is remembered, the start. That way
+    /// is not gone before somebody looks: [`Replay::settle`] can be stopped on it.
     ///
     /// # Errors
     /// Those of the run. The present is then what it was.
     pub fn seek_event_before(&mut self) -> Result<Stop, Error> {
-        let now = self.time;
-        let before = self.events().rev().map(|event| event.time).find(|t| *t < now);
-        let stop = self.seek(before.unwrap_or(0.0))?;
-        Ok(if before.is_none() && stop == Stop::There { Stop::Nothing } else { stop })
+        let (events, remembered) = (&self.events, self.events().len());
+        let Some(last) = (0..remembered).rev().find(|&i| events[i].event.time < self.time) else {
+            let stop = self.seek(0.0)?;
+            return Ok(if stop == Stop::There { Stop::Nothing } else { stop });
+        };
+        // What happens within a rounding of that time belongs to it.
+        let t = events[last].event.time;
+        let with_it = (last..remembered).take_while(|&i| happens_by(events[i].at, t)).last().unwrap_or(last);
+        (self.happened, self.modules) = (self.forgotten + with_it + 1, events[with_it].modules);
+        (self.time, self.placed, self.shown) = (t, false, false);
+        Ok(Stop::There)
+    }
+
+    /// Goes the way to the present, if that is still to be gone.
+    ///
+    /// # Errors
+    /// Those of the run, though it was gone before.
+    pub fn settle(&mut self) -> Result<Stop, Error> {
+        if self.placed {
+            return Ok(Stop::There);
+        }
+        let expected = (self.happened, self.modules);
+        self.place(self.time)?;
+        let stop = self.run(self.time, false)?;
+        debug_assert!(stop != Stop::There || expected == (self.happened, self.modules));
+        Ok(stop)
+    }
+
+    /// Goes there, whatever the flag says.
+    fn there(&mut self) -> Result<(), Error> {
+        let flag = self.interrupt.take();
+        let gone = self.settle();
+        self.interrupt = flag;
+        gone.map(|_| ())
     }
 
     fn go(&mut self, t: f64, one_event: bool) -> Result<Stop, Error> {
@@ -202,7 +274,9 @@ impl<'m> Replay<'m> {
             true => self.place(present).and_then(|()| self.live.pass(present)),
             false => self.place(t),
         };
-        match gone.and_then(|()| self.run(t, one_event)) {
+        let gone = gone.and_then(|()| self.run(t, one_event));
+        // Whoever steps from event to event may not want to see each.
+        match gone.and_then(|stop| if one_event { Ok(stop) } else { self.show().map(|()| stop) }) {
             Ok(stop) => Ok(stop),
             Err(error) => {
                 // What was good before is good again.
@@ -216,9 +290,10 @@ impl<'m> Replay<'m> {
 
     /// The production by which a module that is there at present is replaced, if that comes up to `limit`; None if it
     /// does not, or if the flag was set or too much work done before it was found. The present stays what it is.
-    pub fn end_of(&self, module: Lineage, limit: f64) -> Option<Event> {
+    pub fn end_of(&mut self, module: Lineage, limit: f64) -> Option<Event> {
         /// In units of work: about two seconds.
         const MOST_WORK: u64 = 20_000_000;
+        self.there().ok()?;
         let mut ahead = self.live.clone();
         let most = ahead.work() + MOST_WORK;
         loop {
@@ -243,8 +318,8 @@ impl<'m> Replay<'m> {
             self.live = mark.simulation.clone();
             // Of another copy, and maybe of another time.
             self.string.reset(t);
-            self.shown = false;
         }
+        (self.placed, self.shown) = (false, false);
         Ok(())
     }
 
@@ -253,7 +328,9 @@ impl<'m> Replay<'m> {
         let mut stop = Stop::There;
         let before = self.live.work();
         loop {
-            let passed = self.live.pass_some(t, STRIDE, one_event);
+            // On new ground, what each instant changes is written down.
+            let stride = if t <= self.seen { STRIDE } else { 1 };
+            let passed = self.live.pass_some(t, stride, one_event);
             self.take_events();
             match passed? {
                 Passed::All => {
@@ -287,9 +364,16 @@ impl<'m> Replay<'m> {
         }
         self.known = self.known.max(self.live.work());
         self.spent += self.live.work() - before;
-        self.shown = false;
-        self.show()?;
+        self.arrive();
         Ok(stop)
+    }
+
+    /// The simulation is at the present.
+    fn arrive(&mut self) {
+        (self.placed, self.shown) = (true, false);
+        self.seen = self.seen.max(self.time);
+        let stats = self.live.stats();
+        (self.happened, self.modules) = (stats.events as usize, stats.modules as usize);
     }
 
     /// Writes the string of the present.
@@ -311,7 +395,8 @@ impl<'m> Replay<'m> {
         if happened > seen {
             let missing = happened - seen;
             let known = new.len().saturating_sub(missing);
-            self.events.extend(new.into_iter().skip(known));
+            let (at, modules) = (self.live.reached_at(), self.live.stats().modules as usize);
+            self.events.extend(new.into_iter().skip(known).map(|event| Past { event, at, modules }));
             while self.events.len() > MOST_EVENTS {
                 self.events.pop_front();
                 self.forgotten += 1;

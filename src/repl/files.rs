@@ -116,7 +116,7 @@ impl Stage<'_> {
         let (bytes, companion) = match extension.as_str() {
             "json" | "txt" => {
                 let printer = Printer::new(&self.session.model);
-                let string = self.replay()?.string();
+                let string = self.string(desk)?;
                 let mut text = String::new();
                 match extension.as_str() {
                     "json" => printer.json(string, &mut text),
@@ -131,7 +131,7 @@ impl Stage<'_> {
                         name.chars().rev().take(8).collect::<Vec<_>>().into_iter().rev().collect::<String>()
                     ))
                 })?;
-                let scene = self.scene()?;
+                let scene = self.scene(desk)?;
                 let mut survey = Survey::new(view);
                 if let Some(field) = perspective {
                     survey = survey.with_perspective(field);

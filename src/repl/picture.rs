@@ -13,11 +13,10 @@ const COVERED: u8 = 48;
 
 impl Stage<'_> {
     /// What is to be seen at present.
-    pub fn scene(&mut self) -> Result<Scene, Fault> {
+    pub fn scene(&mut self, desk: &Desk) -> Result<Scene, Fault> {
         let model = &self.session.model;
-        let replay = self.replay()?;
         let mut scene = turtle::blank(model);
-        turtle::draw(model, replay.string(), &mut scene)
+        turtle::draw(model, self.string(desk)?, &mut scene)
             .map_err(|error| Fault::Said(error.diagnostic().render(&self.session.source, false)))?;
         Ok(scene)
     }
@@ -37,7 +36,7 @@ impl Stage<'_> {
         if rest.len() > 2 {
             return Err(misused(commands::find("draw").expect("it is one")));
         }
-        let scene = self.scene()?;
+        let scene = self.scene(desk)?;
         for warning in &scene.warnings {
             desk.complain(&warning.render(&self.session.source, false));
         }

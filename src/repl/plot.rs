@@ -64,7 +64,7 @@ impl Stage<'_> {
         if to <= from {
             return Err(Fault::new(format!("{} .. {} is no stretch of time", brief(from, 9), brief(to, 9))));
         }
-        let (subject, title) = self.subject(words)?;
+        let (subject, title) = self.subject(words, desk)?;
         // An odd number, so that one row is the middle.
         let sheet_rows = (desk.screen.rows - 6).clamp(6, 16) | 1;
         let mut sheet = Sheet::new(desk.screen.columns - MARGIN - 2, sheet_rows);
@@ -81,7 +81,7 @@ impl Stage<'_> {
             if interrupted || failed.is_some() {
                 break;
             }
-            columns.push(subject.values(self.replay()?.string()));
+            columns.push(subject.values(self.string(desk)?));
         }
         // To where we were; that way is short, and must be gone.
         interrupt::clear();
@@ -126,7 +126,7 @@ impl Stage<'_> {
         desk.say(&framed(&sheet.rows(desk.screen.coloured), &title, [from, to], [low, high], width / 2))
     }
 
-    fn subject(&mut self, words: &[String]) -> Result<(Subject, String), Fault> {
+    fn subject(&mut self, words: &[String], desk: &Desk) -> Result<(Subject, String), Fault> {
         let words: Vec<&str> = words.iter().map(String::as_str).collect();
         match words[..] {
             ["count", name] => {
@@ -139,10 +139,9 @@ impl Stage<'_> {
                 let Some((number, parameter)) = spec[1..].split_once('.') else {
                     return Err(misused(commands::find("plot").expect("it is one")));
                 };
-                let (number, lineage) = self.find(&[number.to_owned()])?;
+                let (number, lineage) = self.find(&[number.to_owned()], desk)?;
                 let model = &self.session.model;
-                let replay = self.replay()?;
-                let module = super::show::modules(replay).find(|m| m.number == number);
+                let module = super::show::modules(self.string(desk)?).find(|m| m.number == number);
                 let kind = module.map(|m| m.module.kind).unwrap_or(KindId::OPEN);
                 let place = parameter_place(model, kind, parameter)?;
                 let name = &model.kinds.get(kind).name;

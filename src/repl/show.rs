@@ -6,9 +6,8 @@ use super::desk::{Desk, Fault};
 use super::stage::{Stage, misused};
 use crate::lang::did_you_mean;
 use crate::model::{KindId, Model};
-use crate::replay::Replay;
 use crate::sim::{Seen, brief, describe};
-use crate::structure::{Lineage, Module};
+use crate::structure::{Lineage, Module, ModuleString};
 
 /// Lines of a string, or rows of a table, that are printed unless more are asked for.
 const MOST_LINES: usize = 16;
@@ -22,8 +21,8 @@ pub struct Numbered<'a> {
 }
 
 /// All modules, numbered from 1.
-pub fn modules<'a>(replay: &'a Replay) -> impl Iterator<Item = Numbered<'a>> {
-    let all = replay.string().iter().filter(|module| !module.kind.is_bracket());
+pub fn modules(string: &ModuleString) -> impl Iterator<Item = Numbered<'_>> {
+    let all = string.iter().filter(|module| !module.kind.is_bracket());
     all.zip(1..).map(|(module, number)| Numbered { number, module })
 }
 
@@ -85,12 +84,13 @@ impl Stage<'_> {
     /// `show [all | A..B | NAME]`
     pub fn show(&mut self, rest: &[String], desk: &Desk) -> Result<(), Fault> {
         let model = &self.session.model;
+        self.string(desk)?;
         let status = self.status()?;
-        let replay = self.replay()?;
+        let present = self.string(desk)?;
         match rest {
-            [] => desk.say(&(status + &string(model, replay, desk.screen.columns, MOST_LINES))),
+            [] => desk.say(&(status + &string(model, present, desk.screen.columns, MOST_LINES))),
             [all] if all == "all" => {
-                desk.say(&(status + &string(model, replay, desk.screen.columns, usize::MAX)))
+                desk.say(&(status + &string(model, present, desk.screen.columns, usize::MAX)))
             }
             [range] if range.starts_with(|c: char| c.is_ascii_digit()) => {
                 let (from, to) = range.split_once("..").unwrap_or((range, range));
@@ -100,12 +100,12 @@ impl Stage<'_> {
                         "`{range}` is no part of the string: `show 10..20` is from the 10th to the 20th module"
                     )));
                 };
-                let rows = modules(replay).filter(|m| (from..=to).contains(&m.number));
+                let rows = modules(present).filter(|m| (from..=to).contains(&m.number));
                 desk.say(&table(model, rows, usize::MAX)?)
             }
             [name, more @ ..] if more.is_empty() || more == ["all"] => {
                 let name = known_name(model, name)?;
-                let rows = modules(replay).filter(|m| is_called(model, m.module.kind, name));
+                let rows = modules(present).filter(|m| is_called(model, m.module.kind, name));
                 let most = if more.is_empty() { MOST_LINES } else { usize::MAX };
                 desk.say(&table(model, rows, most)?)
             }
@@ -114,21 +114,21 @@ impl Stage<'_> {
     }
 
     /// The module that words name.
-    pub fn find(&mut self, rest: &[String]) -> Result<(usize, Lineage), Fault> {
+    pub fn find(&mut self, rest: &[String], desk: &Desk) -> Result<(usize, Lineage), Fault> {
         let model = &self.session.model;
-        let replay = self.replay()?;
+        let present = self.string(desk)?;
         let found = |m: Option<Numbered>, what: String| match m {
             Some(m) => Ok((m.number, m.module.lineage)),
             None => Err(Fault::new(format!("{what} at present; `show` lists the modules"))),
         };
-        let count = modules(replay).count();
+        let count = modules(present).count();
         let words: Vec<&str> = rest.iter().map(|word| word.trim_start_matches('#')).collect();
         let number = |text: &str| text.parse::<usize>().ok();
         match words[..] {
             [word] if number(word).is_some() => {
                 let n = number(word).unwrap_or(0);
                 found(
-                    modules(replay).find(|m| m.number == n),
+                    modules(present).find(|m| m.number == n),
                     format!("no module has the number {n} (the last is {count})"),
                 )
             }
@@ -139,7 +139,7 @@ impl Stage<'_> {
             {
                 let is_it =
                     |m: &Numbered| m.module.lineage.to_string() == word || m.module.lineage.name() == word;
-                found(modules(replay).find(is_it), format!("there is no module of the lineage {word}"))
+                found(modules(present).find(is_it), format!("there is no module of the lineage {word}"))
             }
             [name] | [name, _] => {
                 let name = known_name(model, name)?;
@@ -150,7 +150,7 @@ impl Stage<'_> {
                         None => return Err(Fault::new(format!("`{text}` is not a number from 1"))),
                     },
                 };
-                let mut all = modules(replay).filter(|m| is_called(model, m.module.kind, name));
+                let mut all = modules(present).filter(|m| is_called(model, m.module.kind, name));
                 let which = if nth == 1 {
                     format!("there is no `{name}`")
                 } else {
@@ -164,17 +164,19 @@ impl Stage<'_> {
 
     /// `inspect N | NAME [N] | LINEAGE`
     pub fn inspect(&mut self, rest: &[String], desk: &Desk) -> Result<(), Fault> {
-        let (number, lineage) = self.find(rest)?;
+        let (number, lineage) = self.find(rest, desk)?;
         let limit = self.horizon(self.time().unwrap_or(0.0));
         let session = self.session;
         let model = &session.model;
         let replay = self.replay()?;
         let t = replay.time();
-        let Some(all) = replay.simulation().inspect(t, number - 1) else {
+        let end = replay.end_of(lineage, limit);
+        let Some(all) = replay.simulation().ok().and_then(|now| now.inspect(t, number - 1)) else {
             return Err(Fault::new("this module cannot be looked at now"));
         };
         let line = |span: crate::diagnostic::Span| session.source.position(span.start).0;
-        let count = modules(replay).count();
+        let present = self.string(desk)?;
+        let count = modules(present).count();
         let name = |seen: &Seen| describe(model, seen.kind, &seen.parameters);
         let mut out = format!("{}\n", name(&all.module));
         let ago = brief(t - all.birth, 6);
@@ -217,7 +219,7 @@ impl Stage<'_> {
                 out += &format!("  {title:8}  none\n");
                 return;
             };
-            let at = modules(replay).find(|m| m.module.lineage == seen.lineage).map_or(0, |m| m.number);
+            let at = modules(present).find(|m| m.module.lineage == seen.lineage).map_or(0, |m| m.number);
             let read = if all.context.iter().any(|other| other.lineage == seen.lineage) {
                 ", in the rule's context"
             } else {
@@ -232,7 +234,7 @@ impl Stage<'_> {
         for seen in all.context.iter().filter(apart) {
             out += &format!("  context   {}\n", name(seen));
         }
-        match replay.end_of(lineage, limit) {
+        match end {
             Some(event) => {
                 let rule = &model.rules[event.rule];
                 let clause = line(rule.produces[event.clause].span);
@@ -296,9 +298,8 @@ impl Stage<'_> {
 }
 
 /// The string as it would be typed.
-fn string(model: &Model, replay: &Replay, width: usize, most: usize) -> String {
+fn string(model: &Model, all: &ModuleString, width: usize, most: usize) -> String {
     let (mut out, mut lines, mut line, mut shown) = (String::new(), 0, String::new(), 0);
-    let all = replay.string();
     let count = |range: std::ops::Range<usize>| range.filter(|i| !all.get(*i).kind.is_bracket()).count();
     for (i, module) in all.iter().enumerate() {
         let text = describe(model, module.kind, module.parameters);

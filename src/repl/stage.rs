@@ -9,6 +9,7 @@ use crate::lang::{did_you_mean, words};
 use crate::replay::{Replay, Stop};
 use crate::session::Session;
 use crate::sim::{self, brief};
+use crate::structure::ModuleString;
 
 /// What comes after a statement.
 #[derive(Debug)]
@@ -100,6 +101,22 @@ impl<'m> Stage<'m> {
                 Err(Fault::Said(text))
             }
         }
+    }
+
+    /// Goes the way to the present, if nobody wanted to see it before.
+    pub fn settle(&mut self, desk: &Desk) -> Result<(), Fault> {
+        let gone = self.replay()?.settle();
+        self.arrive(gone, desk).map(|_| ())
+    }
+
+    /// The structure at present.
+    pub fn string(&mut self, desk: &Desk) -> Result<&ModuleString, Fault> {
+        self.settle(desk)?;
+        if let Err(error) = self.replay()?.string() {
+            return Err(self.drawn(&error, desk));
+        }
+        let formed = self.replay()?.string();
+        Ok(formed.expect("it was formed"))
     }
 
     /// Does what a statement says.

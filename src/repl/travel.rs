@@ -170,14 +170,12 @@ impl Stage<'_> {
     /// Where we are, in a line.
     pub fn status(&mut self) -> Result<String, Fault> {
         let replay = self.replay()?;
-        let modules = replay.string().iter().filter(|m| !m.kind.is_bracket()).count();
-        let happened = replay.simulation().stats().events;
-        let plural = |n: u64, word: &str| format!("{n} {word}{}", if n == 1 { "" } else { "s" });
+        let plural = |n: usize, word: &str| format!("{n} {word}{}", if n == 1 { "" } else { "s" });
         Ok(format!(
             "t = {}: {}, {} so far\n",
             brief(replay.time(), 12),
-            plural(modules as u64, "module"),
-            plural(happened, "production")
+            plural(replay.modules(), "module"),
+            plural(replay.productions(), "production")
         ))
     }
 
@@ -221,6 +219,7 @@ impl Stage<'_> {
             return Ok(flow);
         }
         let frames = self.session.model.frames;
+        self.settle(desk)?;
         let mut text = self.status()?;
         let replay = self.replay()?;
         if let Some(frames) = frames {
@@ -231,8 +230,11 @@ impl Stage<'_> {
                 brief(frames.step, 9)
             );
         }
-        let stats = replay.simulation().stats();
         let (marks, bytes) = replay.marks();
+        let stats = match replay.simulation() {
+            Ok(simulation) => simulation.stats(),
+            Err(error) => return Err(self.drawn(&error, desk)),
+        };
         text += &format!(
             "  up to here: {} productions, {} steps, {} evaluations of rates, at most {} modules\n  for going back: {marks} marks, {:.1} MB\n",
             stats.events,

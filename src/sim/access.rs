@@ -15,23 +15,31 @@ use crate::structure::Instant;
 pub enum Passed {
     /// Nothing comes before the time that was asked for.
     All,
-    /// After an event.
+    /// After productions of one instant.
     Event,
     /// After as many entries as were allowed.
     Some,
 }
 
+/// True if an event of an instant has taken place when time has passed up to `t`.
+pub fn happens_by(at: Instant, t: f64) -> bool {
+    is_before(at, true, Instant::new(t))
+}
+
 impl Simulation<'_> {
     /// Lets time pass up to `t`, as [`Simulation::pass`], but at most so many entries of the queues (events, ends of
-    /// steps), and, if that is asked for, only to the next event.
+    /// steps), and, if that is asked for, only to the next
+    /// production.
     ///
     /// # Errors
     /// As of [`Simulation::pass`].
     pub fn pass_some(&mut self, t: f64, most: usize, one_event: bool) -> Result<Passed, Error> {
         for _ in 0..most {
+            let before = self.stats.events;
             match self.guarded(|simulation| simulation.advance_once(t))? {
                 None => return Ok(Passed::All),
-                Some(true) if one_event => return Ok(Passed::Event),
+                // Not if a module has only gone over to other equations.
+                Some(_) if one_event && self.stats.events > before => return Ok(Passed::Event),
                 Some(_) => {}
             }
         }
@@ -46,7 +54,12 @@ impl Simulation<'_> {
 
     /// The time of the last thing that was passed; 0 at the start.
     pub fn reached(&self) -> f64 {
-        self.last.map_or(0.0, |(at, _)| at.to_f64())
+        self.reached_at().to_f64()
+    }
+
+    /// The same, to all its digits.
+    pub fn reached_at(&self) -> Instant {
+        self.last.map_or(Instant::ZERO, |(at, _)| at)
     }
 
     /// A measure of the work done so far, in units of very roughly a tenth of a microsecond. It grows

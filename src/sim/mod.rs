@@ -101,7 +101,7 @@ mod tableau;
 mod transition;
 mod watch;
 
-pub use access::Passed;
+pub use access::{Passed, happens_by};
 pub use error::{Error, Site, Unsolved};
 pub use event::Event;
 pub use inspect::{Inspection, Seen};

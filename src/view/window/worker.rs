@@ -314,7 +314,11 @@ impl<Tell: Fn(News)> Service<'_, Tell> {
         let (fit, page) = shot.look.camera(&shot.space, shot.pixels, SLACK[usize::from(shot.fine)]);
         scene.clear();
         scene.accuracy = fit.accuracy;
-        if let Err(error) = turtle::draw(&self.session.model, replay.string(), scene) {
+        let drawn = match replay.string() {
+            Ok(string) => turtle::draw(&self.session.model, string, scene).map_err(|error| error.to_string()),
+            Err(error) => Err(error.to_string()),
+        };
+        if let Err(error) = drawn {
             (self.tell)(News::Trouble(format!("error: at t = {}: {error}\n", shot.time)));
             return true;
         }
@@ -325,7 +329,7 @@ impl<Tell: Fn(News)> Service<'_, Tell> {
             order: self.order.clone(),
             image,
             part,
-            modules: replay.string().iter().filter(|m| !m.kind.is_bracket()).count() as u64,
+            modules: replay.modules() as u64,
             spent: [there - self.begun, there.elapsed()],
         })));
         true
