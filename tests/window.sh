@@ -52,44 +52,51 @@ awk -v ms="$median" 'BEGIN { exit !(ms > 0 && ms <= 50) }' || fail "wanted 50 ms
 
 # Playing.
 for model in leaf lychnis; do
-    echo "$model: $(window "models/$model.dls" --play 5 --screenshot "$shots/$model.png")"
+    played=$(window "models/$model.dls" --play 5 --screenshot "$shots/$model.png") || fail "$model does not play"
+    echo "$model: $played"
+    awk '{ exit !($1 >= 10) }' <<< "$played" || fail "wanted 10 pictures a second"
 done
+
+# Once the window of a model is there and has shown it: does something beside it.
+beside() {
+    local id
+    id=$(timeout 60 xdotool search --sync --onlyvisible --name "$1" | head -1)
+    xdotool windowfocus "$id" || true
+    shift
+    sleep 1
+    "$@"
+}
 
 # A model that is saved: the same as the new one seen from the beginning, so time and view are kept.
 cp models/leaf.dls "$work/plant.dls"
 sed 's/^param α_max = [0-9.]*/param α_max = 30.0/' models/leaf.dls > "$work/changed.dls"
 cmp -s "$work/plant.dls" "$work/changed.dls" && fail "the change is none"
 window "$work/plant.dls" --at 7 --screenshot "$shots/before.png"
-(sleep 2; cp "$work/changed.dls" "$work/plant.dls") &
+beside plant.dls cp "$work/changed.dls" "$work/plant.dls" &
 window "$work/plant.dls" --at 7 --delay 4 --screenshot "$shots/saved.png"
 window "$work/plant.dls" --at 7 --screenshot "$shots/changed.png"
 cmp -s "$shots/saved.png" "$shots/before.png" && fail "a model that was saved is not shown"
 cmp "$shots/saved.png" "$shots/changed.png" || fail "after saving the window is another than that of the new model"
 # One with a mistake, and mended again.
-(sleep 2; echo 'F(x: solve dx/dt = 1' >> "$work/plant.dls") &
+cat "$work/changed.dls" - > "$work/mistake.dls" <<< 'F(x: solve dx/dt = 1'
+beside plant.dls cp "$work/mistake.dls" "$work/plant.dls" &
 window "$work/plant.dls" --at 7 --delay 4 --screenshot "$shots/mistake.png"
 cmp -s "$shots/mistake.png" "$shots/changed.png" && fail "a mistake is not shown"
-(sleep 2; cp "$work/changed.dls" "$work/plant.dls") &
+beside plant.dls cp "$work/changed.dls" "$work/plant.dls" &
 window "$work/plant.dls" --at 7 --delay 4 --screenshot "$shots/mended.png"
 cmp "$shots/mended.png" "$shots/changed.png" || fail "a mended model is not shown"
 
 # Hands.
-hands() {
-    sleep 2.5
-    local id
-    id=$(xdotool search --onlyvisible --name 'leaf.dls' | head -1)
-    xdotool windowfocus "$id" || true
-    "$@"
-}
-(hands xdotool key Home) &
-window models/leaf.dls --at 7 --delay 5 --screenshot "$shots/home.png"
+beside leaf.dls xdotool key Home &
+window models/leaf.dls --at 7 --delay 4 --screenshot "$shots/home.png"
 window models/leaf.dls --at 0 --screenshot "$shots/first.png"
 cmp "$shots/home.png" "$shots/first.png" || fail "the key home does not go to the first time"
-(hands xdotool mousemove 500 400 mousedown 1 mousemove 560 420 mousemove 640 440 mouseup 1) &
-window models/leaf.dls --at 7 --delay 5 --screenshot "$shots/turned.png"
+# As slowly as hands do it: all within one picture is no dragging.
+beside leaf.dls xdotool mousemove 500 400 mousedown 1 sleep 0.1 mousemove 560 420 sleep 0.1 mousemove 640 440 sleep 0.1 mouseup 1 &
+window models/leaf.dls --at 7 --delay 4 --screenshot "$shots/turned.png"
 window models/leaf.dls --at 7 --screenshot "$shots/leaf-7.png"
 cmp -s "$shots/turned.png" "$shots/leaf-7.png" && fail "dragging does not turn the plant"
-# A model that cannot be read at first, and one that is not there.
+# A value to begin with; a model that is not there; no screen.
 window "$work/plant.dls" --at 7 --set n_0=5 --screenshot "$shots/set.png"
 status=0
 window "$work/nothing.dls" 2> "$work/said" || status=$?

@@ -39,7 +39,7 @@ fn open(args: &ViewArgs) -> Result<(), Failure> {
     let model = shared.model.clone();
     if !model.is_file() {
         // The message of everybody else.
-        return super::common::open(&model, &shared.settings).map(drop);
+        return super::common::open(&model, &shared.settings, &shared.include).map(drop);
     }
     let range = shared.from.zip(shared.to).map(|(from, to)| [from, to]);
     if let Some([from, to]) = range.filter(|[from, to]| to < from) {
@@ -48,6 +48,7 @@ fn open(args: &ViewArgs) -> Result<(), Failure> {
     let options = Options {
         model,
         set: shared.settings.clone(),
+        include: shared.include.folders.clone(),
         settings: settings(shared)?,
         range,
         at: shared.at.as_ref().and_then(|at| at.iter().copied().reduce(f64::min)),

@@ -213,17 +213,29 @@ struct Band<'p, const N: usize> {
     depths: Vec<f32>,
     /// `0xffrrggbb`, or 0 where there is nothing.
     colors: Vec<u32>,
+    /// First column in which something may be drawn, and the one after the last: most of a picture is empty.
+    touched: [usize; 2],
 }
 
 impl<const N: usize> Band<'_, N> {
     fn new(pattern: &Pattern<N>, width: usize) -> Band<'_, N> {
         let samples = width * BAND * N;
-        Band { pattern, width, depths: vec![f32::NEG_INFINITY; samples], colors: vec![0; samples] }
+        Band {
+            pattern,
+            width,
+            depths: vec![f32::NEG_INFINITY; samples],
+            colors: vec![0; samples],
+            touched: [0; 2],
+        }
     }
 
     fn clear(&mut self) {
-        self.depths.fill(f32::NEG_INFINITY);
-        self.colors.fill(0);
+        let [first, end] = std::mem::take(&mut self.touched).map(|column| column * N);
+        let row = (self.width * N).max(1);
+        for (depths, colors) in self.depths.chunks_exact_mut(row).zip(self.colors.chunks_exact_mut(row)) {
+            depths[first..end].fill(f32::NEG_INFINITY);
+            colors[first..end].fill(0);
+        }
     }
 
     /// Draws what of a triangle is in the `rows` rows from `top`.
@@ -234,6 +246,9 @@ impl<const N: usize> Band<'_, N> {
         rows: usize,
         shade: &impl Fn(usize, [f64; 3]) -> Color,
     ) {
+        let [first, last] = triangle.columns;
+        let [from, end] = self.touched;
+        self.touched = if from == end { [first, last + 1] } else { [from.min(first), end.max(last + 1)] };
         let place = |k: i64| (k as f64 + 8.5) / 16.0;
         let [origin, right, down] = triangle.depth;
         let depth_at = self.pattern.map(|(x, y)| right * place(x) + down * place(y));
@@ -274,17 +289,27 @@ impl<const N: usize> Band<'_, N> {
         }
     }
 
-    /// The pixels of the first rows: the means of their samples.
+    /// The pixels of the first rows: the means of their samples. They are transparent before.
     fn resolve(&self, pixels: &mut [[u8; 4]]) {
-        for (pixel, samples) in pixels.iter_mut().zip(self.colors.chunks_exact(N)) {
-            let mut sum = [0_u32; 4];
-            for sample in samples {
-                let [opacity, red, green, blue] = sample.to_be_bytes();
-                for (total, channel) in sum.iter_mut().zip([red, green, blue, opacity]) {
-                    *total += u32::from(channel);
+        let [first, end] = self.touched;
+        let samples = self.colors.chunks_exact((self.width * N).max(1));
+        for (pixels, samples) in pixels.chunks_exact_mut(self.width.max(1)).zip(samples) {
+            let samples = samples[first * N..end * N].chunks_exact(N);
+            for (pixel, samples) in pixels[first..end].iter_mut().zip(samples) {
+                if samples[1..].iter().all(|sample| *sample == samples[0]) {
+                    let [opacity, red, green, blue] = samples[0].to_be_bytes();
+                    *pixel = [red, green, blue, opacity];
+                    continue;
                 }
+                let mut sum = [0_u32; 4];
+                for sample in samples {
+                    let [opacity, red, green, blue] = sample.to_be_bytes();
+                    for (total, channel) in sum.iter_mut().zip([red, green, blue, opacity]) {
+                        *total += u32::from(channel);
+                    }
+                }
+                *pixel = sum.map(|total| ((total + N as u32 / 2) / N as u32) as u8);
             }
-            *pixel = sum.map(|total| ((total + N as u32 / 2) / N as u32) as u8);
         }
     }
 }

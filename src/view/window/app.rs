@@ -5,39 +5,32 @@ use std::sync::mpsc::{Receiver, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use eframe::egui::{self, Color32, Key, RichText, Sense, TextureHandle, TextureOptions};
+use eframe::egui::{self, Color32, Key, Sense, TextureHandle, TextureOptions};
 
 use super::life::Life;
 use super::look::{Look, Space};
+use super::orders::STILL;
 use super::player::{Player, SPEEDS};
 use super::trial::{Outcome, Runner};
-use super::worker::{Desk, Facts, News, Order, Shot, work};
+use super::worker::{Desk, Facts, News, Order, Shown, work};
 use super::{Options, panel, timeline};
 use crate::export::Page;
 use crate::lang::Setting;
 
-/// After so long, what stands still is drawn as well as can be.
-const STILL: Duration = Duration::from_millis(180);
 /// After so long without a picture, the window says that it waits.
 const LONG: Duration = Duration::from_millis(400);
-/// So long a run may take before a slider that moves on ends it.
-const LEAST: Duration = Duration::from_millis(250);
-/// Most pixels of a picture that moves, and of one that stands still; the screen makes up the rest.
-const MOST_PIXELS: [f64; 2] = [1.2e6, 8e6];
-/// Parts of the screen's pixels, each way, that what moves is drawn with: fewer where drawing takes longer than the first of these
-/// times, more where it takes less than the second.
-const COARSE: [f64; 3] = [1.0, 0.7, 0.5];
-const TOO_LONG: Duration = Duration::from_millis(22);
-const SHORT: Duration = Duration::from_millis(7);
 /// Of the panel at the side, in points.
 const WIDTH: f32 = 270.0;
 /// Degrees for a drag over the height of the picture.
 const TURN: [f64; 2] = [250.0, 180.0];
 
+/// What a key does.
+type Action<'a> = &'a dyn Fn(&mut Window);
+
 /// The window.
 pub struct Window {
     pub(super) desk: Arc<Desk>,
-    news: Receiver<News>,
+    pub(super) news: Receiver<News>,
     worker: Option<JoinHandle<()>>,
     file: String,
     start: Option<f64>,
@@ -45,23 +38,32 @@ pub struct Window {
     /// What is wrong, as long as it is.
     pub(super) trouble: Option<String>,
     pub(super) life: Option<Life>,
+    /// It is that of a model, or of params, that have changed since.
+    pub(super) aged: bool,
     /// Values of params that hands have changed, or the command line.
     pub(super) set: Vec<Setting>,
     pub(super) player: Player,
-    look: Option<Look>,
-    space: Space,
+    pub(super) look: Option<Look>,
+    pub(super) space: Space,
     /// Somebody has turned or moved the plant.
     touched: bool,
-    texture: Option<TextureHandle>,
+    /// The picture, and what part of the area for the plant it covers.
+    texture: Option<(TextureHandle, [f32; 4])>,
     /// What the texture shows, its modules, and how long it took to run and to draw it.
     pub(super) shown: Option<(Order, u64, [Duration; 2])>,
     /// The last order, and when it was given.
     pub(super) ordered: Option<(Order, Instant)>,
-    /// Which of [`COARSE`].
-    coarse: usize,
+    /// How long the last quick picture took, run and drawing; more if it has not come in time.
+    pub(super) quick: Duration,
+    /// Everything that was asked for was on the screen, as good as it gets, and the life known, when the window was drawn last.
+    pub(super) settled: bool,
+    /// The time that the list of productions was scrolled to last.
+    pub(super) listed: f64,
+    /// Which of the sizes that moving pictures have.
+    pub(super) coarse: usize,
     info: bool,
     last: Instant,
-    moved: Instant,
+    pub(super) moved: Instant,
     trial: Runner,
 }
 
@@ -92,6 +94,7 @@ impl Window {
             facts: None,
             trouble: None,
             life: None,
+            aged: false,
             set,
             player: Player::new([0.0, 0.0], 0.0),
             look: None,
@@ -100,6 +103,9 @@ impl Window {
             texture: None,
             shown: None,
             ordered: None,
+            quick: Duration::ZERO,
+            settled: false,
+            listed: f64::NAN,
             coarse: 0,
             info: true,
             last: Instant::now(),
@@ -111,48 +117,53 @@ impl Window {
     /// Takes in what has become known.
     fn hear(&mut self, context: &egui::Context) {
         while let Ok(news) = self.news.try_recv() {
-            match news {
-                News::Read(facts) => {
-                    let first = self.facts.is_none();
-                    self.player.set_range(facts.range, facts.step);
-                    self.set.retain(|s| facts.parameters.iter().any(|p| p.name == s.name));
-                    self.facts = Some(*facts);
-                    self.trouble = None;
-                    if first {
-                        self.player.time = self.player.range[0];
-                        match self.start {
-                            Some(time) => self.player.seek(time),
-                            None => self.player.play(true),
-                        }
+            self.learn(context, news);
+        }
+    }
+
+    pub(super) fn learn(&mut self, context: &egui::Context, news: News) {
+        match news {
+            News::Read(facts) => {
+                let first = self.facts.is_none();
+                self.player.set_range(facts.range, facts.step);
+                self.set.retain(|s| facts.parameters.iter().any(|p| p.name == s.name));
+                self.facts = Some(*facts);
+                self.trouble = None;
+                self.aged = true;
+                if first {
+                    self.player.time = self.player.range[0];
+                    match self.start {
+                        Some(time) => self.player.seek(time),
+                        None => self.player.play(true),
                     }
                 }
-                News::Trouble(message) => self.trouble = Some(message),
-                News::Life(life) => {
-                    if self.look.is_none() || !self.touched && !self.life.as_ref().is_some_and(|l| l.whole) {
-                        self.space = life.space.clone();
-                        let (azimuth, elevation, perspective) = (0.0, 0.0, true);
-                        self.look = Some(Look::at(&self.space, azimuth, elevation, perspective));
-                    }
-                    self.life = Some(*life);
+            }
+            News::Trouble(message) => self.trouble = Some(message),
+            News::Life(life) => {
+                if self.look.is_none() || !self.touched && !self.life.as_ref().is_some_and(|l| l.whole) {
+                    self.space = life.space.clone();
+                    let (azimuth, elevation, perspective) = (0.0, 0.0, true);
+                    self.look = Some(Look::at(&self.space, azimuth, elevation, perspective));
                 }
-                News::Picture(picture) => {
-                    let picture = *picture;
-                    let options = TextureOptions::LINEAR;
-                    match &mut self.texture {
-                        Some(texture) => texture.set(picture.image, options),
-                        None => self.texture = Some(context.load_texture("plant", picture.image, options)),
+                self.life = Some(*life);
+                self.aged = false;
+                self.listed = f64::NAN;
+            }
+            News::Picture(picture) => {
+                let Shown { order, image, part, modules, spent } = *picture;
+                let options = TextureOptions::LINEAR;
+                match &mut self.texture {
+                    Some((texture, place)) => {
+                        texture.set(image, options);
+                        *place = part;
                     }
-                    self.trouble = None;
-                    let drawn = picture.spent[1];
-                    if picture.order.shot.as_ref().is_some_and(|shot| !shot.fine) {
-                        if drawn > TOO_LONG {
-                            self.coarse = (self.coarse + 1).min(COARSE.len() - 1);
-                        } else if drawn < SHORT {
-                            self.coarse = self.coarse.saturating_sub(1);
-                        }
-                    }
-                    self.shown = Some((picture.order, picture.modules, picture.spent));
+                    None => self.texture = Some((context.load_texture("plant", image, options), part)),
                 }
+                self.trouble = None;
+                if order.shot.as_ref().is_some_and(|shot| !shot.fine) {
+                    self.pace(spent);
+                }
+                self.shown = Some((order, modules, spent));
             }
         }
     }
@@ -182,64 +193,6 @@ impl Window {
         }
     }
 
-    /// Orders what is to be seen now.
-    fn order(&mut self, pixels: [f64; 2]) {
-        let fine = !self.player.playing && self.moved.elapsed() >= STILL;
-        let most = MOST_PIXELS[usize::from(fine)];
-        let coarse = if fine { 1.0 } else { COARSE[self.coarse] };
-        let less = (most / (pixels[0] * pixels[1]).max(1.0)).sqrt().min(1.0) * coarse;
-        let shot = self.look.clone().filter(|_| self.facts.is_some()).map(|look| Shot {
-            time: self.player.time,
-            look,
-            space: self.space.clone(),
-            pixels: pixels.map(|side| (side * less).round().max(1.0) as u32),
-            fine,
-        });
-        let order = Order { set: self.set.clone(), shot };
-        let Some((last, _)) = &self.ordered else {
-            // The worker has begun with this.
-            if order.shot.is_some() || self.facts.is_some() {
-                self.give(order, false);
-            }
-            return;
-        };
-        if *last == order {
-            return;
-        }
-        // How it is drawn is not what is moved.
-        let plain =
-            |order: &Order| order.shot.clone().map(|shot| Shot { fine: false, pixels: [0; 2], ..shot });
-        if order.set != last.set || plain(&order) != plain(last) {
-            self.moved = Instant::now();
-        }
-        // What plays takes one picture after the other; hands want the last one only, but a slider that is being dragged
-        // should show something on its way.
-        let slides = order.set != last.set;
-        let young = self.ordered.as_ref().is_some_and(|(_, since)| since.elapsed() < LEAST);
-        let hurry = if slides { !(young && self.waits()) } else { !self.player.playing };
-        if hurry || !self.waits() {
-            self.give(order, hurry);
-        }
-    }
-
-    fn give(&mut self, order: Order, hurry: bool) {
-        self.desk.put(order.clone(), hurry);
-        self.ordered = Some((order, Instant::now()));
-    }
-
-    /// Whether the last order is still to be fulfilled.
-    pub(super) fn waits(&self) -> bool {
-        let shown = self.shown.as_ref().map(|(order, ..)| order);
-        self.trouble.is_none() && self.ordered.as_ref().is_some_and(|(order, _)| Some(order) != shown)
-    }
-
-    /// Everything that was asked for is on the screen, as good as it gets, and the life is known.
-    pub(super) fn is_settled(&self) -> bool {
-        let fine = self.shown.as_ref().and_then(|(order, ..)| order.shot.as_ref()).is_some_and(|s| s.fine);
-        self.trouble.is_some()
-            || (!self.player.playing && fine && !self.waits() && self.life.as_ref().is_some_and(|l| l.whole))
-    }
-
     fn keys(&mut self, context: &egui::Context) {
         if context.wants_keyboard_input() {
             return;
@@ -254,7 +207,7 @@ impl Window {
             w.touched = true;
             w.look.iter_mut().for_each(|look| look.magnify(factor, 0.0, 0.0, 1.0));
         };
-        let actions: [(Key, &dyn Fn(&mut Window)); 24] = [
+        let actions: [(Key, Action<'_>); 24] = [
             (Key::Space, &|w| w.player.play(!w.player.playing)),
             (Key::ArrowLeft, &|w| w.player.frames(-many)),
             (Key::ArrowRight, &|w| w.player.frames(many)),
@@ -348,21 +301,28 @@ impl Window {
         });
     }
 
-    /// The plant, and the hands on it. Returns the pixels that it has on the screen.
-    fn plant(&mut self, ui: &mut egui::Ui) -> [f64; 2] {
+    /// The plant, and the hands on it.
+    fn plant(&mut self, ui: &mut egui::Ui) {
         let (response, painter) = ui.allocate_painter(ui.available_size(), Sense::click_and_drag());
         let area = response.rect;
-        if let Some(texture) = &self.texture {
+        self.hands(ui, &response);
+        let ratio = f64::from(ui.ctx().pixels_per_point());
+        let most = ui.ctx().input(|input| input.max_texture_side) as f64;
+        if self.order([area.width(), area.height()].map(|side| (f64::from(side) * ratio).min(most))) {
+            self.wait(ui.ctx());
+        }
+        let asked = self.shown.as_ref().and_then(|(order, ..)| order.shot.as_ref()).map(|shot| shot.pixels);
+        if let (Some((texture, [left, top, right, bottom])), Some([wide, high])) = (&self.texture, asked) {
             // Stretched as little as it may be while the window changes its size.
-            let size = texture.size_vec2();
+            let size = egui::vec2(wide as f32, high as f32);
             let scale = (area.width() / size.x).min(area.height() / size.y);
-            let whole = egui::Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
-            painter.image(
-                texture.id(),
-                egui::Rect::from_center_size(area.center(), size * scale),
-                whole,
-                Color32::WHITE,
+            let picture = egui::Rect::from_center_size(area.center(), size * scale);
+            let part = egui::Rect::from_min_max(
+                picture.lerp_inside(egui::vec2(*left, *top)),
+                picture.lerp_inside(egui::vec2(*right, *bottom)),
             );
+            let whole = egui::Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
+            painter.image(texture.id(), part, whole, Color32::WHITE);
         }
         let title = self.facts.as_ref().map_or("", |facts| &facts.title);
         let (title, file) =
@@ -379,6 +339,10 @@ impl Window {
             egui::FontId::proportional(13.0),
             faint,
         );
+    }
+
+    fn hands(&mut self, ui: &egui::Ui, response: &egui::Response) {
+        let area = response.rect;
         let [width, height] = [f64::from(area.width()), f64::from(area.height().max(1.0))];
         if let Some(look) = &mut self.look {
             let drag = response.drag_delta();
@@ -405,14 +369,14 @@ impl Window {
         if response.double_clicked() {
             self.whole();
         }
-        let ratio = f64::from(ui.ctx().pixels_per_point());
-        let most = ui.ctx().input(|input| input.max_texture_side) as f64;
-        [width, height].map(|side| (side * ratio).min(most))
     }
 }
 
 impl eframe::App for Window {
     fn update(&mut self, context: &egui::Context, _: &mut eframe::Frame) {
+        let mut trial = std::mem::take(&mut self.trial);
+        trial.step(self, context);
+        self.trial = trial;
         self.hear(context);
         let now = Instant::now();
         self.player.pass((now - self.last).as_secs_f64());
@@ -431,26 +395,20 @@ impl eframe::App for Window {
             ui.add_space(4.0);
         });
         if let Some(trouble) = &self.trouble {
-            egui::TopBottomPanel::bottom("trouble").show(context, |ui| {
-                egui::ScrollArea::both().max_height(240.0).auto_shrink([false, true]).show(ui, |ui| {
-                    let text = RichText::new(trouble.trim_end())
-                        .monospace()
-                        .color(Color32::from_rgb(0xa0, 0x1c, 0x1c));
-                    ui.add(egui::Label::new(text).extend().selectable(true));
-                });
-            });
+            panel::trouble(context, trouble.trim_end());
         }
-        let frame = egui::Frame::new().fill(background());
-        let pixels = egui::CentralPanel::default().frame(frame).show(context, |ui| self.plant(ui)).inner;
-        let mut trial = std::mem::take(&mut self.trial);
-        trial.step(self, context);
-        self.trial = trial;
-        self.order(pixels);
+        egui::CentralPanel::default().frame(egui::Frame::new()).show(context, |ui| self.plant(ui));
+        self.settled = self.is_settled();
         if self.player.playing {
             context.request_repaint();
-        } else if !self.is_settled() {
+        } else if !self.settled {
             context.request_repaint_after(STILL / 2);
         }
+    }
+
+    /// What is behind the plant: filling a rectangle with it costs as much as the picture where there is no graphics processor.
+    fn clear_color(&self, _: &egui::Visuals) -> [f32; 4] {
+        background().to_normalized_gamma_f32()
     }
 
     fn on_exit(&mut self, _: Option<&eframe::glow::Context>) {

@@ -8,6 +8,7 @@
 //! - [`player`]: time that goes on, stands still, begins again.
 //! - [`life`]: the whole of it, for the timeline.
 //! - [`worker`]: a thread that reads the model, goes to a time, draws; it can be interrupted.
+//! - [`orders`]: what is asked of it, when, and how well drawn.
 //! - [`app`], [`panel`], [`timeline`]: what is on the screen.
 //!
 //! Pictures are those of the PNG export, drawn by our own rasteriser: the same on every machine, whatever it has for a
@@ -16,6 +17,7 @@
 mod app;
 mod life;
 mod look;
+mod orders;
 mod panel;
 mod player;
 mod timeline;
@@ -36,6 +38,8 @@ pub struct Options {
     pub model: PathBuf,
     /// Values of `param`s to begin with.
     pub set: Vec<Setting>,
+    /// Where files are that it names and that are not in its folder.
+    pub include: Vec<PathBuf>,
     pub settings: Settings,
     /// First and last time, in the model's unit; `None`: those of its `frames`.
     pub range: Option<[f64; 2]>,
@@ -68,6 +72,8 @@ pub fn open(options: Options) -> Result<(), Error> {
             .with_app_id("dlsys")
             .with_inner_size([1180.0, 800.0])
             .with_min_inner_size([480.0, 320.0]),
+        // Colours are those of the picture.
+        dithering: false,
         ..Default::default()
     };
     let seen = outcome.clone();

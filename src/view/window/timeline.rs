@@ -1,6 +1,6 @@
 //! The timeline: modules over time, productions as ticks, and where one is.
 
-use eframe::egui::{self, Color32, Pos2, Rangef, Rect, Sense, Stroke};
+use eframe::egui::{self, Color32, Mesh, Pos2, Rect, Sense, Shape, Stroke};
 
 use super::life::Life;
 use super::player::Player;
@@ -34,13 +34,20 @@ pub fn show(ui: &mut egui::Ui, player: &mut Player, life: Option<&Life>) {
     if let Some(life) = life {
         let most = life.counts.iter().map(|(_, modules)| *modules).max().unwrap_or(0).max(1) as f32;
         let y = |modules: u64| floor - (floor - area.top()) * modules as f32 / most;
+        // One thing each: edges of many rectangles side by side would be seen as stripes.
+        let (mut fill, mut outline) = (Mesh::default(), Vec::new());
         for pair in life.counts.windows(2) {
             let [(a, before), (b, after)] = [pair[0], pair[1]];
-            let area = Rect::from_min_max(Pos2::new(x(a), y(before)), Pos2::new(x(b), floor));
-            painter.rect_filled(area, 0.0, FILL);
-            painter.hline(area.x_range(), area.top(), Stroke::new(1.0, LINE));
-            painter.vline(area.right(), Rangef::new(y(before), y(after)), Stroke::new(1.0, LINE));
+            fill.add_colored_rect(
+                Rect::from_min_max(Pos2::new(x(a), y(before)), Pos2::new(x(b), floor)),
+                FILL,
+            );
+            let corners = [(a, before), (b, before), (b, after)];
+            outline.extend(corners.map(|(t, modules)| Pos2::new(x(t), y(modules).round() + 0.5)));
         }
+        outline.dedup();
+        painter.add(fill);
+        painter.add(Shape::line(outline, Stroke::new(1.0, LINE)));
         let mut last = f32::NEG_INFINITY;
         for happening in life.history.happenings.iter().filter(|h| (from..=to).contains(&h.t)) {
             let at = x(happening.t).round();

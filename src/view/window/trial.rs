@@ -48,10 +48,8 @@ enum Stage {
     Begin,
     /// The so-manieth slider is to be moved when all is still.
     Still(usize),
-    /// It was moved then; the new picture is not there yet.
+    /// It was moved then; the new picture is not on the screen yet.
     Slid(usize, Instant),
-    /// The new picture was handed to the screen; when this is done again, it is there.
-    Handed(usize, Instant, [Duration; 2]),
     /// Since when, pictures so far, and the time of the last one.
     Playing(Instant, u32, f64),
     Screenshot,
@@ -73,7 +71,8 @@ impl Runner {
         Runner { trial, outcome, stage: Stage::Begin, begun: None }
     }
 
-    /// Once for each time that the window is drawn.
+    /// Once for each time that the window is drawn, before anything is taken in: what the window shows then is on the screen, for what it
+    /// drew last has been handed over.
     pub fn step(&mut self, window: &mut Window, context: &egui::Context) {
         let Trial { delay, slide, play, screenshot } = &self.trial;
         if slide.is_empty() && play.is_none() && screenshot.is_none() {
@@ -97,13 +96,13 @@ impl Runner {
         match &mut self.stage {
             Stage::Begin => {
                 let passed = self.begun.map_or(0.0, |begun| begun.elapsed().as_secs_f64());
-                let ready = window.is_settled() || window.shown.is_some() && window.player.playing;
+                let ready = window.settled || window.shown.is_some() && window.player.playing;
                 if ready && passed >= delay.unwrap_or(0.0) {
                     self.stage = next(0);
                 }
             }
             Stage::Still(number) => {
-                if window.is_settled() {
+                if window.settled {
                     window.set(&slide[*number].name, slide[*number].value);
                     self.stage = Stage::Slid(*number, Instant::now());
                 }
@@ -111,17 +110,14 @@ impl Runner {
             Stage::Slid(number, since) => {
                 let new = window.shown.as_ref().filter(|(order, ..)| order.set == window.set);
                 if let Some((_, _, spent)) = new {
-                    self.stage = Stage::Handed(*number, *since, *spent);
+                    let Setting { name, value } = &slide[*number];
+                    let [ran, drawn] = spent.map(milliseconds);
+                    say(&format!(
+                        "{name} = {value}: on the screen after {:.1} ms (read and run {ran:.1}, drawn {drawn:.1})",
+                        milliseconds(since.elapsed())
+                    ));
+                    self.stage = next(*number + 1);
                 }
-            }
-            Stage::Handed(number, since, spent) => {
-                let Setting { name, value } = &slide[*number];
-                let [ran, drawn] = spent.map(milliseconds);
-                say(&format!(
-                    "{name} = {value}: on the screen after {:.1} ms (read and run {ran:.1}, drawn {drawn:.1})",
-                    milliseconds(since.elapsed())
-                ));
-                self.stage = next(*number + 1);
             }
             Stage::Playing(since, pictures, last) => {
                 if *pictures == 0 {
@@ -144,7 +140,7 @@ impl Runner {
                 }
             }
             Stage::Screenshot => match screenshot {
-                Some(_) if window.is_settled() => {
+                Some(_) if window.settled => {
                     context.send_viewport_cmd(ViewportCommand::Screenshot(egui::UserData::default()));
                     self.stage = Stage::Asked;
                 }

@@ -23,6 +23,9 @@ use crate::turtle;
 
 /// Time between two looks at the files.
 const WATCH: Duration = Duration::from_millis(150);
+/// So long the life waits after the first picture of a model, which goes to the screen first: and a slider that moves on makes
+/// another life.
+const REST: Duration = Duration::from_millis(60);
 /// Distance from curved surfaces, in pixels, of what moves and of what stands still.
 const SLACK: [f64; 2] = [0.8, 0.3];
 
@@ -69,7 +72,9 @@ pub struct Facts {
 /// A picture.
 pub struct Shown {
     pub order: Order,
+    /// Where something is drawn, and where that is, in parts of the picture that was ordered: left, top, right, bottom.
     pub image: ColorImage,
+    pub part: [f32; 4],
     /// Brackets not counted.
     pub modules: u64,
     /// Of this model and these params: from the order to the state, and from there to the picture.
@@ -172,12 +177,12 @@ struct Unread {
 
 /// Reads the model. Values of params that it does not have any more, because the file has changed, are forgotten.
 fn read(options: &Options, set: &mut Vec<Setting>) -> Result<Session, Unread> {
-    let refused = match Session::open(&options.model, set) {
+    let refused = match Session::open_with(&options.model, set, &options.include) {
         Ok(session) => return Ok(session),
         Err(refused) => refused,
     };
     if refused.diagnostics.is_empty()
-        && let Ok(session) = Session::open(&options.model, &[])
+        && let Ok(session) = Session::open_with(&options.model, &[], &options.include)
     {
         let known = |s: &Setting| session.model.parameters.iter().any(|p| p.name == s.name);
         if !set.iter().all(known) {
@@ -231,12 +236,18 @@ impl<Tell: Fn(News)> Service<'_, Tell> {
         let mut living = Living::new(session, self.options.settings, range, step);
         let mut scene = turtle::blank(model);
         let mut done = self.order.shot.is_none();
+        let threads = std::thread::available_parallelism().map_or(1, usize::from);
         let mut watched = Instant::now();
+        let mut rest = if done { Duration::ZERO } else { REST };
         loop {
             // Whoever hurries from now on has an order that is taken below, or interrupts.
             self.desk.hurry.store(false, Ordering::Relaxed);
-            let idle = done && living.is_done();
-            if let Some(new) = self.desk.take(if idle { WATCH } else { Duration::ZERO }) {
+            let wait = match done {
+                true if living.is_done() => WATCH,
+                true => std::mem::take(&mut rest),
+                false => Duration::ZERO,
+            };
+            if let Some(new) = self.desk.take(wait) {
                 let read = new.set != self.order.set;
                 self.order = new;
                 self.begun = Instant::now();
@@ -255,7 +266,7 @@ impl<Tell: Fn(News)> Service<'_, Tell> {
                 }
             }
             if !done {
-                done = self.shoot(&mut replay, &mut scene);
+                done = self.shoot(&mut replay, &mut scene, threads);
             } else if living.advance(&self.desk.hurry) {
                 (self.tell)(News::Life(Box::new(living.life())));
             }
@@ -289,7 +300,7 @@ impl<Tell: Fn(News)> Service<'_, Tell> {
     }
 
     /// Makes the picture that is wanted. False if it was interrupted.
-    fn shoot(&self, replay: &mut Replay, scene: &mut Scene) -> bool {
+    fn shoot(&self, replay: &mut Replay, scene: &mut Scene, threads: usize) -> bool {
         let Some(shot) = &self.order.shot else { return true };
         match replay.seek(shot.time) {
             Ok(Stop::Interrupted) => return false,
@@ -312,17 +323,59 @@ impl<Tell: Fn(News)> Service<'_, Tell> {
             return true;
         }
         let smoothness = if shot.fine { Smoothness::Fine } else { Smoothness::Quick };
-        let threads = std::thread::available_parallelism().map_or(1, usize::from);
         let pixels = export::pixels_by(scene, &fit, &page, smoothness, threads);
-        let colors =
-            pixels.into_iter().map(|[r, g, b, a]| Color32::from_rgba_premultiplied(r, g, b, a)).collect();
-        let size = page.pixels.map(|side| side as usize);
+        let (image, part) = cropped(&pixels, page.pixels.map(|side| side as usize));
         (self.tell)(News::Picture(Box::new(Shown {
             order: self.order.clone(),
-            image: ColorImage::new(size, colors),
+            image,
+            part,
             modules: replay.modules() as u64,
             spent: [there - self.begun, there.elapsed()],
         })));
         true
+    }
+}
+
+/// The part of a picture in which something is drawn, and where it is: left, top, right and bottom in parts of the picture. A plant leaves
+/// most of the window empty, and every pixel has to go to the screen.
+fn cropped(pixels: &[[u8; 4]], [width, height]: [usize; 2]) -> (ColorImage, [f32; 4]) {
+    let drawn = |pixel: &[u8; 4]| pixel[3] > 0;
+    let [mut left, mut right, mut top, mut bottom] = [width, 0, height, 0];
+    for (y, row) in pixels.chunks_exact(width.max(1)).enumerate() {
+        if let (Some(first), Some(last)) = (row.iter().position(drawn), row.iter().rposition(drawn)) {
+            (left, right) = (left.min(first), right.max(last + 1));
+            (top, bottom) = (top.min(y), y + 1);
+        }
+    }
+    // A texture has a pixel at least; and one that is empty all around, for where it is stretched the edge of a picture is faded.
+    let [left, top] = [left, top].map(|first| first.saturating_sub(1));
+    let (right, bottom) = ((right + 1).clamp(left + 1, width), (bottom + 1).clamp(top + 1, height));
+    let rows = pixels.chunks_exact(width.max(1)).take(bottom).skip(top);
+    let colors = rows.flat_map(|row| &row[left..right]);
+    let colors = colors.map(|&[r, g, b, a]| Color32::from_rgba_premultiplied(r, g, b, a)).collect();
+    let [x, y] = [width, height].map(|side| 1.0 / side as f32);
+    let part = [left as f32 * x, top as f32 * y, right as f32 * x, bottom as f32 * y];
+    (ColorImage::new([right - left, bottom - top], colors), part)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_empty_around_a_plant_is_left_out() {
+        let mut pixels = vec![[0; 4]; 10 * 8];
+        for at in [3 * 10 + 4, 5 * 10 + 6] {
+            pixels[at] = [1, 2, 3, 255];
+        }
+        let (image, part) = cropped(&pixels, [10, 8]);
+        assert_eq!((image.size, part), ([5, 5], [0.3, 0.25, 0.8, 0.875]));
+        assert_eq!(image.pixels.iter().filter(|c| c.a() > 0).count(), 2);
+        assert_eq!((image[(1, 1)].a(), image[(3, 3)].a()), (255, 255));
+        // At the edges, and nothing at all.
+        pixels[0] = [255; 4];
+        pixels[79] = [255; 4];
+        assert_eq!(cropped(&pixels, [10, 8]).0.size, [10, 8]);
+        assert_eq!(cropped(&[[0; 4]; 6], [3, 2]).0.pixels.len(), 1);
     }
 }
