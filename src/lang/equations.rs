@@ -232,6 +232,10 @@ impl RuleBuilder<'_> {
         free.sort_unstable();
         free.dedup();
         let missing = zeros.len() - unknowns.len();
+        if missing == 0 {
+            // What else stands in them keeps its value.
+            free.clear();
+        }
         if free.len() != missing {
             let name = |p: &usize| format!("`{}`", head.parameters[*p].text);
             let names: Vec<String> = free.iter().map(name).collect();

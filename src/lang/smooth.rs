@@ -45,7 +45,9 @@ impl RuleBuilder<'_> {
                     gentle
                 } else {
                     frozen.conditions.truncate(known);
-                    frozen.take_out(graph, rate, &still, None, &mut self.scope.comparisons, span)
+                    let strict =
+                        frozen.take_out(graph, rate, &still, None, &mut self.scope.comparisons, span);
+                    where_defined(graph, strict, rate, time + 2)
                 },
             ));
         }
@@ -69,6 +71,25 @@ fn gentle_is_driven(
     let curved = |id: &NodeId| graph.integral_is_known(*id);
     graph.reachable(&[rate]).iter().any(curved)
         && driven_form(graph, parameter as u32, gentle, still, time).is_some()
+}
+
+/// Smooth equations, where they have a value; elsewhere those as written. A method looks beyond the instant at which a
+/// condition changes, and rounding puts that instant a little too late: `sqrt(max(x, 0))` goes on there as `sqrt(x)`, of
+/// an x that is negative.
+fn where_defined(graph: &mut Graph, smooth: NodeId, written: NodeId, first_flag: u32) -> NodeId {
+    let nodes = graph.reachable(&[smooth]);
+    let is_partial = |id: &NodeId| match graph.node(*id) {
+        Node::Unary(Unary::Sqrt | Unary::Ln | Unary::Log10 | Unary::Asin | Unary::Acos, _) => true,
+        Node::Binary(Binary::Pow, _, power) => graph.as_constant(power).is_none_or(|p| p != p.floor()),
+        _ => false,
+    };
+    let is_flag = |id: &NodeId| matches!(graph.node(*id), Node::Var(v) if v >= first_flag);
+    if !nodes.iter().any(is_partial) || !nodes.iter().any(is_flag) {
+        return smooth;
+    }
+    let (zero, difference) = (graph.constant(0.0), graph.binary(Binary::Sub, smooth, smooth));
+    let finite = graph.binary(Binary::Eq, difference, zero);
+    graph.select(finite, smooth, written)
 }
 
 /// Conditions that variables stand for.
@@ -151,7 +172,7 @@ impl Frozen {
                 let up = op == Unary::Ceil;
                 let negated = |graph: &mut Graph, x| if up { graph.unary(Unary::Neg, x) } else { x };
                 let (x, a) = (negated(graph, x), negated(graph, a));
-                let (level, _) = self.level(graph, x, a);
+                let (level, _) = self.level(graph, x, a, true);
                 Some(negated(graph, level))
             }
             (Node::Curve(curve, part, x), Node::Curve(_, _, a))
@@ -159,7 +180,7 @@ impl Frozen {
             {
                 let phase = graph.curve(curve, Part::Phase, x);
                 let moved = graph.curve(curve, Part::Phase, a);
-                let (piece, change) = self.level(graph, phase, moved);
+                let (piece, change) = self.level(graph, phase, moved, false);
                 let sides = [graph.curve_of(curve).name.clone(), "its value at a knot".to_owned()];
                 comparisons.entry(change).or_insert((span, Arc::new(sides)));
                 Some(graph.piece(curve, part, piece, a))
@@ -170,14 +191,22 @@ impl Frozen {
 
     /// The whole number below an expression, frozen: a jump at every whole number, where the sine of π x changes sign.
     /// Between two of them it is the even, or the odd, number next to x - 1/2, however x is rounded at the jump itself.
-    /// Also the condition that changes there.
-    fn level(&mut self, graph: &mut Graph, x: NodeId, rebuilt: NodeId) -> (NodeId, NodeId) {
+    /// If it is `closed`, a whole number where x comes to rest is that number: even where the cosine is positive. Also the
+    /// condition that changes there.
+    fn level(&mut self, graph: &mut Graph, x: NodeId, rebuilt: NodeId, closed: bool) -> (NodeId, NodeId) {
         let [zero, half, one, two] = [0.0, 0.5, 1.0, 2.0].map(|x| graph.constant(x));
         let pi = graph.constant(std::f64::consts::PI);
         let phase = graph.binary(Binary::Mul, pi, x);
         let sine = graph.unary(Unary::Sin, phase);
         let change = graph.binary(Binary::Lt, zero, sine);
-        let even = self.flag(graph, change);
+        let mut is_even = change;
+        if closed {
+            let cosine = graph.unary(Unary::Cos, phase);
+            let (on, up) = (graph.binary(Binary::Eq, zero, sine), graph.binary(Binary::Lt, zero, cosine));
+            let on_even = graph.binary(Binary::And, on, up);
+            is_even = graph.binary(Binary::Or, change, on_even);
+        }
+        let even = self.flag(graph, is_even);
         // 2 floor((x + 1/2 - odd) / 2) + odd: x stands in it once, so that bounds of it are as narrow as can be.
         let odd = graph.select(even, zero, one);
         let shift = graph.binary(Binary::Sub, half, odd);

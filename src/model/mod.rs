@@ -143,8 +143,16 @@ impl Frames {
 
     /// The times. Each is computed from its index, so that errors do not add up.
     pub fn times(&self) -> impl Iterator<Item = f64> + use<> {
-        let Frames { from, step, .. } = *self;
-        (0..self.count()).map(move |i| from + i as f64 * step)
+        let frames = *self;
+        (0..self.count()).map(move |i| frames.time(i))
+    }
+
+    /// One of the times. That which is meant where rounding makes a neighbour of it: 0.3 from steps of 0.1, not
+    /// 0.30000000000000004.
+    pub fn time(&self, index: usize) -> f64 {
+        let t = self.from + index as f64 * self.step;
+        let short: f64 = format!("{t:.14e}").parse().unwrap_or(t);
+        if (short - t).abs() <= 4.0 * f64::EPSILON * t.abs() { short } else { t }
     }
 }
 

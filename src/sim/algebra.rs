@@ -73,6 +73,8 @@ const NONE: u32 = u32::MAX;
 const MAX_CORRECTIONS: usize = 60;
 /// A correction of no more than this part of the unknown is the last: the next one would be its square.
 const SMALL: f64 = 1e-9;
+/// Nor is one that does not help, of no more than this part of the unknown or of 1, as tolerances are.
+const NOISE: f64 = 1e-13;
 /// A pivot of no more than this part of its row is none.
 const SINGULAR: f64 = 1e-13;
 /// Where steps have become nothing, unknowns that matter so little in their equations, for what else is in them, are why.
@@ -346,17 +348,20 @@ impl Solver<'_> {
                 // Where nothing is left to correct it does not matter how.
                 return Err(Fault::Singular(places[0]));
             };
-            let size = |y: &[f64]| places.iter().map(|p| y[*p].abs()).fold(1e-300, f64::max);
-            let length = |c: &[f64], y: &[f64]| {
-                let scale = size(y);
-                let of = |(c, p): (&f64, &usize)| c.abs() / y[*p].abs().max(1e-3 * scale).max(1e-12);
-                c.iter().zip(&places).map(of).fold(0.0, f64::max)
+            let start: Vec<f64> = places.iter().map(|p| y[*p]).collect();
+            // One scale for this correction and the next: a solution may be zero, and on the way to it everything is
+            // large for what it is added to.
+            let scale = start.iter().fold(1e-300, |most: f64, x| most.max(x.abs()));
+            let length = |c: &[f64]| {
+                let of = |(c, x): (&f64, &f64)| c.abs() / x.abs().max(1e-3 * scale).max(1e-12);
+                c.iter().zip(&start).map(of).fold(0.0, f64::max)
             };
-            let whole = length(&correction, y);
+            let whole = length(&correction);
+            // Next to zero, rounding in the equations is all that is left long before it is small for the unknown.
+            let noise = (correction.iter().zip(&start)).all(|(c, x)| c.abs() <= NOISE * x.abs().max(1.0));
             if whole == 0.0 {
                 return Ok(());
             }
-            let start: Vec<f64> = places.iter().map(|p| y[*p]).collect();
             let mut part = 1.0;
             loop {
                 for ((place, from), c) in places.iter().zip(&start).zip(&correction) {
@@ -369,9 +374,15 @@ impl Solver<'_> {
                 }
                 if bad(&trial).is_none()
                     && let Some(next) = matrix.solve(&trial)
-                    && length(&next, y) <= (1.0 - 0.25 * part) * whole
+                    && length(&next) <= (1.0 - 0.25 * part) * whole
                 {
                     break;
+                }
+                if noise {
+                    for (place, from) in places.iter().zip(&start) {
+                        y[*place] = *from;
+                    }
+                    return Ok(());
                 }
                 part *= 0.5;
                 if part < 1e-6 {

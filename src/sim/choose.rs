@@ -18,8 +18,9 @@ use crate::structure::ModuleId;
 /// Most times that the equations at one instant are chosen anew before the choice is called chattering.
 const MAX_CHOICES: usize = 8;
 
-/// How many neighbours in a row are asked for the rate of a value that depends on them.
-const DEPTH: usize = 2;
+/// How many neighbours in a row are asked for the rate of a value that depends on them, if none of them has been asked
+/// before.
+const DEPTH: usize = 100;
 
 /// A rate of no more than this part of the value, over the length of a step, is rounding.
 const NOISE: f64 = 16.0 * f64::EPSILON;
@@ -52,6 +53,7 @@ impl Simulation<'_> {
             state.solve = next_clause(rule, &guess, &[]);
             state.switches = switches(rule, state.solve, &guess);
         }
+        self.known_rates.clear();
         let mut outcome = Ok(());
         for choice in 0.. {
             let mut changed = false;
@@ -88,6 +90,7 @@ impl Simulation<'_> {
                         Some(next) => {
                             state.solve = Some(next);
                             state.switches = switches(rule, state.solve, &signs);
+                            self.known_rates.forget(id);
                             changed = true;
                         }
                         None => {
@@ -104,6 +107,7 @@ impl Simulation<'_> {
                         trouble.get_or_insert(Trouble { id, chattering: true, signs: signs.clone() });
                     }
                     state.switches = wanted;
+                    self.known_rates.forget(id);
                     changed = true;
                 }
                 settled.push((id, signs));
@@ -272,6 +276,7 @@ impl Simulation<'_> {
 
     /// The rates of a module's parameters a little ahead, by its present equations.
     pub(super) fn rates_ahead(&mut self, id: ModuleId, tau: f64, out: &mut Vec<f64>) {
+        self.known_rates.clear();
         self.rates_to(id, tau, DEPTH, out);
     }
 

@@ -307,6 +307,13 @@ impl Simulation<'_> {
         if algebraic.is_empty() || depth == 0 {
             return;
         }
+        if let Some(known) = self.known_rates.get(id, tau) {
+            for (&parameter, rate) in algebraic.of.iter().zip(known) {
+                out[parameter] = *rate;
+            }
+            return;
+        }
+        self.known_rates.begin(id, tau, algebraic.of.len(), &around);
         let mut variables = Vec::new();
         self.neighbours_ahead(compiled, id, &around, tau, depth, out, &mut variables);
         variables.extend(switches.iter().map(|&on| Dual { value: f64::from(u8::from(on)), rate: 0.0 }));
@@ -341,5 +348,6 @@ impl Simulation<'_> {
         for (place, value) in left.iter().enumerate().filter(|(place, _)| algebraic.explicit[*place]) {
             out[algebraic.of[place]] = if value.rate.is_finite() { value.rate } else { 0.0 };
         }
+        self.known_rates.set(id, tau, algebraic.of.iter().map(|&parameter| out[parameter]));
     }
 }

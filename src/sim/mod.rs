@@ -75,6 +75,7 @@ mod gather;
 mod implicit;
 mod inspect;
 mod integrator;
+mod known_rates;
 mod light;
 mod linear;
 mod local;

@@ -218,7 +218,27 @@ impl Simulation<'_> {
         if let Some(id) = oldest {
             self.watch_for_piling_up(id)?;
         }
-        self.settle()
+        let before = self.stats.events;
+        self.settle()?;
+        match oldest {
+            Some(id) if self.stats.events == before => self.watch_for_standstill(id),
+            _ => Ok(()),
+        }
+    }
+
+    /// Equations that change again and again at one instant.
+    fn watch_for_standstill(&mut self, id: ModuleId) -> Result<(), Error> {
+        /// Others may happen at nearly the same instant, within its resolution; so many do not.
+        const MOST: usize = 1000;
+        let (since, times) = self.standing;
+        let stands = self.now.since(since) <= self.now.resolution();
+        self.standing = if stands { (since, times + 1) } else { (self.now, 0) };
+        if times <= MOST || !stands {
+            return Ok(());
+        }
+        let rule = self.plant.rule_and_clause(id).0.unwrap_or(0);
+        let site = self.site_of(id, rule, self.model.rules[rule].span, self.now.to_f64());
+        Err(Error::Chattering { site })
     }
 
     /// True if all of the front has one instant, and nothing else happens then.

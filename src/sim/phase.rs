@@ -26,8 +26,15 @@ impl Simulation<'_> {
         let mut opened = std::mem::take(&mut self.opened);
         opened.append(&mut self.ready);
         for &id in &opened {
+            if let Some(state) = self.plant.state_mut(id) {
+                state.open = None;
+                state.waits = true;
+            }
+        }
+        // A module that got several rules within the instant is there several times; its motion begins once.
+        opened.retain(|id| self.plant.state_mut(*id).is_some_and(|state| std::mem::take(&mut state.waits)));
+        for &id in &opened {
             let Some(state) = self.plant.state_mut(id) else { continue };
-            state.open = None;
             if state.rule.is_some() {
                 state.restarted = self.group;
                 self.start_motions(id, self.forced);

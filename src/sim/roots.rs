@@ -48,7 +48,8 @@ pub fn first_root(f: &mut impl Function, from: f64, to: f64, start: Sign, tolera
     if first != Sign::Zero && sign == Sign::Any {
         sign = first;
     }
-    if first != Sign::Zero && first != sign {
+    // Where it is undefined from here on it may be defined here.
+    if first != Sign::Zero && first != sign && sign != Sign::Undefined {
         return Some(Root { position: from, at: Sign::Zero, after: first });
     }
     // Off zero: a root from here on is one that was not there before.
@@ -93,6 +94,14 @@ pub fn first_root(f: &mut impl Function, from: f64, to: f64, start: Sign, tolera
         if armed {
             // Exactly: a value that merely comes within the tolerance may be about to cross.
             let exact = Sign::of(f.value(hi));
+            // At the very end of the stretch, if it is about to cross within the rounding of the position.
+            if monotone && hi >= to && exact == sign && end == Sign::Zero {
+                let rate = f.bounds(lo.max(hi - 1e-9 * hi), hi).rate;
+                let steep = rate.lo.abs().min(rate.hi.abs()) * 16.0 * f64::EPSILON * hi;
+                if f.value(hi).abs() <= steep && (rate.hi < 0.0) == (sign == Sign::Plus) {
+                    return Some(Root { position: hi, at: Sign::Zero, after: opposite(sign) });
+                }
+            }
             let crossed = if monotone { exact != sign } else { end != sign && end != Sign::Zero };
             if crossed {
                 let position = bracket(f, lo, hi, sign);
@@ -109,8 +118,21 @@ pub fn first_root(f: &mut impl Function, from: f64, to: f64, start: Sign, tolera
                 // An extremum on zero, or near enough.
                 for (at, seen) in [(middle, classify(f.value(middle))), (hi, end)] {
                     if seen == Sign::Zero {
-                        let position = first_zero(lo, at, |x| classify(f.value(x)) == Sign::Zero);
-                        return Some(Root { position, at: Sign::Zero, after: sign });
+                        // A kink in a crossing looks like one, as far as its value is zero.
+                        let (beyond, after) = way_out(f, at, to, classify);
+                        if after == opposite(sign) {
+                            let position =
+                                if Sign::of(f.value(lo)) == sign { bracket(f, lo, beyond, sign) } else { lo };
+                            return Some(Root { position, at: Sign::Zero, after });
+                        }
+                        let position = if after == Sign::Zero {
+                            // It stays there: from where it is as small as it gets.
+                            let least = 2.0 * f.value(beyond).abs();
+                            first_where(lo, beyond, |x| f.value(x).abs() <= least)
+                        } else {
+                            first_where(lo, at, |x| classify(f.value(x)) == Sign::Zero)
+                        };
+                        return Some(Root { position, at: Sign::Zero, after });
                     }
                 }
             }
@@ -119,7 +141,17 @@ pub fn first_root(f: &mut impl Function, from: f64, to: f64, start: Sign, tolera
                 sign = end;
             }
             if end != sign {
-                return Some(Root { position: lo, at: Sign::Zero, after: end });
+                // From zero on it goes, or it jumps.
+                let position = first_where(lo, hi, |x| classify(f.value(x)) != Sign::Zero);
+                let (there, later) = (f.value(position).abs(), f.value(hi).abs());
+                if sign == Sign::Undefined {
+                    return Some(Root { position, at: end, after: end });
+                }
+                return Some(if there > 4.0 * tolerance && there > 0.5 * later && later.is_finite() {
+                    Root { position, at: end, after: end }
+                } else {
+                    Root { position: lo, at: Sign::Zero, after: end }
+                });
             }
             armed = true;
         }
@@ -127,14 +159,29 @@ pub fn first_root(f: &mut impl Function, from: f64, to: f64, start: Sign, tolera
     None
 }
 
-/// The first position at which `is_zero` holds, which it does at `hi` and need not at `lo`; by bisection.
-fn first_zero(mut lo: f64, mut hi: f64, mut is_zero: impl FnMut(f64) -> bool) -> f64 {
+/// A position where a function is no longer zero that is at `at`, and its sign there; zero if that is not nearby.
+fn way_out(f: &mut impl Function, at: f64, to: f64, classify: impl Fn(f64) -> Sign) -> (f64, Sign) {
+    /// Further away, zero is where it stays.
+    const NEARBY: f64 = 1e-6;
+    let (size, mut reach) = (at.max(SMALL), NARROW * at.max(SMALL));
+    loop {
+        let position = (at + reach).min(to);
+        let sign = classify(f.value(position));
+        if sign != Sign::Zero || position >= to || reach > NEARBY * size {
+            return (position, sign);
+        }
+        reach *= 2.0;
+    }
+}
+
+/// The first position at which something holds, which it does at `hi` and need not at `lo`; by bisection.
+fn first_where(mut lo: f64, mut hi: f64, mut holds: impl FnMut(f64) -> bool) -> f64 {
     while hi - lo > f64::EPSILON * hi {
         let middle = 0.5 * (lo + hi);
         if middle <= lo || middle >= hi {
             break;
         }
-        if is_zero(middle) {
+        if holds(middle) {
             hi = middle;
         } else {
             lo = middle;
@@ -260,6 +307,31 @@ mod tests {
             op(Binary::Add, op(Binary::Mul, d, d), c(1e-12))
         });
         assert_eq!(first_root(&mut miss, 0.0, 1.0, Sign::Plus, 1e-15), None);
+    }
+
+    #[test]
+    fn a_crossing_with_a_kink_is_no_touch() {
+        // max(a (x - c), b (x - c)) has no rate at c; the tolerance is a thousand times what rounding makes of it.
+        for (a, b) in [(-1.0 / 2.6, -2.5), (-2.5, -1.0 / 2.6)] {
+            let mut f = given!(x => |c: fn(f64) -> T, op: fn(Binary, T, T) -> T, _: fn(Unary, T) -> T| {
+                let d = op(Binary::Sub, x, c(0.62));
+                op(Binary::Max, op(Binary::Mul, d, c(a)), op(Binary::Mul, d, c(b)))
+            });
+            let root = first_root(&mut f, 0.0, 1.0, Sign::Plus, 1e-13).expect("a root");
+            assert!((root.position - 0.62).abs() < 1e-15 && root.after == Sign::Minus, "{root:?}");
+            assert_eq!(first_root(&mut f, root.position, 1.0, root.after, 1e-15), None);
+        }
+    }
+
+    #[test]
+    fn a_crossing_at_the_very_end_is_not_left_to_what_follows() {
+        // As rounding has it, sin(2 π) is still below zero.
+        let mut f = given!(x => |c: fn(f64) -> T, op: fn(Binary, T, T) -> T, un: fn(Unary, T) -> T| {
+            let t = op(Binary::Add, x, c(1.0));
+            op(Binary::Sub, c(0.0), un(Unary::Sin, op(Binary::Mul, c(std::f64::consts::PI), t)))
+        });
+        let root = first_root(&mut f, 1e-14, 1.0, Sign::Plus, 1e-15).expect("a root");
+        assert_eq!((root.position, root.after), (1.0, Sign::Minus));
     }
 
     #[test]

@@ -12,6 +12,7 @@ use super::derive::Steps;
 use super::error::{Error, Site};
 use super::event::Event;
 use super::integrator::Integrator;
+use super::known_rates::KnownRates;
 use super::motion::Motion;
 use super::neighbours::Neighbours;
 use super::observe::Gallery;
@@ -95,6 +96,9 @@ pub struct Simulation<'m> {
     pub(super) watcher: Watcher,
     /// Events in a row of modules that hardly lived.
     pub(super) stalled: usize,
+    /// Since when nothing has happened but changes of equations, at one instant, and how many.
+    pub(super) standing: (Instant, usize),
+    pub(super) known_rates: KnownRates,
     pub(super) stats: Stats,
     /// Productions since they were last taken, if they are recorded.
     pub(super) log: Option<Vec<Event>>,
@@ -187,6 +191,8 @@ impl<'m> Simulation<'m> {
                 .collect(),
             watcher: Watcher::default(),
             stalled: 0,
+            standing: (Instant::ZERO, 0),
+            known_rates: KnownRates::default(),
             stats: Stats::default(),
             log: settings.log.then(Vec::new),
             recorder: (settings.log && settings.transitions).then(Recorder::default),

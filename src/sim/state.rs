@@ -42,6 +42,8 @@ pub struct State {
     pub next: Next,
     /// Set while an instant is examined that concerns the module.
     pub open: Option<Box<Open>>,
+    /// Its motions are about to begin.
+    pub waits: bool,
     /// Number of the instant at which its motions last began.
     pub restarted: u64,
 }
@@ -148,6 +150,7 @@ impl State {
             visited: 0,
             next: Next::default(),
             open: None,
+            waits: false,
             restarted: 0,
         }
     }

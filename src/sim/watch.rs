@@ -16,6 +16,9 @@ use crate::structure::Instant;
 /// Zero, for a difference of two sides, in units of their rounding.
 pub const TOUCH: f64 = 256.0 * f64::EPSILON;
 
+/// A difference of two sides of no more than this part of them, or of 1, may be what numerical motions leave of zero.
+const NOISE: f64 = 1e-10;
+
 /// Most changes of a module's signs that are followed within one stretch.
 const MAX_ROUNDS: usize = 50;
 
@@ -251,9 +254,43 @@ impl Watcher {
         sign: Sign,
         tolerance: f64,
     ) -> Option<Meeting> {
+        // The sign that a boundary was left with is believed against values that are rounding, and against a jump that
+        // comes within the rounding of time.
+        let (mut from, mut tolerance) = (from, tolerance);
+        let start = self.difference(path, atom).value(from);
+        if sign != Sign::Any && start != 0.0 && start * sign_of(sign) <= 0.0 {
+            let size = self.out[2 * atom].abs().max(1.0);
+            let soon = (from + 4.0 * path.start.resolution() / path.h).min(limit);
+            let then = self.difference(path, atom).value(soon);
+            if sign == Sign::Zero && then == 0.0 || then * sign_of(sign) > tolerance {
+                from = soon;
+            } else {
+                let limit = if sign == Sign::Zero { 64.0 * f64::EPSILON } else { NOISE };
+                let noise = if start.abs() <= limit * size { 4.0 * start.abs() } else { 0.0 };
+                tolerance = tolerance.max(noise).max(self.rounding(path, atom, from));
+            }
+        }
         let Root { position, at, after } =
             first_root(&mut self.difference(path, atom), from, limit, sign, tolerance)?;
         Some(Meeting { position, time: path.start.after(position * path.h), at, after, level: None })
+    }
+
+    /// What rounding of the variables makes of the difference of two sides.
+    fn rounding(&mut self, path: &Path, atom: usize, at: f64) -> f64 {
+        path.over(at, at, &mut self.bounds);
+        for variable in &mut self.bounds {
+            let width = 64.0 * f64::EPSILON * variable.value.magnitude();
+            variable.value.lo -= width;
+            variable.value.hi += width;
+        }
+        let sides = &path.rule.sides;
+        self.bounds_out.resize(sides.outputs(), Dual::constant(0.0));
+        sides.eval(&self.bounds, &mut self.bounds_scratch, &mut self.bounds_out);
+        let [a, b] = [0, 1].map(|side| self.bounds_out[2 * atom + side].value);
+        let width = (a.hi - a.lo) + (b.hi - b.lo);
+        // More than that is a jump.
+        let size = a.magnitude().max(b.magnitude()).max(1.0);
+        if width <= NOISE * size { width } else { 0.0 }
     }
 
     /// When a variable that moves one way only takes the value at which its atom's sides meet.
@@ -349,6 +386,15 @@ impl Watcher {
 /// The last position that is the same instant as this one.
 pub fn path_together(path: &Path, position: f64) -> f64 {
     position + path.start.after(position * path.h).resolution() / path.h
+}
+
+/// 1, -1, or 0 where there is no sign.
+fn sign_of(sign: Sign) -> f64 {
+    match sign {
+        Sign::Plus => 1.0,
+        Sign::Minus => -1.0,
+        _ => 0.0,
+    }
 }
 
 pub fn opposite(sign: Sign) -> Sign {

@@ -28,6 +28,7 @@ mod book;
 mod chance;
 mod cli;
 mod common;
+mod corners;
 mod discrete;
 mod editing;
 mod export;
