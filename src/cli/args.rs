@@ -424,13 +424,13 @@ pub struct SharedArgs {
     #[arg(long, value_name = "T1,T2,…", allow_negative_numbers = true, value_delimiter = ',', value_parser = time, conflicts_with_all = ["from", "to", "step"])]
     pub at: Option<Vec<f64>>,
     /// First of equidistant times to observe [default: the model's `frames`]
-    #[arg(long, value_name = "A", allow_negative_numbers = true, value_parser = time, requires = "to", requires = "step")]
+    #[arg(long, value_name = "A", allow_negative_numbers = true, value_parser = time)]
     pub from: Option<f64>,
     /// Last of them
-    #[arg(long, value_name = "B", allow_negative_numbers = true, value_parser = time, requires = "from")]
+    #[arg(long, value_name = "B", allow_negative_numbers = true, value_parser = time)]
     pub to: Option<f64>,
     /// Time between them
-    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive, requires = "from")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
     pub step: Option<f64>,
     /// Set a `param` of the model; can be repeated
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]

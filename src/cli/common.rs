@@ -300,6 +300,16 @@ impl Run {
         }
     }
 
+    /// Says so if nothing is drawn in any frame.
+    pub fn note_what_is_seen(&self, bounds: bool) {
+        if !bounds {
+            let warning = Diagnostic::warning("nothing is drawn in any frame").help(
+                "the turtle draws F, surfaces such as @L, and what `interpret` says of other modules: `interpret A(x): F(x)`",
+            );
+            self.note(vec![warning]);
+        }
+    }
+
     /// Prints what was noted.
     pub fn warn(&self) {
         let mut remarks = self.remarks.lock().unwrap_or_else(PoisonError::into_inner);
@@ -333,23 +343,30 @@ fn times(args: &SharedArgs, session: &Session) -> Result<Vec<f64>, Failure> {
         times.dedup();
         return Ok(times);
     }
-    let frames = match (args.from, args.to, args.step) {
-        (Some(from), Some(to), Some(step)) => {
-            let frames = Frames { from, to, step };
-            if to < from {
-                return Err(Failure::Usage(format!("error: --to {to} is before --from {from}\n")));
-            }
-            if (to - from) / step >= Frames::LIMIT as f64 {
-                return Err(Failure::Usage(format!("error: more than {} frames\n", Frames::LIMIT)));
-            }
-            frames
-        }
-        _ => session.model.frames.ok_or_else(|| {
-            Failure::Usage(
-                "error: the model has no `frames`: say when to look with `--at T1,T2,…` or `--from A --to B --step S`\n"
-                    .to_owned(),
-            )
-        })?,
+    let own = session.model.frames;
+    // What is not said is as in the model.
+    let (from, to, step) = (
+        args.from.or(own.map(|own| own.from)),
+        args.to.or(own.map(|own| own.to)),
+        args.step.or(own.map(|own| own.step)),
+    );
+    let (Some(from), Some(to), Some(step)) = (from, to, step) else {
+        return Err(Failure::Usage(
+            "error: the model has no `frames`: say when to look with `--at T1,T2,…` or `--from A --to B --step S`\n"
+                .to_owned(),
+        ));
     };
+    let frames = Frames { from, to, step };
+    if to < from {
+        let own = |flag: Option<f64>| if flag.is_some() { "" } else { " of the model" };
+        return Err(Failure::Usage(format!(
+            "error: --to {to}{} is before --from {from}{}\n",
+            own(args.to),
+            own(args.from)
+        )));
+    }
+    if (to - from) / step >= Frames::LIMIT as f64 {
+        return Err(Failure::Usage(format!("error: more than {} frames\n", Frames::LIMIT)));
+    }
     Ok(frames.times().collect())
 }

@@ -127,8 +127,9 @@ fn record(run: &Run, accuracy: Option<f64>) -> Result<Recording, Failure> {
         Ok(())
     })?;
     drop(progress);
-    run.warn();
     let mut fit = survey.fit();
+    run.note_what_is_seen(fit.bounds.is_some());
+    run.warn();
     fit.accuracy = accuracy.unwrap_or(fit.accuracy);
     let (model, source) = (&run.session.model, &run.session.source);
     let name =

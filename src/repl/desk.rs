@@ -178,7 +178,8 @@ impl Desk {
     /// Takes the last change back.
     pub fn undo(&mut self, time: f64) -> Result<Flow, Fault> {
         let Some(text) = self.draft.previous().map(str::to_owned) else {
-            return Err(Fault::new("nothing was changed yet"));
+            let set = if self.set.is_empty() { "" } else { "; params go back with `set`" };
+            return Err(Fault::new(format!("the text was not changed yet{set}")));
         };
         let session = self.read(&text, &self.set)?;
         self.draft.undo();

@@ -60,6 +60,14 @@ impl Draft {
         self.text == self.saved || self.text.trim().is_empty()
     }
 
+    /// True if a file is there that holds neither what was read from it or saved in it, nor what is to be saved.
+    pub fn was_changed_elsewhere(&self, path: &Path) -> bool {
+        let Ok(found) = std::fs::read(path) else { return false };
+        let found = String::from_utf8_lossy(&found);
+        let same = |text: &str| text.lines().eq(found.trim_start_matches('\u{feff}').lines());
+        !same(&self.saved) && !same(&self.text)
+    }
+
     pub fn set_saved(&mut self, path: &Path) {
         self.path = Some(path.to_owned());
         self.saved = self.text.clone();

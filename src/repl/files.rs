@@ -72,6 +72,11 @@ impl Stage<'_> {
         let own = desk.draft.path.as_ref().is_some_and(|known| real(known) == real(&path));
         if !own {
             spare(&path, force, desk)?;
+        } else if !force && desk.draft.was_changed_elsewhere(&path) {
+            return Err(Fault::new(format!(
+                "{} was changed by somebody else since it was read: `reload` takes what is there, `save NAME.dls` another name, `save --force` writes over it",
+                path.display()
+            )));
         }
         let text = desk.draft.text.clone();
         write(&path, text.as_bytes(), desk)?;
@@ -127,8 +132,9 @@ impl Stage<'_> {
             other => {
                 let format: Format = other.parse().map_err(|_| {
                     Fault::new(format!(
-                        "the name tells the format: .svg, .png, .obj, .json or .txt, but this one ends with `{}`; `render -o DIR` writes all frames",
-                        name.chars().rev().take(8).collect::<Vec<_>>().into_iter().rev().collect::<String>()
+                        "the name tells the format: .svg, .png, .obj, .json or .txt, but `{}` has {}; `render -o DIR` writes all frames",
+                        path.display(),
+                        if extension.is_empty() { "none".to_owned() } else { format!("`.{extension}`") }
                     ))
                 })?;
                 let scene = self.scene(desk)?;

@@ -153,7 +153,7 @@ impl Stage<'_> {
         if wanted != index {
             desk.say(if count > 0 { "this is the last frame\n" } else { "this is the first frame\n" })?;
         }
-        let target = frames.from + index as f64 * frames.step;
+        let target = frames.time(index as usize);
         let beyond = if count > 0 { target < t } else { target > t };
         self.go(if beyond { t } else { target }, desk)
     }

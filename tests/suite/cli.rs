@@ -111,7 +111,7 @@ fn faults_have_their_exit_status() {
         (&["run", "tests/errors/run_cascade.dls", "--at", "1"], 1, "without end"),
         (&["run", model, "--at=-1"], 2, "time begins at 0"),
         (&["run", model, "--at", "soon"], 2, "not a number"),
-        (&["run", model, "--from", "0", "--to", "1"], 2, "--step"),
+        (&["run", model, "--from", "90"], 2, "of the model is before --from 90"),
         (&["run", model, "--from", "2", "--to", "1", "--step", "1"], 2, "before"),
         (&["run", model, "--method", "rk4", "--at", "1"], 2, "--step-size"),
         (&["run", model, "--method", "magic", "--at", "1"], 2, "methods are"),

@@ -28,6 +28,15 @@ pub fn survey(args: &RenderArgs) -> Result<Survey, Failure> {
 
 /// Refuses flags that mean nothing with the format or the layout.
 pub fn agree(args: &RenderArgs) -> Result<(), Failure> {
+    let extension = args.out.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    if !args.out.is_dir() && ["svg", "png", "obj", "gif", "mp4", "webm"].contains(&extension.as_str()) {
+        let name = args.out.with_extension("");
+        return Err(usage(format!(
+            "-o names a folder, and {} looks like a file: every frame is a file in it; `-o {}` and --format svg, png or obj, or `--at T` for one frame",
+            args.out.display(),
+            name.display()
+        )));
+    }
     if args.format == FrameFormat::Obj {
         if args.layout != Layout::Frames {
             return Err(usage(format!(

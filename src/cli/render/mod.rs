@@ -154,6 +154,9 @@ impl Render<'_> {
             if (self.stale)() { Err(Failure::Stale) } else { Ok(()) }
         });
         drop(progress);
+        if measured.is_ok() {
+            self.run.note_what_is_seen(survey.fit().bounds.is_some());
+        }
         self.run.warn();
         events.map_or(Ok(()), EventLog::finish)?;
         measured.map(|_| survey)
