@@ -53,6 +53,8 @@ fn the_layout_of_every_model_is_canonical_once_and_means_the_same() {
         parsed += 1;
         let once = laid_out(&text).unwrap_or_else(|| panic!("{} has no layout", path.display()));
         assert_eq!(laid_out(&once).as_ref(), Some(&once), "{}", path.display());
+        // Those that people read first are laid out.
+        assert!(!path.starts_with(repository("models")) || once == text, "{}: `dlsys fmt`", path.display());
         assert_eq!(meaning(&once), Some(meaning_before), "{}", path.display());
         assert_eq!(comments(&once), comments(&text), "{}", path.display());
     }
