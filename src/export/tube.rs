@@ -100,7 +100,7 @@ impl<'s> Tubes<'s> {
                 && segments[before].contour == segment.contour
                 && radii[before][1] > 0.0
                 && radii[i][0] > 0.0
-                && can_join(&segments[before], segment, radii[before][1].max(radii[i][0]))
+                && can_join(&segments[before], segment, [radii[before][1], radii[i][0]])
             {
                 next[before] = i;
                 continues[i] = true;
@@ -334,14 +334,21 @@ pub(super) fn curve(points: &[[f64; 2]], sides: usize) -> Vec<Spoke> {
     spokes
 }
 
-/// Whether two segments can share a ring of this radius.
-fn can_join(a: &Segment, b: &Segment, radius: f64) -> bool {
+/// Whether two segments can share a ring, or the plane of it where they have these radii there.
+fn can_join(a: &Segment, b: &Segment, radii: [f64; 2]) -> bool {
+    /// Most that a shoulder may reach beyond the thinner one, as a part of its radius: it would be a spike.
+    const OVERHANG: f64 = 0.1;
     let cos = a.direction.dot(&b.direction);
     if cos < SHARPEST {
         return false;
     }
     // How far the ring reaches into either segment: r tan(θ/2).
-    let reach = radius * ((1.0 - cos).max(0.0) / (1.0 + cos)).sqrt();
+    let (thin, thick) = (radii[0].min(radii[1]), radii[0].max(radii[1]));
+    let half = ((1.0 - cos).max(0.0) / (1.0 + cos)).sqrt();
+    if (thick - thin) * half > OVERHANG * thin {
+        return false;
+    }
+    let reach = thick * half;
     let shorter = (a.end - a.start).norm().min((b.end - b.start).norm());
     reach <= 0.5 * shorter
 }

@@ -223,6 +223,21 @@ fn a_sharp_turn_or_a_short_piece_begins_a_new_tube() {
 }
 
 #[test]
+fn a_bend_where_the_width_changes_has_no_spike() {
+    let text = written(&scene("!(0.4) F(2) +(70) !(0.6) F(2)"), "front", Format::Obj);
+    let (sin, cos) = 70.0_f64.to_radians().sin_cos();
+    let corner = Vector::new(0.0, 2.0, 0.0);
+    let axes = [(Vector::zeros(), corner), (corner, corner + 2.0 * Vector::new(-sin, cos, 0.0))];
+    for (vertex, _) in triangles(&read_obj(&text)).into_iter().flatten() {
+        let away = axes.map(|(from, to)| {
+            let (along, p) = (to - from, vertex.coords - from);
+            (p - along * (p.dot(&along) / along.norm_squared()).clamp(0.0, 1.0)).norm()
+        });
+        assert!(away[0].min(away[1]) < 0.3 + 1e-6, "{vertex} lies outside");
+    }
+}
+
+#[test]
 fn groups_are_named_after_modules() {
     let text = written(&scene(TWIG), "front", Format::Obj);
     let names: Vec<&str> = text.lines().filter_map(|line| line.strip_prefix("g ")).collect();
