@@ -68,6 +68,13 @@ impl Progress {
         self.show();
     }
 
+    /// So much of all of it is done, from 0 to 1.
+    pub fn reach(&mut self, part: f64) {
+        let all = self.bar.length().unwrap_or(0);
+        self.bar.set_position((part.clamp(0.0, 1.0) * all as f64) as u64);
+        self.show();
+    }
+
     /// Hides it while something else is printed.
     pub fn suspend<R>(&self, print: impl FnOnce() -> R) -> R {
         self.bar.suspend(print)

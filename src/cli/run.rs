@@ -8,7 +8,7 @@ use super::common::{Failure, Run, count_of, out_error};
 use super::events::EventLog;
 use super::progress::Progress;
 use crate::model::Model;
-use crate::sim::describe;
+use crate::sim::{Passed, describe};
 use crate::structure::ModuleString;
 
 /// Reads a model and reports on it.
@@ -29,6 +29,11 @@ pub fn check(args: &CheckArgs) -> Result<(), Failure> {
     if args.continuity { super::continuity::check(args, &session) } else { Ok(()) }
 }
 
+/// Parts of a way whose progress is told.
+const WAY: usize = 1000;
+/// Events and steps that are passed before it is told how far that is.
+const STRIDE: usize = 1000;
+
 /// Runs a model and prints its strings.
 pub fn run(args: &RunArgs) -> Result<(), Failure> {
     let run = Run::start(&args.shared)?;
@@ -43,9 +48,17 @@ pub fn run(args: &RunArgs) -> Result<(), Failure> {
         let mut simulation = run.simulate()?;
         let mut string = ModuleString::default();
         let mut text = String::new();
-        let mut progress = Progress::of_printed("running", run.times.len());
+        // On the way to one time only, the way is what is told.
+        let alone = run.times.len() == 1;
+        let mut progress = match alone {
+            true => Progress::new("running", WAY),
+            false => Progress::of_printed("running", run.times.len()),
+        };
         for &t in &run.times {
             let before = Instant::now();
+            while alone && let Ok(Passed::Some) = simulation.pass_some(t, STRIDE, false) {
+                progress.reach(simulation.reached() / t);
+            }
             let done = simulation.at(t, &mut string);
             clock.simulate += before.elapsed();
             if let Some(log) = &mut events {
@@ -60,7 +73,9 @@ pub fn run(args: &RunArgs) -> Result<(), Failure> {
             }
             out.write_all(text.as_bytes()).map_err(out_error)?;
             clock.output += before.elapsed();
-            progress.inc();
+            if !alone {
+                progress.inc();
+            }
         }
         Ok(simulation.stats())
     })();

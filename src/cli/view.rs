@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::Path;
 
 use super::args::ViewArgs;
-use super::common::{Failure, Run, out_error};
+use super::common::{Failure, Run, count_of, out_error};
 use super::progress::Progress;
 use super::reel::{Pass, Shot, play};
 use crate::export::{self, Survey, View};
@@ -85,7 +85,8 @@ fn write(args: &ViewArgs, out: &Path) -> Result<(), Failure> {
     export::replace(folder, &name, document.as_bytes())
         .map_err(|error| Failure::Model(format!("error: {error}\n")))?;
     let megabytes = document.len() as f64 / 1e6;
-    writeln!(std::io::stdout(), "{}: {count} frames, {megabytes:.1} MB", out.display()).map_err(out_error)
+    writeln!(std::io::stdout(), "{}: {}, {megabytes:.1} MB", out.display(), count_of(count, "frame"))
+        .map_err(out_error)
 }
 
 /// Refuses to write over what is not a page of ours.

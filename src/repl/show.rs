@@ -244,7 +244,7 @@ impl Stage<'_> {
                     rule.label
                 );
             }
-            None => out += &format!("  next      nothing up to t = {}\n", brief(limit, 9)),
+            None => out += &format!("  next      no production up to t = {}\n", brief(limit, 9)),
         }
         desk.say(&out)
     }

@@ -49,12 +49,12 @@ pub fn new(args: &NewArgs) -> Result<(), Failure> {
         };
         Failure::Model(format!("error: cannot write {}: {error}\n\n  = help: {help}\n", path.display()))
     })?;
-    let (file, frames) = (path.display(), path.with_extension(""));
-    let frames = frames.display();
+    let (file, frames) = (typed(&path), path.with_extension(""));
+    let (folder, frames) = (frames.display(), typed(&frames));
     let next = [
         (
             format!("render {file} -o {frames}"),
-            format!("draws it; open {frames}/frame-0120.svg in a browser"),
+            format!("draws it; open {folder}/frame-0120.svg in a browser"),
         ),
         (
             format!("render {file} -o {frames} --watch"),
@@ -63,11 +63,18 @@ pub fn new(args: &NewArgs) -> Result<(), Failure> {
         (format!("check {file}"), "says what is wrong with it".to_owned()),
     ];
     let width = next.iter().map(|(command, _)| command.chars().count()).max().unwrap_or(0);
-    let mut text = format!("{file} is written. What to do with it:\n");
+    let mut text = format!("{} is written. What to do with it:\n", path.display());
     for (command, what) in &next {
         text += &format!("  dlsys {command:width$}  {what}\n");
     }
     std::io::stdout().write_all(text.as_bytes()).map_err(out_error)
+}
+
+/// A name as a shell takes it.
+fn typed(path: &Path) -> String {
+    let name = path.display().to_string();
+    let plain = |c: char| c.is_alphanumeric() || "._-/\\:~".contains(c);
+    if name.chars().all(plain) { name } else { format!("'{}'", name.replace('\'', "'\\''")) }
 }
 
 /// The model's text. A name may have characters that a title cannot.

@@ -95,15 +95,22 @@ pub fn render_run(args: &RenderArgs, run: Run, stale: &(dyn Fn() -> bool + Sync)
     if args.quiet {
         return Ok(());
     }
-    let line = format!(
+    let mut line = format!(
         "{}, {}, in {:.2} s: {}\n",
         count_of(run.times.len(), "frame"),
         size_of(written.bytes),
         begun.elapsed().as_secs_f64(),
         written.names
     );
+    if written.bytes > LARGE && args.accuracy.is_none() && args.format != super::args::FrameFormat::Png {
+        line +=
+            "  large: --accuracy 0.02 makes surfaces of fewer pieces, --format png makes pictures of dots\n";
+    }
     std::io::stdout().write_all(line.as_bytes()).map_err(out_error)
 }
+
+/// Bytes of a render that somebody may want to be fewer.
+const LARGE: u64 = 50_000_000;
 
 /// What there is to be said of a render in one line.
 struct Written {
