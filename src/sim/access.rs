@@ -28,8 +28,7 @@ pub fn happens_by(at: Instant, t: f64) -> bool {
 
 impl Simulation<'_> {
     /// Lets time pass up to `t`, as [`Simulation::pass`], but at most so many entries of the queues (events, ends of
-    /// steps), and, if that is asked for, only to the next
-    /// production.
+    /// steps), and, if that is asked for, only to the next production.
     ///
     /// # Errors
     /// As of [`Simulation::pass`].
