@@ -69,10 +69,6 @@
 //!
 //! Imports go down this arrow and never back; `lang`, `sim`, `turtle` and `export` do not know one another.
 //! `ARCHITECTURE.md` tells why things are as they are.
-//!
-//! # What it does not do yet
-//!
-//! No random numbers.
 
 pub mod cli;
 pub mod diagnostic;

@@ -227,6 +227,13 @@ impl Program {
             }
             return;
         }
+        if self.code.is_empty() {
+            // Nothing but variables.
+            for (value, register) in out.iter_mut().zip(&self.outputs) {
+                *value = variables[*register as usize];
+            }
+            return;
+        }
         scratch.clear();
         scratch.extend_from_slice(&variables[..self.variables]);
         scratch.resize(self.registers, T::constant(0.0));

@@ -4,10 +4,14 @@
 //! that come first (`light`), so entries of one float are one bundle here, and order within it is decided there. A
 //! light module stays what it is until its event, so nothing is ever taken back.
 
+use std::collections::VecDeque;
+
 /// An entry's slot has this bit if it is the number of a run; a tree has no such slots.
 const RUN: u32 = 1 << 31;
 /// Children of an entry in the heap: four lie in one line of the cache.
 const ARITY: usize = 4;
+/// Lines beside the heap.
+const LINES: usize = 4;
 /// Times that are remembered, so that equal ones meet.
 const RECENT: usize = 16;
 const NOWHERE: u32 = u32::MAX;
@@ -33,10 +37,17 @@ impl Entry {
     }
 }
 
-/// A heap of events in which many of one time are one entry: a thousand cells that divide together cost one place in
+/// Events in order, in which many of one time are one entry: a thousand cells that divide together cost one place in
 /// the order, and one push each.
+///
+/// What is put in is mostly later than all before it of its kind: newborns that live as long as each other. Such events
+/// wait in a few lines, first in, first out; the heap is for what comes out of turn. A line is read and written in the
+/// order of memory, a heap of a million events at ten places for each.
 #[derive(Clone, Debug)]
 pub struct Agenda {
+    lines: [VecDeque<Entry>; LINES],
+    /// The last time of each line.
+    ends: [f64; LINES],
     heap: Vec<Entry>,
     /// The first place of the heap is empty: most events are followed by a later one, which is put there.
     hole: bool,
@@ -44,16 +55,21 @@ pub struct Agenda {
     free_runs: Vec<u32>,
     /// Times lately put in, by a hash, with their runs.
     recent: [(u64, u32); RECENT],
+    /// The earliest entry and the line where it stands (none for the heap), once somebody has asked.
+    first: Option<(Entry, Option<usize>)>,
 }
 
 impl Default for Agenda {
     fn default() -> Agenda {
         Agenda {
+            lines: Default::default(),
+            ends: [f64::NEG_INFINITY; LINES],
             heap: Vec::new(),
             hole: false,
             runs: Vec::new(),
             free_runs: Vec::new(),
             recent: [(u64::MAX, NOWHERE); RECENT],
+            first: None,
         }
     }
 }
@@ -83,16 +99,37 @@ impl Agenda {
     }
 
     /// The earliest time.
-    pub fn earliest(&self) -> Option<f64> {
-        self.first().map(|entry| entry.time())
+    #[inline]
+    pub fn earliest(&mut self) -> Option<f64> {
+        self.first().map(|(entry, _)| entry.time())
     }
 
     /// The slot of which the earliest event is, unless it is many.
-    pub fn earliest_slot(&self) -> Option<u32> {
-        self.first().map(|entry| entry.slot).filter(|slot| slot & RUN == 0)
+    pub fn earliest_slot(&mut self) -> Option<u32> {
+        self.first().map(|(entry, _)| entry.slot).filter(|slot| slot & RUN == 0)
     }
 
-    fn first(&self) -> Option<Entry> {
+    #[inline]
+    fn first(&mut self) -> Option<(Entry, Option<usize>)> {
+        if self.first.is_none() {
+            self.first = self.find_first();
+        }
+        self.first
+    }
+
+    fn find_first(&self) -> Option<(Entry, Option<usize>)> {
+        let mut first = self.first_of_heap().map(|entry| (entry, None));
+        for (line, entries) in self.lines.iter().enumerate() {
+            if let Some(&entry) = entries.front()
+                && first.is_none_or(|(other, _)| entry.time() < other.time())
+            {
+                first = Some((entry, Some(line)));
+            }
+        }
+        first
+    }
+
+    fn first_of_heap(&self) -> Option<Entry> {
         if !self.hole {
             return self.heap.first().copied();
         }
@@ -103,10 +140,14 @@ impl Agenda {
     /// Takes out everything of the earliest time.
     pub fn pop(&mut self, out: &mut Vec<u32>) {
         let Some(time) = self.earliest() else { return };
-        while self.earliest() == Some(time) {
-            self.fill_hole();
-            let Entry { slot, .. } = self.heap[0];
-            self.hole = true;
+        while let Some((_, line)) = self.first().filter(|(entry, _)| entry.time() == time) {
+            let Some(Entry { slot, .. }) = (match line {
+                Some(line) => self.pop_line(line),
+                None => self.pop_heap(),
+            }) else {
+                return;
+            };
+            self.first = None;
             if slot & RUN == 0 {
                 out.push(slot);
                 continue;
@@ -127,6 +168,20 @@ impl Agenda {
 
     fn push_entry(&mut self, time: f64, slot: u32) {
         let entry = Entry::new(time, slot);
+        // The line that it fits best: the others stay free for what comes earlier.
+        let mut line = None;
+        for (i, end) in self.ends.iter().enumerate() {
+            if *end <= time && line.is_none_or(|other: usize| *end > self.ends[other]) {
+                line = Some(i);
+            }
+        }
+        if self.first.is_some_and(|(first, _)| time < first.time()) {
+            self.first = Some((entry, line));
+        }
+        if let Some(line) = line {
+            self.ends[line] = time;
+            return self.lines[line].push_back(entry);
+        }
         if self.hole {
             self.hole = false;
             return self.sift_down(entry);
@@ -142,6 +197,20 @@ impl Agenda {
             at = above;
         }
         self.heap[at] = entry;
+    }
+
+    fn pop_line(&mut self, line: usize) -> Option<Entry> {
+        let entry = self.lines[line].pop_front();
+        if self.lines[line].is_empty() {
+            self.ends[line] = f64::NEG_INFINITY;
+        }
+        entry
+    }
+
+    fn pop_heap(&mut self) -> Option<Entry> {
+        self.fill_hole();
+        self.hole = !self.heap.is_empty();
+        self.heap.first().copied()
     }
 
     fn fill_hole(&mut self) {

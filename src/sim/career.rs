@@ -74,6 +74,9 @@ pub struct Life {
     pub successor: usize,
     pub children: Vec<Child>,
     pub residual: f64,
+    /// All that is said of the end here is the same whenever a module with these values is born; but for the times of the
+    /// children's events, which come as long after as they say.
+    pub lasting: bool,
 }
 
 /// What modules of a rule are going to do that are born with these values, whenever that is.
@@ -94,6 +97,9 @@ pub struct Child {
     pub time: Option<f64>,
     /// It is to be looked up.
     pub open: bool,
+    /// The same is told whenever it is born, and its event is `tau` later, if there is one.
+    pub lasting: bool,
+    pub tau: Option<f64>,
 }
 
 impl Life {
@@ -107,6 +113,22 @@ impl Life {
             let Some(tau) = self.tau else { return false };
             (self.birth, self.at, self.replaced) = (birth, birth.after(tau), None);
         }
+        true
+    }
+
+    /// Lets the end be the same as that of the last one who lived this life, now. False if that cannot be said.
+    pub fn end_again(&mut self, now: Instant) -> bool {
+        if !self.lasting || self.tau != Some(now.since(self.birth)) {
+            return false;
+        }
+        for child in &mut self.children {
+            let Some(tau) = child.tau else { continue };
+            child.time = now.ahead(tau);
+            if child.time.is_none() {
+                return false;
+            }
+        }
+        self.replaced = Some(now);
         true
     }
 }
@@ -127,6 +149,8 @@ pub struct Careers {
     rules: Vec<Option<usize>>,
     /// By rule: nothing in it depends on the time of birth.
     timeless: Vec<bool>,
+    /// By rule and production: what comes of it depends on the values at birth only.
+    lasting: Vec<Vec<bool>>,
     /// By rule: the last one, if it is timeless.
     pub forecasts: Vec<Option<Forecast>>,
 }
@@ -151,13 +175,19 @@ impl Careers {
             .collect();
         let of_rule = vec![Vec::new(); model.rules.len()];
         let timeless = model.rules.iter().map(is_timeless).collect();
+        let lasting = model.rules.iter().map(lasting_productions).collect();
         let forecasts = vec![None; model.rules.len()];
-        Careers { all: Vec::new(), lives: Vec::new(), of_rule, rules, timeless, forecasts }
+        Careers { all: Vec::new(), lives: Vec::new(), of_rule, rules, timeless, lasting, forecasts }
     }
 
     /// True if nothing in a rule depends on the time of birth.
     pub fn is_timeless(&self, rule: usize) -> bool {
         self.timeless[rule]
+    }
+
+    /// True if what comes of a production depends on the values at birth only, whenever that is.
+    pub fn is_lasting(&self, rule: usize, produce: usize) -> bool {
+        self.lasting[rule][produce]
     }
 
     /// The rule of a kind whose modules can be light.
@@ -220,4 +250,15 @@ fn is_timeless(rule: &Rule) -> bool {
     blind(&rule.sides)
         && rule.watch_at_rest.iter().all(watch_is_blind)
         && rule.solves.iter().all(solve_is_blind)
+}
+
+/// Of each production of a rule, whether what comes of it depends on the values at birth only: neither chance, nor `t`,
+/// nor `age`, which is rounded.
+fn lasting_productions(rule: &Rule) -> Vec<bool> {
+    let time = rule.time_variable();
+    let reads_time = |variable: usize| variable == time || variable == time + 1;
+    let plain = is_timeless(rule) && !rule.sides.reads().into_iter().any(reads_time);
+    (rule.produces.iter())
+        .map(|p| plain && !p.is_fault && !p.outcome.is_random() && !p.outcome.reads().any(reads_time))
+        .collect()
 }

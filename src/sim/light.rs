@@ -17,7 +17,7 @@ use super::settle::Firing;
 use super::simulation::Simulation;
 use super::state::{Change, What};
 use crate::model::{Comparison, KindId, Outcome, Sign};
-use crate::structure::{Instant, ModuleId, NO_LABEL};
+use crate::structure::{Instant, Look, ModuleId, NO_LABEL};
 
 impl Simulation<'_> {
     /// Begins the life of a module whose kind may be light; false if it is not.
@@ -35,7 +35,11 @@ impl Simulation<'_> {
         }
         let Some(career) = self.plant.careers.get(label) else { return false };
         if career.is_over_at_birth() {
-            self.opened.push(id);
+            // A cascade may be most of the structure: half the memory where nobody else is open.
+            match self.opened.is_empty() {
+                true => self.firing_light.push(id.slot() as u32),
+                false => self.opened.push(id),
+            }
         }
         true
     }
@@ -48,14 +52,13 @@ impl Simulation<'_> {
             && let Some(known) = &self.plant.careers.forecasts[rule]
             && same_bits(&known.values, &self.variables[..arity])
         {
-            let Some(tau) = known.tau else { return Child { label: known.label, time: None, open: false } };
-            let at = self.now.after(tau);
-            // Far from zero the time may be too short to be told.
-            if at.since(self.now) > 0.0 && at.to_f64().is_finite() {
-                return Child { label: known.label, time: Some(at.to_f64()), open: false };
+            let time = known.tau.map(|tau| self.now.ahead(tau));
+            if time != Some(None) {
+                let (label, time, tau) = (known.label, time.flatten(), known.tau);
+                return Child { label, time, open: false, lasting: true, tau };
             }
         }
-        let refused = Child { label: REFUSED, time: None, open: true };
+        let refused = Child { label: REFUSED, time: None, open: true, lasting: false, tau: None };
         let values = SmallVec::from_slice(&self.variables[..arity]);
         let Some(outlook) = self.outlook(&self.model.rules[rule]) else { return refused };
         let Prospect { solve, signs, first: First { event, lasting }, .. } = match outlook {
@@ -63,7 +66,7 @@ impl Simulation<'_> {
             Outlook::Over { produce, signs } => {
                 let career = Career { rule, solve: None, signs, end: Some(End::AtBirth { produce }) };
                 let label = self.plant.careers.intern(career);
-                return label.map_or(refused, |label| Child { label, time: None, open: true });
+                return label.map_or(refused, |label| Child { label, ..refused });
             }
         };
         let end = event.map(|(change, produce)| {
@@ -78,24 +81,31 @@ impl Simulation<'_> {
         let Some(label) = self.plant.careers.intern(Career { rule, solve, signs, end }) else {
             return refused;
         };
-        if let Some(tau) = lasting.filter(|_| timeless) {
+        let lasting = lasting.filter(|_| timeless);
+        if let Some(tau) = lasting {
             self.plant.careers.forecasts[rule] = Some(Forecast { values, label, tau });
         }
-        Child { label, time, open: false }
+        Child { label, time, open: false, lasting: lasting.is_some(), tau: lasting.flatten() }
     }
 
     /// The life of a light module, taken out of its career; to be given back.
-    fn life(&mut self, id: ModuleId, label: u16) -> Box<Life> {
+    #[inline]
+    fn life(&mut self, slot: u32) -> (u16, Box<Life>) {
+        let Look { label, birth, values, .. } = self.plant.tree.look(slot);
         let mut life = self.plant.careers.take_life(label);
-        let tree = &self.plant.tree;
-        let (birth, values) = (tree.birth(id), tree.parameters(id));
-        if life.is_of(birth, values) {
-            return life;
+        if !life.is_of(birth, values) {
+            life.values.clear();
+            life.values.extend_from_slice(values);
+            life.birth = birth;
+            self.live(label, &mut life);
         }
-        life.birth = birth;
-        life.values.clear();
-        life.values.extend_from_slice(values);
-        (life.replaced, life.known) = (None, true);
+        (label, life)
+    }
+
+    /// Finds out what a light module does that has the birth and the values of `life`.
+    fn live(&mut self, label: u16, life: &mut Life) {
+        let birth = life.birth;
+        (life.replaced, life.known, life.lasting) = (None, true, false);
         let career = self.plant.careers.get(label).expect("a light module");
         let (rule, solve, end) = (&self.model.rules[career.rule], career.solve, career.end);
         let timeless = self.plant.careers.is_timeless(career.rule);
@@ -112,14 +122,11 @@ impl Simulation<'_> {
                 life.tau = meeting.tau.filter(|_| timeless);
             }
         }
-        life
     }
 
     /// The instant of the event of the light module in a slot.
     pub(super) fn event_of(&mut self, slot: u32) -> Instant {
-        let id = self.plant.tree.id(slot);
-        let label = self.plant.tree.label(id);
-        let life = self.life(id, label);
+        let (label, life) = self.life(slot);
         let at = life.at;
         self.plant.careers.keep(label, life);
         at
@@ -132,7 +139,7 @@ impl Simulation<'_> {
         if career.is_over_at_birth() {
             return;
         }
-        let life = self.life(id, label);
+        let (label, life) = self.life(id.slot() as u32);
         let first = self.plant.tree.places(id).start;
         let mut values = Vec::new();
         values_at_event(&life, self.now, &mut values);
@@ -146,7 +153,7 @@ impl Simulation<'_> {
     pub(super) fn promote(&mut self, id: ModuleId) {
         let label = self.plant.tree.label(id);
         let Some(career) = self.plant.careers.get(label).cloned() else { return };
-        let life = self.life(id, label);
+        let (label, life) = self.life(id.slot() as u32);
         let group = self.group;
         self.plant.tree.set_label(id, NO_LABEL);
         let state = self.plant.make_state(id);
@@ -171,17 +178,19 @@ impl Simulation<'_> {
     /// Replaces a light module whose event it is. Nothing that others of the instant read changes by that.
     pub(super) fn replace_light(&mut self, slot: u32, rounds: usize) -> Result<(), Error> {
         let model = self.model;
-        let id = self.plant.tree.id(slot);
-        let label = self.plant.tree.label(id);
+        let (label, mut life) = self.life(slot);
+        let look = self.plant.tree.look(slot);
+        let (id, kind, lineage) = (look.id, look.kind, self.plant.tree.lineage_of(&look));
         let career = self.plant.careers.get(label).expect("a light module");
         let (rule, produce) = (career.rule, career.produce().expect("it is its event"));
         let clause = &model.rules[rule].produces[produce];
-        let mut life = self.life(id, label);
         let fire = Firing { id, rule, produce };
         // What chance decides, is another thing for each of them.
-        if (life.replaced != Some(self.now) || clause.outcome.is_random() || clause.is_fault)
-            && let Err(misfortune) = self.succeed(&mut life, id, rule, produce)
-        {
+        let again = match life.replaced == Some(self.now) {
+            true => !clause.outcome.is_random() && !clause.is_fault,
+            false => life.end_again(self.now),
+        };
+        if !again && let Err(misfortune) = self.succeed(&mut life, id, rule, produce) {
             life.replaced = None;
             self.plant.careers.keep(label, life);
             self.stand_still(id);
@@ -200,12 +209,11 @@ impl Simulation<'_> {
             return Err(Error::TooManyModules { site: self.site(&fire), limit, rounds });
         }
         let tree = &mut self.plant.tree;
-        let (lineage, kind) = (tree.lineage(id), tree.kind(id));
         if let Some(log) = &mut self.log {
             log.push(Event {
                 time: self.now.to_f64(),
                 lineage,
-                kind: tree.kind(id),
+                kind,
                 rule,
                 clause: produce,
                 successor: clause.outcome.weights.is_some().then_some(life.successor),
@@ -225,8 +233,14 @@ impl Simulation<'_> {
             if let Some(time) = child.time {
                 self.agenda.push(time, id.slot() as u32);
             }
-            if child.open {
-                self.fresh.push(id);
+            if !child.open {
+                continue;
+            }
+            // What ends as soon as it is there need not be looked at by anybody first.
+            let goes_on = child.label < REFUSED && self.fresh.is_empty();
+            match goes_on && self.plain && self.cuts.is_none() {
+                true => self.firing_light.push(id.slot() as u32),
+                false => self.fresh.push(id),
             }
         }
         self.plant.careers.keep(label, life);
@@ -257,7 +271,7 @@ impl Simulation<'_> {
         self.variables.extend([self.now.to_f64(), self.now.since(life.birth)]);
         life.children.clear();
         life.arguments.clear();
-        life.replaced = Some(self.now);
+        (life.replaced, life.lasting) = (Some(self.now), false);
         if clause.is_fault {
             return Ok(());
         }
@@ -277,6 +291,8 @@ impl Simulation<'_> {
             let child = self.child(kind, own);
             life.children.push(child);
         }
+        life.lasting =
+            self.plant.careers.is_lasting(rule, produce) && life.children.iter().all(|c| c.lasting);
         Ok(())
     }
 
@@ -291,7 +307,7 @@ impl Simulation<'_> {
             }
             None => {
                 let open = Some(kind) == self.cuts || !self.model.kinds.get(kind).has_no_rules();
-                Child { label: NO_LABEL, time: None, open }
+                Child { label: NO_LABEL, time: None, open, lasting: true, tau: None }
             }
         }
     }

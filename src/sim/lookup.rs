@@ -8,7 +8,7 @@ use std::collections::HashSet;
 use smallvec::SmallVec;
 
 use super::around::Around;
-use super::settle::clear;
+use super::settle::{LONG, clear};
 use super::simulation::Simulation;
 use super::state::{Signs, State};
 use super::watch::{TOUCH, opposite};
@@ -48,6 +48,10 @@ impl Simulation<'_> {
         let model = self.model;
         let mut fresh = std::mem::take(&mut self.fresh);
         self.cut_branches(&fresh);
+        if fresh.len() > LONG {
+            // A cascade: growing bit by bit, the list would be there twice.
+            self.firing_light.reserve_exact(fresh.len());
+        }
         for id in fresh.drain(..) {
             // It may have been replaced already, within the same instant.
             if !self.plant.tree.is_alive(id) {

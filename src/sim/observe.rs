@@ -3,9 +3,12 @@
 //! The first goes through the structure in string order and writes who is there, with the values of which motions are
 //! displacements; it also notes who moves. It is made anew only when the structure has changed: from frame to frame a
 //! string stays, but for the second pass, which goes through those that move, by career: the coefficients of their
-//! motions are evaluated for many modules at once (`Program::eval_lanes`, to the same bits as one by one).
+//! motions are evaluated for many modules at once (`Program::eval_lanes`, to the same bits as one by one), and once
+//! for twins.
 
-use super::career::Career;
+use std::ops::Range;
+
+use super::career::{Career, same_bits};
 use super::error::Error;
 use super::motion::{Flow, Riccati};
 use super::simulation::Simulation;
@@ -18,7 +21,7 @@ use crate::structure::{Instant, ModuleId, ModuleString, Version, Visit};
 pub(super) struct Gallery {
     version: Option<Version>,
     /// Light modules, by label.
-    columns: Vec<Vec<Row>>,
+    columns: Vec<Cast>,
     /// Modules with a state, and where their parameters begin in the string.
     others: Vec<(ModuleId, usize)>,
     registers: Vec<Lanes>,
@@ -32,12 +35,43 @@ impl Clone for Gallery {
     }
 }
 
-/// A light module: birth, and the places of its parameters in the tree and in the string.
+/// The light modules of a career that move.
+#[derive(Clone, Debug, Default)]
+struct Cast {
+    rows: Vec<Row>,
+    /// Where the parameters of each stand in the string.
+    places: Vec<u32>,
+}
+
+/// A light module with its twins: those after it in the string that were born at the same instant with the same values,
+/// so that they are the same at all times.
 #[derive(Clone, Copy, Debug)]
 struct Row {
     birth: Instant,
+    /// Where the parameters of one of them begin in the tree.
     from: u32,
-    to: u32,
+    /// Where they end in the list of places; they begin where those of the row before end.
+    end: u32,
+}
+
+impl Cast {
+    fn clear(&mut self) {
+        self.rows.clear();
+        self.places.clear();
+    }
+
+    fn add(&mut self, birth: Instant, values: &[f64], own: Range<usize>, to: usize) {
+        self.places.push(to as u32);
+        let end = self.places.len() as u32;
+        if let Some(last) = self.rows.last_mut()
+            && last.birth == birth
+            && same_bits(&values[last.from as usize..last.from as usize + own.len()], &values[own.clone()])
+        {
+            last.end = end;
+            return;
+        }
+        self.rows.push(Row { birth, from: own.start as u32, end });
+    }
 }
 
 impl Simulation<'_> {
@@ -66,10 +100,10 @@ impl Simulation<'_> {
                 bad = bad.min(to + at);
             }
         }
-        for (label, rows) in gallery.columns.iter().enumerate().filter(|(_, rows)| !rows.is_empty()) {
+        for (label, cast) in gallery.columns.iter().enumerate().filter(|(_, cast)| !cast.rows.is_empty()) {
             let career = self.plant.careers.get(label as u16).expect("a light module's label");
             let registers = &mut gallery.registers;
-            let place = self.show_column(career, rows, now, again, registers, out.parameters_mut());
+            let place = self.show_column(career, cast, now, again, registers, out.parameters_mut());
             bad = bad.min(place);
         }
         self.gallery = gallery;
@@ -86,33 +120,33 @@ impl Simulation<'_> {
     /// The first pass.
     fn hang(&self, gallery: &mut Gallery, t: f64, now: Instant, out: &mut ModuleString) {
         let Gallery { columns, others, .. } = gallery;
-        columns.iter_mut().for_each(Vec::clear);
-        columns.resize(self.plant.careers.len(), Vec::new());
+        columns.iter_mut().for_each(Cast::clear);
+        columns.resize(self.plant.careers.len(), Cast::default());
         others.clear();
         let plant = &self.plant;
-        plant.tree.write(t, now, out, |id, label, from, to| match columns.get_mut(label as usize) {
-            Some(rows) => {
-                let birth = plant.tree.birth(id);
-                rows.push(Row { birth, from: from as u32, to: to as u32 });
+        // What rests need not be looked at again.
+        let moves: Vec<bool> = (0..plant.careers.len())
+            .map(|label| {
+                let career = plant.careers.get(label as u16).expect("as many as there are columns");
+                let clause = career.solve.map(|solve| &self.model.rules[career.rule].solves[solve]);
+                clause.is_some_and(|clause| !clause.of.is_empty())
+            })
+            .collect();
+        plant.tree.write(t, now, out, |id, label, to| match columns.get_mut(label as usize) {
+            Some(cast) if moves[label as usize] => {
+                cast.add(plant.tree.birth(id), plant.tree.values(), plant.tree.places(id), to);
             }
+            Some(_) => {}
             None if plant.state(id).is_some() => others.push((id, to)),
             None => {}
         });
-        // What rests need not be looked at again.
-        for (label, rows) in columns.iter_mut().enumerate() {
-            let career = plant.careers.get(label as u16).expect("as many as there are columns");
-            let clause = career.solve.map(|solve| &self.model.rules[career.rule].solves[solve]);
-            if clause.is_none_or(|clause| clause.of.is_empty()) {
-                rows.clear();
-            }
-        }
     }
 
     /// The second pass over the modules of a career; `again` if it has been over the same string before. Returns the first place of a value that is not finite.
     fn show_column(
         &self,
         career: &Career,
-        rows: &[Row],
+        cast: &Cast,
         now: Instant,
         again: bool,
         registers: &mut Vec<Lanes>,
@@ -125,11 +159,12 @@ impl Simulation<'_> {
         let values = self.plant.tree.values();
         let mut bad = usize::MAX;
         let mut tau = [0.0; LANES];
-        for rows in rows.chunks(LANES) {
+        let mut begin = 0;
+        for rows in cast.rows.chunks(LANES) {
             registers.resize(registers.len().max(time + 2), [0.0; LANES]);
             for (lane, row) in rows.iter().enumerate() {
                 tau[lane] = now.since(row.birth).max(0.0);
-                for (i, x) in values[row.from as usize..][..arity].iter().enumerate() {
+                for (i, x) in values[row.from as usize..row.from as usize + arity].iter().enumerate() {
                     registers[i][lane] = *x;
                 }
                 registers[time][lane] = row.birth.to_f64();
@@ -157,14 +192,19 @@ impl Simulation<'_> {
                     Law::Driven(law) => driven(law, registers, [parameter, time], &tau, rows.len()),
                     Law::Sum { .. } | Law::Numeric(_) => continue,
                 };
+                let mut from = begin;
                 for (row, &x) in rows.iter().zip(&moved) {
-                    let to = row.to as usize + parameter;
-                    out[to] = x;
+                    let twins = &cast.places[from..row.end as usize];
+                    from = row.end as usize;
+                    for &to in twins {
+                        out[to as usize + parameter] = x;
+                    }
                     if !x.is_finite() {
-                        bad = bad.min(to);
+                        bad = bad.min(twins[0] as usize + parameter);
                     }
                 }
             }
+            begin = rows.last().map_or(begin, |row| row.end as usize);
         }
         bad
     }

@@ -76,6 +76,28 @@ pub(super) fn is_before(at: Instant, event: bool, until: Instant) -> bool {
     if event { ahead <= until.resolution() } else { ahead < 0.0 }
 }
 
+/// Sorts numbers below `end`, each of which is there once.
+fn sort(numbers: &mut Vec<u32>, end: usize) {
+    if numbers.is_sorted() {
+        return;
+    }
+    // Where they are a good part of all, they need not be compared.
+    if numbers.len() < end / 64 {
+        return numbers.sort_unstable();
+    }
+    let mut there = vec![0u64; end / 64 + 1];
+    for number in numbers.drain(..) {
+        there[number as usize / 64] |= 1 << (number % 64);
+    }
+    for (i, &word) in there.iter().enumerate() {
+        let mut rest = word;
+        while rest != 0 {
+            numbers.push(i as u32 * 64 + rest.trailing_zeros());
+            rest &= rest - 1;
+        }
+    }
+}
+
 impl Simulation<'_> {
     /// What comes next.
     pub(super) fn coming(&mut self) -> Option<Coming> {
@@ -120,15 +142,15 @@ impl Simulation<'_> {
         if let Some(&some) = members.first() {
             self.front.first = self.event_of(some);
         }
-        if members.iter().any(|slot| self.event_of(*slot) != self.front.first) {
+        if members.iter().skip(1).any(|slot| self.event_of(*slot) != self.front.first) {
             let mut all: Vec<(Instant, u32)> =
                 members.iter().map(|slot| (self.event_of(*slot), *slot)).collect();
             all.sort_unstable_by(|a, b| a.partial_cmp(b).unwrap_or(Ordering::Equal));
             members.clear();
             members.extend(all.iter().map(|(_, slot)| *slot));
             self.front.instants.extend(all.iter().map(|(at, _)| *at));
-        } else if !members.is_sorted() {
-            members.sort_unstable();
+        } else {
+            sort(&mut members, self.plant.tree.slots());
         }
         self.front.members = members;
         self.front.head()
@@ -198,23 +220,26 @@ impl Simulation<'_> {
     /// Goes to an event and through it, with all that happens at the same instant.
     fn pass_event(&mut self, first: Coming) -> Result<(), Error> {
         let at = first.at();
-        let oldest = match first {
-            Coming::Light(_, slot) if self.only_the_front(at) => {
-                // All of the front, at one instant.
-                self.now = at;
-                // Who comes next is fetched from memory meanwhile.
-                if let Some(slot) = self.agenda.earliest_slot() {
-                    std::hint::black_box(self.plant.tree.birth(self.plant.tree.id(slot)));
-                }
-                self.show_coupled(at);
-                std::mem::swap(&mut self.firing_light, &mut self.front.members);
-                self.front.members.clear();
+        if let Coming::Light(_, slot) = first
+            && self.only_the_front(at)
+        {
+            // All of the front, at one instant.
+            self.now = at;
+            // Who comes next is fetched from memory meanwhile.
+            if let Some(slot) = self.agenda.earliest_slot() {
+                std::hint::black_box(self.plant.tree.birth(self.plant.tree.id(slot)));
+            }
+            self.show_coupled(at);
+            std::mem::swap(&mut self.firing_light, &mut self.front.members);
+            self.front.members.clear();
+            if self.front.passed > 0 {
                 self.firing_light.drain(..self.front.passed);
                 self.front.passed = 0;
-                Some(self.plant.tree.id(slot))
             }
-            _ => self.gather(at)?,
-        };
+            self.watch_for_piling_up(self.plant.tree.id(slot))?;
+            return self.settle_lightly();
+        }
+        let oldest = self.gather(at)?;
         if let Some(id) = oldest {
             self.watch_for_piling_up(id)?;
         }
@@ -337,5 +362,25 @@ impl Simulation<'_> {
         }
         self.group_entries = group;
         Ok(oldest)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn slots_are_sorted_whether_they_are_many_or_few(
+            slots in proptest::collection::hash_set(0..1000u32, 0..200),
+            end in 1000..40_000usize,
+        ) {
+            let mut numbers: Vec<u32> = slots.into_iter().collect();
+            let mut expected = numbers.clone();
+            expected.sort();
+            sort(&mut numbers, end);
+            prop_assert_eq!(numbers, expected);
+        }
     }
 }

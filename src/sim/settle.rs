@@ -30,7 +30,7 @@ use crate::structure::ModuleId;
 pub const MAX_ROUNDS: usize = 10_000;
 
 /// Lists that were longer are not kept for the next instant.
-const LONG: usize = 1 << 18;
+pub(super) const LONG: usize = 1 << 18;
 
 /// A production that applies.
 #[derive(Clone, Debug)]
@@ -48,7 +48,24 @@ impl Simulation<'_> {
         self.note_arrivals();
         self.open_resting();
         self.begin_levelling();
-        let mut rounds = 0;
+        self.settle_from(0)
+    }
+
+    /// The same where nothing but productions of light modules is known to happen at the instant: `self.firing_light`.
+    /// Most events are like that.
+    pub(super) fn settle_lightly(&mut self) -> Result<(), Error> {
+        if !self.plain {
+            return self.settle();
+        }
+        self.group += 1;
+        let light = std::mem::take(&mut self.firing_light);
+        self.replace_all_light(light, 1)?;
+        // What is made may have to be looked at, or end at once.
+        if self.fresh.is_empty() && self.firing_light.is_empty() { Ok(()) } else { self.settle_from(1) }
+    }
+
+    /// What happens at the instant after so many rounds of productions.
+    fn settle_from(&mut self, mut rounds: usize) -> Result<(), Error> {
         let mut hurried = false;
         loop {
             if !self.fresh.is_empty() || std::mem::take(&mut self.changed) {
@@ -83,14 +100,15 @@ impl Simulation<'_> {
             }
             if firing.iter().all(|fire| self.plant.is_light(fire.id)) {
                 light.extend(firing.iter().map(|fire| fire.id.slot() as u32));
-                self.replace_all_light(&light, rounds)?;
+                self.replace_all_light(light, rounds)?;
             } else {
                 self.promote_all(&light, &mut firing);
                 self.replace(&firing, rounds)?;
+                clear(&mut light);
+                self.firing_light = light;
             }
             clear(&mut firing);
-            clear(&mut light);
-            (self.firing, self.firing_light) = (firing, light);
+            self.firing = firing;
         }
         self.neighbours.end_instant();
         self.finish_transitions();
@@ -107,7 +125,7 @@ impl Simulation<'_> {
         rounds: usize,
     ) -> Result<(), Error> {
         if firing.is_empty() && !light.is_empty() {
-            self.replace_all_light(light, rounds)?;
+            self.replace_all_light(std::mem::take(light), rounds)?;
         } else if !firing.is_empty() {
             self.promote_all(light, firing);
         }
@@ -187,15 +205,26 @@ impl Simulation<'_> {
         firing
     }
 
-    /// Replaces light modules: none reads what another is replaced by.
-    fn replace_all_light(&mut self, light: &[u32], rounds: usize) -> Result<(), Error> {
-        for &slot in light {
+    /// Replaces light modules: none reads what another is replaced by. Those of their successors that end at once are the next
+    /// in `self.firing_light`, which was empty.
+    fn replace_all_light(&mut self, mut light: Vec<u32>, rounds: usize) -> Result<(), Error> {
+        if light.len() > LONG {
+            // A cascade may double with each round. Growing bit by bit, the list would be there twice.
+            self.firing_light.reserve_exact(2 * light.len());
+        }
+        for &slot in &light {
             self.replace_light(slot, rounds)?;
+        }
+        if self.firing_light.is_empty() {
+            clear(&mut light);
+            self.firing_light = light;
         }
         self.structure += 1;
         self.changed = true;
-        let plant = &self.plant;
-        self.opened.retain(|id| plant.state(*id).is_some());
+        if !self.opened.is_empty() {
+            let plant = &self.plant;
+            self.opened.retain(|id| plant.state(*id).is_some());
+        }
         Ok(())
     }
 

@@ -72,6 +72,9 @@ pub struct Simulation<'m> {
     pub(super) kinds_with_context: Vec<bool>,
     /// Neighbours are remembered.
     pub(super) hands_on: bool,
+    /// No module looks at others, nothing is solved for, no rule is discrete, no transition is recorded: what one light
+    /// module does at an instant is no business of anybody else.
+    pub(super) plain: bool,
     /// Discrete rules.
     pub(super) steps: Steps,
     pub(super) neighbours: Neighbours,
@@ -148,6 +151,10 @@ impl<'m> Simulation<'m> {
             model.kinds.iter().map(|(_, kind)| kind.rules.iter().any(has_context)).collect();
         let looks_around = kinds_with_context.contains(&true);
         let hands_on = looks_around || model.rules.iter().any(|rule| rule.discrete && rule.context_len() > 0);
+        let gathers = model.rules.iter().any(|rule| !rule.aggregates.is_empty());
+        let (steps, algebra) = (Steps::new(model), Consistency::new(model));
+        let is_discrete = model.rules.iter().any(|rule| rule.discrete);
+        let plain = !hands_on && !gathers && !algebra.any && !is_discrete && !settings.transitions;
         let careers = Careers::new(model, &kinds_with_context);
         let mut simulation = Simulation {
             model,
@@ -172,11 +179,12 @@ impl<'m> Simulation<'m> {
             looks_around,
             kinds_with_context,
             hands_on,
-            steps: Steps::new(model),
+            plain,
+            steps,
             neighbours: Neighbours::default(),
-            gathers: model.rules.iter().any(|rule| !rule.aggregates.is_empty()),
+            gathers,
             attached: Vec::new(),
-            algebra: Consistency::new(model),
+            algebra,
             to_look: Vec::new(),
             lost: false,
             resting: Vec::new(),

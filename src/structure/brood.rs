@@ -63,8 +63,8 @@ impl Broods {
 
     /// Counts the modules of a new brood, if it is one.
     pub fn count(&mut self, number: u32, modules: u16) {
-        if let Some(brood) = self.all.get_mut(number as usize) {
-            brood.trail += u64::from(modules).min(UNCOUNTED) * ONE;
+        if number != NO_BROOD {
+            self.all[number as usize].trail += u64::from(modules).min(UNCOUNTED) * ONE;
         }
     }
 

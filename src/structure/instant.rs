@@ -30,6 +30,13 @@ impl Instant {
         Instant { high, low }
     }
 
+    /// The instant after a duration as a float; None if it is infinite, or no later: far from zero a short time cannot be
+    /// told.
+    pub fn ahead(self, duration: f64) -> Option<f64> {
+        let at = self.after(duration);
+        (at.since(self) > 0.0 && at.high.is_finite()).then_some(at.high)
+    }
+
     /// The duration since an earlier instant.
     pub fn since(self, earlier: Instant) -> f64 {
         let (difference, error) = two_sum(self.high, -earlier.high);

@@ -14,10 +14,11 @@ mod lineage;
 mod string;
 mod tree;
 mod walk;
+mod ways;
 
 pub use chance::{Purpose, Seed, key};
 pub use instant::Instant;
 pub use lineage::{Family, Lineage};
 pub use string::{Module, ModuleString, Version};
-pub use tree::{ModuleId, NO_LABEL, Tree};
+pub use tree::{Look, ModuleId, NO_LABEL, Tree};
 pub use walk::{Visit, Walk};

@@ -10,7 +10,7 @@
 use smallvec::SmallVec;
 
 use super::brood::{Broods, NO_BROOD};
-use super::{Family, Instant, Lineage, Visit, Walk};
+use super::{Family, Instant, Lineage};
 use crate::model::{KindId, Successor};
 
 /// The branch that holds the main axis.
@@ -62,13 +62,25 @@ pub(super) struct Node {
     pub kind: KindId,
     /// Of the slot.
     pub generation: u32,
-    before: Link,
+    pub before: Link,
     pub after: Link,
     /// Where the parameters begin; of a branch, what its own axis begins with.
     pub first: u32,
     pub brood: u32,
     pub place: u16,
     pub label: u16,
+}
+
+/// A module in a [`Tree`], looked at once.
+#[derive(Clone, Copy, Debug)]
+pub struct Look<'t> {
+    pub id: ModuleId,
+    pub kind: KindId,
+    pub label: u16,
+    pub birth: Instant,
+    pub values: &'t [f64],
+    /// Brood, and place in it.
+    member: (u32, u16),
 }
 
 /// The modules alive, their order and their parameters.
@@ -144,7 +156,7 @@ impl Tree {
         self.nodes[id.slot()].generation == id.generation
     }
 
-    fn node(&self, id: ModuleId) -> &Node {
+    pub(super) fn node(&self, id: ModuleId) -> &Node {
         let node = &self.nodes[id.slot()];
         debug_assert_eq!(node.generation, id.generation, "the module is no longer alive");
         node
@@ -153,6 +165,20 @@ impl Tree {
     /// Who lives in a slot.
     pub fn id(&self, slot: u32) -> ModuleId {
         ModuleId { slot, generation: self.nodes[slot as usize].generation }
+    }
+
+    /// All that is known of who lives in a slot.
+    #[inline]
+    pub fn look(&self, slot: u32) -> Look<'_> {
+        let node = &self.nodes[slot as usize];
+        let Node { kind, label, brood, place, generation, .. } = *node;
+        let (birth, values) = (self.broods.birth(brood), &self.values[node.places(&self.arities)]);
+        Look { id: ModuleId { slot, generation }, kind, label, birth, values, member: (brood, place) }
+    }
+
+    /// The lineage of one that was looked at.
+    pub fn lineage_of(&self, look: &Look) -> Lineage {
+        self.broods.lineage(look.member.0, look.member.1)
     }
 
     pub fn kind(&self, id: ModuleId) -> KindId {
@@ -206,39 +232,46 @@ impl Tree {
         self.values[place] = value;
     }
 
-    /// Puts a node into a slot. What is after it is not known yet.
-    fn allocate(&mut self, kind: KindId, before: Link, brood: u32, place: u16) -> u32 {
-        let mut node =
-            Node { kind, generation: 0, before, after: before, first: 0, label: NO_LABEL, brood, place };
-        let arity = self.arities[kind.index()] as usize;
-        if arity > 0 {
-            let known = self.free_values.get_mut(arity).and_then(Vec::pop);
-            node.first = known.unwrap_or_else(|| {
-                self.values.resize(self.values.len() + arity, 0.0);
-                (self.values.len() - arity) as u32
-            });
-        }
+    /// Puts a node into a free slot.
+    fn allocate(&mut self, mut node: Node) -> ModuleId {
         match self.free.pop() {
             Some(slot) => {
                 let place = &mut self.nodes[slot as usize];
                 node.generation = place.generation;
                 *place = node;
-                slot
+                ModuleId { slot, generation: node.generation }
             }
             None => {
                 self.nodes.push(node);
-                self.nodes.len() as u32 - 1
+                ModuleId { slot: self.nodes.len() as u32 - 1, generation: 0 }
+            }
+        }
+    }
+
+    /// Gives values a place, and tells where it begins.
+    fn store(&mut self, values: &[f64]) -> u32 {
+        if values.is_empty() {
+            return 0;
+        }
+        match self.free_values.get_mut(values.len()).and_then(Vec::pop) {
+            Some(first) => {
+                self.values[first as usize..first as usize + values.len()].copy_from_slice(values);
+                first
+            }
+            None => {
+                self.values.extend_from_slice(values);
+                (self.values.len() - values.len()) as u32
             }
         }
     }
 
     fn release(&mut self, slot: u32) {
-        self.end(slot);
+        self.vacate(slot);
         self.free.push(slot);
     }
 
     /// Ends the life of whoever is in a slot. The slot is not free yet.
-    fn end(&mut self, slot: u32) {
+    fn vacate(&mut self, slot: u32) {
         let node = &mut self.nodes[slot as usize];
         node.generation = node.generation.wrapping_add(1);
         let (arity, first) = (self.arities[node.kind.index()] as usize, node.first);
@@ -288,9 +321,34 @@ impl Tree {
     ) {
         let Node { before, after, brood, .. } = *self.node(id);
         self.broods.leave(brood);
+        if let [kind] = string.kinds[..]
+            && kind != KindId::OPEN
+        {
+            return self.succeed(id, kind, arguments, birth, family, made);
+        }
         self.release(id.slot);
         self.modules -= 1;
         self.insert(before, after, string, arguments, birth, family, made);
+    }
+
+    /// Puts a single module into the place of another. Its neighbours need not know, and at a million modules their
+    /// memory is far away.
+    fn succeed(
+        &mut self,
+        id: ModuleId,
+        kind: KindId,
+        arguments: &[f64],
+        birth: Instant,
+        family: Family,
+        made: &mut Vec<ModuleId>,
+    ) {
+        self.vacate(id.slot);
+        let first = self.store(arguments);
+        let brood = self.broods.begin(family, birth, 0);
+        self.broods.count(brood, 1);
+        let node = &mut self.nodes[id.slot()];
+        (node.kind, node.first, node.brood, node.place, node.label) = (kind, first, brood, 0, NO_LABEL);
+        made.push(ModuleId { slot: id.slot, generation: node.generation });
     }
 
     /// Takes out a module and all that follows on its axis, with all branches. Slots that are to be kept stay empty until
@@ -309,7 +367,7 @@ impl Tree {
                     self.modules -= 1;
                 }
                 if keep(at.0) {
-                    self.end(at.0)
+                    self.vacate(at.0)
                 } else {
                     self.release(at.0)
                 }
@@ -325,20 +383,6 @@ impl Tree {
         self.free.push(slot);
     }
 
-    /// The modules that follow on the axis of this one, with all branches, in string order.
-    pub fn following(&self, id: ModuleId) -> Vec<ModuleId> {
-        let (mut depth, mut out) = (0usize, Vec::new());
-        for visit in Walk::new(self, self.node(id).after) {
-            match visit {
-                Visit::Module(id) => out.push(id),
-                Visit::Open => depth += 1,
-                Visit::Close if depth == 0 => break,
-                Visit::Close => depth -= 1,
-            }
-        }
-        out
-    }
-
     /// Puts a string between two neighbours.
     #[allow(clippy::too_many_arguments)]
     fn insert(
@@ -346,14 +390,14 @@ impl Tree {
         mut before: Link,
         after: Link,
         string: &Successor,
-        arguments: &[f64],
+        mut arguments: &[f64],
         birth: Instant,
         family: Family,
         made: &mut Vec<ModuleId>,
     ) {
         // The branches that are open.
         let mut branches: SmallVec<[u32; 8]> = SmallVec::new();
-        let (mut place, mut next) = (0, 0);
+        let mut place = 0;
         // Of the present brood; a very long successor is several.
         let (mut brood, mut members) = (NO_BROOD, 0);
         for &kind in &string.kinds {
@@ -363,8 +407,19 @@ impl Tree {
                 before = Link(branch);
                 continue;
             }
+            // What is after it is not known yet.
+            let mut node = Node {
+                kind,
+                generation: 0,
+                before,
+                after: before,
+                first: 0,
+                label: NO_LABEL,
+                brood: NO_BROOD,
+                place: 0,
+            };
             if kind == KindId::OPEN {
-                let slot = self.allocate(kind, before, NO_BROOD, 0);
+                let slot = self.allocate(node).slot;
                 self.link_forward(before, Link(slot));
                 branches.push(slot);
                 before = Link::end_of(slot);
@@ -375,103 +430,22 @@ impl Tree {
                 brood = self.broods.begin(family, birth, place);
                 members = 0;
             }
-            let slot = self.allocate(kind, before, brood, members);
+            let own;
+            (own, arguments) = arguments.split_at(self.arities[kind.index()] as usize);
+            (node.first, node.brood, node.place) = (self.store(own), brood, members);
+            let id = self.allocate(node);
+            self.link_forward(before, Link(id.slot));
             members += 1;
-            self.link_forward(before, Link(slot));
-            let id = self.id(slot);
-            let places = self.places(id);
-            if !places.is_empty() {
-                let count = places.len();
-                let own = self.values[places].iter_mut();
-                own.zip(&arguments[next..next + count]).for_each(|(value, &x)| *value = x);
-                next += count;
-            }
             place += 1;
-            before = Link(slot);
-            self.modules += 1;
+            before = Link(id.slot);
             made.push(id);
         }
+        self.modules += place as usize;
         self.broods.count(brood, members);
         self.link_forward(before, after);
         if after.ended().is_none() {
             self.nodes[after.0 as usize].before = before;
         }
-    }
-
-    /// The nearest module before this one on the path to the root, finished side branches and modules
-    /// of skipped kinds passed over.
-    pub fn left(&self, id: ModuleId, skipped: impl Fn(KindId) -> bool) -> Option<ModuleId> {
-        let mut at = id.slot;
-        loop {
-            let before = self.nodes[at as usize].before;
-            at = match before.ended() {
-                Some(TRUNK) => return None,
-                // The first of a branch grows from what stands before the branch.
-                Some(branch) => branch,
-                None => {
-                    let kind = self.nodes[before.0 as usize].kind;
-                    if kind != KindId::OPEN && !skipped(kind) {
-                        return Some(self.id(before.0));
-                    }
-                    before.0
-                }
-            };
-        }
-    }
-
-    /// The next module on the same axis, side branches and modules of skipped kinds passed over.
-    pub fn right(&self, id: ModuleId, skipped: impl Fn(KindId) -> bool) -> Option<ModuleId> {
-        let mut at = self.node(id).after;
-        while at.ended().is_none() {
-            let node = &self.nodes[at.0 as usize];
-            if node.kind != KindId::OPEN && !skipped(node.kind) {
-                return Some(self.id(at.0));
-            }
-            at = node.after;
-        }
-        None
-    }
-
-    /// The modules attached to this one, in string order, appended to `out`: the first of each side branch, then the next
-    /// on the same axis, modules of skipped kinds passed over. Also tells whether the last is on the axis.
-    pub fn children(&self, id: ModuleId, skipped: impl Fn(KindId) -> bool, out: &mut Vec<ModuleId>) -> bool {
-        let mut at = self.node(id).after;
-        // The branches that are open.
-        let mut branches: SmallVec<[u32; 8]> = SmallVec::new();
-        loop {
-            if at.ended().is_some() {
-                let Some(branch) = branches.pop() else { return false };
-                at = self.nodes[branch as usize].after;
-                continue;
-            }
-            let node = &self.nodes[at.0 as usize];
-            if node.kind == KindId::OPEN {
-                branches.push(at.0);
-                at = Link(node.first);
-            } else if skipped(node.kind) {
-                at = node.after;
-            } else {
-                out.push(self.id(at.0));
-                // What follows on the axis of this one is attached to it.
-                let Some(branch) = branches.pop() else { return true };
-                at = self.nodes[branch as usize].after;
-            }
-        }
-    }
-
-    /// True if a module of a certain kind stands after this one on its axis, or on a branch of that.
-    pub fn is_followed(&self, id: ModuleId, wanted: impl Fn(KindId) -> bool) -> bool {
-        let mut depth = 0usize;
-        for visit in Walk::new(self, self.node(id).after) {
-            match visit {
-                Visit::Module(id) if wanted(self.kind(id)) => return true,
-                Visit::Module(_) => {}
-                Visit::Open => depth += 1,
-                Visit::Close if depth == 0 => return false,
-                Visit::Close => depth -= 1,
-            }
-        }
-        false
     }
 }
 
@@ -483,19 +457,20 @@ impl Node {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
+    use super::super::Visit;
     use super::*;
     use crate::expr::{Graph, Program};
     use crate::model::Kinds;
 
     /// A string of kinds without parameters, written with one letter each.
-    fn string(kinds: &mut Kinds, text: &str) -> Successor {
+    pub fn string(kinds: &mut Kinds, text: &str) -> Successor {
         let ids = text.chars().map(|c| kinds.intern(&c.to_string(), 0)).collect();
         let arguments = Program::compile(&Graph::default(), &[], 0);
         Successor { kinds: ids, arguments, ..Successor::default() }
     }
 
-    fn show(kinds: &Kinds, tree: &Tree) -> String {
+    pub fn show(kinds: &Kinds, tree: &Tree) -> String {
         tree.walk()
             .map(|visit| match visit {
                 Visit::Open => "[".to_owned(),
@@ -505,7 +480,7 @@ mod tests {
             .collect()
     }
 
-    fn grown(text: &str, swaps: &[(usize, &str)]) -> (Kinds, Tree) {
+    pub fn grown(text: &str, swaps: &[(usize, &str)]) -> (Kinds, Tree) {
         let mut kinds = Kinds::default();
         let axiom = string(&mut kinds, text);
         let successors: Vec<_> = swaps.iter().map(|(at, s)| (*at, string(&mut kinds, s))).collect();
@@ -533,22 +508,6 @@ mod tests {
     }
 
     #[test]
-    fn children_are_the_first_of_each_branch_and_the_next_on_the_axis() {
-        let children = |text: &str| {
-            let (kinds, tree) = grown(text, &[]);
-            let Some(Visit::Module(first)) = tree.walk().next() else { panic!("a module comes first") };
-            let mut all = Vec::new();
-            let on_axis = tree.children(first, |kind| kinds.get(kind).name == "x", &mut all);
-            let names: String = all.iter().map(|id| kinds.get(tree.kind(*id)).name.clone()).collect();
-            (names, on_axis)
-        };
-        let is = |names: &str, on_axis| (names.to_owned(), on_axis);
-        assert_eq!(children("A[B[C]D][xE[F]][]xG[H]I"), is("BEG", true));
-        assert_eq!(children("A[[B]C][x][[xD]]"), is("BCD", false));
-        assert_eq!(children("A"), is("", false));
-    }
-
-    #[test]
     fn what_is_cut_leaves_room_for_others() {
         let (mut kinds, mut tree) = grown("A[B[C]%D[E[F]G]H]IXYZ", &[]);
         let more = string(&mut kinds, "XY[Z]");
@@ -572,30 +531,5 @@ mod tests {
         }
         assert_eq!(show(&kinds, &tree), "A[B[A][A][A][C]]IXYZXY[Z]XY[Z]XY[Z]");
         assert!(made.iter().all(|id| id.slot() != cut.slot()), "its slot is kept");
-    }
-
-    #[test]
-    fn context_follows_the_axes() {
-        let (kinds, tree) = grown("A[B[C]]D[E]", &[]);
-        let name = |id: Option<ModuleId>| id.map(|id| kinds.get(tree.kind(id)).name.clone());
-        let all: Vec<_> = tree
-            .walk()
-            .filter_map(|v| match v {
-                Visit::Module(id) => Some(id),
-                _ => None,
-            })
-            .map(|id| (name(Some(id)), name(tree.left(id, |_| false)), name(tree.right(id, |_| false))))
-            .collect();
-        let some = |s: &str| Some(s.to_owned());
-        assert_eq!(
-            all,
-            [
-                (some("A"), None, some("D")),
-                (some("B"), some("A"), None),
-                (some("C"), some("B"), None),
-                (some("D"), some("A"), None),
-                (some("E"), some("D"), None),
-            ]
-        );
     }
 }

@@ -19,13 +19,13 @@ impl Tree {
     }
 
     /// Writes the structure out, every parameter with the value that the tree has of it. `note` is told each module
-    /// with its label and the places of its parameters in the tree and in the string.
+    /// with its label and where its parameters begin in the string.
     pub fn write(
         &self,
         time: f64,
         now: Instant,
         out: &mut ModuleString,
-        mut note: impl FnMut(ModuleId, u16, usize, usize),
+        mut note: impl FnMut(ModuleId, u16, usize),
     ) {
         out.begin(time, now, &self.broods, self.extent());
         let mut next = Link(self.nodes[TRUNK as usize].first);
@@ -44,10 +44,9 @@ impl Tree {
                         continue;
                     }
                     let places = node.places(&self.shown);
-                    let from = places.start;
                     let to = out.push_known(node.kind, node.brood, node.place, &self.values[places]);
                     let id = ModuleId::of_parts(next.0, node.generation);
-                    note(id, node.label, from, to);
+                    note(id, node.label, to);
                     next = node.after;
                 }
             }
