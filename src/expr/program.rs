@@ -56,12 +56,13 @@ pub type Lanes = [f64; LANES];
 /// its place.
 const PART: usize = 8;
 
+/// Does an operation in so many parts of the lanes.
 #[inline(always)]
-fn each(registers: &mut [Lanes], [to, a, b]: [Register; 3], f: impl Fn(f64, f64) -> f64) {
+fn each(registers: &mut [Lanes], parts: usize, [to, a, b]: [Register; 3], f: impl Fn(f64, f64) -> f64) {
     let part = |of: Register, registers: &[Lanes], i: usize| -> [f64; PART] {
         registers[of as usize].as_chunks::<PART>().0[i]
     };
-    for i in 0..LANES / PART {
+    for i in 0..parts.min(LANES / PART) {
         let (mut x, y) = (part(a, registers, i), part(b, registers, i));
         for (x, y) in x.iter_mut().zip(y) {
             *x = f(*x, y);
@@ -80,6 +81,8 @@ pub struct Program {
     outputs: Vec<Register>,
     variables: usize,
     registers: usize,
+    /// The variables that it reads, ascending.
+    reads: Vec<usize>,
     /// The outputs, if they depend on nothing.
     constants: Option<Vec<f64>>,
     curves: Vec<Arc<Curve>>,
@@ -159,15 +162,15 @@ impl Program {
             });
         }
         let constants = roots.iter().map(|root| graph.as_constant(*root)).collect();
-        Program {
-            constants,
-            curves,
-            arrays,
-            code,
-            outputs: roots.iter().map(|r| place[r]).collect(),
-            variables,
-            registers: registers as usize,
-        }
+        let outputs: Vec<Register> = roots.iter().map(|r| place[r]).collect();
+        let operands = code.iter().flat_map(|instruction: &Instruction| instruction.operands()).flatten();
+        let mut reads: Vec<usize> = (operands.chain(outputs.iter().copied()))
+            .map(|register| register as usize)
+            .filter(|register| *register < variables)
+            .collect();
+        reads.sort_unstable();
+        reads.dedup();
+        Program { constants, curves, arrays, code, outputs, variables, registers: registers as usize, reads }
     }
 
     /// Number of values that an evaluation gives.
@@ -176,17 +179,8 @@ impl Program {
     }
 
     /// The variables that it reads, ascending.
-    pub fn reads(&self) -> Vec<usize> {
-        let mut all: Vec<usize> = (self.code.iter())
-            .flat_map(|instruction| instruction.operands())
-            .flatten()
-            .chain(self.outputs.iter().copied())
-            .map(|register| register as usize)
-            .filter(|register| *register < self.variables)
-            .collect();
-        all.sort_unstable();
-        all.dedup();
-        all
+    pub fn reads(&self) -> &[usize] {
+        &self.reads
     }
 
     /// The outputs, if they depend on nothing.
@@ -269,19 +263,31 @@ impl Program {
     /// operation runs over all rows before the next, and gives each the same bits as [`Program::eval`]. Returns the
     /// register of each output.
     pub fn eval_lanes(&self, registers: &mut Vec<Lanes>) -> impl ExactSizeIterator<Item = usize> + '_ {
-        registers.resize(self.registers, [0.0; LANES]);
+        self.eval_rows(registers, LANES)
+    }
+
+    /// The same for the first `rows` only: what is in the other lanes afterwards means nothing.
+    pub fn eval_rows(
+        &self,
+        registers: &mut Vec<Lanes>,
+        rows: usize,
+    ) -> impl ExactSizeIterator<Item = usize> + '_ {
+        let parts = rows.div_ceil(PART);
+        if registers.len() < self.registers {
+            registers.resize(self.registers, [0.0; LANES]);
+        }
         for &instruction in &self.code {
             match instruction {
-                Instruction::Const(to, x) => registers[to as usize] = [x; LANES],
-                Instruction::Unary(Unary::Neg, to, a) => each(registers, [to, a, a], |x, _| -x),
-                Instruction::Unary(op, to, a) => each(registers, [to, a, a], |x, _| f64::unary(op, x)),
+                Instruction::Const(to, x) => each(registers, parts, [to, to, to], |_, _| x),
+                Instruction::Unary(Unary::Neg, to, a) => each(registers, parts, [to, a, a], |x, _| -x),
+                Instruction::Unary(op, to, a) => each(registers, parts, [to, a, a], |x, _| f64::unary(op, x)),
                 // The choice of the operation is made once, not for every row.
                 Instruction::Binary(op, to, a, b) => match op {
-                    Binary::Add => each(registers, [to, a, b], |x, y| x + y),
-                    Binary::Sub => each(registers, [to, a, b], |x, y| x - y),
-                    Binary::Mul => each(registers, [to, a, b], |x, y| x * y),
-                    Binary::Div => each(registers, [to, a, b], |x, y| x / y),
-                    _ => each(registers, [to, a, b], |x, y| f64::binary(op, x, y)),
+                    Binary::Add => each(registers, parts, [to, a, b], |x, y| x + y),
+                    Binary::Sub => each(registers, parts, [to, a, b], |x, y| x - y),
+                    Binary::Mul => each(registers, parts, [to, a, b], |x, y| x * y),
+                    Binary::Div => each(registers, parts, [to, a, b], |x, y| x / y),
+                    _ => each(registers, parts, [to, a, b], |x, y| f64::binary(op, x, y)),
                 },
                 Instruction::Select(to, c, a, b) => {
                     let (c, a, b) = (registers[c as usize], registers[a as usize], registers[b as usize]);
@@ -289,15 +295,15 @@ impl Program {
                 }
                 Instruction::Curve(curve, part, to, a) => {
                     let curve = &self.curves[curve as usize];
-                    each(registers, [to, a, a], |x, _| curve.eval(part, x));
+                    each(registers, parts, [to, a, a], |x, _| curve.eval(part, x));
                 }
                 Instruction::Piece(curve, part, to, i, a) => {
                     let curve = &self.curves[curve as usize];
-                    each(registers, [to, i, a], |i, x| curve.continued(part, i, x));
+                    each(registers, parts, [to, i, a], |i, x| curve.continued(part, i, x));
                 }
                 Instruction::Element(array, to, i) => {
                     let array = &self.arrays[array as usize];
-                    each(registers, [to, i, i], |i, _| array.element(i));
+                    each(registers, parts, [to, i, i], |i, _| array.element(i));
                 }
             }
         }

@@ -51,10 +51,10 @@ impl RuleBuilder<'_> {
 /// The variables that conditions read, by themselves or through aggregates, which begin with the variable `first`.
 pub(super) fn watched(sides: &Program, aggregates: &[Aggregate], count: usize, first: usize) -> Vec<bool> {
     let mut watched: Vec<bool> = vec![false; count];
-    for v in sides.reads() {
+    for &v in sides.reads() {
         watched[v] = true;
         if let Some(aggregate) = v.checked_sub(first).and_then(|i| aggregates.get(i)) {
-            aggregate.term.reads().into_iter().filter(|v| *v < count).for_each(|v| watched[v] = true);
+            aggregate.term.reads().iter().copied().filter(|v| *v < count).for_each(|v| watched[v] = true);
         }
     }
     watched

@@ -284,6 +284,7 @@ impl RuleBuilder<'_> {
                     watch: Vec::new(),
                     flashes: false,
                     is_delicate: false,
+                    stepping: Default::default(),
                 }
             })
             .collect();

@@ -8,7 +8,9 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use super::need::{drawn_only, needed};
-use super::{Algebraic, Jacobian, Law, Linear, Model, Numeric, Obstacle, Pattern, Rule, Watch, driven_form};
+use super::{
+    Algebraic, Jacobian, Law, Linear, Model, Numeric, Obstacle, Pattern, Rule, Stepping, Watch, driven_form,
+};
 use crate::diagnostic::Span;
 use crate::expr::{Binary, Graph, Monomial, Node, NodeId, Polynomial, Program, Unary};
 
@@ -105,6 +107,11 @@ pub fn analyse(graph: &mut Graph, model: &mut Model, drafts: &[Draft]) {
         for algebraic in model.rules[rule].solves.iter_mut().map(|s| &mut s.algebraic) {
             let is_needed = |p: &usize| kinds.iter().any(|kind| needed.contains(&(*kind, *p)));
             algebraic.needed = algebraic.of.iter().map(is_needed).collect();
+        }
+        for solve in 0..model.rules[rule].solves.len() {
+            let of = &model.rules[rule];
+            let stepping = Stepping::new(of, &of.solves[solve]);
+            model.rules[rule].solves[solve].stepping = stepping;
         }
     }
     model.drawn_only = drawn_only(graph, model, drafts);

@@ -43,6 +43,7 @@ mod need;
 mod rank;
 mod remedy;
 mod rule;
+mod stepping;
 
 pub use algebraic::{Aggregate, Algebraic, Fold, Turn};
 pub use analysis::{AlgebraicDraft, Draft, analyse};
@@ -61,6 +62,7 @@ pub use measure::Measure;
 pub use rank::is_singular;
 pub use remedy::{Boundary, Remedy};
 pub use rule::{Interpretation, Outcome, Pattern, Produce, Rule, Solve, Successor, Switch};
+pub use stepping::Stepping;
 
 use std::sync::Arc;
 

@@ -8,8 +8,8 @@
 //! [`Draw`]s of a successor.
 
 use super::{
-    Aggregate, Algebraic, Boundary, Clock, Condition, Draw, Jacobian, KindId, Law, Linear, NewClock, Turn,
-    Watch,
+    Aggregate, Algebraic, Boundary, Clock, Condition, Draw, Jacobian, KindId, Law, Linear, NewClock,
+    Stepping, Turn, Watch,
 };
 use crate::diagnostic::Span;
 use crate::expr::{Program, Scratch, Value};
@@ -149,6 +149,7 @@ pub struct Solve {
     pub flashes: bool,
     /// The clock of an event at a rate runs, and something is integrated numerically.
     pub is_delicate: bool,
+    pub stepping: Stepping,
 }
 
 /// A condition inside an equation, replaced there by a variable, so that the equation is smooth between
@@ -194,7 +195,7 @@ impl Outcome {
     pub fn reads(&self) -> impl Iterator<Item = usize> + '_ {
         let draws = self.successors.iter().flat_map(|s| &s.draws).map(|draw| &draw.parameters);
         let arguments = self.successors.iter().map(|s| &s.arguments);
-        arguments.chain(draws).chain(&self.weights).flat_map(Program::reads)
+        arguments.chain(draws).chain(&self.weights).flat_map(Program::reads).copied()
     }
 }
 

@@ -20,7 +20,6 @@ use super::watch::needs_search;
 use super::{Method, Scheduler};
 use crate::model::Model;
 use crate::structure::{Instant, ModuleId, Visit};
-use smallvec::SmallVec;
 use std::collections::HashSet;
 
 /// The coupled modules and their common step.
@@ -41,6 +40,7 @@ pub struct Coupled {
     /// Modules that have lost a neighbour who reads them.
     pub loosened: Vec<ModuleId>,
     pub repairer: Repairer,
+    affected: Affected,
     /// A solution without steps was looked for.
     tried: bool,
     /// Times that an event cut a motion without steps.
@@ -56,7 +56,7 @@ const MAX_TRIES: usize = 100;
 const MAX_CUTS: u32 = 2;
 
 /// What an instant means for the coupled modules.
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Affected {
     /// Coupled modules whose equations or inputs have changed.
     seeds: Vec<ModuleId>,
@@ -71,14 +71,22 @@ struct Affected {
 impl Simulation<'_> {
     /// Finds out who is coupled now, given the modules that have begun new motions, and lets the coupled ones go on.
     pub(super) fn couple(&mut self, begun: &[ModuleId]) -> Result<(), Error> {
-        let Affected { seeds, joined, freed, dependent } = self.affected(begun);
-        for &id in &dependent {
+        let mut affected = std::mem::take(&mut self.coupled.affected);
+        self.find_affected(begun, &mut affected);
+        let coupled = self.couple_affected(&affected);
+        self.coupled.affected = affected;
+        coupled
+    }
+
+    fn couple_affected(&mut self, affected: &Affected) -> Result<(), Error> {
+        let Affected { seeds, joined, freed, dependent } = affected;
+        for &id in dependent {
             if let Some(state) = self.plant.state_mut(id) {
                 state.pass_changes(self.now);
             }
             self.look_ahead(id, self.now)?;
         }
-        for &id in &freed {
+        for &id in freed {
             let now = self.now;
             let state = self.plant.state_mut(id).expect("seen above");
             state.coupled = false;
@@ -90,16 +98,16 @@ impl Simulation<'_> {
             }
         }
         self.coupled.repaired |= !freed.is_empty();
-        for &id in &joined {
+        for &id in joined {
             self.plant.state_mut(id).expect("seen above").coupled = true;
         }
-        for &id in &seeds {
+        for &id in seeds {
             let now = self.now;
             let state = self.plant.state_mut(id).expect("seen above");
             state.pass_changes(now);
             state.next = Next::default();
         }
-        if seeds.is_empty() || self.repair(&seeds, &joined) {
+        if seeds.is_empty() || self.repair(seeds, joined) {
             return Ok(());
         }
         if self.coupled.linear.is_some() {
@@ -115,7 +123,11 @@ impl Simulation<'_> {
     }
 
     /// Looks at the modules that have begun new motions, and at their neighbours.
-    fn affected(&mut self, begun: &[ModuleId]) -> Affected {
+    fn find_affected(&mut self, begun: &[ModuleId], affected: &mut Affected) {
+        affected.seeds.clear();
+        affected.joined.clear();
+        affected.freed.clear();
+        affected.dependent.clear();
         let mut near = std::mem::take(&mut self.coupled.loosened);
         // Whose many neighbours are there already.
         let mut known = HashSet::new();
@@ -131,9 +143,12 @@ impl Simulation<'_> {
                 near.extend_from_slice(&state.context);
             }
         }
+        let visit = self.coupled.repairer.begin_visit();
+        near.retain(|id| {
+            let state = self.plant.state_mut(*id);
+            state.is_some_and(|state| std::mem::replace(&mut state.visited, visit) != visit)
+        });
         near.sort_unstable();
-        near.dedup();
-        let mut affected = Affected::default();
         let moved = |id: &ModuleId| self.plant.state(*id).is_some_and(|s| s.restarted == self.group);
         for &id in &near {
             let Some(state) = self.plant.state(id) else { continue };
@@ -155,7 +170,6 @@ impl Simulation<'_> {
         }
         near.clear();
         self.coupled.loosened = near;
-        affected
     }
 
     /// True if a module must be integrated together with neighbours: because it reads one that is integrated, or reads
@@ -197,7 +211,7 @@ impl Simulation<'_> {
             let Plant { tree, states, .. } = &mut self.plant;
             let state = states[id.slot()].as_mut().expect("a member");
             let first = tree.places(id).start;
-            for parameter in integrated(self.model, state) {
+            for &parameter in integrated(self.model, state) {
                 let motion = &mut state.motions[parameter];
                 let value = match *motion {
                     Motion::Coupled(component) => {
@@ -430,12 +444,7 @@ impl Simulation<'_> {
 
 /// The parameters of a coupled module that are integrated, then those that are solved for, in the order of their
 /// components.
-pub(super) fn integrated(model: &Model, state: &State) -> SmallVec<[usize; 4]> {
-    let Some((rule, solve)) = state.rule.zip(state.solve) else { return SmallVec::new() };
-    let solve = &model.rules[rule].solves[solve];
-    let numeric = |i: &usize| state.forced || solve.numeric.contains(i);
-    let algebraic = &solve.algebraic;
-    let solved = |place: &usize| algebraic.is_solved(*place, state.forced);
-    let given = (0..algebraic.of.len()).filter(solved).map(|place| algebraic.of[place]);
-    (0..solve.of.len()).filter(numeric).map(|i| solve.of[i]).chain(given).collect()
+pub(super) fn integrated<'m>(model: &'m Model, state: &State) -> &'m [usize] {
+    let Some((rule, solve)) = state.rule.zip(state.solve) else { return &[] };
+    model.rules[rule].solves[solve].stepping.components(state.forced)
 }

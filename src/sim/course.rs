@@ -62,6 +62,9 @@ impl Course {
     /// The dense output that a component follows from an instant on, and its number there.
     fn stretch(&self, component: usize, at: Instant) -> Option<(&Dense, usize)> {
         let Track { first, count, component } = self.track(component);
+        if count == 1 {
+            return Some((&self.stretches[first as usize], component as usize));
+        }
         let own = &self.stretches[first as usize..(first + count) as usize];
         let dense = own.iter().find(|dense| at.since(dense.end) < 0.0).or(own.last())?;
         Some((dense, component as usize))
@@ -94,7 +97,7 @@ impl Course {
     }
 
     /// Puts stretches in place of what some components have followed. `components` are numbered as in the stretches.
-    pub fn replace(&mut self, stretches: Vec<Dense>, components: &[u32], all: usize) {
+    pub fn replace(&mut self, stretches: &mut Vec<Dense>, components: &[u32], all: usize) {
         for component in self.tracks.len()..all {
             self.tracks.push(Track { first: 0, count: 1, component: component as u32 });
         }
@@ -102,7 +105,7 @@ impl Course {
         for (number, &component) in components.iter().enumerate() {
             self.tracks[component as usize] = Track { first, count, component: number as u32 };
         }
-        self.stretches.extend(stretches);
+        self.stretches.append(stretches);
     }
 }
 

@@ -46,25 +46,27 @@ impl Dense {
 
     /// One component at a position, by de Casteljau's algorithm.
     pub fn value(&self, component: usize, position: f64) -> f64 {
-        let mut c: Coefficients = [0.0; MAX_DEGREE + 1];
-        c[..=self.degree].copy_from_slice(self.of(component));
+        let c = self.of(component);
+        // Of the degrees that methods have most often, code without loops.
+        if let Ok(c) = c.try_into() {
+            return casteljau::<5>(c, position);
+        }
+        if let Ok(c) = c.try_into() {
+            return casteljau::<8>(c, position);
+        }
+        let mut all: Coefficients = [0.0; MAX_DEGREE + 1];
+        all[..=self.degree].copy_from_slice(c);
         for level in (1..=self.degree).rev() {
             for i in 0..level {
-                c[i] = mix(c[i], c[i + 1], position);
+                all[i] = mix(all[i], all[i + 1], position);
             }
         }
-        c[0]
+        all[0]
     }
 
     /// The value of a polynomial of the highest degree.
     pub fn at(coefficients: &[f64; MAX_DEGREE + 1], position: f64) -> f64 {
-        let mut c = *coefficients;
-        for level in (1..=MAX_DEGREE).rev() {
-            for i in 0..level {
-                c[i] = mix(c[i], c[i + 1], position);
-            }
-        }
-        c[0]
+        casteljau(coefficients, position)
     }
 
     /// The stretch from `lo` to `hi`, with other polynomials for some components.
@@ -151,6 +153,18 @@ fn cut(c: &mut [f64], lo: f64, hi: f64) {
             }
         }
     }
+}
+
+/// The value of a polynomial with so many coefficients.
+#[inline(always)]
+fn casteljau<const N: usize>(coefficients: &[f64; N], position: f64) -> f64 {
+    let mut c = *coefficients;
+    for level in (1..N).rev() {
+        for i in 0..level {
+            c[i] = mix(c[i], c[i + 1], position);
+        }
+    }
+    c[0]
 }
 
 /// Exact at both ends, unlike `a + s (b - a)`.

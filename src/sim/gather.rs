@@ -66,6 +66,9 @@ impl System {
 
     /// Puts the children of all aggregates with the same term together, a few for each evaluation.
     pub fn put_together(&mut self) {
+        if self.sums.is_empty() {
+            return self.folds.clear();
+        }
         let key = |sum: &Sum| (self.rows[sum.row as usize].rule, sum.aggregate);
         let mut groups: BTreeMap<(usize, usize), Vec<(u32, u32)>> = BTreeMap::new();
         for (number, sum) in self.sums.iter().enumerate() {
@@ -157,11 +160,11 @@ impl Equations<'_> {
     /// Computes all aggregates. Children of many modules are worked on together; each sum is added up in string order.
     pub fn add_up(&mut self, tau: f64, y: &[f64]) {
         let system = self.system;
-        self.sums.clear();
+        self.memory.sums.clear();
         if system.sums.is_empty() {
             return;
         }
-        self.sums.resize(system.sums.len(), 0.0);
+        self.memory.sums.resize(system.sums.len(), 0.0);
         let mut begun = vec![false; system.sums.len()];
         for (of, lanes) in &system.folds {
             self.fold(*of, lanes, tau, y, &mut begun);
@@ -181,9 +184,9 @@ impl Equations<'_> {
         let rule = &self.rules[rule];
         let aggregate = &rule.aggregates[aggregate];
         let width = aggregate.pattern.width;
-        let mut registers = std::mem::take(&mut self.registers);
-        registers.resize(rule.variables + width, [0.0; LANES]);
-        for v in aggregate.term.reads() {
+        let mut registers = std::mem::take(&mut self.memory.registers);
+        registers.resize(registers.len().max(rule.variables + width), [0.0; LANES]);
+        for &v in aggregate.term.reads() {
             for (lane, &(number, child)) in registers[v].iter_mut().zip(lanes) {
                 let sum = &system.sums[number as usize];
                 let row = &system.rows[sum.row as usize];
@@ -192,22 +195,22 @@ impl Equations<'_> {
                     None if v < row.sources => system.sources[row.first_source + v],
                     None => Source::Fixed(system.time(row, v - row.sources, tau)),
                 };
-                *lane = system.value(source, tau, y, &self.inputs);
+                *lane = system.value(source, tau, y, &self.memory.inputs);
             }
         }
-        let output = aggregate.term.eval_lanes(&mut registers).next().unwrap_or(0);
+        let output = aggregate.term.eval_rows(&mut registers, lanes.len()).next().unwrap_or(0);
         for (lane, &(number, _)) in lanes.iter().enumerate() {
             let number = number as usize;
-            let known = std::mem::replace(&mut begun[number], true).then_some(self.sums[number]);
-            self.sums[number] = aggregate.fold.add(known, registers[output][lane]);
+            let known = std::mem::replace(&mut begun[number], true).then_some(self.memory.sums[number]);
+            self.memory.sums[number] = aggregate.fold.add(known, registers[output][lane]);
         }
-        self.registers = registers;
+        self.memory.registers = registers;
     }
 
     /// Equations that become singular, at the start of a step.
     pub fn fading(&mut self, y: &[f64]) -> Option<Fault> {
         self.read_inputs(0.0);
-        self.system.algebra.fading(self.system, self.rules, &self.inputs, y)
+        self.system.algebra.fading(self.system, self.rules, &self.memory.inputs, y)
     }
 
     /// How far the errors of the components at the end of a step move what is solved for.

@@ -133,7 +133,8 @@ impl Simulation<'_> {
         if let Some(state) = self.plant.state_mut(id) {
             state.pass_changes(now);
         }
-        let followed = self.plant.state(id).filter(|s| s.rule == Some(rule)).map(|s| s.signs.clone());
+        let followed =
+            self.plant.state(id).filter(|s| s.rule == Some(rule)).map(|s| Signs::from_slice(&s.signs));
         let (mut signs, clear) = self.signs_of_values(id, compiled, context, followed);
         let before = self.plant.state(id);
         // A limit that is only approached may have been reached by rounding.
@@ -293,7 +294,8 @@ impl Simulation<'_> {
         if rule.atoms.is_empty() {
             return (Signs::new(), true);
         }
-        self.plant.variables(rule, id, context, self.now, &mut self.variables);
+        let read = (rule, &rule.watched[..]);
+        self.plant.variables_read(read, id, context, self.now, &mut self.variables);
         let mut out: SmallVec<[f64; 16]> = smallvec::smallvec![0.0; rule.sides.outputs()];
         rule.sides.eval(&self.variables, &mut self.scratch, &mut out);
         let scale = self.plant.tree.parameters(id).iter().fold(1.0, |m: f64, x| m.max(x.abs()));

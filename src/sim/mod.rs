@@ -62,6 +62,7 @@ mod blend;
 mod career;
 mod chance;
 mod choose;
+mod columns;
 mod consistent;
 mod coupled;
 mod course;

@@ -79,7 +79,8 @@ impl Simulation<'_> {
             }
             self.solved(solve, true, &mut motions);
         } else {
-            self.plant.variables(rule, id, &state.context, self.now, &mut self.variables);
+            let read = (rule, solve.stepping.laws_read());
+            self.plant.variables_read(read, id, &state.context, self.now, &mut self.variables);
             self.variables.extend(state.switches.iter().map(|&on| f64::from(u8::from(on))));
             refused = !self.formulas(solve, rule.time_variable(), &mut motions)
                 || !self.functions(solve, rule.time_variable(), &mut motions);
@@ -166,7 +167,8 @@ impl Simulation<'_> {
             }
             let program = &algebraic.formulas[place];
             let moves = |v: &usize| *v < motions.len() && !matches!(motions[*v], Motion::Rest);
-            let moving = program.reads().into_iter().filter(moves).map(|v| (v, motions[v].clone())).collect();
+            let moving =
+                program.reads().iter().copied().filter(moves).map(|v| (v, motions[v].clone())).collect();
             let Some(function) = Function::new(program, &self.variables, moving, time) else { return false };
             motions[parameter] = Motion::Function(Box::new(function));
         }
@@ -201,7 +203,7 @@ impl Simulation<'_> {
         while let Some(i) = (0..known.len()).find(|&i| {
             let Law::Sum { inflow, .. } = &solve.laws[i] else { return false };
             let waits = |v: usize| solve.of.iter().position(|p| *p == v).is_some_and(|j| j != i && !known[j]);
-            !known[i] && !inflow.reads().into_iter().any(waits)
+            !known[i] && !inflow.reads().iter().copied().any(waits)
         }) {
             let Law::Sum { factor, inflow } = &solve.laws[i] else { unreachable!("found as one") };
             let parameter = solve.of[i];

@@ -131,6 +131,34 @@ impl Plant {
     }
 }
 
+impl Plant {
+    /// The same where only some variables are read: what is not read may be any number.
+    pub fn variables_read(
+        &self,
+        (rule, reads): (&Rule, &[bool]),
+        id: ModuleId,
+        around: &Around,
+        at: Instant,
+        out: &mut Vec<f64>,
+    ) {
+        if !rule.aggregates.is_empty() {
+            return self.variables(rule, id, around, at, out);
+        }
+        out.clear();
+        for &module in std::iter::once(&id).chain(around.context()) {
+            let values = self.tree.parameters(module);
+            let first = out.len();
+            let (from, to) = (first.min(reads.len()), (first + values.len()).min(reads.len()));
+            match reads[from..to].contains(&true) {
+                true => self.values(module, at, out),
+                false => out.extend_from_slice(values),
+            }
+        }
+        out.resize(rule.variables - 2, 0.0);
+        out.extend([at.to_f64(), at.since(self.tree.birth(id))]);
+    }
+}
+
 /// The variables of a module's rule along a stretch of time: positions 0 to 1 of `h` from `start`.
 pub struct Path<'p> {
     pub plant: &'p Plant,

@@ -20,7 +20,7 @@
 use super::coupled::integrated;
 use super::course::Course;
 use super::dense::Dense;
-use super::equations::Equations;
+use super::equations::{Equations, Memory};
 use super::integrator::{INNER_TOLERANCE, Integrator};
 use super::motion::Motion;
 use super::queue::Who;
@@ -29,7 +29,7 @@ use super::state::{Control, Next};
 use super::system::System;
 use crate::structure::{Instant, ModuleId};
 
-/// What repairs have learnt, and their memory.
+/// What repairs have learnt, and their memory: nothing is allocated for one but its motion.
 #[derive(Clone)]
 pub struct Repairer {
     integrator: Integrator,
@@ -38,16 +38,42 @@ pub struct Repairer {
     rings: usize,
     /// By component: its number in the system of the region.
     numbers: Vec<u32>,
-    /// Memory for the equations of a region.
+    /// The equations of the region.
     system: System,
+    memory: Memory,
+    region: Region,
+    trial: Trial,
+    y: Vec<f64>,
+    values: Vec<f64>,
     /// Number of the last visit to modules.
     visit: u64,
 }
 
 impl Default for Repairer {
     fn default() -> Repairer {
-        let (integrator, control, numbers, system) = Default::default();
-        Repairer { integrator, control, rings: 3, numbers, system, visit: 0 }
+        let (integrator, control, numbers, system, memory) = Default::default();
+        let (region, trial, y, values) = Default::default();
+        Repairer {
+            integrator,
+            control,
+            rings: 3,
+            numbers,
+            system,
+            memory,
+            region,
+            trial,
+            y,
+            values,
+            visit: 0,
+        }
+    }
+}
+
+impl Repairer {
+    /// A number for a visit to modules that no visit has had.
+    pub fn begin_visit(&mut self) -> u64 {
+        self.visit += 1;
+        self.visit
     }
 }
 
@@ -66,13 +92,17 @@ const CONSERVED: f64 = 1e-11;
 const NOT_HERE: u32 = u32::MAX;
 
 /// Modules that are integrated again, the seeds first, then ring after ring.
+#[derive(Clone, Default)]
 struct Region {
     members: Vec<ModuleId>,
     /// Where each ring begins.
     rings: Vec<usize>,
+    /// Those who may be in the next ring.
+    next: Vec<ModuleId>,
 }
 
 /// The motion of a region.
+#[derive(Clone, Default)]
 struct Trial {
     stretches: Vec<Dense>,
     /// Its components, by their number in the stretches.
@@ -94,22 +124,39 @@ impl Simulation<'_> {
             return false;
         }
         self.number_newcomers(seeds);
+        let (region, trial) = (&mut self.coupled.repairer.region, &mut self.coupled.repairer.trial);
+        let (mut region, mut trial) = (std::mem::take(region), std::mem::take(trial));
+        let repaired = self.repair_within(&mut region, &mut trial, seeds, joined);
+        trial.stretches.clear();
+        (self.coupled.repairer.region, self.coupled.repairer.trial) = (region, trial);
+        repaired
+    }
+
+    fn repair_within(
+        &mut self,
+        region: &mut Region,
+        trial: &mut Trial,
+        seeds: &[ModuleId],
+        joined: &[ModuleId],
+    ) -> bool {
         // Within a slice of time nobody sees what happens to others.
         let sliced = self.settings.is_sliced();
         let mut rings = if sliced { 0 } else { self.coupled.repairer.rings };
         loop {
-            let region = self.region(seeds, rings);
+            self.surround(region, seeds, rings);
             if !sliced && region.members.len() as f64 > MOST * self.coupled.members.len() as f64 {
                 return false;
             }
-            let Some(trial) = self.integrate(&region) else { return false };
-            let reach = if sliced { 0 } else { self.reach(&region, &trial) };
+            if self.integrate(region, trial).is_none() {
+                return false;
+            }
+            let reach = if sliced { 0 } else { self.reach(region, trial) };
             let closed = region.rings.len() <= rings;
             if reach < region.rings.len() || closed {
                 // One ring beyond the last that changed.
                 self.coupled.repairer.rings = (reach + 1).clamp(1, MAX_RINGS);
                 self.coupled.members.extend_from_slice(joined);
-                self.take_over(&region, trial);
+                self.take_over(region, trial);
                 return true;
             }
             rings *= 2;
@@ -129,7 +176,7 @@ impl Simulation<'_> {
             }
             self.settle_values(id);
             let state = self.plant.state(id).expect("a seed");
-            for parameter in integrated(self.model, state) {
+            for &parameter in integrated(self.model, state) {
                 let course = self.plant.coupled.as_mut().expect("seen above");
                 let component = course.add(known) as u32;
                 self.plant.state_mut(id).expect("a seed").motions[parameter] = Motion::Coupled(component);
@@ -139,60 +186,63 @@ impl Simulation<'_> {
 
     /// Makes the present values of a module's integrated parameters those of the tree.
     fn settle_values(&mut self, id: ModuleId) {
-        let mut values = Vec::new();
-        self.plant.values(id, self.now, &mut values);
+        let values = &mut self.coupled.repairer.values;
+        values.clear();
+        self.plant.values(id, self.now, values);
         let first = self.plant.tree.places(id).start;
         let state = self.plant.state(id).expect("a seed");
-        for parameter in integrated(self.model, state) {
+        for &parameter in integrated(self.model, state) {
             self.plant.tree.set_value(first + parameter, values[parameter]);
         }
     }
 
-    /// The seeds and so many rings around them.
-    fn region(&mut self, seeds: &[ModuleId], rings: usize) -> Region {
-        self.coupled.repairer.visit += 1;
-        let visit = self.coupled.repairer.visit;
-        let mut region = Region { members: Vec::new(), rings: vec![0] };
+    /// Makes a region of the seeds and so many rings around them.
+    fn surround(&mut self, region: &mut Region, seeds: &[ModuleId], rings: usize) {
+        let visit = self.coupled.repairer.begin_visit();
+        let Region { members, rings: begins, next } = region;
+        members.clear();
+        begins.clear();
+        begins.push(0);
         for &id in seeds {
             self.plant.state_mut(id).expect("a seed").visited = visit;
-            region.members.push(id);
+            members.push(id);
         }
-        let mut next = Vec::new();
         for _ in 0..rings {
-            let from = *region.rings.last().expect("the seeds");
-            for &id in &region.members[from..] {
+            let from = *begins.last().expect("the seeds");
+            for &id in &members[from..] {
                 self.readers(id, |reader, _| next.push(reader));
             }
-            region.rings.push(region.members.len());
+            begins.push(members.len());
             for id in next.drain(..) {
                 let state = self.plant.state_mut(id).expect("a reader");
                 if state.coupled && std::mem::replace(&mut state.visited, visit) != visit {
-                    region.members.push(id);
+                    members.push(id);
                 }
             }
-            if region.rings.last() == Some(&region.members.len()) {
-                region.rings.pop();
+            if begins.last() == Some(&members.len()) {
+                begins.pop();
                 break;
             }
         }
-        region
     }
 
-    /// The motion of a region from now to the end of the common step.
-    fn integrate(&mut self, region: &Region) -> Option<Trial> {
+    /// The motion of a region from now to the end of the common step; None if there is none.
+    fn integrate(&mut self, region: &Region, trial: &mut Trial) -> Option<()> {
         let course = self.plant.coupled.as_ref()?;
-        let mut components = Vec::new();
-        let mut y = Vec::new();
+        let Trial { stretches, components } = trial;
+        let Repairer { integrator, control, numbers, system, memory, y, .. } = &mut self.coupled.repairer;
+        stretches.clear();
+        components.clear();
+        y.clear();
         for &id in &region.members {
             let (state, values) = (self.plant.state(id)?, self.plant.tree.parameters(id));
-            for parameter in integrated(self.model, state) {
+            for &parameter in integrated(self.model, state) {
                 if let Motion::Coupled(component) = state.motions[parameter] {
                     components.push(component);
                     y.push(course.value(component as usize, self.now).unwrap_or(values[parameter]));
                 }
             }
         }
-        let Repairer { integrator, control, numbers, system, .. } = &mut self.coupled.repairer;
         for (number, &component) in components.iter().enumerate() {
             if numbers.len() <= component as usize {
                 numbers.resize(component as usize + 1, NOT_HERE);
@@ -203,30 +253,33 @@ impl Simulation<'_> {
         let rules = &self.model.rules;
         let frozen = self.settings.is_sliced();
         system.rebuild(rules, &self.plant, &region.members, self.now, number, frozen);
-        for &component in &components {
+        for &component in &*components {
             numbers[component as usize] = NOT_HERE;
         }
         integrator.restart(self.settings.method, y.len());
-        let (mut from, mut stretches) = (self.now, Vec::new());
+        let mut from = self.now;
         while course.end.since(from) > 0.0 {
             if stretches.len() >= MAX_STEPS {
                 return None;
             }
-            let mut equations = Equations::new(system, rules, Some(course));
+            let mut equations = Equations::within(std::mem::take(memory), system, rules, Some(course));
             let end = Some(course.end);
             let stats = &mut self.stats;
-            let step = integrator.step(&self.coupled_settings, control, &mut equations, &y, from, end, stats);
+            let step = integrator.step(&self.coupled_settings, control, &mut equations, y, from, end, stats);
             from = step.ok()?;
             if system.algebra.is_empty() {
-                stretches.push(integrator.dense(&mut equations, &y));
+                stretches.push(integrator.dense(&mut equations, y));
             } else {
                 stretches
-                    .extend(integrator.blended(&mut equations, &y, &self.coupled_settings, control).ok()?);
+                    .extend(integrator.blended(&mut equations, y, &self.coupled_settings, control).ok()?);
             }
-            integrator.advance(&mut y);
-            system.advance(from);
+            *memory = equations.memory;
+            integrator.advance(y);
+            if course.end.since(from) > 0.0 {
+                system.advance(from);
+            }
         }
-        Some(Trial { stretches, components })
+        Some(())
     }
 
     /// The number of rings that a trial changes by more than may be neglected.
@@ -249,7 +302,7 @@ impl Simulation<'_> {
             let to = region.rings.get(ring + 1).copied().unwrap_or(region.members.len());
             for id in region.members[from..to].iter().rev() {
                 let state = self.plant.state(*id).expect("a member");
-                for parameter in integrated(self.model, state).into_iter().rev() {
+                for &parameter in integrated(self.model, state).iter().rev() {
                     if let Motion::Coupled(component) = state.motions[parameter] {
                         number -= 1;
                         if changes(component, number) {
@@ -263,10 +316,10 @@ impl Simulation<'_> {
     }
 
     /// Makes a trial the motion of its region, and finds the region's next events.
-    fn take_over(&mut self, region: &Region, trial: Trial) {
+    fn take_over(&mut self, region: &Region, trial: &mut Trial) {
         let all = self.coupled.system.places.len();
         let course: &mut Course = self.plant.coupled.as_mut().expect("seen above");
-        course.replace(trial.stretches, &trial.components, all);
+        course.replace(&mut trial.stretches, &trial.components, all);
         self.coupled.repaired = true;
         let now: Instant = self.now;
         for &id in &region.members {

@@ -36,19 +36,27 @@ const FLOOR: f64 = 1e-18;
 /// Components that are worked on together: one read of each stage's rates serves many of them.
 const BLOCK: usize = 64;
 
-/// Adds the sum of the stages' rates with these weights, from component `first` on.
+/// So few components are not worth that: each is added up by itself, in the same order.
+const FEW: usize = 2;
+
+/// Components that fit into the processor's registers together. Rates are kept in so many more places than there are
+/// components that all of them are whole parts: what the last places hold means nothing.
+const PART: usize = 8;
+
+/// Adds the sum of the stages' rates with these weights, from component `first` on. The sums are whole parts.
 fn weigh(weights: &[f64], k: &[Vec<f64>], first: usize, sums: &mut [f64]) {
+    let count = sums.len();
     for (weight, k) in weights.iter().zip(k) {
         if *weight != 0.0 {
-            for (sum, k) in sums.iter_mut().zip(&k[first..]) {
-                *sum += weight * k;
+            let (sums, k) = (sums.as_chunks_mut::<PART>().0, k[first..first + count].as_chunks::<PART>().0);
+            for (sums, k) in sums.iter_mut().zip(k) {
+                for (sum, k) in sums.iter_mut().zip(k) {
+                    *sum += weight * k;
+                }
             }
         }
     }
 }
-
-/// So few components are not worth a block: each is added up by itself, in the same order.
-const FEW: usize = 8;
 
 /// The sum of one component's rates at the stages with these weights.
 fn weighed(weights: &[f64], k: &[Vec<f64>], component: usize) -> f64 {
@@ -115,10 +123,13 @@ impl Workspace {
         if self.end.len() == n && !self.k.is_empty() {
             return;
         }
-        let stages = DOP853.a.len();
-        self.k.resize(stages, Vec::new());
-        for k in &mut self.k {
-            k.resize(n, 0.0);
+        let places = n.next_multiple_of(PART);
+        if self.k.first().is_none_or(|k| k.len() != places) {
+            let stages = DOP853.a.len();
+            self.k.resize(stages, Vec::new());
+            for k in &mut self.k {
+                k.resize(places, 0.0);
+            }
         }
         self.stage.resize(n, 0.0);
         self.other_end.resize(n, 0.0);
@@ -127,14 +138,14 @@ impl Workspace {
 
     fn evaluate(&mut self, system: &mut impl Rates, tau: f64, stage: usize) {
         self.evaluations += system.modules();
-        system.rates(tau, &self.stage, &mut self.k[stage]);
+        system.rates(tau, &self.stage, &mut self.k[stage][..self.stage.len()]);
     }
 
     /// Computes the rates at the start of a step; the component whose rate is not finite is an error.
     pub fn start(&mut self, system: &mut impl Rates, y: &[f64]) -> Result<(), usize> {
         self.stage.copy_from_slice(y);
         self.evaluate(system, 0.0, 0);
-        self.k[0].iter().position(|x| !x.is_finite()).map_or(Ok(()), Err)
+        self.rates_at_start().iter().position(|x| !x.is_finite()).map_or(Ok(()), Err)
     }
 
     /// Tries a step from `y`, whose rates are known.
@@ -193,21 +204,24 @@ impl Workspace {
 
     /// The state at which a stage's rate is taken.
     fn combine(&mut self, tableau: &Tableau, i: usize, y: &[f64], h: f64) {
-        if y.len() <= FEW {
-            for (j, (s, y)) in self.stage.iter_mut().zip(y).enumerate() {
-                *s = y + h * weighed(tableau.a[i], &self.k, j);
+        match y.len() {
+            0..=FEW => {
+                for (j, (s, y)) in self.stage.iter_mut().zip(y).enumerate() {
+                    *s = y + h * weighed(tableau.a[i], &self.k, j);
+                }
             }
-            return;
+            ..=PART => self.combine_blocks::<PART>(tableau.a[i], y, h),
+            _ => self.combine_blocks::<BLOCK>(tableau.a[i], y, h),
         }
-        let mut first = 0;
-        for (y, stage) in y.chunks(BLOCK).zip(self.stage.chunks_mut(BLOCK)) {
-            let mut sums = [0.0; BLOCK];
-            let sums = &mut sums[..y.len()];
-            weigh(tableau.a[i], &self.k, first, sums);
-            for (s, (y, sum)) in stage.iter_mut().zip(y.iter().zip(sums)) {
+    }
+
+    fn combine_blocks<const N: usize>(&mut self, weights: &[f64], y: &[f64], h: f64) {
+        for (block, (y, stage)) in y.chunks(N).zip(self.stage.chunks_mut(N)).enumerate() {
+            let mut sums = [0.0; N];
+            weigh(weights, &self.k, block * N, &mut sums[..y.len().next_multiple_of(PART)]);
+            for (s, (y, sum)) in stage.iter_mut().zip(y.iter().zip(&sums)) {
                 *s = y + h * *sum;
             }
-            first += y.len();
         }
     }
 
@@ -215,7 +229,7 @@ impl Workspace {
     /// difference of their rates (Hairer and Wanner 1996, IV.2).
     pub fn stiffness(&self, method: Method, h: f64) -> f64 {
         let Some(tableau) = method.tableau() else { return 0.0 };
-        let (a, b) = (&self.k[tableau.stages - 1], &self.k[tableau.stages - 2]);
+        let [a, b] = [1, 2].map(|before| &self.k[tableau.stages - before][..self.end.len()]);
         let square = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| (x - y) * (x - y)).sum::<f64>();
         let distance = square(&self.end, &self.other_end);
         if distance > 0.0 { h * (square(a, b) / distance).sqrt() } else { 0.0 }
@@ -223,7 +237,7 @@ impl Workspace {
 
     /// The rates at the start of the step.
     pub fn rates_at_start(&self) -> &[f64] {
-        &self.k[0]
+        &self.k[0][..self.end.len()]
     }
 
     /// The largest error of a component, in units of what is tolerated, by truncation and by rounding.
@@ -238,8 +252,9 @@ impl Workspace {
                         *sum = weighed(row, &self.k, j);
                     }
                 } else {
-                    sums[..count].fill(0.0);
-                    weigh(row, &self.k, first, &mut sums[..count]);
+                    let sums = &mut sums[..count.next_multiple_of(PART)];
+                    sums.fill(0.0);
+                    weigh(row, &self.k, first, sums);
                 }
             }
             let estimates = sums[0].iter().zip(&sums[1]).take(count);
@@ -274,7 +289,8 @@ impl Workspace {
 
     fn finite(&self, error: f64, rounding: f64, last: usize) -> Trial {
         let bad = self.end.iter().position(|x| !x.is_finite());
-        match bad.or_else(|| self.k[last].iter().position(|x| !x.is_finite())) {
+        let rates = &self.k[last][..self.end.len()];
+        match bad.or_else(|| rates.iter().position(|x| !x.is_finite())) {
             None if error.is_finite() => Trial::Done { error, rounding },
             at => Trial::NotFinite(at.unwrap_or(0)),
         }
@@ -320,7 +336,7 @@ impl Workspace {
 
     /// A step over which the solution changes little (Hairer, Nørsett and Wanner 1993, II.4).
     pub fn first_size(&mut self, method: Method, system: &mut impl Rates, y: &[f64], tolerance: f64) -> f64 {
-        let f = &self.k[0];
+        let f = &self.k[0][..y.len()];
         let norm = |v: &[f64]| {
             v.iter().zip(y).fold(0.0f64, |m, (v, y)| m.max((v / (tolerance * (1.0 + y.abs()))).abs()))
         };

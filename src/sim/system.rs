@@ -1,17 +1,13 @@
 //! The equations of the coupled modules between two changes of structure.
 
 use super::algebra::Algebra;
+use super::columns::Columns;
 use super::course::Course;
 use super::gather::Partial;
 use super::motion::Motion;
 use super::plant::Plant;
-use crate::expr::{LANES, Lanes};
 use crate::model::{Rule, Solve};
 use crate::structure::{Instant, ModuleId};
-use smallvec::SmallVec;
-
-/// Rule, clause and whether all is integrated, and the rows for which that is so.
-type Batch = ((usize, usize, bool), SmallVec<[u32; 16]>);
 
 /// A rule and one of its aggregates.
 type Term = (usize, usize);
@@ -47,7 +43,7 @@ pub struct System {
     given: Vec<u32>,
     /// Components of the coupled modules that are read.
     inputs: Vec<u32>,
-    pub chunks: Vec<Chunk>,
+    pub columns: Columns,
     pub switches: Vec<f64>,
     /// Place in the tree's values, and owner with its parameter, of each component.
     pub places: Vec<(usize, ModuleId, usize)>,
@@ -94,72 +90,6 @@ pub struct Sum {
     pub count: usize,
 }
 
-/// Rows that are evaluated at once: at most [`LANES`], with the same program.
-#[derive(Clone, Debug)]
-pub struct Chunk {
-    pub rows: Vec<u32>,
-    /// Registers of the rule's variables.
-    pub registers: usize,
-    /// What the program reads, and from where.
-    pub columns: Vec<(usize, Column)>,
-    /// Places of the first rate of each row.
-    pub rates: Places,
-}
-
-/// One variable of all rows of a chunk.
-#[derive(Clone, Debug)]
-pub enum Column {
-    Time,
-    Age,
-    Fixed(Vec<f64>),
-    State(Places),
-    /// Aggregates, by their numbers.
-    Sum(Vec<u32>),
-    Mixed(Vec<Source>),
-}
-
-/// Places in a vector; mostly one after another, because rows stand in string order.
-#[derive(Clone, Debug)]
-pub enum Places {
-    Run { first: usize, count: usize },
-    Any(Vec<u32>),
-}
-
-impl Places {
-    fn new(all: Vec<u32>) -> Places {
-        let first = all[0];
-        match all.iter().zip(first..).all(|(a, b)| *a == b) {
-            true => Places::Run { first: first as usize, count: all.len() },
-            false => Places::Any(all),
-        }
-    }
-
-    pub fn gather(&self, from: &[f64], to: &mut Lanes) {
-        match self {
-            &Places::Run { first, count } => to[..count].copy_from_slice(&from[first..first + count]),
-            Places::Any(all) => {
-                for (lane, place) in to.iter_mut().zip(all) {
-                    *lane = from[*place as usize];
-                }
-            }
-        }
-    }
-
-    /// Writes to the places, all moved by `offset`.
-    pub fn scatter(&self, from: &Lanes, offset: usize, to: &mut [f64]) {
-        match self {
-            &Places::Run { first, count } => {
-                to[first + offset..first + offset + count].copy_from_slice(&from[..count])
-            }
-            Places::Any(all) => {
-                for (lane, place) in from.iter().zip(all) {
-                    to[*place as usize + offset] = *lane;
-                }
-            }
-        }
-    }
-}
-
 impl System {
     /// The equations of some of the coupled modules. `unknown` gives the number here of a component, in the order of
     /// the members; None if it is not integrated here. If `frozen`, neighbours are
@@ -202,22 +132,21 @@ impl System {
         for &id in members {
             let state = plant.state(id).expect("members have states");
             let first = plant.tree.places(id).start;
-            let mut own: SmallVec<[(u32, usize); 4]> = (state.motions.iter().enumerate())
-                .filter_map(|(parameter, m)| match m {
-                    Motion::Coupled(c) => Some((*c, parameter)),
-                    _ => None,
-                })
-                .collect();
-            own.sort_unstable();
             let (Some(rule), Some(solve)) = (state.rule, state.solve) else { continue };
-            if own.is_empty() {
+            let stepping = &rules[rule].solves[solve].stepping;
+            let coupled =
+                |parameter: &usize| matches!(state.motions.get(*parameter), Some(Motion::Coupled(_)));
+            let own = || stepping.components(state.forced).iter().copied().filter(coupled);
+            let count = own().count();
+            if count == 0 {
                 continue;
             }
             let first_rate = system.places.len();
-            system.places.extend(own.iter().map(|&(_, parameter)| (first + parameter, id, parameter)));
+            system.places.extend(own().map(|parameter| (first + parameter, id, parameter)));
             let first_source = system.sources.len();
             let compiled = &rules[rule];
             let mut add = |system: &mut System, module: ModuleId, child: bool| {
+                let variable = system.sources.len() - first_source;
                 if frozen && module != id {
                     values_then.clear();
                     plant.values(module, start, &mut values_then);
@@ -226,9 +155,15 @@ impl System {
                     return;
                 }
                 let values = plant.tree.parameters(module);
+                let read = |i: usize| child || stepping.reads(variable + i);
+                if !(0..values.len()).any(read) {
+                    return system.sources.extend(values.iter().map(|x| Source::Fixed(*x)));
+                }
                 let neighbour = plant.state(module).filter(|s| !s.motions.is_empty());
                 for (i, &x) in values.iter().enumerate() {
                     let source = match neighbour.map(|s| (&s.motions[i], s.since)) {
+                        // Any value will do.
+                        _ if !read(i) => Source::Fixed(x),
                         None | Some((Motion::Rest | Motion::Step(_), _)) => Source::Fixed(x),
                         Some((Motion::Coupled(c), _)) => match unknown(*c) {
                             Some(number) => Source::State(number),
@@ -273,7 +208,7 @@ impl System {
                 switches: system.switches.len() - first_switch,
                 first_rate,
                 rates: integrated,
-                algebraic: own.len() - integrated,
+                algebraic: count - integrated,
                 first_given: system.given.len(),
                 birth,
                 age: start.since(birth),
@@ -294,7 +229,9 @@ impl System {
     pub fn finish(&mut self, rules: &[Rule]) {
         self.algebra = Algebra::new(self, rules);
         self.put_together();
-        self.batch(rules);
+        let mut columns = std::mem::take(&mut self.columns);
+        columns.fill(self, rules);
+        self.columns = columns;
     }
 
     /// Adds the equations of algebraic parameters of a module alone, of which are given their first component and their
@@ -332,70 +269,9 @@ impl System {
         &self.given[row.first_given..row.first_given + row.algebraic]
     }
 
-    /// Puts rows with the same program together, a chunk of them for each evaluation.
-    fn batch(&mut self, rules: &[Rule]) {
-        let mut batches: SmallVec<[Batch; 4]> = SmallVec::new();
-        for (n, row) in self.rows.iter().enumerate().filter(|(_, row)| row.rates > 0) {
-            let key = (row.rule, row.solve, row.forced);
-            match batches.iter_mut().find(|(k, _)| *k == key) {
-                Some((_, rows)) => rows.push(n as u32),
-                None => batches.push((key, smallvec::smallvec![n as u32])),
-            }
-        }
-        let mut chunks = std::mem::take(&mut self.chunks);
-        chunks.clear();
-        for (_, rows) in &batches {
-            let first = &self.rows[rows[0] as usize];
-            let program = super::equations::program(rules, first);
-            let reads = program.reads();
-            for rows in rows.chunks(LANES) {
-                let columns = reads.iter().map(|&variable| (variable, self.column(rows, variable))).collect();
-                let rates = rows.iter().map(|row| self.rows[*row as usize].first_rate as u32).collect();
-                let registers = first.sources + 2 + first.switches;
-                let rows = rows.to_vec();
-                chunks.push(Chunk { rows, registers, columns, rates: Places::new(rates) });
-            }
-        }
-        self.chunks = chunks;
-    }
-
-    /// Where one variable of some rows with the same program comes from.
-    fn column(&self, rows: &[u32], variable: usize) -> Column {
-        let rows = || rows.iter().map(|row| &self.rows[*row as usize]);
-        let sources = rows().next().map_or(0, |row| row.sources);
-        if variable == sources {
-            return Column::Time;
-        }
-        if variable == sources + 1 {
-            return Column::Age;
-        }
-        if variable > sources {
-            let switch = |row: &Row| self.switches[row.first_switch + variable - sources - 2];
-            return Column::Fixed(rows().map(switch).collect());
-        }
-        let all: Vec<Source> = rows().map(|row| self.sources[row.first_source + variable]).collect();
-        let state = |source: &Source| match source {
-            Source::State(component) => Some(*component),
-            _ => None,
-        };
-        let fixed = |source: &Source| match source {
-            Source::Fixed(x) => Some(*x),
-            _ => None,
-        };
-        if let Some(components) = all.iter().map(state).collect() {
-            return Column::State(Places::new(components));
-        }
-        let sum = |source: &Source| match source {
-            Source::Sum(number) => Some(*number),
-            _ => None,
-        };
-        if let Some(sums) = all.iter().map(sum).collect() {
-            return Column::Sum(sums);
-        }
-        match all.iter().map(fixed).collect() {
-            Some(values) => Column::Fixed(values),
-            None => Column::Mixed(all),
-        }
+    /// The switches of a row.
+    pub fn switches_of(&self, row: &Row) -> &[f64] {
+        &self.switches[row.first_switch..row.first_switch + row.switches]
     }
 
     /// What the components that are read are at a time after the start; NaN where that is not known.
@@ -453,7 +329,7 @@ impl System {
         out.extend(sources.iter().map(|source| self.value(*source, tau, y, inputs)));
         out.extend([self.start.to_f64() + tau, row.age + tau]);
         self.gather(rules, row, tau, y, inputs, out);
-        out.extend_from_slice(&self.switches[row.first_switch..row.first_switch + row.switches]);
+        out.extend_from_slice(self.switches_of(row));
     }
 
     /// Calls a function with each partial derivative of one module's rates by a component that is integrated.

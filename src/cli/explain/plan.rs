@@ -400,7 +400,7 @@ impl Facts<'_> {
             variable.checked_sub(rule.first_aggregate).and_then(|i| rule.aggregates.get(i))
         {
             let of_child = |v: usize| v.checked_sub(rule.variables);
-            let read = aggregate.term.reads().into_iter().filter_map(of_child);
+            let read = aggregate.term.reads().iter().copied().filter_map(of_child);
             let kinds = || aggregate.pattern.kinds.iter().map(|kind| self.model.kinds.get(*kind));
             return { read }.any(|p| kinds().any(|kind| is_numeric(self.model, kind, Some(p))));
         }

@@ -65,7 +65,8 @@ pub fn law(
             (Some(name), why)
         }
         Law::Sum { inflow, .. } => {
-            let driven: Vec<String> = inflow.reads().into_iter().filter_map(|v| variable(rule, v)).collect();
+            let driven: Vec<String> =
+                inflow.reads().iter().copied().filter_map(|v| variable(rule, v)).collect();
             let own = |name: &&String| rule.parameters.contains(name) || *name == "t" || *name == "age";
             let driven: Vec<String> = driven.iter().filter(own).cloned().collect();
             let why =
@@ -110,7 +111,7 @@ fn driven(rule: &Rule, x: &str, law: &Driven, piecewise: &str) -> (Option<String
         (0, Some(pace)) => {
             let time = |v: &usize| *v >= rule.time_variable() && *v < rule.variables;
             let times: Vec<String> =
-                pace.reads().into_iter().filter(time).filter_map(|v| variable(rule, v)).collect();
+                pace.reads().iter().copied().filter(time).filter_map(|v| variable(rule, v)).collect();
             format!("a function of {}", list(&times))
         }
         (1, _) => format!("the curve {}", curves[0]),
