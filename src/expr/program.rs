@@ -14,6 +14,9 @@ enum Instruction {
     Const(Register, f64),
     Unary(Unary, Register, Register),
     Binary(Binary, Register, Register, Register),
+    /// With a constant on the left, or on the right.
+    Left(Binary, Register, f64, Register),
+    Right(Binary, Register, Register, f64),
     Select(Register, Register, Register, Register),
     /// The first number says which of the program's curves, or arrays.
     Curve(u32, Part, Register, Register),
@@ -27,6 +30,8 @@ impl Instruction {
             Instruction::Const(to, _)
             | Instruction::Unary(_, to, _)
             | Instruction::Binary(_, to, ..)
+            | Instruction::Left(_, to, ..)
+            | Instruction::Right(_, to, ..)
             | Instruction::Select(to, ..)
             | Instruction::Curve(_, _, to, _)
             | Instruction::Piece(_, _, to, ..)
@@ -37,9 +42,11 @@ impl Instruction {
     fn operands(self) -> [Option<Register>; 3] {
         match self {
             Instruction::Const(..) => [None; 3],
-            Instruction::Unary(_, _, a) | Instruction::Curve(.., a) | Instruction::Element(.., a) => {
-                [Some(a), None, None]
-            }
+            Instruction::Unary(_, _, a)
+            | Instruction::Left(.., a)
+            | Instruction::Right(_, _, a, _)
+            | Instruction::Curve(.., a)
+            | Instruction::Element(.., a) => [Some(a), None, None],
             Instruction::Binary(_, _, a, b) | Instruction::Piece(.., a, b) => [Some(a), Some(b), None],
             Instruction::Select(_, c, a, b) => [Some(c), Some(a), Some(b)],
         }
@@ -97,6 +104,25 @@ fn listed<T>(list: &mut Vec<Arc<T>>, known: &mut HashMap<Lookup, u32>, lookup: L
     })
 }
 
+/// The number that a node is.
+fn constant(graph: &Graph, id: NodeId) -> f64 {
+    match graph.node(id) {
+        Node::Const(bits) => f64::from_bits(bits),
+        _ => unreachable!("only constants stand in instructions"),
+    }
+}
+
+/// The operands of a node that are read from registers: a constant operand stands in the instruction.
+fn in_registers(graph: &Graph, id: NodeId) -> [Option<NodeId>; 3] {
+    let node = graph.node(id);
+    let is_constant = |id: NodeId| matches!(graph.node(id), Node::Const(_));
+    match node {
+        Node::Binary(_, a, b) if is_constant(a) && !is_constant(b) => [None, Some(b), None],
+        Node::Binary(_, a, b) if is_constant(b) && !is_constant(a) => [Some(a), None, None],
+        _ => node.operands(),
+    }
+}
+
 impl Program {
     /// Compiles `roots`, which may read the variables `0..variables`.
     ///
@@ -106,7 +132,7 @@ impl Program {
         let order = graph.reachable(roots);
         let mut uses: HashMap<NodeId, usize> = HashMap::new();
         for &id in order.iter() {
-            for operand in graph.node(id).operands().into_iter().flatten() {
+            for operand in in_registers(graph, id).into_iter().flatten() {
                 *uses.entry(operand).or_default() += 1;
             }
         }
@@ -128,8 +154,11 @@ impl Program {
                 place.insert(id, v);
                 continue;
             }
-            let operands = node.operands().map(|o| o.map(|o| place[&o]));
-            for operand in node.operands().into_iter().flatten() {
+            if matches!(node, Node::Const(_)) && !uses.contains_key(&id) {
+                continue;
+            }
+            let operands = in_registers(graph, id);
+            for operand in operands.into_iter().flatten() {
                 let left = uses.get_mut(&operand).expect("counted above");
                 *left -= 1;
                 if *left == 0 && !matches!(graph.node(operand), Node::Var(_)) {
@@ -140,11 +169,18 @@ impl Program {
                 registers += 1;
                 registers - 1
             });
+            let operands = operands.map(|o| o.map(|o| place[&o]));
             place.insert(id, to);
             code.push(match (node, operands) {
                 (Node::Const(bits), _) => Instruction::Const(to, f64::from_bits(bits)),
                 (Node::Unary(op, _), [Some(a), ..]) => Instruction::Unary(op, to, a),
                 (Node::Binary(op, ..), [Some(a), Some(b), _]) => Instruction::Binary(op, to, a, b),
+                (Node::Binary(op, x, _), [None, Some(b), _]) => {
+                    Instruction::Left(op, to, constant(graph, x), b)
+                }
+                (Node::Binary(op, _, x), [Some(a), None, _]) => {
+                    Instruction::Right(op, to, a, constant(graph, x))
+                }
                 (Node::Select(..), [Some(c), Some(a), Some(b)]) => Instruction::Select(to, c, a, b),
                 (Node::Curve(curve, part, _), [Some(a), ..]) => {
                     let which = listed(&mut curves, &mut known_curves, curve, graph.curve_of(curve));
@@ -238,6 +274,8 @@ impl Program {
                 Instruction::Binary(op, to, a, b) => {
                     (to, T::binary(op, scratch[a as usize], scratch[b as usize]))
                 }
+                Instruction::Left(op, to, x, b) => (to, T::binary(op, T::constant(x), scratch[b as usize])),
+                Instruction::Right(op, to, a, x) => (to, T::binary(op, scratch[a as usize], T::constant(x))),
                 Instruction::Select(to, c, a, b) => {
                     (to, T::select(scratch[c as usize], scratch[a as usize], scratch[b as usize]))
                 }
@@ -288,6 +326,20 @@ impl Program {
                     Binary::Mul => each(registers, parts, [to, a, b], |x, y| x * y),
                     Binary::Div => each(registers, parts, [to, a, b], |x, y| x / y),
                     _ => each(registers, parts, [to, a, b], |x, y| f64::binary(op, x, y)),
+                },
+                Instruction::Left(op, to, x, b) => match op {
+                    Binary::Add => each(registers, parts, [to, b, b], |y, _| x + y),
+                    Binary::Sub => each(registers, parts, [to, b, b], |y, _| x - y),
+                    Binary::Mul => each(registers, parts, [to, b, b], |y, _| x * y),
+                    Binary::Div => each(registers, parts, [to, b, b], |y, _| x / y),
+                    _ => each(registers, parts, [to, b, b], |y, _| f64::binary(op, x, y)),
+                },
+                Instruction::Right(op, to, a, y) => match op {
+                    Binary::Add => each(registers, parts, [to, a, a], |x, _| x + y),
+                    Binary::Sub => each(registers, parts, [to, a, a], |x, _| x - y),
+                    Binary::Mul => each(registers, parts, [to, a, a], |x, _| x * y),
+                    Binary::Div => each(registers, parts, [to, a, a], |x, _| x / y),
+                    _ => each(registers, parts, [to, a, a], |x, _| f64::binary(op, x, y)),
                 },
                 Instruction::Select(to, c, a, b) => {
                     let (c, a, b) = (registers[c as usize], registers[a as usize], registers[b as usize]);

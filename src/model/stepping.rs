@@ -9,10 +9,19 @@ pub struct Stepping {
     /// The parameters that are integrated, then those that are solved for, in the order of their components; where formulas
     /// are used, and where all equations are integrated.
     components: [Vec<usize>; 2],
-    /// Of each variable of the rule: whether a step may read it.
-    reads: Vec<bool>,
+    /// The parameters of the module and of its context that a step may read.
+    reads: Vec<Read>,
     /// Of each variable of the rule: whether formulas read it when a module takes the equations up.
     laws_read: Vec<bool>,
+}
+
+/// A variable of a rule that is a parameter.
+#[derive(Clone, Copy, Debug)]
+pub struct Read {
+    pub variable: usize,
+    /// Number in the context; None for the module itself.
+    pub neighbour: Option<usize>,
+    pub parameter: usize,
 }
 
 impl Stepping {
@@ -25,16 +34,23 @@ impl Stepping {
         });
         let linear = solve.linear.as_ref();
         let programs = [&solve.rates, &solve.numeric_rates, &solve.jacobian.values];
-        let mut reads = read_by(programs.into_iter().chain(linear.map(|l| &l.coefficients)), rule.variables);
+        let mut read = read_by(programs.into_iter().chain(linear.map(|l| &l.coefficients)), rule.variables);
         let entries = solve.jacobian.entries.iter().map(|(_, variable)| *variable);
         for variable in linear.into_iter().flat_map(|l| l.variables.iter().flatten().copied()).chain(entries)
         {
-            reads[variable] = true;
+            read[variable] = true;
         }
         // What is solved for, and what is added up over children, reads by ways of its own.
         if !algebraic.is_empty() || !rule.aggregates.is_empty() {
-            reads.fill(true);
+            read.fill(true);
         }
+        let widths = rule.left.iter().chain(&rule.right).map(|pattern| pattern.width).enumerate();
+        let own = (0..rule.parameters.len()).map(|parameter| (None, parameter));
+        let context = widths.flat_map(|(n, width)| (0..width).map(move |parameter| (Some(n), parameter)));
+        let reads = (own.chain(context).enumerate())
+            .map(|(variable, (neighbour, parameter))| Read { variable, neighbour, parameter })
+            .filter(|one| read[one.variable])
+            .collect();
         let mut laws = Vec::new();
         let mut few = rule.aggregates.is_empty() && algebraic.is_empty();
         for law in &solve.laws {
@@ -60,9 +76,9 @@ impl Stepping {
         &self.components[usize::from(forced)]
     }
 
-    /// True if a step may read the variable.
-    pub fn reads(&self, variable: usize) -> bool {
-        self.reads.get(variable).copied().unwrap_or(true)
+    /// The parameters of the module and of its context that a step may read.
+    pub fn reads(&self) -> &[Read] {
+        &self.reads
     }
 
     /// The variables that formulas read when a module takes the equations up.

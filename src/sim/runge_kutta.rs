@@ -33,29 +33,31 @@ pub trait Rates {
 /// Errors below the tolerated part of this are none, whatever they are errors of.
 const FLOOR: f64 = 1e-18;
 
-/// Components that are worked on together: one read of each stage's rates serves many of them.
-const BLOCK: usize = 64;
-
-/// So few components are not worth that: each is added up by itself, in the same order.
+/// So few components are added up one by one, in the same order as many.
 const FEW: usize = 2;
 
 /// Components that fit into the processor's registers together. Rates are kept in so many more places than there are
 /// components that all of them are whole parts: what the last places hold means nothing.
 const PART: usize = 8;
 
-/// Adds the sum of the stages' rates with these weights, from component `first` on. The sums are whole parts.
-fn weigh(weights: &[f64], k: &[Vec<f64>], first: usize, sums: &mut [f64]) {
-    let count = sums.len();
+/// The sums of the stages' rates with these weights, of the components from `first` on.
+#[inline]
+fn weigh(weights: &[f64], k: &[Vec<f64>], first: usize) -> [f64; PART] {
+    let mut sums = [0.0; PART];
     for (weight, k) in weights.iter().zip(k) {
         if *weight != 0.0 {
-            let (sums, k) = (sums.as_chunks_mut::<PART>().0, k[first..first + count].as_chunks::<PART>().0);
-            for (sums, k) in sums.iter_mut().zip(k) {
-                for (sum, k) in sums.iter_mut().zip(k) {
-                    *sum += weight * k;
-                }
+            let k: &[f64; PART] = part(k, first);
+            for (sum, k) in sums.iter_mut().zip(k) {
+                *sum += weight * k;
             }
         }
     }
+    sums
+}
+
+/// The part of some rates that begins with a component.
+fn part(k: &[f64], first: usize) -> &[f64; PART] {
+    k[first..first + PART].try_into().expect("as many as that")
 }
 
 /// The sum of one component's rates at the stages with these weights.
@@ -204,21 +206,15 @@ impl Workspace {
 
     /// The state at which a stage's rate is taken.
     fn combine(&mut self, tableau: &Tableau, i: usize, y: &[f64], h: f64) {
-        match y.len() {
-            0..=FEW => {
-                for (j, (s, y)) in self.stage.iter_mut().zip(y).enumerate() {
-                    *s = y + h * weighed(tableau.a[i], &self.k, j);
-                }
+        let weights = tableau.a[i];
+        if y.len() <= FEW {
+            for (j, (s, y)) in self.stage.iter_mut().zip(y).enumerate() {
+                *s = y + h * weighed(weights, &self.k, j);
             }
-            ..=PART => self.combine_blocks::<PART>(tableau.a[i], y, h),
-            _ => self.combine_blocks::<BLOCK>(tableau.a[i], y, h),
+            return;
         }
-    }
-
-    fn combine_blocks<const N: usize>(&mut self, weights: &[f64], y: &[f64], h: f64) {
-        for (block, (y, stage)) in y.chunks(N).zip(self.stage.chunks_mut(N)).enumerate() {
-            let mut sums = [0.0; N];
-            weigh(weights, &self.k, block * N, &mut sums[..y.len().next_multiple_of(PART)]);
+        for (block, (y, stage)) in y.chunks(PART).zip(self.stage.chunks_mut(PART)).enumerate() {
+            let sums = weigh(weights, &self.k, block * PART);
             for (s, (y, sum)) in stage.iter_mut().zip(y.iter().zip(&sums)) {
                 *s = y + h * *sum;
             }
@@ -243,35 +239,30 @@ impl Workspace {
     /// The largest error of a component, in units of what is tolerated, by truncation and by rounding.
     fn error(&self, tableau: &Tableau, y: &[f64], h: f64, tolerance: f64) -> (f64, f64) {
         let (mut error, mut rounding): (f64, f64) = (0.0, 0.0);
-        let mut sums = [[0.0; BLOCK]; 2];
-        for first in (0..y.len()).step_by(BLOCK) {
-            let count = BLOCK.min(y.len() - first);
-            for (row, sums) in tableau.e.iter().zip(&mut sums) {
-                if count <= FEW {
-                    for (j, sum) in (first..).zip(&mut sums[..count]) {
-                        *sum = weighed(row, &self.k, j);
-                    }
-                } else {
-                    let sums = &mut sums[..count.next_multiple_of(PART)];
-                    sums.fill(0.0);
-                    weigh(row, &self.k, first, sums);
+        let estimates = |row: &[f64], first: usize| match y.len() {
+            0..=FEW => std::array::from_fn(|j| if j < y.len() { weighed(row, &self.k, j) } else { 0.0 }),
+            _ => weigh(row, &self.k, first),
+        };
+        for (block, (start, end)) in y.chunks(PART).zip(self.end.chunks(PART)).enumerate() {
+            let first = block * PART;
+            let mut high = estimates(tableau.e[0], first);
+            if let Some(low) = tableau.e.get(1) {
+                for (high, low) in high.iter_mut().zip(estimates(low, first)) {
+                    *high = dop853_error(h * *high, h * low);
                 }
+            } else {
+                high = high.map(|high| (h * high).abs());
             }
-            let estimates = sums[0].iter().zip(&sums[1]).take(count);
-            for (j, (high, low)) in (first..).zip(estimates) {
-                let (a, b) = (y[j], self.end[j]);
-                let estimate = match tableau.e.len() {
-                    1 => (h * high).abs(),
-                    _ => dop853_error(h * high, h * low),
-                };
+            let (departure, second) = (part(&self.k[0], first), part(&self.k[1], first));
+            for (j, (a, b)) in start.iter().zip(end).enumerate() {
                 // Relative to where the step begins, and to how far it goes from there at first: what
                 // grows from 1e-6 must be known to its own digits. Not to where it ends: beyond an
                 // event, equations may lead anywhere, and that must not spoil the part that counts.
                 // What begins from rest goes somewhere only after that: the second stage shows it.
-                let speed = self.k[0][j].abs().max(self.k[1][j].abs());
+                let speed = departure[j].abs().max(second[j].abs());
                 let scale = tolerance * (a.abs().max(h.abs() * speed) + FLOOR);
                 rounding = rounding.max(4.0 * f64::EPSILON * b.abs() / scale);
-                let ratio = estimate / scale;
+                let ratio = high[j] / scale;
                 error = if ratio > error || ratio.is_nan() { ratio } else { error };
             }
         }
@@ -308,21 +299,30 @@ impl Workspace {
 
     /// The dense output of the step just tried, up to `end` if that is known better than as `start` and `h`.
     pub fn dense(&self, method: Method, start: Instant, end: Option<Instant>, y: &[f64], h: f64) -> Dense {
-        let mut c = Vec::new();
-        let hk = |stage: usize, j: usize| h * self.k[stage][j];
         let degree = match method {
             Method::Euler => 1,
             Method::Rk4 => 3,
             Method::Dop853 => 7,
             _ => 4,
         };
-        c.reserve(y.len() * (degree + 1));
-        for (j, (&a, &b)) in y.iter().zip(&self.end).enumerate() {
+        let mut c = Vec::with_capacity(y.len() * (degree + 1));
+        for (block, (y, end)) in y.chunks(PART).zip(self.end.chunks(PART)).enumerate() {
+            let first = block * PART;
+            let ends = y.iter().zip(end).enumerate();
             match method {
-                Method::Euler => c.extend([a, b]),
-                Method::Rk4 => c.extend([a, a + hk(0, j) / 3.0, b - hk(4, j) / 3.0, b]),
-                Method::Dop853 => c.extend(dop853_dense(a, b, &std::array::from_fn(|i| hk(i, j)))),
-                _ => c.extend(dopri5_dense(a, b, std::array::from_fn(|i| hk(i, j)))),
+                Method::Euler => ends.for_each(|(_, (&a, &b))| c.extend([a, b])),
+                Method::Rk4 => {
+                    let hk = |stage: usize, j: usize| h * self.k[stage][first + j];
+                    ends.for_each(|(j, (a, b))| c.extend([*a, a + hk(0, j) / 3.0, b - hk(4, j) / 3.0, *b]));
+                }
+                Method::Dop853 => {
+                    let k: [_; 16] = std::array::from_fn(|stage| part(&self.k[stage], first));
+                    ends.for_each(|(j, (a, b))| c.extend(dop853_dense(*a, *b, &k.map(|k| h * k[j]))));
+                }
+                _ => {
+                    let k: [_; 7] = std::array::from_fn(|stage| part(&self.k[stage], first));
+                    ends.for_each(|(j, (a, b))| c.extend(dopri5_dense(*a, *b, k.map(|k| h * k[j]))));
+                }
             }
         }
         Dense::new(start, end, h, degree, c)

@@ -6,8 +6,10 @@ use super::course::Course;
 use super::gather::Partial;
 use super::motion::Motion;
 use super::plant::Plant;
+use super::state::State;
 use crate::model::{Rule, Solve};
 use crate::structure::{Instant, ModuleId};
+use smallvec::SmallVec;
 
 /// A rule and one of its aggregates.
 type Term = (usize, usize);
@@ -128,72 +130,52 @@ impl System {
         system.sums.clear();
         system.children.clear();
         system.given.clear();
-        let mut values_then = Vec::new();
         for &id in members {
             let state = plant.state(id).expect("members have states");
             let first = plant.tree.places(id).start;
             let (Some(rule), Some(solve)) = (state.rule, state.solve) else { continue };
-            let stepping = &rules[rule].solves[solve].stepping;
-            let coupled =
-                |parameter: &usize| matches!(state.motions.get(*parameter), Some(Motion::Coupled(_)));
-            let own = || stepping.components(state.forced).iter().copied().filter(coupled);
-            let count = own().count();
+            let (compiled, clause) = (&rules[rule], &rules[rule].solves[solve]);
+            let first_rate = system.places.len();
+            for &parameter in clause.stepping.components(state.forced) {
+                if let Some(Motion::Coupled(_)) = state.motions.get(parameter) {
+                    system.places.push((first + parameter, id, parameter));
+                }
+            }
+            let count = system.places.len() - first_rate;
             if count == 0 {
                 continue;
             }
-            let first_rate = system.places.len();
-            system.places.extend(own().map(|parameter| (first + parameter, id, parameter)));
             let first_source = system.sources.len();
-            let compiled = &rules[rule];
-            let mut add = |system: &mut System, module: ModuleId, child: bool| {
-                let variable = system.sources.len() - first_source;
-                if frozen && module != id {
-                    values_then.clear();
-                    plant.values(module, start, &mut values_then);
-                    let to = if child { &mut system.children } else { &mut system.sources };
-                    to.extend(values_then.iter().map(|x| Source::Fixed(*x)));
-                    return;
+            if frozen || !compiled.aggregates.is_empty() {
+                for &module in std::iter::once(&id).chain(state.context.context()) {
+                    let sources = system.sources_of(plant, module, frozen && module != id, &unknown);
+                    system.sources.extend(sources);
                 }
-                let values = plant.tree.parameters(module);
-                let read = |i: usize| child || stepping.reads(variable + i);
-                if !(0..values.len()).any(read) {
-                    return system.sources.extend(values.iter().map(|x| Source::Fixed(*x)));
-                }
-                let neighbour = plant.state(module).filter(|s| !s.motions.is_empty());
-                for (i, &x) in values.iter().enumerate() {
-                    let source = match neighbour.map(|s| (&s.motions[i], s.since)) {
-                        // Any value will do.
-                        _ if !read(i) => Source::Fixed(x),
-                        None | Some((Motion::Rest | Motion::Step(_), _)) => Source::Fixed(x),
-                        Some((Motion::Coupled(c), _)) => match unknown(*c) {
-                            Some(number) => Source::State(number),
-                            None => {
-                                system.inputs.push(*c);
-                                Source::Input(system.inputs.len() as u32 - 1)
-                            }
-                        },
-                        Some((motion, since)) => {
-                            let offset = start.since(since);
-                            system.formulas.push(Formula { motion: motion.clone(), x, since, offset });
-                            Source::Formula(system.formulas.len() as u32 - 1)
-                        }
+            } else {
+                // What is not read may be any number.
+                system.sources.resize(first_source + compiled.variables - 2, Source::Fixed(0.0));
+                for read in clause.stepping.reads() {
+                    let (module, moves) = match read.neighbour.map(|n| state.context.context()[n]) {
+                        None => (id, Some(state)),
+                        Some(module) => (module, plant.state(module)),
                     };
-                    if child { system.children.push(source) } else { system.sources.push(source) }
+                    let x = plant.tree.parameters(module)[read.parameter];
+                    let source = system.source(moves, read.parameter, x, &unknown);
+                    system.sources[first_source + read.variable] = source;
                 }
-            };
-            for &module in std::iter::once(&id).chain(state.context.context()) {
-                add(system, module, false);
             }
             let row = system.rows.len() as u32;
             for aggregate in 0..compiled.aggregates.len() {
                 let children = state.context.children(aggregate);
                 let first = system.children.len();
-                children.iter().for_each(|child| add(system, *child, true));
+                for &child in children {
+                    let sources = system.sources_of(plant, child, frozen, &unknown);
+                    system.children.extend(sources);
+                }
                 system.sums.push(Sum { row, aggregate, first, count: children.len() });
                 system.sources.push(Source::Sum(system.sums.len() as u32 - 1));
             }
             system.sources.resize(first_source + compiled.variables - 2, Source::Fixed(0.0));
-            let clause = &rules[rule].solves[solve];
             let integrated = rates(clause, state.forced);
             let first_switch = system.switches.len();
             system.switches.extend(state.switches.iter().map(|&on| f64::from(u8::from(on))));
@@ -218,6 +200,52 @@ impl System {
             system.given.extend(given.map(|place| place as u32));
         }
         system.finish(rules);
+    }
+
+    /// Where a parameter comes from that has the value `x` in the tree, of a module with this state.
+    #[inline]
+    fn source(
+        &mut self,
+        state: Option<&State>,
+        parameter: usize,
+        x: f64,
+        unknown: impl Fn(u32) -> Option<u32>,
+    ) -> Source {
+        let Some((state, motion)) = state.and_then(|s| Some((s, s.motions.get(parameter)?))) else {
+            return Source::Fixed(x);
+        };
+        match motion {
+            Motion::Rest | Motion::Step(_) => Source::Fixed(x),
+            Motion::Coupled(component) => match unknown(*component) {
+                Some(number) => Source::State(number),
+                None => {
+                    self.inputs.push(*component);
+                    Source::Input(self.inputs.len() as u32 - 1)
+                }
+            },
+            motion => {
+                let (since, offset) = (state.since, self.start.since(state.since));
+                self.formulas.push(Formula { motion: motion.clone(), x, since, offset });
+                Source::Formula(self.formulas.len() as u32 - 1)
+            }
+        }
+    }
+
+    /// Where all parameters of a module come from; what they are at the start, if they are frozen.
+    fn sources_of(
+        &mut self,
+        plant: &Plant,
+        module: ModuleId,
+        frozen: bool,
+        unknown: impl Fn(u32) -> Option<u32>,
+    ) -> SmallVec<[Source; 8]> {
+        if frozen {
+            let mut then = Vec::new();
+            plant.values(module, self.start, &mut then);
+            return then.into_iter().map(Source::Fixed).collect();
+        }
+        let (values, state) = (plant.tree.parameters(module).iter().enumerate(), plant.state(module));
+        values.map(|(i, &x)| self.source(state, i, x, &unknown)).collect()
     }
 
     /// A system without rows.
