@@ -49,7 +49,7 @@ impl Simulation<'_> {
             let entry = open(state);
             entry.tried.clear();
             entry.flips = 0;
-            let guess = entry.guess.clone();
+            let guess = Signs::from_slice(&entry.guess);
             state.solve = next_clause(rule, &guess, &[]);
             state.switches = switches(rule, state.solve, &guess);
         }
@@ -142,7 +142,7 @@ impl Simulation<'_> {
         let known = state.open.as_ref().expect("open");
         let elsewhere = known.flow.is_none();
         if rule.atoms.is_empty() || (known.clear || !elsewhere) && !known.at.contains(&Sign::Zero) {
-            return (known.at.clone(), false);
+            return (Signs::from_slice(&known.at), false);
         }
         let mut entry = known.clone();
         let mut snapped = false;

@@ -105,7 +105,10 @@ impl Simulation<'_> {
             let now = self.now;
             let state = self.plant.state_mut(id).expect("seen above");
             state.pass_changes(now);
-            state.next = Next::default();
+            // Formulas go on as they were, whatever their module reads.
+            if !state.next.lasting || state.restarted == self.group {
+                state.next = Next::default();
+            }
         }
         if seeds.is_empty() || self.repair(seeds, joined) {
             return Ok(());

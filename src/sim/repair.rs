@@ -107,6 +107,8 @@ struct Trial {
     stretches: Vec<Dense>,
     /// Its components, by their number in the stretches.
     components: Vec<u32>,
+    /// Where those of each ring begin.
+    rings: Vec<usize>,
 }
 
 impl Simulation<'_> {
@@ -150,7 +152,7 @@ impl Simulation<'_> {
             if self.integrate(region, trial).is_none() {
                 return false;
             }
-            let reach = if sliced { 0 } else { self.reach(region, trial) };
+            let reach = if sliced { 0 } else { self.reach(trial) };
             let closed = region.rings.len() <= rings;
             if reach < region.rings.len() || closed {
                 // One ring beyond the last that changed.
@@ -229,12 +231,16 @@ impl Simulation<'_> {
     /// The motion of a region from now to the end of the common step; None if there is none.
     fn integrate(&mut self, region: &Region, trial: &mut Trial) -> Option<()> {
         let course = self.plant.coupled.as_ref()?;
-        let Trial { stretches, components } = trial;
+        let Trial { stretches, components, rings } = trial;
         let Repairer { integrator, control, numbers, system, memory, y, .. } = &mut self.coupled.repairer;
         stretches.clear();
         components.clear();
+        rings.clear();
         y.clear();
-        for &id in &region.members {
+        for (n, &id) in region.members.iter().enumerate() {
+            if region.rings.get(rings.len()) == Some(&n) {
+                rings.push(components.len());
+            }
             let (state, values) = (self.plant.state(id)?, self.plant.tree.parameters(id));
             for &parameter in integrated(self.model, state) {
                 if let Motion::Coupled(component) = state.motions[parameter] {
@@ -283,11 +289,11 @@ impl Simulation<'_> {
     }
 
     /// The number of rings that a trial changes by more than may be neglected.
-    fn reach(&self, region: &Region, trial: &Trial) -> usize {
+    fn reach(&self, trial: &Trial) -> usize {
         let Some(course) = &self.plant.coupled else { return 0 };
         let tolerance = INNER_TOLERANCE * self.coupled_settings.tolerance;
         let tolerance = if self.gathers { tolerance.min(CONSERVED) } else { tolerance };
-        let changes = |component: u32, number: usize| {
+        let changes = |number: usize, component: u32| {
             trial.stretches.iter().any(|dense| {
                 [0.5, 1.0].into_iter().any(|position| {
                     let at = if position == 1.0 { dense.end } else { dense.start.after(position * dense.h) };
@@ -297,22 +303,9 @@ impl Simulation<'_> {
                 })
             })
         };
-        let mut number = trial.components.len();
-        for (ring, &from) in region.rings.iter().enumerate().rev() {
-            let to = region.rings.get(ring + 1).copied().unwrap_or(region.members.len());
-            for id in region.members[from..to].iter().rev() {
-                let state = self.plant.state(*id).expect("a member");
-                for &parameter in integrated(self.model, state).iter().rev() {
-                    if let Motion::Coupled(component) = state.motions[parameter] {
-                        number -= 1;
-                        if changes(component, number) {
-                            return ring + 1;
-                        }
-                    }
-                }
-            }
-        }
-        0
+        let mut components = trial.components.iter().enumerate();
+        let last = components.rfind(|(number, component)| changes(*number, **component));
+        last.map_or(0, |(number, _)| trial.rings.partition_point(|first| *first <= number))
     }
 
     /// Makes a trial the motion of its region, and finds the region's next events.

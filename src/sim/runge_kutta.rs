@@ -36,8 +36,8 @@ const FLOOR: f64 = 1e-18;
 /// So few components are added up one by one, in the same order as many.
 const FEW: usize = 2;
 
-/// Components that fit into the processor's registers together. Rates are kept in so many more places than there are
-/// components that all of them are whole parts: what the last places hold means nothing.
+/// Components that fit into the processor's registers together. States and rates are kept in so many more places than
+/// there are components that all of them are whole parts: what the last places hold means nothing.
 const PART: usize = 8;
 
 /// The sums of the stages' rates with these weights, of the components from `first` on.
@@ -74,6 +74,8 @@ fn weighed(weights: &[f64], k: &[Vec<f64>], component: usize) -> f64 {
 /// Working memory of a step.
 #[derive(Clone, Debug, Default)]
 pub struct Workspace {
+    /// The state at the start of the step.
+    from: Vec<f64>,
     /// Rates at the stages; the first is that of the start of the step.
     k: Vec<Vec<f64>>,
     stage: Vec<f64>,
@@ -133,19 +135,21 @@ impl Workspace {
                 k.resize(places, 0.0);
             }
         }
-        self.stage.resize(n, 0.0);
+        self.from.resize(places, 0.0);
+        self.stage.resize(places, 0.0);
         self.other_end.resize(n, 0.0);
         self.end.resize(n, 0.0);
     }
 
     fn evaluate(&mut self, system: &mut impl Rates, tau: f64, stage: usize) {
         self.evaluations += system.modules();
-        system.rates(tau, &self.stage, &mut self.k[stage][..self.stage.len()]);
+        let n = self.end.len();
+        system.rates(tau, &self.stage[..n], &mut self.k[stage][..n]);
     }
 
     /// Computes the rates at the start of a step; the component whose rate is not finite is an error.
     pub fn start(&mut self, system: &mut impl Rates, y: &[f64]) -> Result<(), usize> {
-        self.stage.copy_from_slice(y);
+        self.stage[..y.len()].copy_from_slice(y);
         self.evaluate(system, 0.0, 0);
         self.rates_at_start().iter().position(|x| !x.is_finite()).map_or(Ok(()), Err)
     }
@@ -178,23 +182,25 @@ impl Workspace {
                     *end = y[i] + h / 6.0 * (a + 2.0 * (b + c) + d);
                 }
                 // The rate at the end gives the Hermite interpolant and is the next step's first.
-                self.stage.copy_from_slice(&self.end);
+                self.stage[..y.len()].copy_from_slice(&self.end);
                 self.evaluate(system, h, 4);
                 self.finite(0.0, 0.0, 4)
             }
             Some(tableau) => {
+                let n = y.len();
+                self.from[..n].copy_from_slice(y);
                 for i in 1..tableau.stages {
-                    self.combine(tableau, i, y, h);
+                    self.combine(tableau.a[i], n, h);
                     self.evaluate(system, tableau.c[i] * h, i);
                     if i + 2 == tableau.stages {
-                        self.other_end.copy_from_slice(&self.stage);
+                        self.other_end.copy_from_slice(&self.stage[..n]);
                     }
                     if i + 1 == tableau.stages {
                         // The last stage is the end of the step.
-                        self.end.copy_from_slice(&self.stage);
+                        self.end.copy_from_slice(&self.stage[..n]);
                     }
                 }
-                let (mut error, rounding) = self.error(tableau, y, h, tolerance);
+                let (mut error, rounding) = self.error(tableau, n, h, tolerance);
                 if system.is_algebraic() {
                     let errors: Vec<f64> = (0..y.len()).map(|j| self.estimate(tableau, h, j)).collect();
                     error = error.max(system.algebraic_error(h, &self.end, &errors, tolerance));
@@ -204,19 +210,20 @@ impl Workspace {
         }
     }
 
-    /// The state at which a stage's rate is taken.
-    fn combine(&mut self, tableau: &Tableau, i: usize, y: &[f64], h: f64) {
-        let weights = tableau.a[i];
-        if y.len() <= FEW {
-            for (j, (s, y)) in self.stage.iter_mut().zip(y).enumerate() {
-                *s = y + h * weighed(weights, &self.k, j);
+    /// The state at which a stage's rate is taken, given its weights.
+    fn combine(&mut self, weights: &[f64], n: usize, h: f64) {
+        let Workspace { from, stage, k, .. } = self;
+        if n <= FEW {
+            for (j, (s, y)) in stage.iter_mut().zip(from).enumerate().take(n) {
+                *s = *y + h * weighed(weights, k, j);
             }
             return;
         }
-        for (block, (y, stage)) in y.chunks(PART).zip(self.stage.chunks_mut(PART)).enumerate() {
-            let sums = weigh(weights, &self.k, block * PART);
-            for (s, (y, sum)) in stage.iter_mut().zip(y.iter().zip(&sums)) {
-                *s = y + h * *sum;
+        let (from, stage) = (from.as_chunks::<PART>().0, stage.as_chunks_mut::<PART>().0);
+        for (block, (from, stage)) in from.iter().zip(stage).enumerate() {
+            let sums = weigh(weights, k, block * PART);
+            for i in 0..PART {
+                stage[i] = from[i] + h * sums[i];
             }
         }
     }
@@ -237,32 +244,38 @@ impl Workspace {
     }
 
     /// The largest error of a component, in units of what is tolerated, by truncation and by rounding.
-    fn error(&self, tableau: &Tableau, y: &[f64], h: f64, tolerance: f64) -> (f64, f64) {
+    fn error(&self, tableau: &Tableau, n: usize, h: f64, tolerance: f64) -> (f64, f64) {
         let (mut error, mut rounding): (f64, f64) = (0.0, 0.0);
-        let estimates = |row: &[f64], first: usize| match y.len() {
-            0..=FEW => std::array::from_fn(|j| if j < y.len() { weighed(row, &self.k, j) } else { 0.0 }),
+        let estimates = |row: &[f64], first: usize| match n {
+            0..=FEW => std::array::from_fn(|j| if j < n { weighed(row, &self.k, j) } else { 0.0 }),
             _ => weigh(row, &self.k, first),
         };
-        for (block, (start, end)) in y.chunks(PART).zip(self.end.chunks(PART)).enumerate() {
+        // The last stage is the end of the step.
+        let (from, end) = (self.from.as_chunks::<PART>().0, self.stage.as_chunks::<PART>().0);
+        for (block, (from, end)) in from.iter().zip(end).enumerate() {
             let first = block * PART;
-            let mut high = estimates(tableau.e[0], first);
+            let mut estimate = estimates(tableau.e[0], first);
             if let Some(low) = tableau.e.get(1) {
-                for (high, low) in high.iter_mut().zip(estimates(low, first)) {
+                for (high, low) in estimate.iter_mut().zip(estimates(low, first)) {
                     *high = dop853_error(h * *high, h * low);
                 }
             } else {
-                high = high.map(|high| (h * high).abs());
+                estimate = estimate.map(|high| (h * high).abs());
             }
             let (departure, second) = (part(&self.k[0], first), part(&self.k[1], first));
-            for (j, (a, b)) in start.iter().zip(end).enumerate() {
+            let (mut ratios, mut roundings) = ([0.0; PART], [0.0; PART]);
+            for j in 0..PART {
                 // Relative to where the step begins, and to how far it goes from there at first: what
                 // grows from 1e-6 must be known to its own digits. Not to where it ends: beyond an
                 // event, equations may lead anywhere, and that must not spoil the part that counts.
                 // What begins from rest goes somewhere only after that: the second stage shows it.
                 let speed = departure[j].abs().max(second[j].abs());
-                let scale = tolerance * (a.abs().max(h.abs() * speed) + FLOOR);
-                rounding = rounding.max(4.0 * f64::EPSILON * b.abs() / scale);
-                let ratio = high[j] / scale;
+                let scale = tolerance * (from[j].abs().max(h.abs() * speed) + FLOOR);
+                roundings[j] = 4.0 * f64::EPSILON * end[j].abs() / scale;
+                ratios[j] = estimate[j] / scale;
+            }
+            for (ratio, other) in ratios.into_iter().zip(roundings).take(n - first) {
+                rounding = rounding.max(other);
                 error = if ratio > error || ratio.is_nan() { ratio } else { error };
             }
         }
@@ -290,8 +303,9 @@ impl Workspace {
     /// Computes what the dense output of a good step needs besides.
     pub fn finish(&mut self, method: Method, system: &mut impl Rates, y: &[f64], h: f64) {
         if let Some(tableau) = method.tableau() {
+            self.from[..y.len()].copy_from_slice(y);
             for i in tableau.stages..tableau.a.len() {
-                self.combine(tableau, i, y, h);
+                self.combine(tableau.a[i], y.len(), h);
                 self.evaluate(system, tableau.c[i] * h, i);
             }
         }
@@ -320,8 +334,11 @@ impl Workspace {
                     ends.for_each(|(j, (a, b))| c.extend(dop853_dense(*a, *b, &k.map(|k| h * k[j]))));
                 }
                 _ => {
-                    let k: [_; 7] = std::array::from_fn(|stage| part(&self.k[stage], first));
-                    ends.for_each(|(j, (a, b))| c.extend(dopri5_dense(*a, *b, k.map(|k| h * k[j]))));
+                    let (mut from, mut to) = ([0.0; PART], [0.0; PART]);
+                    from[..y.len()].copy_from_slice(y);
+                    to[..y.len()].copy_from_slice(end);
+                    let hk = std::array::from_fn(|stage| part(&self.k[stage], first).map(|k| h * k));
+                    c.extend_from_slice(dopri5_dense(&from, &to, &hk)[..y.len()].as_flattened());
                 }
             }
         }

@@ -174,8 +174,8 @@ impl State {
     /// Opens the module as one that was followed along its trajectory.
     pub fn follow(&mut self) -> &mut Open {
         if self.open.is_none() {
-            let flow = Some((self.solve, self.switches.clone()));
-            let (at, guess) = (self.signs.clone(), self.signs.clone());
+            let flow = Some((self.solve, Switches::from_slice(&self.switches)));
+            let (at, guess) = (Signs::from_slice(&self.signs), Signs::from_slice(&self.signs));
             self.open = Some(Box::new(Open { at, guess, flow, ..Open::default() }));
         }
         self.open.as_mut().expect("just opened")
@@ -184,7 +184,8 @@ impl State {
     /// Opens the module as one whose signs are known from its values only.
     pub fn place(&mut self, clear: bool) {
         let guess = self.signs.iter().map(|&s| if s == Sign::Zero { Sign::Any } else { s }).collect();
-        self.open = Some(Box::new(Open { at: self.signs.clone(), guess, clear, ..Open::default() }));
+        let at = Signs::from_slice(&self.signs);
+        self.open = Some(Box::new(Open { at, guess, clear, ..Open::default() }));
     }
 
     /// Takes over the signs that have changed without consequence up to an instant.

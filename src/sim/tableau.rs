@@ -196,18 +196,27 @@ fn dense_sum(d: &[f64], hk: &[f64]) -> f64 {
     d.iter().zip(hk).map(|(d, k)| d * (k - first)).sum()
 }
 
-/// Dense output of one component of a [`DOPRI5`] step: Bernstein coefficients of degree 4 on [0, 1].
+/// Dense output of some components of a [`DOPRI5`] step: Bernstein coefficients of degree 4 on [0, 1].
 ///
-/// `y0` and `y1` are the values at the ends of the step and `hk` is `h` times the stage rates. With
+/// `y0` and `y1` are the values at the ends of the step and `hk` is `h` times the rates of each stage. With
 /// `r2 = y1 - y0`, `r3 = hk1 - r2`, `r4 = r2 - hk7 - r3`, `r5 = sum d_i hk_i` it is the polynomial
 /// `y0 + s r2 + s(1-s) r3 + s^2(1-s) r4 + s^2(1-s)^2 r5` of the code DOPRI5 (Hairer, Norsett, Wanner, II.6).
 /// The ends are exact: `b_0 = y0`, `b_4 = y1`; the slopes there are `hk1` and `hk7`.
 /// Its error in a step falls like `h^5`.
-pub fn dopri5_dense(y0: f64, y1: f64, hk: [f64; 7]) -> [f64; 5] {
-    let (first, end) = (hk[0], hk[6]);
-    let r5 = dense_sum(DOPRI5.d[0], &hk);
-    let middle = y0 + (0.5 * (y1 - y0) + (first - end + r5) / 6.0);
-    [y0, y0 + first / 4.0, middle, y1 - end / 4.0, y1]
+#[inline]
+pub fn dopri5_dense<const N: usize>(y0: &[f64; N], y1: &[f64; N], hk: &[[f64; N]; 7]) -> [[f64; 5]; N] {
+    let (first, end) = (&hk[0], &hk[6]);
+    // As in `dense_sum`, for all of them side by side.
+    let mut r5 = [-0.0; N];
+    for (d, k) in DOPRI5.d[0].iter().zip(hk) {
+        for j in 0..N {
+            r5[j] += d * (k[j] - first[j]);
+        }
+    }
+    std::array::from_fn(|j| {
+        let middle = y0[j] + (0.5 * (y1[j] - y0[j]) + (first[j] - end[j] + r5[j]) / 6.0);
+        [y0[j], y0[j] + first[j] / 4.0, middle, y1[j] - end[j] / 4.0, y1[j]]
+    })
 }
 
 /// Dense output of one component of a [`DOP853`] step: Bernstein coefficients of degree 7 on [0, 1].
@@ -282,7 +291,7 @@ mod tests {
 
     fn dense(tab: &Tableau, y0: f64, y1: f64, hk: &[f64; 16]) -> Vec<f64> {
         match tab.order {
-            5 => dopri5_dense(y0, y1, std::array::from_fn(|i| hk[i])).to_vec(),
+            5 => dopri5_dense(&[y0], &[y1], &std::array::from_fn(|i| [hk[i]]))[0].to_vec(),
             _ => dop853_dense(y0, y1, hk).to_vec(),
         }
     }

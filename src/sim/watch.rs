@@ -8,7 +8,7 @@ use smallvec::SmallVec;
 
 use super::plant::Path;
 use super::roots::{Function, Root, first_root};
-use super::state::{Change, State};
+use super::state::{Change, Signs, State};
 use crate::expr::{Binary, Dual, Interval, Program, Scratch, Value};
 use crate::model::{Condition, Rule, Sign, Solve, Truth, Watch};
 use crate::structure::Instant;
@@ -132,7 +132,7 @@ impl Watcher {
         if rule.atoms.is_empty() {
             return found;
         }
-        let mut now = state.signs.clone();
+        let mut now = Signs::from_slice(&state.signs);
         for change in &state.next.changes {
             now[change.atom] = change.after;
         }
@@ -171,7 +171,7 @@ impl Watcher {
         {
             rounds += 1;
             let together = path_together(path, first.position);
-            let (mut at, mut after) = (now.clone(), now.clone());
+            let (mut at, mut after) = (Signs::from_slice(&now), Signs::from_slice(&now));
             let mut group: SmallVec<[Change; 1]> = SmallVec::new();
             for w in &watched {
                 // A touch is known only to about the root of the rounding; one that is zero here is here.
