@@ -12,7 +12,8 @@ use std::collections::HashMap;
 use smallvec::SmallVec;
 
 use super::simulation::Simulation;
-use crate::model::{KindId, Successor};
+use super::state::State;
+use crate::model::{KindId, Model, Successor};
 use crate::structure::{ModuleId, Tree};
 
 /// A module with more neighbours than this is taken to read all that it has looked at.
@@ -47,8 +48,41 @@ struct Near {
 pub struct Neighbours {
     near: Vec<Near>,
     /// What stands left of what stood right of a module that has died at this instant.
-    forwards: HashMap<ModuleId, Link>,
+    forwards: Forwards,
     lookers: Vec<SmallVec<[ModuleId; 4]>>,
+}
+
+/// Links by module. Most instants concern few modules: then a list is enough.
+#[derive(Clone, Debug, Default)]
+struct Forwards {
+    few: Vec<(ModuleId, Link)>,
+    many: HashMap<ModuleId, Link>,
+}
+
+impl Forwards {
+    fn get(&self, id: ModuleId) -> Option<Link> {
+        let known = self.few.iter().find(|(of, _)| *of == id).map(|(_, link)| *link);
+        if self.many.is_empty() { known } else { known.or_else(|| self.many.get(&id).copied()) }
+    }
+
+    fn insert(&mut self, id: ModuleId, link: Link) {
+        const FEW: usize = 8;
+        if let Some((_, known)) = self.few.iter_mut().find(|(of, _)| *of == id) {
+            *known = link;
+        } else if self.few.len() < FEW {
+            self.few.push((id, link));
+        } else {
+            self.many.insert(id, link);
+        }
+    }
+
+    fn clear(&mut self) {
+        self.few.clear();
+        // One large instant is no reason to sweep a large table at every small one.
+        if !self.many.is_empty() {
+            self.many = HashMap::new();
+        }
+    }
 }
 
 impl Neighbours {
@@ -87,7 +121,7 @@ impl Neighbours {
         let mut link = known;
         while let Link::Module(id) = link
             && !tree.is_alive(id)
-            && let Some(&next) = self.forwards.get(&id)
+            && let Some(next) = self.forwards.get(id)
         {
             way.push(id);
             link = next;
@@ -100,10 +134,7 @@ impl Neighbours {
 
     /// Says that everybody has looked who had to look at this instant.
     pub fn end_instant(&mut self) {
-        // One large instant is no reason to sweep a large table at every small one.
-        if !self.forwards.is_empty() {
-            self.forwards = HashMap::new();
-        }
+        self.forwards.clear();
     }
 
     /// The right neighbour, as [`Tree::right`] finds it.
@@ -216,16 +247,21 @@ impl Neighbours {
     }
 }
 
+/// True if the equations or conditions of a module that has looked at another read something of it that may change.
+pub fn reads(model: &Model, state: &State, seen: ModuleId) -> bool {
+    // Who has looked at many has looked at children, and reads them.
+    state.rule.is_some_and(|rule| model.rules[rule].reads_context)
+        && (state.context.len() > MANY || state.context.contains(&seen))
+}
+
 impl Simulation<'_> {
     /// Calls a function with each module whose equations or conditions read something of this one that may change, and
     /// with its context; with some twice.
     pub(super) fn readers(&self, id: ModuleId, mut each: impl FnMut(ModuleId, &[ModuleId])) {
         for &looker in self.neighbours.lookers(id) {
-            let Some(state) = self.plant.state(looker) else { continue };
-            let reads = |rule: usize| self.model.rules[rule].reads_context;
-            // Who has looked at many has looked at children, and reads them.
-            let sees = state.context.len() > MANY || state.context.contains(&id);
-            if sees && state.rule.is_some_and(reads) {
+            if let Some(state) = self.plant.state(looker)
+                && reads(self.model, state, id)
+            {
                 each(looker, &state.context);
             }
         }

@@ -8,6 +8,7 @@ use super::state::State;
 use crate::expr::{Dual, Interval, Value};
 use crate::model::Rule;
 use crate::structure::{Instant, ModuleId, Tree};
+use smallvec::SmallVec;
 
 /// The growing structure with the motions of its parameters.
 #[derive(Clone, Debug)]
@@ -84,9 +85,19 @@ impl Plant {
         match self.state(id).filter(|s| !s.motions.is_empty()) {
             None => out.extend_from_slice(values),
             Some(state) => {
-                out.extend(values.iter().zip(&state.motions).map(|(x, m)| self.moved(state, m, *x, at)));
+                for (&x, motion) in values.iter().zip(&state.motions[..]) {
+                    let rests = matches!(motion, Motion::Rest);
+                    out.push(if rests { x } else { self.moved(state, motion, x, at) });
+                }
             }
         }
+    }
+
+    /// One parameter of a module at an instant.
+    pub fn value(&self, id: ModuleId, parameter: usize, at: Instant) -> f64 {
+        let x = self.tree.parameters(id)[parameter];
+        let moving = self.state(id).and_then(|s| Some((s, s.motions.get(parameter)?)));
+        moving.map_or(x, |(state, motion)| self.moved(state, motion, x, at))
     }
 
     /// Makes the values at an instant those of the tree, and the motions begin there, all at rest.
@@ -96,15 +107,18 @@ impl Plant {
 
     /// The same, but for parameters whose values then are given.
     pub fn materialise_except(&mut self, id: ModuleId, at: Instant, given: &[(usize, f64)]) {
-        for (i, place) in self.tree.places(id).enumerate() {
-            let Some(state) = self.state(id) else { return };
-            let Some(motion) = state.motions.get(i) else { break };
+        let places = self.tree.places(id);
+        let mut moved: SmallVec<[(usize, f64); 4]> = SmallVec::new();
+        let Some(state) = self.state(id) else { return };
+        for ((i, place), motion) in places.enumerate().zip(&state.motions[..]) {
             if let Some(&(_, value)) = given.iter().find(|(parameter, _)| *parameter == i) {
-                self.tree.set_value(place, value);
+                moved.push((place, value));
             } else if !matches!(motion, Motion::Rest) {
-                let value = self.moved(state, motion, self.tree.values()[place], at);
-                self.tree.set_value(place, value);
+                moved.push((place, self.moved(state, motion, self.tree.values()[place], at)));
             }
+        }
+        for (place, value) in moved {
+            self.tree.set_value(place, value);
         }
         let Some(state) = self.state_mut(id) else { return };
         state.since = at;

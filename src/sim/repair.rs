@@ -23,11 +23,13 @@ use super::dense::Dense;
 use super::equations::{Equations, Memory};
 use super::integrator::{INNER_TOLERANCE, Integrator};
 use super::motion::Motion;
+use super::neighbours::reads;
 use super::queue::Who;
 use super::simulation::Simulation;
 use super::state::{Control, Next};
 use super::system::System;
 use crate::structure::{Instant, ModuleId};
+use smallvec::SmallVec;
 
 /// What repairs have learnt, and their memory: nothing is allocated for one but its motion.
 #[derive(Clone)]
@@ -44,7 +46,6 @@ pub struct Repairer {
     region: Region,
     trial: Trial,
     y: Vec<f64>,
-    values: Vec<f64>,
     /// Number of the last visit to modules.
     visit: u64,
 }
@@ -52,20 +53,8 @@ pub struct Repairer {
 impl Default for Repairer {
     fn default() -> Repairer {
         let (integrator, control, numbers, system, memory) = Default::default();
-        let (region, trial, y, values) = Default::default();
-        Repairer {
-            integrator,
-            control,
-            rings: 3,
-            numbers,
-            system,
-            memory,
-            region,
-            trial,
-            y,
-            values,
-            visit: 0,
-        }
+        let (region, trial, y) = Default::default();
+        Repairer { integrator, control, rings: 3, numbers, system, memory, region, trial, y, visit: 0 }
     }
 }
 
@@ -97,8 +86,6 @@ struct Region {
     members: Vec<ModuleId>,
     /// Where each ring begins.
     rings: Vec<usize>,
-    /// Those who may be in the next ring.
-    next: Vec<ModuleId>,
 }
 
 /// The motion of a region.
@@ -188,20 +175,18 @@ impl Simulation<'_> {
 
     /// Makes the present values of a module's integrated parameters those of the tree.
     fn settle_values(&mut self, id: ModuleId) {
-        let values = &mut self.coupled.repairer.values;
-        values.clear();
-        self.plant.values(id, self.now, values);
         let first = self.plant.tree.places(id).start;
-        let state = self.plant.state(id).expect("a seed");
-        for &parameter in integrated(self.model, state) {
-            self.plant.tree.set_value(first + parameter, values[parameter]);
+        let all = integrated(self.model, self.plant.state(id).expect("a seed"));
+        let values: SmallVec<[f64; 4]> = all.iter().map(|p| self.plant.value(id, *p, self.now)).collect();
+        for (parameter, value) in all.iter().zip(values) {
+            self.plant.tree.set_value(first + parameter, value);
         }
     }
 
     /// Makes a region of the seeds and so many rings around them.
     fn surround(&mut self, region: &mut Region, seeds: &[ModuleId], rings: usize) {
         let visit = self.coupled.repairer.begin_visit();
-        let Region { members, rings: begins, next } = region;
+        let Region { members, rings: begins } = region;
         members.clear();
         begins.clear();
         begins.push(0);
@@ -210,15 +195,16 @@ impl Simulation<'_> {
             members.push(id);
         }
         for _ in 0..rings {
-            let from = *begins.last().expect("the seeds");
-            for &id in &members[from..] {
-                self.readers(id, |reader, _| next.push(reader));
-            }
-            begins.push(members.len());
-            for id in next.drain(..) {
-                let state = self.plant.state_mut(id).expect("a reader");
-                if state.coupled && std::mem::replace(&mut state.visited, visit) != visit {
-                    members.push(id);
+            let (from, to) = (*begins.last().expect("the seeds"), members.len());
+            begins.push(to);
+            for inner in from..to {
+                let seen = members[inner];
+                for &looker in self.neighbours.lookers(seen) {
+                    let Some(state) = self.plant.state_mut(looker) else { continue };
+                    if state.coupled && state.visited != visit && reads(self.model, state, seen) {
+                        state.visited = visit;
+                        members.push(looker);
+                    }
                 }
             }
             if begins.last() == Some(&members.len()) {
