@@ -7,6 +7,7 @@
 use super::course::Course;
 use super::equations::Equations;
 use super::error::Error;
+use super::fetch::fetch_ahead;
 use super::integrator::{Integrator, StepError, foresee};
 use super::linear::Linear;
 use super::motion::Motion;
@@ -201,16 +202,23 @@ impl Simulation<'_> {
 
     /// Begins the common motion of the coupled modules at an instant.
     fn restart_coupled(&mut self, at: Instant) -> Result<(), Error> {
-        let coupled = |plant: &Plant, visit| match visit {
-            Visit::Module(id) if plant.state(id).is_some_and(|s| s.coupled) => Some(id),
-            _ => None,
-        };
         let mut members = std::mem::take(&mut self.coupled.members);
         members.clear();
-        members.extend(self.plant.tree.walk().filter_map(|visit| coupled(&self.plant, visit)));
+        members.extend(self.plant.tree.walk().filter_map(|visit| match visit {
+            Visit::Module(id) if matches!(self.plant.states.get(id.slot()), Some(Some(_))) => Some(id),
+            _ => None,
+        }));
         let course = self.plant.coupled.take();
         self.coupled.y.clear();
-        for &id in &members {
+        let mut count = 0;
+        for n in 0..members.len() {
+            fetch_ahead(&self.plant, &members, n);
+            let id = members[n];
+            if self.plant.state(id).is_none_or(|s| !s.coupled) {
+                continue;
+            }
+            members[count] = id;
+            count += 1;
             let Plant { tree, states, .. } = &mut self.plant;
             let state = states[id.slot()].as_mut().expect("a member");
             let first = tree.places(id).start;
@@ -239,9 +247,10 @@ impl Simulation<'_> {
                 self.queue.cancel(Who::Module(id.slot() as u32));
             }
         }
+        members.truncate(count);
         self.queue.cancel(Who::Coupled);
-        self.coupled.system =
-            System::new(&self.model.rules, &self.plant, &members, at, Some, self.settings.is_sliced());
+        let frozen = self.settings.is_sliced();
+        self.coupled.system.rebuild(&self.model.rules, &self.plant, &members, at, Some, frozen);
         self.coupled.members = members;
         (self.coupled.repaired, self.coupled.pending) = (false, false);
         let without_steps = self.settings.method == Method::Auto
@@ -335,7 +344,8 @@ impl Simulation<'_> {
         self.coupled.pending = course.is_none();
         self.plant.coupled = course;
         let members = std::mem::take(&mut self.coupled.members);
-        for &id in &members {
+        for (at, &id) in members.iter().enumerate() {
+            fetch_ahead(&self.plant, &members, at);
             self.search_member(id, from);
         }
         self.coupled.members = members;
@@ -362,7 +372,8 @@ impl Simulation<'_> {
             let Some(rule) = state.rule.map(|r| &self.model.rules[r]) else { return };
             // Everything that the module reads follows one polynomial up to there.
             let mut knot = course.end;
-            for id in std::iter::once(&id).chain(&state.context) {
+            let all = std::iter::once(&id).chain(&state.context);
+            for id in all.filter(|_| !course.is_whole()) {
                 for motion in self.plant.state(*id).map_or(&[][..], |s| &s.motions) {
                     if let Motion::Coupled(component) = motion {
                         let end = course.knot(*component as usize, start);
@@ -406,7 +417,8 @@ impl Simulation<'_> {
             return self.restart_coupled(at);
         }
         let Coupled { members, system, y, integrator, control, .. } = &mut self.coupled;
-        for id in members {
+        for (n, id) in members.iter().enumerate() {
+            fetch_ahead(&self.plant, members, n);
             self.plant.state_mut(*id).expect("a member").pass_changes(at);
         }
         integrator.advance(y);

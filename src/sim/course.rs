@@ -54,6 +54,11 @@ impl Course {
         self.stretches[0].start
     }
 
+    /// True if all components follow the dense output of the common step to its end.
+    pub fn is_whole(&self) -> bool {
+        self.tracks.is_empty()
+    }
+
     fn track(&self, component: usize) -> Track {
         let whole = Track { first: 0, count: 1, component: component as u32 };
         self.tracks.get(component).copied().unwrap_or(whole)

@@ -72,6 +72,7 @@ mod derive;
 mod equations;
 mod error;
 mod event;
+mod fetch;
 mod gather;
 mod implicit;
 mod inspect;

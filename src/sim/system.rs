@@ -3,6 +3,7 @@
 use super::algebra::Algebra;
 use super::columns::Columns;
 use super::course::Course;
+use super::fetch::fetch_ahead;
 use super::gather::Partial;
 use super::motion::Motion;
 use super::plant::Plant;
@@ -93,23 +94,9 @@ pub struct Sum {
 }
 
 impl System {
-    /// The equations of some of the coupled modules. `unknown` gives the number here of a component, in the order of
-    /// the members; None if it is not integrated here. If `frozen`, neighbours are
-    /// taken as they are at the start.
-    pub fn new(
-        rules: &[Rule],
-        plant: &Plant,
-        members: &[ModuleId],
-        start: Instant,
-        unknown: impl Fn(u32) -> Option<u32>,
-        frozen: bool,
-    ) -> System {
-        let mut system = System::default();
-        system.rebuild(rules, plant, members, start, unknown, frozen);
-        system
-    }
-
-    /// The same, in the memory of other equations.
+    /// Makes these the equations of some of the coupled modules. `unknown` gives the number here of a component, in the
+    /// order of the members; None if it is not integrated here. If `frozen`, neighbours are taken as they are at the
+    /// start.
     pub fn rebuild(
         &mut self,
         rules: &[Rule],
@@ -130,7 +117,8 @@ impl System {
         system.sums.clear();
         system.children.clear();
         system.given.clear();
-        for &id in members {
+        for (at, &id) in members.iter().enumerate() {
+            fetch_ahead(plant, members, at);
             let state = plant.state(id).expect("members have states");
             let first = plant.tree.places(id).start;
             let (Some(rule), Some(solve)) = (state.rule, state.solve) else { continue };
