@@ -6,6 +6,7 @@ use super::system::{Row, Source, System};
 use crate::expr::{LANES, Lanes};
 use crate::model::Rule;
 use smallvec::SmallVec;
+use std::ops::Range;
 
 /// All rows with rates, in chunks. What chunks and columns consist of stands in a few long lists, so that the equations
 /// of another region are written into the memory of the last.
@@ -82,8 +83,11 @@ impl Columns {
         }
         for of in keys {
             let first = self.rows.len();
-            let rows = system.rows.iter().enumerate();
-            self.rows.extend(rows.filter(|(_, row)| row.rates > 0 && key(row) == of).map(|(n, _)| n as u32));
+            for (n, row) in system.rows.iter().enumerate() {
+                if row.rates > 0 && key(row) == of {
+                    self.rows.push(n as u32);
+                }
+            }
             for first in (first..self.rows.len()).step_by(LANES) {
                 self.chunk(system, rules, first, LANES.min(self.rows.len() - first));
             }
@@ -117,8 +121,8 @@ impl Columns {
     }
 
     /// Where one variable of some rows with the same program comes from.
-    fn column(&mut self, system: &System, rows: std::ops::Range<usize>, variable: usize) -> Column {
-        let rows = self.rows[rows].iter().map(|row| &system.rows[*row as usize]);
+    fn column(&mut self, system: &System, range: Range<usize>, variable: usize) -> Column {
+        let rows = self.rows[range.clone()].iter().map(|row| &system.rows[*row as usize]);
         let sources = rows.clone().next().map_or(0, |row| row.sources);
         if variable == sources {
             return Column::Time;
@@ -126,42 +130,55 @@ impl Columns {
         if variable == sources + 1 {
             return Column::Age;
         }
-        let (number, place, mixed) = (self.numbers.len(), self.places.len(), self.sources.len());
+        let (number, place) = (self.numbers.len(), self.places.len());
         if variable > sources {
             self.numbers.extend(rows.map(|row| system.switches_of(row)[variable - sources - 2]));
             return Column::Fixed(number);
         }
         let all = rows.map(|row| system.sources[row.first_source + variable]);
+        // Mostly components and inputs.
         let components = system.places.len() as u32;
-        let (mut fixed, mut states, mut known, mut sums) = (true, true, true, true);
+        let mut inputs = false;
         for source in all.clone() {
-            fixed &= matches!(source, Source::Fixed(_));
-            states &= matches!(source, Source::State(_));
-            known &= matches!(source, Source::State(_) | Source::Input(_));
-            sums &= matches!(source, Source::Sum(_));
+            match source {
+                Source::State(component) => self.places.push(component),
+                Source::Input(input) => {
+                    inputs = true;
+                    self.places.push(components + input);
+                }
+                _ => {
+                    self.places.truncate(place);
+                    return self.other_column(system, range, variable);
+                }
+            }
         }
-        if fixed {
-            self.numbers.extend(all.map(|source| match source {
-                Source::Fixed(x) => x,
-                _ => f64::NAN,
-            }));
+        if inputs { Column::Known(place) } else { Column::State(self.run(place)) }
+    }
+
+    /// A variable that is no component in some rows.
+    fn other_column(&mut self, system: &System, range: Range<usize>, variable: usize) -> Column {
+        let Columns { rows, numbers, places, sources, .. } = self;
+        let all = rows[range].iter().map(|row| &system.rows[*row as usize]);
+        let all = all.map(|row| system.sources[row.first_source + variable]);
+        let (number, place, mixed) = (numbers.len(), places.len(), sources.len());
+        let fixed = |source| match source {
+            Source::Fixed(x) => Some(x),
+            _ => None,
+        };
+        let sum = |source| match source {
+            Source::Sum(sum) => Some(sum),
+            _ => None,
+        };
+        if all.clone().all(|source| fixed(source).is_some()) {
+            numbers.extend(all.filter_map(fixed));
             return Column::Fixed(number);
         }
-        if !known && !sums {
-            self.sources.extend(all);
-            return Column::Mixed(mixed);
+        if all.clone().all(|source| sum(source).is_some()) {
+            places.extend(all.filter_map(sum));
+            return Column::Sum(place);
         }
-        self.places.extend(all.map(|source| match source {
-            Source::State(component) => component,
-            Source::Input(input) => components + input,
-            Source::Sum(sum) => sum,
-            _ => u32::MAX,
-        }));
-        match (states, sums) {
-            (true, _) => Column::State(self.run(place)),
-            (_, true) => Column::Sum(place),
-            _ => Column::Known(place),
-        }
+        sources.extend(all);
+        Column::Mixed(mixed)
     }
 
     /// Evaluates the rates of all rows.

@@ -27,6 +27,8 @@ pub struct Equations<'s> {
 #[derive(Clone, Debug, Default)]
 pub struct Memory {
     pub(super) inputs: Vec<f64>,
+    /// The time that the inputs are of.
+    read_at: Option<f64>,
     /// Components, then inputs.
     known: Vec<f64>,
     /// Values of the aggregates.
@@ -50,12 +52,16 @@ impl<'s> Equations<'s> {
         rules: &'s [Rule],
         course: Option<&'s Course>,
     ) -> Equations<'s> {
-        Equations { system, rules, course, memory }
+        Equations { system, rules, course, memory: Memory { read_at: None, ..memory } }
     }
 
     /// Reads the inputs.
     pub fn read_inputs(&mut self, tau: f64) {
-        self.system.read(self.course, tau, &mut self.memory.inputs);
+        // The last stages of a step are of one time.
+        if self.memory.read_at != Some(tau) {
+            self.system.read(self.course, tau, &mut self.memory.inputs);
+            self.memory.read_at = Some(tau);
+        }
     }
 
     /// Puts the state into `settled`, with its algebraic components solved for; and reads the inputs.

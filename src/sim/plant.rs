@@ -159,14 +159,10 @@ impl Plant {
             return self.variables(rule, id, around, at, out);
         }
         out.clear();
-        for &module in std::iter::once(&id).chain(around.context()) {
-            let values = self.tree.parameters(module);
-            let first = out.len();
-            let (from, to) = (first.min(reads.len()), (first + values.len()).min(reads.len()));
-            match reads[from..to].contains(&true) {
-                true => self.values(module, at, out),
-                false => out.extend_from_slice(values),
-            }
+        self.values(id, at, out);
+        let context = reads.get(out.len()..rule.variables - 2).unwrap_or_default();
+        if context.contains(&true) {
+            around.context().iter().for_each(|module| self.values(*module, at, out));
         }
         out.resize(rule.variables - 2, 0.0);
         out.extend([at.to_f64(), at.since(self.tree.birth(id))]);

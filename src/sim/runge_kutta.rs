@@ -322,16 +322,18 @@ impl Workspace {
         let mut c = Vec::with_capacity(y.len() * (degree + 1));
         for (block, (y, end)) in y.chunks(PART).zip(self.end.chunks(PART)).enumerate() {
             let first = block * PART;
-            let ends = y.iter().zip(end).enumerate();
+            let ends = y.iter().zip(end);
             match method {
-                Method::Euler => ends.for_each(|(_, (&a, &b))| c.extend([a, b])),
+                Method::Euler => ends.for_each(|(&a, &b)| c.extend([a, b])),
                 Method::Rk4 => {
                     let hk = |stage: usize, j: usize| h * self.k[stage][first + j];
-                    ends.for_each(|(j, (a, b))| c.extend([*a, a + hk(0, j) / 3.0, b - hk(4, j) / 3.0, *b]));
+                    ends.enumerate()
+                        .for_each(|(j, (a, b))| c.extend([*a, a + hk(0, j) / 3.0, b - hk(4, j) / 3.0, *b]));
                 }
                 Method::Dop853 => {
                     let k: [_; 16] = std::array::from_fn(|stage| part(&self.k[stage], first));
-                    ends.for_each(|(j, (a, b))| c.extend(dop853_dense(*a, *b, &k.map(|k| h * k[j]))));
+                    ends.enumerate()
+                        .for_each(|(j, (a, b))| c.extend(dop853_dense(*a, *b, &k.map(|k| h * k[j]))));
                 }
                 _ => {
                     let (mut from, mut to) = ([0.0; PART], [0.0; PART]);

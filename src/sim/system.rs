@@ -93,6 +93,9 @@ pub struct Sum {
     pub count: usize,
 }
 
+/// More modules than this are not likely to be in the processor's caches.
+const REGION: usize = 256;
+
 impl System {
     /// Makes these the equations of some of the coupled modules. `unknown` gives the number here of a component, in the
     /// order of the members; None if it is not integrated here. If `frozen`, neighbours are taken as they are at the
@@ -118,7 +121,10 @@ impl System {
         system.children.clear();
         system.given.clear();
         for (at, &id) in members.iter().enumerate() {
-            fetch_ahead(plant, members, at);
+            // A region has just been visited.
+            if members.len() > REGION {
+                fetch_ahead(plant, members, at);
+            }
             let state = plant.state(id).expect("members have states");
             let first = plant.tree.places(id).start;
             let (Some(rule), Some(solve)) = (state.rule, state.solve) else { continue };
@@ -147,7 +153,7 @@ impl System {
                         None => (id, Some(state)),
                         Some(module) => (module, plant.state(module)),
                     };
-                    let x = plant.tree.parameters(module)[read.parameter];
+                    let x = || plant.tree.parameters(module)[read.parameter];
                     let source = system.source(moves, read.parameter, x, &unknown);
                     system.sources[first_source + read.variable] = source;
                 }
@@ -190,20 +196,20 @@ impl System {
         system.finish(rules);
     }
 
-    /// Where a parameter comes from that has the value `x` in the tree, of a module with this state.
+    /// Where a parameter comes from that has the value `x()` in the tree, of a module with this state.
     #[inline]
     fn source(
         &mut self,
         state: Option<&State>,
         parameter: usize,
-        x: f64,
+        x: impl Fn() -> f64,
         unknown: impl Fn(u32) -> Option<u32>,
     ) -> Source {
         let Some((state, motion)) = state.and_then(|s| Some((s, s.motions.get(parameter)?))) else {
-            return Source::Fixed(x);
+            return Source::Fixed(x());
         };
         match motion {
-            Motion::Rest | Motion::Step(_) => Source::Fixed(x),
+            Motion::Rest | Motion::Step(_) => Source::Fixed(x()),
             Motion::Coupled(component) => match unknown(*component) {
                 Some(number) => Source::State(number),
                 None => {
@@ -213,7 +219,7 @@ impl System {
             },
             motion => {
                 let (since, offset) = (state.since, self.start.since(state.since));
-                self.formulas.push(Formula { motion: motion.clone(), x, since, offset });
+                self.formulas.push(Formula { motion: motion.clone(), x: x(), since, offset });
                 Source::Formula(self.formulas.len() as u32 - 1)
             }
         }
@@ -233,7 +239,7 @@ impl System {
             return then.into_iter().map(Source::Fixed).collect();
         }
         let (values, state) = (plant.tree.parameters(module).iter().enumerate(), plant.state(module));
-        values.map(|(i, &x)| self.source(state, i, x, &unknown)).collect()
+        values.map(|(i, &x)| self.source(state, i, || x, &unknown)).collect()
     }
 
     /// A system without rows.
@@ -293,10 +299,12 @@ impl System {
     /// What the components that are read are at a time after the start; NaN where that is not known.
     pub fn read(&self, course: Option<&Course>, tau: f64, out: &mut Vec<f64>) {
         out.clear();
-        if !self.inputs.is_empty() {
-            let at = self.start.after(tau);
-            let value = |component: &u32| course.and_then(|c| c.value(*component as usize, at));
-            out.extend(self.inputs.iter().map(|component| value(component).unwrap_or(f64::NAN)));
+        if self.inputs.is_empty() {
+            return;
+        }
+        let at = self.start.after(tau);
+        for &component in &self.inputs {
+            out.push(course.and_then(|c| c.value(component as usize, at)).unwrap_or(f64::NAN));
         }
     }
 
