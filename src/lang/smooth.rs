@@ -92,6 +92,25 @@ fn where_defined(graph: &mut Graph, smooth: NodeId, written: NodeId, first_flag:
     graph.select(finite, smooth, written)
 }
 
+/// True for what is constant but for jumps, as `floor(t)/2` is.
+fn is_step(graph: &Graph, root: NodeId, still: &dyn Fn(u32) -> bool) -> bool {
+    let mut steps: HashSet<NodeId> = HashSet::new();
+    for id in graph.reachable(&[root]) {
+        let is = match graph.node(id) {
+            Node::Const(_) | Node::Element(..) => true,
+            Node::Unary(Unary::Floor | Unary::Ceil | Unary::Sign, _) => true,
+            Node::Binary(Binary::Lt | Binary::Le | Binary::Eq | Binary::Ne, ..) => true,
+            Node::Var(v) => still(v),
+            Node::Select(_, a, b) => steps.contains(&a) && steps.contains(&b),
+            other => other.operands().into_iter().flatten().all(|operand| steps.contains(&operand)),
+        };
+        if is {
+            steps.insert(id);
+        }
+    }
+    steps.contains(&root)
+}
+
 /// Conditions that variables stand for.
 struct Frozen {
     conditions: Vec<NodeId>,
@@ -131,7 +150,7 @@ impl Frozen {
             if graph.variables(&[a, b]).into_iter().all(still) {
                 return None;
             }
-            self.smooth_node(graph, id, rebuilt, comparisons, span)
+            self.smooth_node(graph, id, rebuilt, still, comparisons, span)
         })[0]
     }
 
@@ -140,6 +159,7 @@ impl Frozen {
         graph: &mut Graph,
         id: NodeId,
         rebuilt: Node,
+        still: &dyn Fn(u32) -> bool,
         comparisons: &mut HashMap<NodeId, (Span, Arc<[String; 2]>)>,
         span: Span,
     ) -> Option<NodeId> {
@@ -168,6 +188,8 @@ impl Frozen {
                 let rest = graph.select(above, one, zero);
                 Some(graph.select(below, minus, rest))
             }
+            // It jumps with its argument, and then only.
+            (Node::Unary(Unary::Floor | Unary::Ceil, x), _) if is_step(graph, x, still) => None,
             (Node::Unary(op @ (Unary::Floor | Unary::Ceil), x), Node::Unary(_, a)) => {
                 let up = op == Unary::Ceil;
                 let negated = |graph: &mut Graph, x| if up { graph.unary(Unary::Neg, x) } else { x };

@@ -257,7 +257,7 @@ fn is_timeless(rule: &Rule) -> bool {
 fn lasting_productions(rule: &Rule) -> Vec<bool> {
     let time = rule.time_variable();
     let reads_time = |variable: usize| variable == time || variable == time + 1;
-    let plain = is_timeless(rule) && !rule.sides.reads().into_iter().any(reads_time);
+    let plain = is_timeless(rule) && !rule.sides.reads().iter().any(|variable| reads_time(*variable));
     (rule.produces.iter())
         .map(|p| plain && !p.is_fault && !p.outcome.is_random() && !p.outcome.reads().any(reads_time))
         .collect()

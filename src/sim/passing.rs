@@ -178,7 +178,7 @@ impl Simulation<'_> {
             Coming::Other(entry) => self.is_event(entry.who),
             Coming::Light(..) => true,
         };
-        if !is_before(coming.at(), event, until) {
+        if !is_before(coming.at(), event, until) && (event || !self.is_in_the_way(coming, until)) {
             return Ok(None);
         }
         (self.passed, self.last) = (self.passed + 1, Some((coming.at(), event)));
@@ -190,6 +190,26 @@ impl Simulation<'_> {
             _ => self.pass_event(coming)?,
         }
         Ok(Some(event))
+    }
+
+    /// True for the end of what is known if it comes at the very instant up to which time passes, and what happens then is
+    /// known only, or comes up only, when one has gone on from there.
+    fn is_in_the_way(&mut self, coming: Coming, until: Instant) -> bool {
+        let Coming::Other(entry) = coming else { return false };
+        let within = |at: Instant| at.since(until) <= until.resolution();
+        if !within(entry.at) {
+            return false;
+        }
+        // The stretch of a formula that was searched costs nothing to go on from.
+        if let Who::Module(slot) = entry.who
+            && self.plant.states[slot as usize].as_ref().is_some_and(|s| s.coupled || !s.is_numeric())
+        {
+            return true;
+        }
+        // A step more may lead where nobody wanted to go.
+        self.front.head().is_some_and(|(at, _)| within(at))
+            || self.agenda.earliest().map(Instant::new).is_some_and(within)
+            || self.queue.valid().any(|other| within(other.at) && self.is_event(other.who))
     }
 
     /// True if the entry is an event, not the end of what is known.

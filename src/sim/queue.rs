@@ -91,6 +91,16 @@ impl Queue {
         None
     }
 
+    /// All valid entries, in no order.
+    pub fn valid(&self) -> impl Iterator<Item = &Entry> {
+        let serial = |who| match who {
+            Who::Coupled => Some(self.coupled),
+            Who::Step => Some(self.step),
+            Who::Module(slot) => self.serials.get(slot as usize).copied(),
+        };
+        self.heap.iter().filter(move |entry| serial(entry.who) == Some(entry.serial))
+    }
+
     /// Takes out what `peek_other` has shown.
     pub fn pop(&mut self) {
         self.heap.pop();

@@ -17,6 +17,7 @@ use std::sync::LazyLock;
 use smallvec::SmallVec;
 
 use super::around::Around;
+use super::career::{Career, End};
 use super::chance;
 use super::error::Error;
 use super::event::Event;
@@ -235,8 +236,16 @@ impl Simulation<'_> {
         }
         let mut all = Vec::new();
         for &slot in light {
-            self.promote(self.plant.tree.id(slot));
-            all.extend(self.fire_quickly(slot as usize));
+            let id = self.plant.tree.id(slot);
+            let at_birth = match self.plant.careers.get(self.plant.tree.label(id)) {
+                Some(Career { rule, end: Some(End::AtBirth { produce }), .. }) => Some((*rule, *produce)),
+                _ => None,
+            };
+            self.promote(id);
+            match at_birth {
+                Some((rule, produce)) => all.push(Firing { id, rule, produce }),
+                None => all.extend(self.fire_quickly(slot as usize)),
+            }
         }
         all.append(firing);
         *firing = all;

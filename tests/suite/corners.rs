@@ -73,6 +73,31 @@ fn floors_are_whole_numbers_where_they_come_to_rest() {
     );
 }
 
+/// An argument that is itself a step does not pass a whole number, it jumps to it.
+#[test]
+fn steps_of_steps_jump_with_them() {
+    let v = "const v = [1, 2.5, -3, 4]\n";
+    rate(v, "v[floor(t)]", 3.0, 0.5);
+    rate(v, "v[floor(2t)/2]", 3.0, 0.5);
+    rate(v, "v[min(floor(t), 2)]", 3.0, 0.5);
+    rate(v, "v[if t < 1 then 0 else 1]", 3.0, 6.0);
+    rate("", "floor(floor(t))", 3.0, 3.0);
+    rate("", "floor(ceil(t))", 3.0, 6.0);
+    rate("", "floor(if t < 1 then 0 else 1)", 3.0, 2.0);
+    for (index, t, expected) in [
+        ("n", 0.5, 1.0),
+        ("n", 1.5, 2.5),
+        ("n", 2.5, -3.0),
+        ("3 - n", 0.5, 4.0),
+        ("3 - n", 1.5, -3.0),
+        ("n + 1e-9", 1.5, 2.5),
+        ("n + 0.5", 3.5, 4.0),
+    ] {
+        let model = format!("{v}initial string: A(0, v[0])\nA(n, s): solve n = floor(t), s = v[{index}]");
+        reaches(&model, t, &[f64::floor(t), expected]);
+    }
+}
+
 #[test]
 fn what_jumps_may_be_compared() {
     rate("", "if floor(t) = 1 then 2 else 0.5", 4.0, 3.5);
@@ -186,4 +211,24 @@ fn what_decays_to_zero_across_corners_comes_to_rest() {
     // x' = (0.65 - x)/1.65 - 0.462 x in the end.
     let rest = (0.65 / 1.65) / (1.0 / 1.65 + 0.462);
     assert!((states[0][1].1[0] - rest).abs() < 1e-4, "{states:?}");
+}
+
+/// What has been searched, or the step of somebody else, may end at that instant, too.
+#[test]
+fn at_the_instant_of_an_event_its_successor_is_there() {
+    let meets = "A(x, n):\n  solve x = age\n  if x = 3 produce C(t)\n  if t = n produce C(t)";
+    reaches(&format!("initial string: A(0, 2) A(0, 1)\n{meets}"), 1.0, &[1.0, 2.0, 1.0]);
+    reaches(&format!("initial string: A(0, 7) A(0, 5) A(0, 1)\n{meets}"), 5.0, &[3.0, 3.0, 1.0]);
+    reaches(
+        &format!("initial string: A(0, 2) A(0, 1) S(1)\n{meets}\nS(n) : * -> S(n + 1)"),
+        1.0,
+        &[1.0, 2.0, 1.0, 2.0],
+    );
+    reaches("initial string: M(0)\nM(s): solve s = floor(t)", 1.0, &[1.0]);
+    let rare = "A(n):\n  if t >= 1 + n produce ε\n  at rate 0.01*t produce B";
+    reaches(&format!("initial string: A(1) A(0)\n{rare}"), 1.0, &[1.0]);
+    // Steps of a length that is given end there.
+    let steps = Settings { method: Method::Rk4, step_size: 0.125, ..Settings::default() };
+    let text = "initial string: X(0) A(1)\nX(x): solve dx/dt = cos(x)\nA(n): if t = n produce ε";
+    assert_eq!(run(text, steps, &[1.0]).expect("it runs")[0].len(), 1);
 }
