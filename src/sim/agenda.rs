@@ -10,6 +10,8 @@ use std::collections::VecDeque;
 const RUN: u32 = 1 << 31;
 /// Children of an entry in the heap: four lie in one line of the cache.
 const ARITY: usize = 4;
+/// A heap that can hold no more than this keeps its memory.
+const LARGE: usize = 1 << 16;
 /// Lines beside the heap.
 const LINES: usize = 4;
 /// Times that are remembered, so that equal ones meet.
@@ -219,6 +221,10 @@ impl Agenda {
             && !self.heap.is_empty()
         {
             self.sift_down(last);
+        }
+        // What goes from the heap into lines is not to be paid for twice.
+        if self.heap.capacity() > LARGE && self.heap.len() < self.heap.capacity() / 2 {
+            self.heap.shrink_to(self.heap.len() + self.heap.len() / 4);
         }
     }
 
