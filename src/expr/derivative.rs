@@ -63,6 +63,10 @@ impl Graph {
         let one = self.constant(1.0);
         Some(match op {
             Unary::Neg => self.constant(-1.0),
+            Unary::Square => {
+                let two = self.constant(2.0);
+                self.times(two, x)
+            }
             Unary::Sqrt => {
                 let half = self.constant(0.5);
                 self.binary(Binary::Div, half, value)

@@ -60,6 +60,7 @@ impl<T: Differentiable> Value for Dual<T> {
         let over = |n, d| T::binary(Binary::Div, n, d);
         let slope = match op {
             Unary::Neg | Unary::Not => T::constant(-1.0),
+            Unary::Square => T::binary(Binary::Mul, T::constant(2.0), x),
             Unary::Sqrt => over(T::constant(0.5), value),
             Unary::Exp => value,
             Unary::Ln => over(one, x),

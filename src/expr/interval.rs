@@ -151,6 +151,7 @@ impl Value for Interval {
         match op {
             Unary::Neg => Interval { lo: -a.hi, hi: -a.lo, ..a },
             Unary::Not => Interval { lo: 1.0 - a.hi, hi: 1.0 - a.lo, ..a },
+            Unary::Square => Interval::unary(Unary::Abs, a).increasing(|x| x * x),
             Unary::Sqrt => a.clipped(0.0, f64::INFINITY).increasing(f64::sqrt),
             Unary::Exp => a.increasing(f64::exp),
             Unary::Ln => a.clipped(0.0, f64::INFINITY).increasing(f64::ln),

@@ -8,6 +8,8 @@ use super::{Array, Curve, Part};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Unary {
     Neg,
+    /// What a product of something with itself is compiled to: bounds of it are narrower than those of a product.
+    Square,
     /// Logical negation of a truth value.
     Not,
     Sqrt,
@@ -107,6 +109,7 @@ impl Value for f64 {
     fn unary(op: Unary, a: f64) -> f64 {
         match op {
             Unary::Neg => -a,
+            Unary::Square => a * a,
             Unary::Not => 1.0 - a,
             Unary::Sqrt => a.sqrt(),
             Unary::Exp => a.exp(),

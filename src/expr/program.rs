@@ -174,6 +174,9 @@ impl Program {
             code.push(match (node, operands) {
                 (Node::Const(bits), _) => Instruction::Const(to, f64::from_bits(bits)),
                 (Node::Unary(op, _), [Some(a), ..]) => Instruction::Unary(op, to, a),
+                (Node::Binary(Binary::Mul, ..), [Some(a), Some(b), _]) if a == b => {
+                    Instruction::Unary(Unary::Square, to, a)
+                }
                 (Node::Binary(op, ..), [Some(a), Some(b), _]) => Instruction::Binary(op, to, a, b),
                 (Node::Binary(op, x, _), [None, Some(b), _]) => {
                     Instruction::Left(op, to, constant(graph, x), b)
@@ -318,6 +321,7 @@ impl Program {
             match instruction {
                 Instruction::Const(to, x) => each(registers, parts, [to, to, to], |_, _| x),
                 Instruction::Unary(Unary::Neg, to, a) => each(registers, parts, [to, a, a], |x, _| -x),
+                Instruction::Unary(Unary::Square, to, a) => each(registers, parts, [to, a, a], |x, _| x * x),
                 Instruction::Unary(op, to, a) => each(registers, parts, [to, a, a], |x, _| f64::unary(op, x)),
                 // The choice of the operation is made once, not for every row.
                 Instruction::Binary(op, to, a, b) => match op {

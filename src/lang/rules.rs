@@ -11,7 +11,7 @@ use super::gather::watched;
 use super::print;
 use super::scope::{RESERVED, Scope, Variables};
 use crate::diagnostic::{Diagnostic, Span};
-use crate::expr::{Binary, Node, NodeId, Program, Unary};
+use crate::expr::{Binary, Graph, Node, NodeId, Program, Unary};
 use crate::model::{
     Boundary, CUT, Class, Clock, Comparison, Condition, DRAWN_WORDS, Draft, Interpretation, Jacobian, KindId,
     Kinds, Pattern, Produce, Rule, Solve, Step, base_of, class_of, never_reached,
@@ -255,14 +255,16 @@ impl RuleBuilder<'_> {
             .into_iter()
             .map(|(guard, span, Equations { rates, algebraic }, switches)| {
                 let total = count + switches.len();
-                let graph = &self.scope.graph;
+                let graph = &mut self.scope.graph;
                 // A value that has no rate is not known to approach anything.
-                let given = |(a, b): (NodeId, NodeId)| {
+                let given = |graph: &Graph, (a, b): (NodeId, NodeId)| {
                     let read = graph.variables(&[a, b]);
                     algebraic.iter().any(|entry| read.contains(&(entry.parameter as u32)))
                 };
                 let unreachable = (atoms.sides.iter())
-                    .map(|&sides| !given(sides) && never_reached(graph, sides, &rates, own, context, total))
+                    .map(|&sides| {
+                        !given(graph, sides) && never_reached(graph, sides, &rates, own, context, total)
+                    })
                     .collect();
                 let roots: Vec<NodeId> = rates.iter().map(|(_, node)| *node).collect();
                 draft.rates.push(rates.clone());

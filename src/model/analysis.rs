@@ -8,6 +8,7 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use super::need::{drawn_only, needed};
+use super::pulses::find_flashes;
 use super::{
     Algebraic, Jacobian, Law, Linear, Model, Numeric, Obstacle, Pattern, Rule, Stepping, Watch, driven_form,
 };
@@ -94,12 +95,12 @@ pub fn analyse(graph: &mut Graph, model: &mut Model, drafts: &[Draft]) {
             let clocked =
                 rates.iter().any(|(parameter, _)| rule.clocks.iter().any(|c| c.parameter == *parameter));
             solve.is_delicate = clocked && laws.iter().any(|law| !law.is_closed());
-            solve.flashes = nodes.iter().any(|&rate| flashes(graph, rate, rule.variables - 2));
             solve.laws = laws;
             solve.numeric = numeric;
         }
         rule.reads_context = reads_context;
     }
+    find_flashes(graph, model, drafts, &moving);
     let needed = needed(graph, model, drafts);
     for rule in 0..model.rules.len() {
         let kinds: Vec<usize> =
@@ -395,11 +396,6 @@ fn is_sum(graph: &mut Graph, root: NodeId, constants: &Constants, sums: &HashSet
         }
     }
     true
-}
-
-fn flashes(graph: &mut Graph, rate: NodeId, time: usize) -> bool {
-    let is_time = |v: u32| v as usize == time || v as usize == time + 1;
-    graph.variables(&[rate]).into_iter().any(is_time) && graph.polynomial(rate, is_time).is_none()
 }
 
 /// A rate as `constant + Σ coefficient · variable`, if it is that, with constant coefficients.

@@ -21,8 +21,16 @@ use crate::lang::Setting;
 use crate::sim::Method;
 
 /// Names of the errors that a case may demand.
-const FAULTS: [&str; 7] =
-    ["OutsideDomain", "Chattering", "Cascade", "Zeno", "NotFinite", "StepTooSmall", "TooManyModules"];
+const FAULTS: [&str; 8] = [
+    "OutsideDomain",
+    "Chattering",
+    "Cascade",
+    "Zeno",
+    "NotFinite",
+    "StepTooSmall",
+    "TooManyModules",
+    "InDoubt",
+];
 
 /// A model with exact answers.
 #[derive(Clone, Debug)]

@@ -350,6 +350,7 @@ fn fault_name(fault: &sim::Error) -> &'static str {
         sim::Error::BadWeights { .. } => "BadWeights",
         sim::Error::NegativeRate { .. } => "NegativeRate",
         sim::Error::StepTooSmall { .. } => "StepTooSmall",
+        sim::Error::InDoubt { .. } => "InDoubt",
         sim::Error::Unsolved { .. } => "Unsolved",
         sim::Error::PeriodTooShort { .. } => "PeriodTooShort",
         sim::Error::TooManyModules { .. } => "TooManyModules",

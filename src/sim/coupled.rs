@@ -8,6 +8,7 @@ use super::course::Course;
 use super::equations::Equations;
 use super::error::Error;
 use super::fetch::fetch_ahead;
+use super::flash::{Glance, Lookout, MAX_UNBOUNDED};
 use super::integrator::{Integrator, StepError, foresee};
 use super::linear::Linear;
 use super::motion::Motion;
@@ -15,11 +16,11 @@ use super::plant::{Path, Plant};
 use super::queue::Who;
 use super::repair::Repairer;
 use super::simulation::Simulation;
-use super::state::{Control, Next, State, What};
+use super::state::{Control, State, What};
 use super::system::System;
 use super::watch::needs_search;
 use super::{Method, Scheduler};
-use crate::model::Model;
+use crate::model::{Model, Rule};
 use crate::structure::{Instant, ModuleId, Visit};
 use std::collections::HashSet;
 
@@ -48,6 +49,8 @@ pub struct Coupled {
     cuts: u32,
     mark: Instant,
     since_mark: usize,
+    /// Members whose rates may have flashes.
+    flashing: Vec<ModuleId>,
 }
 
 /// Most times that a step is tried whose algebraic components cannot be followed.
@@ -108,7 +111,7 @@ impl Simulation<'_> {
             state.pass_changes(now);
             // Formulas go on as they were, whatever their module reads.
             if !state.next.lasting || state.restarted == self.group {
-                state.next = Next::default();
+                state.next = state.next.again();
             }
         }
         if seeds.is_empty() || self.repair(seeds, joined) {
@@ -243,7 +246,7 @@ impl Simulation<'_> {
             }
             state.pass_changes(at);
             if !state.next.lasting {
-                state.next = Next::default();
+                state.next = state.next.again();
                 self.queue.cancel(Who::Module(id.slot() as u32));
             }
         }
@@ -251,6 +254,11 @@ impl Simulation<'_> {
         self.queue.cancel(Who::Coupled);
         let frozen = self.settings.is_sliced();
         self.coupled.system.rebuild(&self.model.rules, &self.plant, &members, at, Some, frozen);
+        self.coupled.flashing.clear();
+        if self.flashes && !self.settings.method.is_fixed_step() {
+            let flashing: Vec<ModuleId> = members.iter().copied().filter(|id| self.may_flash(*id)).collect();
+            self.coupled.flashing = flashing;
+        }
         self.coupled.members = members;
         (self.coupled.repaired, self.coupled.pending) = (false, false);
         let without_steps = self.settings.method == Method::Auto
@@ -305,7 +313,7 @@ impl Simulation<'_> {
     /// Makes a step of the coupled modules and searches it.
     fn step_coupled(&mut self, from: Instant) -> Result<(), Error> {
         let rules = &self.model.rules;
-        let Coupled { system, y, integrator, control, .. } = &mut self.coupled;
+        let Coupled { system, y, integrator, control, flashing, .. } = &mut self.coupled;
         let mut equations = Equations::new(system, rules, None);
         let limit = self.settings.slice_end(from);
         let (mut course, mut tries) = (None, 0);
@@ -313,13 +321,51 @@ impl Simulation<'_> {
         let step = loop {
             let stats = &mut self.stats;
             let step = integrator.step(settings, control, &mut equations, y, from, limit, stats);
-            if step.is_err() || system.algebra.is_empty() {
+            if step.is_err() || system.algebra.is_empty() && flashing.is_empty() {
                 break step;
             }
-            match integrator.blended(&mut equations, y, settings, control) {
+            let stretches = match system.algebra.is_empty() {
+                true => Ok(vec![integrator.dense(&mut equations, y)]),
+                false => integrator.blended(&mut equations, y, settings, control),
+            };
+            match stretches {
                 Ok(stretches) => {
-                    course = Some(Course::of(stretches));
-                    break step;
+                    let found = Course::of(stretches);
+                    let h = found.end.since(from);
+                    self.plant.coupled = Some(found);
+                    let stiff = control.stiff || settings.method == Method::Radau;
+                    let overlooked = flashing.iter().filter_map(|id| {
+                        let glance = glance(
+                            &self.plant,
+                            rules,
+                            &mut self.lookout,
+                            *id,
+                            from,
+                            settings.tolerance,
+                            stiff,
+                        );
+                        match glance {
+                            Glance::Clear => None,
+                            Glance::Overlooked(at) => Some(at),
+                            Glance::Unbounded(at) if tries <= MAX_UNBOUNDED => Some(at),
+                            Glance::Unbounded(at) => {
+                                let rule = self.plant.state(*id).and_then(|s| s.rule).unwrap_or(0);
+                                self.unbounded.entry(rule).or_insert(from.to_f64() + at * h);
+                                None
+                            }
+                        }
+                    });
+                    let overlooked = overlooked.reduce(f64::min);
+                    course = self.plant.coupled.take();
+                    let least = 64.0 * from.resolution();
+                    match overlooked {
+                        Some(at) if h > least && tries < MAX_TRIES => {
+                            tries += 1;
+                            stats.rejected += 1;
+                            control.size = (h * if at > 0.0 { at } else { 0.25 }).max(least);
+                        }
+                        _ => break step,
+                    }
                 }
                 Err(fault) => {
                     tries += 1;
@@ -371,18 +417,7 @@ impl Simulation<'_> {
             let (Some(course), Some(state)) = (&self.plant.coupled, self.plant.state(id)) else { return };
             let Some(rule) = state.rule.map(|r| &self.model.rules[r]) else { return };
             // Everything that the module reads follows one polynomial up to there.
-            let mut knot = course.end;
-            let all = std::iter::once(&id).chain(&state.context);
-            for id in all.filter(|_| !course.is_whole()) {
-                for motion in self.plant.state(*id).map_or(&[][..], |s| &s.motions) {
-                    if let Motion::Coupled(component) = motion {
-                        let end = course.knot(*component as usize, start);
-                        if end.since(knot) < 0.0 {
-                            knot = end;
-                        }
-                    }
-                }
-            }
+            let knot = self.plant.knot(state, course, start);
             let h = knot.since(start);
             if h <= 0.0 {
                 return self.queue.cancel(who);
@@ -392,9 +427,11 @@ impl Simulation<'_> {
             let last = knot.since(course.end) >= 0.0;
             let state = self.plant.state_mut(id).expect("seen above");
             state.next.changes.extend(found.changes);
+            state.next.near = found.near;
             if found.event.is_some() {
                 let time = found.touched[0].time;
-                (state.next.what, state.next.touched) = (What::Event, found.touched);
+                let what = if found.in_doubt { What::Doubt } else { What::Event };
+                (state.next.what, state.next.touched) = (what, found.touched);
                 return self.queue.schedule(who, time);
             }
             if last {
@@ -445,6 +482,24 @@ impl Simulation<'_> {
             || self.coupled.linear.is_some()
     }
 
+    fn may_flash(&self, id: ModuleId) -> bool {
+        let clause = self.plant.state(id).and_then(|s| Some(&self.model.rules[s.rule?].solves[s.solve?]));
+        clause.is_some_and(|solve| solve.flashes)
+    }
+
+    /// True if something may have been overlooked of the present motion of some coupled modules, from now on.
+    pub(super) fn is_overlooked(&mut self, members: &[ModuleId]) -> bool {
+        if !self.flashes || self.settings.method.is_fixed_step() {
+            return false;
+        }
+        let (now, tolerance) = (self.now, self.coupled_settings.tolerance);
+        let flashing: Vec<ModuleId> = members.iter().copied().filter(|id| self.may_flash(*id)).collect();
+        let (plant, rules, lookout) = (&self.plant, &self.model.rules, &mut self.lookout);
+        flashing
+            .into_iter()
+            .any(|id| glance(plant, rules, lookout, id, now, tolerance, false) != Glance::Clear)
+    }
+
     fn coupled_error(&self, error: StepError, at: Instant) -> Error {
         let Coupled { system, y, .. } = &self.coupled;
         let owner = |component: usize| system.owner(component);
@@ -455,6 +510,39 @@ impl Simulation<'_> {
         }
         self.step_error(error, at, owner)
     }
+}
+
+/// Looks for what has been overlooked of a coupled module from an instant to the end of the common step; positions are
+/// those in this stretch.
+fn glance(
+    plant: &Plant,
+    rules: &[Rule],
+    lookout: &mut Lookout,
+    id: ModuleId,
+    from: Instant,
+    tolerance: f64,
+    stiff: bool,
+) -> Glance {
+    let clause = |state: &State| Some((state.rule?, state.solve?));
+    let Some(state) = plant.state(id) else { return Glance::Clear };
+    let (Some((rule, solve)), Some(course)) = (clause(state), &plant.coupled) else { return Glance::Clear };
+    let mut start = from;
+    let all = course.end.since(from);
+    while course.end.since(start) > 0.0 {
+        let knot = plant.knot(state, course, start);
+        let h = knot.since(start);
+        if h <= 0.0 {
+            break;
+        }
+        let path = Path::of_equations(plant, state, &rules[rule], (start, h), None);
+        let whole = |at: f64| (start.since(from) + at * h) / all;
+        match lookout.look(&path, &rules[rule].solves[solve], tolerance, stiff) {
+            Glance::Clear => start = knot,
+            Glance::Overlooked(at) => return Glance::Overlooked(whole(at)),
+            Glance::Unbounded(at) => return Glance::Unbounded(whole(at)),
+        }
+    }
+    Glance::Clear
 }
 
 /// The parameters of a coupled module that are integrated, then those that are solved for, in the order of their

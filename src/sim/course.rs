@@ -137,6 +137,11 @@ impl<'c> Piece<'c> {
         Dual { value, rate: rate * self.scale }
     }
 
+    /// What it may be wrong by, as a part of its size.
+    pub fn error(&self) -> f64 {
+        self.dense.error
+    }
+
     /// Bounds over the whole stretch.
     pub fn bounds(&self) -> Interval {
         if self.from == 0.0 && self.scale == 1.0 {

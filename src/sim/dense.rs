@@ -18,6 +18,8 @@ pub struct Dense {
     pub end: Instant,
     /// Length of the step.
     pub h: f64,
+    /// What its components may be wrong by, as a part of their size.
+    pub error: f64,
     degree: usize,
     /// `degree + 1` coefficients for each component.
     coefficients: Vec<f64>,
@@ -27,7 +29,7 @@ impl Dense {
     /// A step to `end`, if that is known better than as `start` and `h`.
     pub fn new(start: Instant, end: Option<Instant>, h: f64, degree: usize, coefficients: Vec<f64>) -> Dense {
         debug_assert!(degree <= MAX_DEGREE);
-        Dense { start, end: end.unwrap_or_else(|| start.after(h)), h, degree, coefficients }
+        Dense { start, end: end.unwrap_or_else(|| start.after(h)), h, error: 0.0, degree, coefficients }
     }
 
     /// Number of components.
@@ -93,7 +95,7 @@ impl Dense {
         let start = if lo == 0.0 { self.start } else { self.start.after(lo * self.h) };
         let end = if hi == 1.0 { self.end } else { self.start.after(hi * self.h) };
         let h = if lo == 0.0 && hi == 1.0 { self.h } else { end.since(start) };
-        Dense { start, end, h, degree: MAX_DEGREE, coefficients: all }
+        Dense { start, end, h, error: self.error, degree: MAX_DEGREE, coefficients: all }
     }
 
     /// One component at a position, and its rate there per unit of position.

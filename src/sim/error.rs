@@ -76,6 +76,18 @@ pub enum Error {
     BadWeights { site: Site, why: String },
     #[error("the rate of an event of {} is negative at t = {}", .site.module, .site.when())]
     NegativeRate { site: Site },
+    #[error(
+        "{} has come near {} and turned back at t = {}: whether it met it, the error of integration does not tell",
+        .site.module, if .boundary.is_empty() { "a boundary" } else { .boundary }, .site.when()
+    )]
+    InDoubt {
+        site: Site,
+        /// Where the sides meet, as written.
+        boundary: Box<str>,
+        /// How far they are apart there, and what they may be wrong by.
+        gap: f64,
+        error: f64,
+    },
     #[error("the step size fell to nothing at t = {}", .site.when())]
     StepTooSmall { site: Site },
     #[error("{} of {} {} at t = {}", .unknown.0, .site.module, .unknown.1.message(), .site.when())]
@@ -106,6 +118,7 @@ impl Error {
             | Error::BadWeights { site, .. }
             | Error::NegativeRate { site }
             | Error::StepTooSmall { site }
+            | Error::InDoubt { site, .. }
             | Error::Unsolved { site, .. }
             | Error::TooManyModules { site, .. } => site,
         }
@@ -167,6 +180,13 @@ impl Error {
             Error::NegativeRate { .. } => {
                 d.help("a rate is at least 0: bound it, as in `at rate max(0, …)`, or say when there is none: `if … at rate … produce …`")
             }
+            Error::InDoubt { gap, error, .. } => d
+                .note(format!(
+                    "the two sides are {} apart there, and may be wrong by {}",
+                    super::brief(*gap, 2),
+                    super::brief(*error, 2)
+                ))
+                .help("if it does not get there, a smaller `--tolerance` shows it; if it is meant to, let what comes near count: `if x >= 1 - 1e-5` in place of `if x = 1`"),
             Error::StepTooSmall { .. } => d.help(
                 "the solution may become infinite here, or the equations jump in a way that no `if` shows; a fixed step (`--method rk4 --step-size H`) shows how it behaves",
             ),
@@ -197,6 +217,7 @@ impl Error {
             Error::BadWeights { .. } => "by the weights of this clause",
             Error::NegativeRate { .. } => "the rate of this clause",
             Error::StepTooSmall { .. } => "these equations",
+            Error::InDoubt { .. } => "met, or only nearly?",
             Error::Unsolved { .. } => "solved for here",
             Error::TooManyModules { .. } => "this production made the last of them",
         }

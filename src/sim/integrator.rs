@@ -21,6 +21,8 @@ pub struct Integrator {
     pub dear: bool,
     /// Start, length and end of the step just made.
     step: (Instant, f64, Instant),
+    /// What its end may be wrong by, relative.
+    error: f64,
 }
 
 /// Why there is no step. The component that is to blame, if it is known.
@@ -35,6 +37,15 @@ pub enum StepError {
 /// The tolerance of a single step, as a part of the tolerance asked for: errors of steps add up, and move
 /// the times of events, which move what comes after them.
 pub const INNER_TOLERANCE: f64 = 0.1;
+
+/// Errors of steps that are estimated may be so many times larger.
+const CAUTION: f64 = 4.0;
+/// However many steps there have been, values are taken to be right to so many tolerances.
+pub const CERTAINTY: f64 = 2.0;
+
+/// Within a step that is twice as long as stability allows, what decays is interpolated by four times as much worse than its
+/// end is known, and so on.
+const WIGGLE: f64 = 50.0;
 
 /// A step is long enough that takes so many stretches.
 const MANY_STRETCHES: f64 = 4.0;
@@ -170,14 +181,27 @@ impl Integrator {
                         // A step that had to end early says nothing against longer ones.
                         control.size = if 2.0 * h > room { next.max(control.size) } else { next };
                         control.last_error = error;
+                        let most = CERTAINTY * settings.tolerance;
+                        control.error = (control.error
+                            + CAUTION * INNER_TOLERANCE * settings.tolerance * error)
+                            .min(most);
                     }
                     break;
                 }
             }
         }
         stats.steps += 1;
-        if settings.method == Method::Auto && method != Method::Radau {
-            suspect(control, self.workspace.stiffness(method, h), method);
+        self.error = control.error;
+        if grid.is_none() && method != Method::Radau {
+            let stiffness = self.workspace.stiffness(method, h);
+            let excess = stiffness / stability(method);
+            if excess > 1.0 {
+                self.error +=
+                    WIGGLE * excess * excess * INNER_TOLERANCE * settings.tolerance * control.last_error;
+            }
+            if settings.method == Method::Auto {
+                suspect(control, stiffness, method);
+            }
         }
         let end = match (grid, limit) {
             (Some(grid), _) => Instant::new(next_grid_time(start, grid)),
@@ -192,11 +216,15 @@ impl Integrator {
     /// it.
     pub fn dense(&mut self, system: &mut impl Rates, y: &[f64]) -> Dense {
         let (start, h, end) = self.step;
-        if let Some(implicit) = self.implicit.as_mut().filter(|_| self.method == Method::Radau) {
-            return implicit.dense(start, y, h);
-        }
-        self.workspace.finish(self.method, system, y, h);
-        self.workspace.dense(self.method, start, Some(end), y, h)
+        let mut dense = match self.implicit.as_mut().filter(|_| self.method == Method::Radau) {
+            Some(implicit) => implicit.dense(start, y, h),
+            None => {
+                self.workspace.finish(self.method, system, y, h);
+                self.workspace.dense(self.method, start, Some(end), y, h)
+            }
+        };
+        dense.error = self.error;
+        dense
     }
 
     /// The dense output of the step just made from `y`, with what is solved for along with it. Where that cannot be
@@ -236,12 +264,16 @@ impl Integrator {
     }
 }
 
+/// The step times the rate of decay up to which an explicit method damps.
+fn stability(method: Method) -> f64 {
+    if method == Method::Dop853 { 1.9 } else { 2.8 }
+}
+
 /// Watches for steps that are short for stability's sake only (Hairer and Wanner 1996, IV.2). The bounds lie below the
 /// ends of the stability regions, where step control was seen to stay; at the tolerances that DOP853 is used for,
 /// accuracy alone keeps steps well under its bound.
 fn suspect(control: &mut Control, stiffness: f64, method: Method) {
-    let bound = if method == Method::Dop853 { 1.9 } else { 2.8 };
-    if stiffness > bound {
+    if stiffness > stability(method) {
         control.suspicion += 1;
         control.stiff |= control.suspicion >= 15;
     } else {

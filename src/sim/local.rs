@@ -1,15 +1,15 @@
 //! Modules that are integrated alone, each with steps of its own.
 
 use super::Method;
-use super::dense::Dense;
 use super::error::Error;
+use super::flash::{Glance, MAX_UNBOUNDED};
 use super::integrator::{StepError, foresee};
 use super::motion::Motion;
-use super::plant::Plant;
+use super::plant::{Path, Plant};
 use super::runge_kutta::Rates;
 use super::simulation::Simulation;
 use super::state::{Control, State, Step};
-use crate::expr::{Interval, Program, Scratch, Value};
+use crate::expr::{Program, Scratch};
 use crate::model::{Jacobian, Rule};
 use crate::structure::{Instant, ModuleId};
 use smallvec::SmallVec;
@@ -108,66 +108,6 @@ impl Alone<'_> {
 /// Most times that a step is cut because of what it may have overlooked.
 const MAX_TRIES: usize = 100;
 
-/// Rates so many times larger than all that were seen are a surprise.
-const SURPRISE: f64 = 8.0;
-/// Pieces of a step narrower than this are not halved any more, and no more of them are looked at.
-const NARROW: f64 = 1.0 / 256.0;
-const MAX_PIECES: usize = 512;
-
-impl Alone<'_> {
-    /// The first position in a step near which rates may be far larger than they are wherever they were evaluated: a
-    /// short flash of light between two stages. By bounds over pieces of the step, so that none is missed.
-    fn overlooked(&mut self, dense: &Dense, tolerance: f64) -> Option<f64> {
-        let n = self.numeric.len();
-        let (mut y, mut rates) = (vec![0.0; n], vec![0.0; n]);
-        let mut seen = vec![0.0f64; n];
-        for position in [0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0] {
-            for (c, y) in y.iter_mut().enumerate() {
-                *y = dense.value(c, position);
-            }
-            self.rates(position * dense.h, &y, &mut rates);
-            for (seen, rate) in seen.iter_mut().zip(&rates) {
-                *seen = seen.max(rate.abs());
-            }
-        }
-        let mut variables: Vec<Interval> = self.variables.iter().map(|x| Interval::constant(*x)).collect();
-        let mut out = vec![Interval::EMPTY; n];
-        let mut scratch = Vec::new();
-        let mut stack = vec![(0.0, 1.0)];
-        let mut pieces = 0;
-        while let Some((lo, hi)) = stack.pop() {
-            pieces += 1;
-            let (from, to) = (lo * dense.h, hi * dense.h);
-            for (c, &variable) in self.numeric.iter().enumerate() {
-                variables[variable] = dense.piece(c, lo, hi).value;
-            }
-            for &(variable, motion, x) in &self.formulas {
-                let value = motion.over(self.offset + from, self.offset + to).value;
-                variables[variable] = Interval { lo: x + value.lo, hi: x + value.hi, ..value };
-            }
-            variables[self.time] = Interval::spanned(self.t + from, self.t + to);
-            variables[self.time + 1] = Interval::spanned(self.age + from, self.age + to);
-            self.program.eval(&variables, &mut scratch, &mut out);
-            let surprising = |(rate, seen): (&Interval, &f64)| {
-                let size = rate.magnitude();
-                size > SURPRISE * seen && size * (to - from) > tolerance
-            };
-            if !out.iter().zip(&seen).any(surprising) {
-                continue;
-            }
-            if hi - lo <= NARROW {
-                return Some(lo);
-            }
-            if pieces >= MAX_PIECES {
-                return None;
-            }
-            let middle = 0.5 * (lo + hi);
-            stack.extend([(middle, hi), (lo, middle)]);
-        }
-        None
-    }
-}
-
 impl Rates for Alone<'_> {
     fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]) {
         self.move_to(tau, y);
@@ -203,6 +143,8 @@ impl Simulation<'_> {
         let hint = self.hints[self.plant.tree.kind(id).index()][solve];
         let going_on = state.step.as_ref().filter(|s| s.live);
         let mut control = going_on.map_or(hint, |s| s.control);
+        // What was learnt elsewhere says nothing of how well this module is known.
+        control.error = state.step.as_ref().map_or(0.0, |s| s.control.error);
         let step = {
             let scratch = std::mem::take(&mut self.scratch);
             let mut system = Alone::new(&self.plant, state, rule, from, variables, scratch, &mut y);
@@ -216,9 +158,8 @@ impl Simulation<'_> {
             }
             let fixed = self.settings.method.is_fixed_step();
             let settings = self.settings.for_clocks(rule.solves[solve].is_delicate);
-            // For stiff equations, bounds of rates say nothing.
             let stiff = control.stiff || self.settings.method == Method::Radau;
-            let flashes = rule.solves[solve].flashes && !fixed && !stiff;
+            let flashes = rule.solves[solve].flashes && !fixed;
             let mut tries = 0;
             let step = loop {
                 let stats = &mut self.stats;
@@ -230,8 +171,13 @@ impl Simulation<'_> {
                 if !flashes || tries > MAX_TRIES {
                     break step;
                 }
-                match system.overlooked(dense, self.settings.tolerance) {
-                    Some(at) if dense.h > least => {
+                let path = Path::of_equations(&self.plant, state, rule, (from, dense.h), Some(dense));
+                match self.lookout.look(&path, &rule.solves[solve], self.settings.tolerance, stiff) {
+                    Glance::Unbounded(at) if tries > MAX_UNBOUNDED => {
+                        self.unbounded.entry(index).or_insert(from.to_f64() + at * dense.h);
+                        break step;
+                    }
+                    Glance::Overlooked(at) | Glance::Unbounded(at) if dense.h > least => {
                         stats.rejected += 1;
                         let part = if at > 0.0 { at } else { 0.25 };
                         control.size = (part * dense.h).max(least);

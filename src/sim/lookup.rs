@@ -8,10 +8,12 @@ use std::collections::HashSet;
 use smallvec::SmallVec;
 
 use super::around::Around;
+use super::doubt::half_width;
 use super::settle::{LONG, clear};
 use super::simulation::Simulation;
 use super::state::{Signs, State};
 use super::watch::{TOUCH, opposite};
+use crate::expr::Interval;
 use crate::model::{Pattern, Rule, Sign, Turn};
 use crate::structure::{ModuleId, Visit};
 
@@ -26,6 +28,15 @@ pub(super) fn sign_at_birth(a: f64, b: f64) -> Sign {
     let (difference, size) = (a - b, a.abs().max(b.abs()));
     let equal = size.is_finite() && difference.abs() <= EQUAL * size;
     if equal { Sign::Zero } else { Sign::of(difference) }
+}
+
+/// What the errors of values, relative, make of the difference of an atom's sides.
+fn noise(rule: &Rule, atom: usize, values: &[f64], error: f64) -> f64 {
+    let around = |x: &f64| Interval { lo: x - error * x.abs(), hi: x + error * x.abs(), partial: false };
+    let variables: Vec<Interval> = values.iter().map(around).collect();
+    let mut out = vec![Interval::EMPTY; rule.sides.outputs()];
+    rule.sides.eval(&variables, &mut Vec::new(), &mut out);
+    half_width(out[2 * atom], out[2 * atom + 1])
 }
 
 /// The place of the bracket that closes the first one.
@@ -128,6 +139,7 @@ impl Simulation<'_> {
     /// Gives a module its rule and opens it.
     pub(super) fn take_up(&mut self, id: ModuleId, rule: usize, context: &Around) {
         let compiled = &self.model.rules[rule];
+        let error = self.error_of(id);
         self.plant.materialise(id, self.now);
         let now = self.now;
         if let Some(state) = self.plant.state_mut(id) {
@@ -135,6 +147,7 @@ impl Simulation<'_> {
         }
         let followed =
             self.plant.state(id).filter(|s| s.rule == Some(rule)).map(|s| Signs::from_slice(&s.signs));
+        let followed = followed.map(|signs| (signs, error));
         let (mut signs, clear) = self.signs_of_values(id, compiled, context, followed);
         let before = self.plant.state(id);
         // A limit that is only approached may have been reached by rounding.
@@ -155,12 +168,12 @@ impl Simulation<'_> {
         if state.coupled {
             self.coupled.loosened.extend_from_slice(&state.context);
         }
-        state.rule = Some(rule);
         state.context = context.clone();
         state.solve = None;
         state.signs = signs;
         state.switches.clear();
-        state.next = Default::default();
+        state.next = if state.rule == Some(rule) { state.next.again() } else { Default::default() };
+        state.rule = Some(rule);
         state.since = self.now;
         if compiled.is_plain() {
             // Nothing to judge and nothing to choose.
@@ -173,6 +186,14 @@ impl Simulation<'_> {
         if !was_open {
             self.opened.push(id);
         }
+    }
+
+    /// What integrated values that a module reads may be wrong by now, relative; 0 where nothing is integrated.
+    fn error_of(&self, id: ModuleId) -> f64 {
+        let Some(state) = self.plant.state(id) else { return 0.0 };
+        let own = state.step.as_ref().filter(|_| state.is_numeric()).map_or(0.0, |step| step.dense.error);
+        let common = if self.plant.coupled.is_some() { self.coupled.control.error } else { 0.0 };
+        own.max(common)
     }
 
     /// Collects the context that a rule asks for, in the order of the rule's variables; false if it is
@@ -289,7 +310,7 @@ impl Simulation<'_> {
         id: ModuleId,
         rule: &Rule,
         context: &Around,
-        followed: Option<Signs>,
+        followed: Option<(Signs, f64)>,
     ) -> (Signs, bool) {
         if rule.atoms.is_empty() {
             return (Signs::new(), true);
@@ -306,9 +327,15 @@ impl Simulation<'_> {
                 // An infinite side is far from everything.
                 let size = side[0].abs().max(side[1].abs());
                 // A sign that has just turned, by no more than rounding, turns at this instant.
-                let turned = followed.as_ref().is_some_and(|f| f[atom] == opposite(Sign::of(difference)));
+                let turned = followed.as_ref().is_some_and(|f| f.0[atom] == opposite(Sign::of(difference)));
                 let tolerance = if turned { TOUCH } else { EQUAL };
                 let equal = size.is_finite() && difference.abs() <= tolerance * size;
+                // By no more than the error of integration: it goes on with the sign that it had.
+                if let Some((signs, error)) = followed.as_ref().filter(|f| turned && !equal && f.1 > 0.0)
+                    && difference.abs() <= noise(rule, atom, &self.variables, *error)
+                {
+                    return signs[atom];
+                }
                 clear &= !equal && difference.abs() > NEAR * scale;
                 if equal { Sign::Zero } else { Sign::of(difference) }
             })

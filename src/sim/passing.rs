@@ -381,6 +381,7 @@ impl Simulation<'_> {
             oldest = oldest.or(first);
         }
         self.group_entries = group;
+        self.join_ties();
         Ok(oldest)
     }
 }

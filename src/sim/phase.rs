@@ -228,7 +228,7 @@ impl Simulation<'_> {
         let rule = &model.rules[state.rule.expect("a module with a rule")];
         // The steps of coupled modules are not their own.
         let numeric = state.is_numeric() && !state.coupled;
-        state.next = Next::default();
+        state.next = state.next.again();
         let (h, limit) = if numeric {
             match self.step_alone(id, from) {
                 Ok(h) => (h, 1.0),
@@ -249,6 +249,7 @@ impl Simulation<'_> {
         let end = (state.motions.iter()).filter_map(Motion::end).reduce(f64::min);
         let end = end.map(|tau| state.since.after(tau));
         let (what, at) = match found.event {
+            Some(_) if found.in_doubt => (What::Doubt, found.touched[0].time),
             Some(_) => (What::Event, found.touched[0].time),
             None if numeric => (What::Window, state.step.as_ref().map_or(from, |s| s.dense.end)),
             None if limit.is_finite() => (What::Window, from.after(h)),
@@ -260,7 +261,8 @@ impl Simulation<'_> {
         };
         let state = self.plant.state_mut(id).expect("seen above");
         let lasting = limit.is_infinite();
-        state.next = Next { what, touched: found.touched, changes: found.changes, lasting };
+        let near = found.near;
+        state.next = Next { what, touched: found.touched, changes: found.changes, lasting, near };
         if what == What::Nothing {
             self.queue.cancel(who);
         } else {

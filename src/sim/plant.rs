@@ -3,12 +3,16 @@
 use super::around::{Around, gather};
 use super::career::Careers;
 use super::course::{Course, Piece};
+use super::dense::Dense;
 use super::motion::Motion;
 use super::state::State;
 use crate::expr::{Dual, Interval, Value};
 use crate::model::Rule;
 use crate::structure::{Instant, ModuleId, Tree};
 use smallvec::SmallVec;
+
+/// What rounding makes of a value, relative.
+const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 /// The growing structure with the motions of its parameters.
 #[derive(Clone, Debug)]
@@ -127,6 +131,25 @@ impl Plant {
         }
     }
 
+    /// The end of the stretch, from an instant on, in which all coupled components that a module reads follow one polynomial.
+    pub fn knot(&self, state: &State, course: &Course, from: Instant) -> Instant {
+        let mut knot = course.end;
+        if course.is_whole() {
+            return knot;
+        }
+        for &id in std::iter::once(&state.id).chain(&state.context) {
+            for motion in self.state(id).map_or(&[][..], |s| &s.motions) {
+                if let Motion::Coupled(component) = motion {
+                    let end = course.knot(*component as usize, from);
+                    if end.since(knot) < 0.0 {
+                        knot = end;
+                    }
+                }
+            }
+        }
+        knot
+    }
+
     /// The variables of a rule at an instant: parameters, those of the context, aggregates, `t` and `age`.
     pub fn variables(&self, rule: &Rule, id: ModuleId, around: &Around, at: Instant, out: &mut Vec<f64>) {
         out.clear();
@@ -177,17 +200,37 @@ pub struct Path<'p> {
     pub start: Instant,
     pub h: f64,
     age: f64,
+    /// Which variables are wanted; all where this is empty.
+    wanted: &'p [bool],
+    /// The module's own step, if it is not yet among what is known.
+    step: Option<&'p Dense>,
 }
 
 impl<'p> Path<'p> {
     pub fn new(plant: &'p Plant, state: &'p State, rule: &'p Rule, start: Instant, h: f64) -> Path<'p> {
-        Path { plant, state, rule, start, h, age: start.since(plant.tree.birth(state.id)) }
+        let age = start.since(plant.tree.birth(state.id));
+        Path { plant, state, rule, start, h, age, wanted: &rule.watched, step: None }
+    }
+
+    /// The path of all variables that equations read; along a step of the module's own, if that is given.
+    pub fn of_equations(
+        plant: &'p Plant,
+        state: &'p State,
+        rule: &'p Rule,
+        (start, h): (Instant, f64),
+        step: Option<&'p Dense>,
+    ) -> Path<'p> {
+        Path { wanted: &[], step, ..Path::new(plant, state, rule, start, h) }
     }
 
     /// What numeric motions follow along this stretch.
     fn piece<'s>(&'s self, state: &'s State, motion: &Motion) -> Option<Piece<'s>> {
         match motion {
-            Motion::Step(c) => Some(Piece::new(&state.step.as_ref()?.dense, *c as usize, self.start, self.h)),
+            Motion::Step(c) => {
+                let own = self.step.filter(|_| state.id == self.state.id);
+                let dense = own.or(state.step.as_ref().map(|step| &step.dense))?;
+                Some(Piece::new(dense, *c as usize, self.start, self.h))
+            }
             Motion::Coupled(c) => self.plant.coupled.as_ref()?.piece(*c as usize, self.start, self.h),
             _ => None,
         }
@@ -199,7 +242,7 @@ impl<'p> Path<'p> {
         Some(self.piece(self.state, motion)?.bounds())
     }
 
-    /// Gives each variable that conditions read to one of three functions: values that rest, pieces of dense output, and formulas
+    /// Gives each variable that is wanted to one of three functions: values that rest, pieces of dense output, and formulas
     /// with their start value and the time since it.
     fn each<T: Value>(
         &self,
@@ -210,7 +253,7 @@ impl<'p> Path<'p> {
         time: impl Fn(f64) -> T,
     ) {
         out.clear();
-        let watched = &self.rule.watched;
+        let wanted = |i: usize| self.wanted.get(i).copied().unwrap_or(true);
         let append = |id: ModuleId, reads: &dyn Fn(usize) -> bool, out: &mut Vec<T>| {
             let values = self.plant.tree.parameters(id);
             if !(out.len()..out.len() + values.len()).any(reads) {
@@ -235,7 +278,7 @@ impl<'p> Path<'p> {
             }
         };
         for &id in std::iter::once(&self.state.id).chain(self.state.context.context()) {
-            append(id, &|i| watched[i], out);
+            append(id, &wanted, out);
         }
         let times = [time(self.start.to_f64()), time(self.age)];
         if self.rule.aggregates.is_empty() {
@@ -244,7 +287,7 @@ impl<'p> Path<'p> {
             return;
         }
         let child = |id, out: &mut Vec<T>| append(id, &|_| true, out);
-        gather(self.rule, &self.state.context, times, out, &mut Vec::new(), |i| watched[i], child);
+        gather(self.rule, &self.state.context, times, out, &mut Vec::new(), wanted, child);
     }
 
     /// All variables at the start.
@@ -275,6 +318,31 @@ impl<'p> Path<'p> {
         );
     }
 
+    /// All variables that equations read at a position.
+    pub fn everything_at(&self, position: f64, out: &mut Vec<f64>) {
+        self.at(position, out);
+        out.extend(self.state.switches.iter().map(|&on| f64::from(u8::from(on))));
+    }
+
+    /// Bounds of all variables that equations read. If `held`, what is integrated stays as it is in the middle.
+    pub fn everything_over(&self, lo: f64, hi: f64, held: bool, out: &mut Vec<Interval>) {
+        let h = self.h;
+        self.each(
+            out,
+            Interval::constant,
+            |piece| match held {
+                true => Interval::constant(piece.value(0.5 * (lo + hi))),
+                false => piece.over(lo, hi).value,
+            },
+            |motion, x, offset| {
+                let value = motion.over(offset + lo * h, offset + hi * h).value;
+                Interval { lo: x + value.lo, hi: x + value.hi, ..value }
+            },
+            |t| Interval::spanned(t + lo * h, t + hi * h),
+        );
+        out.extend(self.state.switches.iter().map(|&on| Interval::constant(f64::from(u8::from(on)))));
+    }
+
     /// Bounds of values and rates from one position to another.
     pub fn over(&self, lo: f64, hi: f64, out: &mut Vec<Dual<Interval>>) {
         let h = self.h;
@@ -291,13 +359,46 @@ impl<'p> Path<'p> {
         );
     }
 
-    /// Bounds of values over the whole stretch.
+    /// What the values may be at a position, given the errors of integration and of rounding.
+    pub fn uncertain(&self, position: f64, out: &mut Vec<Interval>) {
+        let tau = position * self.h;
+        let around = |x: f64, more: f64| {
+            let width = ROUNDING * x.abs() + more;
+            Interval { lo: x - width, hi: x + width, partial: false }
+        };
+        self.each(
+            out,
+            |x| around(x, 0.0),
+            // Beyond the position the step may lead anywhere.
+            |piece| {
+                around(piece.value(position), piece.error() * piece.over(0.0, position).value.magnitude())
+            },
+            |motion, x, offset| around(x + motion.value(offset + tau), ROUNDING * x.abs()),
+            |t| around(t + tau, 0.0),
+        );
+    }
+
+    /// What integrated values along the path may be wrong by, as a part of their size; 0 if there are none.
+    pub fn error(&self) -> f64 {
+        let error = |state: &State| {
+            let pieces = state.motions.iter().filter_map(|motion| self.piece(state, motion));
+            pieces.map(|piece| piece.error()).fold(0.0, f64::max)
+        };
+        let others = self.state.context.iter().filter_map(|id| self.plant.state(*id));
+        others.map(error).fold(error(self.state), f64::max)
+    }
+
+    /// Bounds of values over the whole stretch, given the errors of integration.
     pub fn whole(&self, out: &mut Vec<Interval>) {
         let h = self.h;
         self.each(
             out,
             Interval::constant,
-            |piece| piece.bounds(),
+            |piece| {
+                let bounds = piece.bounds();
+                let width = piece.error() * bounds.magnitude();
+                Interval { lo: bounds.lo - width, hi: bounds.hi + width, ..bounds }
+            },
             |motion, x, offset| {
                 let value = motion.over(offset, offset + h).value;
                 Interval { lo: x + value.lo, hi: x + value.hi, ..value }

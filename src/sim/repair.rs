@@ -21,12 +21,12 @@ use super::coupled::integrated;
 use super::course::Course;
 use super::dense::Dense;
 use super::equations::{Equations, Memory};
-use super::integrator::{INNER_TOLERANCE, Integrator};
+use super::integrator::{CERTAINTY, INNER_TOLERANCE, Integrator};
 use super::motion::Motion;
 use super::neighbours::reads;
 use super::queue::Who;
 use super::simulation::Simulation;
-use super::state::{Control, Next};
+use super::state::Control;
 use super::system::System;
 use crate::structure::{Instant, ModuleId};
 use smallvec::SmallVec;
@@ -146,7 +146,8 @@ impl Simulation<'_> {
                 self.coupled.repairer.rings = (reach + 1).clamp(1, MAX_RINGS);
                 self.coupled.members.extend_from_slice(joined);
                 self.take_over(region, trial);
-                return true;
+                // A common step that begins now finds what has been overlooked.
+                return !self.is_overlooked(&region.members);
             }
             rings *= 2;
             if rings > MAX_RINGS {
@@ -249,6 +250,8 @@ impl Simulation<'_> {
             numbers[component as usize] = NOT_HERE;
         }
         integrator.restart(self.settings.method, y.len());
+        // The edge of the region neglects as much as that.
+        control.error = self.coupled.control.error + INNER_TOLERANCE * self.coupled_settings.tolerance;
         let mut from = self.now;
         while course.end.since(from) > 0.0 {
             if stretches.len() >= MAX_STEPS {
@@ -300,12 +303,15 @@ impl Simulation<'_> {
         let course: &mut Course = self.plant.coupled.as_mut().expect("seen above");
         course.replace(&mut trial.stretches, &trial.components, all);
         self.coupled.repaired = true;
+        let tolerance = self.coupled_settings.tolerance;
+        let known = &mut self.coupled.control.error;
+        *known = (*known + INNER_TOLERANCE * tolerance).min(CERTAINTY * tolerance);
         let now: Instant = self.now;
         for &id in &region.members {
             let state = self.plant.state_mut(id).expect("a member");
             state.pass_changes(now);
             if !state.next.lasting {
-                state.next = Next::default();
+                state.next = state.next.again();
                 self.queue.cancel(Who::Module(id.slot() as u32));
                 self.search_member(id, now);
             }

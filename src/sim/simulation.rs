@@ -1,6 +1,6 @@
 //! The clock: events in their order, observation.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::agenda::Agenda;
@@ -11,13 +11,14 @@ use super::coupled::Coupled;
 use super::derive::Steps;
 use super::error::{Error, Site};
 use super::event::Event;
+use super::flash::Lookout;
 use super::integrator::Integrator;
 use super::known_rates::KnownRates;
 use super::motion::Motion;
 use super::neighbours::Neighbours;
 use super::observe::Gallery;
 use super::passing::{Coming, Front};
-use super::plant::Plant;
+use super::plant::{Path, Plant};
 use super::queue::Queue;
 use super::settle::Firing;
 use super::state::{Control, What};
@@ -97,6 +98,11 @@ pub struct Simulation<'m> {
     /// same under different rules take the same steps.
     pub(super) hints: Vec<Vec<Control>>,
     pub(super) watcher: Watcher,
+    pub(super) lookout: Lookout,
+    /// Rules whose rates could not be bounded, and when first.
+    pub(super) unbounded: BTreeMap<usize, f64>,
+    /// Some rates may have flashes.
+    pub(super) flashes: bool,
     /// Events in a row of modules that hardly lived.
     pub(super) stalled: usize,
     /// Since when nothing has happened but changes of equations, at one instant, and how many.
@@ -198,6 +204,9 @@ impl<'m> Simulation<'m> {
                 })
                 .collect(),
             watcher: Watcher::default(),
+            lookout: Lookout::default(),
+            unbounded: BTreeMap::new(),
+            flashes: model.rules.iter().flat_map(|rule| &rule.solves).any(|solve| solve.flashes),
             stalled: 0,
             standing: (Instant::ZERO, 0),
             known_rates: KnownRates::default(),
@@ -260,6 +269,12 @@ impl<'m> Simulation<'m> {
         Stats { modules: self.plant.tree.len() as u64, rhs_evaluations, ..self.stats }
     }
 
+    /// The heads of the rules whose rates could not be bounded somewhere, with the time: a rate that is large for a very
+    /// short time there may have been overlooked.
+    pub fn unbounded(&self) -> Vec<(String, f64)> {
+        self.unbounded.iter().map(|(&rule, &t)| (self.model.rules[rule].label.clone(), t)).collect()
+    }
+
     /// The productions since the last call, in the order of time.
     pub fn take_events(&mut self) -> Vec<Event> {
         self.log.as_mut().map(std::mem::take).unwrap_or_default()
@@ -307,6 +322,10 @@ impl<'m> Simulation<'m> {
     pub(super) fn touch_alone(&mut self, slot: usize) -> Result<ModuleId, Error> {
         let state = self.plant.states[slot].as_mut().expect("scheduled");
         let id = state.id;
+        if state.next.what == What::Doubt {
+            let atom = state.next.touched[0].atom;
+            return Err(self.in_doubt(id, atom));
+        }
         if state.next.what == What::Fault {
             let ends: Vec<Option<f64>> = state.motions.iter().map(Motion::end).collect();
             let first = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1);
@@ -358,6 +377,26 @@ impl<'m> Simulation<'m> {
             return Error::NotFinite { site: Site { span, ..site }, what: "the rate of an event".to_owned() };
         }
         Error::NotFinite { site, what: compiled.parameters.get(parameter).cloned().unwrap_or_default() }
+    }
+
+    /// Two sides of a condition that have come too near each other for anybody to tell whether they have met.
+    fn in_doubt(&mut self, id: ModuleId, atom: usize) -> Error {
+        let index = self.plant.rule_and_clause(id).0.unwrap_or(0);
+        let rule = &self.model.rules[index];
+        self.plant.materialise(id, self.now);
+        let site = self.site_of(id, index, rule.atoms[atom], self.now.to_f64());
+        let mut sides = vec![0.0; rule.sides.outputs()];
+        if let Some(state) = self.plant.state(id) {
+            self.plant.variables(rule, id, &state.context, self.now, &mut self.variables);
+            rule.sides.eval(&self.variables, &mut self.scratch, &mut sides);
+        }
+        let gap = (sides[2 * atom] - sides[2 * atom + 1]).abs();
+        let error = self
+            .plant
+            .state(id)
+            .map_or(0.0, |state| Path::new(&self.plant, state, rule, self.now, 0.0).error());
+        let boundary = rule.boundaries[atom].to_string();
+        Error::InDoubt { site, boundary: boundary.into(), gap, error: error.max(gap) }
     }
 
     /// Some module, to name where nothing more is known.

@@ -69,11 +69,13 @@ pub struct Control {
     /// Signs of stiffness in a row.
     pub suspicion: u32,
     pub stiff: bool,
+    /// The sum of what the steps so far are estimated to be wrong by, relative; no more than the tolerance.
+    pub error: f64,
 }
 
 impl Default for Control {
     fn default() -> Control {
-        Control { size: 0.0, last_error: 1.0, suspicion: 0, stiff: false }
+        Control { size: 0.0, last_error: 1.0, suspicion: 0, stiff: false, error: 0.0 }
     }
 }
 
@@ -87,6 +89,8 @@ pub struct Next {
     pub changes: Vec<Change>,
     /// All this follows from formulas, and holds whatever a common step brings.
     pub lasting: bool,
+    /// Atoms, one bit each, whose sides have come so near each other that nobody can tell on which side of zero they are.
+    pub near: u64,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -100,6 +104,15 @@ pub enum What {
     Window,
     /// The end of the solution.
     Fault,
+    /// Two sides come near each other and part again, and cannot be told from such as have met.
+    Doubt,
+}
+
+impl Next {
+    /// Nothing known, of a module that goes on.
+    pub fn again(&self) -> Next {
+        Next { near: self.near, ..Next::default() }
+    }
 }
 
 /// A sign that changes.
@@ -162,7 +175,7 @@ impl State {
         self.switches.clear();
         (self.step, self.open) = (None, None);
         self.next.changes.clear();
-        self.next.lasting = false;
+        (self.next.lasting, self.next.near) = (false, 0);
         (self.window, self.forced, self.coupled) = (0.0, false, false);
     }
 

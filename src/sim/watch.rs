@@ -6,6 +6,7 @@
 
 use smallvec::SmallVec;
 
+use super::doubt::{Ahead, Question};
 use super::plant::Path;
 use super::roots::{Function, Root, first_root};
 use super::state::{Change, Signs, State};
@@ -31,18 +32,24 @@ pub struct Found {
     pub touched: SmallVec<[Change; 1]>,
     /// Signs that change without consequence before it, or before the end.
     pub changes: Vec<Change>,
+    /// It is not known whether there is one.
+    pub in_doubt: bool,
+    /// As in [`Next`](super::state::Next).
+    pub near: u64,
 }
 
 /// Working memory of searches.
 #[derive(Clone, Debug, Default)]
 pub struct Watcher {
-    values: Vec<f64>,
+    pub(super) values: Vec<f64>,
     departure: Vec<Dual<f64>>,
     whole: Vec<Interval>,
     bounds: Vec<Dual<Interval>>,
     scratch: Scratch<f64>,
     departure_scratch: Scratch<Dual<f64>>,
-    whole_scratch: Scratch<Interval>,
+    pub(super) whole_scratch: Scratch<Interval>,
+    pub(super) around: Vec<Interval>,
+    pub(super) around_out: Vec<Interval>,
     bounds_scratch: Scratch<Dual<Interval>>,
     out: Vec<f64>,
     departure_out: Vec<Dual<f64>>,
@@ -56,20 +63,23 @@ struct Watched {
     atom: usize,
     /// What counts as zero; NaN for those whose instant is a formula.
     tolerance: f64,
-    next: Option<Meeting>,
+    ahead: Ahead,
 }
 
-#[derive(Clone, Copy)]
-struct Meeting {
-    position: f64,
-    time: Instant,
-    at: Sign,
-    after: Sign,
-    level: Option<(usize, f64)>,
+/// An instant at which the sides of an atom meet.
+#[derive(Clone, Copy, Debug)]
+pub struct Meeting {
+    pub position: f64,
+    pub time: Instant,
+    pub at: Sign,
+    pub after: Sign,
+    pub level: Option<(usize, f64)>,
+    /// How much earlier or later it may be, in units of time.
+    pub slack: f64,
 }
 
 /// The difference of two sides of an atom along a path.
-struct Difference<'w, 'p> {
+pub struct Difference<'w, 'p> {
     path: &'w Path<'p>,
     sides: &'w Program,
     atom: usize,
@@ -138,6 +148,10 @@ impl Watcher {
         }
         let mut watched: SmallVec<[Watched; 4]> = SmallVec::new();
         let mut measured = false;
+        // Where nothing is integrated, all is known to the last digits.
+        let error = path.error();
+        let integrated = error > 0.0;
+        let near = state.next.near;
         for (atom, watch) in rule.watch(state.solve).iter().enumerate() {
             if is_unreachable(rule, state, atom) {
                 continue;
@@ -148,35 +162,61 @@ impl Watcher {
                     let next =
                         self.meet(path, atom, variable, level, now[atom]).filter(|m| m.position <= limit);
                     if next.is_some() {
-                        watched.push(Watched { atom, tolerance: f64::NAN, next });
+                        let ahead = Ahead { next, ..Ahead::default() };
+                        watched.push(Watched { atom, tolerance: f64::NAN, ahead });
                     }
                 }
                 How::Search => {
-                    if self.keeps_clear(path, watch, now[atom]) {
+                    if self.keeps_clear(path, watch, now[atom], error) {
                         continue;
                     }
                     if !std::mem::replace(&mut measured, true) {
                         self.measure(path);
                     }
                     if let Some(tolerance) = self.may_change(path, atom, now[atom]) {
-                        let next = self.root(path, atom, 0.0, limit, now[atom], tolerance);
-                        watched.push(Watched { atom, tolerance, next });
+                        let near = atom < 64 && near & 1 << atom != 0;
+                        let question = Question { atom, from: 0.0, limit, sign: now[atom], tolerance, near };
+                        let ahead = self.ahead(path, question, integrated);
+                        watched.push(Watched { atom, tolerance, ahead });
                     }
                 }
             }
         }
         let mut rounds = 0;
-        while let Some(first) =
-            watched.iter().filter_map(|w| w.next).min_by(|a, b| a.position.total_cmp(&b.position))
-        {
+        loop {
+            let first =
+                watched.iter().filter_map(|w| w.ahead.next).min_by(|a, b| a.position.total_cmp(&b.position));
+            let doubts = watched.iter().enumerate().filter_map(|(i, w)| Some((i, w.ahead.doubt?)));
+            let doubt = doubts.min_by(|(_, a), (_, b)| a.total_cmp(b));
+            if let Some((i, position)) = doubt
+                && first.is_none_or(|first| position < first.position)
+            {
+                let atom = watched[i].atom;
+                if produces(rule, &now, atom) {
+                    let (time, at, after) = (path.start.after(position * path.h), Sign::Zero, now[atom]);
+                    found.event = Some(position);
+                    found.touched.push(Change { atom, time, at, after, level: None });
+                    found.in_doubt = true;
+                    return found;
+                }
+                let (sign, tolerance) = (now[atom], watched[i].tolerance);
+                let question = Question { atom, from: position, limit, sign, tolerance, near: false };
+                rounds += 1;
+                watched[i].ahead = match rounds > MAX_ROUNDS {
+                    true => Ahead::default(),
+                    false => self.ahead(path, question, integrated),
+                };
+                continue;
+            }
+            let Some(first) = first else { break };
             rounds += 1;
-            let together = path_together(path, first.position);
+            let together = path_together(path, first.position).max(first.position + first.slack / path.h);
             let (mut at, mut after) = (Signs::from_slice(&now), Signs::from_slice(&now));
             let mut group: SmallVec<[Change; 1]> = SmallVec::new();
             for w in &watched {
                 // A touch is known only to about the root of the rounding; one that is zero here is here.
                 let mut zero = || self.difference(path, w.atom).value(first.position).abs() <= w.tolerance;
-                let here = match &w.next {
+                let here = match &w.ahead.next {
                     Some(meeting) if meeting.position <= together => Some(*meeting),
                     _ if w.tolerance.is_nan() => None,
                     Some(meeting) if meeting.after == now[w.atom] && zero() => {
@@ -203,30 +243,45 @@ impl Watcher {
             now = after;
             for w in &mut watched {
                 if group.iter().any(|change| change.atom == w.atom) {
-                    let from = w.next.map_or(first.position, |m| m.position.max(first.position));
+                    let from = w.ahead.next.map_or(first.position, |m| m.position.max(first.position));
                     // One that moves one way only meets its level once.
-                    w.next = if w.tolerance.is_nan() {
-                        None
+                    w.ahead = if w.tolerance.is_nan() {
+                        Ahead::default()
                     } else {
-                        self.root(path, w.atom, from, limit, now[w.atom], w.tolerance)
+                        let (atom, tolerance) = (w.atom, w.tolerance);
+                        let question =
+                            Question { atom, from, limit, sign: now[atom], tolerance, near: false };
+                        self.ahead(path, question, integrated)
                     };
                 }
             }
             found.changes.extend(group);
         }
+        for w in watched.iter().filter(|w| w.ahead.near && w.atom < 64) {
+            found.near |= 1 << w.atom;
+        }
         found
+    }
+
+    /// Looks ahead for an atom.
+    fn ahead(&mut self, path: &Path, question: Question, integrated: bool) -> Ahead {
+        if integrated && matches!(question.sign, Sign::Plus | Sign::Minus) {
+            return self.look(path, question);
+        }
+        let Question { atom, from, limit, sign, tolerance, .. } = question;
+        Ahead { next: self.root(path, atom, from, limit, sign, tolerance), ..Ahead::default() }
     }
 
     /// True if a parameter that is integrated stays away from the one value at which its atom's sides meet: most steps
     /// need no more than a look at its bounds.
-    fn keeps_clear(&mut self, path: &Path, watch: &Watch, sign: Sign) -> bool {
+    fn keeps_clear(&mut self, path: &Path, watch: &Watch, sign: Sign, error: f64) -> bool {
         let Watch::Crossing { variable, level } = watch else { return false };
         if !matches!(sign, Sign::Plus | Sign::Minus) {
             return false;
         }
         let Some(bounds) = path.dense_bounds(*variable) else { return false };
         let level = self.level(path, level);
-        let margin = 1e-9 * (level.abs() + bounds.magnitude());
+        let margin = error.max(1e-9) * (level.abs() + bounds.magnitude());
         level < bounds.lo - margin || level > bounds.hi + margin
     }
 
@@ -241,11 +296,11 @@ impl Watcher {
         out[0]
     }
 
-    fn difference<'w, 'p>(&'w mut self, path: &'w Path<'p>, atom: usize) -> Difference<'w, 'p> {
+    pub(super) fn difference<'w, 'p>(&'w mut self, path: &'w Path<'p>, atom: usize) -> Difference<'w, 'p> {
         Difference { path, sides: &path.rule.sides, atom, memory: self }
     }
 
-    fn root(
+    pub(super) fn root(
         &mut self,
         path: &Path,
         atom: usize,
@@ -272,7 +327,9 @@ impl Watcher {
         }
         let Root { position, at, after } =
             first_root(&mut self.difference(path, atom), from, limit, sign, tolerance)?;
-        Some(Meeting { position, time: path.start.after(position * path.h), at, after, level: None })
+        let time = path.start.after(position * path.h);
+        let slack = if path.error() > 0.0 { self.slack(path, atom, position) } else { 0.0 };
+        Some(Meeting { position, time, at, after, level: None, slack })
     }
 
     /// What rounding of the variables makes of the difference of two sides.
@@ -329,7 +386,8 @@ impl Watcher {
         };
         let position = time.since(path.start) / path.h;
         let level = (variable < t).then_some((variable, level));
-        let meeting = Meeting { position, time, at: Sign::Zero, after: opposite(sign), level };
+        let after = opposite(sign);
+        let meeting = Meeting { position, time, at: Sign::Zero, after, level, slack: 0.0 };
         if position > path.start.resolution() / path.h {
             return Some(meeting);
         }
@@ -389,7 +447,7 @@ pub fn path_together(path: &Path, position: f64) -> f64 {
 }
 
 /// 1, -1, or 0 where there is no sign.
-fn sign_of(sign: Sign) -> f64 {
+pub fn sign_of(sign: Sign) -> f64 {
     match sign {
         Sign::Plus => 1.0,
         Sign::Minus => -1.0,
@@ -428,6 +486,15 @@ pub fn rate_at(
     // The rate changes by this much over the rounding of the value.
     let nearby = rate(value * (1.0 + 8.0 * f64::EPSILON));
     if here.abs() <= (nearby - here).abs() { 0.0 } else { here }
+}
+
+/// Whether a production may follow if an atom's sides meet.
+pub fn produces(rule: &Rule, signs: &[Sign], atom: usize) -> bool {
+    let holds = |at: Sign| {
+        let sign = |i: usize| if i == atom { at } else { signs[i] };
+        rule.produces.iter().any(|p| p.guard.judge(sign) == Truth::Yes)
+    };
+    !holds(signs[atom]) && (holds(Sign::Zero) || holds(opposite(signs[atom])))
 }
 
 /// Whether anything follows from the signs at an instant and just after it.
