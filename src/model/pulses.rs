@@ -30,11 +30,17 @@ pub fn find_flashes(graph: &mut Graph, model: &mut Model, drafts: &[Draft], movi
             nodes.extend(
                 draft.algebraic[number].iter().filter(|entry| entry.explicit).map(|entry| entry.node),
             );
+            // Terms of aggregates count as what they are added up in.
+            let read = graph.variables(&nodes);
+            let summed =
+                (0..rule.aggregates.len()).filter(|i| read.contains(&((rule.first_aggregate + i) as u32)));
+            nodes.extend(summed.map(|i| draft.terms[i]));
             let formula_of: Vec<usize> = by_formula(solve).collect();
             let moved = |v: usize| match v {
                 v if v < own => solve.of.contains(&v) || solve.algebraic.of.contains(&v),
                 v if v < time => moving[v - own],
-                v => v <= time + 1,
+                // Those of children come after all others.
+                v => v <= time + 1 || v >= rule.variables,
             };
             let unresolved = |v: usize| match v {
                 v if v < own => formula_of.contains(&v),

@@ -25,6 +25,9 @@ const DEPTH: usize = 100;
 /// A rate of no more than this part of the value, over the length of a step, is rounding.
 const NOISE: f64 = 16.0 * f64::EPSILON;
 
+/// Rates that differ by no more than this part of them, or of the module's parameters over a step, are the same.
+const SMOOTH: f64 = 1e-9;
+
 /// Why a module has no equations.
 struct Trouble {
     id: ModuleId,
@@ -103,11 +106,28 @@ impl Simulation<'_> {
                 let wanted = switches(rule, state.solve, &signs);
                 if wanted != state.switches {
                     entry.flips += 1;
-                    if entry.flips > 2 {
+                    let undecided = entry.flips > 2;
+                    let other = std::mem::replace(&mut state.switches, wanted);
+                    self.known_rates.forget(id);
+                    if undecided && self.is_smooth_across(id, &other) {
+                        // Whichever way it goes, it goes on alike: it rests on the boundary.
+                        let state = self.plant.state_mut(id).expect("seen above");
+                        let at = &state.open.as_ref().expect("open").at;
+                        let rest: Signs = at
+                            .iter()
+                            .zip(&signs)
+                            .map(|(at, after)| match at {
+                                Sign::Zero => Sign::Zero,
+                                _ => *after,
+                            })
+                            .collect();
+                        state.switches = switches(rule, state.solve, &rest);
+                        settled.push((id, rest));
+                        continue;
+                    }
+                    if undecided {
                         trouble.get_or_insert(Trouble { id, chattering: true, signs: signs.clone() });
                     }
-                    state.switches = wanted;
-                    self.known_rates.forget(id);
                     changed = true;
                 }
                 settled.push((id, signs));
@@ -132,6 +152,22 @@ impl Simulation<'_> {
         }
         self.opened = opened;
         outcome
+    }
+
+    /// True if a module's rates are the same under other conditions inside its equations.
+    fn is_smooth_across(&mut self, id: ModuleId, other: &Switches) -> bool {
+        let (mut here, mut there) = (Vec::new(), Vec::new());
+        self.rates_to(id, 0.0, DEPTH, &mut here);
+        let swap = |simulation: &mut Self, switches: Switches| {
+            simulation.known_rates.forget(id);
+            let state = simulation.plant.state_mut(id).expect("open modules have a state");
+            std::mem::replace(&mut state.switches, switches)
+        };
+        let own = swap(self, other.clone());
+        self.rates_to(id, 0.0, DEPTH, &mut there);
+        swap(self, own);
+        let size = self.scale(id) / self.reach_of(id);
+        here.iter().zip(&there).all(|(a, b)| (a - b).abs() <= SMOOTH * (size + a.abs().max(b.abs())))
     }
 
     /// Where a module's signs go under the present equations. Also tells whether a sign turned out to be

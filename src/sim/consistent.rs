@@ -72,6 +72,9 @@ impl Simulation<'_> {
             }
             wanted.push(id);
         }
+        // One that has got several rules at the instant is there several times.
+        let mut once = std::collections::HashSet::new();
+        wanted.retain(|id| once.insert(*id));
         // And whoever depends on them.
         let mut known: std::collections::HashSet<ModuleId> = wanted.iter().copied().collect();
         let mut at = 0;

@@ -381,6 +381,12 @@ impl Simulation<'_> {
             Err(error) => {
                 // What cannot be solved for says more than that no step goes on.
                 let fault = equations.make_consistent(0.0, &mut y.clone()).err();
+                let component = match error {
+                    StepError::TooSmall(c) | StepError::Rate(c) | StepError::NotFinite(c) => c,
+                };
+                if fault.is_none() && self.arrest_coupled(component, from) {
+                    return Ok(());
+                }
                 return Err(match fault {
                     Some(fault) => self.unsolved(fault, self.coupled.system.owner(fault.component()), from),
                     None => self.coupled_error(error, from),
@@ -480,6 +486,15 @@ impl Simulation<'_> {
             || self.settings.method == Method::Radau
             || self.coupled.control.stiff
             || self.coupled.linear.is_some()
+    }
+
+    /// Where no common step leads on because some equations end there: if a boundary is there too, of the module that a
+    /// component belongs to or of one that it reads, it has been reached.
+    fn arrest_coupled(&mut self, component: usize, at: Instant) -> bool {
+        let Some((id, _)) = self.coupled.system.owner(component) else { return false };
+        let context = self.plant.state(id).map(|s| s.context.to_vec()).unwrap_or_default();
+        let all = std::iter::once(id).chain(context);
+        all.fold(false, |arrested, id| self.arrest(id, at).is_some() || arrested)
     }
 
     fn may_flash(&self, id: ModuleId) -> bool {

@@ -133,6 +133,7 @@ impl Integrator {
             None if control.size > 0.0 => control.size.max(64.0 * start.resolution()),
             None => self.workspace.first_size(method, system, y, tolerance),
         };
+        self.workspace.resolution = start.resolution();
         let room = limit.map_or(f64::INFINITY, |limit| limit.since(start));
         let mut rejected = false;
         loop {
@@ -166,6 +167,15 @@ impl Integrator {
                     }
                     h *= 0.25;
                     rejected = true;
+                }
+                Trial::Done { error, rounding }
+                    if error.max(rounding) > 1.0
+                        && grid.is_none()
+                        && self.workspace.is_instant(y, h, start.resolution(), tolerance) =>
+                {
+                    control.size = h * 10.0;
+                    control.last_error = 1.0;
+                    break;
                 }
                 Trial::Done { error, rounding } if error.max(rounding) > 1.0 => {
                     stats.rejected += 1;

@@ -272,7 +272,7 @@ impl Simulation<'_> {
     }
 
     /// Where no step leads on because the equations end there: if a boundary is there too, it has been reached.
-    fn arrest(&mut self, id: ModuleId, at: Instant) -> Option<()> {
+    pub(super) fn arrest(&mut self, id: ModuleId, at: Instant) -> Option<()> {
         let model = self.model;
         let state = self.plant.state(id)?;
         let rule = &model.rules[state.rule?];

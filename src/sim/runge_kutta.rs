@@ -33,6 +33,10 @@ pub trait Rates {
 /// Errors below the tolerated part of this are none, whatever they are errors of.
 const FLOOR: f64 = 1e-18;
 
+/// A step of so many resolutions of time, in which nothing changes by more than this part of the tolerance, is as good as none.
+const INSTANT: f64 = 1e4;
+const NOTHING: f64 = 1e-3;
+
 /// So few components are added up one by one, in the same order as many.
 const FEW: usize = 2;
 
@@ -83,6 +87,8 @@ pub struct Workspace {
     other_end: Vec<f64>,
     /// The state at the end of the step.
     pub end: Vec<f64>,
+    /// The resolution of time at the start of the step.
+    pub resolution: f64,
     /// Of the equations of one module.
     pub evaluations: u64,
 }
@@ -246,6 +252,7 @@ impl Workspace {
     /// The largest error of a component, in units of what is tolerated, by truncation and by rounding.
     fn error(&self, tableau: &Tableau, n: usize, h: f64, tolerance: f64) -> (f64, f64) {
         let (mut error, mut rounding): (f64, f64) = (0.0, 0.0);
+        let blur = 4.0 * self.resolution / tableau.c[1];
         let estimates = |row: &[f64], first: usize| match n {
             0..=FEW => std::array::from_fn(|j| if j < n { weighed(row, &self.k, j) } else { 0.0 }),
             _ => weigh(row, &self.k, first),
@@ -270,7 +277,9 @@ impl Workspace {
                 // event, equations may lead anywhere, and that must not spoil the part that counts.
                 // What begins from rest goes somewhere only after that: the second stage shows it.
                 let speed = departure[j].abs().max(second[j].abs());
-                let scale = tolerance * (from[j].abs().max(h.abs() * speed) + FLOOR);
+                // Rates that depend on time are known as well as time is.
+                let blur = blur * (second[j] - departure[j]).abs();
+                let scale = tolerance * (from[j].abs().max(h.abs() * speed) + FLOOR) + blur;
                 roundings[j] = 4.0 * f64::EPSILON * end[j].abs() / scale;
                 ratios[j] = estimate[j] / scale;
             }
@@ -374,6 +383,14 @@ impl Workspace {
         let next = if most <= 1e-15 { (guess * 1e-3).max(1e-6) } else { (0.01 / most).powf(1.0 / order) };
         let size = next.min(100.0 * guess);
         if size.is_finite() && size > 0.0 { size } else { 1e-6 }
+    }
+
+    /// True for a step so short that nothing much can happen in it, however rates may jump: no step control can do better
+    /// where a rate leaves zero like a root, or jumps where no condition says so.
+    pub fn is_instant(&self, y: &[f64], h: f64, resolution: f64, tolerance: f64) -> bool {
+        let change =
+            |most: f64| y.iter().zip(&self.end).all(|(y, end)| (end - y).abs() <= most * y.abs().max(1.0));
+        h <= INSTANT * resolution && change(NOTHING * tolerance) || h <= 4.0 * resolution && change(1e-9)
     }
 
     /// The component that changes most, for its size.

@@ -23,8 +23,8 @@ use super::error::Error;
 use super::event::Event;
 use super::plant::Plant;
 use super::simulation::Simulation;
-use super::state::{Change, Open};
-use crate::model::{Comparison, Model, Outcome, Sign, Truth};
+use super::state::{Change, Open, State};
+use crate::model::{Comparison, Model, Outcome, Sign, Truth, Watch};
 use crate::structure::ModuleId;
 
 /// Most rounds of productions at one instant.
@@ -178,7 +178,13 @@ impl Simulation<'_> {
     pub(super) fn note_resting(&mut self, modules: &[ModuleId]) {
         for &id in modules {
             let state = self.plant.state(id);
-            if state.is_some_and(|s| !s.context.is_empty() && s.signs.contains(&Sign::Zero)) {
+            let rests = |s: &State| {
+                // What stands still until an event of its own is not moved by others.
+                let watch = s.rule.map_or(&[][..], |rule| self.model.rules[rule].watch(s.solve));
+                let mut atoms = s.signs.iter().zip(watch);
+                atoms.any(|(sign, watch)| *sign == Sign::Zero && !matches!(watch, Watch::Still))
+            };
+            if state.is_some_and(|s| !s.context.is_empty() && rests(s)) {
                 self.resting.push(id);
             }
         }
