@@ -13,6 +13,8 @@ pub struct Stepping {
     reads: Vec<Read>,
     /// Of each variable of the rule: whether formulas read it when a module takes the equations up.
     laws_read: Vec<bool>,
+    /// Rates, or values that are solved for, read `t`.
+    timed: bool,
 }
 
 /// A variable of a rule that is a parameter.
@@ -68,7 +70,9 @@ impl Stepping {
             laws_read.fill(true);
         }
         laws_read.iter_mut().take(rule.parameters.len()).for_each(|own| *own = true);
-        Stepping { components, reads, laws_read }
+        let time = rule.time_variable();
+        let timed = [&solve.rates, &algebraic.values].iter().any(|program| program.reads().contains(&time));
+        Stepping { components, reads, laws_read, timed }
     }
 
     /// The parameters that are integrated, then those that are solved for, in the order of their components.
@@ -79,6 +83,11 @@ impl Stepping {
     /// The parameters of the module and of its context that a step may read.
     pub fn reads(&self) -> &[Read] {
         &self.reads
+    }
+
+    /// True if rates, or values that are solved for, read the time of the simulation.
+    pub fn is_timed(&self) -> bool {
+        self.timed
     }
 
     /// The variables that formulas read when a module takes the equations up.

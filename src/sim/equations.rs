@@ -110,6 +110,10 @@ impl Rates for Equations<'_> {
         self.memory.settled = settled;
     }
 
+    fn is_timed(&self) -> bool {
+        self.system.timed
+    }
+
     fn is_algebraic(&self) -> bool {
         !self.system.algebra.is_empty()
     }

@@ -133,7 +133,7 @@ impl Integrator {
             None if control.size > 0.0 => control.size.max(64.0 * start.resolution()),
             None => self.workspace.first_size(method, system, y, tolerance),
         };
-        self.workspace.resolution = start.resolution();
+        self.workspace.resolution = if system.is_timed() { start.resolution() } else { 0.0 };
         let room = limit.map_or(f64::INFINITY, |limit| limit.since(start));
         let mut rejected = false;
         loop {

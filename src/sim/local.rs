@@ -129,6 +129,10 @@ impl Rates for Alone<'_> {
     fn modules(&self) -> u64 {
         1
     }
+
+    fn is_timed(&self) -> bool {
+        self.program.reads().contains(&self.time)
+    }
 }
 
 impl Simulation<'_> {

@@ -24,6 +24,11 @@ pub trait Rates {
         0.0
     }
 
+    /// True if rates read the time of the simulation, which is known as well as a float is.
+    fn is_timed(&self) -> bool {
+        false
+    }
+
     /// True if there is something that is solved for along with the components.
     fn is_algebraic(&self) -> bool {
         false
@@ -87,7 +92,7 @@ pub struct Workspace {
     other_end: Vec<f64>,
     /// The state at the end of the step.
     pub end: Vec<f64>,
-    /// The resolution of time at the start of the step.
+    /// The resolution of time, if rates read it.
     pub resolution: f64,
     /// Of the equations of one module.
     pub evaluations: u64,

@@ -51,6 +51,8 @@ pub struct System {
     /// Place in the tree's values, and owner with its parameter, of each component.
     pub places: Vec<(usize, ModuleId, usize)>,
     pub start: Instant,
+    /// Some rates read the time of the simulation.
+    pub timed: bool,
 }
 
 /// A parameter that follows a formula, as an input.
@@ -111,6 +113,7 @@ impl System {
     ) {
         let system = self;
         system.start = start;
+        system.timed = false;
         system.rows.clear();
         system.sources.clear();
         system.formulas.clear();
@@ -129,6 +132,7 @@ impl System {
             let first = plant.tree.places(id).start;
             let (Some(rule), Some(solve)) = (state.rule, state.solve) else { continue };
             let (compiled, clause) = (&rules[rule], &rules[rule].solves[solve]);
+            system.timed |= clause.stepping.is_timed();
             let first_rate = system.places.len();
             for &parameter in clause.stepping.components(state.forced) {
                 if let Some(Motion::Coupled(_)) = state.motions.get(parameter) {

@@ -17,6 +17,7 @@
 //! - [`schedulers`]: local repair against one clock, remembered neighbours against the whole string.
 //! - [`pictures`]: pixels, perspective, and sheets of several frames.
 //! - [`plants`]: the paper's plants: order of flowering, continuity, the gallery.
+//! - [`random`]: random coupled models by four ways of solving.
 //! - [`repl`]: the interactive session, without a terminal and with one.
 //! - [`replay`]: any time after any other, to the bits of a run.
 //! - [`report`]: studies of methods, and hard cases with exact answers.
@@ -42,6 +43,7 @@ mod organs;
 mod pages;
 mod pictures;
 mod plants;
+mod random;
 mod repl;
 mod replay;
 mod report;
