@@ -95,6 +95,31 @@ pub const CASES: &[(&str, &str)] = &[
         "n30-decimal-ties-for-generations.dls",
         include_str!("../../models/hard/n30-decimal-ties-for-generations.dls"),
     ),
+    ("n40-short-of-a-limit.dls", include_str!("../../models/hard/n40-short-of-a-limit.dls")),
+    ("n41-late-light.dls", include_str!("../../models/hard/n41-late-light.dls")),
+    ("n42-neighbours-equalise.dls", include_str!("../../models/hard/n42-neighbours-equalise.dls")),
+    ("n43-touch-in-doubt.dls", include_str!("../../models/hard/n43-touch-in-doubt.dls")),
+    (
+        "n44-twins-with-other-neighbours.dls",
+        include_str!("../../models/hard/n44-twins-with-other-neighbours.dls"),
+    ),
+    ("n45-flash-along-a-parameter.dls", include_str!("../../models/hard/n45-flash-along-a-parameter.dls")),
+    ("n46-flash-in-a-neighbour.dls", include_str!("../../models/hard/n46-flash-in-a-neighbour.dls")),
+    ("n47-kinks-along-a-chain.dls", include_str!("../../models/hard/n47-kinks-along-a-chain.dls")),
+    ("n48-sum-with-a-condition.dls", include_str!("../../models/hard/n48-sum-with-a-condition.dls")),
+    (
+        "n49-root-ends-for-a-neighbour.dls",
+        include_str!("../../models/hard/n49-root-ends-for-a-neighbour.dls"),
+    ),
+    ("n50-rest-on-a-kink.dls", include_str!("../../models/hard/n50-rest-on-a-kink.dls")),
+    (
+        "n51-rate-leaves-zero-like-a-root.dls",
+        include_str!("../../models/hard/n51-rate-leaves-zero-like-a-root.dls"),
+    ),
+    (
+        "n52-equations-that-come-with-a-neighbour.dls",
+        include_str!("../../models/hard/n52-equations-that-come-with-a-neighbour.dls"),
+    ),
 ];
 
 #[cfg(test)]

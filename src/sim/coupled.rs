@@ -8,7 +8,7 @@ use super::course::Course;
 use super::equations::Equations;
 use super::error::Error;
 use super::fetch::fetch_ahead;
-use super::flash::{Glance, Lookout, MAX_UNBOUNDED};
+use super::flash::{self, Glance, MAX_UNBOUNDED};
 use super::integrator::{Integrator, StepError, foresee};
 use super::linear::Linear;
 use super::motion::Motion;
@@ -334,17 +334,11 @@ impl Simulation<'_> {
                     let h = found.end.since(from);
                     self.plant.coupled = Some(found);
                     let stiff = control.stiff || settings.method == Method::Radau;
+                    let nodes = integrator.nodes();
                     let overlooked = flashing.iter().filter_map(|id| {
-                        let glance = glance(
-                            &self.plant,
-                            rules,
-                            &mut self.lookout,
-                            *id,
-                            from,
-                            settings.tolerance,
-                            stiff,
-                        );
-                        match glance {
+                        let how = (settings.tolerance, stiff);
+                        let step = step_of(&self.plant, rules, *id, from, &nodes, how)?;
+                        match self.lookout.look(&step) {
                             Glance::Clear => None,
                             Glance::Overlooked(at) => Some(at),
                             Glance::Unbounded(at) if tries <= MAX_UNBOUNDED => Some(at),
@@ -507,12 +501,14 @@ impl Simulation<'_> {
         if !self.flashes || self.settings.method.is_fixed_step() {
             return false;
         }
-        let (now, tolerance) = (self.now, self.coupled_settings.tolerance);
         let flashing: Vec<ModuleId> = members.iter().copied().filter(|id| self.may_flash(*id)).collect();
+        let how = (self.coupled_settings.tolerance, false);
         let (plant, rules, lookout) = (&self.plant, &self.model.rules, &mut self.lookout);
-        flashing
-            .into_iter()
-            .any(|id| glance(plant, rules, lookout, id, now, tolerance, false) != Glance::Clear)
+        let nodes = &*self.coupled.repairer.nodes();
+        flashing.into_iter().any(|id| {
+            let step = step_of(plant, rules, id, self.now, nodes, how);
+            step.is_some_and(|step| lookout.look(&step) != Glance::Clear)
+        })
     }
 
     fn coupled_error(&self, error: StepError, at: Instant) -> Error {
@@ -527,37 +523,19 @@ impl Simulation<'_> {
     }
 }
 
-/// Looks for what has been overlooked of a coupled module from an instant to the end of the common step; positions are
-/// those in this stretch.
-fn glance(
-    plant: &Plant,
-    rules: &[Rule],
-    lookout: &mut Lookout,
+/// A step of a coupled module, from an instant to the end of what is known.
+fn step_of<'p>(
+    plant: &'p Plant,
+    rules: &'p [Rule],
     id: ModuleId,
-    from: Instant,
-    tolerance: f64,
-    stiff: bool,
-) -> Glance {
-    let clause = |state: &State| Some((state.rule?, state.solve?));
-    let Some(state) = plant.state(id) else { return Glance::Clear };
-    let (Some((rule, solve)), Some(course)) = (clause(state), &plant.coupled) else { return Glance::Clear };
-    let mut start = from;
-    let all = course.end.since(from);
-    while course.end.since(start) > 0.0 {
-        let knot = plant.knot(state, course, start);
-        let h = knot.since(start);
-        if h <= 0.0 {
-            break;
-        }
-        let path = Path::of_equations(plant, state, &rules[rule], (start, h), None);
-        let whole = |at: f64| (start.since(from) + at * h) / all;
-        match lookout.look(&path, &rules[rule].solves[solve], tolerance, stiff) {
-            Glance::Clear => start = knot,
-            Glance::Overlooked(at) => return Glance::Overlooked(whole(at)),
-            Glance::Unbounded(at) => return Glance::Unbounded(whole(at)),
-        }
-    }
-    Glance::Clear
+    start: Instant,
+    nodes: &'p [f64],
+    (tolerance, stiff): (f64, bool),
+) -> Option<flash::Step<'p>> {
+    let state = plant.state(id)?;
+    let rule = &rules[state.rule?];
+    let (solve, end) = (&rule.solves[state.solve?], plant.coupled.as_ref()?.end);
+    Some(flash::Step { plant, state, rule, solve, start, end, nodes, own: None, tolerance, stiff })
 }
 
 /// The parameters of a coupled module that are integrated, then those that are solved for, in the order of their

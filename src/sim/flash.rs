@@ -13,9 +13,14 @@
 //! differ by any amount. There the states are taken as they are in the middle of a piece, and only time and formulas vary.
 //! What cannot be bounded is counted, and `run --stats` and `explain` say of what.
 
-use super::plant::Path;
+use smallvec::SmallVec;
+
+use super::dense::Dense;
+use super::plant::{Path, Plant};
+use super::state::State;
 use crate::expr::{Interval, Program, Scratch};
-use crate::model::Solve;
+use crate::model::{Rule, Solve};
+use crate::structure::Instant;
 
 /// Rates so many times larger than all that were seen are a surprise.
 const SURPRISE: f64 = 8.0;
@@ -24,10 +29,8 @@ const NARROW: f64 = 1.0 / 256.0;
 const MAX_PIECES: usize = 512;
 /// Most times that a step is cut for want of bounds: a part of 4^-20 of it is as narrow as anything that can be told.
 pub const MAX_UNBOUNDED: usize = 20;
-/// Where rates are looked at.
-const LOOKS: [f64; 7] = [0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0];
 
-/// What bounds say of a step.
+/// What bounds say of a step, at the first position where they say anything.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Glance {
     /// Nothing has been overlooked.
@@ -36,6 +39,22 @@ pub enum Glance {
     Overlooked(f64),
     /// There are no bounds near this position.
     Unbounded(f64),
+}
+
+/// A step of a module's equations, to be looked through.
+pub struct Step<'p> {
+    pub plant: &'p Plant,
+    pub state: &'p State,
+    pub rule: &'p Rule,
+    pub solve: &'p Solve,
+    pub start: Instant,
+    pub end: Instant,
+    /// Where in the step the method has evaluated rates.
+    pub nodes: &'p [f64],
+    /// The dense output, if the module is integrated alone.
+    pub own: Option<&'p Dense>,
+    pub tolerance: f64,
+    pub stiff: bool,
 }
 
 /// Bounds rates along steps.
@@ -51,51 +70,82 @@ pub struct Lookout {
 }
 
 impl Lookout {
-    /// Looks along a path, the dense output of a step, for what the rates and values of the module's equations may be in
-    /// between, to a tolerance.
-    pub fn look(&mut self, path: &Path, solve: &Solve, tolerance: f64, stiff: bool) -> Glance {
-        let rates = if path.state.forced { &solve.rates } else { &solve.numeric_rates };
-        let mut glance = Glance::Clear;
-        if rates.outputs() > 0 {
-            glance = self.along(path, rates, path.h, tolerance, stiff);
+    /// Looks along a step for what the rates of the module's equations, and its values that are solved for, may be between
+    /// the places where they were evaluated.
+    pub fn look(&mut self, step: &Step) -> Glance {
+        let all = step.end.since(step.start);
+        let rates = if step.state.forced { &step.solve.rates } else { &step.solve.numeric_rates };
+        self.see(step, rates, all);
+        let values = &step.solve.algebraic.values;
+        let explicit = values.outputs() > 0 && step.solve.algebraic.explicit.iter().all(|e| *e);
+        let mut start = step.start;
+        while step.end.since(start) > 0.0 {
+            let knot = match (&step.plant.coupled, step.own) {
+                (Some(course), None) => step.plant.knot(step.state, course, start),
+                _ => step.end,
+            };
+            let h = knot.since(start);
+            if h <= 0.0 {
+                break;
+            }
+            let path = Path::of_equations(step.plant, step.state, step.rule, (start, h), step.own);
+            let (before, part) = (start.since(step.start) / all, h / all);
+            let mut glance = self.along(&path, rates, all * part, part, step);
+            if explicit && glance == Glance::Clear {
+                // What the dense output has of them, against what they may be.
+                let rates = std::mem::take(&mut self.seen);
+                let of = step.solve.algebraic.of.iter();
+                self.seen =
+                    of.map(|p| path.dense_bounds(*p).map_or(f64::INFINITY, Interval::magnitude)).collect();
+                glance = self.along(&path, values, 1.0, part, step);
+                self.seen = rates;
+            }
+            match glance {
+                Glance::Clear => start = knot,
+                Glance::Overlooked(at) => return Glance::Overlooked(before + part * at),
+                Glance::Unbounded(at) => return Glance::Unbounded(before + part * at),
+            }
         }
-        // Values that are solved for enter other modules' rates.
-        let values = &solve.algebraic.values;
-        if glance == Glance::Clear && values.outputs() > 0 && solve.algebraic.explicit.iter().all(|e| *e) {
-            glance = self.along(path, values, 1.0, tolerance, stiff);
-        }
-        glance
+        Glance::Clear
     }
 
-    /// The same for one program, whose outputs matter when they last for a part of `scale`.
-    fn along(&mut self, path: &Path, program: &Program, scale: f64, tolerance: f64, stiff: bool) -> Glance {
+    /// The rates where the method has seen them.
+    fn see(&mut self, step: &Step, rates: &Program, all: f64) {
         self.seen.clear();
-        self.seen.resize(program.outputs(), 0.0);
-        self.out.resize(program.outputs(), 0.0);
-        self.bounds_out.resize(program.outputs(), Interval::EMPTY);
-        for position in LOOKS {
-            path.everything_at(position, &mut self.values);
-            program.eval(&self.values, &mut self.scratch, &mut self.out);
+        self.seen.resize(rates.outputs(), 0.0);
+        self.out.resize(rates.outputs(), 0.0);
+        for node in step.nodes {
+            let at = (step.start.after(node * all), 0.0);
+            let path = Path::of_equations(step.plant, step.state, step.rule, at, step.own);
+            path.everything_at(0.0, &mut self.values);
+            rates.eval(&self.values, &mut self.scratch, &mut self.out);
             for (seen, value) in self.seen.iter_mut().zip(&self.out) {
                 *seen = seen.max(value.abs());
             }
         }
-        let mut stack = vec![(0.0, 1.0)];
+    }
+
+    /// Compares bounds of a program along a path, which is a part of the step, with what was seen. What they exceed that
+    /// by matters times `scale`, when it lasts for the whole path.
+    fn along(&mut self, path: &Path, program: &Program, scale: f64, part: f64, step: &Step) -> Glance {
+        self.bounds_out.resize(program.outputs(), Interval::EMPTY);
+        let mut stack: SmallVec<[(f64, f64); 16]> = SmallVec::new();
+        stack.push((0.0, 1.0));
         let mut pieces = 0;
         while let Some((lo, hi)) = stack.pop() {
             pieces += 1;
-            path.everything_over(lo, hi, stiff, &mut self.bounds);
+            path.everything_over(lo, hi, step.stiff, &mut self.bounds);
             program.eval(&self.bounds, &mut self.bounds_scratch, &mut self.bounds_out);
             let (mut surprising, mut bounded) = (false, true);
             for (bounds, seen) in self.bounds_out.iter().zip(&self.seen) {
                 let size = bounds.magnitude();
                 bounded &= size.is_finite();
-                surprising |= !(size <= SURPRISE * seen || size * scale * (hi - lo) <= tolerance);
+                surprising |= !(size <= SURPRISE * seen || size * scale * (hi - lo) <= step.tolerance);
             }
             if !surprising {
                 continue;
             }
-            if hi - lo <= NARROW {
+            if (hi - lo) * part <= NARROW {
                 return if bounded { Glance::Overlooked(lo) } else { Glance::Unbounded(lo) };
             }
             if pieces >= MAX_PIECES {

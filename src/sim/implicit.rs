@@ -56,6 +56,11 @@ impl Implicit {
         Implicit { radau, stages, pattern: None, scale: Vec::new(), coefficients: Vec::new() }
     }
 
+    /// The nodes of the stages.
+    pub fn nodes(&self) -> &[f64] {
+        self.radau.nodes()
+    }
+
     /// True if the method is the one for a tolerance.
     pub fn fits(&self, tolerance: f64) -> bool {
         self.stages == stages(tolerance)

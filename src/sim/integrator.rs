@@ -4,7 +4,7 @@ use super::algebra::Fault;
 use super::dense::Dense;
 use super::equations::Equations;
 use super::implicit::Implicit;
-use super::runge_kutta::{Rates, Trial, Workspace};
+use super::runge_kutta::{Nodes, Rates, Trial, Workspace};
 use super::state::Control;
 use super::{Method, Settings, Stats};
 use crate::structure::Instant;
@@ -73,6 +73,14 @@ impl Integrator {
         self.method = method;
         if let Some(implicit) = &mut self.implicit {
             implicit.forget();
+        }
+    }
+
+    /// Where in the step just made rates were evaluated that count.
+    pub fn nodes(&self) -> Nodes {
+        match &self.implicit {
+            Some(implicit) if self.method == Method::Radau => Nodes::from_slice(implicit.nodes()),
+            _ => self.method.nodes(),
         }
     }
 

@@ -2,10 +2,10 @@
 
 use super::Method;
 use super::error::Error;
-use super::flash::{Glance, MAX_UNBOUNDED};
+use super::flash::{self, Glance, MAX_UNBOUNDED};
 use super::integrator::{StepError, foresee};
 use super::motion::Motion;
-use super::plant::{Path, Plant};
+use super::plant::Plant;
 use super::runge_kutta::Rates;
 use super::simulation::Simulation;
 use super::state::{Control, State, Step};
@@ -175,8 +175,12 @@ impl Simulation<'_> {
                 if !flashes || tries > MAX_TRIES {
                     break step;
                 }
-                let path = Path::of_equations(&self.plant, state, rule, (from, dense.h), Some(dense));
-                match self.lookout.look(&path, &rule.solves[solve], self.settings.tolerance, stiff) {
+                let (plant, solve) = (&self.plant, &rule.solves[solve]);
+                let (nodes, tolerance) = (&*self.alone.nodes(), self.settings.tolerance);
+                let (start, end, own) = (from, dense.end, Some(dense));
+                let step_made =
+                    flash::Step { plant, state, rule, solve, start, end, nodes, own, tolerance, stiff };
+                match self.lookout.look(&step_made) {
                     Glance::Unbounded(at) if tries > MAX_UNBOUNDED => {
                         self.unbounded.entry(index).or_insert(from.to_f64() + at * dense.h);
                         break step;

@@ -25,6 +25,7 @@ use super::integrator::{CERTAINTY, INNER_TOLERANCE, Integrator};
 use super::motion::Motion;
 use super::neighbours::reads;
 use super::queue::Who;
+use super::runge_kutta::Nodes;
 use super::simulation::Simulation;
 use super::state::Control;
 use super::system::System;
@@ -59,6 +60,11 @@ impl Default for Repairer {
 }
 
 impl Repairer {
+    /// Where its steps evaluate rates.
+    pub fn nodes(&self) -> Nodes {
+        self.integrator.nodes()
+    }
+
     /// A number for a visit to modules that no visit has had.
     pub fn begin_visit(&mut self) -> u64 {
         self.visit += 1;

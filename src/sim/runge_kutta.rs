@@ -80,6 +80,9 @@ fn weighed(weights: &[f64], k: &[Vec<f64>], component: usize) -> f64 {
     sum
 }
 
+/// Places in a step, as parts of it.
+pub type Nodes = smallvec::SmallVec<[f64; 12]>;
+
 /// Working memory of a step.
 #[derive(Clone, Debug, Default)]
 pub struct Workspace {
@@ -116,6 +119,13 @@ impl Method {
             Method::Dop853 => Some(&DOP853),
             _ => Some(&DOPRI5),
         }
+    }
+
+    /// Where a step evaluates rates that its estimate of errors depends on, as parts of it.
+    pub(super) fn nodes(self) -> Nodes {
+        let Some(tableau) = self.tableau() else { return Nodes::from_slice(&[0.0, 0.5, 1.0]) };
+        let counts = |(_, weight): &(&f64, &f64)| **weight != 0.0;
+        tableau.c.iter().zip(tableau.e[0]).filter(counts).map(|(c, _)| *c).collect()
     }
 
     /// Order of the error estimate.

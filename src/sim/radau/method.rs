@@ -63,6 +63,10 @@ pub(super) struct Method<const S: usize, const L: usize> {
 }
 
 impl<const S: usize, const L: usize> Method<S, L> {
+    pub fn nodes(&self) -> &[f64] {
+        &self.table.nodes
+    }
+
     pub(super) fn new() -> Self {
         let table = Collocation::compute();
         let lambda = Wide { re: table.lambda.map(|l| l.re), im: table.lambda.map(|l| l.im) };

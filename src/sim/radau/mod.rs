@@ -66,6 +66,11 @@ macro_rules! each {
 }
 
 impl Radau {
+    /// The nodes of the stages, as parts of a step.
+    pub fn nodes(&self) -> &[f64] {
+        each!(self, method => method.nodes())
+    }
+
     /// A method of 3 stages (order 5) or 5 stages (order 9); `None` for any other number.
     pub fn new(stages: usize) -> Option<Radau> {
         match stages {
