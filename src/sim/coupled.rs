@@ -259,7 +259,10 @@ impl Simulation<'_> {
             && !self.watches_coupled();
         self.coupled.tried = without_steps;
         self.coupled.linear = (without_steps)
-            .then(|| Linear::new(&self.coupled.system, &self.model.rules, &self.coupled.y))
+            .then(|| {
+                let tolerance = self.coupled_settings.tolerance;
+                Linear::new(&self.coupled.system, &self.model.rules, &self.coupled.y, tolerance)
+            })
             .flatten();
         // After each, all members are searched.
         self.coupled.integrator.dear = true;
@@ -290,7 +293,8 @@ impl Simulation<'_> {
         match linear {
             Some(linear) => {
                 if self.plant.coupled.as_ref().is_none_or(|course| course.start() != at) {
-                    self.plant.coupled = Some(Course::new(linear.at(at)));
+                    let dense = linear.at(at, &self.coupled_settings, &mut self.stats);
+                    self.plant.coupled = Some(Course::new(dense));
                 }
             }
             None => {

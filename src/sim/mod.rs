@@ -91,7 +91,6 @@ mod plant;
 mod queue;
 mod quick;
 mod radau;
-mod rational;
 mod repair;
 mod roots;
 mod runge_kutta;
