@@ -95,6 +95,9 @@ pub const CASES: &[(&str, &str)] = &[
         "n30-decimal-ties-for-generations.dls",
         include_str!("../../models/hard/n30-decimal-ties-for-generations.dls"),
     ),
+    ("n31-transport-one-way.dls", include_str!("../../models/hard/n31-transport-one-way.dls")),
+    ("n32-what-is-left-of-much.dls", include_str!("../../models/hard/n32-what-is-left-of-much.dls")),
+    ("n33-stiff-chain-and-source.dls", include_str!("../../models/hard/n33-stiff-chain-and-source.dls")),
 ];
 
 #[cfg(test)]

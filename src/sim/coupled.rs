@@ -289,11 +289,11 @@ impl Simulation<'_> {
 
     /// Sees to it that the coupled modules' motion is known at an instant.
     pub(super) fn show_coupled(&mut self, at: Instant) {
-        let Coupled { system, y, integrator, linear, pending, .. } = &mut self.coupled;
+        let Coupled { system, y, integrator, control, linear, pending, .. } = &mut self.coupled;
         match linear {
             Some(linear) => {
                 if self.plant.coupled.as_ref().is_none_or(|course| course.start() != at) {
-                    let dense = linear.at(at, &self.coupled_settings, &mut self.stats);
+                    let dense = linear.at(at, &self.coupled_settings, control, &mut self.stats);
                     self.plant.coupled = Some(Course::new(dense));
                 }
             }

@@ -19,9 +19,9 @@ const ERROR: f64 = 5e-14;
 /// The same of the difference quotients of its error.
 const ERROR_OF_SLOPE: f64 = 2e-11;
 /// What is rounded in an elimination, in units of what the largest entry rounds to.
-const ROUNDINGS: f64 = 8.0;
+const ROUNDINGS: f64 = 3.0;
 /// Roundings of the pivots themselves last as disturbances do, and so do those of the state of rest.
-const MEMORIES: f64 = 4.0;
+const MEMORIES: f64 = 8.0;
 /// The largest weight, and the inverse of the smallest, as a logarithm.
 const MOST_WEIGHT: f64 = 200.0;
 /// The difference between the whole and the halves may be as large as this part of the tolerance.
@@ -89,7 +89,7 @@ impl Poles {
             let (down, up) = (a[place], a[place + 1]);
             let product = down * up;
             if product > 0.0 {
-                weights[k] = weights[parent] + 0.5 * (down / up).abs().ln();
+                weights[k] = weights[parent] + if down == up { 0.0 } else { 0.5 * (down / up).ln() };
                 discs[k] += product.sqrt();
                 discs[parent] += product.sqrt();
             } else if product < 0.0 {

@@ -22,11 +22,11 @@ pub struct Steps {
 }
 
 impl Steps {
-    pub fn new(problem: &Problem, settings: &Settings) -> Steps {
+    pub fn new(problem: &Problem, settings: &Settings, control: Control) -> Steps {
         let mut integrator = Integrator::default();
         integrator.restart(settings.method, problem.y.len());
         let (from, end) = (Instant::ZERO, Instant::ZERO);
-        Steps { integrator, control: Control::default(), y: problem.y.clone(), from, end, dense: None }
+        Steps { integrator, control, y: problem.y.clone(), from, end, dense: None }
     }
 
     /// True if a time can only be reached from the start.

@@ -208,7 +208,7 @@ fn the_promise_is_kept_whatever_way_is_taken() {
         let settings = Settings { tolerance: problem.tolerance, ..Settings::default() };
         let (mut before, mut stats) = (linear.clone(), Stats::default());
         let at = Instant::new(tau);
-        let dense = linear.at(at, &settings, &mut stats);
+        let dense = linear.at(at, &settings, &Control::default(), &mut stats);
         let found: Vec<f64> = (0..dense.len()).map(|i| dense.value(i, 0.0)).collect();
         if let Some(error) = error(&problem, tau, &found) {
             assert!(error <= 100.0, "{error} tolerances: seed {seed}, t = {tau}, {stats:?}\n{problem:?}");
@@ -221,10 +221,10 @@ fn the_promise_is_kept_whatever_way_is_taken() {
         // To the same bits after other looks, forwards and back.
         for part in [0.01, 0.5, 0.9, 2.0] {
             if part < 1.0 || stats.steps == 0 {
-                before.at(Instant::new(part * tau), &settings, &mut stats);
+                before.at(Instant::new(part * tau), &settings, &Control::default(), &mut stats);
             }
         }
-        let again = before.at(at, &settings, &mut stats);
+        let again = before.at(at, &settings, &Control::default(), &mut stats);
         for (i, x) in found.iter().enumerate() {
             assert_eq!(x.to_bits(), again.value(i, 0.0).to_bits(), "seed {seed}, unknown {i}");
         }
