@@ -37,7 +37,7 @@ const UNPROVEN_POLES_COST: f64 = 2_000.0;
 /// More products than this are dearer than steps.
 const MOST_PRODUCTS: f64 = 30_000.0;
 /// Bounds of errors may be as large as this part of the tolerance: they are seldom reached, and the promise is a hundred.
-const ALLOWED: f64 = 30.0;
+const ALLOWED: f64 = 40.0;
 /// What rounds once is off by this at most, relative to its size.
 const ROUNDING: f64 = 0.5 * f64::EPSILON;
 
@@ -53,6 +53,11 @@ pub struct Problem {
 }
 
 impl Problem {
+    /// True if no value can be off by more than is allowed, whatever the values are, given a bound of all errors.
+    fn allows_all(&self, y: &[f64], bound: f64) -> bool {
+        bound <= ALLOWED * self.tolerance && y.iter().fold(true, |good, y| good & y.is_finite())
+    }
+
     /// True if no value can be off by more than is allowed, given a bound of the error of each.
     fn allows(&self, y: &[f64], bound: impl Fn(usize) -> f64) -> bool {
         let allowed = ALLOWED * self.tolerance;
@@ -68,7 +73,7 @@ pub struct Linear {
     unknown: Vec<u32>,
     start: Instant,
     orthant: Orthant,
-    series: Series,
+    series: Option<Series>,
     /// Of what is larger than every error of the series.
     majorant: Option<Box<Series>>,
     poles: Option<Poles>,
@@ -83,9 +88,8 @@ impl Linear {
             return None;
         }
         let orthant = Orthant::new(&problem)?;
-        let series = Series::new(&problem);
         let poles = Poles::new(&problem);
-        Some(Linear { problem, unknown, start, orthant, series, majorant: None, poles, steps: None })
+        Some(Linear { problem, unknown, start, orthant, series: None, majorant: None, poles, steps: None })
     }
 
     /// The components at an instant, as the dense output of a step that stays where it is. Not numbers if there are
@@ -106,14 +110,18 @@ impl Linear {
 
     /// The state some time after the start, by the first way that can answer for it.
     fn without_steps(&mut self, tau: f64) -> Option<Vec<f64>> {
-        let products = self.series.products(tau);
-        let poles_first = self.poles.as_ref().is_some_and(|poles| {
-            products > if poles.are_proven() { POLES_COST } else { UNPROVEN_POLES_COST }
-        });
+        let pays_above = match &self.poles {
+            Some(poles) if poles.are_proven() => POLES_COST,
+            Some(_) => UNPROVEN_POLES_COST,
+            None => f64::INFINITY,
+        };
+        // To know that does not take the series.
+        let surely = self.poles.as_ref().is_some_and(|poles| poles.spare(pays_above, tau));
+        let poles_first = surely || self.products(tau) > pays_above;
         if poles_first && let Some(y) = self.by_poles(tau) {
             return Some(y);
         }
-        if products <= MOST_PRODUCTS
+        if self.products(tau) <= MOST_PRODUCTS
             && let Some(y) = self.by_series(tau)
         {
             return Some(y);
@@ -121,12 +129,22 @@ impl Linear {
         if poles_first { None } else { self.by_poles(tau) }
     }
 
+    fn series(&mut self) -> &mut Series {
+        self.series.get_or_insert_with(|| Series::new(&self.problem))
+    }
+
+    /// Products of the matrix and a vector that the series takes.
+    fn products(&mut self, tau: f64) -> f64 {
+        self.series().products(tau)
+    }
+
     fn by_poles(&mut self, tau: f64) -> Option<Vec<f64>> {
         self.poles.as_mut()?.at(&self.problem, tau)
     }
 
     fn by_series(&mut self, tau: f64) -> Option<Vec<f64>> {
-        let Linear { problem, orthant, series, majorant, .. } = self;
+        self.series();
+        let Linear { problem, orthant, series: Some(series), majorant, .. } = self else { return None };
         let (y, cut, rounding) = series.at(&problem.y, tau);
         // What is cut off is known for all unknowns together; what is rounded, relative to the sum of all sizes.
         let largest = series.largest(tau);

@@ -19,7 +19,7 @@ const ERROR: f64 = 5e-14;
 /// The same of the difference quotients of its error.
 const ERROR_OF_SLOPE: f64 = 2e-11;
 /// What is rounded in an elimination, in units of what the largest entry rounds to.
-const ROUNDINGS: f64 = 3.0;
+const ROUNDINGS: f64 = 4.5;
 /// Roundings of the pivots themselves last as disturbances do, and so do those of the state of rest.
 const MEMORIES: f64 = 8.0;
 /// The largest weight, and the inverse of the smallest, as a logarithm.
@@ -35,6 +35,9 @@ pub struct Poles {
     shift: f64,
     /// What is known of the error. None if influences are one way.
     proof: Option<Proof>,
+    /// The largest value of b, and of the state of rest: infinite if there is none.
+    inflow: f64,
+    rest: f64,
     /// The largest entry.
     largest: f64,
     factors: Vec<Wide<LANES>>,
@@ -48,6 +51,10 @@ struct Proof {
     /// Of each unknown: the part of the forest that it belongs to.
     part: Vec<u32>,
     sizes: Vec<Sizes>,
+    /// The largest weight.
+    heaviest: f64,
+    /// The memories are known.
+    remembers: bool,
 }
 
 /// Sizes in a part of the forest, in the coordinates in which its matrix is symmetric.
@@ -58,10 +65,51 @@ struct Sizes {
     b: f64,
     rest: f64,
     away: f64,
-    /// The largest value of the start, or of the state of rest if that is known.
+    /// The largest value of the start, or of the state of rest if that is known; if it is not, what flows in.
     most: f64,
-    /// A disturbance that lasts is never more than what it adds in so much time.
+    inflow: f64,
+    /// A disturbance that lasts is never more than what it adds in so much time; infinite as long as nobody has asked.
     memory: f64,
+}
+
+impl Proof {
+    fn new(problem: &Problem, weights: Vec<f64>, part: Vec<u32>, parts: usize, rest: &[f64]) -> Proof {
+        let mut sizes = vec![Sizes { memory: f64::INFINITY, ..Sizes::default() }; parts];
+        for (i, weight) in weights.iter().enumerate() {
+            let size = &mut sizes[part[i] as usize];
+            let inverse = 1.0 / weight;
+            let [y, b, rest] = [problem.y[i], problem.b[i], rest[i]].map(|x| x * inverse);
+            size.y += y * y;
+            size.b += b * b;
+            size.rest += rest * rest;
+            size.away += (y - rest) * (y - rest);
+            size.most = size.most.max(y.abs());
+            if rest.is_finite() {
+                size.most = size.most.max(rest.abs());
+            } else {
+                size.inflow = size.inflow.max(b.abs());
+            }
+        }
+        let heaviest = weights.iter().fold(0.0, |m: f64, w| m.max(*w));
+        Proof { weights, part, sizes, heaviest, remembers: false }
+    }
+
+    /// True if the state at a time, `y`, is within what is allowed. `rounding` is what the matrix rounds to, `growth` how
+    /// much larger everything may be than at the start.
+    fn holds(&self, problem: &Problem, y: &[f64], tau: f64, growth: f64, rounding: f64) -> bool {
+        let bound = |s: &Sizes| {
+            let slope = ERROR * s.y.sqrt() + ERROR_OF_SLOPE * tau * s.b.sqrt();
+            let rest = ERROR * (s.away.sqrt() + 2.0 * s.rest.sqrt());
+            let time = tau.min(MEMORIES * s.memory);
+            growth * (slope.min(rest) + rounding * time * (s.most + tau * s.inflow))
+        };
+        let bounds: Vec<f64> = self.sizes.iter().map(bound).collect();
+        let largest =
+            self.heaviest * bounds.iter().fold(0.0, |m, b| if *b > m || b.is_nan() { *b } else { m });
+        // Most often no value need be looked at.
+        problem.allows_all(y, largest)
+            || problem.allows(y, |i| self.weights[i] * bounds[self.part[i] as usize])
+    }
 }
 
 impl Poles {
@@ -100,12 +148,50 @@ impl Poles {
         }
         let shift = discs.into_iter().fold(0.0, f64::max);
         let (factors, rhs) = (Vec::new(), Vec::new());
-        let mut poles = Poles { pattern, a, shift, proof: None, largest, factors, rhs };
-        if both_ways && shift.is_finite() && weights.iter().all(|w| w.abs() <= MOST_WEIGHT) {
+        let most = |values: &[f64]| values.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+        let inflow = most(&problem.b);
+        let mut poles = Poles { pattern, a, shift, proof: None, inflow, rest: 0.0, largest, factors, rhs };
+        let mut rest = vec![0.0; n];
+        if inflow > 0.0 {
+            rest = poles.rest(problem.b.iter().copied()).unwrap_or_else(|| vec![f64::INFINITY; n]);
+            poles.rest = most(&rest);
+        }
+        if both_ways && weights.iter().all(|w| w.abs() <= MOST_WEIGHT) {
             weights.iter_mut().for_each(|w| *w = w.exp());
-            poles.proof = Some(poles.proof(problem, weights, part, parts as usize));
+            poles.proof = Some(Proof::new(problem, weights, part, parts as usize, &rest));
         }
         shift.is_finite().then_some(poles)
+    }
+
+    /// Where everything comes to rest: `A x = -b`.
+    fn rest(&self, b: impl Iterator<Item = f64>) -> Option<Vec<f64>> {
+        let mut factors = Vec::new();
+        let mut x: Vec<f64> = b.map(|b| -b).collect();
+        let regular = self.pattern.factor(&self.a, 0.0, -1.0, &mut factors);
+        self.pattern.solve(&factors, &mut x);
+        regular.then_some(x)
+    }
+
+    /// Finds out how long a disturbance is remembered, from where one of 1 would lead. False if that is known.
+    fn remember(&mut self) -> bool {
+        let Some(proof) = self.proof.as_ref().filter(|proof| !proof.remembers) else { return false };
+        let keeps_signs = self.a[proof.weights.len()..].iter().all(|a| *a >= 0.0);
+        let led =
+            (keeps_signs && self.shift == 0.0).then(|| self.rest(proof.weights.iter().copied())).flatten();
+        let Some(proof) = &mut self.proof else { return false };
+        proof.remembers = true;
+        let Some(led) = led else { return false };
+        proof.sizes.iter_mut().for_each(|size| size.memory = 0.0);
+        for (i, x) in led.iter().enumerate() {
+            let memory = &mut proof.sizes[proof.part[i] as usize].memory;
+            *memory = memory.max(if *x >= 0.0 { x / proof.weights[i] } else { f64::INFINITY });
+        }
+        true
+    }
+
+    /// True if it takes more products of the matrix and a vector than that to come to a time by a series.
+    pub fn spare(&self, products: f64, tau: f64) -> bool {
+        self.largest * tau > products
     }
 
     /// True if the error has a bound.
@@ -113,56 +199,25 @@ impl Poles {
         self.proof.is_some()
     }
 
-    fn proof(&self, problem: &Problem, weights: Vec<f64>, part: Vec<u32>, parts: usize) -> Proof {
-        let mut sizes = vec![Sizes::default(); parts];
-        // Where everything comes to rest, A x = -b, and where a disturbance of 1 would lead.
-        let mut rest: Vec<f64> = problem.b.iter().map(|b| -b).collect();
-        let mut disturbed: Vec<f64> = weights.iter().map(|w| -w).collect();
-        let mut factors = Vec::new();
-        if self.pattern.factor(&self.a, 0.0, -1.0, &mut factors) {
-            self.pattern.solve(&factors, &mut rest);
-            self.pattern.solve(&factors, &mut disturbed);
-        } else {
-            rest.iter_mut().filter(|x| **x != 0.0).for_each(|x| *x = f64::INFINITY);
-            disturbed.fill(f64::INFINITY);
-        }
-        let keeps_signs = self.a[weights.len()..].iter().all(|a| *a >= 0.0);
-        for i in 0..weights.len() {
-            let size = &mut sizes[part[i] as usize];
-            let [y, b, rest, disturbed] =
-                [problem.y[i], problem.b[i], rest[i], disturbed[i]].map(|x| x / weights[i]);
-            let lasts = keeps_signs && self.shift == 0.0 && disturbed >= 0.0;
-            size.memory = size.memory.max(if lasts { disturbed } else { f64::INFINITY });
-            size.y += y * y;
-            size.b += b * b;
-            size.rest += rest * rest;
-            size.away += (y - rest) * (y - rest);
-            size.most = size.most.max(y.abs()).max(if rest.is_finite() { rest.abs() } else { 0.0 });
-        }
-        Proof { weights, part, sizes }
-    }
-
     /// The state some time after the start of the problem. None if its error may be too large.
     pub fn at(&mut self, problem: &Problem, tau: f64) -> Option<Vec<f64>> {
         let whole = self.propagate(&problem.y, &problem.b, tau)?;
         let growth = (self.shift * tau).exp();
         let rounding = ROUNDINGS * ROUNDING * self.largest;
-        if let Some(Proof { weights, part, sizes }) = &self.proof {
-            let bounds: Vec<f64> = sizes
-                .iter()
-                .map(|s| {
-                    let slope = ERROR * s.y.sqrt() + ERROR_OF_SLOPE * tau * s.b.sqrt();
-                    let rest = ERROR * (s.away.sqrt() + 2.0 * s.rest.sqrt());
-                    let time = tau.min(MEMORIES * s.memory);
-                    growth * (slope.min(rest) + rounding * time * s.most)
-                })
-                .collect();
-            return problem.allows(&whole, |i| weights[i] * bounds[part[i] as usize]).then_some(whole);
+        while let Some(proof) = &self.proof {
+            if proof.holds(problem, &whole, tau, growth, rounding) {
+                return Some(whole);
+            }
+            if !self.remember() {
+                return None;
+            }
         }
         let half = self.propagate(&problem.y, &problem.b, 0.5 * tau)?;
         let halves = self.propagate(&half, &problem.b, 0.5 * tau)?;
-        let most = problem.y.iter().chain(&halves).fold(0.0f64, |m, y| m.max(y.abs()));
-        if !problem.allows(&halves, |_| growth * rounding * tau * most) {
+        // What adds up in unknowns that nothing leaves is off by the same part for the whole and for the halves.
+        let flow = self.rest.min(tau * self.inflow);
+        let most = problem.y.iter().chain(&halves).fold(flow, |m, y| m.max(y.abs()));
+        if !problem.allows(&halves, |_| growth * (rounding * tau + ERROR_OF_SLOPE) * most) {
             return None;
         }
         let allowed = AGREEMENT * problem.tolerance;

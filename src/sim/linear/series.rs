@@ -90,11 +90,11 @@ impl Orthant {
 
     /// Values that an error has led out of the orthant are put where they would leave it.
     pub fn confine(&self, y: &mut [f64]) {
-        for (i, y) in y.iter_mut().enumerate() {
-            let sign = self.signs.get(i).copied().unwrap_or(1.0);
-            if sign * *y < 0.0 {
-                *y = 0.0;
-            }
+        if self.signs.is_empty() {
+            y.iter_mut().for_each(|y| *y = if *y < 0.0 { 0.0 } else { *y });
+        }
+        for (y, sign) in y.iter_mut().zip(&self.signs) {
+            *y = if sign * *y < 0.0 { 0.0 } else { *y };
         }
     }
 }

@@ -139,7 +139,7 @@ fn answers(weighing: Weighing, wanted: [usize; 3]) {
         let (problem, tau) = random(&mut Random(seed), weighing);
         let Some(mut linear) = linear(&problem) else { continue };
         let proven = linear.poles.as_ref().is_some_and(Poles::are_proven);
-        let affordable = linear.series.products(tau) <= MOST_PRODUCTS;
+        let affordable = linear.products(tau) <= MOST_PRODUCTS;
         let series = if affordable { linear.by_series(tau) } else { None };
         let poles = linear.by_poles(tau);
         for (way, found) in [(0, series), (if proven { 1 } else { 2 }, poles)] {
@@ -168,12 +168,12 @@ fn neighbours_that_weigh_alike() {
 
 #[test]
 fn neighbours_of_different_weight() {
-    answers(Weighing::Weighted, [600, 200, 150]);
+    answers(Weighing::Weighted, [600, 200, 120]);
 }
 
 #[test]
 fn influences_one_way() {
-    answers(Weighing::OneWay, [600, 0, 500]);
+    answers(Weighing::OneWay, [600, 0, 400]);
 }
 
 #[test]
@@ -193,6 +193,40 @@ fn neighbours_that_swing_are_left_to_steps() {
     assert!(swing(&[(0, 1, -1.0), (1, 2, -1.0), (2, 0, 1.0)]));
     assert!(swing(&[(0, 1, -1.0), (1, 0, -2.0)]));
     answers(Weighing::Against, [50, 0, 0]);
+}
+
+/// Nothing leaves: what flows in adds up, and every rounding of the matrix lasts. The bound of the error is hardly larger
+/// than the error here.
+#[test]
+fn what_nothing_leaves() {
+    let mut answers = 0;
+    for seed in 0..600 {
+        let mut r = Random(seed);
+        let n = 2 + r.below(3) as u32;
+        let (mut entries, mut decays) = (Vec::new(), vec![0.0; n as usize]);
+        for k in 1..n {
+            let d = r.decades(-1.0, 2.0);
+            let seen_only = r.chance(0.2);
+            entries.extend([(k, k - 1, d), (k - 1, k, if seen_only { 0.0 } else { d })]);
+            decays[k as usize] += d;
+            decays[k as usize - 1] += if seen_only { 0.0 } else { d };
+        }
+        entries.extend(decays.iter().enumerate().map(|(k, d)| (k as u32, k as u32, -d)));
+        let mut b = vec![0.0; n as usize];
+        b[0] = r.one_of(&[0.0, 1.0, 1e6]);
+        let size = r.one_of(&[0.0, 1.0, 1e6]);
+        let y = (0..n).map(|_| size * r.between(-1.0, 1.0)).collect();
+        let problem = Problem { entries, b, y, tolerance: r.one_of(&[1e-9, 1e-11]) };
+        let tau = r.decades(-1.0, 6.0);
+        let mut linear = linear(&problem).expect("no unknown swings");
+        let series = if linear.products(tau) <= MOST_PRODUCTS { linear.by_series(tau) } else { None };
+        for found in [series, linear.by_poles(tau)].into_iter().flatten() {
+            let error = error(&problem, tau, &found).expect("nothing overflows");
+            assert!(error <= ALLOWED, "{error} tolerances: seed {seed}, t = {tau}\n{problem:?}");
+            answers += 1;
+        }
+    }
+    assert!(answers >= 500, "{answers}");
 }
 
 /// Everything that is offered to the simulation, whichever way it is come by: within the promise, and never beyond zero.
