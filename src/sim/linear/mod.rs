@@ -36,7 +36,7 @@ const POLES_COST: f64 = 60.0;
 const UNPROVEN_POLES_COST: f64 = 2_000.0;
 /// More products than this are dearer than steps.
 const MOST_PRODUCTS: f64 = 30_000.0;
-/// Bounds of errors may be as large as this part of the tolerance: they are seldom reached, and the promise is a hundred.
+/// Bounds of errors may be so many tolerances: they are seldom reached, and a hundred are promised.
 const ALLOWED: f64 = 40.0;
 /// What rounds once is off by this at most, relative to its size.
 const ROUNDING: f64 = 0.5 * f64::EPSILON;

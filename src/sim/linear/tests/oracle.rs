@@ -94,8 +94,8 @@ pub fn exact(problem: &Problem, tau: f64) -> Vec<f64> {
     let largest = problem.entries.iter().fold(1e-3, |m: f64, e| m.max(e.2.abs()));
     let most = problem.b.iter().fold(0.0, |m: f64, b| m.max(b.abs()));
     let constant = (most / largest).max(1e-30).log2().ceil().exp2();
-    for i in 0..n {
-        a[i][n] = Double::new(problem.b[i] / constant);
+    for (row, b) in a.iter_mut().zip(&problem.b) {
+        row[n] = Double::new(b / constant);
     }
     let e = exponential(&a, tau);
     let start: Vec<Double> = problem.y.iter().copied().chain([constant]).map(Double::new).collect();
