@@ -14,4 +14,5 @@ pub mod plants;
 pub mod restart;
 pub mod scale;
 pub mod solver;
+pub mod transport;
 pub mod tune;

@@ -267,7 +267,10 @@ impl Simulation<'_> {
             && !self.watches_coupled();
         self.coupled.tried = without_steps;
         self.coupled.linear = (without_steps)
-            .then(|| Linear::new(&self.coupled.system, &self.model.rules, &self.coupled.y))
+            .then(|| {
+                let tolerance = self.coupled_settings.tolerance;
+                Linear::new(&self.coupled.system, &self.model.rules, &self.coupled.y, tolerance)
+            })
             .flatten();
         // After each, all members are searched.
         self.coupled.integrator.dear = true;
@@ -294,11 +297,12 @@ impl Simulation<'_> {
 
     /// Sees to it that the coupled modules' motion is known at an instant.
     pub(super) fn show_coupled(&mut self, at: Instant) {
-        let Coupled { system, y, integrator, linear, pending, .. } = &mut self.coupled;
+        let Coupled { system, y, integrator, control, linear, pending, .. } = &mut self.coupled;
         match linear {
             Some(linear) => {
                 if self.plant.coupled.as_ref().is_none_or(|course| course.start() != at) {
-                    self.plant.coupled = Some(Course::new(linear.at(at)));
+                    let dense = linear.at(at, &self.coupled_settings, control, &mut self.stats);
+                    self.plant.coupled = Some(Course::new(dense));
                 }
             }
             None => {

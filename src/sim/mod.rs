@@ -93,7 +93,6 @@ mod plant;
 mod queue;
 mod quick;
 mod radau;
-mod rational;
 mod repair;
 mod roots;
 mod runge_kutta;

@@ -2,6 +2,7 @@
 //!
 //! - [`book`]: the book in `docs/`, followed literally; [`pages`] reads its Markdown.
 //! - [`light`]: modules with formulas only, the quick way against the general one.
+//! - [`linear`]: neighbours with linear equations against closed forms: transport one way, large starts, stiff chains.
 //! - [`listings`]: the paper's models against results of an independent program.
 //! - [`algebraic`], [`signals`]: values and equations instead of rates; sums over what is attached; contexts with branches.
 //! - [`semantics`]: what happens when (events, contexts, errors of a run), model by small model.
@@ -38,6 +39,7 @@ mod gallery;
 mod inspect;
 mod language;
 mod light;
+mod linear;
 mod listings;
 mod organs;
 mod pages;

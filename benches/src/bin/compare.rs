@@ -1,4 +1,4 @@
-//! Prints one table: `cargo run --release --bin compare [filament] [restart] [anabaena]`.
+//! Prints one table: `cargo run --release --bin compare [filament] [transport] [restart] [anabaena]`.
 //!
 //! First both programs are tuned to the error that is asked for; then they run in turns. Times are medians with their
 //! quartiles, ratios are medians of the ratios of each round.
@@ -11,6 +11,7 @@ use dlsys_benches::filament::{self, Coupling, D_SLOW, D_STIFF, Filament};
 use dlsys_benches::measure::{self, Race, Spread, duration};
 use dlsys_benches::restart::{self, Best, EVENTS, Life};
 use dlsys_benches::solver::{Candidate, Dlsys, Method};
+use dlsys_benches::transport;
 use dlsys_benches::tune::{self, Tuned};
 
 /// Rounds of a race.
@@ -34,6 +35,9 @@ fn main() -> Result<(), String> {
     let mut rows = Vec::new();
     if wanted("filament") {
         filaments(&mut rows)?;
+    }
+    if wanted("transport") {
+        rows.push(one_way());
     }
     if wanted("restart") {
         restarts(&mut rows)?;
@@ -84,6 +88,15 @@ fn filaments(rows: &mut Vec<Row>) -> Result<(), String> {
         rows.push(race(problem.name(), ours, theirs, target));
     }
     Ok(())
+}
+
+fn one_way() -> Row {
+    let reference = transport::reference();
+    let error = |solver: &dyn dlsys_benches::solver::Solver| transport::error(&reference, solver);
+    println!("transport one way: error {:.0e}", transport::TARGET);
+    let theirs = tune::fastest(&transport::explicit(), (7, 14), transport::TARGET, LIMIT, &error, tell);
+    let ours = tune::fastest(&[transport::dlsys()], (3, 14), transport::TARGET, LIMIT, &error, tell);
+    race("transport one way, 1,000 cells".into(), ours, theirs, 1.0)
 }
 
 fn tell(name: &str, found: Option<(&Tuned, Duration)>) {

@@ -129,6 +129,16 @@ impl Pattern {
         &self.neighbour[self.first[k + 1] as usize..self.first[k] as usize]
     }
 
+    /// Of each unknown its parent, and the place of its entry in the parent's column, after which comes that of the parent's
+    /// in its own; None of a root. None if the pattern is no forest.
+    pub fn forest(&self) -> Option<impl Iterator<Item = Option<(usize, usize)>>> {
+        let n = self.unknowns();
+        let above = move |(k, parent): (usize, &u32)| {
+            (*parent != ROOT).then(|| (*parent as usize, n + 2 * self.first[k + 1] as usize))
+        };
+        (n == self.parent.len()).then(|| self.parent.iter().enumerate().map(above))
+    }
+
     /// Number of whole numbers in the factors.
     fn factor_length<F: Field>(&self) -> usize {
         if self.parent.is_empty() {
