@@ -121,6 +121,7 @@ pub fn play<Done: Send>(
         Ok(())
     });
     (clock.simulate, clock.output) = (simulate, output);
+    run.note(reel.simulation.remarks());
     taken.map(|()| reel.simulation.stats())
 }
 

@@ -77,12 +77,14 @@ pub fn run(args: &RunArgs) -> Result<(), Failure> {
                 progress.inc();
             }
         }
+        run.note(simulation.remarks());
         Ok(simulation.stats())
     })();
     // What was computed before an error is written before the error is reported.
     events.map_or(Ok(()), EventLog::finish)?;
     out.flush().map_err(out_error)?;
     drop(out);
+    run.warn();
     run.write_stats(&args.shared, clock, result?)
 }
 

@@ -253,4 +253,6 @@ pub struct Stats {
     pub modules: u64,
     /// Most modules that were alive at once.
     pub peak_modules: u64,
+    /// Rules whose rates could not be bounded somewhere: [`Simulation::remarks`].
+    pub unbounded: u64,
 }

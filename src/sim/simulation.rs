@@ -25,7 +25,7 @@ use super::state::{Control, What};
 use super::transition::Recorder;
 use super::watch::Watcher;
 use super::{Method, Settings, Stats};
-use crate::diagnostic::Span;
+use crate::diagnostic::{Diagnostic, Span};
 use crate::expr::Scratch;
 use crate::model::{CUT, KindId, Model};
 use crate::structure::{Family, Instant, Lineage, ModuleId, ModuleString, Seed, Tree};
@@ -266,13 +266,20 @@ impl<'m> Simulation<'m> {
     pub fn stats(&self) -> Stats {
         let coupled = self.coupled.integrator.evaluations() + self.repair_evaluations();
         let rhs_evaluations = self.stats.rhs_evaluations + self.alone.evaluations() + coupled;
-        Stats { modules: self.plant.tree.len() as u64, rhs_evaluations, ..self.stats }
+        let (modules, unbounded) = (self.plant.tree.len() as u64, self.unbounded.len() as u64);
+        Stats { modules, unbounded, rhs_evaluations, ..self.stats }
     }
 
-    /// The heads of the rules whose rates could not be bounded somewhere, with the time: a rate that is large for a very
-    /// short time there may have been overlooked.
-    pub fn unbounded(&self) -> Vec<(String, f64)> {
-        self.unbounded.iter().map(|(&rule, &t)| (self.model.rules[rule].label.clone(), t)).collect()
+    /// What there is to say of the run so far: rules whose rates could not be bounded somewhere, so that a rate that is large
+    /// there for a very short time may have been overlooked.
+    pub fn remarks(&self) -> Vec<Diagnostic> {
+        let remark = |(&rule, &t): (&usize, &f64)| {
+            let rule = &self.model.rules[rule];
+            Diagnostic::warning(format!("the rates of {} have no bounds near t = {}", rule.label, brief(t, 6)))
+                .at(rule.span, "these equations")
+                .help("a rate that is very large there for a very short time may be overlooked: see what is divided by, or taken the logarithm of, or compare with `--method rk4 --step-size H`")
+        };
+        self.unbounded.iter().map(remark).collect()
     }
 
     /// The productions since the last call, in the order of time.
