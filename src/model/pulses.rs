@@ -47,9 +47,14 @@ pub fn find_flashes(graph: &mut Graph, model: &mut Model, drafts: &[Draft], movi
                 v if v < time => context[v - own] || v >= rule.first_aggregate && terms_read,
                 _ => false,
             };
-            solve.flashes = nodes.iter().any(|&node| {
-                graph.variables(&[node]).into_iter().any(|v| unresolved(v as usize))
-                    || graph.polynomial(node, |v| moved(v as usize)).is_none()
+            // What has a formula itself is integrated only where everything is.
+            let rates = draft.rates[number].iter().zip(&solve.laws);
+            let closed: Vec<NodeId> =
+                rates.filter(|(_, law)| law.is_closed()).map(|((_, node), _)| *node).collect();
+            solve.flashes = nodes.iter().any(|node| {
+                let reads_formula = || graph.variables(&[*node]).into_iter().any(|v| unresolved(v as usize));
+                !closed.contains(node) && reads_formula()
+                    || graph.polynomial(*node, |v| moved(v as usize)).is_none()
             });
         }
     }

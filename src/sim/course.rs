@@ -12,6 +12,8 @@ pub struct Course {
     /// By component: where it is found. Empty as long as there is the common step only.
     tracks: Vec<Track>,
     pub end: Instant,
+    /// What the components may be wrong by, relative, in the worst of the stretches.
+    pub error: f64,
 }
 
 /// The stretches, one after another, in which a component is found, and its number there.
@@ -35,8 +37,8 @@ pub struct Piece<'c> {
 impl Course {
     /// The components of a common step.
     pub fn new(step: Dense) -> Course {
-        let end = step.end;
-        Course { stretches: vec![step], tracks: Vec::new(), end }
+        let (end, error) = (step.end, step.error);
+        Course { stretches: vec![step], tracks: Vec::new(), end, error }
     }
 
     /// The components of a common step that is several stretches.
@@ -46,7 +48,8 @@ impl Course {
         let track = |component: u32| Track { first: 0, count, component };
         let tracks =
             if count == 1 { Vec::new() } else { (0..stretches[0].len() as u32).map(track).collect() };
-        Course { stretches, tracks, end }
+        let error = stretches.iter().map(|dense| dense.error).fold(0.0, f64::max);
+        Course { stretches, tracks, end, error }
     }
 
     /// The start of the common step.
@@ -110,6 +113,7 @@ impl Course {
         for (number, &component) in components.iter().enumerate() {
             self.tracks[component as usize] = Track { first, count, component: number as u32 };
         }
+        self.error = stretches.iter().map(|dense| dense.error).fold(self.error, f64::max);
         self.stretches.append(stretches);
     }
 }

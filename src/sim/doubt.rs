@@ -20,7 +20,7 @@
 use super::plant::Path;
 use super::roots::{Function, first_root};
 use super::simulation::Simulation;
-use super::state::{Change, Signs};
+use super::state::{Change, Signs, What};
 use super::watch::{Meeting, Watcher, opposite, produces, sign_of};
 use crate::expr::{Dual, Interval};
 use crate::model::Sign;
@@ -31,6 +31,9 @@ const NEARBY: f64 = 1e-6;
 
 /// What crosses zero with this part of the speed that has brought it there goes on.
 const STEADY: f64 = 0.7;
+
+/// A difference so many times larger than what the sides may be wrong by is no matter of evidence.
+const FAR: f64 = 1e3;
 
 /// What is ahead of an atom on a path.
 #[derive(Clone, Copy, Debug, Default)]
@@ -74,6 +77,8 @@ pub struct Question {
     pub tolerance: f64,
     /// The sides were near each other before, and had come there from outside.
     pub near: bool,
+    /// What integrated values may be wrong by, relative; 0 if there are none.
+    pub error: f64,
 }
 
 impl Watcher {
@@ -81,8 +86,11 @@ impl Watcher {
     pub(super) fn look(&mut self, path: &Path, mut question: Question) -> Ahead {
         let Question { atom, limit, sign, tolerance, .. } = question;
         let side = sign_of(sign);
-        let noise = self.noise(path, atom, question.from);
         let start = side * self.difference(path, atom).value(question.from);
+        // Most are far from the band, and need not be told how wide it is.
+        let [a, b] = [self.out[2 * atom], self.out[2 * atom + 1]];
+        let is_far = start.abs() > FAR * question.error * a.abs().max(b.abs()).max(start.abs());
+        let noise = if is_far { 0.0 } else { self.noise(path, atom, question.from) };
         if noise > tolerance && start.abs() <= noise {
             // In the band: which way out?
             let up = self.leaves(path, question, noise, sign);
@@ -96,7 +104,7 @@ impl Watcher {
                     };
                     let position = if start > 0.0 { crossing(self) } else { None };
                     let position = position.unwrap_or(question.from);
-                    let meeting = self.meeting_at(path, atom, position, opposite(sign));
+                    let meeting = Watcher::meeting_at(path, position, opposite(sign));
                     return Ahead { next: Some(meeting), ..Ahead::default() };
                 }
                 (up, _) => {
@@ -210,20 +218,13 @@ impl Watcher {
         sign_of(sign) * rate.lo < 0.0 && sign_of(sign) * rate.hi < 0.0
     }
 
-    /// A meeting at a position, and how much earlier or later it may be.
-    pub(super) fn meeting_at(&mut self, path: &Path, atom: usize, position: f64, after: Sign) -> Meeting {
+    /// A meeting at a position.
+    fn meeting_at(path: &Path, position: f64, after: Sign) -> Meeting {
         let time = path.start.after(position * path.h);
-        Meeting {
-            position,
-            time,
-            at: Sign::Zero,
-            after,
-            level: None,
-            slack: self.slack(path, atom, position),
-        }
+        Meeting { position, time, at: Sign::Zero, after, level: None }
     }
 
-    /// How much earlier or later a crossing may be, in units of time, given the errors of integration.
+    /// How much earlier or later a crossing may be, in units of position, given the errors of integration.
     pub(super) fn slack(&mut self, path: &Path, atom: usize, position: f64) -> f64 {
         let noise = self.noise(path, atom, position);
         let (lo, hi) = ((position - NEARBY).max(0.0), (position + NEARBY).min(1.0));
@@ -233,7 +234,7 @@ impl Watcher {
             return 0.0;
         }
         // Not more than a small part of the time in which things change.
-        (noise / speed).min(10.0 * path.error()) * path.h
+        (noise / speed).min(10.0 * path.error())
     }
 }
 
@@ -269,8 +270,19 @@ impl Simulation<'_> {
         if rule.produces.is_empty() || rule.atoms.is_empty() {
             return None;
         }
+        // What is known to come, or how far that is known, is mostly far away.
+        let known = match (&state.next.what, &self.plant.coupled, &state.step) {
+            (What::Event, ..) => state.next.touched[0].time,
+            (_, Some(course), _) if state.coupled => course.end,
+            (_, _, Some(step)) => step.dense.end,
+            _ => self.now,
+        };
         let path = Path::new(&self.plant, state, rule, self.now, 64.0 * self.now.resolution());
         let error = path.error();
+        let reach = self.reach_of(id);
+        if known.since(self.now) > FAR * error * reach.max(self.now.resolution()) {
+            return None;
+        }
         let mut signs = Signs::from_slice(&state.signs);
         for change in state.next.changes.iter().filter(|change| change.time.since(self.now) <= 0.0) {
             signs[change.atom] = change.after;

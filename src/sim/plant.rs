@@ -380,9 +380,14 @@ impl<'p> Path<'p> {
 
     /// What integrated values along the path may be wrong by, as a part of their size; 0 if there are none.
     pub fn error(&self) -> f64 {
+        let course = self.plant.coupled.as_ref().map_or(0.0, |course| course.error);
         let error = |state: &State| {
-            let pieces = state.motions.iter().filter_map(|motion| self.piece(state, motion));
-            pieces.map(|piece| piece.error()).fold(0.0, f64::max)
+            let of = |motion: &Motion| match motion {
+                Motion::Coupled(_) => course,
+                Motion::Step(_) => state.step.as_ref().map_or(0.0, |step| step.dense.error),
+                _ => 0.0,
+            };
+            state.motions.iter().map(of).fold(0.0, f64::max)
         };
         let others = self.state.context.iter().filter_map(|id| self.plant.state(*id));
         others.map(error).fold(error(self.state), f64::max)

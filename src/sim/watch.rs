@@ -51,7 +51,7 @@ pub struct Watcher {
     pub(super) around: Vec<Interval>,
     pub(super) around_out: Vec<Interval>,
     bounds_scratch: Scratch<Dual<Interval>>,
-    out: Vec<f64>,
+    pub(super) out: Vec<f64>,
     departure_out: Vec<Dual<f64>>,
     whole_out: Vec<Interval>,
     bounds_out: Vec<Dual<Interval>>,
@@ -74,8 +74,6 @@ pub struct Meeting {
     pub at: Sign,
     pub after: Sign,
     pub level: Option<(usize, f64)>,
-    /// How much earlier or later it may be, in units of time.
-    pub slack: f64,
 }
 
 /// The difference of two sides of an atom along a path.
@@ -175,8 +173,9 @@ impl Watcher {
                     }
                     if let Some(tolerance) = self.may_change(path, atom, now[atom]) {
                         let near = atom < 64 && near & 1 << atom != 0;
-                        let question = Question { atom, from: 0.0, limit, sign: now[atom], tolerance, near };
-                        let ahead = self.ahead(path, question, integrated);
+                        let question =
+                            Question { atom, from: 0.0, limit, sign: now[atom], tolerance, near, error };
+                        let ahead = self.ahead(path, question);
                         watched.push(Watched { atom, tolerance, ahead });
                     }
                 }
@@ -200,17 +199,24 @@ impl Watcher {
                     return found;
                 }
                 let (sign, tolerance) = (now[atom], watched[i].tolerance);
-                let question = Question { atom, from: position, limit, sign, tolerance, near: false };
+                let question = Question { atom, from: position, limit, sign, tolerance, near: false, error };
                 rounds += 1;
                 watched[i].ahead = match rounds > MAX_ROUNDS {
                     true => Ahead::default(),
-                    false => self.ahead(path, question, integrated),
+                    false => self.ahead(path, question),
                 };
                 continue;
             }
             let Some(first) = first else { break };
             rounds += 1;
-            let together = path_together(path, first.position).max(first.position + first.slack / path.h);
+            let mut together = path_together(path, first.position);
+            let others = watched.iter().filter(|w| w.ahead.next.is_some()).count();
+            if integrated && others > 1 && !first_is_exact(&watched, first.position) {
+                let atom =
+                    watched.iter().find(|w| w.ahead.next.is_some_and(|m| m.position == first.position));
+                together = together
+                    .max(first.position + atom.map_or(0.0, |w| self.slack(path, w.atom, first.position)));
+            }
             let (mut at, mut after) = (Signs::from_slice(&now), Signs::from_slice(&now));
             let mut group: SmallVec<[Change; 1]> = SmallVec::new();
             for w in &watched {
@@ -250,8 +256,8 @@ impl Watcher {
                     } else {
                         let (atom, tolerance) = (w.atom, w.tolerance);
                         let question =
-                            Question { atom, from, limit, sign: now[atom], tolerance, near: false };
-                        self.ahead(path, question, integrated)
+                            Question { atom, from, limit, sign: now[atom], tolerance, near: false, error };
+                        self.ahead(path, question)
                     };
                 }
             }
@@ -264,8 +270,8 @@ impl Watcher {
     }
 
     /// Looks ahead for an atom.
-    fn ahead(&mut self, path: &Path, question: Question, integrated: bool) -> Ahead {
-        if integrated && matches!(question.sign, Sign::Plus | Sign::Minus) {
+    fn ahead(&mut self, path: &Path, question: Question) -> Ahead {
+        if question.error > 0.0 && matches!(question.sign, Sign::Plus | Sign::Minus) {
             return self.look(path, question);
         }
         let Question { atom, from, limit, sign, tolerance, .. } = question;
@@ -328,8 +334,7 @@ impl Watcher {
         let Root { position, at, after } =
             first_root(&mut self.difference(path, atom), from, limit, sign, tolerance)?;
         let time = path.start.after(position * path.h);
-        let slack = if path.error() > 0.0 { self.slack(path, atom, position) } else { 0.0 };
-        Some(Meeting { position, time, at, after, level: None, slack })
+        Some(Meeting { position, time, at, after, level: None })
     }
 
     /// What rounding of the variables makes of the difference of two sides.
@@ -387,7 +392,7 @@ impl Watcher {
         let position = time.since(path.start) / path.h;
         let level = (variable < t).then_some((variable, level));
         let after = opposite(sign);
-        let meeting = Meeting { position, time, at: Sign::Zero, after, level, slack: 0.0 };
+        let meeting = Meeting { position, time, at: Sign::Zero, after, level };
         if position > path.start.resolution() / path.h {
             return Some(meeting);
         }
@@ -486,6 +491,11 @@ pub fn rate_at(
     // The rate changes by this much over the rounding of the value.
     let nearby = rate(value * (1.0 + 8.0 * f64::EPSILON));
     if here.abs() <= (nearby - here).abs() { 0.0 } else { here }
+}
+
+/// True if what comes first is known by a formula.
+fn first_is_exact(watched: &[Watched], position: f64) -> bool {
+    watched.iter().any(|w| w.tolerance.is_nan() && w.ahead.next.is_some_and(|m| m.position == position))
 }
 
 /// Whether a production may follow if an atom's sides meet.

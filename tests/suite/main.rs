@@ -14,6 +14,7 @@
 //! - [`cli`]: the program as it is typed.
 //! - [`editing`]: layout, `new`, `render --watch`, completions.
 //! - [`inspect`]: what `explain`, `--events` and `check --continuity` say.
+//! - [`evidence`]: events of integrated values: found, not there, or in doubt; pulses; ties.
 //! - [`export`]: SVG and OBJ, read back by other people's code.
 //! - [`schedulers`]: local repair against one clock, remembered neighbours against the whole string.
 //! - [`pictures`]: pixels, perspective, and sheets of several frames.
@@ -33,6 +34,7 @@ mod common;
 mod corners;
 mod discrete;
 mod editing;
+mod evidence;
 mod export;
 mod files;
 mod gallery;

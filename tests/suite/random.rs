@@ -228,7 +228,15 @@ fn random_models_come_out_alike_by_four_ways() {
     for n in 0..count {
         let seed = seed.wrapping_mul(1_000_003).wrapping_add(n);
         let text = model(seed);
-        let outcomes: Vec<Outcome> = ways.iter().map(|(_, settings)| run(&text, *settings, &times)).collect();
+        let solve = |(name, settings): &(&str, Settings)| {
+            let begun = std::time::Instant::now();
+            let outcome = run(&text, *settings, &times);
+            if begun.elapsed().as_secs() > 4 {
+                println!("model {seed} takes {name} {:.0} s:\n{text}", begun.elapsed().as_secs_f64());
+            }
+            outcome
+        };
+        let outcomes: Vec<Outcome> = ways.iter().map(solve).collect();
         let mut said = Vec::new();
         let reference = outcomes.iter().rev().find_map(|o| o.as_ref().ok());
         for ((name, settings), outcome) in ways.iter().zip(&outcomes) {

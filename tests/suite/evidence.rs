@@ -1,0 +1,146 @@
+//! Events of integrated values: what is found, what is not there, and what is said to be in doubt.
+
+use dlsys::sim::{Error, Method, Settings};
+
+use crate::common::{run, session};
+
+/// The time of the first production up to a time; None if there is none.
+fn first_event(text: &str, settings: Settings, by: f64) -> Result<Option<f64>, Error> {
+    let session = session(text);
+    let mut simulation = session.simulate(Settings { log: true, ..settings })?;
+    simulation.pass(by)?;
+    Ok(simulation.take_events().first().map(|event| event.time))
+}
+
+/// A sine in two modules, and a threshold at, above or below its greatest value.
+fn sine(threshold: f64) -> String {
+    format!(
+        "initial string: X(0) Y(1)\nX(x) > Y(y):\n  solve dx/dt = y\n  if x = {threshold:?} produce E\n\
+         X(x) < Y(y): solve dy/dt = -x\n"
+    )
+}
+
+#[test]
+fn what_misses_and_what_crosses_is_told_apart_beyond_the_tolerance() {
+    for (method, tolerance) in [
+        (Method::Auto, 1e-4),
+        (Method::Auto, 1e-6),
+        (Method::Auto, 1e-9),
+        (Method::Dop853, 1e-6),
+        (Method::Radau, 1e-6),
+    ] {
+        let settings = Settings { method, tolerance, ..Settings::default() };
+        for power in 2..13 {
+            for digit in [1.0, 3.0] {
+                let gap = digit * 10f64.powi(-power);
+                let certain = gap > 50.0 * tolerance;
+                let doubt =
+                    |outcome: &Result<Option<f64>, Error>| matches!(outcome, Err(Error::InDoubt { .. }));
+                let miss = first_event(&sine(1.0 + gap), settings, 4.0);
+                assert!(matches!(miss, Ok(None)) || doubt(&miss) && !certain, "{gap} {settings:?}: {miss:?}");
+                let hit = first_event(&sine(1.0 - gap), settings, 4.0);
+                let exact = (1.0 - gap).asin();
+                // The slope there is the root of twice the gap.
+                let allowed = 100.0 * tolerance / (2.0 * gap).sqrt();
+                let found = matches!(hit, Ok(Some(t)) if (t - exact).abs() <= allowed.max(1e-12));
+                assert!(found || doubt(&hit) && !certain, "{gap} {settings:?}: {hit:?}, not {exact}");
+            }
+        }
+    }
+}
+
+#[test]
+fn neighbours_that_equalise_never_meet() {
+    for method in [Method::Auto, Method::Dopri5, Method::Dop853, Method::Radau] {
+        for tolerance in [1e-3, 1e-6, 1e-9] {
+            for (rate, extra) in [(1.0, ""), (0.3, " + 0.1 - 0.1*x"), (4.0, " - 0.2*x^3"), (1.0, " + sin(t)")]
+            {
+                let text = format!(
+                    "initial string: B(0.2) C(0.8)\nB(x) > C(y): solve dx/dt = {rate}*(y - x){extra}\n\
+                     B(y) < C(x):\n  solve dx/dt = {rate}*(y - x){extra}\n  if x = y produce E\n  if x < y produce G\n"
+                );
+                let settings = Settings { method, tolerance, ..Settings::default() };
+                let found = first_event(&text, settings, 400.0);
+                assert!(matches!(found, Ok(None)), "{found:?} {settings:?}\n{text}");
+            }
+        }
+    }
+}
+
+#[test]
+fn thresholds_short_of_a_limit_are_reached() {
+    // x = 1 - exp(-t), and one that is approached like 1/t; limits of both are not.
+    for short in [1e-2, 1e-5, 1e-8, 1e-11, 1e-14] {
+        let exponential = |level: &str| {
+            format!("initial string: A(0)\nA(x):\n  solve dx/dt = 1 - x\n  if x = {level} produce E")
+        };
+        let t =
+            first_event(&exponential(&format!("1 - {short:?}")), Settings::default(), 1e3).expect("it runs");
+        let exact = -(1.0 - (1.0 - short)).ln();
+        assert!(t.is_some_and(|t| (t - exact).abs() < 1e-2 * exact), "{short}: {t:?}, not {exact}");
+        assert_eq!(first_event(&exponential("1"), Settings::default(), 1e3).expect("it runs"), None);
+        let slow = |level: &str| {
+            format!("initial string: A(0)\nA(x):\n  solve dx/dt = (1 - x)^2\n  if x = {level} produce E")
+        };
+        let exact = 1.0 / (1.0 - (1.0 - short)) - 1.0;
+        let t = first_event(&slow(&format!("1 - {short:?}")), Settings::default(), 1e15).expect("it runs");
+        assert!(t.is_some_and(|t| (t - exact).abs() < 1e-2 * exact), "{short}: {t:?}, not {exact}");
+        assert_eq!(first_event(&slow("1"), Settings::default(), 1e15).expect("it runs"), None);
+    }
+}
+
+#[test]
+fn pulses_of_any_width_are_seen_wherever_they_are() {
+    // One of area 1 at a random place: in a rate of time, along a parameter, in a neighbour's value, among coupled modules.
+    for n in 0..60 {
+        let (at, width) = (3.0 + (n as f64 * 7.31) % 40.0, 10f64.powf(-(n as f64 % 6.0)));
+        let height = 1.0 / (width * std::f64::consts::PI.sqrt());
+        let pulse = |x: &str| format!("{height:?}*exp(-(({x} - {at:?})/{width:?})^2)");
+        let models = [
+            format!("initial string: A(0)\nA(x): solve dx/dt = {}", pulse("t")),
+            format!("initial string: A(0, 0)\nA(x, y): solve dx/dt = {}, dy/dt = 1", pulse("y")),
+            format!(
+                "initial string: L(0) A(0)\nL(y): solve y = {}\nL(y) < A(x): solve dx/dt = y",
+                pulse("t")
+            ),
+            format!(
+                "initial string: A(0) B(0)\nA(x) > B(y): solve dx/dt = {} + 0*y\nA(x) < B(y): solve dy/dt = x - y",
+                pulse("t")
+            ),
+            format!(
+                "initial string: A(0) [ B(0) ]\nA(x): solve dx/dt = sum(B(y): {})\nB(y): solve dy/dt = 1",
+                pulse("y")
+            ),
+        ];
+        for text in models {
+            for (method, tolerance) in [(Method::Auto, 1e-6), (Method::Dop853, 1e-8), (Method::Dopri5, 1e-4)]
+            {
+                let settings = Settings { method, tolerance, ..Settings::default() };
+                let end = run(&text, settings, &[100.0]).unwrap_or_else(|e| panic!("{e}\n{text}"));
+                let x = end[0].iter().find(|module| module.0 == "A").expect("it lives").1[0];
+                assert!(
+                    (x - 1.0).abs() < 100.0 * tolerance,
+                    "{x} at {at} of width {width}, {settings:?}\n{text}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn twins_have_their_events_together_whatever_their_neighbours_are() {
+    for (rate, level) in [("1 - x^3", 0.9), ("x*cos(x)", 1.4), ("1/(1 + x^2)", 2.0), ("exp(-x)", 1.1)] {
+        for tolerance in [1e-4, 1e-6, 1e-9] {
+            let text = format!(
+                "initial string: A(0.1, 0) A(0.1, 1) D(0)\nC(b, m) < A(x, n): solve dx/dt = 0\n\
+                 A(x, n) > D(z):\n  solve dx/dt = {rate}, dn/dt = z - x*n\n  if x = {level} produce C(t, n)\n\
+                 A(x, n):\n  solve dx/dt = {rate}\n  if x = {level} produce C(t, n)\n\
+                 A(x, n) < D(z): solve dz/dt = x - z"
+            );
+            let settings = Settings { tolerance, ..Settings::default() };
+            let end = run(&text, settings, &[30.0]).unwrap_or_else(|e| panic!("{e}\n{text}"));
+            let names: String = end[0].iter().map(|module| module.0.as_str()).collect();
+            assert_eq!(names, "CCD", "{settings:?}\n{text}");
+        }
+    }
+}
