@@ -83,7 +83,8 @@ pub fn run(args: &RunArgs) -> Result<(), Failure> {
     events.map_or(Ok(()), EventLog::finish)?;
     out.flush().map_err(out_error)?;
     drop(out);
-    run.write_stats(&args.shared, clock, result?)
+    run.write_stats(&args.shared, clock, result?)?;
+    if args.verify.verify { super::verify::verify(&args.verify, &run) } else { Ok(()) }
 }
 
 /// Writes strings of modules as text.

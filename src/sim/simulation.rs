@@ -269,6 +269,11 @@ impl<'m> Simulation<'m> {
         Stats { modules: self.plant.tree.len() as u64, rhs_evaluations, ..self.stats }
     }
 
+    /// True if equations were stiff, so that the implicit method was taken.
+    pub fn has_been_stiff(&self) -> bool {
+        self.alone.is_implicit() || self.coupled.integrator.is_implicit()
+    }
+
     /// The heads of the rules whose rates could not be bounded somewhere, with the time: a rate that is large for a very
     /// short time there may have been overlooked.
     pub fn unbounded(&self) -> Vec<(String, f64)> {
