@@ -7,6 +7,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use super::fmt::FmtArgs;
 use super::new::NewArgs;
 use super::shell::{self, CompletionsArgs, ManArgs};
+use super::verify::VerifyArgs;
 use crate::export::{Camera, Layout, Page};
 use crate::lang::Setting;
 use crate::scene::Color;
@@ -185,6 +186,8 @@ pub struct ExplainArgs {
 pub struct RunArgs {
     #[command(flatten)]
     pub shared: SharedArgs,
+    #[command(flatten)]
+    pub verify: VerifyArgs,
     /// How strings, or measures, are printed
     #[arg(long, value_enum, default_value_t = TextFormat::Text)]
     pub format: TextFormat,
@@ -194,7 +197,7 @@ pub struct RunArgs {
     /// As text: number of specimens, mean, standard deviation (of a sample: divided by one less than their number),
     /// quantiles (between the two nearest values by proportion). As JSON: one line for each specimen, in the order of seeds, with
     /// seed, t (the times), and for each measure its values at these times.
-    #[arg(long, value_name = "A..B", value_parser = seeds, conflicts_with_all = ["seed", "events", "stats"])]
+    #[arg(long, value_name = "A..B", value_parser = seeds, conflicts_with_all = ["seed", "events", "stats", "verify"])]
     pub seeds: Option<Seeds>,
     /// What is measured of each specimen: 'F(x): x' is the sum of x over all modules F(x), 'F(x)' their number; can be
     /// repeated [default: the number of all modules]
@@ -377,6 +380,10 @@ pub struct ReportArgs {
     /// More modules than this are an error
     #[arg(long, value_name = "N", default_value_t = 10_000_000)]
     pub max_modules: usize,
+    /// Instead of the study: compute everything again by an independent way, as `dlsys run --verify` does, at each tolerance,
+    /// with the method `auto` or those of --methods. Exit status 1 if something differs by more than 100 tolerances
+    #[arg(long, conflicts_with_all = ["hard", "out", "step_sizes", "slices"])]
+    pub verify: bool,
     /// Run the hard cases: all *.dls files of a directory, or, without one, those that are built in. Exit
     /// status 1 if any fails
     #[arg(long, value_name = "DIR", num_args = 0..=1)]
@@ -518,7 +525,7 @@ fn time(text: &str) -> Result<f64, String> {
     }
 }
 
-fn positive(text: &str) -> Result<f64, String> {
+pub(super) fn positive(text: &str) -> Result<f64, String> {
     match number(text)? {
         x if x > 0.0 => Ok(x),
         _ => Err("must be greater than 0".to_owned()),

@@ -20,6 +20,7 @@ mod report;
 pub(crate) mod run;
 mod shell;
 mod specimens;
+mod verify;
 mod view;
 
 use clap::Parser;

@@ -24,7 +24,7 @@ pub fn report(args: &ReportArgs) -> Result<(), Failure> {
     if !args.cases.is_empty() {
         return Err(Failure::Usage("error: --case is for --hard\n".to_owned()));
     }
-    let mut names: BTreeMap<String, usize> = BTreeMap::new();
+    let (mut names, mut failed) = (BTreeMap::<String, usize>::new(), 0);
     for model in &args.models {
         let session = open(model, &args.settings, &args.include)?;
         let stem = model.file_stem().map_or("model".to_owned(), |s| s.to_string_lossy().into_owned());
@@ -32,9 +32,24 @@ pub fn report(args: &ReportArgs) -> Result<(), Failure> {
         let count = names.entry(stem.clone()).or_insert(0);
         *count += 1;
         let name = if *count == 1 { stem } else { format!("{stem}-{count}") };
-        study(args, &session, &name)?;
+        match args.verify {
+            true => failed += usize::from(!verify(args, &session)?),
+            false => study(args, &session, &name)?,
+        }
     }
-    Ok(())
+    match failed {
+        0 => Ok(()),
+        n => Err(Failure::Model(format!(
+            "error: {n} of {} not verified\n",
+            count_of(args.models.len(), "model")
+        ))),
+    }
+}
+
+/// Computes what a model comes to again, at each tolerance. True if all is well; what is not was said.
+fn verify(args: &ReportArgs, session: &Session) -> Result<bool, Failure> {
+    let tolerances = args.tolerances.clone().unwrap_or_else(Plan::default_tolerances);
+    super::verify::verify_all(args, session, &tolerances, &times(args, session)?, &print)
 }
 
 /// Studies a model that was read; `name` is that of its files.

@@ -85,7 +85,8 @@ pub fn run(args: &RunArgs) -> Result<(), Failure> {
     out.flush().map_err(out_error)?;
     drop(out);
     run.warn();
-    run.write_stats(&args.shared, clock, result?)
+    run.write_stats(&args.shared, clock, result?)?;
+    if args.verify.verify { super::verify::verify(&args.verify, &run) } else { Ok(()) }
 }
 
 /// Writes strings of modules as text.

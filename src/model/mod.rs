@@ -106,6 +106,18 @@ impl Model {
     }
 }
 
+impl Model {
+    /// What a kind's parameters are called: as in its first rule, else by their numbers.
+    pub fn parameter_names(&self, kind: KindId) -> Vec<String> {
+        let kind = self.kinds.get(kind);
+        match kind.all_rules().next() {
+            // Behind those that are written, there may be hidden ones.
+            Some(rule) => self.rules[rule].parameters[..kind.arity].to_vec(),
+            None => (1..=kind.arity).map(|i| i.to_string()).collect(),
+        }
+    }
+}
+
 impl Default for Model {
     /// The empty model: no modules, turns of 90 degrees.
     fn default() -> Model {

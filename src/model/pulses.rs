@@ -2,28 +2,42 @@
 //!
 //! A step resolves what it integrates, and polynomials of that. It does not resolve time, nor what follows a formula: that
 //! may do anything between two stages. So a rate may have flashes if it is no polynomial in what moves, or reads something
-//! that follows a formula other than a polynomial of time.
+//! that follows a formula. What grows or decays exponentially is fast at its beginning only, where a step begins, too; one that
+//! enters a rate linearly makes no flash.
 
 use super::analysis::Draft;
-use super::{Law, Model, Rule, Solve};
+use super::{Law, Model, Pattern, Rule};
 use crate::expr::{Graph, NodeId};
 
-/// Sets [`Solve::flashes`] in all rules. `moving` tells, by rule, which variables of the context move.
+/// How a parameter may move between the stages of a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+enum Pace {
+    /// It rests, is integrated, or is a polynomial of time.
+    #[default]
+    Resolved,
+    /// It grows or decays exponentially.
+    Exponential,
+    /// It follows any other formula.
+    Any,
+}
+
+/// Sets [`Solve::flashes`](super::Solve::flashes) in all rules. `moving` tells, by rule, which variables of the context move.
 pub fn find_flashes(graph: &mut Graph, model: &mut Model, drafts: &[Draft], moving: &[Vec<bool>]) {
-    let mut formulas: Vec<Vec<bool>> =
-        model.kinds.iter().map(|(_, kind)| vec![false; kind.width()]).collect();
+    let clauses: Vec<Vec<Vec<(usize, Pace)>>> =
+        model.rules.iter().zip(drafts).map(|(rule, draft)| paces(graph, rule, draft)).collect();
+    let mut kinds: Vec<Vec<Pace>> =
+        model.kinds.iter().map(|(_, kind)| vec![Pace::default(); kind.width()]).collect();
     for (id, kind) in model.kinds.iter() {
-        for solve in kind.rules.iter().flat_map(|rule| &model.rules[*rule].solves) {
-            for parameter in by_formula(solve) {
-                formulas[id.index()][parameter] = true;
-            }
+        for &(parameter, pace) in kind.rules.iter().flat_map(|rule| clauses[*rule].iter().flatten()) {
+            let known = &mut kinds[id.index()][parameter];
+            *known = pace.max(*known);
         }
     }
-    for ((rule, draft), moving) in model.rules.iter_mut().zip(drafts).zip(moving) {
-        let context = context_by_formula(rule, &formulas);
-        let terms_read: bool = (rule.aggregates.iter()).any(|aggregate| {
-            aggregate.pattern.kinds.iter().any(|kind| formulas[kind.index()].contains(&true))
-        });
+    for (((rule, draft), moving), clauses) in model.rules.iter_mut().zip(drafts).zip(moving).zip(&clauses) {
+        let context = context_paces(rule, &kinds);
+        let of_children: Pace = (rule.aggregates.iter())
+            .flat_map(|aggregate| aggregate.pattern.kinds.iter().flat_map(|kind| &kinds[kind.index()]))
+            .fold(Pace::default(), |most, pace| most.max(*pace));
         let (own, time) = (rule.parameters.len(), rule.variables - 2);
         for (number, solve) in rule.solves.iter_mut().enumerate() {
             let mut nodes: Vec<NodeId> = draft.rates[number].iter().map(|rate| rate.1).collect();
@@ -35,44 +49,66 @@ pub fn find_flashes(graph: &mut Graph, model: &mut Model, drafts: &[Draft], movi
             let summed =
                 (0..rule.aggregates.len()).filter(|i| read.contains(&((rule.first_aggregate + i) as u32)));
             nodes.extend(summed.map(|i| draft.terms[i]));
-            let formula_of: Vec<usize> = by_formula(solve).collect();
             let moved = |v: usize| match v {
                 v if v < own => solve.of.contains(&v) || solve.algebraic.of.contains(&v),
                 v if v < time => moving[v - own],
                 // Those of children come after all others.
                 v => v <= time + 1 || v >= rule.variables,
             };
-            let unresolved = |v: usize| match v {
-                v if v < own => formula_of.contains(&v),
-                v if v < time => context[v - own] || v >= rule.first_aggregate && terms_read,
-                _ => false,
+            let pace = |v: usize| match v {
+                v if v < own => {
+                    clauses[number].iter().find(|(p, _)| *p == v).map_or(Pace::default(), |p| p.1)
+                }
+                v if v < time => context[v - own],
+                v if v >= rule.variables => of_children,
+                _ => Pace::default(),
             };
             // What has a formula itself is integrated only where everything is.
             let rates = draft.rates[number].iter().zip(&solve.laws);
             let closed: Vec<NodeId> =
                 rates.filter(|(_, law)| law.is_closed()).map(|((_, node), _)| *node).collect();
-            solve.flashes = nodes.iter().any(|node| {
-                let reads_formula = || graph.variables(&[*node]).into_iter().any(|v| unresolved(v as usize));
-                !closed.contains(node) && reads_formula()
-                    || graph.polynomial(*node, |v| moved(v as usize)).is_none()
+            solve.flashes = nodes.iter().any(|&node| {
+                let Some(all) = graph.polynomial(node, |v| moved(v as usize)) else { return true };
+                let exponential = |powers: &[(u32, u32)]| {
+                    let of = powers.iter().filter(|(v, _)| pace(*v as usize) == Pace::Exponential);
+                    of.map(|(_, power)| power).sum::<u32>()
+                };
+                let any = || graph.variables(&[node]).into_iter().any(|v| pace(v as usize) == Pace::Any);
+                !closed.contains(&node) && (any() || all.terms.keys().any(|powers| exponential(powers) > 1))
             });
         }
     }
 }
 
-/// The parameters of a clause that follow formulas which are no polynomials.
-fn by_formula(solve: &Solve) -> impl Iterator<Item = usize> + '_ {
-    let laws = solve.laws.iter().zip(&solve.of);
-    let closed = laws.filter(|(law, _)| law.is_closed() && !matches!(law, Law::Polynomial(_)));
-    let given = solve.algebraic.of.iter().zip(&solve.algebraic.closed).filter(|(_, closed)| **closed);
-    closed.map(|(_, parameter)| *parameter).chain(given.map(|(parameter, _)| *parameter))
+/// The parameters of each clause that follow formulas which are no polynomials, and how.
+fn paces(graph: &mut Graph, rule: &Rule, draft: &Draft) -> Vec<Vec<(usize, Pace)>> {
+    let clauses = rule.solves.iter().zip(&draft.rates);
+    clauses
+        .map(|(solve, rates)| {
+            let mut all = Vec::new();
+            for ((parameter, rate), law) in rates.iter().zip(&solve.laws) {
+                let pace = match law {
+                    Law::Numeric(_) | Law::Polynomial(_) => continue,
+                    Law::Quadratic(_) => {
+                        let by_self = graph.polynomial(*rate, |v| v as usize == *parameter);
+                        if by_self.is_some_and(|p| p.degree() <= 1) { Pace::Exponential } else { Pace::Any }
+                    }
+                    _ => Pace::Any,
+                };
+                all.push((*parameter, pace));
+            }
+            all.extend(solve.algebraic.of.iter().map(|parameter| (*parameter, Pace::Any)));
+            all
+        })
+        .collect()
 }
 
-/// For each variable of the context: whether it follows such a formula in some kind that matches.
-fn context_by_formula(rule: &Rule, formulas: &[Vec<bool>]) -> Vec<bool> {
-    let mut all: Vec<bool> = (rule.left.iter().chain(&rule.right))
-        .flat_map(|pattern| (0..pattern.width).map(|p| pattern.kinds.iter().any(|k| formulas[k.index()][p])))
+/// The same of the variables of the context: in any kind that matches.
+fn context_paces(rule: &Rule, kinds: &[Vec<Pace>]) -> Vec<Pace> {
+    let of = |pattern: &Pattern, p: usize| pattern.kinds.iter().map(|kind| kinds[kind.index()][p]).max();
+    let mut all: Vec<Pace> = (rule.left.iter().chain(&rule.right))
+        .flat_map(|pattern| (0..pattern.width).map(move |p| of(pattern, p).unwrap_or_default()))
         .collect();
-    all.resize(rule.variables - 2 - rule.parameters.len(), false);
+    all.resize(rule.variables - 2 - rule.parameters.len(), Pace::default());
     all
 }

@@ -34,7 +34,7 @@ impl Names {
         let mut names = Names::default();
         for (id, kind) in model.kinds.iter().filter(|(id, _)| !id.is_bracket()) {
             names.kinds.push(kind.name.clone());
-            let own = parameter_names(model, id);
+            let own = model.parameter_names(id);
             names.plots.extend(own.iter().map(|parameter| format!("{}.{parameter}", kind.name)));
         }
         names.parameters = model.parameters.iter().map(|p| p.name.clone()).collect();
@@ -46,16 +46,6 @@ impl Names {
             list.dedup();
         }
         names
-    }
-}
-
-/// What a kind's parameters are called: as in its first rule, else by their numbers.
-pub fn parameter_names(model: &Model, kind: crate::model::KindId) -> Vec<String> {
-    let kind = model.kinds.get(kind);
-    match kind.rules.first() {
-        // Behind those that are written, there may be hidden ones.
-        Some(rule) => model.rules[*rule].parameters[..kind.arity].to_vec(),
-        None => (1..=kind.arity).map(|i| i.to_string()).collect(),
     }
 }
 

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use super::assist::parameter_names;
 use super::braille::Sheet;
 use super::commands;
 use super::desk::{Desk, Fault};
@@ -167,7 +166,7 @@ impl Stage<'_> {
         let model = &self.session.model;
         let Some((name, parameter)) = spec.rsplit_once('.').filter(|(name, _)| !name.is_empty()) else {
             let all = model.kinds.iter().find(|(id, _)| is_called(model, *id, spec));
-            let own = all.map(|(id, _)| parameter_names(model, id)).unwrap_or_default();
+            let own = all.map(|(id, _)| model.parameter_names(id)).unwrap_or_default();
             let example = own.first().map_or("F.x".to_owned(), |parameter| format!("{spec}.{parameter}"));
             return Err(Fault::new(format!("say which parameter, as in `plot {example}`")));
         };
@@ -189,7 +188,7 @@ impl Stage<'_> {
 
 /// The place of a parameter, by name or by number from 1.
 fn parameter_place(model: &Model, kind: KindId, parameter: &str) -> Result<usize, Fault> {
-    let names = parameter_names(model, kind);
+    let names = model.parameter_names(kind);
     let kind = model.kinds.get(kind);
     let number = parameter.parse::<usize>().ok().filter(|n| (1..=kind.arity).contains(n));
     if let Some(place) = names.iter().position(|name| name == parameter).or(number.map(|n| n - 1)) {

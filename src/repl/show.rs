@@ -1,6 +1,6 @@
 //! Commands about modules and texts: `list`, `show`, `inspect`, `events`.
 
-use super::assist::{coloured, parameter_names};
+use super::assist::coloured;
 use super::commands;
 use super::desk::{Desk, Fault};
 use super::stage::{Stage, misused};
@@ -200,7 +200,7 @@ impl Stage<'_> {
         out.push('\n');
         let names = match all.rule {
             Some(rule) => model.rules[rule].parameters.clone(),
-            None => parameter_names(model, all.module.kind),
+            None => model.parameter_names(all.module.kind),
         };
         let mut rows = Vec::new();
         for (i, value) in all.module.parameters.iter().enumerate() {

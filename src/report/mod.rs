@@ -1,4 +1,5 @@
-//! How good the answers are and what they cost: work-precision studies of any model, and the hard cases.
+//! How good the answers are and what they cost: work-precision studies of any model, the hard cases, and a second
+//! opinion on a run.
 //!
 //! ```text
 //! model × method × accuracy ──record──▶ Record ──compare with the reference──▶ Outcome ──▶ Study
@@ -12,6 +13,7 @@
 //! - `study`: all points of all methods of a model; `order`: the slope that they show.
 //! - `table`, `files`, `plot` (with `axis`): a study for people, for programs, for print.
 //! - `spread`, `band`: how measures of many specimens are distributed, as tables and as a plot.
+//! - `verify`: one run again by an independent way, for users who want to be sure of an answer.
 //! - `case`, `hard`, `cases`: models with exact answers in their first lines.
 //!
 //! Runs are made one after another, never in parallel, because they are timed.
@@ -30,6 +32,7 @@ mod reference;
 mod spread;
 mod study;
 mod table;
+mod verify;
 
 pub use band::band_svg;
 pub use case::{Case, CaseError, Expectation, Piece, Within};
@@ -44,3 +47,7 @@ pub use reference::{Reference, References};
 pub use spread::{Course, QUANTILES, Spread, spread_csv, spread_table};
 pub use study::{Outcome, Plan, Point, Series, Study, Wall, default_times, study};
 pub use table::{hard_table, mismatches, series_table, study_head, study_table};
+pub use verify::{
+    Gap, PROMISED, Pair, Productions, Split, Unverified, Verification, complaint, unverified,
+    verification_rows, verification_table, verify, way,
+};

@@ -11,7 +11,7 @@ use crate::session::Session;
 use crate::sim::Method;
 
 /// The tightest tolerance that can be asked for.
-const TIGHTEST: f64 = 1e-13;
+pub(super) const TIGHTEST: f64 = 1e-13;
 /// A tight run may take so many times as long as a point of the study.
 const PATIENCE: f64 = 3.0;
 

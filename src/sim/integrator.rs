@@ -84,6 +84,11 @@ impl Integrator {
         }
     }
 
+    /// True if the implicit method was taken.
+    pub fn is_implicit(&self) -> bool {
+        self.implicit.is_some()
+    }
+
     /// Evaluations of one module's equations so far.
     pub fn evaluations(&self) -> u64 {
         self.workspace.evaluations

@@ -270,6 +270,11 @@ impl<'m> Simulation<'m> {
         Stats { modules, unbounded, rhs_evaluations, ..self.stats }
     }
 
+    /// True if equations were stiff, so that the implicit method was taken.
+    pub fn has_been_stiff(&self) -> bool {
+        self.alone.is_implicit() || self.coupled.integrator.is_implicit()
+    }
+
     /// What there is to say of the run so far: rules whose rates could not be bounded somewhere, so that a rate that is large
     /// there for a very short time may have been overlooked.
     pub fn remarks(&self) -> Vec<Diagnostic> {

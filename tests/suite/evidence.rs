@@ -76,7 +76,7 @@ fn thresholds_short_of_a_limit_are_reached() {
         };
         let t =
             first_event(&exponential(&format!("1 - {short:?}")), Settings::default(), 1e3).expect("it runs");
-        let exact = -(1.0 - (1.0 - short)).ln();
+        let exact = -f64::ln(1.0 - (1.0 - short));
         assert!(t.is_some_and(|t| (t - exact).abs() < 1e-2 * exact), "{short}: {t:?}, not {exact}");
         assert_eq!(first_event(&exponential("1"), Settings::default(), 1e3).expect("it runs"), None);
         let slow = |level: &str| {

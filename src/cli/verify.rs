@@ -1,0 +1,109 @@
+//! `dlsys run --verify` and `dlsys report --verify`: the answer is computed again by an independent way.
+//!
+//! The table of a run goes to standard error: what is on standard output is the same with the flag and without it.
+
+use clap::Args;
+
+use super::args::{ReportArgs, positive};
+use super::common::{Failure, Run, coloured, count_of, tell};
+use super::progress::Progress;
+use crate::report::{
+    Unverified, complaint, unverified, verification_rows, verification_table, verify as compare,
+};
+use crate::session::Session;
+use crate::sim::{Method, Settings};
+
+#[derive(Debug, Args)]
+pub struct VerifyArgs {
+    /// Compute everything again by an independent way and compare; exit with status 1 if something differs by more than
+    /// 100 tolerances
+    ///
+    /// The other way has another method, which integrates what has formulas, too, a hundredth of the tolerance, and one
+    /// clock for all modules. Compared are all parameters at the observed times, relative to max(1, |value|), and the time and
+    /// the order of all productions. The table of differences, in units of `--tolerance`, goes to standard error. If no
+    /// other way comes to the last time, nothing is verified: status 1.
+    #[arg(long)]
+    pub verify: bool,
+    /// With --verify: seconds that another way may take
+    #[arg(long, value_name = "S", allow_negative_numbers = true, default_value = "60", value_parser = positive, requires = "verify")]
+    pub time_limit: f64,
+}
+
+fn failure(session: &Session, why: Unverified) -> Failure {
+    match why {
+        Unverified::Fault(error) => Failure::Model(error.diagnostic().render(&session.source, coloured())),
+        Unverified::NoOtherWay(refused) => Failure::Model(unverified(&refused)),
+    }
+}
+
+/// Verifies a run that is done.
+pub fn verify(args: &VerifyArgs, run: &Run) -> Result<(), Failure> {
+    let mut progress = Progress::new("verifying", 0);
+    let session = &run.session;
+    let found = compare(session, run.settings, &run.times, args.time_limit, &mut |what| progress.say(what));
+    drop(progress);
+    let found = found.map_err(|why| failure(session, why))?;
+    tell(&verification_table(&session.model, &found));
+    match complaint(&session.model, &found) {
+        Some(message) => Err(Failure::Model(format!("\n{message}"))),
+        None => Ok(()),
+    }
+}
+
+/// Verifies each method of a report at each of its tolerances, and prints the table. True if all is well; if not, the first
+/// complaint was said.
+pub fn verify_all(
+    args: &ReportArgs,
+    session: &Session,
+    tolerances: &[f64],
+    times: &[f64],
+    print: &dyn Fn(&str) -> Result<(), Failure>,
+) -> Result<bool, Failure> {
+    let methods = args.methods.clone().unwrap_or_else(|| vec![Method::Auto]);
+    if let Some(fixed) = methods.iter().find(|m| m.is_fixed_step()) {
+        let name = crate::report::method_name(*fixed);
+        return Err(Failure::Usage(format!(
+            "error: a report is verified at its tolerances, and `{name}` has a fixed step; verify a run: `dlsys run … --verify`\n"
+        )));
+    }
+    let all = methods.iter().flat_map(|&method| {
+        tolerances.iter().map(move |&tolerance| Settings {
+            method,
+            tolerance,
+            max_modules: args.max_modules,
+            ..Settings::default()
+        })
+    });
+    let all: Vec<Settings> = all.collect();
+    let mut progress = Progress::new("verifying", all.len());
+    let (mut rows, mut failed, mut wrong) = (Vec::new(), String::new(), 0);
+    for settings in &all {
+        match compare(session, *settings, times, args.time_limit, &mut |what| progress.say(what)) {
+            Ok(found) => {
+                if let Some(message) = complaint(&session.model, &found) {
+                    wrong += 1;
+                    failed = if failed.is_empty() { message } else { failed };
+                }
+                rows.push((*settings, Ok(found)));
+            }
+            Err(why) => {
+                wrong += 1;
+                rows.push((*settings, Err(why.clone())));
+                if let (true, Failure::Model(message)) = (failed.is_empty(), failure(session, why)) {
+                    failed = message;
+                }
+            }
+        }
+        progress.inc();
+    }
+    drop(progress);
+    print(&verification_rows(session, times, &rows))?;
+    tell(&failed);
+    if wrong > 1 {
+        tell(&format!(
+            "error: {wrong} of {} are not verified; this is the first\n\n",
+            count_of(rows.len(), "run")
+        ));
+    }
+    Ok(wrong == 0)
+}
