@@ -52,8 +52,7 @@ pub fn repl(args: &ReplArgs) -> Result<(), Failure> {
         tolerance: args.tolerance,
         step_size: args.step_size.unwrap_or(defaults.step_size),
         seed: args.seed,
-        max_modules: args.max_modules,
-        ..defaults
+        ..args.budget.settings()
     };
     let mut desk = Desk::new(settings, args.include.folders.clone(), screen);
     let mut log = Log { echo: args.echo, interactive, ..Log::default() };

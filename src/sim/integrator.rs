@@ -122,6 +122,10 @@ impl Integrator {
             None if control.size > 0.0 => control.size.max(64.0 * start.resolution()),
             None => self.workspace.first_size(method, system, y, tolerance),
         };
+        // A step that time cannot tell would be made for ever.
+        if grid.is_some() && h <= 0.5 * start.resolution() {
+            return Err(StepError::TooSmall(self.workspace.worst(y)));
+        }
         let room = limit.map_or(f64::INFINITY, |limit| limit.since(start));
         let mut rejected = false;
         loop {
