@@ -267,6 +267,9 @@ pub struct RenderArgs {
     /// Background of pictures: "#rrggbb" or none (transparent) [default: #fbfaf5]
     #[arg(long, value_name = "COLOUR", value_parser = background)]
     pub background: Option<Background>,
+    /// More bytes than this, in all files of the render, are an error, such as 500MB
+    #[arg(long, value_name = "BYTES", default_value = "10GB", value_parser = bytes)]
+    pub max_output: u64,
     /// Threads that draw and write while the simulation goes on; files do not depend on it [default: one for each core]
     #[arg(long, value_name = "N", value_parser = threads)]
     pub threads: Option<usize>,

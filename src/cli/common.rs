@@ -267,10 +267,10 @@ impl Run {
             let (h, steps) = (settings.step_size, end / settings.step_size);
             if steps > settings.max_events as f64 {
                 return Err(Failure::Usage(format!(
-                    "error: {h} is too short a step: it takes {steps:.1e} of them up to t = {end}, and {} are the most\n\n  \
+                    "error: {h:e} is too short a step: it takes {steps:.1e} of them up to t = {end}, and {} are the most\n\n  \
                      = help: if this is meant, allow more: `--max-events {:.0e}`\n",
                     settings.max_events,
-                    10.0 * steps.min(1e308)
+                    steps.min(1e308)
                 )));
             }
         }

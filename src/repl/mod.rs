@@ -89,6 +89,7 @@ pub fn repl(args: &ReplArgs) -> Result<(), Failure> {
         log.take(set, &mut desk, None)?;
         start = play(&mut stage, &mut desk, &mut input, &mut log)?;
     }
+    crate::rescue::remember(None);
     if interactive && !desk.draft.is_saved() {
         desk.say("The model was not saved; the history has what was typed.\n")?;
     }
@@ -118,6 +119,7 @@ fn play(stage: &mut Stage, desk: &mut Desk, input: &mut Input, log: &mut Log) ->
         if log.echo && !log.interactive {
             desk.say(&echo(&statement))?;
         }
+        crate::rescue::remember((!desk.draft.is_saved()).then_some(&desk.draft.text));
         let done = stage.obey(&statement, desk);
         if let Some(flow) = log.take(done, desk, Some(&statement))?
             && !matches!(flow, Flow::On)

@@ -210,7 +210,10 @@ impl Error {
             }
             Error::TooManyEvents { foreseen: Some((count, _)), .. } => d
                 .help("a life, a rate or a step size is out of proportion to the times that are observed: compare their units")
-                .help(format!("if this is meant, allow more: `--max-events {:.0e}`", count.max(1.0))),
+                .help_opt(
+                    // What would take years is not meant.
+                    (*count < 1e15).then(|| format!("if this is meant, allow more: `--max-events {count:.0e}`")),
+                ),
             Error::OutOfTime { limit, .. } => {
                 d.help(format!("if it is worth waiting for, allow more: `--max-seconds {}`", limit * 10.0))
             }

@@ -2,6 +2,7 @@
 //!
 //! - [`book`]: the book in `docs/`, followed literally; [`pages`] reads its Markdown.
 //! - [`light`]: modules with formulas only, the quick way against the general one.
+//! - [`limits`]: what runs away, extreme numbers, killed processes, full disks, little memory.
 //! - [`listings`]: the paper's models against results of an independent program.
 //! - [`algebraic`], [`signals`]: values and equations instead of rates; sums over what is attached; contexts with branches.
 //! - [`semantics`]: what happens when (events, contexts, errors of a run), model by small model.
@@ -37,6 +38,7 @@ mod gallery;
 mod inspect;
 mod language;
 mod light;
+mod limits;
 mod listings;
 mod organs;
 mod pages;
