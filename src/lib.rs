@@ -65,6 +65,8 @@
 //! | [`repl`] | the interactive session |
 //! | [`report`] | how good the answers are, and what they cost |
 //! | [`cli`] | the program |
+//! | [`memory`] | whether there is memory for what comes next |
+//! | [`rescue`] | what is said and saved when the program is at fault |
 //! | [`diagnostic`] | messages that point at the text |
 //!
 //! Imports go down this arrow and never back; `lang`, `sim`, `turtle` and `export` do not know one another.
@@ -76,10 +78,12 @@ pub mod export;
 pub mod expr;
 pub mod interrupt;
 pub mod lang;
+pub mod memory;
 pub mod model;
 pub mod repl;
 pub mod replay;
 pub mod report;
+pub mod rescue;
 pub mod scene;
 pub mod session;
 pub mod sim;

@@ -11,7 +11,7 @@ use super::verify::VerifyArgs;
 use crate::export::{Camera, Layout, Page};
 use crate::lang::Setting;
 use crate::scene::Color;
-use crate::sim::Method;
+use crate::sim::{Method, Settings};
 
 /// Differential L-systems: plants as growing strings of modules, whose parameters follow differential
 /// equations and whose productions fire when a trajectory reaches the boundary of its domain.
@@ -148,6 +148,8 @@ pub struct CheckArgs {
     /// a jump is a finding, not a fault
     #[arg(long, value_enum, requires = "continuity")]
     pub deny: Option<Order>,
+    #[command(flatten)]
+    pub budget: BudgetArgs,
 }
 
 /// Where else files are looked for that a model names.
@@ -268,6 +270,9 @@ pub struct RenderArgs {
     /// Background of pictures: "#rrggbb" or none (transparent) [default: #fbfaf5]
     #[arg(long, value_name = "COLOUR", value_parser = background)]
     pub background: Option<Background>,
+    /// More bytes than this, in all files of the render, are an error, such as 500MB
+    #[arg(long, value_name = "BYTES", default_value = "10GB", value_parser = bytes)]
+    pub max_output: u64,
     /// Threads that draw and write while the simulation goes on; files do not depend on it [default: one for each core]
     #[arg(long, value_name = "N", value_parser = threads)]
     pub threads: Option<usize>,
@@ -377,9 +382,8 @@ pub struct ReportArgs {
     /// Seconds that a run may take; a point that would take longer, judged from the one before, is left out
     #[arg(long, value_name = "S", allow_negative_numbers = true, default_value = "10", value_parser = positive)]
     pub time_limit: f64,
-    /// More modules than this are an error
-    #[arg(long, value_name = "N", default_value_t = 10_000_000)]
-    pub max_modules: usize,
+    #[command(flatten)]
+    pub budget: BudgetArgs,
     /// Instead of the study: compute everything again by an independent way, as `dlsys run --verify` does, at each tolerance,
     /// with the method `auto` or those of --methods. Exit status 1 if something differs by more than 100 tolerances
     #[arg(long, conflicts_with_all = ["hard", "out", "step_sizes", "slices"])]
@@ -414,12 +418,44 @@ pub struct ReplArgs {
     /// Seed of random numbers, for models that draw them: the same seed gives the same plant
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
-    /// More modules than this are an error
-    #[arg(long, value_name = "N", default_value_t = 10_000_000)]
-    pub max_modules: usize,
+    #[command(flatten)]
+    pub budget: BudgetArgs,
     /// Print each line before what it does, as on a terminal; for transcripts
     #[arg(long)]
     pub echo: bool,
+}
+
+/// What a run may take, so that what runs away ends with a message.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct BudgetArgs {
+    /// More modules than this are an error
+    #[arg(long, value_name = "N", default_value_t = Settings::MODULES)]
+    pub max_modules: usize,
+    /// More productions and steps than this are an error, such as 1e12
+    ///
+    /// So is a run in which time hardly goes on, such that it would take a hundred times as many.
+    #[arg(long, value_name = "N", default_value = "1e10", value_parser = events)]
+    pub max_events: u64,
+    /// A simulation that takes longer than this is an error [default: none does]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
+    pub max_seconds: Option<f64>,
+    /// A simulation for which dlsys would take more memory than this is an error, such as 500MB or 8GB [default: what the
+    /// system has]
+    #[arg(long, value_name = "BYTES", value_parser = bytes)]
+    pub max_memory: Option<u64>,
+}
+
+impl BudgetArgs {
+    /// Settings with these limits.
+    pub fn settings(&self) -> Settings {
+        Settings {
+            max_modules: self.max_modules,
+            max_events: self.max_events,
+            max_seconds: self.max_seconds.unwrap_or(f64::INFINITY),
+            max_memory: self.max_memory.unwrap_or(u64::MAX),
+            ..Settings::default()
+        }
+    }
 }
 
 /// Flags of everything that runs a model.
@@ -462,9 +498,8 @@ pub struct SharedArgs {
     /// Seed of random numbers, for models that draw them: the same seed gives the same plant
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
-    /// More modules than this are an error
-    #[arg(long, value_name = "N", default_value_t = 10_000_000)]
-    pub max_modules: usize,
+    #[command(flatten)]
+    pub budget: BudgetArgs,
     /// Write times and counts of work as JSON
     #[arg(long, value_name = "FILE")]
     pub stats: Option<PathBuf>,
@@ -515,6 +550,32 @@ fn number(text: &str) -> Result<f64, String> {
             }
             _ => "not a number".to_owned(),
         }),
+    }
+}
+
+/// A number of things, which may be written as 1e12.
+fn events(text: &str) -> Result<u64, String> {
+    match number(text)? {
+        n if n >= 1.0 && n.fract() == 0.0 => Ok(n as u64),
+        _ => Err("must be a whole number from 1".to_owned()),
+    }
+}
+
+/// A number of bytes with its unit: 500MB, 2GB.
+fn bytes(text: &str) -> Result<u64, String> {
+    let text = text.trim();
+    let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
+    let unit = match text[digits.len()..].to_ascii_lowercase().as_str() {
+        "" | "b" => 1.0,
+        "kb" | "k" => 1e3,
+        "mb" | "m" => 1e6,
+        "gb" | "g" => 1e9,
+        "tb" | "t" => 1e12,
+        _ => return Err("expected a number of bytes, such as 500MB or 2GB".to_owned()),
+    };
+    match number(digits).map_err(|_| "expected a number of bytes, such as 500MB or 2GB")? * unit {
+        n if n >= 1.0 => Ok(n as u64),
+        _ => Err("must be at least one byte".to_owned()),
     }
 }
 

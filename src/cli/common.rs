@@ -218,9 +218,8 @@ pub fn settings(args: &SharedArgs) -> Result<Settings, Failure> {
         tolerance: args.tolerance,
         step_size: args.step_size.unwrap_or(defaults.step_size),
         seed: args.seed,
-        max_modules: args.max_modules,
         log: args.events.is_some(),
-        ..defaults
+        ..args.budget.settings()
     })
 }
 
@@ -263,6 +262,17 @@ impl Run {
                 "error: {slice} is too short a slice: it takes {:.1e} of them up to t = {end}, and {MAX_SLICES:e} are the most\n",
                 end / slice
             )));
+        }
+        if let Some(end) = times.last().filter(|_| settings.method.is_fixed_step()) {
+            let (h, steps) = (settings.step_size, end / settings.step_size);
+            if steps > settings.max_events as f64 {
+                return Err(Failure::Usage(format!(
+                    "error: {h:e} is too short a step: it takes {steps:.1e} of them up to t = {end}, and {} are the most\n\n  \
+                     = help: if this is meant, allow more: `--max-events {:.0e}`\n",
+                    settings.max_events,
+                    steps.min(1e308)
+                )));
+            }
         }
         Ok(Run { session, remarks: Mutex::default(), times, settings, clock: Clock::default() })
     }

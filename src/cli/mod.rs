@@ -1,7 +1,7 @@
 //! The command line: `dlsys check`, `explain`, `run`, `render`, `view`, `gallery`, `report` and `repl`; `new`, `fmt`; `completions`,
 //! `man`.
 //!
-//! Exit status: 0 done; 1 the model or the run is at fault; 2 the command line is.
+//! Exit status: 0 done; 1 the model or the run is at fault; 2 the command line is; 101 dlsys itself is.
 
 pub(crate) mod args;
 pub(crate) mod common;
@@ -25,11 +25,23 @@ mod view;
 
 use clap::Parser;
 
+use crate::rescue;
 use args::{Action, Command};
 use common::{Failure, tell};
 
 /// Runs the command line of this process; returns its exit status.
 pub fn main() -> u8 {
+    rescue::guarded(&std::env::temp_dir(), command_line).unwrap_or_else(|message| {
+        tell(&message);
+        rescue::STATUS
+    })
+}
+
+fn command_line() -> u8 {
+    #[cfg(debug_assertions)]
+    if std::env::var_os("DLSYS_PANIC").is_some_and(|what| what == "at once") {
+        panic!("asked for");
+    }
     let command = match Command::try_parse() {
         Ok(command) => command,
         Err(error) => {

@@ -62,7 +62,7 @@ pub fn study(args: &ReportArgs, session: &Session, name: &str) -> Result<(), Fai
         times: times(args, session)?,
         runs: args.runs,
         time_limit: args.time_limit,
-        max_modules: args.max_modules,
+        base: args.budget.settings(),
     };
     let progress = RefCell::new(Progress::of_printed(name, plan.points(session)));
     // Each method's block is printed when it is there.

@@ -67,12 +67,7 @@ pub fn verify_all(
         )));
     }
     let all = methods.iter().flat_map(|&method| {
-        tolerances.iter().map(move |&tolerance| Settings {
-            method,
-            tolerance,
-            max_modules: args.max_modules,
-            ..Settings::default()
-        })
+        tolerances.iter().map(move |&tolerance| Settings { method, tolerance, ..args.budget.settings() })
     });
     let all: Vec<Settings> = all.collect();
     let mut progress = Progress::new("verifying", all.len());

@@ -131,7 +131,9 @@ fn record(run: &Run, accuracy: Option<f64>) -> Result<Recording, Failure> {
     let mut fit = survey.fit();
     run.note_what_is_seen(fit.bounds.is_some());
     run.warn();
-    fit.accuracy = accuracy.unwrap_or(fit.accuracy);
+    if let Some(accuracy) = accuracy {
+        fit = fit.with_accuracy(accuracy);
+    }
     let (model, source) = (&run.session.model, &run.session.source);
     let name =
         Path::new(&source.name).file_name().map_or(source.name.clone(), |n| n.to_string_lossy().into());

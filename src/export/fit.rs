@@ -44,6 +44,10 @@ impl Survey {
     pub fn fit(&self) -> Fit {
         let default_width = self.space.default_width();
         let extent = self.space.extent();
+        let bounds = self.space.corners(default_width);
+        // Where stems are wider than everything is long, their width is what there is to see.
+        let whole = bounds.map_or(0.0, |[low, high]| (high - low).max());
+        let size = extent.max(whole - extent);
         let shadow = self.seen.shadow(default_width);
         let camera = match (self.field, &shadow) {
             (Some(field), Some(shadow)) => Camera::perspective(self.view, field, shadow),
@@ -54,8 +58,8 @@ impl Survey {
             camera,
             default_width,
             extent,
-            accuracy: extent * Fit::ACCURACY,
-            bounds: self.space.corners(default_width),
+            accuracy: size * Fit::ACCURACY,
+            bounds,
             picture: Picture::around(shadow.map(|shadow| camera.frame(&shadow))),
             light: Light::new(depths, extent),
         }
@@ -83,6 +87,14 @@ pub struct Fit {
 impl Fit {
     /// The default accuracy, in parts of the extent: half a pixel of a picture of a thousand.
     pub const ACCURACY: f64 = 1.0 / 2000.0;
+
+    /// The accuracy if this one is asked for: no finer than what the last digits of coordinates can show.
+    pub fn with_accuracy(self, accuracy: f64) -> Fit {
+        /// Files tell apart a millionth of the extent.
+        const FINEST: f64 = 5e-7;
+        let size = self.accuracy / Fit::ACCURACY;
+        Fit { accuracy: accuracy.max(size * FINEST), ..self }
+    }
 
     /// Opposite corners of the box around one scene, lines having their width.
     pub fn bounds_of(&self, scene: &Scene) -> Option<[Point; 2]> {

@@ -9,6 +9,8 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::{GENERATOR, Manifest};
 
@@ -31,6 +33,10 @@ pub enum Error {
     Foreign { directory: PathBuf, file: String },
     #[error("{} is not of an earlier render and is not overwritten; choose another directory", .0.display())]
     Taken(PathBuf),
+    #[error("another render is writing to {}; wait for its end, or choose another directory", .0.display())]
+    Busy(PathBuf),
+    #[error("the files of this render are larger than {limit} bytes")]
+    TooLarge { limit: u64 },
     #[error("{} is not a directory; choose another name", .0.display())]
     NotADirectory(PathBuf),
     #[error("`{0}` cannot be the name of a file of a render")]
@@ -55,7 +61,27 @@ pub struct FrameDirectory {
     written: Vec<String>,
     /// Their bytes.
     bytes: u64,
+    /// Most bytes of all files, and how many there are so far, those that are being written included.
+    limit: u64,
+    spent: Arc<AtomicU64>,
     journal: fs::File,
+    /// Held while the directory is written to; given back by the system when the process ends, however it does.
+    _lock: Option<fs::File>,
+}
+
+/// Claims a directory for a render. Where the file system knows no locks there is none.
+fn lock(path: &Path) -> Result<Option<fs::File>, Error> {
+    // Of a directory where it can be opened, so that nothing is left behind; else of a file in it.
+    let opened = match cfg!(unix) {
+        true => fs::File::open(path),
+        false => fs::OpenOptions::new().create(true).append(true).open(path.join(format!("{TEMPORARY}lock"))),
+    };
+    let Ok(file) = opened else { return Ok(None) };
+    match file.try_lock() {
+        Ok(()) => Ok(Some(file)),
+        Err(fs::TryLockError::WouldBlock) => Err(Error::Busy(path.to_owned())),
+        Err(fs::TryLockError::Error(_)) => Ok(None),
+    }
 }
 
 impl FrameDirectory {
@@ -70,6 +96,7 @@ impl FrameDirectory {
             Ok(_) => {}
             Err(_) => fs::create_dir_all(path).map_err(io_error("make the directory", path))?,
         }
+        let claimed = lock(path)?;
         let present = list(path)?;
         let mut ours = listed_by_manifest(&path.join(MANIFEST));
         ours.extend(listed_by_journal(&path.join(JOURNAL)));
@@ -80,7 +107,8 @@ impl FrameDirectory {
         {
             return Err(Error::Foreign { directory: path.to_owned(), file: file.clone() });
         }
-        for name in present.iter().filter(|name| name.starts_with(TEMPORARY)) {
+        let is_lock = |name: &str| name.strip_prefix(TEMPORARY) == Some("lock");
+        for name in present.iter().filter(|name| name.starts_with(TEMPORARY) && !is_lock(name)) {
             let file = path.join(name);
             fs::remove_file(&file).map_err(io_error("remove", &file))?;
         }
@@ -96,7 +124,22 @@ impl FrameDirectory {
         let journal =
             fs::OpenOptions::new().append(true).open(&journal).map_err(io_error("open", &journal))?;
         let foreign = present.iter().filter(foreign).cloned().collect();
-        Ok(FrameDirectory { path: path.to_owned(), earlier, foreign, written: Vec::new(), bytes: 0, journal })
+        Ok(FrameDirectory {
+            path: path.to_owned(),
+            earlier,
+            foreign,
+            written: Vec::new(),
+            bytes: 0,
+            limit: u64::MAX,
+            spent: Arc::default(),
+            journal,
+            _lock: claimed,
+        })
+    }
+
+    /// Writes no more than so many bytes in all.
+    pub fn limited(self, limit: u64) -> FrameDirectory {
+        FrameDirectory { limit, ..self }
     }
 
     /// Name of a frame: `frame-0000.svg`. All frames of a render of `count` have the same number of digits,
@@ -123,7 +166,7 @@ impl FrameDirectory {
 
     /// Where files are written before they have a name.
     pub fn staging(&self) -> Staging {
-        Staging { path: self.path.clone() }
+        Staging { path: self.path.clone(), limit: self.limit, spent: self.spent.clone() }
     }
 
     fn check(&self, name: &str) -> Result<(), Error> {
@@ -180,6 +223,29 @@ impl FrameDirectory {
 #[derive(Clone, Debug)]
 pub struct Staging {
     path: PathBuf,
+    limit: u64,
+    spent: Arc<AtomicU64>,
+}
+
+/// A file that is being written, as long as there is room for it.
+pub struct Measured<'f> {
+    file: &'f mut fs::File,
+    staging: &'f Staging,
+}
+
+impl Write for Measured<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let before = self.staging.spent.fetch_add(bytes.len() as u64, Ordering::Relaxed);
+        if before.saturating_add(bytes.len() as u64) > self.staging.limit {
+            return Err(io::Error::new(io::ErrorKind::QuotaExceeded, "too many bytes"));
+        }
+        self.file.write_all(bytes)?;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
 }
 
 impl Staging {
@@ -187,9 +253,13 @@ impl Staging {
     ///
     /// # Errors
     /// If it cannot be made, and those of `fill`.
-    pub fn write(&self, fill: impl FnOnce(&mut fs::File) -> io::Result<()>) -> Result<Staged, Error> {
+    pub fn write(&self, fill: impl FnOnce(&mut Measured<'_>) -> io::Result<()>) -> Result<Staged, Error> {
         let mut file = aside(&self.path)?;
-        fill(file.as_file_mut()).map_err(io_error("write to", &self.path))?;
+        let filled = fill(&mut Measured { file: file.as_file_mut(), staging: self });
+        if filled.is_err() && self.spent.load(Ordering::Relaxed) > self.limit {
+            return Err(Error::TooLarge { limit: self.limit });
+        }
+        filled.map_err(io_error("write to", &self.path))?;
         Ok(Staged(file))
     }
 }
@@ -208,6 +278,10 @@ impl Staged {
 /// Writes a file aside and renames it.
 pub fn replace(directory: &Path, name: &str, bytes: &[u8]) -> Result<(), Error> {
     let target = directory.join(name);
+    // A device or a pipe is written to; a file in its place would be the end of it.
+    if fs::metadata(&target).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
+        return fs::write(&target, bytes).map_err(io_error("write", &target));
+    }
     let mut file = aside(directory)?;
     file.write_all(bytes).map_err(io_error("write", &target))?;
     Staged(file).persist(&target)
@@ -303,6 +377,39 @@ mod tests {
         let manifest: serde_json::Value = serde_json::from_slice(&text).expect("JSON");
         assert_eq!(manifest["files"], serde_json::json!(["frame-0000.svg"]));
         assert_eq!(manifest["settings"]["format"], "svg");
+    }
+
+    #[test]
+    fn two_renders_do_not_share_a_directory() {
+        let home = tempfile::tempdir().expect("a directory");
+        let first = FrameDirectory::create(home.path(), false).expect("new");
+        let second = FrameDirectory::create(home.path(), false);
+        assert!(matches!(second, Err(Error::Busy(_))), "{second:?}");
+        drop(first);
+        render(home.path(), 1, false).expect("given back");
+        assert_eq!(names(home.path()), ["frame-0000.svg", "manifest.json"]);
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_device_is_written_to_and_stays_a_device() {
+        // By way of a link of our own: no test touches what belongs to the system.
+        let home = tempfile::tempdir().expect("a directory");
+        let link = home.path().join("page.html");
+        std::os::unix::fs::symlink("/dev/null", &link).expect("a link");
+        replace(home.path(), "page.html", b"text").expect("written");
+        let kept = fs::symlink_metadata(&link).expect("there").file_type().is_symlink();
+        assert!(kept && fs::read(&link).expect("readable").is_empty());
+    }
+
+    #[test]
+    fn more_bytes_than_are_allowed_are_not_written() {
+        let home = tempfile::tempdir().expect("a directory");
+        let mut directory = FrameDirectory::create(home.path(), false).expect("new").limited(1000);
+        directory.write("frame-0000.svg", &[b'x'; 900]).expect("there is room");
+        let error = directory.write("frame-0001.svg", &[b'x'; 101]).expect_err("too many");
+        assert!(matches!(error, Error::TooLarge { limit: 1000 }), "{error}");
+        assert!(!home.path().join("frame-0001.svg").exists());
     }
 
     #[test]

@@ -42,6 +42,9 @@ pub(super) fn write(
     out: &mut (dyn Write + Send),
 ) -> io::Result<()> {
     let solid = Solid::new(scene, fit, sides);
+    if solid.counts.contains(&u32::MAX) {
+        return Err(io::Error::other("a mesh has at most 4e9 points: choose a coarser accuracy"));
+    }
     let names = Names::new(scene, '.');
     let order = solid.by_owner();
     let points = solid.parts(0..solid.len(), PART);

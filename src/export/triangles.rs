@@ -100,7 +100,7 @@ impl<'s> Solid<'s> {
         let mut counts = tubes.counts;
         let mut number = |vertices: usize, normals: usize| {
             let first = counts;
-            counts = [counts[0] + vertices as u32, counts[1] + normals as u32];
+            counts = [counts[0].saturating_add(vertices as u32), counts[1].saturating_add(normals as u32)];
             first
         };
         let polygons = scene.polygons.iter().map(|polygon| number(polygon.vertices.len(), 1)).collect();

@@ -156,7 +156,7 @@ impl<'s> Tubes<'s> {
         let end = if last { shape.dome(radii[1]) } else { [ring; 2] };
         self.pieces.push(Piece { segment, profile, radii, section, begins, last, first: self.counts });
         for (count, (a, b)) in self.counts.iter_mut().zip(start.into_iter().zip(end)) {
-            *count += a + b;
+            *count = count.saturating_add(a.saturating_add(b));
         }
     }
 

@@ -222,6 +222,11 @@ impl Successor {
         self.places.get(place).filter(|(known, _)| *known == kind).map(|(_, span)| *span)
     }
 
+    /// Number of the parameters of all its modules, hidden ones included.
+    pub fn width(&self) -> usize {
+        self.arguments.outputs() + self.clocks.len()
+    }
+
     /// Computes the arguments of a string without chance.
     pub fn evaluate<T: Value>(&self, variables: &[T], scratch: &mut Scratch<T>, out: &mut Vec<T>) {
         out.clear();

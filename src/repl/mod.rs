@@ -52,8 +52,7 @@ pub fn repl(args: &ReplArgs) -> Result<(), Failure> {
         tolerance: args.tolerance,
         step_size: args.step_size.unwrap_or(defaults.step_size),
         seed: args.seed,
-        max_modules: args.max_modules,
-        ..defaults
+        ..args.budget.settings()
     };
     let mut desk = Desk::new(settings, args.include.folders.clone(), screen);
     let mut log = Log { echo: args.echo, interactive, ..Log::default() };
@@ -90,6 +89,7 @@ pub fn repl(args: &ReplArgs) -> Result<(), Failure> {
         log.take(set, &mut desk, None)?;
         start = play(&mut stage, &mut desk, &mut input, &mut log)?;
     }
+    crate::rescue::remember(None);
     if interactive && !desk.draft.is_saved() {
         desk.say("The model was not saved; the history has what was typed.\n")?;
     }
@@ -119,6 +119,7 @@ fn play(stage: &mut Stage, desk: &mut Desk, input: &mut Input, log: &mut Log) ->
         if log.echo && !log.interactive {
             desk.say(&echo(&statement))?;
         }
+        crate::rescue::remember((!desk.draft.is_saved()).then_some(&desk.draft.text));
         let done = stage.obey(&statement, desk);
         if let Some(flow) = log.take(done, desk, Some(&statement))?
             && !matches!(flow, Flow::On)

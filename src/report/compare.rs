@@ -252,8 +252,13 @@ mod tests {
         let session = Session::from_text("pair.dls", &text, &[]).expect("good");
         let setup = Setup { method: Method::Dopri5, accuracy: Accuracy::Tolerance(1e-9) };
         let times = [0.5, 0.95, 2.0];
-        let record =
-            Task { session: &session, times: &times, limit: 10.0, max_modules: 100 }.record(setup, true);
+        let record = Task {
+            session: &session,
+            times: &times,
+            limit: 10.0,
+            base: crate::sim::Settings { max_modules: 100, ..Default::default() },
+        }
+        .record(setup, true);
         (session, record)
     }
 

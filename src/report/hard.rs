@@ -354,6 +354,9 @@ fn fault_name(fault: &sim::Error) -> &'static str {
         sim::Error::Unsolved { .. } => "Unsolved",
         sim::Error::PeriodTooShort { .. } => "PeriodTooShort",
         sim::Error::TooManyModules { .. } => "TooManyModules",
+        sim::Error::TooManyEvents { .. } => "TooManyEvents",
+        sim::Error::OutOfTime { .. } => "OutOfTime",
+        sim::Error::OutOfMemory { .. } => "OutOfMemory",
     }
 }
 

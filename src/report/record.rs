@@ -53,8 +53,8 @@ pub struct Setup {
 }
 
 impl Setup {
-    fn settings(self, max_modules: usize) -> Settings {
-        let mut settings = Settings { method: self.method, max_modules, ..Settings::default() };
+    fn settings(self, base: Settings) -> Settings {
+        let mut settings = Settings { method: self.method, ..base };
         match self.accuracy {
             Accuracy::Tolerance(x) => settings.tolerance = x,
             Accuracy::StepSize(x) => settings.step_size = x,
@@ -134,7 +134,8 @@ pub struct Task<'a> {
     pub times: &'a [f64],
     /// Seconds after which a run is stopped.
     pub limit: f64,
-    pub max_modules: usize,
+    /// What it may take.
+    pub base: Settings,
 }
 
 /// Brings a simulation on, and stops it when it takes too long.
@@ -226,7 +227,7 @@ impl<'a> Task<'a> {
         mut see: impl FnMut(&ModuleString),
     ) -> (f64, Option<Simulation<'a>>, Option<Stop>) {
         let mut driver = Driver::new(self.limit, self.end());
-        let settings = Settings { log, ..setup.settings(self.max_modules) };
+        let settings = Settings { log, ..setup.settings(self.base) };
         let mut simulation = match self.session.simulate(settings) {
             Ok(simulation) => simulation,
             Err(error) => return (driver.seconds(), None, Some(Stop::Fault(error))),

@@ -178,7 +178,12 @@ mod tests {
         let text = "initial string: A(0.1)\nA(x): solve dx/dt = x*(1 - x)";
         let session = Session::from_text("logistic.dls", text, &[]).expect("good");
         let times = [1.0, 3.0];
-        let task = Task { session: &session, times: &times, limit: 10.0, max_modules: 100 };
+        let task = Task {
+            session: &session,
+            times: &times,
+            limit: 10.0,
+            base: crate::sim::Settings { max_modules: 100, ..Default::default() },
+        };
         let mut references = References::new(task, 1.0 / 1024.0);
         for (_, judged) in Method::NAMED {
             let reference = references.of(judged).expect("a reference");

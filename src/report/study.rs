@@ -23,7 +23,8 @@ pub struct Plan {
     pub runs: usize,
     /// Seconds that a single run may take.
     pub time_limit: f64,
-    pub max_modules: usize,
+    /// What a run may take.
+    pub base: crate::sim::Settings,
 }
 
 impl Plan {
@@ -164,7 +165,7 @@ pub fn study(
     watch: &mut dyn FnMut(&str),
     done: &mut dyn FnMut(&Study),
 ) -> Result<Study, String> {
-    let task = Task { session, times: &plan.times, limit: plan.time_limit, max_modules: plan.max_modules };
+    let task = Task { session, times: &plan.times, limit: plan.time_limit, base: plan.base };
     let steps = Plan::default_step_sizes(task.end(), None);
     let mut references = References::new(task, steps.last().copied().unwrap_or(1.0) / 2.0);
     let mut study = Study {
@@ -309,7 +310,7 @@ mod tests {
             times: (1..=60).map(f64::from).collect(),
             runs: 1,
             time_limit: 10.0,
-            max_modules: 100,
+            base: crate::sim::Settings { max_modules: 100, ..Default::default() },
         };
         let study = study(&session, "order", &plan, &mut |_| (), &mut |_| ()).expect("a study");
         for series in &study.series {

@@ -52,6 +52,15 @@ impl Steps {
         Steps { has_rules: has_rules.collect(), is_settled: is_settled.collect(), ..Steps::default() }
     }
 
+    /// Whoever may be replaced first, and how many there are.
+    pub fn first(&self) -> Option<ModuleId> {
+        self.population.first().copied()
+    }
+
+    pub fn len(&self) -> usize {
+        self.population.len()
+    }
+
     /// Counts a newborn module in.
     pub fn join(&mut self, id: ModuleId) {
         self.population.push(id);

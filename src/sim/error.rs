@@ -1,6 +1,7 @@
 //! What can go wrong while a model runs.
 
 use crate::diagnostic::{Diagnostic, Span};
+use crate::memory::Shortage;
 use crate::model::{Distribution, Remedy};
 use crate::structure::Lineage;
 
@@ -103,6 +104,28 @@ pub enum Error {
         /// Productions that had followed one another at this instant.
         rounds: usize,
     },
+    #[error("{}", too_many(*.limit, .foreseen, .site))]
+    TooManyEvents {
+        site: Site,
+        limit: u64,
+        /// As many as it would take up to some time, at the present pace.
+        foreseen: Option<(f64, f64)>,
+    },
+    #[error("{limit} seconds are over at t = {}", .site.when())]
+    OutOfTime { site: Site, limit: f64 },
+    #[error("no memory for more than {modules} modules at t = {}", .site.when())]
+    OutOfMemory { site: Site, modules: usize, shortage: Shortage },
+}
+
+fn too_many(limit: u64, foreseen: &Option<(f64, f64)>, site: &Site) -> String {
+    match foreseen {
+        None => format!("more than {limit} productions and steps up to t = {}", site.when()),
+        Some((count, until)) => format!(
+            "time hardly goes on at t = {}: up to t = {} it would take {count:.0e} productions and steps",
+            site.when(),
+            super::brief(*until, 12)
+        ),
+    }
 }
 
 impl Error {
@@ -120,7 +143,10 @@ impl Error {
             | Error::StepTooSmall { site }
             | Error::InDoubt { site, .. }
             | Error::Unsolved { site, .. }
-            | Error::TooManyModules { site, .. } => site,
+            | Error::TooManyModules { site, .. }
+            | Error::TooManyEvents { site, .. }
+            | Error::OutOfTime { site, .. }
+            | Error::OutOfMemory { site, .. } => site,
         }
     }
 
@@ -199,6 +225,27 @@ impl Error {
             Error::TooManyModules { rounds, .. } if *rounds > 8 => d
                 .note(format!("{rounds} productions followed one another without time going on"))
                 .help("a successor that meets the condition again is replaced again at once: change the condition, or the successor's parameters"),
+            Error::TooManyEvents { limit, foreseen: None, .. } => {
+                d.help(format!("if this is meant, allow more: `--max-events {}`", limit.saturating_mul(10)))
+            }
+            Error::TooManyEvents { foreseen: Some((count, _)), .. } => d
+                .help("a life, a rate or a step size is out of proportion to the times that are observed: compare their units")
+                .help_opt(
+                    // What would take years is not meant.
+                    (*count < 1e15).then(|| format!("if this is meant, allow more: `--max-events {count:.0e}`")),
+                ),
+            Error::OutOfTime { limit, .. } => {
+                d.help(format!("if it is worth waiting for, allow more: `--max-seconds {}`", limit * 10.0))
+            }
+            Error::OutOfMemory { shortage, .. } => {
+                let wanted = format!("{:.0} MB more were wanted", shortage.wanted as f64 / 1e6);
+                let d = d.note(match shortage.there {
+                    Some(there) => format!("{wanted}, and there are {:.0} MB", there as f64 / 1e6),
+                    None => format!("{wanted}, and the system does not give them"),
+                });
+                d.help_opt(shortage.own_limit.then(|| "allow more with `--max-memory`, such as `--max-memory 8GB`".to_owned()))
+                    .help("if this structure is not meant to be so large, bound its growth, or stop it earlier: `--max-modules N` says where it gets too large")
+            }
             Error::TooManyModules { limit, .. } => {
                 d.help(format!("if this is meant, allow more: `--max-modules {}`", limit.saturating_mul(10)))
             }
@@ -220,6 +267,8 @@ impl Error {
             Error::InDoubt { .. } => "met, or only nearly?",
             Error::Unsolved { .. } => "solved for here",
             Error::TooManyModules { .. } => "this production made the last of them",
+            Error::TooManyEvents { .. } | Error::OutOfTime { .. } => "the run was here",
+            Error::OutOfMemory { .. } => "the run was here",
         }
     }
 }

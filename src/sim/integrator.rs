@@ -147,6 +147,10 @@ impl Integrator {
             None => self.workspace.first_size(method, system, y, tolerance),
         };
         self.workspace.resolution = if system.is_timed() { start.resolution() } else { 0.0 };
+        // A step that time cannot tell would be made for ever.
+        if grid.is_some() && h <= 0.5 * start.resolution() {
+            return Err(StepError::TooSmall(self.workspace.worst(y)));
+        }
         let room = limit.map_or(f64::INFINITY, |limit| limit.since(start));
         let mut rejected = false;
         loop {

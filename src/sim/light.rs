@@ -208,6 +208,11 @@ impl Simulation<'_> {
             let limit = self.settings.max_modules;
             return Err(Error::TooManyModules { site: self.site(&fire), limit, rounds });
         }
+        if let Err(shortage) = self.room_for(successor) {
+            self.plant.careers.keep(label, life);
+            self.stand_still(id);
+            return Err(self.out_of_memory(shortage, self.site(&fire)));
+        }
         let tree = &mut self.plant.tree;
         if let Some(log) = &mut self.log {
             log.push(Event {

@@ -59,6 +59,7 @@ mod agenda;
 mod algebra;
 mod around;
 mod blend;
+mod budget;
 mod career;
 mod chance;
 mod choose;
@@ -182,6 +183,14 @@ pub struct Settings {
     pub seed: u64,
     /// More modules than this are an error.
     pub max_modules: usize,
+    /// More productions and steps than this are an error; so is a run that is foreseen to need a hundred times as many, at
+    /// a pace that hardly brings time on.
+    pub max_events: u64,
+    /// More seconds than this, spent in calls of the simulation, are an error. Infinite by default.
+    pub max_seconds: f64,
+    /// More bytes of memory than this, of the process as a whole where the system tells them, are an error. By
+    /// default only what the system has not got.
+    pub max_memory: u64,
     /// Productions are recorded for [`Simulation::take_events`].
     pub log: bool,
     /// Everything is done the general way; for tests of the quick one.
@@ -200,7 +209,10 @@ impl Default for Settings {
             tolerance: 1e-6,
             step_size: 0.01,
             seed: 0,
-            max_modules: 10_000_000,
+            max_modules: Settings::MODULES,
+            max_events: Settings::EVENTS,
+            max_seconds: f64::INFINITY,
+            max_memory: u64::MAX,
             log: false,
             slow: false,
             transitions: false,
@@ -209,6 +221,10 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// What a run may take unless something else is said: so much that only what runs away takes more.
+    pub const MODULES: usize = 10_000_000;
+    pub const EVENTS: u64 = 10_000_000_000;
+
     /// The grid on which steps of fixed size end.
     fn grid(&self) -> Option<f64> {
         self.method.is_fixed_step().then_some(self.step_size)

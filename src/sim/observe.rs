@@ -84,6 +84,7 @@ impl Simulation<'_> {
         if again {
             out.show(t, now);
         } else {
+            self.afford_string()?;
             self.hang(&mut gallery, t, now, out);
             gallery.version = Some(version);
             out.set_version(version);

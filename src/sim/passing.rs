@@ -181,6 +181,7 @@ impl Simulation<'_> {
         if !is_before(coming.at(), event, until) && (event || !self.is_in_the_way(coming, until)) {
             return Ok(None);
         }
+        self.watch_budget(coming, until)?;
         (self.passed, self.last) = (self.passed + 1, Some((coming.at(), event)));
         match coming {
             Coming::Other(entry) if !event => {

@@ -73,6 +73,9 @@ impl Simulation<'_> {
                 self.look_up();
                 self.level(false)?;
             }
+            if self.steps.due {
+                self.afford_round(self.steps.len(), self.steps.first())?;
+            }
             let mut firing = self.judge();
             let mut light = std::mem::take(&mut self.firing_light);
             self.find_steps(&mut firing);
@@ -94,6 +97,11 @@ impl Simulation<'_> {
                 break;
             }
             rounds += 1;
+            self.watch_round(|simulation| {
+                let first =
+                    light.first().map_or_else(|| firing[0].id, |slot| simulation.plant.tree.id(*slot));
+                simulation.site_of_firing(first, firing.first())
+            })?;
             if rounds > MAX_ROUNDS {
                 let first = light.first().map_or_else(|| firing[0].id, |slot| self.plant.tree.id(*slot));
                 let site = self.site_of_firing(first, firing.first());
@@ -216,6 +224,7 @@ impl Simulation<'_> {
     /// in `self.firing_light`, which was empty.
     fn replace_all_light(&mut self, mut light: Vec<u32>, rounds: usize) -> Result<(), Error> {
         if light.len() > LONG {
+            self.afford_round(light.len(), light.first().map(|slot| self.plant.tree.id(*slot)))?;
             // A cascade may double with each round. Growing bit by bit, the list would be there twice.
             self.firing_light.reserve_exact(2 * light.len());
         }
@@ -277,6 +286,7 @@ impl Simulation<'_> {
         if self.reads_lazily() {
             self.refresh(self.now)?;
         }
+        self.afford_round(firing.len(), firing.first().map(|fire| fire.id))?;
         self.record(firing);
         let mut all = std::mem::take(&mut self.arguments);
         all.clear();
@@ -314,6 +324,9 @@ impl Simulation<'_> {
             if self.plant.tree.len() + successor.kinds.len() > self.settings.max_modules {
                 let limit = self.settings.max_modules;
                 return Err(Error::TooManyModules { site: self.site(fire), limit, rounds });
+            }
+            if let Err(shortage) = self.room_for(successor) {
+                return Err(self.out_of_memory(shortage, self.site(fire)));
             }
             let kind = self.plant.tree.kind(fire.id);
             self.forget(fire.id);

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, HashSet};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::agenda::Agenda;
+use super::budget::Budget;
 use super::career::Careers;
 use super::chance;
 use super::consistent::Consistency;
@@ -118,6 +119,7 @@ pub struct Simulation<'m> {
     /// Number of changes of the structure.
     pub(super) structure: u64,
     fault: Option<Error>,
+    pub(super) budget: Budget,
     /// Entries of the queues passed so far; the last of them, and whether it was an event.
     pub(super) passed: u64,
     pub(super) last: Option<(Instant, bool)>,
@@ -214,6 +216,7 @@ impl<'m> Simulation<'m> {
             log: settings.log.then(Vec::new),
             recorder: (settings.log && settings.transitions).then(Recorder::default),
             fault: None,
+            budget: Budget::default(),
             passed: 0,
             last: None,
             variables: Vec::new(),
@@ -231,19 +234,15 @@ impl<'m> Simulation<'m> {
             rates: Vec::new(),
             group_entries: Vec::new(),
         };
+        simulation.start_clock();
         simulation.plant_axiom()?;
         simulation.settle()?;
+        simulation.stop_clock();
         Ok(simulation)
     }
 
     fn plant_axiom(&mut self) -> Result<(), Error> {
-        let site = || Site {
-            module: "the initial string".to_owned(),
-            lineage: Lineage::of_axiom(0),
-            rule: "initial string".to_owned(),
-            span: Span::default(),
-            time: 0.0,
-        };
+        let site = || site_of_axiom(0.0);
         let (mut arguments, mut variables) = (Vec::new(), Vec::new());
         let (axiom, scratch) = (&self.model.axiom, &mut self.scratch);
         chance::arguments(self.seed, axiom, Family::AXIOM, &mut variables, scratch, &mut arguments)
@@ -319,7 +318,9 @@ impl<'m> Simulation<'m> {
         if let Some(fault) = &self.fault {
             return Err(fault.clone());
         }
+        self.start_clock();
         let gone = go(self);
+        self.stop_clock();
         if let Err(fault) = &gone {
             self.fault = Some(fault.clone());
         }
@@ -424,6 +425,11 @@ impl<'m> Simulation<'m> {
         self.site_of(fire.id, fire.rule, span, self.now.to_f64())
     }
 
+    /// Where there is no module to name.
+    pub(super) fn site_of_axiom(&self, time: f64) -> Site {
+        site_of_axiom(time)
+    }
+
     pub(super) fn site_of(&self, id: ModuleId, rule: usize, span: Span, time: f64) -> Site {
         let tree = &self.plant.tree;
         Site {
@@ -433,6 +439,16 @@ impl<'m> Simulation<'m> {
             span,
             time,
         }
+    }
+}
+
+fn site_of_axiom(time: f64) -> Site {
+    Site {
+        module: "the initial string".to_owned(),
+        lineage: Lineage::of_axiom(0),
+        rule: "initial string".to_owned(),
+        span: Span::default(),
+        time,
     }
 }
 

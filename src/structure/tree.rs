@@ -7,6 +7,8 @@
 //! A module is a record of 28 bytes and its parameters; its birth and lineage are kept with those of its siblings
 //! (`brood`). At a million modules, what anything costs is the memory that it touches.
 
+use std::collections::TryReserveError;
+
 use smallvec::SmallVec;
 
 use super::brood::{Broods, NO_BROOD};
@@ -134,7 +136,7 @@ impl Tree {
     }
 
     /// Number of modules and brackets, and of parameters at most.
-    pub(super) fn extent(&self) -> (usize, usize) {
+    pub fn extent(&self) -> (usize, usize) {
         let branches = self.nodes.len() - 1 - self.free.len() - self.modules;
         (self.modules + 2 * branches, self.values.len())
     }
@@ -263,6 +265,31 @@ impl Tree {
                 (self.values.len() - values.len()) as u32
             }
         }
+    }
+
+    /// True if modules of these kinds have a place without a list that grows.
+    #[inline]
+    pub fn has_room(&self, kinds: &[KindId], width: usize) -> bool {
+        let (nodes, values) = (&self.nodes, &self.values);
+        nodes.capacity() - nodes.len() + self.free.len() >= kinds.len()
+            && (values.capacity() - values.len() >= width || self.has_free_values(kinds))
+    }
+
+    /// True if the parameters of these kinds have a place that others have left.
+    fn has_free_values(&self, kinds: &[KindId]) -> bool {
+        kinds.iter().filter(|kind| !kind.is_bracket()).all(|kind| {
+            let arity = self.arities[kind.index()] as usize;
+            arity == 0 || self.free_values.get(arity).is_some_and(|free| free.len() >= kinds.len())
+        })
+    }
+
+    /// Lets the lists of nodes and values grow as they would.
+    ///
+    /// # Errors
+    /// If there is no memory for that.
+    pub fn make_room(&mut self, kinds: &[KindId], width: usize) -> Result<(), TryReserveError> {
+        self.nodes.try_reserve(kinds.len().saturating_sub(self.free.len()))?;
+        if self.has_free_values(kinds) { Ok(()) } else { self.values.try_reserve(width) }
     }
 
     fn release(&mut self, slot: u32) {

@@ -7,7 +7,7 @@ use super::command::Command;
 use super::error::{self, Error, Fault, Remark, Remarks};
 use super::frame::{Axis, Frame};
 use super::patch::OpenPatches;
-use super::{COORDINATE_LIMIT, Pose, shapes};
+use super::{COORDINATE_LIMIT, Pose, SMALLEST_LENGTH, shapes};
 use crate::diagnostic::Span;
 use crate::model::{KindId, Model};
 use crate::scene::{
@@ -173,7 +173,11 @@ impl<'a> Walk<'a> {
                 self.check_width(given);
                 self.state.width = match given {
                     Some(width) => Width::Set(self.in_range(width.max(0.0))?),
-                    None => self.state.width.scaled(THINNING),
+                    // Thinner and thinner, without end, is nothing at last.
+                    None => match self.state.width.scaled(THINNING) {
+                        Width::Set(width) => Width::Set(self.in_range(width)?),
+                        Width::Default(factor) => Width::Default(self.in_range(factor)?),
+                    },
                 };
                 self.state.run = 0;
             }
@@ -256,7 +260,11 @@ impl<'a> Walk<'a> {
         Ok(())
     }
 
+    /// A length, or another measure, as it is drawn: what is too small to be told from nothing is nothing.
     fn in_range(&self, x: f64) -> Result<f64, Error> {
+        if x.abs() < SMALLEST_LENGTH {
+            return Ok(0.0);
+        }
         if x.abs() <= COORDINATE_LIMIT { Ok(x) } else { Err(self.complain(Fault::TooFar)) }
     }
 
@@ -264,9 +272,10 @@ impl<'a> Walk<'a> {
     /// tropism.
     fn step(&mut self, length: f64, draw: bool) -> Result<(), Error> {
         let [heading, left, _] = self.state.frame.vectors();
+        let length = self.in_range(length)?;
         let bend = Bend::new(heading, self.target, self.state.strength).filter(|_| length != 0.0);
         if let Some(bend) = bend {
-            let pieces = bend.pieces(self.in_range(length)?, self.scene.accuracy);
+            let pieces = bend.pieces(length, self.scene.accuracy);
             let mut before = Vector::zeros();
             for i in 1..=pieces {
                 let displacement = bend.displacement(length * i as f64 / pieces as f64);
@@ -341,9 +350,12 @@ impl<'a> Walk<'a> {
 
     /// Moves, with compensated summation (Neumaier 1974).
     fn advance(&mut self, by: Vector) -> Result<(), Error> {
+        // A direction that is nearly an axis has parts far shorter than the whole.
+        let by = by.map(|x| if x.abs() < SMALLEST_LENGTH { 0.0 } else { x });
         for i in 0..3 {
             let (old, step) = (self.state.position[i], by[i] + self.state.remainder[i]);
-            let new = self.in_range(old + step)?;
+            let new = old + step;
+            self.in_range(new)?;
             self.state.remainder[i] =
                 if old.abs() >= step.abs() { (old - new) + step } else { (step - new) + old };
             self.state.position[i] = new;

@@ -2,6 +2,7 @@
 //!
 //! - [`book`]: the book in `docs/`, followed literally; [`pages`] reads its Markdown.
 //! - [`light`]: modules with formulas only, the quick way against the general one.
+//! - [`limits`]: what runs away, extreme numbers, killed processes, full disks, little memory.
 //! - [`linear`]: neighbours with linear equations against closed forms: transport one way, large starts, stiff chains.
 //! - [`listings`]: the paper's models against results of an independent program.
 //! - [`algebraic`], [`signals`]: values and equations instead of rates; sums over what is attached; contexts with branches.
@@ -41,6 +42,7 @@ mod gallery;
 mod inspect;
 mod language;
 mod light;
+mod limits;
 mod linear;
 mod listings;
 mod organs;

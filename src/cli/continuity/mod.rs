@@ -34,8 +34,11 @@ pub fn check(args: &CheckArgs, session: &Session) -> Result<(), Failure> {
     })?;
     // What is located or integrated must be known better than jumps are told from none.
     let tolerance = (args.tolerance / 100.0).clamp(1e-12, 1e-4);
-    let settings =
-        Settings { tolerance, max_modules: MAX_MODULES, log: true, transitions: true, ..Settings::default() };
+    let settings = {
+        let given = args.budget.settings();
+        let max_modules = given.max_modules.min(MAX_MODULES);
+        Settings { tolerance, max_modules, log: true, transitions: true, ..given }
+    };
     let fault =
         |error: &crate::sim::Error| Failure::Model(error.diagnostic().render(&session.source, coloured()));
     let mut simulation = session.simulate(settings).map_err(|error| fault(&error))?;

@@ -8,6 +8,7 @@
 mod flags;
 mod watch;
 
+use std::collections::HashMap;
 use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
@@ -57,7 +58,9 @@ fn specimens(args: &RenderArgs, mut run: Run, seeds: Seeds) -> Result<(), Failur
         parts.push(render.frames);
     }
     let mut fit = survey.fit();
-    fit.accuracy = args.accuracy.unwrap_or(fit.accuracy);
+    if let Some(accuracy) = args.accuracy {
+        fit = fit.with_accuracy(accuracy);
+    }
     let width = seeds.last.to_string().len();
     let mut bytes = 0;
     for (seed, frames) in seeds.iter().zip(parts) {
@@ -89,7 +92,9 @@ pub fn render_run(args: &RenderArgs, run: Run, stale: &(dyn Fn() -> bool + Sync)
     let threads = flags::threads(args);
     let mut render = Render { args, run: &run, out: &args.out, threads, frames: Vec::new(), stale };
     let mut fit = render.measure(survey, &mut clock)?.fit();
-    fit.accuracy = args.accuracy.unwrap_or(fit.accuracy);
+    if let Some(accuracy) = args.accuracy {
+        fit = fit.with_accuracy(accuracy);
+    }
     let (stats, written) = render.write(fit, &mut clock)?;
     run.write_stats(&args.shared, clock, stats)?;
     if args.quiet {
@@ -174,7 +179,9 @@ impl Render<'_> {
         let mut writer = FrameWriter::new(flags::format(self.args), fit);
         writer.page = flags::page(self.args, writer.page.picture)?;
         // Only now that the run is known to be good, the directory is touched.
-        let mut directory = FrameDirectory::create(self.out, self.args.force).map_err(out_of_directory)?;
+        let mut directory = FrameDirectory::create(self.out, self.args.force)
+            .map_err(out_of_directory)?
+            .limited(self.args.max_output);
         let mut manifest = self.manifest(&writer.fit, &writer.page);
         let count = self.run.times.len();
         // Frames side by side; threads that have none help with those of others.
@@ -184,7 +191,9 @@ impl Render<'_> {
             let file = FrameDirectory::frame_name(shot.index, count, writer.format.extension());
             let companion = writer.companion(scene).filter(|_| shot.index == 0);
             let title = format!("{}, t = {}", self.title(), shot.time);
-            let staged = staging.write(|file| writer.write_to(scene, &title, file));
+            let staged = staging
+                .write(|file| writer.write_to(scene, &title, file))
+                .map_err(|error| explain(error, shot, scene));
             (record(&writer.fit, shot, scene, file), companion, staged)
         };
         let mut progress = self.bar("writing", count);
@@ -196,10 +205,11 @@ impl Render<'_> {
             None,
             work,
             |(record, companion, staged)| {
+                let staged = staged?;
                 if let Some((name, bytes)) = companion {
                     directory.write(name, &bytes).map_err(out_of_directory)?;
                 }
-                staged.and_then(|staged| directory.put(&record.file, staged)).map_err(out_of_directory)?;
+                directory.put(&record.file, staged).map_err(out_of_directory)?;
                 manifest.frames.push(record);
                 progress.inc();
                 Ok(())
@@ -228,7 +238,9 @@ impl Render<'_> {
         let page = flags::page(self.args, sheet.picture)?;
         let refuse = |error: export::SheetError| Failure::Usage(format!("error: {error}\n"));
         let writer = SheetWriter::new(flags::format(self.args), fit.clone(), sheet, page).map_err(refuse)?;
-        let mut directory = FrameDirectory::create(self.out, self.args.force).map_err(out_of_directory)?;
+        let mut directory = FrameDirectory::create(self.out, self.args.force)
+            .map_err(out_of_directory)?
+            .limited(self.args.max_output);
         let mut manifest = self.manifest(&fit, writer.page());
         let work = |shot: &Shot, scene: &Scene| {
             (record(&fit, shot, scene, writer.file()), writer.part(shot.index, scene))
@@ -327,10 +339,36 @@ fn record(fit: &Fit, shot: &Shot, scene: &Scene, file: String) -> FrameRecord {
     }
 }
 
+/// An error of a frame; of one that is too large, with what makes it so.
+fn explain(error: export::Error, shot: &Shot, scene: &Scene) -> Failure {
+    let export::Error::TooLarge { limit } = error else { return out_of_directory(error) };
+    let mut counts: HashMap<&str, usize> = HashMap::new();
+    let owners = scene.segments.iter().map(|s| s.owner).chain(scene.polygons.iter().map(|p| p.owner));
+    let owners =
+        owners.chain(scene.surfaces.iter().map(|s| s.owner)).chain(scene.patches.iter().map(|p| p.owner));
+    for owner in owners {
+        *counts.entry(&*scene.owner(owner).name).or_default() += 1;
+    }
+    let most = counts.into_iter().max_by(|a, b| a.1.cmp(&b.1).then(b.0.cmp(a.0)));
+    let most = most.map_or(String::new(), |(name, count)| {
+        format!(
+            "  = note: frame {} at t = {} draws {count} pieces for `{name}`, more than for anything else\n",
+            shot.index, shot.time
+        )
+    });
+    Failure::Model(format!(
+        "error: the files of this render are larger than {}\n\n{most}  \
+         = help: a coarser --accuracy makes surfaces and stems of fewer pieces, fewer frames make fewer files\n  \
+         = help: if this is meant, allow more: `--max-output {:.0}GB`\n",
+        size_of(limit),
+        (limit as f64 / 1e8).ceil().max(1.0)
+    ))
+}
+
 fn out_of_directory(error: export::Error) -> Failure {
     let message = format!("error: {error}\n");
     match error {
-        export::Error::Io { .. } => Failure::Model(message),
+        export::Error::Io { .. } | export::Error::TooLarge { .. } => Failure::Model(message),
         // The directory was chosen on the command line.
         _ => Failure::Usage(message),
     }
