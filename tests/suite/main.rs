@@ -2,6 +2,7 @@
 //!
 //! - [`book`]: the book in `docs/`, followed literally; [`pages`] reads its Markdown.
 //! - [`light`]: modules with formulas only, the quick way against the general one.
+//! - [`layout`]: what `fmt` may not do to any text.
 //! - [`listings`]: the paper's models against results of an independent program.
 //! - [`algebraic`], [`signals`]: values and equations instead of rates; sums over what is attached; contexts with branches.
 //! - [`semantics`]: what happens when (events, contexts, errors of a run), model by small model.
@@ -20,6 +21,7 @@
 //! - [`repl`]: the interactive session, without a terminal and with one.
 //! - [`replay`]: any time after any other, to the bits of a run.
 //! - [`report`]: studies of methods, and hard cases with exact answers.
+//! - [`wild`]: texts that nobody would write.
 //! - [`view`]: pages that play a recording, read back.
 
 mod algebraic;
@@ -36,6 +38,7 @@ mod files;
 mod gallery;
 mod inspect;
 mod language;
+mod layout;
 mod light;
 mod listings;
 mod organs;
@@ -49,3 +52,4 @@ mod schedulers;
 mod semantics;
 mod signals;
 mod view;
+mod wild;
