@@ -72,6 +72,7 @@ mod derive;
 mod equations;
 mod error;
 mod event;
+mod exact;
 mod fetch;
 mod gather;
 mod implicit;
