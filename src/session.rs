@@ -96,7 +96,7 @@ impl Session {
             let inputs = vec![model.clone()];
             Box::new(Refused { source, diagnostics: vec![diagnostic], settings: Vec::new(), inputs })
         };
-        let bytes = std::fs::read(path).map_err(|error| {
+        let bytes = read_whole(path, Source::LIMIT as u64).map_err(|error| {
             let diagnostic = Diagnostic::error(format!("the model cannot be read: {error}"))
                 .help("give the path of a model's file, `NAME.dls`; `dlsys new NAME` makes one");
             refuse(Source::new(&name, ""), diagnostic)
@@ -183,6 +183,19 @@ impl Session {
     pub fn simulate(&self, settings: sim::Settings) -> Result<Simulation<'_>, sim::Error> {
         Simulation::new(&self.model, settings)
     }
+}
+
+/// The bytes of a file, or one more than the limit of a larger one. Only files are read: a device has no end, and a pipe may
+/// never have a beginning.
+pub(crate) fn read_whole(path: &Path, limit: u64) -> std::io::Result<Vec<u8>> {
+    let found = std::fs::metadata(path)?;
+    if !found.is_file() && !found.is_dir() {
+        let why = "it is no regular file, but a device, a pipe or the like";
+        return Err(std::io::Error::new(std::io::ErrorKind::InvalidInput, why));
+    }
+    let mut bytes = Vec::new();
+    std::fs::File::open(path)?.take(limit + 1).read_to_end(&mut bytes)?;
+    Ok(bytes)
 }
 
 /// The folder of a model and others, with the files that it may read.

@@ -9,6 +9,7 @@ use clap::Args;
 use super::common::{Failure, coloured, out_error, tell};
 use crate::diagnostic::{Diagnostic, Source};
 use crate::lang::format::format;
+use crate::session::read_whole;
 
 #[derive(Debug, Args)]
 pub struct FmtArgs {
@@ -95,12 +96,13 @@ fn file(path: &Path, check: bool) -> Result<Option<usize>, Failure> {
     let fault = |action: &str, error: std::io::Error| {
         let help = match error.kind() {
             std::io::ErrorKind::NotFound => "is the name right? In another folder it needs its path",
+            std::io::ErrorKind::InvalidInput => "standard input is laid out as `-`",
             std::io::ErrorKind::IsADirectory => "name the files in it, such as `*.dls`",
             _ => "check the rights to the file and its folder; it is as it was",
         };
         Failure::Model(format!("error: cannot {action} {}: {error}\n  = help: {help}\n", path.display()))
     };
-    let bytes = fs::read(path).map_err(|error| fault("read", error))?;
+    let bytes = read_whole(path, Source::LIMIT as u64).map_err(|error| fault("read", error))?;
     let (text, differs) = laid_out(&path.display().to_string(), bytes)?;
     if differs.is_some() && !check {
         replace(path, &text).map_err(|error| fault("write", error))?;

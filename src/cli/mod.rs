@@ -46,7 +46,10 @@ fn command_line() -> u8 {
         Ok(command) => command,
         Err(error) => {
             // Help and version are answers, not errors; clap knows which stream they belong on.
-            let _ = error.print();
+            if let Err(Failure::Model(message)) = error.print().map_err(common::out_error) {
+                tell(&message);
+                return 1;
+            }
             return u8::try_from(error.exit_code()).unwrap_or(2);
         }
     };

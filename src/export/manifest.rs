@@ -7,7 +7,7 @@ use serde::Serialize;
 pub struct Manifest {
     /// Program and version. Filled in by [`Manifest::new`]; by it a directory is known to be ours.
     pub generator: String,
-    /// Name of the model, as the user gave it.
+    /// Name of the model's file, without its folder: the same bytes wherever `render` is called.
     pub model: String,
     /// The model's `title`.
     pub title: Option<String>,

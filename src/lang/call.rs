@@ -13,6 +13,9 @@ use crate::model::Distribution;
 
 /// Most nodes that the functions of a model may expand to.
 const MAX_WORK: usize = 20_000_000;
+/// Most nodes that one function may have that is called. Functions that call others twice are there at once; what
+/// somebody writes never is.
+const MAX_BODY: usize = 200_000;
 
 impl Scope {
     pub(super) fn call(
@@ -130,13 +133,20 @@ impl Scope {
         span: Span,
     ) -> Option<Lowered> {
         let (body, draws) = (function.body?, function.draws.clone());
-        self.work += self.graph.reachable(&[body.node]).len() + draws.len();
-        if self.work > MAX_WORK {
+        let size = self.graph.reachable(&[body.node]).len() + draws.len();
+        self.work += size;
+        if self.work > MAX_WORK || size > MAX_BODY {
             if self.work < usize::MAX / 2 {
                 self.work = usize::MAX / 2;
                 self.diagnostics.push(
                     Diagnostic::error("the functions of this model expand without bound")
-                        .at(span, format!("more than {MAX_WORK} operations"))
+                        .at(
+                            span,
+                            format!(
+                                "more than {} operations",
+                                if size > MAX_BODY { MAX_BODY } else { MAX_WORK }
+                            ),
+                        )
                         .help("a function that calls another twice doubles it; compute a shared part once"),
                 );
             }

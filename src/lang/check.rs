@@ -42,7 +42,7 @@ impl<'k> ByName<'k> {
     }
 }
 
-/// Matches the modules of contexts to kinds; a context that nothing can match is an error.
+/// Matches the modules of contexts to kinds, and says which nothing can match.
 pub fn resolve_contexts(
     model: &mut Model,
     rules: &[&ast::Rule],
@@ -85,7 +85,8 @@ fn resolve(
             ))
             .at(head.span, "the number of parameters must agree, or the context is never there")
             .help(format!("name each of them, used or not: `{}`", advice::head_with(head, kind.arity))),
-            None => Diagnostic::error(format!("there is no module `{name}`"))
+            // A model that is being written may not have it yet.
+            None => Diagnostic::warning(format!("there is no module `{name}`"))
                 .at(head.span, never)
                 .help(advice::no_such_module(kinds, name)),
         };
@@ -196,7 +197,8 @@ pub fn reachability(
 
 fn shadowed_rule(model: &Model, index: usize, own: &[KindId], diagnostics: &mut Vec<Diagnostic>) {
     let rule = &model.rules[index];
-    let wider = |a: &Pattern, b: &Pattern| b.kinds.iter().all(|k| a.matches(*k));
+    // Of a context that nothing matches something else is said.
+    let wider = |a: &Pattern, b: &Pattern| !b.kinds.is_empty() && b.kinds.iter().all(|k| a.matches(*k));
     let own_rules = model.kinds.get(own[0]).rules_like(rule);
     let earlier = own_rules.iter().take(MAX_RULES).take_while(|j| **j < index);
     // Of discrete rules the first applies whose condition holds, too.
@@ -219,7 +221,7 @@ fn shadowed_rule(model: &Model, index: usize, own: &[KindId], diagnostics: &mut 
         {
             if rule.discrete {
                 diagnostics.push(
-                    Diagnostic::error("this rule can never be reached")
+                    Diagnostic::warning("this rule can never be reached")
                         .at(rule.span, "it has the head of the rule before it, and that one always holds")
                         .at(before.span, "this rule comes first")
                         .help("give the first one a condition: `A(x) : x > 3 -> …`"),
@@ -235,7 +237,7 @@ fn shadowed_rule(model: &Model, index: usize, own: &[KindId], diagnostics: &mut 
             return;
         }
         diagnostics.push(
-            Diagnostic::error("this rule can never be reached")
+            Diagnostic::warning("this rule can never be reached")
                 .at(rule.span, "whenever its context is there, so is that of the rule before it")
                 .at(before.span, "this rule comes first")
                 .help("of several rules the first whose context is there applies: put the special one first"),

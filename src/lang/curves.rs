@@ -258,6 +258,14 @@ impl Scope {
             return self.no_such_function(what, name, at);
         };
         self.used.insert(name.clone());
+        if !function.draws.is_empty() {
+            self.diagnostics.push(
+                Diagnostic::error(format!("`{name}` draws a random number: it has no {what}"))
+                    .at(at, "another value at each call is no function of its arguments")
+                    .help("draw the number in a successor, and hand it to the function as a parameter"),
+            );
+            return None;
+        }
         let ends = usize::from(what == "integral");
         self.arguments(what, span, nodes.len(), function.parameters.len() + ends)?;
         let related =

@@ -13,7 +13,7 @@ mod ahead;
 mod forgotten;
 mod keywords;
 
-use super::lexeme::{Lexeme, Token};
+use super::lexeme::{Lexeme, Token, in_name, number_length};
 use super::words::FOLDS;
 use crate::diagnostic::{Diagnostic, Span};
 
@@ -239,8 +239,12 @@ impl Scanner<'_> {
                     }
                     (Token::Text, to)
                 }
-                c if c.is_alphabetic() => (Token::Word, take_while(&|c| c.is_alphanumeric() || c == '_')),
-                c if c.is_ascii_digit() => (Token::Number, take_while(&|c| c.is_ascii_digit())),
+                c if c.is_alphabetic() => (Token::Word, take_while(&in_name)),
+                c if c.is_ascii_digit() => {
+                    let to = i + number_length(&line[i..]);
+                    while chars.next_if(|(j, _)| *j < to).is_some() {}
+                    (Token::Number, to)
+                }
                 '(' => (Token::Open, i + 1),
                 ')' => (Token::Close, i + 1),
                 ',' => (Token::Comma, i + 1),
@@ -411,8 +415,7 @@ impl Scanner<'_> {
             }
             Token::Number | Token::Text => {}
             Token::Open => {
-                let outside = |c: char| !c.is_alphanumeric() && c != '_';
-                let word = self.text[..start].trim_end().rsplit(outside).next().unwrap_or_default();
+                let word = self.text[..start].trim_end().rsplit(|c| !in_name(c)).next().unwrap_or_default();
                 let is_sum = FOLDS.contains(&word);
                 self.levels.push(Level { at: start, is_sum, ..Level::default() });
                 last = Last::Operator;

@@ -237,15 +237,15 @@ impl RuleBuilder<'_> {
             equations.set_all(smooth);
             drafts.push((guard.clone(), clause.span, equations, switches));
         }
+        if !good {
+            return None;
+        }
         if let (true, Some(first)) = (drafts.is_empty(), clocks.first()) {
             // Clocks run, though nothing else does.
             let span = produces[first.produce].span;
             let rates = hazards.iter().filter_map(|hazard| self.clock_rate(hazard, None)).collect();
             let (rates, switches) = self.smooth(rates, own, count, span, &mut atoms)?;
             drafts.push((Condition::default(), span, Equations { rates, algebraic: Vec::new() }, switches));
-        }
-        if !good {
-            return None;
         }
         let context = count - own - 2;
         let (aggregates, terms) = self.aggregates(count);

@@ -373,10 +373,14 @@ impl Scope {
             names.insert(parameter.text.clone(), node);
         }
         let inner = Variables { names, ..Variables::default() };
+        // It is looked at again and again, by whoever reads it: numbers that are drawn once have no place in it.
+        let may_draw = std::mem::take(&mut self.draws.allowed);
         let term = match aggregate.term {
-            Some(term) => self.number(all, term, &inner)?,
-            None => self.graph.constant(1.0),
+            Some(term) => self.number(all, term, &inner),
+            None => Some(self.graph.constant(1.0)),
         };
+        self.draws.allowed = may_draw;
+        let term = term?;
         let same = |known: &Gathered| {
             let names = known.head.name.text == aggregate.head.name.text
                 && known.head.parameters.len() == aggregate.head.parameters.len();

@@ -2,6 +2,7 @@
 
 use super::curves::FUNCTIONALS;
 use super::layout::DECLARATIONS;
+pub use super::lexeme::{in_name, number_length};
 use crate::expr::{Binary, Unary};
 use crate::model::Distribution;
 

@@ -200,19 +200,13 @@ pub fn coloured(text: &str, names: &Names) -> String {
     let mut first = true;
     let mut rest = text;
     while let Some(c) = rest.chars().next() {
-        let is_word = |c: char| c.is_alphanumeric() || c == '_';
+        let is_word = words::in_name;
         let (length, ink) = if c == '#' && !(command && rest[1..].starts_with(|c: char| c.is_ascii_digit())) {
             (rest.find('\n').unwrap_or(rest.len()), ink::FAINT)
         } else if c == '"' {
             (rest[1..].find(['"', '\n']).map_or(rest.len(), |at| at + 2).min(rest.len()), ink::TEXT)
         } else if c.is_ascii_digit() {
-            let number = |c: char| c.is_ascii_digit() || c == '.';
-            let mut length = rest.find(|c| !number(c)).unwrap_or(rest.len());
-            // A range is two numbers.
-            if let Some(at) = rest[..length].find("..") {
-                length = at.max(1);
-            }
-            (length, ink::NUMBER)
+            (words::number_length(rest), ink::NUMBER)
         } else if c.is_alphabetic() || c == '@' {
             let length =
                 rest[c.len_utf8()..].find(|c| !is_word(c)).map_or(rest.len(), |at| at + c.len_utf8());

@@ -25,6 +25,8 @@ pub enum Fault {
     Said(String),
     /// Nobody reads the answers any more.
     Closed,
+    /// Answers cannot be written, to a full disk for instance: the message.
+    Unwritable(String),
 }
 
 impl Fault {
@@ -48,6 +50,7 @@ impl From<Fault> for Failure {
         match fault {
             Fault::Said(message) => Failure::Model(message),
             Fault::Closed => Failure::ClosedPipe,
+            Fault::Unwritable(message) => Failure::Model(message),
         }
     }
 }
@@ -106,7 +109,12 @@ impl Desk {
     /// If nobody reads it.
     pub fn say(&self, text: &str) -> Result<(), Fault> {
         let mut out = std::io::stdout().lock();
-        out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(|_| Fault::Closed)
+        out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(|error| {
+            match crate::cli::common::out_error(error) {
+                Failure::Model(message) => Fault::Unwritable(message),
+                _ => Fault::Closed,
+            }
+        })
     }
 
     /// Prints what is wrong.

@@ -72,7 +72,7 @@ pub fn repl(args: &ReplArgs) -> Result<(), Failure> {
     let mut start = match &args.model {
         Some(path) => match desk.load(path, &args.settings) {
             Ok(flow) => flow,
-            Err(Fault::Closed) => return Err(Failure::ClosedPipe),
+            Err(fault @ (Fault::Closed | Fault::Unwritable(_))) => return Err(fault.into()),
             // On a terminal somebody may mend the file and try again.
             Err(Fault::Said(message)) if interactive => {
                 desk.complain(&message);
@@ -158,7 +158,7 @@ impl Log {
         self.statements += usize::from(statement.is_some());
         match done {
             Ok(value) => Ok(Some(value)),
-            Err(Fault::Closed) => Err(Failure::ClosedPipe),
+            Err(fault @ (Fault::Closed | Fault::Unwritable(_))) => Err(fault.into()),
             Err(Fault::Said(message)) => {
                 desk.complain(&message);
                 if !self.interactive {

@@ -13,11 +13,12 @@ use smallvec::SmallVec;
 
 use super::around::Around;
 use super::error::Error;
+use super::exact::exact_atoms;
 use super::lookup::sign_at_birth;
 use super::queue::Who;
 use super::settle::Firing;
 use super::simulation::Simulation;
-use crate::model::{Model, Rule, Truth};
+use crate::model::{Model, Rule, Sign, Truth};
 use crate::structure::{Instant, ModuleId};
 
 /// What is known of the steps.
@@ -38,6 +39,8 @@ pub(super) struct Steps {
     pub has_rules: Vec<bool>,
     /// By kind: if no rule applies to a module at its first step, none ever does.
     is_settled: Vec<bool>,
+    /// By rule and atom: what it compares is exact.
+    exact: Vec<Vec<bool>>,
 }
 
 impl Steps {
@@ -49,7 +52,8 @@ impl Steps {
         let is_settled = (model.kinds.iter()).map(|(_, kind)| {
             kind.rules.is_empty() && kind.steps.iter().all(|r| reads_itself(&model.rules[*r]))
         });
-        Steps { has_rules: has_rules.collect(), is_settled: is_settled.collect(), ..Steps::default() }
+        let exact = exact_atoms(model);
+        Steps { has_rules: has_rules.collect(), is_settled: is_settled.collect(), exact, ..Steps::default() }
     }
 
     /// Whoever may be replaced first, and how many there are.
@@ -167,6 +171,15 @@ impl Simulation<'_> {
         self.plant.variables(rule, id, context, self.now, &mut self.variables);
         let mut sides: SmallVec<[f64; 16]> = smallvec::smallvec![0.0; rule.sides.outputs()];
         rule.sides.eval(&self.variables, &mut self.scratch, &mut sides);
-        guard.judge(|atom| sign_at_birth(sides[2 * atom], sides[2 * atom + 1])) == Truth::Yes
+        let exact = &self.steps.exact[rule.index];
+        let sign = |atom: usize| match (sides[2 * atom], sides[2 * atom + 1]) {
+            (a, b) if !exact[atom] => sign_at_birth(a, b),
+            // Not by their difference: that of two infinite sides is no number.
+            (a, b) if a == b => Sign::Zero,
+            (a, b) if a < b => Sign::Minus,
+            (a, b) if a > b => Sign::Plus,
+            _ => Sign::Undefined,
+        };
+        guard.judge(sign) == Truth::Yes
     }
 }

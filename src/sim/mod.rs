@@ -74,6 +74,7 @@ mod doubt;
 mod equations;
 mod error;
 mod event;
+mod exact;
 mod fetch;
 mod flash;
 mod gather;

@@ -287,3 +287,49 @@ fn progress_is_written_where_it_is_asked_for() {
 fn text_of(output: &Output) -> String {
     text(&output.stderr)
 }
+
+/// What is no file is refused at once: a device without an end, a pipe that nobody writes to.
+#[cfg(unix)]
+#[test]
+fn devices_and_pipes_are_no_models() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let pipe = folder.path().join("pipe.dls");
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status().expect("mkfifo");
+    assert!(made.success());
+    for path in ["/dev/zero", pipe.to_str().expect("UTF-8")] {
+        for command in ["check", "run", "explain", "fmt"] {
+            let (status, said) = bad(&[command, path]);
+            assert!(status == 1 && said.contains("no regular file") && said.contains("help"), "{said}");
+        }
+    }
+}
+
+/// Answers that cannot be written are a failure, of every subcommand.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_a_failure() {
+    for arguments in [
+        &["repl"][..],
+        &["run", "models/dragon.dls", "--at", "1"],
+        &["check", "models/dragon.dls"],
+        &["explain", "models/dragon.dls"],
+        &["gallery", "--list"],
+        &["completions", "bash"],
+        &["man"],
+        &["help"],
+        &["--version"],
+    ] {
+        let output = std::process::Command::new(env!("CARGO_BIN_EXE_dlsys"))
+            .args(arguments)
+            .current_dir(crate::common::repository("."))
+            .stdin(
+                std::fs::File::open(crate::common::repository("tests/sessions/full-disk.txt"))
+                    .expect("a script"),
+            )
+            .stdout(std::fs::OpenOptions::new().write(true).open("/dev/full").expect("a device"))
+            .output()
+            .expect("the program starts");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.code() == Some(1) && said.contains("cannot write"), "{arguments:?}: {said}");
+    }
+}

@@ -232,3 +232,23 @@ fn at_the_instant_of_an_event_its_successor_is_there() {
     let text = "initial string: X(0) A(1)\nX(x): solve dx/dt = cos(x)\nA(n): if t = n produce ε";
     assert_eq!(run(text, steps, &[1.0]).expect("it runs")[0].len(), 1);
 }
+
+/// Values that no equation moves are compared to the last bit, whichever way a condition is written; values that come of
+/// equations with a tolerance.
+#[test]
+fn conditions_over_values_that_nothing_moves_are_exact() {
+    let text = "initial string: U(0) G(0) E(0)\nU(x) : x < 1 -> U(x + 0.1)\nG(x) : 1 - x > 0 -> G(x + 0.1)\n\
+        E(x) : x = 0.3 -> E(9)\nE(x) -> E(x + 0.1)\n";
+    let strings = crate::common::run(text, Settings::default(), &[20.0]).expect("it runs");
+    // Ten times 0.1 is less than 1, and three times 0.1 is not 0.3, as for every other program.
+    let sum: f64 = (0..11).fold(0.0, |x, _| x + 0.1);
+    let parameters: Vec<f64> = strings[0].iter().map(|(_, p)| p[0]).collect();
+    assert_eq!(parameters[..2], [sum, sum]);
+    assert!(parameters[2] < 3.0, "{}", parameters[2]);
+    // What has grown, and what is handed on of it, has the error of an integration.
+    let grown = "initial string: C(0)\nC(x): solve dx/dt = 0.1\nC(x) : x >= 0.3 -> D(x, 0)\n\
+        D(x, n) : x = 0.3 & n = 0 -> D(x, 1)\n";
+    let strings = crate::common::run(grown, Settings::default(), &[4.0]).expect("it runs");
+    assert_eq!(strings[0][0].0, "D");
+    assert_eq!(strings[0][0].1[1], 1.0);
+}

@@ -4,6 +4,7 @@
 //! - [`light`]: modules with formulas only, the quick way against the general one.
 //! - [`limits`]: what runs away, extreme numbers, killed processes, full disks, little memory.
 //! - [`linear`]: neighbours with linear equations against closed forms: transport one way, large starts, stiff chains.
+//! - [`layout`]: what `fmt` may not do to any text.
 //! - [`listings`]: the paper's models against results of an independent program.
 //! - [`algebraic`], [`signals`]: values and equations instead of rates; sums over what is attached; contexts with branches.
 //! - [`semantics`]: what happens when (events, contexts, errors of a run), model by small model.
@@ -24,6 +25,7 @@
 //! - [`repl`]: the interactive session, without a terminal and with one.
 //! - [`replay`]: any time after any other, to the bits of a run.
 //! - [`report`]: studies of methods, and hard cases with exact answers.
+//! - [`wild`]: texts that nobody would write.
 //! - [`view`]: pages that play a recording, read back.
 
 mod algebraic;
@@ -41,6 +43,7 @@ mod files;
 mod gallery;
 mod inspect;
 mod language;
+mod layout;
 mod light;
 mod limits;
 mod linear;
@@ -57,3 +60,4 @@ mod schedulers;
 mod semantics;
 mod signals;
 mod view;
+mod wild;

@@ -321,7 +321,11 @@ impl Render<'_> {
             described["size"] = json!(page.pixels);
             described["background"] = page.background.map(|color| color.to_string()).into();
         }
-        let mut manifest = Manifest::new(&run.session.source.name, model.title.clone(), described);
+        // The path as it was typed would make the bytes depend on the folder that one is in.
+        let path = std::path::Path::new(&run.session.source.name);
+        let name =
+            path.file_name().map_or(run.session.source.name.clone(), |n| n.to_string_lossy().into_owned());
+        let mut manifest = Manifest::new(name, model.title.clone(), described);
         manifest.view_box = (format == Format::Svg).then(|| page.picture.view_box());
         manifest.bounds = fit.bounds.map(|c| c.map(|p| [p.x, p.y, p.z]));
         manifest

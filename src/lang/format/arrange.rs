@@ -125,6 +125,10 @@ fn is_body(piece: &Piece<'_>) -> bool {
 
 /// Whether a piece begins a clause or its action, and not, say, an `if` in an expression.
 fn is_keyword(piece: &Piece<'_>, before: Option<&Piece<'_>>) -> bool {
+    // `2if x < 1 then 1 else 0` is a product.
+    if before.is_some_and(|b| b.factor) {
+        return false;
+    }
     let begins = match piece.text {
         "solve" | "produce" | "let" => true,
         "if" | "at" => before.is_some_and(|b| b.place == Place::Colon || b.in_string || !b.operator),
@@ -280,6 +284,10 @@ fn space(before: &Piece<'_>, after: &Piece<'_>) -> bool {
             || matches!(piece.text, "if" | "solve" | "produce" | "or" | "at" | "rate") && piece.operator
     };
     let bracket = |piece: &Piece<'_>, symbol: &str| piece.text == symbol && !piece.grouped;
+    // `2c` is a product, and so is `2if x < 1 then 1 else 0`; `@in` is a name.
+    if before.factor || before.text == "@" {
+        return false;
+    }
     let element = before.token == Token::Word && !before.operator && bracket(after, "[");
     if element || bracket(before, "[") || bracket(after, "]") {
         return false;
@@ -289,9 +297,6 @@ fn space(before: &Piece<'_>, after: &Piece<'_>) -> bool {
     }
     if matches!(before.token, Token::Comma | Token::Colon) || word(before) || word(after) {
         return true;
-    }
-    if before.text == "@" {
-        return false;
     }
     if after.token == Token::Open && before.token == Token::Word {
         return false;
@@ -308,8 +313,6 @@ fn space(before: &Piece<'_>, after: &Piece<'_>) -> bool {
         // A sign with one side stands at what it is the sign of.
         _ if before.token == Token::Symbol && matches!(before.text, "+" | "-" | "!") => false,
         _ if before.token == Token::Symbol || after.token == Token::Symbol => kept,
-        // `2c` is a product.
-        _ if before.factor => false,
         _ => true,
     }
 }

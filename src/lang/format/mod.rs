@@ -18,26 +18,27 @@
 mod arrange;
 mod pieces;
 
-use super::parse;
+use super::ast::Document;
+use super::{parse, print};
 use crate::diagnostic::{Diagnostic, Source};
-use pieces::{Line, lines};
+use pieces::lines;
 
-/// The text in its canonical layout, which says the same: the same tokens, in the same declarations.
+/// The text in its canonical layout, which says the same: the same characters but white space, read as the same
+/// declarations and rules. Both are looked at when the layout is made, and independently of how it is made.
 ///
 /// # Errors
 /// What is wrong with a text that cannot be parsed. Nothing is said about what it means.
 pub fn format(source: &Source) -> Result<String, Vec<Diagnostic>> {
-    let (_, errors) = parse::parse(source);
+    let (document, errors) = parse::parse(source);
     if !errors.is_empty() {
         return Err(errors);
     }
-    let before = lines(&source.text);
-    let mut text = arrange::arrange(&before);
+    let mut text = arrange::arrange(&lines(&source.text));
     if source.text.contains("\r\n") {
         text = text.replace('\n', "\r\n");
     }
     // Whatever the language becomes: rather no layout than another model.
-    if !same(&before, &lines(&text)) {
+    if !kept(&source.text, &text) || !says_the_same(&document, &text) {
         let fault = Diagnostic::error("this text cannot be laid out without changing what it says")
             .help("leave its layout as it is; please report it with the text");
         return Err(vec![fault]);
@@ -45,20 +46,29 @@ pub fn format(source: &Source) -> Result<String, Vec<Diagnostic>> {
     Ok(text)
 }
 
-/// Whether two texts have the same tokens, the same line breaks that end something, and the same comments.
-fn same(a: &[Line<'_>], b: &[Line<'_>]) -> bool {
-    let meant = |line: &&Line<'_>| !line.pieces.is_empty() || line.comment.is_some();
-    let mut others = b.iter().filter(meant);
-    let alike = a.iter().filter(meant).all(|line| {
-        others.next().is_some_and(|other| {
-            let pairs = || line.pieces.iter().zip(&other.pieces);
-            line.comment == other.comment
-                && line.pieces.len() == other.pieces.len()
-                && (line.pieces.is_empty() || line.ends == other.ends)
-                && pairs().all(|(p, q)| p.text == q.text && p.item == q.item && p.factor == q.factor)
+/// Whether a layout has the characters of the text, in their order. It looks at nothing but characters, so that no
+/// mistake about tokens hides from it. White space may differ, but not in quotes, nor within a comment.
+fn kept(text: &str, layout: &str) -> bool {
+    significant(text).eq(significant(layout))
+}
+
+/// What a layout must keep: the characters that are no white space, all of a text in quotes, and comments with their ends.
+fn significant(text: &str) -> impl Iterator<Item = char> + '_ {
+    text.split('\n').flat_map(|line| {
+        let (mut quoted, mut comment) = (false, false);
+        let end = if line.contains('#') { "\n" } else { "" };
+        line.trim_end().chars().chain(end.chars()).filter(move |&c| {
+            quoted ^= c == '"' && !comment;
+            comment |= c == '#' && !quoted;
+            quoted || comment || !c.is_whitespace()
         })
-    });
-    alike && others.next().is_none()
+    })
+}
+
+/// Whether a layout reads as the same declarations, rules and expressions, in their order.
+fn says_the_same(document: &Document, layout: &str) -> bool {
+    let (again, errors) = parse::parse(&Source::new("", layout));
+    errors.is_empty() && print::document(&again) == print::document(document)
 }
 
 #[cfg(test)]
@@ -77,6 +87,8 @@ mod tests {
         for (wild, tame) in [
             ("const  a=2 * ( 3+4 ) /5 ^ -2", "const a = 2*(3 + 4)/5^-2"),
             ("const a = -2c+ 1e-3*1.5E+2 - -b", "const a = -2c + 1e-3*1.5E+2 - -b"),
+            ("const a=1e2x+2e3r*1e9floor(t)-2ex", "const a = 1e2x + 2e3r*1e9floor(t) - 2ex"),
+            ("const a=2if b<1 then 1e2e3 else 3.5(b)", "const a = 2if b < 1 then 1e2e3 else 3.5(b)"),
             ("def f( x,y )=if x<=y&!(x=0)then x else-y", "def f(x, y) = if x <= y & !(x = 0) then x else -y"),
             ("frames 0..9 step .5", ""),
             ("frames 0..9 step 0.5", "frames 0 .. 9 step 0.5"),

@@ -22,8 +22,6 @@ pub struct Piece<'t> {
     pub after_operand: bool,
     pub operator: bool,
     pub depth: usize,
-    /// The number of its declaration or rule.
-    pub item: Option<usize>,
     pub kind: ItemKind,
     pub place: Place,
     /// A number that multiplies what stands directly behind it.
@@ -118,7 +116,6 @@ impl<'t> Reader<'t, '_> {
     fn whole(&self, first: Lexeme) -> usize {
         let rest = &self.text[first.start..];
         match first.token {
-            Token::Number => first.start + number(rest.as_bytes()).max(first.end - first.start),
             Token::Symbol => {
                 let long = LONG.iter().find(|long| rest.starts_with(**long));
                 long.map_or(first.end, |long| first.start + long.len())
@@ -131,11 +128,11 @@ impl<'t> Reader<'t, '_> {
         while self.items.get(self.item).is_some_and(|item| item.start <= first.start) {
             self.item += 1;
         }
-        let item = self.item.checked_sub(1).map(|i| (i, &self.items[i]));
-        let kind = item.map_or(ItemKind::Unknown, |(_, item)| item.kind);
+        let item = self.item.checked_sub(1).map(|i| &self.items[i]);
+        let kind = item.map_or(ItemKind::Unknown, |item| item.kind);
         let place = match item {
-            Some((_, item)) if item.start == first.start => Place::Start,
-            Some((_, item)) => match item.after_colon {
+            Some(item) if item.start == first.start => Place::Start,
+            Some(item) => match item.after_colon {
                 Some(after) if first.end == after => Place::Colon,
                 Some(after) if first.start >= after => Place::Body,
                 _ => Place::Head,
@@ -154,27 +151,9 @@ impl<'t> Reader<'t, '_> {
             after_operand: first.after_operand,
             operator: first.operator,
             depth: first.depth,
-            item: item.map(|(i, _)| i),
             kind,
             place,
             factor: false,
         }
     }
-}
-
-/// The length of the number that a text begins with: digits, a fraction, an exponent.
-fn number(text: &[u8]) -> usize {
-    let digits = |from: usize| text[from..].iter().take_while(|b| b.is_ascii_digit()).count();
-    let mut end = digits(0);
-    if text.get(end) == Some(&b'.') && text.get(end + 1).is_some_and(u8::is_ascii_digit) {
-        end += 1 + digits(end + 1);
-    }
-    if matches!(text.get(end), Some(b'e' | b'E')) {
-        let sign = usize::from(matches!(text.get(end + 1), Some(b'+' | b'-')));
-        let exponent = digits((end + 1 + sign).min(text.len()));
-        if exponent > 0 {
-            end += 1 + sign + exponent;
-        }
-    }
-    end
 }

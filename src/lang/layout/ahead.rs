@@ -2,7 +2,7 @@
 //! clause, the weight of a successor.
 
 use super::{ItemKind, Last, Scanner};
-use crate::lang::lexeme::Token;
+use crate::lang::lexeme::{Token, in_name};
 
 impl Scanner<'_> {
     /// Whether a `:` stands on the line outside parentheses opened on it, and before any `produce` or arrow, behind which it
@@ -79,16 +79,14 @@ impl Scanner<'_> {
     /// Whether `at rate` stands at a word.
     pub(super) fn is_at_rate(&self, start: usize, end: usize) -> bool {
         let next = self.text[end..].trim_start_matches([' ', '\t']);
-        let in_word = |c: char| c.is_alphanumeric() || c == '_';
         let in_rule = self.items.last().is_some_and(|i| i.kind == ItemKind::Rule && i.after_colon.is_some());
         in_rule
             && &self.text[start..end] == "at"
-            && next.strip_prefix("rate").is_some_and(|rest| !rest.starts_with(in_word))
+            && next.strip_prefix("rate").is_some_and(|rest| !rest.starts_with(in_name))
     }
 
     pub(super) fn follows_at(&self, start: usize) -> bool {
-        let in_word = |c: char| c.is_alphanumeric() || c == '_';
         let before = self.text[..start].trim_end_matches([' ', '\t']).strip_suffix("at");
-        before.is_some_and(|rest| !rest.ends_with(in_word))
+        before.is_some_and(|rest| !rest.ends_with(in_name))
     }
 }

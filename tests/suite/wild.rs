@@ -1,0 +1,332 @@
+//! Texts that nobody would write: the models of the repository, the mistakes among them, with random changes. The changes are
+//! the same in every run.
+//!
+//! Here: whatever the text is, reading it ends with a model or with messages that can be drawn, never with a panic. What
+//! `fmt` makes of these texts is looked at in [`layout`](super::layout).
+
+use std::fs;
+use std::path::PathBuf;
+
+use dlsys::diagnostic::Severity;
+use dlsys::session::Session;
+
+use crate::common::repository;
+
+/// The texts of all models, with their paths.
+pub fn texts() -> Vec<(PathBuf, String)> {
+    let mut folders: Vec<PathBuf> = ["models", "tests/paper-models", "tests/errors"].map(repository).to_vec();
+    let mut found = Vec::new();
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).expect("a folder") {
+            let path = entry.expect("readable").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| e == "dls")
+                && let Ok(text) = String::from_utf8(fs::read(&path).expect("readable"))
+            {
+                found.push((path, text));
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+/// Random numbers that are the same in every run.
+pub struct Dice(pub u64);
+
+impl Dice {
+    pub fn roll(&mut self, sides: usize) -> usize {
+        // SplitMix64.
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) % sides.max(1) as u64) as usize
+    }
+
+    fn of<'t>(&mut self, all: &[&'t str]) -> &'t str {
+        all[self.roll(all.len())]
+    }
+
+    /// A place between two characters.
+    fn place(&mut self, text: &str) -> usize {
+        let mut at = self.roll(text.len() + 1);
+        while !text.is_char_boundary(at) {
+            at -= 1;
+        }
+        at
+    }
+}
+
+/// What may stand behind a number, in front of one, or in its place.
+const NUMBERS: [&str; 22] = [
+    "1e2x",
+    "2e3r",
+    "1e9floor(t)",
+    "1e2",
+    "1E+2x",
+    "3e-4(x)",
+    "2ex",
+    "2e",
+    "2e_1",
+    "2e2e2",
+    "1.5e2.5",
+    "1..2",
+    "5.",
+    ".5",
+    "0x1F",
+    "1_000",
+    "2₁",
+    "2x₁",
+    "2²",
+    "2if x < 1 then 1 else 0",
+    "3sum(F(x): x)",
+    "007",
+];
+
+/// Tokens of the language and of others, and white space of all kinds.
+const ODD: [&str; 76] = [
+    "#",
+    "\"",
+    "\"a # b\"",
+    "'",
+    "@",
+    "@ L",
+    "@L",
+    "±",
+    "+",
+    "-",
+    "->",
+    "-->",
+    "→",
+    "- >",
+    "..",
+    "...",
+    ".",
+    "==",
+    "&&",
+    "||",
+    "!=",
+    "! =",
+    "!",
+    "≤",
+    "< =",
+    "·",
+    "**",
+    "(",
+    ")",
+    "[",
+    "]",
+    "{",
+    "}",
+    ",",
+    ":",
+    ";",
+    "%",
+    "|",
+    "\\",
+    "$",
+    "~",
+    "ε",
+    "epsilon",
+    "if",
+    "then",
+    "else",
+    "solve",
+    "produce",
+    "or",
+    "at rate",
+    "at",
+    "let",
+    "match",
+    "case 0:",
+    "for",
+    "step",
+    "in",
+    "string",
+    "strength",
+    "sum(",
+    "count(",
+    "periodic",
+    "title",
+    "ignore",
+    "def",
+    "\t",
+    "\u{a0}",
+    "\u{2003}",
+    "\r",
+    "\n",
+    "\r\n",
+    "\n\n\n",
+    "\u{308}",
+    "é",
+    "e\u{301}",
+    "\u{200b}",
+];
+
+/// Expressions and modules that mean something somewhere.
+const EXPRESSIONS: [&str; 40] = [
+    "slope(f, 1)",
+    "slope(g, x)",
+    "inverse(g, 2)",
+    "inverse(logistic, 0.5)",
+    "integral(g, 0, 1)",
+    "length(a)",
+    "a[10]",
+    "a[-1]",
+    "a[x]",
+    "uniform(0, 1)",
+    "normal(0, 1)",
+    "choice(1, 2)",
+    "integer(1, 2)",
+    "sum(A(x): x)",
+    "count(A(x))",
+    "largest(B: 1)",
+    "t",
+    "age",
+    "(x > 0)",
+    "(if x > 0 then 1 else 0)",
+    "match x case 0: 1 else 2",
+    "1/0",
+    "sqrt(-1)",
+    "1e400",
+    "floor(t)",
+    "min(x, 1)",
+    "f(x)",
+    "f(f(x))",
+    "max(1)",
+    "nowhere",
+    "A(x)",
+    "A",
+    "F(x)[+F]",
+    "% ",
+    "at rate 2 produce A",
+    "solve x = 1",
+    "solve 0 = x - 1 for x",
+    "produce 1: A or 2: F(x)",
+    "let y = 2",
+    "[ A ]",
+];
+
+/// A text with one to four random changes.
+pub fn changed(text: &str, dice: &mut Dice) -> String {
+    let mut text = text.to_owned();
+    for _ in 0..=dice.roll(4) {
+        let at = dice.place(&text);
+        // Where something begins or ends.
+        let edge = |text: &str| {
+            let edges: Vec<usize> = (text[at..].char_indices().zip(text[at..].chars().skip(1)))
+                .filter(|((_, a), b)| a.is_alphanumeric() != b.is_alphanumeric())
+                .map(|((i, a), _)| at + i + a.len_utf8())
+                .take(8)
+                .collect();
+            edges
+        };
+        match dice.roll(11) {
+            0 => text.insert_str(at, dice.of(&ODD)),
+            1 => {
+                let edges = edge(&text);
+                let at = edges.get(dice.roll(edges.len())).copied().unwrap_or(at);
+                text.insert_str(at, dice.of(&ODD));
+            }
+            2 => {
+                // A number with something that is glued to it.
+                if let Some(start) = text[at..].find(|c: char| c.is_ascii_digit()).map(|i| at + i) {
+                    let end =
+                        text[start..].find(|c: char| !c.is_ascii_digit()).map_or(text.len(), |i| start + i);
+                    let start = if dice.roll(2) == 0 { end } else { start };
+                    text.replace_range(start..end, dice.of(&NUMBERS));
+                }
+            }
+            3 => {
+                let edges = edge(&text);
+                let at = edges.get(dice.roll(edges.len())).copied().unwrap_or(at);
+                text.insert_str(at, dice.of(&[" ", "  ", "\t", "\n", "\n  ", "\r\n", " \n\n "]));
+            }
+            4 => {
+                // White space that is gone.
+                if let Some(start) = text[at..].find(char::is_whitespace).map(|i| at + i) {
+                    let end =
+                        text[start..].find(|c: char| !c.is_whitespace()).map_or(text.len(), |i| start + i);
+                    text.replace_range(start..end, dice.of(&["", "", " "]));
+                }
+            }
+            5 => {
+                let end = text[at..].char_indices().nth(1 + dice.roll(5)).map_or(text.len(), |(i, _)| at + i);
+                text.replace_range(at..end, "");
+            }
+            6 => {
+                // Something of the text, elsewhere.
+                let end =
+                    text[at..].char_indices().nth(1 + dice.roll(40)).map_or(text.len(), |(i, _)| at + i);
+                let copy = text[at..end].to_owned();
+                let to = dice.place(&text);
+                text.insert_str(to, &copy);
+            }
+            7 | 8 => {
+                // A word that is another.
+                let in_word = |c: char| c.is_alphanumeric() || c == '_';
+                if let Some(start) = text[at..].find(in_word).map(|i| at + i) {
+                    let end = text[start..].find(|c| !in_word(c)).map_or(text.len(), |i| start + i);
+                    let words: Vec<&str> = text.split(|c| !in_word(c)).filter(|w| !w.is_empty()).collect();
+                    let other = dice.of(&words).to_owned();
+                    text.replace_range(start..end, &other);
+                }
+            }
+            9 => {
+                // A term, a parameter or a module that is another.
+                if let Some(start) = text[at..].find(char::is_alphanumeric).map(|i| at + i) {
+                    let end = text[start..].find(|c: char| !c.is_alphanumeric() && !"_.".contains(c));
+                    let end = end.map_or(text.len(), |i| start + i);
+                    text.replace_range(start..end, dice.of(&EXPRESSIONS));
+                }
+            }
+            _ => {
+                let mut lines: Vec<&str> = text.split_inclusive('\n').collect();
+                let (a, b) = (dice.roll(lines.len()), dice.roll(lines.len()));
+                if !lines.is_empty() {
+                    lines.swap(a, b);
+                }
+                text = lines.concat();
+            }
+        }
+    }
+    text
+}
+
+#[test]
+fn every_text_is_read_or_gets_its_messages() {
+    let mut dice = Dice(7);
+    let (mut read, mut refused, mut panics) = (0, 0, Vec::new());
+    for (path, text) in &texts() {
+        let folder = path.parent().expect("a folder");
+        for _ in 0..(60_000 / text.len().max(100)).clamp(10, 120) {
+            let other = changed(text, &mut dice);
+            let reading = || Session::from_text_in(folder, &[], "m.dls", &other, &[]);
+            let Ok(done) = std::panic::catch_unwind(reading) else {
+                panics.push(other);
+                continue;
+            };
+            match done {
+                Ok(session) => {
+                    read += 1;
+                    for warning in &session.warnings {
+                        assert_eq!(warning.severity, Severity::Warning, "{other}");
+                        assert!(!warning.render(&session.source, false).is_empty());
+                    }
+                }
+                Err(fault) => {
+                    refused += 1;
+                    let errors = fault.diagnostics.iter().filter(|d| d.severity == Severity::Error);
+                    assert!(errors.count() > 0, "refused without a word:\n{other}");
+                    for said in &fault.diagnostics {
+                        assert!(!said.render(&fault.source, false).is_empty());
+                    }
+                }
+            }
+        }
+    }
+    assert!(panics.is_empty(), "{} texts, such as\n{}", panics.len(), panics[0]);
+    assert!(read > 3000 && refused > 10_000, "{read} {refused}");
+}
