@@ -20,6 +20,7 @@
 //! - [`repl`]: the interactive session, without a terminal and with one.
 //! - [`replay`]: any time after any other, to the bits of a run.
 //! - [`report`]: studies of methods, and hard cases with exact answers.
+//! - [`verify`]: runs that are computed again by an independent way.
 //! - [`view`]: pages that play a recording, read back.
 
 mod algebraic;
@@ -48,4 +49,5 @@ mod report;
 mod schedulers;
 mod semantics;
 mod signals;
+mod verify;
 mod view;
