@@ -49,5 +49,5 @@ pub use study::{Outcome, Plan, Point, Series, Study, Wall, default_times, study}
 pub use table::{hard_table, mismatches, series_table, study_head, study_table};
 pub use verify::{
     Gap, PROMISED, Pair, Productions, Split, Unverified, Verification, complaint, unverified,
-    verification_rows, verification_table, verify, way,
+    verification_rows, verification_table, verify,
 };

@@ -11,7 +11,8 @@
 //! - what comes from outside the band and leaves it on the side where it came from may have touched, or not: that is said
 //!   ([`Error::InDoubt`](super::Error::InDoubt)) where something depends on it.
 //!
-//! A touch to the last digits counts as one, as everywhere.
+//! A touch to the last digits counts as one, as everywhere. And all this is for productions: conditions inside equations
+//! change where the integrated values have them change, or pieces of equations would be continued beyond their ends.
 //!
 //! Two modules of which one sees the other may have their events at one instant in truth, and at two instants as
 //! integrated; then the second would see what the first has made. So when a module has its event, those that look at it and
@@ -77,6 +78,8 @@ pub struct Question {
     pub tolerance: f64,
     /// The sides were near each other before, and had come there from outside.
     pub near: bool,
+    /// A production may follow.
+    pub decides: bool,
     /// What integrated values may be wrong by, relative; 0 if there are none.
     pub error: f64,
 }
@@ -91,7 +94,9 @@ impl Watcher {
         let [a, b] = [self.out[2 * atom], self.out[2 * atom + 1]];
         let is_far = start.abs() > FAR * question.error * a.abs().max(b.abs()).max(start.abs());
         let noise = if is_far { 0.0 } else { self.noise(path, atom, question.from) };
-        if noise > tolerance && start.abs() <= noise {
+        // Equations change where their conditions do, however near that is: only a sign that is wrong already waits.
+        let in_band = start.abs() <= noise && (question.decides || start <= 0.0);
+        if noise > tolerance && in_band {
             // In the band: which way out?
             let up = self.leaves(path, question, noise, sign);
             let down = self.leaves(path, question, noise, opposite(sign));
@@ -123,6 +128,7 @@ impl Watcher {
             Some(meeting) if meeting.at != Sign::Zero || meeting.after != opposite(sign) => {
                 return Ahead { next, ..Ahead::default() };
             }
+            _ if !question.decides => return Ahead { next, ..Ahead::default() },
             Some(meeting) => meeting.position,
             None => limit,
         };

@@ -47,6 +47,9 @@ pub const CERTAINTY: f64 = 2.0;
 /// end is known, and so on.
 const WIGGLE: f64 = 50.0;
 
+/// An error of no more than this part of the tolerated one, for values of the size of 1, is none where step control does not help.
+const NOTHING: f64 = 1e-2;
+
 /// A step is long enough that takes so many stretches.
 const MANY_STRETCHES: f64 = 4.0;
 /// How much shorter a step is tried when what is solved for along with it cannot be followed.
@@ -153,6 +156,7 @@ impl Integrator {
         }
         let room = limit.map_or(f64::INFINITY, |limit| limit.since(start));
         let mut rejected = false;
+        let mut powerless = Powerless::default();
         loop {
             // Two steps of the same length rather than a long one and a short one.
             h = if h >= room {
@@ -188,7 +192,9 @@ impl Integrator {
                 Trial::Done { error, rounding }
                     if error.max(rounding) > 1.0
                         && grid.is_none()
-                        && self.workspace.is_instant(y, h, start.resolution(), tolerance) =>
+                        && (self.workspace.is_instant(y, h, start.resolution(), tolerance)
+                            || powerless.is_shown(h, error.max(rounding))
+                                && self.workspace.absolute <= NOTHING * tolerance) =>
                 {
                     control.size = h * 10.0;
                     control.last_error = 1.0;
@@ -294,6 +300,30 @@ impl Integrator {
 /// The step times the rate of decay up to which an explicit method damps.
 fn stability(method: Method) -> f64 {
     if method == Method::Dop853 { 1.9 } else { 2.8 }
+}
+
+/// Step control that does not help: errors that stay what they are, for their scale, however much shorter steps become. They
+/// are rounding of what the rates are computed from, or belong to a solution that looks the same on all scales.
+#[derive(Default)]
+struct Powerless {
+    /// Length and error of a step that was rejected.
+    last: Option<(f64, f64)>,
+    times: u32,
+}
+
+impl Powerless {
+    /// Takes in a step that is about to be rejected.
+    fn is_shown(&mut self, h: f64, error: f64) -> bool {
+        let Some((before, known)) = self.last else {
+            self.last = Some((h, error));
+            return false;
+        };
+        if h <= 0.3 * before {
+            self.times = if error > 0.5 * known { self.times + 1 } else { 0 };
+            self.last = Some((h, error));
+        }
+        self.times >= 3
+    }
 }
 
 /// Watches for steps that are short for stability's sake only (Hairer and Wanner 1996, IV.2). The bounds lie below the

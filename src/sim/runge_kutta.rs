@@ -95,6 +95,8 @@ pub struct Workspace {
     other_end: Vec<f64>,
     /// The state at the end of the step.
     pub end: Vec<f64>,
+    /// The largest estimated error of a component in the step just tried, relative to max(1, |value|).
+    pub absolute: f64,
     /// The resolution of time, if rates read it.
     pub resolution: f64,
     /// Of the equations of one module.
@@ -265,9 +267,10 @@ impl Workspace {
     }
 
     /// The largest error of a component, in units of what is tolerated, by truncation and by rounding.
-    fn error(&self, tableau: &Tableau, n: usize, h: f64, tolerance: f64) -> (f64, f64) {
+    fn error(&mut self, tableau: &Tableau, n: usize, h: f64, tolerance: f64) -> (f64, f64) {
         let (mut error, mut rounding): (f64, f64) = (0.0, 0.0);
         let blur = 4.0 * self.resolution / tableau.c[1];
+        let mut absolute: f64 = 0.0;
         let estimates = |row: &[f64], first: usize| match n {
             0..=FEW => std::array::from_fn(|j| if j < n { weighed(row, &self.k, j) } else { 0.0 }),
             _ => weigh(row, &self.k, first),
@@ -297,12 +300,15 @@ impl Workspace {
                 let scale = tolerance * (from[j].abs().max(h.abs() * speed) + FLOOR) + blur;
                 roundings[j] = 4.0 * f64::EPSILON * end[j].abs() / scale;
                 ratios[j] = estimate[j] / scale;
+                let part = estimate[j] / from[j].abs().max(1.0);
+                absolute = if first + j < n { absolute.max(part) } else { absolute };
             }
             for (ratio, other) in ratios.into_iter().zip(roundings).take(n - first) {
                 rounding = rounding.max(other);
                 error = if ratio > error || ratio.is_nan() { ratio } else { error };
             }
         }
+        self.absolute = absolute;
         (error, rounding)
     }
 

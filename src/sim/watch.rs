@@ -173,8 +173,17 @@ impl Watcher {
                     }
                     if let Some(tolerance) = self.may_change(path, atom, now[atom]) {
                         let near = atom < 64 && near & 1 << atom != 0;
-                        let question =
-                            Question { atom, from: 0.0, limit, sign: now[atom], tolerance, near, error };
+                        let decides = integrated && produces(rule, &now, atom);
+                        let question = Question {
+                            atom,
+                            from: 0.0,
+                            limit,
+                            sign: now[atom],
+                            tolerance,
+                            near,
+                            decides,
+                            error,
+                        };
                         let ahead = self.ahead(path, question);
                         watched.push(Watched { atom, tolerance, ahead });
                     }
@@ -198,8 +207,9 @@ impl Watcher {
                     found.in_doubt = true;
                     return found;
                 }
-                let (sign, tolerance) = (now[atom], watched[i].tolerance);
-                let question = Question { atom, from: position, limit, sign, tolerance, near: false, error };
+                let (sign, tolerance, decides) = (now[atom], watched[i].tolerance, true);
+                let question =
+                    Question { atom, from: position, limit, sign, tolerance, near: false, decides, error };
                 rounds += 1;
                 watched[i].ahead = match rounds > MAX_ROUNDS {
                     true => Ahead::default(),
@@ -255,8 +265,17 @@ impl Watcher {
                         Ahead::default()
                     } else {
                         let (atom, tolerance) = (w.atom, w.tolerance);
-                        let question =
-                            Question { atom, from, limit, sign: now[atom], tolerance, near: false, error };
+                        let decides = integrated && produces(rule, &now, atom);
+                        let question = Question {
+                            atom,
+                            from,
+                            limit,
+                            sign: now[atom],
+                            tolerance,
+                            near: false,
+                            decides,
+                            error,
+                        };
                         self.ahead(path, question)
                     };
                 }

@@ -26,6 +26,7 @@
 //! - [`replay`]: any time after any other, to the bits of a run.
 //! - [`report`]: studies of methods, and hard cases with exact answers.
 //! - [`wild`]: texts that nobody would write.
+//! - [`verify`]: runs that are computed again by an independent way.
 //! - [`view`]: pages that play a recording, read back.
 
 mod algebraic;
@@ -59,5 +60,6 @@ mod report;
 mod schedulers;
 mod semantics;
 mod signals;
+mod verify;
 mod view;
 mod wild;

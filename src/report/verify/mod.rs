@@ -16,12 +16,13 @@ mod table;
 
 pub use parameters::Gap;
 pub use productions::{Pair, Productions, Split};
-pub use table::{complaint, unverified, verification_rows, verification_table, way};
+pub use table::{complaint, unverified, verification_rows, verification_table};
 
 use std::time::Instant;
 
 use parameters::Parameters;
 use productions::Matching;
+use table::way;
 
 use super::record::Stop;
 use super::reference::TIGHTEST;
@@ -155,10 +156,13 @@ fn other_ways(checked: &Settings) -> Vec<Settings> {
         Method::Radau => [Method::Dop853, Method::Dopri5],
         Method::Dopri5 | Method::Rk4 | Method::Euler => [Method::Dop853, Method::Radau],
     };
+    // 1e-7, not 1.0000000000000001e-7.
+    let tighter = checked.tolerance / TIGHTER;
+    let tolerance = format!("{tighter:.12e}").parse().unwrap_or(tighter).max(TIGHTEST);
     let way = |method| Settings {
         method,
         scheduler: Scheduler::Global,
-        tolerance: (checked.tolerance / TIGHTER).max(TIGHTEST),
+        tolerance,
         slow: true,
         log: true,
         transitions: false,
@@ -239,12 +243,14 @@ impl<'m> Limited<'m> {
 
     /// Goes to a time and writes the structure there.
     fn go(&mut self, t: f64) -> Result<(), Stop> {
-        while self.simulation.pass_some(t, STRIDE, false).map_err(Stop::Fault)? != Passed::All {
+        loop {
             if self.start.elapsed().as_secs_f64() > self.limit {
                 return Err(Stop::Overtime { t: self.simulation.reached(), limit: self.limit });
             }
+            if self.simulation.pass_some(t, STRIDE, false).map_err(Stop::Fault)? == Passed::All {
+                return self.simulation.at(t, &mut self.string).map_err(Stop::Fault);
+            }
         }
-        self.simulation.at(t, &mut self.string).map_err(Stop::Fault)
     }
 }
 

@@ -230,7 +230,7 @@ mod tests {
         let split = found.split.expect("not the same");
         assert_eq!((split.ours.as_ref(), split.theirs.as_ref()), (Some(&alone), None));
         assert_eq!(split.rival.expect("near").event.lineage, Lineage::of_axiom(1));
-        let found = judge(&[(&[], &[alone.clone()])], 3.0001);
+        let found = judge(&[(&[], std::slice::from_ref(&alone))], 3.0001);
         assert!(found.split.is_none() && found.at_the_end == 1);
         // One module, two clauses: not the same, at the end either.
         let found = judge(&[(&[event(1, 0, 3.0)], &[event(1, 1, 3.0)])], 3.0);

@@ -169,6 +169,11 @@ pub fn complaint(model: &Model, found: &Verification) -> Option<String> {
         out.push_str("at some times the modules are not the same\n");
     }
     let _ = writeln!(out, "\n  = note: the other way is {}", way(&found.other));
+    if found.checked.method == Method::Auto && model.is_closed_form() {
+        out.push_str(
+            "  = note: `auto` has formulas for all of this model; the other way integrates it, and is more likely to be wrong\n",
+        );
+    }
     let _ = writeln!(out, "  = help: {}\n", help(&found.checked));
     Some(out)
 }
