@@ -23,6 +23,8 @@ pub struct Integrator {
     step: (Instant, f64, Instant),
     /// What its end may be wrong by, relative.
     error: f64,
+    /// Steps are so short that rounding of the state is looked at.
+    noisy: bool,
 }
 
 /// Why there is no step. The component that is to blame, if it is known.
@@ -46,6 +48,9 @@ pub const CERTAINTY: f64 = 2.0;
 /// Within a step that is twice as long as stability allows, what decays is interpolated by four times as much worse than its
 /// end is known, and so on.
 const WIGGLE: f64 = 50.0;
+
+/// After so many rejections of one step, rounding may be why.
+const MANY_REJECTIONS: u32 = 6;
 
 /// An error of no more than this part of the tolerated one, for values of the size of 1, is none where step control does not help.
 const NOTHING: f64 = 1e-2;
@@ -72,6 +77,8 @@ impl Integrator {
     /// Prepares for another system of `n` equations, or for a start elsewhere.
     pub fn restart(&mut self, method: Method, n: usize) {
         self.rate_is_known = false;
+        self.noisy = false;
+        self.workspace.noise.clear();
         self.workspace.resize(n);
         self.method = method;
         if let Some(implicit) = &mut self.implicit {
@@ -157,6 +164,10 @@ impl Integrator {
         let room = limit.map_or(f64::INFINITY, |limit| limit.since(start));
         let mut rejected = false;
         let mut powerless = Powerless::default();
+        let mut rejections = 0;
+        if self.noisy {
+            self.workspace.measure_noise(system, y);
+        }
         loop {
             // Two steps of the same length rather than a long one and a short one.
             h = if h >= room {
@@ -203,6 +214,11 @@ impl Integrator {
                 Trial::Done { error, rounding } if error.max(rounding) > 1.0 => {
                     stats.rejected += 1;
                     // Safety and limits as in DOPRI5 (Hairer, Nørsett and Wanner 1993, II.4).
+                    rejections += 1;
+                    if rejections == MANY_REJECTIONS && !self.noisy && grid.is_none() {
+                        self.noisy = true;
+                        self.workspace.measure_noise(system, y);
+                    }
                     h *= (0.9 * error.max(rounding).powf(-1.0 / f64::from(order + 1))).clamp(0.1, 0.9);
                     rejected = true;
                 }

@@ -97,6 +97,8 @@ pub struct Workspace {
     pub end: Vec<f64>,
     /// The largest estimated error of a component in the step just tried, relative to max(1, |value|).
     pub absolute: f64,
+    /// What rounding of the state makes of each rate; empty where nobody has asked.
+    pub noise: Vec<f64>,
     /// The resolution of time, if rates read it.
     pub resolution: f64,
     /// Of the equations of one module.
@@ -289,6 +291,10 @@ impl Workspace {
             }
             let (departure, second) = (part(&self.k[0], first), part(&self.k[1], first));
             let (mut ratios, mut roundings) = ([0.0; PART], [0.0; PART]);
+            let mut noise = [0.0; PART];
+            for (noise, known) in noise.iter_mut().zip(self.noise.iter().skip(first)) {
+                *noise = *known;
+            }
             for j in 0..PART {
                 // Relative to where the step begins, and to how far it goes from there at first: what
                 // grows from 1e-6 must be known to its own digits. Not to where it ends: beyond an
@@ -297,6 +303,7 @@ impl Workspace {
                 let speed = departure[j].abs().max(second[j].abs());
                 // Rates that depend on time are known as well as time is.
                 let blur = blur * (second[j] - departure[j]).abs();
+                let blur = blur + 4.0 * h.abs() * noise[j];
                 let scale = tolerance * (from[j].abs().max(h.abs() * speed) + FLOOR) + blur;
                 roundings[j] = 4.0 * f64::EPSILON * end[j].abs() / scale;
                 ratios[j] = estimate[j] / scale;
@@ -404,6 +411,18 @@ impl Workspace {
         let next = if most <= 1e-15 { (guess * 1e-3).max(1e-6) } else { (0.01 / most).powf(1.0 / order) };
         let size = next.min(100.0 * guess);
         if size.is_finite() && size > 0.0 { size } else { 1e-6 }
+    }
+
+    /// Finds out what rounding of the state makes of the rates, from their partial derivatives.
+    pub fn measure_noise(&mut self, system: &mut impl Rates, y: &[f64]) {
+        let (couplings, mut partials) = (system.couplings(), Vec::new());
+        system.partials(0.0, y, &mut partials);
+        self.noise.clear();
+        self.noise.resize(y.len(), 0.0);
+        for (&(row, column), slope) in couplings.iter().zip(&partials) {
+            let part = f64::EPSILON * (slope * y[column as usize]).abs();
+            self.noise[row as usize] += if part.is_finite() { part } else { 0.0 };
+        }
     }
 
     /// True for a step so short that nothing much can happen in it, however rates may jump: no step control can do better
