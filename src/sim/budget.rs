@@ -97,7 +97,7 @@ impl Simulation<'_> {
             }
             self.budget.slow += 1;
             if self.budget.slow >= LOOKS {
-                let foreseen = Some((foreseen, until.to_f64()));
+                let foreseen = Some(Box::new((foreseen, until.to_f64())));
                 return Err(Error::TooManyEvents { site: self.site_of_coming(coming), limit, foreseen });
             }
         } else {
@@ -170,7 +170,7 @@ impl Simulation<'_> {
     }
 
     pub(super) fn out_of_memory(&self, shortage: Shortage, site: Site) -> Error {
-        Error::OutOfMemory { modules: self.plant.tree.len(), shortage, site }
+        Error::OutOfMemory { modules: self.plant.tree.len(), shortage: Box::new(shortage), site }
     }
 
     /// Asks for the lists that so many productions of one instant take.

@@ -109,21 +109,22 @@ pub enum Error {
         site: Site,
         limit: u64,
         /// As many as it would take up to some time, at the present pace.
-        foreseen: Option<(f64, f64)>,
+        foreseen: Option<Box<(f64, f64)>>,
     },
     #[error("{limit} seconds are over at t = {}", .site.when())]
     OutOfTime { site: Site, limit: f64 },
     #[error("no memory for more than {modules} modules at t = {}", .site.when())]
-    OutOfMemory { site: Site, modules: usize, shortage: Shortage },
+    OutOfMemory { site: Site, modules: usize, shortage: Box<Shortage> },
 }
 
-fn too_many(limit: u64, foreseen: &Option<(f64, f64)>, site: &Site) -> String {
+fn too_many(limit: u64, foreseen: &Option<Box<(f64, f64)>>, site: &Site) -> String {
     match foreseen {
         None => format!("more than {limit} productions and steps up to t = {}", site.when()),
-        Some((count, until)) => format!(
-            "time hardly goes on at t = {}: up to t = {} it would take {count:.0e} productions and steps",
+        Some(pace) => format!(
+            "time hardly goes on at t = {}: up to t = {} it would take {:.0e} productions and steps",
             site.when(),
-            super::brief(*until, 12)
+            super::brief(pace.1, 12),
+            pace.0
         ),
     }
 }
@@ -228,11 +229,11 @@ impl Error {
             Error::TooManyEvents { limit, foreseen: None, .. } => {
                 d.help(format!("if this is meant, allow more: `--max-events {}`", limit.saturating_mul(10)))
             }
-            Error::TooManyEvents { foreseen: Some((count, _)), .. } => d
+            Error::TooManyEvents { foreseen: Some(pace), .. } => d
                 .help("a life, a rate or a step size is out of proportion to the times that are observed: compare their units")
                 .help_opt(
                     // What would take years is not meant.
-                    (*count < 1e15).then(|| format!("if this is meant, allow more: `--max-events {count:.0e}`")),
+                    (pace.0 < 1e15).then(|| format!("if this is meant, allow more: `--max-events {:.0e}`", pace.0)),
                 ),
             Error::OutOfTime { limit, .. } => {
                 d.help(format!("if it is worth waiting for, allow more: `--max-seconds {}`", limit * 10.0))
