@@ -85,7 +85,6 @@ fn resolve(
             ))
             .at(head.span, "the number of parameters must agree, or the context is never there")
             .help(format!("name each of them, used or not: `{}`", advice::head_with(head, kind.arity))),
-            // A model that is being written may not have it yet.
             None => Diagnostic::warning(format!("there is no module `{name}`"))
                 .at(head.span, never)
                 .help(advice::no_such_module(kinds, name)),
