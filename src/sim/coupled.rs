@@ -492,7 +492,8 @@ impl Simulation<'_> {
         let Some((id, _)) = self.coupled.system.owner(component) else { return false };
         let context = self.plant.state(id).map(|s| s.context.to_vec()).unwrap_or_default();
         let all = std::iter::once(id).chain(context);
-        all.fold(false, |arrested, id| self.arrest(id, at).is_some() || arrested)
+        let arrested: Vec<()> = all.filter_map(|id| self.arrest(id, at)).collect();
+        !arrested.is_empty()
     }
 
     fn may_flash(&self, id: ModuleId) -> bool {

@@ -236,7 +236,7 @@ impl Watcher {
         let (lo, hi) = ((position - NEARBY).max(0.0), (position + NEARBY).min(1.0));
         let Dual { rate, .. } = self.difference(path, atom).bounds(lo, hi);
         let speed = rate.lo.abs().min(rate.hi.abs());
-        if rate.partial || !(rate.lo * rate.hi > 0.0) {
+        if rate.partial || rate.lo.is_nan() || rate.lo * rate.hi <= 0.0 {
             return 0.0;
         }
         // Not more than a small part of the time in which things change.

@@ -25,6 +25,17 @@ impl Site {
     }
 }
 
+/// Two sides that have come so near each other that nobody can tell whether they have met.
+#[derive(Clone, Debug)]
+pub struct Near {
+    /// Where they meet, as written; empty if that is not known.
+    pub boundary: String,
+    /// How far they are apart.
+    pub gap: f64,
+    /// What they may be wrong by.
+    pub error: f64,
+}
+
 /// Why a parameter cannot be solved for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unsolved {
@@ -79,16 +90,9 @@ pub enum Error {
     NegativeRate { site: Site },
     #[error(
         "{} has come near {} and turned back at t = {}: whether it met it, the error of integration does not tell",
-        .site.module, if .boundary.is_empty() { "a boundary" } else { .boundary }, .site.when()
+        .site.module, if .near.boundary.is_empty() { "a boundary" } else { &.near.boundary }, .site.when()
     )]
-    InDoubt {
-        site: Site,
-        /// Where the sides meet, as written.
-        boundary: Box<str>,
-        /// How far they are apart there, and what they may be wrong by.
-        gap: f64,
-        error: f64,
-    },
+    InDoubt { site: Site, near: Box<Near> },
     #[error("the step size fell to nothing at t = {}", .site.when())]
     StepTooSmall { site: Site },
     #[error("{} of {} {} at t = {}", .unknown.0, .site.module, .unknown.1.message(), .site.when())]
@@ -207,11 +211,11 @@ impl Error {
             Error::NegativeRate { .. } => {
                 d.help("a rate is at least 0: bound it, as in `at rate max(0, …)`, or say when there is none: `if … at rate … produce …`")
             }
-            Error::InDoubt { gap, error, .. } => d
+            Error::InDoubt { near, .. } => d
                 .note(format!(
                     "the two sides are {} apart there, and may be wrong by {}",
-                    super::brief(*gap, 2),
-                    super::brief(*error, 2)
+                    super::brief(near.gap, 2),
+                    super::brief(near.error, 2)
                 ))
                 .help("if it does not get there, a smaller `--tolerance` shows it; if it is meant to, let what comes near count: `if x >= 1 - 1e-5` in place of `if x = 1`"),
             Error::StepTooSmall { .. } => d.help(

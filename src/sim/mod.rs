@@ -108,7 +108,7 @@ mod transition;
 mod watch;
 
 pub use access::{Passed, happens_by};
-pub use error::{Error, Site, Unsolved};
+pub use error::{Error, Near, Site, Unsolved};
 pub use event::Event;
 pub use inspect::{Inspection, Seen};
 pub use settle::MAX_ROUNDS;

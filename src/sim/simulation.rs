@@ -10,7 +10,7 @@ use super::chance;
 use super::consistent::Consistency;
 use super::coupled::Coupled;
 use super::derive::Steps;
-use super::error::{Error, Site};
+use super::error::{Error, Near, Site};
 use super::event::Event;
 use super::flash::Lookout;
 use super::integrator::Integrator;
@@ -409,7 +409,7 @@ impl<'m> Simulation<'m> {
             .state(id)
             .map_or(0.0, |state| Path::new(&self.plant, state, rule, self.now, 0.0).error());
         let boundary = rule.boundaries[atom].to_string();
-        Error::InDoubt { site, boundary: boundary.into(), gap, error: error.max(gap) }
+        Error::InDoubt { site, near: Box::new(Near { boundary, gap, error: error.max(gap) }) }
     }
 
     /// Some module, to name where nothing more is known.
