@@ -122,6 +122,14 @@ fn build(
         match item {
             Item::Title(text) => {
                 single.once("title", *span, builder.scope);
+                if text.chars().any(char::is_control) {
+                    let d = Diagnostic::error("a title has no control characters")
+                        .at(*span, "it is shown in terminals");
+                    builder
+                        .scope
+                        .diagnostics
+                        .push(d.help("write the title in letters; a line break ends it"));
+                }
                 title = Some(text.clone());
             }
             Item::Angle(value) => {

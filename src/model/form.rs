@@ -49,7 +49,15 @@ impl Known {
         Known::rounded(self.value + other.value, self.error + other.error)
     }
 
+    /// 1 or -1: nothing is rounded by it.
+    fn is_sign(self) -> bool {
+        self.error == 0.0 && self.value.abs() == 1.0
+    }
+
     fn times(self, other: Known) -> Known {
+        if self.is_sign() || other.is_sign() {
+            return Known { value: self.value * other.value, error: self.error.max(other.error) };
+        }
         let error = self.error * other.value.abs() + other.error * (self.value.abs() + self.error);
         Known::rounded(self.value * other.value, error)
     }
@@ -58,6 +66,9 @@ impl Known {
     fn over(self, other: Known) -> Option<Known> {
         if other.may_be_zero() {
             return None;
+        }
+        if other.is_sign() {
+            return Some(Known { value: self.value / other.value, ..self });
         }
         let value = self.value / other.value;
         let error = (self.error + value.abs() * other.error) / (other.value.abs() - other.error);

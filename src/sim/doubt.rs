@@ -30,8 +30,8 @@ use crate::structure::ModuleId;
 /// The speed of a difference at a position is that around it, to as much of the path on both sides.
 const NEARBY: f64 = 1e-6;
 
-/// What crosses zero with this part of the speed that has brought it there goes on.
-const STEADY: f64 = 0.7;
+/// What is never slower, on its way through the band, than this part of its mean speed goes on.
+const STEADY: f64 = 0.5;
 
 /// A difference so many times larger than what the sides may be wrong by is no matter of evidence.
 const FAR: f64 = 1e3;
@@ -169,13 +169,12 @@ impl Watcher {
         }
     }
 
-    /// True if the difference comes from outside the band on this path and crosses zero, at the limit, no slower than it has
-    /// come: what only approaches zero is slower the nearer it is.
+    /// True if the difference comes from outside the band on this path and crosses zero, at the limit, at a steady speed: what
+    /// only approaches zero is slower the nearer it is.
     fn passes(&mut self, path: &Path, question: Question, noise: f64) -> bool {
         let Some(enters) = self.falls_below(path, question, noise) else { return false };
         let crossing = question.limit;
-        let (lo, hi) = ((crossing - NEARBY).max(0.0), (crossing + NEARBY).min(1.0));
-        let rate = self.difference(path, question.atom).bounds(lo, hi).rate;
+        let rate = self.difference(path, question.atom).bounds(enters, crossing).rate;
         let speed = (-sign_of(question.sign) * rate.lo).min(-sign_of(question.sign) * rate.hi);
         !rate.partial && speed * (crossing - enters) > STEADY * noise
     }
@@ -214,10 +213,10 @@ impl Watcher {
         half_width(self.around_out[2 * atom], self.around_out[2 * atom + 1])
     }
 
-    /// True if the sides of an atom approach each other, and are no further apart than the error of integration.
-    fn is_about_to_meet(&mut self, path: &Path, atom: usize, sign: Sign) -> bool {
+    /// True if the sides of an atom approach each other, and are no further apart than so many errors of integration.
+    fn is_about_to_meet(&mut self, path: &Path, atom: usize, sign: Sign, factor: f64) -> bool {
         let gap = sign_of(sign) * self.difference(path, atom).value(0.0);
-        if gap > path.error() * 1e3 * (1.0 + gap) || gap > self.noise(path, atom, 0.0) {
+        if gap > FAR * factor * path.error() * (1.0 + gap) || gap > factor * self.noise(path, atom, 0.0) {
             return false;
         }
         let rate = self.difference(path, atom).bounds(0.0, 1.0).rate;
@@ -258,9 +257,10 @@ impl Simulation<'_> {
                 None => self.firing[known - self.opened.len()].id,
             };
             known += 1;
+            let other = self.error_of(id);
             for at in 0..self.neighbours.lookers(id).len() {
                 let looker = self.neighbours.lookers(id)[at];
-                if let Some(change) = self.tie(looker) {
+                if let Some(change) = self.tie(looker, other) {
                     let before = self.opened.len();
                     self.touch(looker, &[change]);
                     known = if self.opened.len() > before && known > before { before } else { known };
@@ -269,8 +269,9 @@ impl Simulation<'_> {
         }
     }
 
-    /// The production of a module that it cannot be told to have later than now.
-    fn tie(&mut self, id: ModuleId) -> Option<Change> {
+    /// The production of a module that it cannot be told to have later than now, beside an event of one whose values may be
+    /// wrong by so much.
+    fn tie(&mut self, id: ModuleId, other: f64) -> Option<Change> {
         let state = self.plant.state(id).filter(|s| s.is_numeric() && s.open.is_none())?;
         let rule = &self.model.rules[state.rule?];
         if rule.produces.is_empty() || rule.atoms.is_empty() {
@@ -286,7 +287,8 @@ impl Simulation<'_> {
         let path = Path::new(&self.plant, state, rule, self.now, 64.0 * self.now.resolution());
         let error = path.error();
         let reach = self.reach_of(id);
-        if known.since(self.now) > FAR * error * reach.max(self.now.resolution()) {
+        let factor = if error > 0.0 { 1.0 + other / error } else { 0.0 };
+        if known.since(self.now) > FAR * factor * error * reach.max(self.now.resolution()) {
             return None;
         }
         let mut signs = Signs::from_slice(&state.signs);
@@ -297,7 +299,7 @@ impl Simulation<'_> {
             error > 0.0
                 && matches!(signs[atom], Sign::Plus | Sign::Minus)
                 && produces(rule, &signs, atom)
-                && self.watcher.is_about_to_meet(&path, atom, signs[atom])
+                && self.watcher.is_about_to_meet(&path, atom, signs[atom], factor)
         })?;
         Some(Change { atom, time: self.now, at: Sign::Zero, after: opposite(signs[atom]), level: None })
     }

@@ -189,7 +189,7 @@ impl Simulation<'_> {
     }
 
     /// What integrated values that a module reads may be wrong by now, relative; 0 where nothing is integrated.
-    fn error_of(&self, id: ModuleId) -> f64 {
+    pub(super) fn error_of(&self, id: ModuleId) -> f64 {
         let Some(state) = self.plant.state(id) else { return 0.0 };
         let own = state.step.as_ref().filter(|_| state.is_numeric()).map_or(0.0, |step| step.dense.error);
         let common = if self.plant.coupled.is_some() { self.coupled.control.error } else { 0.0 };

@@ -69,9 +69,9 @@ pub const MODULE_LIMIT: usize = 10_000_000;
 pub const DEPTH_LIMIT: usize = 100;
 /// Coordinates and sizes beyond this are a mistake of the model.
 pub const COORDINATE_LIMIT: f64 = 1e100;
-/// Lengths, widths and sizes below this are none: their squares, and the squares of areas, could not be told from zero any
-/// more, and a direction is a quotient of such.
-pub const SMALLEST_LENGTH: f64 = 1e-60;
+/// Lengths, widths and sizes below this are none: the squares of areas could not be told from zero any more, and a
+/// direction is a quotient of such.
+pub const SMALLEST_LENGTH: f64 = 1e-80;
 
 /// Where a turtle stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
