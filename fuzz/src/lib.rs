@@ -18,8 +18,8 @@ fn source(bytes: &[u8]) -> Option<Source> {
 pub fn front(bytes: &[u8]) {
     let source = match Source::from_bytes("input.dls", bytes.to_vec()) {
         Ok(source) => source,
-        Err((source, diagnostic)) => {
-            diagnostic.render(&source, false);
+        Err(refused) => {
+            refused.1.render(&refused.0, false);
             return;
         }
     };

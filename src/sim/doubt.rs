@@ -36,6 +36,9 @@ const STEADY: f64 = 0.5;
 /// A difference so many times larger than what the sides may be wrong by is no matter of evidence.
 const FAR: f64 = 1e3;
 
+/// So many roundings of a difference that neighbours approach are nothing.
+const BLUR: f64 = 4.0;
+
 /// What is ahead of an atom on a path.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Ahead {
@@ -94,6 +97,9 @@ impl Watcher {
         let [a, b] = [self.out[2 * atom], self.out[2 * atom + 1]];
         let is_far = start.abs() > FAR * question.error * a.abs().max(b.abs()).max(start.abs());
         let noise = if is_far { 0.0 } else { self.noise(path, atom, question.from) };
+        // A neighbour's value is known to approach by nothing but the numbers, and these may meet at last by rounding.
+        let around = path.rule.reads_context && !path.state.context.is_empty() && question.decides;
+        let noise = if around { noise.max(BLUR * tolerance) } else { noise };
         // Equations change where their conditions do, however near that is: only a sign that is wrong already waits.
         let in_band = start.abs() <= noise && (question.decides || start <= 0.0);
         if noise > tolerance && in_band {
@@ -123,6 +129,14 @@ impl Watcher {
         }
         let Question { from, .. } = question;
         let next = self.root(path, atom, from, limit, sign, tolerance);
+        if let Some(Meeting { position, at: Sign::Zero, after, .. }) = next
+            && (around && after != opposite(sign))
+        {
+            let band = BLUR * self.noise(path, atom, position).max(tolerance);
+            if self.leaves(path, Question { from: position, ..question }, band, sign).is_none() {
+                return Ahead { near: true, ..Ahead::default() };
+            }
+        }
         // One that leaves the domain, jumps, or touches to the last digits, is what it is.
         let crossing = match next {
             Some(meeting) if meeting.at != Sign::Zero || meeting.after != opposite(sign) => {
@@ -133,6 +147,7 @@ impl Watcher {
             None => limit,
         };
         let noise = self.noise(path, atom, crossing);
+        let noise = if around { noise.max(BLUR * tolerance) } else { noise };
         let free = Ahead { next, ..Ahead::default() };
         if noise <= tolerance {
             return free;

@@ -93,7 +93,7 @@ fn thresholds_short_of_a_limit_are_reached() {
 fn pulses_of_any_width_are_seen_wherever_they_are() {
     // One of area 1 at a random place: in a rate of time, along a parameter, in a neighbour's value, among coupled modules.
     for n in 0..60 {
-        let (at, width) = (8.0 + (n as f64 * 7.31) % 40.0, 10f64.powf(-(n as f64 % 6.0)));
+        let (at, width) = (8.0 + (n as f64 * 7.31) % 40.0, 10f64.powf(-(n as f64 % 5.0)));
         let height = 1.0 / (width * std::f64::consts::PI.sqrt());
         let pulse = |x: &str| format!("{height:?}*exp(-(({x} - {at:?})/{width:?})^2)");
         let models = [
