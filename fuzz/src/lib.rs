@@ -1,14 +1,18 @@
 //! What is done with an input: each target takes any bytes, and must neither panic nor take for ever.
 
+use std::path::Path;
+
 use dlsys::diagnostic::Source;
 use dlsys::export::{Format, FrameWriter, Survey, View};
+use dlsys::lang::Files;
+use dlsys::model::Model;
 use dlsys::session::Session;
-use dlsys::sim::Settings;
+use dlsys::sim::{Settings, Simulation};
 use dlsys::structure::ModuleString;
 
 /// The targets by name.
-pub const TARGETS: [(&str, fn(&[u8])); 4] =
-    [("front", front), ("format", format), ("simulate", simulate), ("draw", draw)];
+pub const TARGETS: [(&str, fn(&[u8])); 5] =
+    [("front", front), ("format", format), ("simulate", simulate), ("draw", draw), ("files", files)];
 
 fn source(bytes: &[u8]) -> Option<Source> {
     Source::from_bytes("input.dls", bytes.to_vec()).ok()
@@ -49,22 +53,56 @@ pub fn simulate(bytes: &[u8]) {
 
 /// Draws what it looks like, in all formats; no file may have a number that is none.
 pub fn draw(bytes: &[u8]) {
-    run(bytes, |session, string| {
-        let mut scene = dlsys::turtle::blank(&session.model);
-        if dlsys::turtle::draw(&session.model, string, &mut scene).is_err() {
-            return;
+    run(bytes, |session, string| paint(&session.model, string));
+}
+
+fn paint(model: &Model, string: &ModuleString) {
+    let mut scene = dlsys::turtle::blank(model);
+    if dlsys::turtle::draw(model, string, &mut scene).is_err() {
+        return;
+    }
+    let mut survey = Survey::new(View::FRONT);
+    survey.add(&scene);
+    let fit = survey.fit();
+    for format in [Format::Svg, Format::Png, Format::Obj] {
+        let bytes = FrameWriter::new(format, fit.clone()).write(&scene, "a frame");
+        if format == Format::Svg {
+            let text = String::from_utf8(bytes).expect("text");
+            assert!(!text.contains("NaN") && !text.contains("\"inf") && !text.contains("-inf"), "{text}");
         }
-        let mut survey = Survey::new(View::FRONT);
-        survey.add(&scene);
-        let fit = survey.fit();
-        for format in [Format::Svg, Format::Png, Format::Obj] {
-            let bytes = FrameWriter::new(format, fit.clone()).write(&scene, "a frame");
-            if format == Format::Svg {
-                let text = String::from_utf8(bytes).expect("text");
-                assert!(!text.contains("NaN") && !text.contains("\"inf") && !text.contains("-inf"), "{text}");
-            }
+    }
+}
+
+/// Any file has the same content.
+struct Same<'b>(&'b [u8]);
+
+impl Files for Same<'_> {
+    fn read(&self, _: &Path, limit: u64) -> Result<Vec<u8>, String> {
+        Ok(self.0[..self.0.len().min(limit as usize)].to_vec())
+    }
+}
+
+/// Reads the input as a table, as surfaces in both formats, and as a part of a model; draws the surfaces.
+pub fn files(bytes: &[u8]) {
+    for text in [
+        "table g from \"input.csv\"\ninitial string: A(0)\nA(x): solve dx/dt = g(x)\ninterpret A(x): F(g(t))\n",
+        "table monotone g from \"input.csv\" column \"rain\"\ninitial string: A(0)\nA(x): solve dx/dt = g(x)\n",
+        "surface @M from \"input.s\"\ninitial string: F(1) @M(2)\n",
+        "surface @M from \"input.obj\"\ninitial string: F(1) @M(2)\n",
+        "include \"input.dls\"\ninitial string: A(1)\n",
+    ] {
+        let source = Source::from_bytes("input.dls", text.as_bytes().to_vec()).expect("text");
+        let loaded = dlsys::lang::load_with(&source, &[], &Same(bytes));
+        let read = loaded.source.as_ref().unwrap_or(&source);
+        loaded.diagnostics.iter().for_each(|d| drop(d.render(read, false)));
+        let Some(model) = loaded.model else { continue };
+        let settings = Settings { max_modules: 100, max_events: 100, max_seconds: 1.0, ..Settings::default() };
+        let Ok(mut simulation) = Simulation::new(&model, settings) else { continue };
+        let mut string = ModuleString::default();
+        if simulation.at(0.5, &mut string).is_ok() {
+            paint(&model, &string);
         }
-    });
+    }
 }
 
 fn run(bytes: &[u8], see: impl Fn(&Session, &ModuleString)) {

@@ -27,7 +27,7 @@ pub fn numbered(name: &str) -> String {
 /// Of a value that is infinite or no number.
 pub fn not_finite(value: f64) -> &'static str {
     if value.is_nan() {
-        "a root or logarithm of a negative number, 0/0 and the like have no value: change what it is computed from"
+        "a root or logarithm of a negative number, 0/0, an inverse or an element that is not there have no value: change what it is computed from"
     } else {
         "look for a division by 0, the logarithm of 0, or a number that is too large: change what it is computed from"
     }

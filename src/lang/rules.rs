@@ -369,6 +369,16 @@ impl RuleBuilder<'_> {
                     };
                     let known = self.scope.comparisons.get(&id);
                     let (at, boundary) = known.map_or((span, None), |(at, sides)| (*at, Some(&**sides)));
+                    let never = [a, b]
+                        .into_iter()
+                        .any(|side| self.scope.graph.as_constant(side).is_some_and(f64::is_nan));
+                    if never {
+                        self.scope.diagnostics.push(
+                            Diagnostic::warning("this comparison never holds")
+                                .at(at, "one of its sides has no value (NaN)")
+                                .help(advice::not_finite(f64::NAN)),
+                        );
+                    }
                     steps.push(atoms.step(a, b, comparison, at, boundary));
                 }
                 node => unreachable!("{node:?} is no condition"),

@@ -10,7 +10,8 @@ use std::sync::Arc;
 use super::need::{drawn_only, needed};
 use super::pulses::find_flashes;
 use super::{
-    Algebraic, Jacobian, Law, Linear, Model, Numeric, Obstacle, Pattern, Rule, Stepping, Watch, driven_form,
+    Algebraic, Jacobian, Law, Linear, Model, Numeric, Obstacle, Pattern, Rule, Stepping, Sum, Watch,
+    driven_form,
 };
 use crate::diagnostic::Span;
 use crate::expr::{Binary, Graph, Monomial, Node, NodeId, Polynomial, Program, Unary};
@@ -448,7 +449,9 @@ fn watch(
         return Watch::Still;
     }
     let difference = graph.binary(Binary::Sub, a, b);
-    let Some(p) = graph.polynomial(difference, |v| !constants.is_constant(v)) else { return Watch::Root };
+    let Some(p) = graph.polynomial(difference, |v| !constants.is_constant(v)) else {
+        return Watch::Root(None);
+    };
     let moving: Vec<(&[(u32, u32)], NodeId)> =
         p.terms.iter().filter(|(m, _)| !m.is_empty()).map(|(m, c)| (&m[..], *c)).collect();
     match moving[..] {
@@ -456,7 +459,7 @@ fn watch(
         [(&[(variable, 1)], slope)] => {
             let v = variable as usize;
             if v >= constants.own && v < constants.time || v < constants.own && !monotone(v) {
-                return Watch::Root;
+                return Watch::Root(sum(graph, &p));
             }
             let level = match p.terms.get(&Monomial::new()) {
                 None => graph.constant(0.0),
@@ -467,6 +470,20 @@ fn watch(
             };
             Watch::Crossing { variable: v, level: Program::compile(graph, &[level], total) }
         }
-        _ => Watch::Root,
+        _ => Watch::Root(sum(graph, &p)),
     }
+}
+
+/// A polynomial as a sum with factors that are known, if it is one.
+fn sum(graph: &Graph, p: &Polynomial) -> Option<Sum> {
+    let mut sum = Sum { constant: 0.0, terms: Vec::new() };
+    for (monomial, &factor) in &p.terms {
+        let factor = graph.as_constant(factor)?;
+        match monomial[..] {
+            [] => sum.constant = factor,
+            [(variable, 1)] => sum.terms.push((variable as usize, factor)),
+            _ => return None,
+        }
+    }
+    Some(sum)
 }

@@ -69,8 +69,16 @@ pub enum Watch {
     Still,
     /// They meet where one variable that moves one way only takes a value, which the program computes: a formula.
     Crossing { variable: usize, level: Program },
-    /// The first root of a function of time: of formulas, or of dense output.
-    Root,
+    /// The first root of a function of time: of formulas, or of dense output. The difference of the sides, if it is linear.
+    Root(Option<Sum>),
+}
+
+/// `constant + Σ factor · variable`.
+#[derive(Clone, Debug)]
+pub struct Sum {
+    pub constant: f64,
+    /// Variables and their factors.
+    pub terms: Vec<(usize, f64)>,
 }
 
 /// Linear equations: `x_k' = constant + Σ coefficient · variable`.

@@ -59,7 +59,7 @@ pub use invariance::never_reached;
 pub use kind::{
     BUILT_IN_SURFACES, COMMAND_SURFACES, CUT, Class, DRAWN_WORDS, Kind, KindId, Kinds, base_of, class_of,
 };
-pub use law::{Jacobian, Law, Linear, Numeric, Obstacle, Watch};
+pub use law::{Jacobian, Law, Linear, Numeric, Obstacle, Sum, Watch};
 pub use measure::Measure;
 pub use rank::is_singular;
 pub use remedy::{Boundary, Remedy};

@@ -243,7 +243,7 @@ fn is_timeless(rule: &Rule) -> bool {
     let watch_is_blind = |watch: &Watch| match watch {
         Watch::Still => true,
         Watch::Crossing { variable, level } => *variable != time && blind(level),
-        Watch::Root => false,
+        Watch::Root(_) => false,
     };
     let solve_is_blind =
         |s: &Solve| blind(&s.rates) && s.laws.iter().all(law_is_blind) && s.watch.iter().all(watch_is_blind);

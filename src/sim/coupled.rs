@@ -274,6 +274,7 @@ impl Simulation<'_> {
             .flatten();
         // After each, all members are searched.
         self.coupled.integrator.dear = true;
+        self.coupled.integrator.unwatched = self.model.rules.iter().all(|rule| rule.atoms.is_empty());
         self.coupled.integrator.restart(self.settings.method, self.coupled.y.len());
         if self.coupled.members.is_empty() {
             return Ok(());
@@ -308,7 +309,11 @@ impl Simulation<'_> {
             None => {
                 if std::mem::take(pending) {
                     let mut equations = Equations::new(system, &self.model.rules, None);
-                    self.plant.coupled = Some(Course::new(integrator.dense(&mut equations, y)));
+                    let stretches = match integrator.unwatched {
+                        true => integrator.refined(&mut equations, y, &self.coupled_settings),
+                        false => vec![integrator.dense(&mut equations, y)],
+                    };
+                    self.plant.coupled = Some(Course::of(stretches));
                 }
             }
         }

@@ -1,6 +1,6 @@
 //! How the coupled modules move during their common step, and on stretches that were integrated again since it was made.
 
-use super::dense::Dense;
+use super::dense::{Coefficients, Dense};
 use crate::expr::{Dual, Interval};
 use crate::structure::Instant;
 
@@ -26,6 +26,7 @@ struct Track {
 }
 
 /// A component along a stretch of time that lies within one dense output.
+#[derive(Clone, Copy)]
 pub struct Piece<'c> {
     dense: &'c Dense,
     component: usize,
@@ -141,6 +142,18 @@ impl<'c> Piece<'c> {
         Dual { value, rate: rate * self.scale }
     }
 
+    /// Adds the polynomial, times a factor, to a sum of others of the same dense output and stretch; false if it is not of them.
+    pub fn add_to(&self, factor: f64, sum: &mut Option<(Piece<'c>, Coefficients)>) -> bool {
+        let (first, coefficients) = sum.get_or_insert((*self, Coefficients::default()));
+        self.dense.add_to(self.component, factor, coefficients);
+        std::ptr::eq(first.dense, self.dense)
+    }
+
+    /// Bounds of such a sum and of its rate from one position to another.
+    pub fn sum_over(&self, mut sum: Coefficients, lo: f64, hi: f64) -> Dual<Interval> {
+        self.scaled(self.dense.stretch(&mut sum, self.position(lo), self.position(hi)))
+    }
+
     /// What it may be wrong by, as a part of its size.
     pub fn error(&self) -> f64 {
         self.dense.error
@@ -156,7 +169,11 @@ impl<'c> Piece<'c> {
 
     /// Bounds of the value and of its rate (per unit of position) from one position to another.
     pub fn over(&self, lo: f64, hi: f64) -> Dual<Interval> {
-        let Dual { value, rate } = self.dense.piece(self.component, self.position(lo), self.position(hi));
+        self.scaled(self.dense.piece(self.component, self.position(lo), self.position(hi)))
+    }
+
+    /// Rates per unit of position of the stretch.
+    fn scaled(&self, Dual { value, rate }: Dual<Interval>) -> Dual<Interval> {
         let s = self.scale;
         Dual { value, rate: Interval { lo: rate.lo * s, hi: rate.hi * s, ..rate } }
     }

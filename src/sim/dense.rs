@@ -9,7 +9,26 @@ use crate::structure::Instant;
 
 /// Highest degree of a dense output.
 pub const MAX_DEGREE: usize = 7;
-type Coefficients = [f64; MAX_DEGREE + 1];
+/// Where the error of interpolation is measured, and Bernstein polynomials of degree 7 and their slopes there.
+pub const PLACE: f64 = 0.7;
+const AT_PLACE: [[f64; 8]; 2] = bernstein(PLACE);
+
+const fn bernstein(at: f64) -> [[f64; 8]; 2] {
+    const CHOOSE: [f64; 8] = [1.0, 7.0, 21.0, 35.0, 35.0, 21.0, 7.0, 1.0];
+    const fn power(x: f64, n: usize) -> f64 {
+        if n == 0 { 1.0 } else { x * power(x, n - 1) }
+    }
+    let mut all = [[0.0; 8]; 2];
+    let mut i = 0;
+    while i < 8 {
+        all[0][i] = CHOOSE[i] * power(at, i) * power(1.0 - at, 7 - i);
+        all[1][i] = all[0][i] * (i as f64 / at - (7 - i) as f64 / (1.0 - at));
+        i += 1;
+    }
+    all
+}
+
+pub type Coefficients = [f64; MAX_DEGREE + 1];
 
 /// All components of the solution from `start` to `start + h`.
 #[derive(Clone, Debug)]
@@ -113,6 +132,15 @@ impl Dense {
         Dual { value: mix(c[0], c[1], position), rate: self.degree as f64 * (c[1] - c[0]) }
     }
 
+    /// The value of one component and its rate, per unit of position, at [`PLACE`]; quick for polynomials of degree 7.
+    pub fn at_place(&self, component: usize) -> (f64, f64) {
+        let Ok(c): Result<&[f64; 8], _> = self.of(component).try_into() else {
+            let Dual { value, rate } = self.departure(component, PLACE);
+            return (value, rate);
+        };
+        AT_PLACE.map(|weights| weights.iter().zip(c).map(|(w, c)| w * c).sum()).into()
+    }
+
     /// Bounds of one component over the whole step.
     pub fn bounds(&self, component: usize) -> Interval {
         hull(self.of(component))
@@ -122,6 +150,16 @@ impl Dense {
     pub fn piece(&self, component: usize, lo: f64, hi: f64) -> Dual<Interval> {
         let mut c: Coefficients = [0.0; MAX_DEGREE + 1];
         c[..=self.degree].copy_from_slice(self.of(component));
+        self.stretch(&mut c, lo, hi)
+    }
+
+    /// Adds a component, times a factor, to the coefficients of a sum.
+    pub fn add_to(&self, component: usize, factor: f64, sum: &mut Coefficients) {
+        sum.iter_mut().zip(self.of(component)).for_each(|(sum, c)| *sum += factor * c);
+    }
+
+    /// Bounds of a polynomial of the degree of the components and of its rate (per unit of position) from `lo` to `hi`.
+    pub fn stretch(&self, c: &mut Coefficients, lo: f64, hi: f64) -> Dual<Interval> {
         let c = &mut c[..=self.degree];
         cut(c, lo, hi);
         let width = hi - lo;

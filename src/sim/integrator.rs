@@ -4,7 +4,7 @@ use super::algebra::Fault;
 use super::dense::Dense;
 use super::equations::Equations;
 use super::implicit::Implicit;
-use super::runge_kutta::{Nodes, Rates, Trial, Workspace};
+use super::runge_kutta::{Inside, Nodes, Rates, Trial, Workspace};
 use super::state::Control;
 use super::{Method, Settings, Stats};
 use crate::structure::Instant;
@@ -19,10 +19,14 @@ pub struct Integrator {
     method: Method,
     /// Steps cost much besides the rates.
     pub dear: bool,
+    /// Nothing is looked for inside steps; frames that fall into them are refined ([`Integrator::refined`]).
+    pub unwatched: bool,
     /// Start, length and end of the step just made.
     step: (Instant, f64, Instant),
-    /// What its end may be wrong by, relative.
+    /// What it may be wrong by, relative.
     error: f64,
+    /// Its dense output, where that is known already.
+    output: Option<Dense>,
     /// Steps are so short that rounding of the state is looked at.
     noisy: bool,
 }
@@ -45,9 +49,12 @@ const CAUTION: f64 = 4.0;
 /// However many steps there have been, values are taken to be right to so many tolerances.
 pub const CERTAINTY: f64 = 2.0;
 
-/// Within a step that is twice as long as stability allows, what decays is interpolated by four times as much worse than its
-/// end is known, and so on.
-const WIGGLE: f64 = 50.0;
+/// Inside a step the dense output may be wrong by so many tolerances: it is where the step is much longer than stability allows
+/// and the estimate, made of two, is misled by what moves slowly.
+const INSIDE: f64 = 4.0;
+
+/// The end of a step is known so many times better than its inside, if that is worse than its end was estimated.
+const OUTSIDE: f64 = 4.0;
 
 /// After so many rejections of one step, rounding may be why.
 const MANY_REJECTIONS: u32 = 6;
@@ -164,7 +171,8 @@ impl Integrator {
         let room = limit.map_or(f64::INFINITY, |limit| limit.since(start));
         let mut rejected = false;
         let mut powerless = Powerless::default();
-        let mut rejections = 0;
+        (self.output, self.error) = (None, control.error);
+        let (mut rejections, mut wiggles) = (0, 0);
         if self.noisy {
             self.workspace.measure_noise(system, y);
         }
@@ -205,7 +213,8 @@ impl Integrator {
                         && grid.is_none()
                         && (self.workspace.is_instant(y, h, start.resolution(), tolerance)
                             || powerless.is_shown(h, error.max(rounding))
-                                && self.workspace.absolute <= NOTHING * tolerance) =>
+                                && self.workspace.absolute_error(method, y, h, error, tolerance)
+                                    <= NOTHING * tolerance) =>
                 {
                     control.size = h * 10.0;
                     control.last_error = 1.0;
@@ -223,6 +232,14 @@ impl Integrator {
                     rejected = true;
                 }
                 Trial::Done { error, rounding } => {
+                    let inside = self.look_inside(method, system, y, start, h);
+                    if inside.absolute > INSIDE * settings.tolerance && wiggles < MANY_REJECTIONS {
+                        stats.rejected += 1;
+                        wiggles += 1;
+                        h *= (INSIDE * settings.tolerance / inside.absolute).powf(0.125).clamp(0.3, 0.9);
+                        rejected = true;
+                        continue;
+                    }
                     if grid.is_none() {
                         // Rounding is no reason to shorten a step that is good, only not to lengthen it.
                         let most = if rejected || rounding > 0.5 { 1.0 } else { 10.0 };
@@ -232,25 +249,18 @@ impl Integrator {
                         control.last_error = error;
                         let most = CERTAINTY * settings.tolerance;
                         control.error = (control.error
-                            + CAUTION * INNER_TOLERANCE * settings.tolerance * error)
+                            + CAUTION * INNER_TOLERANCE * settings.tolerance * error
+                            + inside.relative / OUTSIDE)
                             .min(most);
+                        self.error = control.error + inside.relative;
                     }
                     break;
                 }
             }
         }
         stats.steps += 1;
-        self.error = control.error;
-        if grid.is_none() && method != Method::Radau {
-            let stiffness = self.workspace.stiffness(method, h);
-            let excess = stiffness / stability(method);
-            if excess > 1.0 {
-                self.error +=
-                    WIGGLE * excess * excess * INNER_TOLERANCE * settings.tolerance * control.last_error;
-            }
-            if settings.method == Method::Auto {
-                suspect(control, stiffness, method);
-            }
+        if settings.method == Method::Auto && method != Method::Radau {
+            suspect(control, self.workspace.stiffness(method, h), method);
         }
         let end = match (grid, limit) {
             (Some(grid), _) => Instant::new(next_grid_time(start, grid)),
@@ -261,10 +271,34 @@ impl Integrator {
         Ok(end)
     }
 
+    /// What the dense output of a step that has just been tried is wrong by inside, where that is not known from the
+    /// estimate of its end.
+    fn look_inside(
+        &mut self,
+        method: Method,
+        system: &mut impl Rates,
+        y: &[f64],
+        start: Instant,
+        h: f64,
+    ) -> Inside {
+        if method != Method::Dop853 || self.unwatched {
+            return Inside::default();
+        }
+        self.workspace.finish(method, system, y, h);
+        let dense = self.workspace.dense(method, start, None, y, h);
+        let error = self.workspace.measure_interpolation(system, y, &dense);
+        self.output = Some(dense);
+        error
+    }
+
     /// The dense output of the step just made from `y`. Nobody need ask for it: a method may have to evaluate rates for
     /// it.
     pub fn dense(&mut self, system: &mut impl Rates, y: &[f64]) -> Dense {
         let (start, h, end) = self.step;
+        if let Some(mut dense) = self.output.take() {
+            (dense.end, dense.error) = (end, self.error);
+            return dense;
+        }
         let mut dense = match self.implicit.as_mut().filter(|_| self.method == Method::Radau) {
             Some(implicit) => implicit.dense(start, y, h),
             None => {
@@ -274,6 +308,34 @@ impl Integrator {
         };
         dense.error = self.error;
         dense
+    }
+
+    /// The dense output of the step just made from `y`, in which nothing was looked for, for a frame inside: by shorter steps
+    /// where it is wrong there, which change nothing of what comes after it.
+    pub fn refined(&mut self, system: &mut impl Rates, y: &[f64], settings: &Settings) -> Vec<Dense> {
+        let whole = self.dense(system, y);
+        if self.method != Method::Dop853 {
+            return vec![whole];
+        }
+        let inside = self.workspace.measure_interpolation(system, y, &whole);
+        if inside.absolute <= INSIDE * settings.tolerance {
+            return vec![whole];
+        }
+        let (mut y, mut from) = (y.to_vec(), whole.start);
+        let mut control = Control { size: 0.5 * whole.h, error: self.error, ..Control::default() };
+        let mut shorter = Integrator { dear: self.dear, ..Integrator::default() };
+        shorter.restart(settings.method, y.len());
+        let (mut stretches, mut stats) = (Vec::new(), Stats::default());
+        while whole.end.since(from) > 0.0 {
+            let mut shifted = Shifted { system, by: from.since(whole.start) };
+            let step =
+                shorter.step(settings, &mut control, &mut shifted, &y, from, Some(whole.end), &mut stats);
+            let Ok(end) = step else { return vec![whole] };
+            stretches.push(shorter.dense(&mut shifted, &y));
+            shorter.advance(&mut y);
+            from = end;
+        }
+        stretches
     }
 
     /// The dense output of the step just made from `y`, with what is solved for along with it. Where that cannot be
@@ -310,6 +372,34 @@ impl Integrator {
         self.rate_is_known = self.workspace.advance(self.method);
         std::mem::swap(y, &mut self.workspace.end);
         self.workspace.end.resize(y.len(), 0.0);
+    }
+}
+
+/// Equations whose time begins later.
+struct Shifted<'s, R> {
+    system: &'s mut R,
+    by: f64,
+}
+
+impl<R: Rates> Rates for Shifted<'_, R> {
+    fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]) {
+        self.system.rates(self.by + tau, y, out);
+    }
+
+    fn couplings(&self) -> Vec<(u32, u32)> {
+        self.system.couplings()
+    }
+
+    fn partials(&mut self, tau: f64, y: &[f64], out: &mut Vec<f64>) {
+        self.system.partials(self.by + tau, y, out);
+    }
+
+    fn modules(&self) -> u64 {
+        self.system.modules()
+    }
+
+    fn is_timed(&self) -> bool {
+        self.system.is_timed()
     }
 }
 

@@ -7,7 +7,7 @@ use super::dense::Dense;
 use super::motion::Motion;
 use super::state::State;
 use crate::expr::{Dual, Interval, Value};
-use crate::model::Rule;
+use crate::model::{Rule, Sum};
 use crate::structure::{Instant, ModuleId, Tree};
 use smallvec::SmallVec;
 
@@ -359,6 +359,33 @@ impl<'p> Path<'p> {
         );
     }
 
+    /// Bounds of a sum of variables, and of its rate, if those that move do so along one dense output.
+    pub fn sum_over(&self, sum: &Sum, lo: f64, hi: f64) -> Option<Dual<Interval>> {
+        let (mut constant, mut moving) = (sum.constant, None);
+        for &(variable, factor) in &sum.terms {
+            let mut parameter = variable;
+            let mut modules = std::iter::once(&self.state.id).chain(self.state.context.context());
+            let id = *modules.find(|id| {
+                let count = self.plant.tree.parameters(**id).len();
+                let is_here = parameter < count;
+                parameter -= if is_here { 0 } else { count };
+                is_here
+            })?;
+            let state = self.plant.state(id);
+            match state.and_then(|state| Some((state, state.motions.get(parameter)?))) {
+                Some((state, motion)) if !matches!(motion, Motion::Rest) => {
+                    if !self.piece(state, motion)?.add_to(factor, &mut moving) {
+                        return None;
+                    }
+                }
+                _ => constant += factor * self.plant.tree.parameters(id)[parameter],
+            }
+        }
+        let (first, coefficients) = moving?;
+        let Dual { value, rate } = first.sum_over(coefficients, lo, hi);
+        Some(Dual { value: Interval { lo: value.lo + constant, hi: value.hi + constant, ..value }, rate })
+    }
+
     /// What the values may be at a position, given the errors of integration and of rounding.
     pub fn uncertain(&self, position: f64, out: &mut Vec<Interval>) {
         let tau = position * self.h;
@@ -381,6 +408,9 @@ impl<'p> Path<'p> {
     /// What integrated values along the path may be wrong by, as a part of their size; 0 if there are none.
     pub fn error(&self) -> f64 {
         let course = self.plant.coupled.as_ref().map_or(0.0, |course| course.error);
+        if self.state.coupled && course > 0.0 {
+            return course;
+        }
         let error = |state: &State| {
             let of = |motion: &Motion| match motion {
                 Motion::Coupled(_) => course,

@@ -161,7 +161,7 @@ impl Simulation<'_> {
         let mut first: Option<Change> = None;
         let mut lasting = Some(None);
         for (atom, watch) in rule.watch(solve).iter().enumerate() {
-            if matches!(watch, Watch::Root) {
+            if matches!(watch, Watch::Root(_)) {
                 return None;
             }
             let Some(meeting) = self.crossing(rule, clause, atom, watch, motions, self.now) else {

@@ -86,6 +86,12 @@ pub struct Difference<'w, 'p> {
 
 impl Function for Difference<'_, '_> {
     fn bounds(&mut self, lo: f64, hi: f64) -> Dual<Interval> {
+        // Values that move together may differ by much less than each of them moves.
+        if let Watch::Root(Some(sum)) = &self.path.rule.watch(self.path.state.solve)[self.atom]
+            && let Some(bounds) = self.path.sum_over(sum, lo, hi)
+        {
+            return bounds;
+        }
         let m = &mut *self.memory;
         self.path.over(lo, hi, &mut m.bounds);
         m.bounds_out.resize(self.sides.outputs(), Dual::constant(0.0));
@@ -128,7 +134,7 @@ fn how<'w>(watch: &'w Watch, state: &State) -> How<'w> {
             Some(motion) if !motion.is_formula() => How::Search,
             _ => How::Formula(*variable, level),
         },
-        Watch::Root => How::Search,
+        Watch::Root(_) => How::Search,
     }
 }
 

@@ -257,7 +257,11 @@ fn random_models_come_out_alike_by_four_ways() {
                 (Ok(_), None) => {}
             }
         }
+        if n % 1000 == 999 {
+            println!("{} models, {} at fault", n + 1, faults.len());
+        }
         if !said.is_empty() {
+            println!("model {seed}: {}", said.join("; "));
             faults.push(format!("model {seed}: {}\n{text}", said.join("; ")));
         }
     }

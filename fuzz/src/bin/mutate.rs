@@ -1,6 +1,7 @@
 //! Changes models by chance and gives them to a target: `mutate --seconds 60 --seed 1 front` (README).
 //!
-//! The corpus is the models and the error gallery of the repository. The same seed gives the same inputs. A panic, or an input
+//! The corpus is the models and the error gallery of the repository; for `files`, those in `seeds`. The same seed gives the same
+//! inputs; `--count N` stops after so many. A panic, or an input
 //! that takes longer than ten seconds, is written into the folder `found`, and the exit status is 1.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -43,14 +44,15 @@ impl Dice {
     }
 }
 
-fn collect(folder: &Path, corpus: &mut Vec<Vec<u8>>) {
+/// Adds the files of a folder and those in it that end so and are short enough.
+fn collect(folder: &Path, endings: &[&str], corpus: &mut Vec<Vec<u8>>) {
     let Ok(entries) = std::fs::read_dir(folder) else { return };
     let mut paths: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
     paths.sort();
     for path in paths {
         if path.is_dir() {
-            collect(&path, corpus);
-        } else if path.extension().is_some_and(|e| e == "dls") {
+            collect(&path, endings, corpus);
+        } else if path.extension().is_some_and(|e| endings.iter().any(|ending| e == *ending)) {
             corpus.extend(std::fs::read(&path).ok().filter(|text| text.len() <= MOST));
         }
     }
@@ -122,6 +124,18 @@ fn mutate(text: &mut Vec<u8>, other: &[u8], dice: &mut Dice) {
     text.truncate(MOST);
 }
 
+/// The processor time of this program, where the system tells; else the time since it began. The machine may be busy.
+fn worked(begun: Instant) -> Duration {
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    // Behind the name, which stands in brackets: user and system time in hundredths of a second.
+    let fields = stat.rsplit(')').next().unwrap_or_default().split_whitespace().skip(11).take(2);
+    let hundredths: Option<u64> = fields.map(|field| field.parse::<u64>().ok()).sum();
+    match hundredths.filter(|_| !stat.is_empty()) {
+        Some(hundredths) => Duration::from_millis(10 * hundredths),
+        None => begun.elapsed(),
+    }
+}
+
 /// Writes an input that is a finding.
 fn keep(target: &str, kind: &str, number: u64, input: &[u8]) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("found");
@@ -132,46 +146,53 @@ fn keep(target: &str, kind: &str, number: u64, input: &[u8]) {
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
-    let (mut seconds, mut seed, mut name) = (60.0_f64, 1_u64, "front".to_owned());
+    let (mut seconds, mut most, mut seed, mut name) = (60.0_f64, u64::MAX, 1_u64, "front".to_owned());
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().unwrap_or_default();
         match argument.as_str() {
             "--seconds" => seconds = value().parse().expect("--seconds S"),
+            "--count" => (most, seconds) = (value().parse().expect("--count N"), f64::INFINITY),
             "--seed" => seed = value().parse().expect("--seed N"),
             other => name = other.to_owned(),
         }
     }
     let (name, target) =
-        *TARGETS.iter().find(|(known, _)| *known == name).expect("a target: front, format, simulate, draw");
+        *TARGETS.iter().find(|(known, _)| *known == name).expect("a target: front, format, simulate, draw, files");
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let mut corpus = Vec::new();
-    collect(&root.join("models"), &mut corpus);
-    collect(&root.join("tests/errors"), &mut corpus);
-    assert!(corpus.len() > 100, "the corpus is there");
+    match name {
+        "files" => collect(&root.join("fuzz/seeds"), &["csv", "s", "obj", "mtl", "dls"], &mut corpus),
+        _ => {
+            collect(&root.join("models"), &["dls"], &mut corpus);
+            collect(&root.join("tests/errors"), &["dls"], &mut corpus);
+        }
+    }
+    assert!(!corpus.is_empty(), "the corpus is there");
     println!("{name}: seed {seed}, {} texts", corpus.len());
+    let begun = Instant::now();
     // What is under way, for the watchdog.
-    let current: Arc<Mutex<(u64, Instant, Vec<u8>)>> = Arc::new(Mutex::new((0, Instant::now(), Vec::new())));
+    let current: Arc<Mutex<(u64, Duration, Vec<u8>)>> = Arc::new(Mutex::new((0, worked(begun), Vec::new())));
     let watched = current.clone();
     std::thread::spawn(move || {
         loop {
             std::thread::sleep(Duration::from_millis(500));
             let now = watched.lock().expect("never poisoned: nothing panics while it is held");
-            if now.1.elapsed() > HANG {
+            if worked(begun).saturating_sub(now.1) > HANG {
                 keep(name, "hang", now.0, &now.2);
                 std::process::exit(1);
             }
         }
     });
     let mut dice = Dice(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
-    let (begun, mut count, mut panics) = (Instant::now(), 0_u64, 0);
+    let (mut count, mut panics) = (0_u64, 0);
     std::panic::set_hook(Box::new(|panic| eprintln!("{panic}")));
-    while begun.elapsed().as_secs_f64() < seconds {
+    while begun.elapsed().as_secs_f64() < seconds && count < most {
         let mut input = corpus[dice.roll(corpus.len())].clone();
         for _ in 0..1 + dice.roll(4) {
             let other = &corpus[dice.roll(corpus.len())];
             mutate(&mut input, other, &mut dice);
         }
-        *current.lock().expect("never poisoned") = (count, Instant::now(), input.clone());
+        *current.lock().expect("never poisoned") = (count, worked(begun), input.clone());
         if catch_unwind(AssertUnwindSafe(|| target(&input))).is_err() {
             panics += 1;
             keep(name, "panic", count, &input);
