@@ -274,7 +274,9 @@ impl Simulation<'_> {
             .flatten();
         // After each, all members are searched.
         self.coupled.integrator.dear = true;
-        self.coupled.integrator.unwatched = self.model.rules.iter().all(|rule| rule.atoms.is_empty());
+        self.coupled.integrator.unwatched = self.model.rules.iter().all(|rule| rule.atoms.is_empty())
+            && self.coupled.flashing.is_empty()
+            && self.coupled.system.algebra.is_empty();
         self.coupled.integrator.restart(self.settings.method, self.coupled.y.len());
         if self.coupled.members.is_empty() {
             return Ok(());

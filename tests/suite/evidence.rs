@@ -144,3 +144,20 @@ fn twins_have_their_events_together_whatever_their_neighbours_are() {
         }
     }
 }
+
+#[test]
+fn a_pulse_that_only_the_dense_output_has_seen_is_seen() {
+    // One stage of DOP853's dense output, which counts for no error, may fall on the flank of a pulse between two stages that do.
+    for n in 0..400 {
+        let at = 2.0 + 0.0013 * f64::from(n);
+        let text = format!(
+            "initial string: L(0) R(0.1)\nL(y): solve dy/dt = {:?}*exp(-((t - {at:?})/2e-4)^2) - y*y\nL(y) < R(x): solve dx/dt = y - x",
+            1.0 / (2e-4 * std::f64::consts::PI.sqrt())
+        );
+        let settings = Settings { tolerance: 1e-8, ..Settings::default() };
+        let end = run(&text, settings, &[4.0]).unwrap_or_else(|e| panic!("{e}\n{text}"));
+        let exact = 1.0 / (1.0 + 4.0 - at);
+        let y = end[0][0].1[0];
+        assert!((y - exact).abs() < 1e-3, "{y}, not {exact}\n{text}");
+    }
+}
