@@ -8,7 +8,7 @@
 //! ```
 //! use dlsys::session::Session;
 //! use dlsys::sim::Settings;
-//! use dlsys::structure::ModuleString;
+//! use dlsys::tree::ModuleString;
 //!
 //! let text = "
 //!     initial string: A(0)
@@ -32,7 +32,7 @@
 //! # let mut simulation = session.simulate(Default::default()).expect("a good start");
 //! # let mut string = Default::default();
 //! # simulation.at(1.0, &mut string).expect("it runs");
-//! use dlsys::export::{Format, FrameWriter, Survey, View};
+//! use dlsys::render::{Format, FrameWriter, Survey, View};
 //! use dlsys::scene::Scene;
 //!
 //! let mut scene = Scene::default();
@@ -73,23 +73,21 @@
 //! `ARCHITECTURE.md` tells why things are as they are.
 
 pub mod cli;
-pub mod diagnostic;
-pub mod export;
-pub mod expr;
 pub mod interrupt;
-pub mod lang;
-pub mod memory;
-pub mod model;
 pub mod repl;
-pub mod replay;
-pub mod report;
 pub mod rescue;
-pub mod scene;
-pub mod session;
-pub mod sim;
-pub mod structure;
-pub mod turtle;
-pub mod view;
+
+pub use dlsys_diagnostic as diagnostic;
+pub use dlsys_expr as expr;
+pub use dlsys_geometry::{scene, turtle};
+pub use dlsys_lang as lang;
+pub use dlsys_model as model;
+pub use dlsys_player as player;
+pub use dlsys_render as render;
+pub use dlsys_session::{self as session, replay};
+pub use dlsys_sim as sim;
+pub use dlsys_study as study;
+pub use dlsys_tree as tree;
 
 /// The listings of the book's chapter about the library are compiled and run.
 #[cfg(doctest)]

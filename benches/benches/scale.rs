@@ -7,7 +7,7 @@ use std::hint::black_box;
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use dlsys::session::Session;
 use dlsys::sim::{Method, Scheduler, Settings, Simulation};
-use dlsys::structure::ModuleString;
+use dlsys::tree::ModuleString;
 use dlsys_benches::plants::{self, Branches, Growing, Lives};
 use dlsys_benches::{scale, solver};
 

@@ -5,7 +5,7 @@
 
 use dlsys::session::Session;
 use dlsys::sim::{Method, Settings, Stats};
-use dlsys::structure::ModuleString;
+use dlsys::tree::ModuleString;
 
 use crate::solver;
 

@@ -4,7 +4,7 @@
 
 use std::fmt::Write;
 
-use dlsys::structure::ModuleString;
+use dlsys::tree::ModuleString;
 
 /// Points of the curve: how fast an internode grows at which age.
 const DRIVE: [[f64; 2]; 4] = [[0.0, 0.0], [0.5, 1.2], [1.5, 0.6], [4.0, 0.5]];

@@ -18,7 +18,7 @@ use diffsol::{
 };
 use dlsys::session::Session;
 use dlsys::sim::{Method, Settings};
-use dlsys::structure::ModuleString;
+use dlsys::tree::ModuleString;
 
 use crate::{measure, solver, tune};
 

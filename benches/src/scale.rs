@@ -5,7 +5,7 @@
 use cpu_time::ProcessTime as Clock;
 use dlsys::session::Session;
 use dlsys::sim::{Method, Scheduler, Settings, Stats};
-use dlsys::structure::ModuleString;
+use dlsys::tree::ModuleString;
 
 use crate::chain::{MU, WALL};
 use crate::filament::{Coupling, D_SLOW, Filament};

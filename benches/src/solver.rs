@@ -9,7 +9,7 @@ use diffsol::{
 };
 use dlsys::session::Session;
 use dlsys::sim::{Settings, Simulation};
-use dlsys::structure::ModuleString;
+use dlsys::tree::ModuleString;
 
 use crate::measure::{self, Spread};
 

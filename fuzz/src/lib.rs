@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use dlsys::diagnostic::Source;
-use dlsys::export::{Format, FrameWriter, Survey, View};
+use dlsys::render::{Format, FrameWriter, Survey, View};
 use dlsys::lang::Files;
 use dlsys::model::Model;
 use dlsys::session::Session;
 use dlsys::sim::{Settings, Simulation};
-use dlsys::structure::ModuleString;
+use dlsys::tree::ModuleString;
 
 /// The targets by name.
 pub const TARGETS: [(&str, fn(&[u8])); 5] =

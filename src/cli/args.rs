@@ -8,8 +8,8 @@ use super::fmt::FmtArgs;
 use super::new::NewArgs;
 use super::shell::{self, CompletionsArgs, ManArgs};
 use super::verify::VerifyArgs;
-use crate::export::{Camera, Layout, Page};
 use crate::lang::Setting;
+use crate::render::{Camera, Layout, Page};
 use crate::scene::Color;
 use crate::sim::{Method, Settings};
 

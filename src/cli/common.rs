@@ -12,11 +12,11 @@ use super::args::{IncludeArgs, Scheduler, SharedArgs};
 use crate::diagnostic::{Diagnostic, Span};
 use crate::lang::Setting;
 use crate::model::Frames;
-use crate::report::method_name;
 use crate::scene::Scene;
 use crate::session::Session;
 use crate::sim::{self, Settings, Simulation, Stats};
-use crate::structure::ModuleString;
+use crate::study::method_name;
+use crate::tree::ModuleString;
 use crate::turtle;
 
 /// Why a command ends without success; its exit status.

@@ -10,7 +10,7 @@ use crate::diagnostic::Diagnostic;
 use crate::interrupt;
 use crate::scene::Scene;
 use crate::sim::{Event, Settings, Simulation, Stats};
-use crate::structure::ModuleString;
+use crate::tree::ModuleString;
 use crate::turtle;
 
 /// The structure at one observation time.

@@ -9,11 +9,11 @@ use std::path::{Path, PathBuf};
 use super::args::ReportArgs;
 use super::common::{Failure, count_of, open, out_error};
 use super::progress::Progress;
-use crate::export;
 use crate::model::Frames;
-use crate::report::{self, CASES, Case, HardPlan, Plan, Row};
+use crate::render;
 use crate::session::Session;
 use crate::sim::Method;
+use crate::study::{self, CASES, Case, HardPlan, Plan, Row};
 
 /// Studies models, or runs the hard cases.
 pub fn report(args: &ReportArgs) -> Result<(), Failure> {
@@ -67,7 +67,7 @@ pub fn study(args: &ReportArgs, session: &Session, name: &str) -> Result<(), Fai
     let progress = RefCell::new(Progress::of_printed(name, plan.points(session)));
     // Each method's block is printed when it is there.
     let mut printed = Ok(());
-    let study = report::study(
+    let study = study::study(
         session,
         name,
         &plan,
@@ -77,8 +77,8 @@ pub fn study(args: &ReportArgs, session: &Session, name: &str) -> Result<(), Fai
             progress.inc();
         },
         &mut |study| {
-            let head = if study.series.len() == 1 { report::study_head(study) } else { String::new() };
-            let block = study.series.last().map(report::series_table).unwrap_or_default();
+            let head = if study.series.len() == 1 { study::study_head(study) } else { String::new() };
+            let block = study.series.last().map(study::series_table).unwrap_or_default();
             if printed.is_ok() {
                 printed = progress.borrow().suspend(|| print(&format!("{head}{block}")));
             }
@@ -94,9 +94,9 @@ pub fn study(args: &ReportArgs, session: &Session, name: &str) -> Result<(), Fai
     })?;
     print("\n")?;
     let Some(out) = &args.out else { return Ok(()) };
-    write(out, &format!("{name}.csv"), &report::csv(&study))?;
-    write(out, &format!("{name}.json"), &report::json(&study))?;
-    write(out, &format!("{name}.svg"), &report::svg(&study))
+    write(out, &format!("{name}.csv"), &study::csv(&study))?;
+    write(out, &format!("{name}.json"), &study::json(&study))?;
+    write(out, &format!("{name}.svg"), &study::svg(&study))
 }
 
 /// Runs hard cases: those of a folder, or those that are built in.
@@ -107,7 +107,7 @@ fn hard(args: &ReportArgs, folder: Option<&Path>) -> Result<(), Failure> {
             CASES.iter().map(|(name, text)| (format!("models/hard/{name}"), (*text).to_owned())).collect()
         }
     };
-    let fault = |error: report::CaseError| Failure::Model(format!("error: {error}\n"));
+    let fault = |error: study::CaseError| Failure::Model(format!("error: {error}\n"));
     let mut cases = Vec::new();
     for (file, text) in &texts {
         cases.push(Case::parse(file, text).map_err(fault)?);
@@ -125,7 +125,7 @@ fn hard(args: &ReportArgs, folder: Option<&Path>) -> Result<(), Failure> {
     if let Some(methods) = &args.methods
         && let Some(fixed) = methods.iter().find(|m| m.is_fixed_step())
     {
-        let name = report::method_name(*fixed);
+        let name = study::method_name(*fixed);
         return Err(Failure::Usage(format!(
             "error: hard cases have tolerances, and `{name}` has a fixed step\n"
         )));
@@ -138,19 +138,19 @@ fn hard(args: &ReportArgs, folder: Option<&Path>) -> Result<(), Failure> {
     let mut progress = Progress::new("hard cases", cases.len());
     let mut rows: Vec<Row> = Vec::new();
     for case in &cases {
-        let run = report::run_case(case, &plan, &mut |what| progress.say(what));
+        let run = study::run_case(case, &plan, &mut |what| progress.say(what));
         rows.extend(run.map_err(fault)?);
         progress.inc();
     }
     drop(progress);
-    print(&report::hard_table(&rows))?;
+    print(&study::hard_table(&rows))?;
     if let Some(out) = &args.out {
-        write(out, "hard.csv", &report::hard_csv(&rows))?;
-        write(out, "hard.json", &report::hard_json(&rows))?;
+        write(out, "hard.csv", &study::hard_csv(&rows))?;
+        write(out, "hard.json", &study::hard_json(&rows))?;
     }
     let failed = rows.iter().filter(|row| !row.passes()).count();
     if failed > 0 {
-        let text = report::mismatches(&rows);
+        let text = study::mismatches(&rows);
         return Err(Failure::Model(format!(
             "{text}\nerror: {failed} of {} failed\n",
             count_of(rows.len(), "run")
@@ -196,7 +196,7 @@ fn times(args: &ReportArgs, session: &Session) -> Result<Vec<f64>, Failure> {
             }
             frames.times().collect()
         }
-        _ => report::default_times(session).ok_or_else(|| {
+        _ => study::default_times(session).ok_or_else(|| {
             Failure::Usage(format!(
                 "error: {} has no `frames`: say where to compare with `--at T1,T2,…` or `--from A --to B --step S`\n",
                 session.source.name
@@ -220,6 +220,6 @@ fn print(text: &str) -> Result<(), Failure> {
 fn write(folder: &Path, name: &str, text: &str) -> Result<(), Failure> {
     fs::create_dir_all(folder)
         .map_err(|error| Failure::Model(format!("error: cannot make {}: {error}\n", folder.display())))?;
-    export::replace(folder, name, text.as_bytes())
+    render::replace(folder, name, text.as_bytes())
         .map_err(|error| Failure::Model(format!("error: {error}\n")))
 }

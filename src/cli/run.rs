@@ -9,7 +9,7 @@ use super::events::EventLog;
 use super::progress::Progress;
 use crate::model::Model;
 use crate::sim::{Passed, describe};
-use crate::structure::ModuleString;
+use crate::tree::ModuleString;
 
 /// Reads a model and reports on it.
 pub fn check(args: &CheckArgs) -> Result<(), Failure> {

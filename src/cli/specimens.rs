@@ -13,9 +13,9 @@ use super::common::{Failure, Run, coloured, out_error};
 use super::parallel;
 use super::progress::Progress;
 use crate::model::Measure;
-use crate::report::{Course, Spread, band_svg, spread_csv, spread_table};
 use crate::sim::Settings;
-use crate::structure::ModuleString;
+use crate::study::{Course, Spread, band_svg, spread_csv, spread_table};
+use crate::tree::ModuleString;
 
 /// Most numbers that are kept, one for each specimen, measure and time.
 const MOST: usize = 100_000_000;

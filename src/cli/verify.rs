@@ -7,11 +7,11 @@ use clap::Args;
 use super::args::{ReportArgs, positive};
 use super::common::{Failure, Run, coloured, count_of, tell};
 use super::progress::Progress;
-use crate::report::{
-    Unverified, complaint, unverified, verification_rows, verification_table, verify as compare,
-};
 use crate::session::Session;
 use crate::sim::{Method, Settings};
+use crate::study::{
+    Unverified, complaint, unverified, verification_rows, verification_table, verify as compare,
+};
 
 #[derive(Debug, Args)]
 pub struct VerifyArgs {
@@ -61,7 +61,7 @@ pub fn verify_all(
 ) -> Result<bool, Failure> {
     let methods = args.methods.clone().unwrap_or_else(|| vec![Method::Auto]);
     if let Some(fixed) = methods.iter().find(|m| m.is_fixed_step()) {
-        let name = crate::report::method_name(*fixed);
+        let name = crate::study::method_name(*fixed);
         return Err(Failure::Usage(format!(
             "error: a report is verified at its tolerances, and `{name}` has a fixed step; verify a run: `dlsys run … --verify`\n"
         )));

@@ -7,10 +7,10 @@ use super::args::ViewArgs;
 use super::common::{Failure, Run, count_of, out_error};
 use super::progress::Progress;
 use super::reel::{Pass, Shot, play};
-use crate::export::{self, Survey, View};
+use crate::player::{Recorder, Recording, Stage, page};
+use crate::render::{self, Survey, View};
 use crate::scene::Scene;
 use crate::sim::Settings;
-use crate::view::{Recorder, Recording, Stage, page};
 
 /// Most frames of a recording; a screen shows no more in five minutes.
 const MOST_FRAMES: usize = 20_000;
@@ -34,7 +34,7 @@ fn open(args: &ViewArgs) -> Result<(), Failure> {
 #[cfg(feature = "viewer")]
 fn open(args: &ViewArgs) -> Result<(), Failure> {
     use super::common::settings;
-    use crate::view::window::{Error, Options, Trial, open};
+    use crate::player::window::{Error, Options, Trial, open};
     let shared = &args.shared;
     let model = shared.model.clone();
     if !model.is_file() {
@@ -82,7 +82,7 @@ fn write(args: &ViewArgs, out: &Path) -> Result<(), Failure> {
     let document = page::document(&recording);
     let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let name = out.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
-    export::replace(folder, &name, document.as_bytes())
+    render::replace(folder, &name, document.as_bytes())
         .map_err(|error| Failure::Model(format!("error: {error}\n")))?;
     let megabytes = document.len() as f64 / 1e6;
     writeln!(std::io::stdout(), "{}: {}, {megabytes:.1} MB", out.display(), count_of(count, "frame"))

@@ -6,7 +6,7 @@ use super::commands;
 use super::desk::{Desk, Fault};
 use super::stage::{Stage, misused};
 use crate::cli::run::Printer;
-use crate::export::{self, Format, FrameWriter, Page, Size, Survey, View};
+use crate::render::{self, Format, FrameWriter, Page, Size, Survey, View};
 use crate::sim::brief;
 
 /// Says whether a file may be written.
@@ -31,7 +31,7 @@ fn write(path: &Path, bytes: &[u8], desk: &mut Desk) -> Result<(), Fault> {
     let Some(name) = path.file_name().and_then(|name| name.to_str()) else {
         return Err(Fault::new(format!("{} is no name for a file", path.display())));
     };
-    export::replace(folder, name, bytes).map_err(Fault::new)?;
+    render::replace(folder, name, bytes).map_err(Fault::new)?;
     desk.written.insert(real(path));
     Ok(())
 }
@@ -107,11 +107,11 @@ impl Stage<'_> {
             },
         };
         let view = match value(&mut words, "--view")? {
-            Some(text) => text.parse().map_err(|error: export::ViewError| Fault::new(error))?,
+            Some(text) => text.parse().map_err(|error: render::ViewError| Fault::new(error))?,
             None => View::FRONT,
         };
         let perspective =
-            number(value(&mut words, "--perspective")?, "--perspective", export::Camera::FIELDS)?;
+            number(value(&mut words, "--perspective")?, "--perspective", render::Camera::FIELDS)?;
         let side = f64::from(Page::MOST_ON_A_SIDE);
         let width = number(value(&mut words, "--width")?, "--width", 1.0..=side)?;
         let [name] = &words[..] else { return Err(misused(commands::find("export").expect("it is one"))) };

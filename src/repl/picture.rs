@@ -4,7 +4,7 @@ use super::braille::Sheet;
 use super::commands;
 use super::desk::{Desk, Fault};
 use super::stage::{Stage, misused};
-use crate::export::{Fit, Page, Size, Survey, View, pixels};
+use crate::render::{Fit, Page, Size, Survey, View, pixels};
 use crate::scene::Scene;
 use crate::turtle;
 
@@ -29,7 +29,7 @@ impl Stage<'_> {
                 blocks = true;
                 continue;
             }
-            view = word.parse().map_err(|error: crate::export::ViewError| {
+            view = word.parse().map_err(|error: crate::render::ViewError| {
                 Fault::new(format!("{error}\n  it is used as `draw {}`", usage()))
             })?;
         }

@@ -13,7 +13,7 @@ use crate::lang::did_you_mean;
 use crate::model::{KindId, Model};
 use crate::replay::Stop;
 use crate::sim::brief;
-use crate::structure::{Lineage, ModuleString};
+use crate::tree::{Lineage, ModuleString};
 
 /// What is plotted.
 enum Subject {
@@ -207,14 +207,14 @@ impl Subject {
     fn values(&self, string: &ModuleString) -> Vec<f64> {
         let of = |kinds: &BTreeMap<KindId, usize>| -> Vec<f64> {
             let value =
-                |m: crate::structure::Module| kinds.get(&m.kind).and_then(|i| m.parameters.get(*i)).copied();
+                |m: crate::tree::Module| kinds.get(&m.kind).and_then(|i| m.parameters.get(*i)).copied();
             string.iter().filter_map(value).collect()
         };
         match self {
             Subject::Each(kinds) => of(kinds),
             Subject::Count(kinds) => vec![string.iter().filter(|m| kinds.contains(&m.kind)).count() as f64],
             Subject::One(lineage, place) => {
-                let own = |m: &crate::structure::Module| m.lineage == *lineage && !m.kind.is_bracket();
+                let own = |m: &crate::tree::Module| m.lineage == *lineage && !m.kind.is_bracket();
                 string.iter().find(own).and_then(|m| m.parameters.get(*place).copied()).into_iter().collect()
             }
             Subject::Whole(summary, kinds) => {

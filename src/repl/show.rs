@@ -7,7 +7,7 @@ use super::stage::{Stage, misused};
 use crate::lang::did_you_mean;
 use crate::model::{KindId, Model};
 use crate::sim::{Seen, brief, describe};
-use crate::structure::{Lineage, Module, ModuleString};
+use crate::tree::{Lineage, Module, ModuleString};
 
 /// Lines of a string, or rows of a table, that are printed unless more are asked for.
 const MOST_LINES: usize = 16;

@@ -9,7 +9,7 @@ use crate::lang::{did_you_mean, words};
 use crate::replay::{Replay, Stop};
 use crate::session::Session;
 use crate::sim::{self, brief};
-use crate::structure::ModuleString;
+use crate::tree::ModuleString;
 
 /// What comes after a statement.
 #[derive(Debug)]

@@ -1,7 +1,7 @@
 //! Building blocks of models against exact values: curves, growth functions, arrays, `match`, `let`.
 
 use dlsys::sim::{Scheduler, Settings, Stats};
-use dlsys::structure::ModuleString;
+use dlsys::tree::ModuleString;
 
 use crate::common::{Plain, run, session, show};
 

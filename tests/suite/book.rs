@@ -27,7 +27,7 @@ use std::process::Command;
 use dlsys::diagnostic::{Diagnostic, Source};
 use dlsys::scene::Scene;
 use dlsys::session::Session;
-use dlsys::structure::ModuleString;
+use dlsys::tree::ModuleString;
 
 use crate::common::repository;
 use crate::pages::{Block, Page, Piece};

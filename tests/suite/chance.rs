@@ -7,7 +7,7 @@
 use std::collections::HashMap;
 
 use dlsys::sim::{Event, Method, Scheduler, Settings};
-use dlsys::structure::{Lineage, ModuleString};
+use dlsys::tree::{Lineage, ModuleString};
 use statrs::function::erf::erfc;
 
 use crate::cli::dlsys;
@@ -286,7 +286,7 @@ fn the_weeds_of_the_book_have_their_frequencies() {
         for event in simulation.take_events() {
             counts[event.successor.expect("there is a choice")] += 1.0;
         }
-        let is_segment = |m: &dlsys::structure::Module| session.model.kinds.get(m.kind).name == "F";
+        let is_segment = |m: &dlsys::tree::Module| session.model.kinds.get(m.kind).name == "F";
         segments.push(string.iter().filter(is_segment).count() as f64);
     }
     // Chi-square with 2 degrees of freedom exceeds 13.8 with probability 0.001.

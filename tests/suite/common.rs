@@ -2,7 +2,7 @@
 
 use dlsys::model::Model;
 use dlsys::scene::Scene;
-use dlsys::structure::{Lineage, ModuleString};
+use dlsys::tree::{Lineage, ModuleString};
 use dlsys::turtle;
 
 /// What the turtle draws for a string; the angle of a turn without a parameter is 45 degrees.

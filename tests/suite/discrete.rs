@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 use dlsys::session::Session;
 use dlsys::sim::Settings;
-use dlsys::structure::ModuleString;
+use dlsys::tree::ModuleString;
 
 use crate::common::repository;
 

@@ -6,7 +6,7 @@
 use std::collections::HashMap;
 
 use crate::common::scene;
-use dlsys::export::{Fit, Format, FrameWriter, Survey, View};
+use dlsys::render::{Fit, Format, FrameWriter, Survey, View};
 use dlsys::scene::{Point, Scene, Vector};
 use proptest::prelude::*;
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use dlsys::session::{Refused, Session};
 use dlsys::sim::Settings;
-use dlsys::structure::ModuleString;
+use dlsys::tree::ModuleString;
 
 use crate::common::{plain, show};
 

@@ -9,7 +9,7 @@ use dlsys::diagnostic::{Diagnostic, Severity, Source};
 use dlsys::scene::Scene;
 use dlsys::session::Session;
 use dlsys::sim::Settings;
-use dlsys::structure::ModuleString;
+use dlsys::tree::ModuleString;
 
 use crate::common::repository;
 

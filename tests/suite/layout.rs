@@ -7,7 +7,7 @@ use dlsys::diagnostic::Source;
 use dlsys::lang::{format::format, parse, print};
 use dlsys::session::Session;
 use dlsys::sim::Settings;
-use dlsys::structure::ModuleString;
+use dlsys::tree::ModuleString;
 
 use crate::common::{plain, repository};
 use crate::wild::{Dice, changed, texts};

@@ -2,7 +2,7 @@
 //! same errors, whichever frames are asked for.
 
 use dlsys::sim::Settings;
-use dlsys::structure::ModuleString;
+use dlsys::tree::ModuleString;
 use proptest::prelude::*;
 
 const LAWS: [&str; 8] = ["1", "0.5", "2", "2*(1 - x/3)*x", "x", "0.25 + age", "3 - x", "1 + 0.5*age^2 - x*0"];

@@ -5,9 +5,9 @@ use std::path::Path;
 use std::process::{Command, Output};
 use std::time::{Duration, Instant};
 
-use dlsys::export::{Format, FrameWriter, Survey, View};
+use dlsys::render::{Format, FrameWriter, Survey, View};
 use dlsys::sim::{Error, Method, Settings};
-use dlsys::structure::ModuleString;
+use dlsys::tree::ModuleString;
 
 use crate::common::{repository, run, session};
 

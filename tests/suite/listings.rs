@@ -5,7 +5,7 @@
 //! located, good to about 1e-9. `anabaena_events.json`: all 351 events up to t = 575.
 
 use dlsys::sim::{Method, Settings};
-use dlsys::structure::ModuleString;
+use dlsys::tree::ModuleString;
 use serde_json::Value;
 
 use crate::common::{Plain, plain, repository, run};

@@ -4,10 +4,10 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use dlsys::export::{Format, FrameWriter, Survey, View};
+use dlsys::render::{Format, FrameWriter, Survey, View};
 use dlsys::scene::{Point, Scene, Vector};
 use dlsys::session::Session;
-use dlsys::structure::ModuleString;
+use dlsys::tree::ModuleString;
 use dlsys::turtle;
 
 const LEAF: &str = "-1 1  0 1  0 1\nCONTACT POINT X: 0 Y: 0 Z: 0\nEND POINT X: 0 Y: 0 Z: 0\n\

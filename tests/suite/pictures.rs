@@ -4,11 +4,11 @@
 use crate::cli::{bad, good};
 use crate::common::scene;
 use crate::export::assert_golden;
-use dlsys::export::{
+use dlsys::render::{
     Fit, Format, FrameWriter, Layout, Page, Sheet, SheetWriter, Size, Spacing, Survey, View,
 };
 use dlsys::scene::{Owner, Point, Polygon, Scene};
-use dlsys::structure::Lineage;
+use dlsys::tree::Lineage;
 
 /// A PNG as a reader sees it: width, height, and red, green, blue (and opacity) of each pixel.
 struct Picture {

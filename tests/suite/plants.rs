@@ -4,7 +4,7 @@ use dlsys::model::Model;
 use dlsys::scene::{Patch, Point, Scene};
 use dlsys::session::Session;
 use dlsys::sim::{Method, Settings};
-use dlsys::structure::ModuleString;
+use dlsys::tree::ModuleString;
 use serde_json::Value;
 
 use crate::cli::good;

@@ -3,13 +3,13 @@
 use dlsys::replay::{Replay, Stop};
 use dlsys::session::Session;
 use dlsys::sim::{Event, Method, Scheduler, Settings};
-use dlsys::structure::ModuleString;
+use dlsys::tree::ModuleString;
 
 use crate::common::{repository, session};
 
 /// Everything that can be seen of a string.
 fn bits(string: &ModuleString) -> Vec<(usize, Vec<u64>, u64, u64)> {
-    let module = |m: dlsys::structure::Module| {
+    let module = |m: dlsys::tree::Module| {
         let parameters = m.parameters.iter().map(|x| x.to_bits()).collect();
         (m.kind.index(), parameters, m.age.to_bits(), m.lineage.id)
     };
@@ -90,7 +90,7 @@ fn every_way_of_integrating_is_the_same_from_every_side() {
 
 #[test]
 fn hard_cases_are_the_same_from_every_side() {
-    for (name, text) in dlsys::report::CASES {
+    for (name, text) in dlsys::study::CASES {
         let Ok(session) = Session::from_text(name, text, &[]) else { continue };
         let Some(frames) = session.model.frames else { continue };
         // Those that end in an error, or take long, have tests of their own.

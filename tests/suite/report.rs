@@ -256,8 +256,8 @@ fn malformed_lines_are_named() {
 fn the_built_in_cases_run() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().to_str().expect("UTF-8");
-    let first = dlsys::report::CASES[0];
-    let id = dlsys::report::Case::parse(first.0, first.1).expect("good").id;
+    let first = dlsys::study::CASES[0];
+    let id = dlsys::study::Case::parse(first.0, first.1).expect("good").id;
     let table = good(&["--hard", "--case", &id, "-o", out]);
     assert!(table.contains(&id) && table.contains("all passed"), "{table}");
     let csv = fields(&read(&folder.path().join("hard.csv")));

@@ -1,7 +1,7 @@
 //! `dlsys run --verify` and `dlsys report --verify`: what passes, what fails and what is said of it.
 
-use dlsys::report::{Unverified, Verification, verify};
 use dlsys::sim::{Method, Settings};
+use dlsys::study::{Unverified, Verification, verify};
 
 use crate::cli::dlsys;
 use crate::common::session;

@@ -3,12 +3,12 @@
 use std::fs;
 use std::io::Read;
 
-use dlsys::export::{Survey, View};
+use dlsys::player::{Form, Stage};
+use dlsys::render::{Survey, View};
 use dlsys::session::Session;
 use dlsys::sim::Settings;
-use dlsys::structure::ModuleString;
+use dlsys::tree::ModuleString;
 use dlsys::turtle;
-use dlsys::view::{Form, Stage};
 use serde_json::Value;
 
 use crate::cli::{bad, dlsys, good};

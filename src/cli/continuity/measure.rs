@@ -3,7 +3,7 @@
 use crate::model::Model;
 use crate::scene::{Patch, Point, Scene, Vector};
 use crate::sim::{Stand, Transition};
-use crate::structure::{Lineage, ModuleString};
+use crate::tree::{Lineage, ModuleString};
 use crate::turtle::{self, Error};
 
 /// Part of a time scale over which speeds are taken.

@@ -17,7 +17,7 @@ use super::args::{CheckArgs, Order};
 use super::common::{Failure, coloured, out_error};
 use crate::session::Session;
 use crate::sim::{Settings, Simulation};
-use crate::structure::ModuleString;
+use crate::tree::ModuleString;
 use measure::Draughtsman;
 use report::{Report, Verdict};
 

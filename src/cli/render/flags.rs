@@ -2,7 +2,7 @@
 
 use crate::cli::args::{Background, FrameFormat, RenderArgs};
 use crate::cli::common::Failure;
-use crate::export::{Format, Layout, Page, Picture, Size, Spacing, Survey, View};
+use crate::render::{Format, Layout, Page, Picture, Size, Spacing, Survey, View};
 
 fn usage(message: impl std::fmt::Display) -> Failure {
     Failure::Usage(format!("error: {message}\n"))

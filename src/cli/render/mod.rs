@@ -20,7 +20,7 @@ use super::common::{Clock, Failure, Run, count_of, out_error, size_of};
 use super::events::EventLog;
 use super::progress::Progress;
 use super::reel::{Pass, Shot, play};
-use crate::export::{
+use crate::render::{
     self, Fit, Format, FrameDirectory, FrameRecord, FrameWriter, Layout, Manifest, Page, Sheet, SheetWriter,
     Survey,
 };
@@ -236,7 +236,7 @@ impl Render<'_> {
         };
         let sheet = Sheet::new(layout, &fit, &self.frames, &captions, flags::spacing(self.args));
         let page = flags::page(self.args, sheet.picture)?;
-        let refuse = |error: export::SheetError| Failure::Usage(format!("error: {error}\n"));
+        let refuse = |error: render::SheetError| Failure::Usage(format!("error: {error}\n"));
         let writer = SheetWriter::new(flags::format(self.args), fit.clone(), sheet, page).map_err(refuse)?;
         let mut directory = FrameDirectory::create(self.out, self.args.force)
             .map_err(out_of_directory)?
@@ -344,8 +344,8 @@ fn record(fit: &Fit, shot: &Shot, scene: &Scene, file: String) -> FrameRecord {
 }
 
 /// An error of a frame; of one that is too large, with what makes it so.
-fn explain(error: export::Error, shot: &Shot, scene: &Scene) -> Failure {
-    let export::Error::TooLarge { limit } = error else { return out_of_directory(error) };
+fn explain(error: render::Error, shot: &Shot, scene: &Scene) -> Failure {
+    let render::Error::TooLarge { limit } = error else { return out_of_directory(error) };
     let mut counts: HashMap<&str, usize> = HashMap::new();
     let owners = scene.segments.iter().map(|s| s.owner).chain(scene.polygons.iter().map(|p| p.owner));
     let owners =
@@ -369,10 +369,10 @@ fn explain(error: export::Error, shot: &Shot, scene: &Scene) -> Failure {
     ))
 }
 
-fn out_of_directory(error: export::Error) -> Failure {
+fn out_of_directory(error: render::Error) -> Failure {
     let message = format!("error: {error}\n");
     match error {
-        export::Error::Io { .. } | export::Error::TooLarge { .. } => Failure::Model(message),
+        render::Error::Io { .. } | render::Error::TooLarge { .. } => Failure::Model(message),
         // The directory was chosen on the command line.
         _ => Failure::Usage(message),
     }

@@ -2,7 +2,7 @@
 
 use cpu_time::ProcessTime as Clock;
 use dlsys::sim::Settings;
-use dlsys::structure::ModuleString;
+use dlsys::tree::ModuleString;
 use dlsys_benches::blocks::{self, AGREEMENT};
 use dlsys_benches::measure::duration;
 use dlsys_benches::scale::median;

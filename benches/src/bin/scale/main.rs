@@ -12,7 +12,7 @@ use std::process::{Command, ExitCode};
 use std::time::Instant;
 
 use dlsys::sim::Settings;
-use dlsys::structure::ModuleString;
+use dlsys::tree::ModuleString;
 use dlsys_benches::measure::duration;
 use dlsys_benches::plants;
 use dlsys_benches::scale::{self, median};

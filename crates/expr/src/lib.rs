@@ -1,0 +1,42 @@
+//! Pure mathematics: expressions over numbered variables. No syntax, no time, no tree.
+//!
+//! ```text
+//! Graph ──compile──▶ Program ──eval::<T>──▶ values of type T
+//! ```
+//!
+//! - [`Graph`] holds hash-consed expressions: equal expressions have equal [`NodeId`]s, constants are
+//!   folded, and every operand stands before its user, so passes are loops, never recursion.
+//! - [`Program`] is straight-line code for a few roots of a graph.
+//! - [`Value`] is what a program computes with. One interpreter serves them all: `f64` for states,
+//!   [`Interval`] for bounds over a stretch of time, [`Dual`] for derivatives along a trajectory.
+//!
+//! ```
+//! use dlsys_expr::{Binary, Graph, Program};
+//!
+//! let mut graph = Graph::default();
+//! let (x, half) = (graph.var(0), graph.constant(0.5));
+//! let y = graph.binary(Binary::Mul, half, x);
+//! let program = Program::compile(&graph, &[y], 1);
+//! assert_eq!(program.eval_one(&[3.0]), 1.5);
+//! ```
+
+mod curve;
+mod derivative;
+mod dual;
+mod elimination;
+mod graph;
+mod interval;
+mod ops;
+mod polynomial;
+mod program;
+#[cfg(test)]
+mod tests;
+
+pub use curve::{Array, Curve, CurveFault, MAX_POINTS, Part, Sort};
+pub use dual::Dual;
+pub use elimination::eliminate;
+pub use graph::{Graph, Integral, Lookup, Node, NodeId};
+pub use interval::Interval;
+pub use ops::{Binary, Unary, Value};
+pub use polynomial::{Monomial, Polynomial};
+pub use program::{LANES, Lanes, Program, Scratch};

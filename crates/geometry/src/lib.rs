@@ -1,0 +1,7 @@
+//! Geometry without a file format, and the turtle that makes it of strings of modules.
+//!
+//! - [`scene`]: elements, materials, meshes, patches, bounds.
+//! - [`turtle`]: strings of modules as a scene.
+
+pub mod scene;
+pub mod turtle;

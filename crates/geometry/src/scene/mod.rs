@@ -1,0 +1,170 @@
+//! What is to be seen, without a file format: segments, polygons and surfaces, each of a material and of a
+//! module.
+//!
+//! ```text
+//! turtle ──▶ Scene { segments, polygons, surfaces, patches } ──▶ export
+//! ```
+//!
+//! - [`Segment`]: a straight piece of a stem. Segments that continue one another form tubes.
+//! - [`Polygon`]: a filled outline. [`Surface`]: a [`Mesh`] placed in space; many share one mesh.
+//! - [`Patch`]: a bicubic Bézier patch; [`Scene::tessellated`] makes surfaces of patches.
+//! - [`Owner`]: the module that drew something. Its name lasts from frame to frame.
+//! - [`Bounds`]: how much space a scene, or all scenes of an animation, take up.
+//!
+//! Lengths are in *scene units*, the units of the model. The axes: `+X` right, `+Y` up, `+Z` towards the
+//! viewer of the front view.
+
+mod bounds;
+mod degrees;
+mod element;
+mod material;
+mod mesh;
+mod patch;
+
+pub use bounds::Bounds;
+pub use degrees::sin_cos_degrees;
+pub use element::{Placement, Polygon, Segment, Surface, Width};
+pub use material::{Color, GRADIENT_STEPS, Material, MaterialId, Palette};
+pub use mesh::{Face, Mesh};
+pub use patch::{Net, Patch, PatchFace, PatchSet};
+
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use dlsys_diagnostic::Diagnostic;
+use dlsys_model::Appearance;
+use dlsys_tree::Lineage;
+
+/// A point, in scene units.
+pub type Point = nalgebra::Point3<f64>;
+/// A direction or displacement, in scene units.
+pub type Vector = nalgebra::Vector3<f64>;
+
+/// The module that drew an element of a scene.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Owner {
+    /// Name of the module's kind, as in the model: `F_i`, `@L`.
+    pub name: Arc<str>,
+    /// Who the module is.
+    pub lineage: Lineage,
+}
+
+/// An [`Owner`] of a [`Scene`], by number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct OwnerId(u32);
+
+impl OwnerId {
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// A surface as it is before it is placed.
+#[derive(Clone, Debug)]
+pub struct Shape {
+    pub mesh: Arc<Mesh>,
+    /// See [`Surface::patches`].
+    pub patches: Option<Arc<PatchSet>>,
+}
+
+impl Shape {
+    /// Of a mesh as it is.
+    pub fn of_mesh(mesh: Mesh) -> Shape {
+        Shape { mesh: Arc::new(mesh), patches: None }
+    }
+
+    /// Of patches, about 1 in size.
+    pub fn of_patches(faces: Vec<PatchFace>) -> Shape {
+        /// Accuracy of the preview.
+        const PREVIEW: f64 = 1.0 / 256.0;
+        let patches = PatchSet::new(faces);
+        Shape { mesh: patches.mesh(PREVIEW), patches: Some(Arc::new(patches)) }
+    }
+}
+
+/// Everything that is to be seen at one instant.
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    pub palette: Palette,
+    /// The model's own surfaces, and what they and the palette were made from, so that they are made once
+    /// and not for every frame.
+    pub shapes: Vec<Shape>,
+    pub prepared_for: Option<Arc<Appearance>>,
+    /// How far curves may be from what is drawn for them, in scene units, if that is known when the turtle
+    /// draws; 0 if not. Bent segments are drawn in pieces; see [`Fit::accuracy`](dlsys_render::Fit::accuracy).
+    pub accuracy: f64,
+    owners: Vec<Owner>,
+    pub segments: Vec<Segment>,
+    pub polygons: Vec<Polygon>,
+    pub surfaces: Vec<Surface>,
+    pub patches: Vec<Patch>,
+    /// What is drawn, but hardly as it was meant.
+    pub warnings: Vec<Diagnostic>,
+}
+
+impl Scene {
+    /// Takes everything out, keeping the palette and the memory.
+    pub fn clear(&mut self) {
+        self.owners.clear();
+        self.segments.clear();
+        self.polygons.clear();
+        self.surfaces.clear();
+        self.patches.clear();
+        self.warnings.clear();
+    }
+
+    /// True if there is nothing to be seen.
+    pub fn is_empty(&self) -> bool {
+        self.segments.is_empty()
+            && self.polygons.is_empty()
+            && self.surfaces.is_empty()
+            && self.patches.is_empty()
+    }
+
+    /// The scene with meshes in place of everything curved, none further than `accuracy` (scene units) from
+    /// what it stands for. Patches come after the other surfaces.
+    pub fn tessellated(&self, accuracy: f64) -> Cow<'_, Scene> {
+        if self.patches.is_empty() && self.surfaces.iter().all(|surface| surface.patches.is_none()) {
+            return Cow::Borrowed(self);
+        }
+        let mut scene = self.clone();
+        for surface in &mut scene.surfaces {
+            if let Some(patches) = surface.patches.take() {
+                surface.mesh = patches.mesh(accuracy / surface.placement.scale);
+            }
+        }
+        scene.surfaces.extend(scene.patches.drain(..).map(|patch| patch.surface(accuracy)));
+        Cow::Owned(scene)
+    }
+
+    /// Visits points that enclose everything that is to be seen, each with the width of the line there; corners of
+    /// what is not a line have the width 0.
+    pub fn each_point(&self, mut visit: impl FnMut(Point, Width)) {
+        for segment in &self.segments {
+            visit(segment.start, segment.widths[0]);
+            visit(segment.end, segment.widths[1]);
+        }
+        let corners = self.polygons.iter().flat_map(|polygon| polygon.vertices.iter().copied());
+        let surfaces = self
+            .surfaces
+            .iter()
+            .flat_map(|surface| surface.mesh.vertices.iter().map(|&v| surface.placement.point(v)));
+        let patches = self.patches.iter().flat_map(Patch::hull);
+        corners.chain(surfaces).chain(patches).for_each(|point| visit(point, Width::Set(0.0)));
+    }
+
+    /// Enters a module that draws something. Modules are entered in string order, each once.
+    pub fn add_owner(&mut self, owner: Owner) -> OwnerId {
+        self.owners.push(owner);
+        OwnerId((self.owners.len() - 1) as u32)
+    }
+
+    pub fn owner(&self, id: OwnerId) -> &Owner {
+        &self.owners[id.index()]
+    }
+
+    /// The modules that drew something, in string order.
+    pub fn owners(&self) -> &[Owner] {
+        &self.owners
+    }
+}

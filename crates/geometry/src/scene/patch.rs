@@ -1,0 +1,393 @@
+//! Bicubic Bézier patches, and their tessellation by accuracy.
+//!
+//! A patch becomes a grid of triangles that deviates from it by no more than a given length: the second
+//! differences of its control net bound its second derivatives, and these bound the deviation (Filip,
+//! Magedson and Markot 1986, *Surface algorithms using bounds on derivatives*). The number of pieces of an edge
+//! is a power of two that depends on the four points of that edge alone, so two patches that share an edge
+//! have the same vertices there, and no cracks; finer grids inside are drawn together at the edge.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex};
+
+use super::{MaterialId, Mesh, OwnerId, Placement, Point, Surface, Vector};
+
+/// Control points by row and column. Seen with rows going up and columns going right, the front is towards
+/// the viewer.
+pub type Net = [[Point; 4]; 4];
+
+/// Most pieces along an edge.
+const FINEST: usize = 64;
+
+/// A patch in space.
+#[derive(Clone, Debug)]
+pub struct Patch {
+    pub net: Net,
+    pub material: MaterialId,
+    pub owner: OwnerId,
+}
+
+impl Patch {
+    /// Points whose convex hull the patch lies in, closer to it than its control points are.
+    pub fn hull(&self) -> impl Iterator<Item = Point> {
+        let mut nets = vec![self.net];
+        for _ in 0..2 {
+            nets = nets.iter().flat_map(quarters).collect();
+        }
+        nets.into_iter().flat_map(|net| net.into_iter().flatten())
+    }
+
+    /// A measure of size: the lengths of the four edges of the control net.
+    pub fn length(&self) -> f64 {
+        edges(&self.net).iter().map(|e| (0..3).map(|i| (e[i + 1] - e[i]).norm()).sum::<f64>()).sum()
+    }
+
+    /// As a mesh in its place; `accuracy` is in scene units.
+    pub fn surface(&self, accuracy: f64) -> Surface {
+        let origin = self.net[0][0];
+        let reach = self.net.iter().flatten().map(|p| (p - origin).amax()).fold(0.0, f64::max);
+        let scale = if reach > 0.0 { reach } else { 1.0 };
+        let unit = self.net.map(|row| row.map(|p| Point::from((p - origin) / scale)));
+        let mut mesh = Mesh::new();
+        tessellate(&unit, accuracy / scale, self.material, false, &mut mesh);
+        let placement = Placement { origin, axes: [Vector::x(), Vector::y(), Vector::z()], scale };
+        Surface { mesh: Arc::new(mesh), patches: None, placement, tint: None, owner: self.owner }
+    }
+}
+
+/// A patch of a [`PatchSet`].
+#[derive(Clone, Debug)]
+pub struct PatchFace {
+    pub net: Net,
+    pub material: MaterialId,
+    /// Whether a colour that the model chooses replaces the material.
+    pub takes_tint: bool,
+}
+
+/// Patches of a surface in coordinates of its own; drawn many times, at any size.
+#[derive(Debug, Default)]
+pub struct PatchSet {
+    faces: Vec<PatchFace>,
+    /// Meshes that were asked for, by the exponent of their accuracy.
+    meshes: Mutex<BTreeMap<i32, Arc<Mesh>>>,
+}
+
+impl PatchSet {
+    pub fn new(faces: Vec<PatchFace>) -> PatchSet {
+        PatchSet { faces, meshes: Mutex::default() }
+    }
+
+    /// The surface as triangles that deviate from it by no more than `accuracy`, in its own units. Meshes
+    /// are kept: accuracies within a factor of four share one.
+    pub fn mesh(&self, accuracy: f64) -> Arc<Mesh> {
+        // With 64 pieces an edge is as fine as it gets; coarser than a surface of unit size makes no sense.
+        let exponent = (accuracy.log2() / 2.0).floor().clamp(-20.0, 0.0) as i32;
+        let make = || {
+            let mut mesh = Mesh::new();
+            for face in &self.faces {
+                tessellate(&face.net, 4_f64.powi(exponent), face.material, face.takes_tint, &mut mesh);
+            }
+            Arc::new(mesh)
+        };
+        match self.meshes.lock() {
+            Ok(mut meshes) => meshes.entry(exponent).or_insert_with(make).clone(),
+            // Another thread panicked; the mesh is made again.
+            Err(_) => make(),
+        }
+    }
+}
+
+/// The four edges: first row, last row, first column, last column.
+fn edges(net: &Net) -> [[Point; 4]; 4] {
+    [net[0], net[3], net.map(|row| row[0]), net.map(|row| row[3])]
+}
+
+fn column(net: &Net, c: usize) -> [Point; 4] {
+    net.map(|row| row[c])
+}
+
+/// A greatest second difference of four points.
+fn bend(p: &[Point; 4]) -> f64 {
+    let second = |i: usize| (p[i].coords - 2.0 * p[i + 1].coords + p[i + 2].coords).norm();
+    second(0).max(second(1))
+}
+
+/// The least power of two whose square is at least this.
+fn pieces(square: f64) -> usize {
+    let mut n = 1;
+    while n < FINEST && ((n * n) as f64) < square {
+        n *= 2;
+    }
+    n
+}
+
+/// Pieces of an edge: a cubic's second derivative is at most 6 times its second differences, a chord over
+/// 1/n deviates by 1/8 of that over n².
+fn edge_pieces(edge: &[Point; 4], accuracy: f64) -> usize {
+    pieces(6.0 * bend(edge) / (8.0 * accuracy))
+}
+
+/// Pieces along rows (from column to column) and along columns that keep the whole patch accurate, as few as
+/// will do.
+fn grid_pieces(net: &Net, accuracy: f64) -> (usize, usize) {
+    let along = |of: &dyn Fn(usize) -> [Point; 4]| (0..4).map(|i| bend(&of(i))).fold(0.0, f64::max);
+    let (uu, vv) = (6.0 * along(&|r| net[r]), 6.0 * along(&|c| column(net, c)));
+    let twist = (0..9)
+        .map(|i| {
+            let (r, c) = (i / 3, i % 3);
+            ((net[r + 1][c + 1] - net[r + 1][c]) - (net[r][c + 1] - net[r][c])).norm()
+        })
+        .fold(0.0, f64::max);
+    let uv = 9.0 * twist;
+    let exponents = 0..=FINEST.trailing_zeros();
+    let pairs = exponents.clone().flat_map(|i| exponents.clone().map(move |j| (1_usize << i, 1_usize << j)));
+    pairs
+        .filter(|&(columns, rows)| {
+            let (u, v) = (columns as f64, rows as f64);
+            uu / (u * u) + 2.0 * uv / (u * v) + vv / (v * v) <= 8.0 * accuracy
+        })
+        .min_by_key(|(columns, rows)| (columns * rows, columns.abs_diff(*rows)))
+        .unwrap_or((FINEST, FINEST))
+}
+
+/// Adds the triangles of a patch.
+fn tessellate(net: &Net, accuracy: f64, material: MaterialId, takes_tint: bool, mesh: &mut Mesh) {
+    let accuracy = if accuracy > 0.0 { accuracy } else { f64::MIN_POSITIVE };
+    // Half of the deviation for the edge, half for the triangles that lead to it.
+    let [bottom, top, left, right] = edges(net).map(|edge| edge_pieces(&edge, accuracy / 2.0));
+    let (columns, rows) = grid_pieces(net, accuracy);
+    let (columns, rows) = (columns.max(bottom).max(top), rows.max(left).max(right));
+    // Of the grid's vertices on an edge those that the edge has; the others fall upon the nearest.
+    let snap = |i: usize, count: usize, kept: usize| {
+        let step = count / kept;
+        (i + step / 2) / step * step
+    };
+    let first = mesh.vertices.len() as u32;
+    let mut numbers = vec![u32::MAX; (columns + 1) * (rows + 1)];
+    let mut number = |i: usize, j: usize, mesh: &mut Mesh| {
+        let (mut i, mut j) = (i, j);
+        if j == 0 || j == rows {
+            i = snap(i, columns, if j == 0 { bottom } else { top });
+        }
+        if i == 0 || i == columns {
+            j = snap(j, rows, if i == 0 { left } else { right });
+        }
+        let place = &mut numbers[j * (columns + 1) + i];
+        if *place == u32::MAX {
+            *place = mesh.vertices.len() as u32;
+            let (u, v) = (i as f64 / columns as f64, j as f64 / rows as f64);
+            mesh.vertices.push(point(net, u, v));
+            mesh.normals.push(normal(net, u, v));
+        }
+        *place
+    };
+    for j in 0..rows {
+        for i in 0..columns {
+            let [a, b, c, d] =
+                [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|(i, j)| number(i, j, mesh));
+            // The diagonal that ends in the patch's own corner, so that no triangle has two of its edges;
+            // but where vertices have fallen together, the one that leaves no slivers.
+            let along = (i < columns / 2) == (j < rows / 2);
+            let cuts = [[[a, b, c], [a, c, d]], [[a, b, d], [b, c, d]]];
+            let chosen = usize::from(!along);
+            let distinct = i > 0 && j > 0 && i + 1 < columns && j + 1 < rows;
+            let other = !distinct && quality(mesh, &cuts[1 - chosen]) > 1.5 * quality(mesh, &cuts[chosen]);
+            for corners in cuts[if other { 1 - chosen } else { chosen }] {
+                mesh.add_face(corners, material, takes_tint);
+            }
+        }
+    }
+    mesh.orient(first);
+}
+
+/// The least of the areas of two triangles, as far as they face as the first normal says; triangles with two
+/// corners in one do not count.
+fn quality(mesh: &Mesh, triangles: &[[u32; 3]; 2]) -> f64 {
+    let facing = |corners: &[u32; 3]| {
+        let [p, q, r] = corners.map(|i| mesh.vertices[i as usize]);
+        (q - p).cross(&(r - p)).dot(&corners.iter().map(|&i| mesh.normals[i as usize]).sum::<Vector>())
+    };
+    let proper = triangles.iter().filter(|[a, b, c]| a != b && b != c && c != a);
+    proper.map(facing).fold(f64::INFINITY, f64::min)
+}
+
+/// Bernstein's polynomials of degree three.
+fn weights(t: f64) -> [f64; 4] {
+    let s = 1.0 - t;
+    [s * s * s, 3.0 * s * s * t, 3.0 * s * t * t, t * t * t]
+}
+
+/// Their derivatives.
+fn slopes(t: f64) -> [f64; 4] {
+    let s = 1.0 - t;
+    [-3.0 * s * s, 3.0 * s * s - 6.0 * s * t, 6.0 * s * t - 3.0 * t * t, 3.0 * t * t]
+}
+
+fn sum(net: &Net, of_columns: [f64; 4], of_rows: [f64; 4]) -> Vector {
+    let mut sum = Vector::zeros();
+    for (row, v) in net.iter().zip(of_rows) {
+        let mut along = Vector::zeros();
+        for (point, u) in row.iter().zip(of_columns) {
+            along += point.coords * u;
+        }
+        sum += along * v;
+    }
+    sum
+}
+
+fn point(net: &Net, u: f64, v: f64) -> Point {
+    Point::from(sum(net, weights(u), weights(v)))
+}
+
+/// The unit normal on the front; where an edge shrinks to a point, that of a place nearby.
+fn normal(net: &Net, u: f64, v: f64) -> Vector {
+    for inwards in [0.0, 1e-3, 0.03, 0.3] {
+        let (u, v) = (u + (0.5 - u) * inwards, v + (0.5 - v) * inwards);
+        let across = sum(net, slopes(u), weights(v)).cross(&sum(net, weights(u), slopes(v)));
+        if let Some(normal) = across.try_normalize(1e-9) {
+            return normal;
+        }
+    }
+    Vector::z()
+}
+
+/// A patch cut in four (de Casteljau).
+fn quarters(net: &Net) -> [Net; 4] {
+    let [low, high] = halves(net);
+    let [a, b] = halves(&transposed(&low));
+    let [c, d] = halves(&transposed(&high));
+    [a, b, c, d].map(|net| transposed(&net))
+}
+
+fn transposed(net: &Net) -> Net {
+    [0, 1, 2, 3].map(|c| column(net, c))
+}
+
+/// Cut across its columns.
+fn halves(net: &Net) -> [Net; 2] {
+    let middle = |a: &[Point; 4], b: &[Point; 4]| [0, 1, 2, 3].map(|c| nalgebra::center(&a[c], &b[c]));
+    let (ab, bc, cd) = (middle(&net[0], &net[1]), middle(&net[1], &net[2]), middle(&net[2], &net[3]));
+    let (abc, bcd) = (middle(&ab, &bc), middle(&bc, &cd));
+    let all = middle(&abc, &bcd);
+    [[net[0], ab, abc, all], [all, bcd, cd, net[3]]]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A net over the unit square, raised by a function.
+    fn raised(height: impl Fn(f64, f64) -> f64) -> Net {
+        [0.0, 1.0, 2.0, 3.0].map(|r| [0.0, 1.0, 2.0, 3.0].map(|c| Point::new(c / 3.0, r / 3.0, height(c, r))))
+    }
+
+    fn mesh(net: &Net, accuracy: f64) -> Mesh {
+        let mut mesh = Mesh::new();
+        tessellate(net, accuracy, MaterialId::LEAF, true, &mut mesh);
+        mesh
+    }
+
+    #[test]
+    fn a_flat_patch_is_two_triangles_that_face_the_viewer() {
+        let mesh = mesh(&raised(|_, _| 0.0), 1e-6);
+        assert_eq!((mesh.vertices.len(), mesh.faces.len()), (4, 2));
+        assert!(mesh.normals.iter().all(|n| (n - Vector::z()).norm() < 1e-12));
+    }
+
+    #[test]
+    fn triangles_are_as_near_to_the_patch_as_they_should() {
+        let net = raised(|c, r| 0.3 * (c * 1.7).sin() + 0.2 * c * r - 0.15 * r * r);
+        for accuracy in [0.1, 1e-2, 1e-3] {
+            let mesh = mesh(&net, accuracy);
+            let mut worst: f64 = 0.0;
+            for face in &mesh.faces {
+                let [a, b, c] = face.corners.map(|i| mesh.vertices[i as usize]);
+                let middle = Point::from((a.coords + b.coords + c.coords) / 3.0);
+                // x and y of this net are its parameters.
+                worst = worst.max((point(&net, middle.x, middle.y) - middle).norm());
+            }
+            assert!(worst <= accuracy, "{worst} > {accuracy}");
+            let area: f64 = mesh
+                .faces
+                .iter()
+                .map(|f| {
+                    let [a, b, c] = f.corners.map(|i| mesh.vertices[i as usize]);
+                    (b - a).cross(&(c - a)).z / 2.0
+                })
+                .sum();
+            assert!((area - 1.0).abs() < 1e-9, "the grid covers the square once: {area}");
+        }
+    }
+
+    #[test]
+    fn patches_that_share_an_edge_share_its_vertices() {
+        // One bends much inside, the other is nearly flat; the common edge bends a little.
+        let edge = |r: f64| 0.02 * r * (3.0 - r);
+        let left = raised(|c, r| if c == 3.0 { edge(r) } else { (c * 2.0).sin() * 2.0 + r * r });
+        let mut right = raised(|c, r| edge(r) * (1.0 - c / 3.0));
+        right.iter_mut().flatten().for_each(|p| p.x += 1.0);
+        let at_edge = |mesh: Mesh| {
+            let mut heights: Vec<[i64; 2]> = (mesh.faces.iter())
+                .flat_map(|f| f.corners)
+                .map(|i| mesh.vertices[i as usize])
+                .filter(|v| (v.x - 1.0).abs() < 1e-12)
+                .map(|v| [(v.y * 1e12).round() as i64, (v.z * 1e12).round() as i64])
+                .collect();
+            heights.sort_unstable();
+            heights.dedup();
+            heights
+        };
+        let (a, b) = (at_edge(mesh(&left, 1e-3)), at_edge(mesh(&right, 1e-3)));
+        assert_eq!(a, b);
+        assert!(a.len() >= 5);
+    }
+
+    #[test]
+    fn normals_are_smooth_and_agree_even_where_an_edge_is_a_point() {
+        let mut net = raised(|c, r| 0.1 * r * (3.0 - r) + 0.05 * c * (3.0 - c));
+        net[3] = [Point::new(0.5, 1.0, 0.0); 4];
+        let mesh = mesh(&net, 1e-3);
+        for face in &mesh.faces {
+            let [a, b, c] = face.corners.map(|i| mesh.vertices[i as usize]);
+            let facing = (b - a).cross(&(c - a));
+            assert!(facing.norm() > 1e-12);
+            for i in face.corners {
+                assert!(
+                    facing.dot(&mesh.normals[i as usize]) > 0.0,
+                    "{face:?} {a} {b} {c} {facing} {} {} of {}",
+                    mesh.normals[i as usize],
+                    i,
+                    mesh.vertices.len()
+                );
+                assert!((mesh.normals[i as usize].norm() - 1.0).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn the_hull_holds_the_patch_closely() {
+        let owner = crate::scene::Scene::default()
+            .add_owner(crate::scene::Owner { name: "@PD".into(), lineage: dlsys_tree::Lineage::of_axiom(0) });
+        let net = raised(|c, r| if c == 1.0 && r == 1.0 { 9.0 } else { 0.0 });
+        let patch = Patch { net, material: MaterialId::LEAF, owner };
+        let highest = patch.hull().map(|p| p.z).fold(0.0, f64::max);
+        let true_height = (0..100)
+            .flat_map(|i| (0..100).map(move |j| (f64::from(i) / 100.0, f64::from(j) / 100.0)))
+            .map(|(u, v)| point(&net, u, v).z)
+            .fold(0.0, f64::max);
+        assert!(highest >= true_height && highest < 1.2 * true_height, "{highest} {true_height}");
+        assert!((patch.length() - 4.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn meshes_are_made_once_and_bounded() {
+        let set = PatchSet::new(vec![PatchFace {
+            net: raised(|c, r| (c * r).sin()),
+            material: MaterialId::LEAF,
+            takes_tint: true,
+        }]);
+        assert!(Arc::ptr_eq(&set.mesh(0.01), &set.mesh(0.011)));
+        assert!(set.mesh(0.0).faces.len() <= 2 * FINEST * FINEST);
+        assert!(set.mesh(f64::INFINITY).faces.len() >= 2);
+        assert!(set.mesh(1e-3).faces.len() > set.mesh(1e-1).faces.len());
+    }
+}

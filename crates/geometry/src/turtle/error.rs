@@ -1,0 +1,217 @@
+//! What can go wrong in drawing, and what is drawn but hardly meant: both with the place in the text.
+//!
+//! A module of the string is drawn by its own name, or as an `interpret` says. The text to look at is in the one case
+//! the production that makes such modules (or the initial string), in the other the line of the `interpret`.
+
+use super::{COORDINATE_LIMIT, DEPTH_LIMIT, MODULE_LIMIT};
+use dlsys_diagnostic::{Diagnostic, Span};
+use dlsys_model::{KindId, Model, Produce, Successor};
+use dlsys_tree::Lineage;
+
+/// Most warnings of one frame.
+const MAX_WARNINGS: usize = 20;
+
+/// What can go wrong.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Fault {
+    #[error("its parameter is {value}")]
+    NotFinite { value: f64 },
+    #[error("it goes beyond the greatest coordinate, {COORDINATE_LIMIT:e}")]
+    TooFar,
+    #[error("its interpretation brings the frame to more than {MODULE_LIMIT} modules")]
+    TooMany,
+    #[error("interpretations are nested more than {DEPTH_LIMIT} deep")]
+    TooDeep,
+    #[error("patch {patch} is not begun; `@PS({patch})` comes before its points")]
+    PatchNotBegun { patch: i64 },
+    #[error("it sets row {row}, column {column} of a patch; both are 0, 1, 2 or 3")]
+    NoControlPoint { row: f64, column: f64 },
+    #[error("patch {patch} has no control point at (row, column) {missing}")]
+    PatchIncomplete { patch: i64, missing: String },
+    #[error("it begins more patches than a frame may have")]
+    TooManyPatches,
+}
+
+impl Fault {
+    fn help(&self) -> String {
+        match self {
+            Fault::NotFinite { .. } => {
+                "look for a division by zero, or a root or logarithm of a negative number, in what it is computed from"
+                    .to_owned()
+            }
+            Fault::TooFar => "look for a length or a size that grows without bound".to_owned(),
+            Fault::TooMany => "draw fewer modules for one, or let the rules make fewer".to_owned(),
+            Fault::TooDeep => {
+                "let the drawing of a module name what is drawn, not another module with a drawing of its own"
+                    .to_owned()
+            }
+            Fault::PatchNotBegun { patch } => format!("write `@PS({patch})` before it in the same string"),
+            Fault::NoControlPoint { .. } => "write `@PC(n, row, column)`, row and column from 0 to 3".to_owned(),
+            Fault::PatchIncomplete { patch, .. } => {
+                format!("set all 16 points with `@PC({patch}, row, column)` before `@PD({patch})`")
+            }
+            Fault::TooManyPatches => {
+                "use the number of a patch again when it is drawn: `@PS(1)` forgets the patch 1 that was there".to_owned()
+            }
+        }
+    }
+}
+
+/// What went wrong, in the drawing of which module.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("cannot draw `{name}` (module {lineage}): {fault}")]
+pub struct Error {
+    pub fault: Fault,
+    /// The module of the string, or the part of its interpretation.
+    pub name: String,
+    /// Of the module of the string.
+    pub lineage: Lineage,
+    /// What the text says of it.
+    pub span: Option<Span>,
+    /// Of the string.
+    pub time: f64,
+}
+
+impl Error {
+    /// The message as it is drawn.
+    pub fn diagnostic(&self) -> Diagnostic {
+        let message = format!("cannot draw `{}` at t = {}: {}", self.name, short(self.time), self.fault);
+        let error = Diagnostic::error(message);
+        let error = match self.span {
+            Some(span) => error.at(span, "drawn by this"),
+            None => error,
+        };
+        error.note(format!("it is drawn for module {}", self.lineage)).help(self.fault.help())
+    }
+}
+
+/// What is drawn, but hardly as it was meant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Remark {
+    NegativeWidth(f64),
+    /// A colour of this number, and how many there are.
+    NoColor(f64, usize),
+    /// A gradient of this number, without a place in it.
+    GradientWithoutPlace(usize),
+    NoContour(f64, usize),
+    /// A polygon with so many vertices.
+    FewVertices(usize),
+    PolygonNotOpen,
+    PolygonNotClosed,
+}
+
+/// The warnings of a frame, each once for each place.
+#[derive(Default)]
+pub(super) struct Remarks(Vec<(std::mem::Discriminant<Remark>, Option<Span>)>);
+
+impl Remarks {
+    /// The warning, unless it has been said.
+    pub(super) fn add(
+        &mut self,
+        remark: Remark,
+        model: &Model,
+        span: Option<Span>,
+        time: f64,
+    ) -> Option<Diagnostic> {
+        let key = (std::mem::discriminant(&remark), span);
+        if self.0.len() >= MAX_WARNINGS || self.0.contains(&key) {
+            return None;
+        }
+        self.0.push(key);
+        Some(warning(remark, model, span, time))
+    }
+}
+
+/// A number as people read it.
+fn short(x: f64) -> f64 {
+    format!("{x:.8e}").parse().unwrap_or(x)
+}
+
+fn warning(remark: Remark, model: &Model, span: Option<Span>, time: f64) -> Diagnostic {
+    let time = short(time);
+    let appearance = &model.appearance;
+    let (message, found, help) = match remark {
+        Remark::NegativeWidth(width) => (
+            "a width is negative".to_owned(),
+            format!("{} at t = {time}, drawn as 0", short(width)),
+            "give a width of 0 or more: `!(max(0, …))` where it may come out negative".to_owned(),
+        ),
+        Remark::NoColor(number, count) => (
+            "there is no such colour".to_owned(),
+            format!("colour {} at t = {time}; beyond the last one they begin again at 1", short(number)),
+            format!("choose a number from 0 to {count}, or declare a colour and write its name: `color rose = \"#e573a5\"`, `;(rose)`"),
+        ),
+        Remark::GradientWithoutPlace(index) => {
+            let name = appearance.gradients.get(index).map_or("leaf", |g| &*g.name);
+            (
+                format!("the gradient `{name}` is used without a place in it"),
+                "drawn in its first colour".to_owned(),
+                format!("write `;({name}, v)`, with v from 0, the first colour, to 1, the last"),
+            )
+        }
+        Remark::NoContour(number, count) => (
+            "there is no such contour".to_owned(),
+            format!("contour {} at t = {time}, drawn as a circle", short(number)),
+            match &appearance.contours[..] {
+                [] => "declare one and write its name: `contour square = (1, 1) (-1, 1) (-1, -1) (1, -1)`, `@C(square)`".to_owned(),
+                [first, ..] => format!("write the name of a contour, such as `@C({})`; the model has {count}, and 0 is a circle", first.name),
+            },
+        ),
+        Remark::FewVertices(count) => (
+            "a polygon has fewer than three vertices, and is not drawn".to_owned(),
+            format!("{count} at t = {time}"),
+            "between `{` and `}` each step `f`, `F` and each `.` makes a vertex: write three or more".to_owned(),
+        ),
+        Remark::PolygonNotOpen => (
+            "a `}` ends no polygon".to_owned(),
+            format!("no polygon is open here at t = {time}"),
+            "write the `{` that begins it, before its first vertex".to_owned(),
+        ),
+        Remark::PolygonNotClosed => (
+            "a `{` is never closed, and its polygon is not drawn".to_owned(),
+            format!("no `}}` follows at t = {time}; what comes behind it makes vertices, and no lines"),
+            "write the `}` that ends it".to_owned(),
+        ),
+    };
+    let warning = Diagnostic::warning(message);
+    let warning = match span {
+        Some(span) => warning.at(span, found),
+        None => warning.note(found),
+    };
+    warning.help(help)
+}
+
+/// Where the text says how a module is drawn: in the `interpret` that is being drawn, in the production that makes such
+/// modules, or in the initial string. Where it cannot be told which module of that it is, the whole; of several productions
+/// the first.
+pub(super) fn place(
+    model: &Model,
+    kind: KindId,
+    lineage: Lineage,
+    inside: Option<(usize, KindId)>,
+) -> Option<Span> {
+    let known = |span: Span| (span != Span::default()).then_some(span);
+    if let Some((index, part)) = inside
+        && let Some(interpretation) = model.interpretations.get(index)
+    {
+        return only_one(&interpretation.drawn, part).or(known(interpretation.span));
+    }
+    let of = |successor: &Successor| successor.place_of(lineage.place()?, kind);
+    if lineage.generation == 0 {
+        return of(&model.axiom).or(known(model.axiom_span));
+    }
+    let productions = model.rules.iter().flat_map(|rule| &rule.produces);
+    let makes = |p: &&Produce| p.outcome.successors.iter().any(|s| s.kinds.contains(&kind));
+    let mut productions = productions.filter(makes);
+    let first = productions.next()?;
+    match (&first.outcome.successors[..], productions.next()) {
+        ([successor], None) => of(successor).or(known(first.span)),
+        _ => known(first.span),
+    }
+}
+
+/// The place of the module of this kind in a drawing that has no other.
+fn only_one(drawn: &Successor, kind: KindId) -> Option<Span> {
+    let (_, span) = drawn.places.iter().find(|(known, _)| *known == kind)?;
+    (drawn.kinds.iter().filter(|known| **known == kind).count() == 1).then_some(*span)
+}

@@ -1,0 +1,122 @@
+//! Interpretations: what is drawn in place of a module.
+//!
+//! The nesting of interpretations is kept on a stack of its own, and their arguments in one array, so that
+//! depth costs memory by the level and nothing by the module.
+
+use super::command::Command;
+use super::prepare::prepare;
+use super::walk::{Source, Walk};
+use super::{DEPTH_LIMIT, Error, Fault, MODULE_LIMIT, Pose};
+use crate::scene::Scene;
+use dlsys_model::{KindId, Model};
+use dlsys_tree::{Module, ModuleString};
+
+/// An interpretation being drawn.
+struct Level<'m> {
+    /// The interpretation.
+    index: usize,
+    /// What is still to be drawn.
+    kinds: std::slice::Iter<'m, KindId>,
+    /// Where in the array of arguments those of this level begin, and those of its next module.
+    first: usize,
+    next: usize,
+}
+
+/// See [`super::trace`].
+pub(super) fn trace(model: &Model, string: &ModuleString, scene: &mut Scene) -> Result<Pose, Error> {
+    let commands = Command::table(model);
+    prepare(model, scene);
+    let mut walk = Walk::new(model, scene, string.time);
+    let mut expander = Expander::new(model, &commands, string);
+    for module in string.iter() {
+        let source = Source { kind: module.kind, lineage: module.lineage };
+        walk.set_source(source);
+        match commands[module.kind.index()] {
+            Command::Interpret(index) => expander.expand(index, module, &mut walk)?,
+            command => walk.obey(command, module.parameters, module.kind)?,
+        }
+    }
+    walk.finish();
+    Ok(walk.pose())
+}
+
+struct Expander<'a> {
+    model: &'a Model,
+    commands: &'a [Command],
+    time: f64,
+    /// Modules of the frame so far, those of the string included.
+    drawn: usize,
+    levels: Vec<Level<'a>>,
+    arguments: Vec<f64>,
+    variables: Vec<f64>,
+    scratch: Vec<f64>,
+    values: Vec<f64>,
+}
+
+impl<'a> Expander<'a> {
+    fn new(model: &'a Model, commands: &'a [Command], string: &ModuleString) -> Expander<'a> {
+        Expander {
+            model,
+            commands,
+            time: string.time,
+            drawn: string.len(),
+            levels: Vec::new(),
+            arguments: Vec::new(),
+            variables: Vec::new(),
+            scratch: Vec::new(),
+            values: Vec::new(),
+        }
+    }
+
+    /// Draws a module's interpretation, and what that is interpreted as in turn.
+    fn expand(&mut self, index: usize, module: Module<'_>, walk: &mut Walk<'_>) -> Result<(), Error> {
+        self.levels.clear();
+        self.arguments.clear();
+        self.variables.clear();
+        self.variables.extend_from_slice(module.parameters);
+        self.enter(index, module.age);
+        while let Some(level) = self.levels.last_mut() {
+            let Some(&kind) = level.kinds.next() else {
+                self.arguments.truncate(level.first);
+                self.levels.pop();
+                continue;
+            };
+            let arity = self.model.kinds.get(kind).arity;
+            walk.inside = Some((level.index, kind));
+            let from = level.next;
+            level.next += arity;
+            self.drawn += 1;
+            if self.drawn > MODULE_LIMIT {
+                return Err(walk.complain(Fault::TooMany));
+            }
+            match self.commands[kind.index()] {
+                Command::Interpret(index) if !self.levels.iter().any(|level| level.index == index) => {
+                    if self.levels.len() >= DEPTH_LIMIT {
+                        return Err(walk.complain(Fault::TooDeep));
+                    }
+                    self.variables.clear();
+                    self.variables.extend_from_slice(&self.arguments[from..from + arity]);
+                    self.enter(index, module.age);
+                }
+                // Inside its own drawing a module is what its name says: `interpret F(x): !(0.1) F(x)`.
+                Command::Interpret(_) => {
+                    let plain = Command::plain(self.model.kinds.get(kind), self.model);
+                    walk.obey(plain, &self.arguments[from..from + arity], kind)?;
+                }
+                command => walk.obey(command, &self.arguments[from..from + arity], kind)?,
+            }
+        }
+        walk.inside = None;
+        Ok(())
+    }
+
+    /// Begins an interpretation; `variables` holds the parameters of the module that it stands for.
+    fn enter(&mut self, index: usize, age: f64) {
+        let drawn = &self.model.interpretations[index].drawn;
+        self.variables.extend([self.time, age]);
+        drawn.evaluate(&self.variables, &mut self.scratch, &mut self.values);
+        let first = self.arguments.len();
+        self.arguments.extend_from_slice(&self.values);
+        self.levels.push(Level { index, kinds: drawn.kinds.iter(), first, next: first });
+    }
+}

@@ -1,0 +1,107 @@
+//! From a string of modules to a scene: the turtle (Prusinkiewicz and Lindenmayer 1990, *The Algorithmic
+//! Beauty of Plants*, sections 1.5 to 1.6, "ABOP").
+//!
+//! The turtle starts at the origin, heading `+Y`, left `-X`, up `+Z`, so that a plant grows upwards in the
+//! front view and `+` turns left on the screen. A module is drawn by the base name of its kind and reads its
+//! leading parameters; one without a meaning draws nothing. Lengths are in scene units, angles in degrees.
+//!
+//! | module | meaning |
+//! |---|---|
+//! | `F(l)` `f(l)` | a step of length `l` (1), drawn or not; a negative length goes backwards |
+//! | `g(l)` | a step, not drawn and making no vertex of a polygon |
+//! | `+(a)` `-(a)` | turn left, right about up (the model's `angle`) |
+//! | `&(a)` `^(a)` | pitch down, up about left |
+//! | `\(a)` `/(a)` | roll left, right about heading |
+//! | `\|` `$` | turn round; roll until left is horizontal |
+//! | `!(w)` `!` | line width, 0 drawing nothing; 0.7 times the present one. A segment has the width at its start all along, so cutting it in two cannot be seen |
+//! | `@W(w)` | the same width as `!(w)`, and what was drawn on this axis since the width was last set tapers to it, evenly over its length |
+//! | `;(n)` `;` | colour `n` of the palette, 0 being the natural one; the next colour |
+//! | `;(n, v)` | colour at place `v` (0 to 1) of gradient `n` |
+//! | `@T(e)` | strength of the tropism from here on, in radians per scene unit: headings bend towards its direction (down, if the model declares none), see `bend.rs` |
+//! | `@C(n)` | cross-section of stems from here on: a contour that the model declares, 0 being a circle. Meshes only |
+//! | `[` `]` | remember and return to position, orientation, width, colour, cross-section and strength of tropism |
+//! | `{` `.` `}` | begin a filled polygon, make the position a vertex, end it; steps between them make vertices, too, and are not drawn |
+//! | `@L(s)` `@K(s)` `@P(s)` `@B(s)` | a leaf, a flower, a petal, a bud of size `s` (1), or any surface that the model declares; nothing if `s` is not positive |
+//! | `@PS(n)` `@PC(n, r, c)` `@PD(n)` | begin Bézier patch `n`; make the position its control point in row `r` and column `c` (0 to 3); draw it, when all 16 are there. Brackets do not matter to them |
+//!
+//! A kind with an interpretation is drawn as that says, in place of its own meaning; what the interpretation
+//! does to the turtle stays.
+//!
+//! # Examples
+//!
+//! ```
+//! use dlsys_session::Session;
+//!
+//! let session = Session::from_text("hook.dls", "initial string: F(3) +(90) F(4) @C(7) F(1)", &[]).unwrap();
+//! let mut string = Default::default();
+//! session.simulate(Default::default()).unwrap().at(0.0, &mut string).expect("it runs");
+//! let mut scene = dlsys_geometry::turtle::blank(&session.model);
+//! let end = dlsys_geometry::turtle::trace(&session.model, &string, &mut scene).expect("it can be drawn").position;
+//! assert!((end.x + 5.0).abs() < 1e-12 && (end.y - 3.0).abs() < 1e-12);
+//! // Nothing is called contour 7: it is drawn as a circle, and said.
+//! assert_eq!(scene.warnings[0].message, "there is no such contour");
+//! ```
+
+mod bend;
+mod command;
+mod error;
+mod frame;
+mod interpret;
+mod patch;
+mod prepare;
+mod shapes;
+mod twofold;
+mod walk;
+
+#[cfg(test)]
+mod organ_tests;
+#[cfg(test)]
+mod tests;
+
+use crate::scene::{Point, Scene, Vector};
+use dlsys_model::Model;
+use dlsys_tree::ModuleString;
+pub use error::{Error, Fault};
+
+/// Most modules that one frame may draw, those that interpretations make included.
+pub const MODULE_LIMIT: usize = 10_000_000;
+/// Deepest nesting of interpretations.
+pub const DEPTH_LIMIT: usize = 100;
+/// Coordinates and sizes beyond this are a mistake of the model.
+pub const COORDINATE_LIMIT: f64 = 1e100;
+/// Lengths, widths and sizes below this are none: the squares of areas could not be told from zero any more, and a
+/// direction is a quotient of such.
+pub const SMALLEST_LENGTH: f64 = 1e-80;
+
+/// Where a turtle stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    pub position: Point,
+    /// Heading, left and up: unit vectors.
+    pub axes: [Vector; 3],
+}
+
+/// An empty scene with the model's colours and surfaces, which are then not made again for every scene that is
+/// cloned from it.
+pub fn blank(model: &Model) -> Scene {
+    let mut scene = Scene::default();
+    prepare::prepare(model, &mut scene);
+    scene
+}
+
+/// Draws a string of modules of this model, adding to the scene. What is drawn but hardly meant goes to its
+/// [`warnings`](Scene::warnings).
+///
+/// # Errors
+/// See [`Error`]. The scene then holds what was drawn before.
+pub fn draw(model: &Model, string: &ModuleString, scene: &mut Scene) -> Result<(), Error> {
+    trace(model, string, scene).map(|_| ())
+}
+
+/// Draws, and tells where the turtle comes to stand.
+///
+/// # Errors
+/// As of [`draw`].
+pub fn trace(model: &Model, string: &ModuleString, scene: &mut Scene) -> Result<Pose, Error> {
+    interpret::trace(model, string, scene)
+}

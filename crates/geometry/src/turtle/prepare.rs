@@ -1,0 +1,49 @@
+//! What a model says about looks, as materials and meshes: made once, and kept in the scene from frame to
+//! frame.
+
+use std::sync::Arc;
+
+use crate::scene::{Color, MaterialId, Mesh, Palette, PatchFace, Point, Scene, Shape, Vector};
+use dlsys_model::{Appearance, Model, Rgb, SurfaceShape};
+
+/// Gives the scene the model's colours and surfaces, unless it has them.
+pub(super) fn prepare(model: &Model, scene: &mut Scene) {
+    let appearance = &model.appearance;
+    if scene.prepared_for.as_ref().is_some_and(|known| Arc::ptr_eq(known, appearance)) {
+        return;
+    }
+    let mut palette = palette(appearance);
+    scene.shapes = appearance.surfaces.iter().map(|surface| shape(surface, &mut palette)).collect();
+    scene.palette = palette;
+    scene.prepared_for = Some(appearance.clone());
+}
+
+fn palette(appearance: &Appearance) -> Palette {
+    let color = |rgb: &Rgb| Color::hex(*rgb);
+    Palette::with(
+        appearance.colors.iter().map(|c| (&*c.name, color(&c.rgb))),
+        appearance.gradients.iter().map(|g| (&*g.name, g.stops.iter().map(color).collect())),
+    )
+}
+
+/// Surfaces from files are in the colours that they bring with them, or in that of leaves, unless another is chosen.
+fn shape(surface: &SurfaceShape, palette: &mut Palette) -> Shape {
+    let point = |p: &[f64; 3]| Point::new(p[0], p[1], p[2]);
+    if surface.patches.is_empty() {
+        let vertices = surface.vertices.iter().map(point).collect();
+        let normals: Vec<Vector> = surface.normals.iter().map(|n| point(n).coords).collect();
+        let own: Vec<MaterialId> =
+            surface.materials.iter().map(|m| palette.add(&m.name, Color::hex(m.rgb))).collect();
+        let painted = |i: usize| surface.painted.get(i).copied().flatten();
+        let material = |i: usize| painted(i).and_then(|n| own.get(n as usize)).copied();
+        let triangles = (surface.triangles.iter().enumerate())
+            .map(|(i, corners)| (*corners, material(i).unwrap_or(MaterialId::LEAF)));
+        return Shape::of_mesh(Mesh::of_triangles(vertices, &normals, triangles));
+    }
+    let face = |net: &[[f64; 3]; 16]| PatchFace {
+        net: [0, 4, 8, 12].map(|row| [0, 1, 2, 3].map(|column| point(&net[row + column]))),
+        material: MaterialId::LEAF,
+        takes_tint: true,
+    };
+    Shape::of_patches(surface.patches.iter().map(face).collect())
+}

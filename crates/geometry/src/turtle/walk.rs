@@ -1,0 +1,445 @@
+//! The turtle itself: its state, and what each command does to it and to the scene.
+
+use std::sync::Arc;
+
+use super::bend::Bend;
+use super::command::Command;
+use super::error::{self, Error, Fault, Remark, Remarks};
+use super::frame::{Axis, Frame};
+use super::patch::OpenPatches;
+use super::{COORDINATE_LIMIT, Pose, SMALLEST_LENGTH, shapes};
+use crate::scene::{
+    MaterialId, Owner, OwnerId, Patch, Placement, Point, Polygon, Scene, Segment, Shape, Surface, Vector,
+    Width,
+};
+use dlsys_diagnostic::Span;
+use dlsys_model::{KindId, Model};
+use dlsys_tree::Lineage;
+
+/// What `!` without a parameter multiplies the width by.
+const THINNING: f64 = 0.7;
+
+/// The module of the string that is being drawn.
+#[derive(Clone, Copy)]
+pub(super) struct Source {
+    pub(super) kind: KindId,
+    pub(super) lineage: Lineage,
+}
+
+/// What brackets remember.
+#[derive(Clone)]
+struct State {
+    position: Point,
+    /// What rounding has kept out of `position`: a million small steps should end where one large step does.
+    remainder: Vector,
+    frame: Frame,
+    width: Width,
+    /// Number of the colour, 0 being the natural one, and its place in a gradient.
+    color: (f64, f64),
+    /// Index of the cross-section of stems; `None` is a circle.
+    contour: Option<u32>,
+    /// Strength of the tropism.
+    strength: f64,
+    /// The last segment on this axis, if the turtle still stands at its end.
+    last: Option<usize>,
+    /// How many segments, the last one and those before it, were drawn since the width was set.
+    run: usize,
+}
+
+/// A polygon that is open.
+struct Outline {
+    vertices: Vec<Point>,
+    /// How many were made, those in one place with the one before included.
+    made: usize,
+    /// The interpretation and the module that began it.
+    begun: (Option<(usize, KindId)>, Source),
+}
+
+/// A turtle that walks through a string and draws into a scene.
+pub(super) struct Walk<'a> {
+    model: &'a Model,
+    scene: &'a mut Scene,
+    state: State,
+    stack: Vec<State>,
+    /// The polygons that are open, innermost last.
+    polygons: Vec<Outline>,
+    patches: OpenPatches,
+    /// Direction of the tropism.
+    target: Vector,
+    source: Source,
+    /// The source as an owner, once it has drawn something.
+    owner: Option<OwnerId>,
+    /// Names of the kinds that have drawn something, shared among their modules.
+    names: Vec<Option<Arc<str>>>,
+    /// The interpretation that is being drawn, and the kind of the part of it.
+    pub(super) inside: Option<(usize, KindId)>,
+    time: f64,
+    remarks: Remarks,
+}
+
+impl<'a> Walk<'a> {
+    pub(super) fn new(model: &'a Model, scene: &'a mut Scene, time: f64) -> Walk<'a> {
+        let tropism = model.appearance.tropism;
+        Walk {
+            model,
+            scene,
+            state: State {
+                position: Point::origin(),
+                remainder: Vector::zeros(),
+                frame: Frame::upright(),
+                width: Width::Default(1.0),
+                color: (0.0, 0.0),
+                contour: None,
+                strength: tropism.map_or(0.0, |tropism| tropism.strength),
+                last: None,
+                run: 0,
+            },
+            stack: Vec::new(),
+            polygons: Vec::new(),
+            patches: OpenPatches::default(),
+            // Without a declaration, gravity.
+            target: tropism.map_or(-Vector::y(), |tropism| Vector::from(tropism.direction)),
+            // Replaced before the first command.
+            source: Source { kind: KindId::OPEN, lineage: Lineage::of_axiom(0) },
+            owner: None,
+            names: vec![None; model.kinds.len()],
+            inside: None,
+            time,
+            remarks: Remarks::default(),
+        }
+    }
+
+    pub(super) fn pose(&self) -> Pose {
+        Pose { position: self.state.position, axes: self.state.frame.vectors() }
+    }
+
+    /// Says on whose behalf the next commands are.
+    pub(super) fn set_source(&mut self, source: Source) {
+        self.source = source;
+        self.owner = None;
+    }
+
+    /// An error about the present source.
+    pub(super) fn complain(&self, fault: Fault) -> Error {
+        let Source { kind, lineage } = self.source;
+        let name = self.model.kinds.get(kind).name.clone();
+        Error { fault, name, lineage, span: self.written(), time: self.time }
+    }
+
+    /// A warning about the present source.
+    fn remark(&mut self, remark: Remark) {
+        let span = self.written();
+        self.scene.warnings.extend(self.remarks.add(remark, self.model, span, self.time));
+    }
+
+    /// Where the text says how the present source is drawn.
+    fn written(&self) -> Option<Span> {
+        error::place(self.model, self.source.kind, self.source.lineage, self.inside)
+    }
+
+    /// The string is at its end.
+    pub(super) fn finish(&mut self) {
+        if let Some(open) = self.polygons.pop() {
+            (self.inside, self.source) = open.begun;
+            self.remark(Remark::PolygonNotClosed);
+        }
+    }
+
+    /// Does what a module of this kind says.
+    pub(super) fn obey(&mut self, command: Command, parameters: &[f64], kind: KindId) -> Result<(), Error> {
+        let read = &parameters[..parameters.len().min(command.parameters())];
+        if let Some(&value) = read.iter().find(|value| !value.is_finite()) {
+            let name = self.model.kinds.get(kind).name.clone();
+            return Err(Error { name, ..self.complain(Fault::NotFinite { value }) });
+        }
+        let given = read.first().copied();
+        match command {
+            Command::Nothing | Command::Interpret(_) => {}
+            Command::Draw => self.step(given.unwrap_or(1.0), true)?,
+            Command::Move => self.step(given.unwrap_or(1.0), false)?,
+            Command::Hop => {
+                // What is open waits, so that no vertex is recorded.
+                let open = std::mem::take(&mut self.polygons);
+                let done = self.step(given.unwrap_or(1.0), false);
+                self.polygons = open;
+                done?;
+            }
+            Command::Turn(axis, sign) => {
+                self.state.frame.turn(axis, sign * given.unwrap_or(self.model.angle))
+            }
+            Command::TurnBack => self.state.frame.turn(Axis::Up, 180.0),
+            Command::Level => self.state.frame.level(),
+            Command::Width => {
+                self.check_width(given);
+                self.state.width = match given {
+                    Some(width) => Width::Set(self.in_range(width.max(0.0))?),
+                    // Thinner and thinner, without end, is nothing at last.
+                    None => match self.state.width.scaled(THINNING) {
+                        Width::Set(width) => Width::Set(self.in_range(width)?),
+                        Width::Default(factor) => Width::Default(self.in_range(factor)?),
+                    },
+                };
+                self.state.run = 0;
+            }
+            Command::Taper => {
+                self.check_width(given);
+                let width = Width::Set(self.in_range(given.unwrap_or(0.0).max(0.0))?);
+                self.taper(width);
+                self.state.width = width;
+                self.state.run = 0;
+            }
+            Command::Bend => self.state.strength = self.in_range(given.unwrap_or(0.0))?,
+            Command::Contour => {
+                // 0, and what is no contour, is a circle.
+                let number = given.unwrap_or(0.0).round();
+                let count = self.model.appearance.contours.len();
+                if number != 0.0 && !(1.0..=count as f64).contains(&number) {
+                    self.remark(Remark::NoContour(number, count));
+                }
+                self.state.contour = (1.0..=count as f64).contains(&number).then(|| number as u32 - 1);
+            }
+            Command::Color => {
+                if let Some(number) = given {
+                    self.check_color(number.round(), read.len() > 1);
+                }
+                self.state.color = match given {
+                    Some(number) => (number, read.get(1).copied().unwrap_or(0.0)),
+                    None => (self.state.color.0 + 1.0, 0.0),
+                }
+            }
+            Command::Push => {
+                self.stack.push(self.state.clone());
+                self.state.last = None;
+                self.state.run = 0;
+            }
+            Command::Pop => {
+                // Brackets match, by the rules of the language; a stray one changes nothing.
+                if let Some(state) = self.stack.pop() {
+                    self.state = state;
+                }
+            }
+            Command::BeginPolygon => {
+                let begun = (self.inside, self.source);
+                self.polygons.push(Outline { vertices: Vec::new(), made: 0, begun });
+            }
+            Command::Vertex => self.record_vertex(),
+            Command::EndPolygon => self.end_polygon(),
+            Command::Leaf => self.place(&shapes::LEAF, given)?,
+            Command::Flower => self.place(&shapes::FLOWER, given)?,
+            Command::Petal => self.place(&shapes::PETAL, given)?,
+            Command::Bud => self.place(&shapes::BUD, given)?,
+            Command::Surface(index) => {
+                if let Some(shape) = self.scene.shapes.get(index).cloned() {
+                    self.place(&shape, given)?;
+                }
+            }
+            Command::BeginPatch | Command::ControlPoint | Command::DrawPatch => self.patch(command, read)?,
+        }
+        Ok(())
+    }
+
+    /// Begins a patch, sets a point of it, or draws it.
+    fn patch(&mut self, command: Command, parameters: &[f64]) -> Result<(), Error> {
+        let given = |i: usize| parameters.get(i).copied().unwrap_or(0.0);
+        match command {
+            Command::BeginPatch => self.patches.begin(given(0)).map_err(|fault| self.complain(fault))?,
+            Command::ControlPoint => {
+                let set = self.patches.set([0, 1, 2].map(given), self.state.position);
+                set.map_err(|fault| self.complain(fault))?;
+            }
+            _ => {
+                let net = self.patches.net(given(0)).map_err(|fault| self.complain(fault))?;
+                let material = self.chosen().unwrap_or(MaterialId::PETAL);
+                let owner = self.owner();
+                // All in one place there is nothing to see, as at the birth of an organ.
+                if net.iter().flatten().any(|p| *p != net[0][0]) {
+                    self.scene.patches.push(Patch { net, material, owner });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// A length, or another measure, as it is drawn: what is too small to be told from nothing is nothing.
+    fn in_range(&self, x: f64) -> Result<f64, Error> {
+        if x.abs() < SMALLEST_LENGTH {
+            return Ok(0.0);
+        }
+        if x.abs() <= COORDINATE_LIMIT { Ok(x) } else { Err(self.complain(Fault::TooFar)) }
+    }
+
+    /// A step along the heading, drawn if `draw` and if no polygon is open; along an arc where there is a
+    /// tropism.
+    fn step(&mut self, length: f64, draw: bool) -> Result<(), Error> {
+        let [heading, left, _] = self.state.frame.vectors();
+        let length = self.in_range(length)?;
+        let bend = Bend::new(heading, self.target, self.state.strength).filter(|_| length != 0.0);
+        if let Some(bend) = bend {
+            let pieces = bend.pieces(length, self.scene.accuracy);
+            let mut before = Vector::zeros();
+            for i in 1..=pieces {
+                let displacement = bend.displacement(length * i as f64 / pieces as f64);
+                let way = displacement - before;
+                before = displacement;
+                if let Some(direction) = way.try_normalize(0.0) {
+                    self.go(way, direction, left, draw)?;
+                }
+                self.record_vertex();
+            }
+            self.state.frame.bend(bend.towards(), bend.turn(length));
+            return Ok(());
+        }
+        if length != 0.0 {
+            self.go(heading * length, heading * length.signum(), left, draw)?;
+        }
+        self.record_vertex();
+        Ok(())
+    }
+
+    /// Goes a straight way, given with its direction, and draws it as a segment if asked to.
+    fn go(&mut self, way: Vector, direction: Vector, across: Vector, draw: bool) -> Result<(), Error> {
+        let start = self.state.position;
+        self.advance(way)?;
+        let end = self.state.position;
+        if end == start {
+            return Ok(());
+        }
+        let follows = self.state.last.take();
+        if draw && self.polygons.is_empty() {
+            let segment = Segment {
+                start,
+                end,
+                direction,
+                across,
+                widths: [self.state.width; 2],
+                contour: self.state.contour,
+                material: self.chosen().unwrap_or(MaterialId::STEM),
+                owner: self.owner(),
+                follows,
+            };
+            self.state.run = if follows.is_some() { self.state.run + 1 } else { 1 };
+            self.state.last = Some(self.scene.segments.len());
+            self.scene.segments.push(segment);
+        }
+        Ok(())
+    }
+
+    /// Lets the segments drawn since the last width run evenly from that width to this one. A width that
+    /// nobody has set is not known before the whole animation is, and stays.
+    fn taper(&mut self, to: Width) {
+        let (Width::Set(from), Width::Set(to)) = (self.state.width, to) else { return };
+        let chain = |scene: &Scene, last: Option<usize>| {
+            let mut next = last;
+            let mut found = Vec::new();
+            for _ in 0..self.state.run {
+                let Some(i) = next else { break };
+                found.push((i, (scene.segments[i].end - scene.segments[i].start).norm()));
+                next = scene.segments[i].follows;
+            }
+            found
+        };
+        let run = chain(self.scene, self.state.last);
+        let whole: f64 = run.iter().map(|(_, length)| length).sum();
+        let mut rest = 0.0;
+        for (i, length) in run {
+            let width = |behind: f64| Width::Set(to + (from - to) * (behind / whole).min(1.0));
+            self.scene.segments[i].widths = [width(rest + length), width(rest)];
+            rest += length;
+        }
+    }
+
+    /// Moves, with compensated summation (Neumaier 1974).
+    fn advance(&mut self, by: Vector) -> Result<(), Error> {
+        // A direction that is nearly an axis has parts far shorter than the whole.
+        let by = by.map(|x| if x.abs() < SMALLEST_LENGTH { 0.0 } else { x });
+        for i in 0..3 {
+            let (old, step) = (self.state.position[i], by[i] + self.state.remainder[i]);
+            let new = old + step;
+            self.in_range(new)?;
+            self.state.remainder[i] =
+                if old.abs() >= step.abs() { (old - new) + step } else { (step - new) + old };
+            self.state.position[i] = new;
+        }
+        Ok(())
+    }
+
+    fn record_vertex(&mut self) {
+        if let Some(open) = self.polygons.last_mut() {
+            open.made += 1;
+            if open.vertices.last() != Some(&self.state.position) {
+                open.vertices.push(self.state.position);
+            }
+        }
+    }
+
+    fn check_width(&mut self, given: Option<f64>) {
+        /// What is nearer to 0 is the rounding of something that is 0.
+        const ROUNDING: f64 = -1e-9;
+        if let Some(width) = given.filter(|w| *w < ROUNDING) {
+            self.remark(Remark::NegativeWidth(width));
+        }
+    }
+
+    /// Looks at the number of a colour that was given, with or without a place in a gradient.
+    fn check_color(&mut self, number: f64, has_place: bool) {
+        let [colors, gradients] = self.scene.palette.counts();
+        let count = colors + gradients;
+        if !(0.0..=count as f64).contains(&number) {
+            self.remark(Remark::NoColor(number, count));
+        } else if !has_place && number > colors as f64 {
+            self.remark(Remark::GradientWithoutPlace(number as usize - colors - 1));
+        }
+    }
+
+    fn end_polygon(&mut self) {
+        let Some(Outline { mut vertices, made, .. }) = self.polygons.pop() else {
+            return self.remark(Remark::PolygonNotOpen);
+        };
+        // One that has yet to grow has all its vertices in one place.
+        if made < 3 {
+            self.remark(Remark::FewVertices(made));
+        }
+        while vertices.len() > 1 && vertices.first() == vertices.last() {
+            vertices.pop();
+        }
+        let distinct = |p: &Point, among: &[Point]| among.iter().all(|q| p != q);
+        let different =
+            (0..vertices.len()).filter(|&i| distinct(&vertices[i], &vertices[..i])).take(3).count();
+        if different == 3 {
+            let material = self.chosen().unwrap_or(MaterialId::LEAF);
+            let owner = self.owner();
+            self.scene.polygons.push(Polygon { vertices, material, owner });
+        }
+    }
+
+    /// Puts a surface of this size (1) at the turtle's position.
+    fn place(&mut self, shape: &Shape, scale: Option<f64>) -> Result<(), Error> {
+        let scale = self.in_range(scale.unwrap_or(1.0))?;
+        if scale > 0.0 {
+            let placement =
+                Placement { origin: self.state.position, axes: self.state.frame.vectors(), scale };
+            let (tint, owner) = (self.chosen(), self.owner());
+            let Shape { mesh, patches } = shape.clone();
+            self.scene.surfaces.push(Surface { mesh, patches, placement, tint, owner });
+        }
+        Ok(())
+    }
+
+    /// The material of the chosen colour; `None` if things keep their own.
+    fn chosen(&self) -> Option<MaterialId> {
+        let (number, value) = self.state.color;
+        self.scene.palette.chosen(number, value)
+    }
+
+    /// The present source as an owner.
+    fn owner(&mut self) -> OwnerId {
+        if let Some(owner) = self.owner {
+            return owner;
+        }
+        let Source { kind, lineage } = self.source;
+        let kinds = &self.model.kinds;
+        let name =
+            self.names[kind.index()].get_or_insert_with(|| kinds.get(kind).name.as_str().into()).clone();
+        *self.owner.insert(self.scene.add_owner(Owner { name, lineage }))
+    }
+}

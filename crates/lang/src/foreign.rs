@@ -1,0 +1,200 @@
+//! Words of cpfg and L-Py, which people bring along, and what stands for them here.
+//!
+//! None of them is reserved: what they mean elsewhere is only said where a text cannot be read, or where nothing has
+//! such a name.
+
+use dlsys_diagnostic::{Diagnostic, Span};
+
+/// Where the book says more.
+const PAGE: &str = "the book has a page for this: “Coming from cpfg or L-Py”, docs/src/moving.md";
+
+/// Beginnings of lines, as words and signs, and what to do.
+const LINES: [(&[&str], &str); 21] = [
+    (&["lsystem", ":"], "remove this line: a file is one model, from its first line to its last"),
+    (&["endlsystem"], "remove this line: a model ends with its file"),
+    (&["axiom", ":"], "small letters: `axiom: …`, or `initial string: …`"),
+    (&["derivation", "length"], STEPS),
+    (&["production", ":"], RULES),
+    (&["productions", ":"], RULES),
+    (
+        &["group"],
+        "rules do not come in groups: what is to change in time is a parameter, or a condition on `t`",
+    ),
+    (
+        &["module"],
+        "remove this line: modules are not declared; the head of a rule names its parameters: `A(x): …`",
+    ),
+    (&["homomorphism"], DRAWINGS),
+    (&["interpretation"], DRAWINGS),
+    (&["endhomomorphism"], "remove this line: each drawing is a line of its own"),
+    (&["endinterpretation"], "remove this line: each drawing is a line of its own"),
+    (&["decomposition"], PARTS),
+    (&["enddecomposition"], "remove this line: what falls into parts has rules like others"),
+    (&["maximum", "depth"], "remove this line: drawings may be nested 100 deep"),
+    (&["seed", ":"], "the seed is no part of the model: `dlsys run MODEL --seed N`"),
+    (
+        &["import"],
+        "a model is no program: functions are declared with `def`, other texts are taken in by `include \"FILE\"`",
+    ),
+    (
+        &["from"],
+        "a model is no program: functions are declared with `def`, other texts are taken in by `include \"FILE\"`",
+    ),
+    (
+        &["for"],
+        "a model is no program: what is to happen again and again are productions: `A(n): if age = 1 & n > 0 produce F(1) A(n - 1)`",
+    ),
+    (
+        &["while"],
+        "a model is no program: what is to happen again and again are productions: `A(n): if age = 1 & n > 0 produce F(1) A(n - 1)`",
+    ),
+    (&["return"], "a model is no program: a function is one expression: `def f(x) = x^2`"),
+];
+
+const STEPS: &str = "there are no derivation steps; write the times to look at: `frames 0 .. N step 1`. Discrete rules apply at t = 1, 2, …";
+const RULES: &str = "remove this line: rules stand among declarations, `A(x): if x = 1 produce F(x) A(0)`, or discrete `A(x) : x > 3 -> F(x) A(0)`";
+const DRAWINGS: &str = "remove this line: each drawing is a line of its own, `interpret A(x): F(x)`";
+const PARTS: &str = "remove this line: what falls into parts at once has a rule, `A(x): produce F(x) B(x)`";
+
+/// What is said of a line that begins with such words, and stands at this place of the text.
+pub fn line(line: &str, at: usize) -> Option<Diagnostic> {
+    let words = beginning(line);
+    // Alone, the words may be names of modules: then something follows that goes with these.
+    let follows =
+        |n: usize| words.get(n).is_none_or(|(w, _)| w.starts_with(|c: char| c == ':' || c.is_alphanumeric()));
+    let (known, help) = LINES.iter().find(|(known, _)| {
+        known.len() <= words.len()
+            && known.iter().zip(&words).all(|(k, (w, _))| w.eq_ignore_ascii_case(k))
+            && (known.len() > 1 || follows(1))
+    })?;
+    let of_words = known.iter().filter(|word| **word != ":").count();
+    let end = words[of_words - 1].1;
+    let number = line.rsplit(':').next().unwrap_or_default().trim().parse::<u32>();
+    let help = match number {
+        Ok(n) => help.replace("0 .. N", &format!("0 .. {n}")).replace("--seed N", &format!("--seed {n}")),
+        Err(_) => (*help).to_owned(),
+    };
+    Some(
+        Diagnostic::error(format!("`{}` means nothing here", &line[..end]))
+            .at(Span::new(at, at + end), "a word of cpfg or L-Py, or of Python")
+            .note(PAGE)
+            .help(help),
+    )
+}
+
+/// The first two words or signs of a line, and where each ends.
+fn beginning(line: &str) -> Vec<(&str, usize)> {
+    let in_word = |c: char| c.is_alphanumeric() || c == '_';
+    let mut found = Vec::new();
+    let mut at = 0;
+    while found.len() < 2 {
+        at += line[at..].len() - line[at..].trim_start().len();
+        let rest = &line[at..];
+        let Some(first) = rest.chars().next() else { break };
+        let length =
+            if in_word(first) { rest.find(|c| !in_word(c)).unwrap_or(rest.len()) } else { first.len_utf8() };
+        at += length;
+        found.push((&rest[..length], at));
+    }
+    found
+}
+
+/// Whether such a word stands on a line alone, where it could be a module.
+pub fn stands_alone(word: &str) -> bool {
+    [
+        "endlsystem",
+        "homomorphism",
+        "endhomomorphism",
+        "endinterpretation",
+        "decomposition",
+        "enddecomposition",
+    ]
+    .contains(&word)
+}
+
+/// What is written for the call of a function that other programs have, given the texts of its arguments.
+pub fn function(name: &str, arguments: &[String]) -> Option<String> {
+    let argument =
+        |i: usize, otherwise: &str| arguments.get(i).cloned().unwrap_or_else(|| otherwise.to_owned());
+    let both = || format!("{}, {}", argument(0, "a"), argument(1, "b"));
+    let call = match name {
+        "pow" | "power" => {
+            let simple = |text: &str| text.chars().all(|c| c.is_alphanumeric() || matches!(c, '_' | '.'));
+            let group = |text: String| if simple(&text) { text } else { format!("({text})") };
+            return Some(format!(
+                "a power is written `{}^{}`",
+                group(argument(0, "x")),
+                group(argument(1, "n"))
+            ));
+        }
+        "ran" => format!("uniform(0, {})", argument(0, "1")),
+        "random" | "rand" => "uniform(0, 1)".to_owned(),
+        "nran" | "gauss" | "normalvariate" => {
+            format!("normal({}, {})", argument(0, "mean"), argument(1, "deviation"))
+        }
+        "randint" | "randrange" => format!("integer({})", both()),
+        "expovariate" => format!("exponential({})", argument(0, "rate")),
+        "srand" | "seed" => {
+            return Some("the seed is no part of the model: `dlsys run MODEL --seed N`".to_owned());
+        }
+        "trunc" | "int" => format!("floor({})", argument(0, "x")),
+        "fabs" => format!("abs({})", argument(0, "x")),
+        _ => return None,
+    };
+    Some(format!("write `{call}`"))
+}
+
+/// What lines of a text such as `#define K 0.5` would define if they were no comments: names, and the meanings.
+pub fn commented_definitions(text: &str) -> impl Iterator<Item = (&str, &str)> {
+    text.lines().filter_map(|line| {
+        let rest = line.trim_start().strip_prefix("#define")?.trim_start_matches([' ', '\t']);
+        let end = rest.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(rest.len());
+        (end > 0).then(|| (&rest[..end], rest[end..].trim()))
+    })
+}
+
+/// Of a name that such a line was to define.
+pub fn of_definition(name: &str, meaning: &str) -> String {
+    match meaning.strip_prefix('(').and_then(|rest| rest.split_once(')')) {
+        // `#define F(x) …`, and not `#define K (2*L)`.
+        Some((formals, body)) if !body.trim().is_empty() => {
+            format!("`#define …` is a comment: write `def {name}({formals}) = {}`", body.trim())
+        }
+        _ if meaning.is_empty() => format!("`#define …` is a comment: write `const {name} = …`"),
+        _ => format!("`#define …` is a comment: write `const {name} = {meaning}`"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_of_other_programs_are_known_and_heads_of_rules_are_not() {
+        let said = |text: &str| line(text, 0).map(|d| d.help.concat());
+        assert!(said("derivation length: 5").is_some_and(|help| help.contains("`frames 0 .. 5 step 1`")));
+        assert!(said("Lsystem: 1").is_some() && said("production:").is_some());
+        assert!(said("production(x): solve dx/dt = 1").is_none());
+        assert!(said("seedling: F").is_none() && said("").is_none());
+    }
+
+    #[test]
+    fn calls_are_translated_with_their_arguments() {
+        let call = |name, arguments: &[&str]| {
+            function(name, &arguments.iter().map(|a| a.to_string()).collect::<Vec<_>>()).unwrap()
+        };
+        assert_eq!(call("pow", &["x + 1", "2"]), "a power is written `(x + 1)^2`");
+        assert_eq!(call("ran", &["10"]), "write `uniform(0, 10)`");
+        assert_eq!(call("nran", &[]), "write `normal(mean, deviation)`");
+        assert!(function("sin", &[]).is_none());
+    }
+
+    #[test]
+    fn definitions_of_the_preprocessor_are_found() {
+        let text = "# define a thing\n#define K 0.5\n#define G(x) x*K\n#define\n";
+        let found: Vec<_> = commented_definitions(text).collect();
+        assert_eq!(found, [("K", "0.5"), ("G", "(x) x*K")]);
+        assert!(of_definition("G", "(x) x*K").ends_with("`def G(x) = x*K`"));
+        assert!(of_definition("L", "(2*K)").ends_with("`const L = (2*K)`"));
+    }
+}

@@ -1,0 +1,159 @@
+//! A text as lines of pieces: tokens as the grammar sees them, so that nothing is put between what belongs together.
+
+use crate::layout::{ItemKind, RawItem, lexemes};
+use crate::lexeme::{Lexeme, Token};
+
+/// Symbols of several characters.
+const LONG: [&str; 9] = ["-->", "->", "<=", ">=", "!=", "..", "==", "&&", "||"];
+
+/// A token of the grammar.
+#[derive(Clone, Copy, Debug)]
+pub struct Piece<'t> {
+    pub text: &'t str,
+    pub token: Token,
+    /// Characters before it on its line.
+    pub column: usize,
+    /// It follows the piece before it without a space.
+    pub touches: bool,
+    /// In a string of modules, in a list of names or in a rule's head, outside parentheses: the writer groups.
+    pub grouped: bool,
+    /// See [`Lexeme`].
+    pub in_string: bool,
+    pub after_operand: bool,
+    pub operator: bool,
+    pub depth: usize,
+    pub kind: ItemKind,
+    pub place: Place,
+    /// A number that multiplies what stands directly behind it.
+    pub factor: bool,
+}
+
+/// Where in a declaration or rule a piece stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// The first.
+    Start,
+    /// Before the colon, or in a declaration that has none.
+    Head,
+    /// The colon.
+    Colon,
+    Body,
+}
+
+/// A line of the text.
+#[derive(Clone, Debug)]
+pub struct Line<'t> {
+    pub pieces: Vec<Piece<'t>>,
+    /// With its `#`, without spaces behind.
+    pub comment: Option<&'t str>,
+    /// Characters before the comment.
+    pub comment_column: usize,
+    /// Its end ends an expression.
+    pub ends: bool,
+}
+
+/// The lines of a text.
+pub fn lines(text: &str) -> Vec<Line<'_>> {
+    let (layout, lexemes) = lexemes(text);
+    let mut reader = Reader { text, items: &layout.items, lexemes: &lexemes, next: 0, item: 0 };
+    let mut lines = Vec::new();
+    let mut start = 0;
+    while start < text.len() {
+        let end = text[start..].find('\n').map_or(text.len(), |i| start + i);
+        let mut line = reader.line(start, end);
+        line.ends = layout.text.as_bytes().get(end).is_none_or(|&byte| byte == b'\n');
+        lines.push(line);
+        start = end + 1;
+    }
+    // Where the text ends, whatever was begun does.
+    if let Some(last) = lines.iter_mut().rfind(|line| !line.pieces.is_empty()) {
+        last.ends = true;
+    }
+    lines
+}
+
+struct Reader<'t, 'l> {
+    text: &'t str,
+    items: &'l [RawItem],
+    lexemes: &'l [Lexeme],
+    /// The next lexeme, and the item that has begun last, from 1.
+    next: usize,
+    item: usize,
+}
+
+impl<'t> Reader<'t, '_> {
+    fn line(&mut self, start: usize, end: usize) -> Line<'t> {
+        let mut pieces: Vec<Piece<'t>> = Vec::new();
+        // Columns are counted along the line, each character once.
+        let (mut counted, mut column, mut last) = (start, 0, start);
+        while let Some(&first) = self.lexemes.get(self.next).filter(|lexeme| lexeme.start < end) {
+            let until = self.whole(first);
+            let mut operator = first.operator;
+            while let Some(part) = self.lexemes.get(self.next).filter(|lexeme| lexeme.start < until) {
+                operator = part.operator;
+                self.next += 1;
+            }
+            column += self.text[counted..first.start].chars().count();
+            counted = first.start;
+            let touches = last == first.start && !pieces.is_empty();
+            if let Some(number) = pieces.last_mut()
+                && touches
+                && number.token == Token::Number
+                && matches!(first.token, Token::Word | Token::Open)
+            {
+                number.factor = true;
+            }
+            pieces.push(Piece { column, touches, operator, ..self.piece(first, until) });
+            last = until;
+        }
+        let rest = &self.text[last..end];
+        let comment = rest.find('#').map(|at| rest[at..].trim_end());
+        let comment_column = rest.find('#').map_or(0, |at| self.text[start..last + at].chars().count());
+        Line { pieces, comment, comment_column, ends: true }
+    }
+
+    /// Where the token of the grammar ends that begins with a lexeme.
+    fn whole(&self, first: Lexeme) -> usize {
+        let rest = &self.text[first.start..];
+        match first.token {
+            Token::Symbol => {
+                let long = LONG.iter().find(|long| rest.starts_with(**long));
+                long.map_or(first.end, |long| first.start + long.len())
+            }
+            _ => first.end,
+        }
+    }
+
+    fn piece(&mut self, first: Lexeme, until: usize) -> Piece<'t> {
+        while self.items.get(self.item).is_some_and(|item| item.start <= first.start) {
+            self.item += 1;
+        }
+        let item = self.item.checked_sub(1).map(|i| &self.items[i]);
+        let kind = item.map_or(ItemKind::Unknown, |item| item.kind);
+        let place = match item {
+            Some(item) if item.start == first.start => Place::Start,
+            Some(item) => match item.after_colon {
+                Some(after) if first.end == after => Place::Colon,
+                Some(after) if first.start >= after => Place::Body,
+                _ => Place::Head,
+            },
+            None => Place::Head,
+        };
+        let names = matches!(kind, ItemKind::Ignore | ItemKind::Consider);
+        let head = matches!(kind, ItemKind::Rule | ItemKind::Interpret) && place != Place::Body;
+        Piece {
+            text: &self.text[first.start..until],
+            token: first.token,
+            column: 0,
+            touches: false,
+            grouped: first.depth == 0 && (first.in_string || names || head),
+            in_string: first.in_string,
+            after_operand: first.after_operand,
+            operator: first.operator,
+            depth: first.depth,
+            kind,
+            place,
+            factor: false,
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! Words that begin a string or an expression, what is open behind them, and line breaks, which may end it.
+
+use super::{ItemKind, Last, Level, Scanner};
+use crate::lexeme::Token;
+
+impl Scanner<'_> {
+    /// Keywords that begin a string or an expression; returns what the word counts as.
+    pub(super) fn keyword(&mut self, start: usize, end: usize) -> Last {
+        let inside = self.levels.len() > 1;
+        let in_expression = !self.in_string || inside;
+        let in_rule = self.items.last().is_some_and(|i| i.kind == ItemKind::Rule && i.after_colon.is_some());
+        match &self.text[start..end] {
+            "produce" if in_rule && !inside => {
+                self.forget_pending();
+                (self.in_string, self.weighted, self.weight_next) = (true, false, true);
+                Last::Operator
+            }
+            "or" if self.weighted && self.in_successor() => {
+                self.weight_next = true;
+                Last::Operator
+            }
+            "at" if !inside && self.is_at_rate(start, end) => {
+                self.forget_pending();
+                self.in_string = false;
+                Last::Operator
+            }
+            "rate" if in_rule && !inside && self.follows_at(start) => Last::Operator,
+            word @ ("solve" | "if") if in_rule && !inside && (self.in_string || word == "solve") => {
+                self.forget_pending();
+                self.in_string = false;
+                self.count_if(word == "if");
+                Last::Operator
+            }
+            "if" => {
+                self.count_if(true);
+                Last::Operator
+            }
+            "match"
+                if in_expression && matches!(self.next, Some(Token::Word | Token::Number | Token::Open)) =>
+            {
+                self.count_if(true);
+                self.level().matching = true;
+                Last::Operator
+            }
+            "case" if in_expression && (self.level_matches() || self.matching) => {
+                self.level().matching = true;
+                let level = self.level();
+                let dropped = std::mem::take(&mut level.right);
+                self.pending -= dropped;
+                Last::Operator
+            }
+            "let" if in_rule && !inside && !self.in_string && self.next == Some(Token::Word) => {
+                self.forget_pending();
+                Last::Operator
+            }
+            "then" | "else" => {
+                let is_else = &self.text[start..end] == "else";
+                let level = self.level();
+                let dropped = level.right + usize::from(is_else && level.ifs > 0);
+                level.right = 0;
+                level.ifs -= usize::from(is_else && level.ifs > 0);
+                self.pending -= dropped;
+                Last::Operator
+            }
+            "step" | "in" | "string" => Last::Operator,
+            "for" if in_rule && !inside && !self.in_string && self.last == Last::Operand => Last::Operator,
+            "strength" if self.items.last().is_some_and(|i| i.kind == ItemKind::Tropism) => Last::Operator,
+            _ => Last::Operand,
+        }
+    }
+
+    fn count_if(&mut self, yes: bool) {
+        if yes {
+            self.level().ifs += 1;
+            self.pending += 1;
+        }
+    }
+
+    pub(super) fn forget_pending(&mut self) {
+        let level = self.levels.last_mut().expect("never empty");
+        self.pending -= level.right + level.ifs;
+        (level.right, level.ifs, level.matching) = (0, 0, false);
+    }
+
+    /// Keeps the line break at `at` if it ends an expression, else blanks it.
+    pub(super) fn line_break(&mut self, at: usize) {
+        if at >= self.out.len() {
+            return;
+        }
+        if self.in_string || self.levels.len() > 1 || self.last != Last::Operand {
+            self.out[at] = b' ';
+            return;
+        }
+        if self.held_break.is_none() {
+            self.matching = self.level_matches();
+        }
+        self.forget_pending();
+        // The first break after the expression is the one that `then` or `else` would take back.
+        self.held_break.get_or_insert(at);
+    }
+
+    pub(super) fn level_matches(&self) -> bool {
+        self.levels.iter().any(|level| level.matching)
+    }
+
+    pub(super) fn level(&mut self) -> &mut Level {
+        self.levels.last_mut().expect("never empty")
+    }
+}

@@ -1,0 +1,84 @@
+//! How modules look, as far as a model says: colours, surfaces, contours, tropism.
+//!
+//! Plain data without geometry of its own: [`lang`](dlsys_lang) fills it in, the turtle makes materials and
+//! meshes of it.
+
+use std::sync::Arc;
+
+use dlsys_diagnostic::Span;
+
+/// What the declarations `color`, `gradient`, `surface`, `contour` and `tropism` say.
+#[derive(Clone, Debug, Default)]
+pub struct Appearance {
+    /// In the order written; colour `i` is number `BUILT_IN_COLORS + 1 + i` of `;(n)`.
+    pub colors: Vec<NamedColor>,
+    /// In the order written; their numbers follow those of the colours.
+    pub gradients: Vec<Gradient>,
+    pub surfaces: Vec<Arc<SurfaceShape>>,
+    /// In the order written; contour `i` is number `i + 1` of `@C(n)`.
+    pub contours: Vec<Contour>,
+    pub tropism: Option<Tropism>,
+}
+
+/// Colours that need no declaration: numbers 1 to 12 of `;(n)`.
+pub const BUILT_IN_COLORS: usize = 12;
+
+/// A colour of the sRGB space as `0xRRGGBB`.
+pub type Rgb = u32;
+
+/// `color name = "#rrggbb"`
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NamedColor {
+    pub name: Arc<str>,
+    pub rgb: Rgb,
+}
+
+/// `gradient name = "#rrggbb", …`: colours at equal distances from 0 to 1.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Gradient {
+    pub name: Arc<str>,
+    /// Two or more.
+    pub stops: Vec<Rgb>,
+}
+
+/// `tropism X, Y, Z strength E`: headings bend towards a direction (ABOP, section 2.3.4).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tropism {
+    /// A unit vector, in scene coordinates.
+    pub direction: [f64; 3],
+    /// Radians per scene unit for a heading at a right angle to the direction; negative bends away.
+    pub strength: f64,
+}
+
+/// The 16 control points of a bicubic Bézier patch, row by row.
+pub type Net = [[f64; 3]; 16];
+
+/// A surface that was read from a file, in the turtle's axes: along the heading, to the left, up; the
+/// turtle stands at the origin.
+#[derive(Clone, Debug, Default)]
+pub struct SurfaceShape {
+    /// With its mark: `@P`.
+    pub name: String,
+    /// Bicubic patches; their front is where, seen with rows going up, columns go right.
+    pub patches: Vec<Net>,
+    /// Corners of triangles.
+    pub vertices: Vec<[f64; 3]>,
+    /// One for each vertex, or none at all if the file has none.
+    pub normals: Vec<[f64; 3]>,
+    pub triangles: Vec<[u32; 3]>,
+    /// Colours that the file gives, with their names.
+    pub materials: Vec<NamedColor>,
+    /// Which of them a triangle has; the list is empty, or there is one for each triangle.
+    pub painted: Vec<Option<u32>>,
+    /// Where it is declared.
+    pub span: Span,
+}
+
+/// `contour name = (x, y) …`: the cross-section of a stem, through these points, counter-clockwise about
+/// the origin. Lengths are in parts of the stem's radius.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Contour {
+    pub name: Arc<str>,
+    /// Three or more.
+    pub points: Vec<[f64; 2]>,
+}

@@ -1,0 +1,99 @@
+//! How much work the equations and conditions of a rule are: what the analysis of a model finds out.
+//!
+//! "Model only what a scene needs": a parameter whose solution is a formula is never stepped, an event whose time
+//! is a formula is never searched for. The classes are facts about the mathematics of a rule; the simulation
+//! looks them up.
+
+use super::Driven;
+use dlsys_expr::Program;
+
+/// How the equation of a parameter is solved. Coefficients are computed when a module takes the equation up,
+/// from the variables of its rule.
+#[derive(Clone, Debug)]
+pub enum Law {
+    /// `x' = c_0 + c_1 age + … + c_n age^n`; the outputs are the coefficients.
+    Polynomial(Program),
+    /// `x' = c + b x + a x²`; the outputs are c, b and a. Exponential and logistic growth, and all of their kind.
+    Quadratic(Program),
+    /// `x' = b x + g(age, t, y, …)`, g made of sums and products of polynomials, exponentials, sines and cosines
+    /// and of other parameters of this class.
+    Sum {
+        /// b
+        factor: Program,
+        /// g
+        inflow: Program,
+    },
+    /// `x' = h(time) q(x)`, with the integral of h known: curves, growth functions of time, and the growth laws of
+    /// Gompertz, Richards and von Bertalanffy.
+    Driven(Box<Driven>),
+    /// Integrated numerically.
+    Numeric(Numeric),
+}
+
+/// Why a parameter is integrated numerically, and how it can be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Numeric {
+    /// It reads something of its neighbours that changes.
+    pub coupled: bool,
+    /// Its rate is linear, with constant coefficients, in everything that changes.
+    pub linear: bool,
+    pub obstacle: Obstacle,
+}
+
+/// What stands in the way of a formula.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Obstacle {
+    /// The rate reads something of neighbours that changes.
+    Neighbours,
+    /// The rate is no polynomial in the parameter itself.
+    NotPolynomial,
+    /// It is one of this degree, greater than 2.
+    Degree(u32),
+    /// The parameter is multiplied by something that changes.
+    Factor,
+    /// What is added to it is no sum of products of polynomials, exponentials, sines and cosines of time, or reads a
+    /// parameter that is none.
+    Inflow,
+}
+
+impl Law {
+    pub fn is_closed(&self) -> bool {
+        !matches!(self, Law::Numeric(_))
+    }
+}
+
+/// How the instant at which the two sides of a comparison meet is found.
+#[derive(Clone, Debug)]
+pub enum Watch {
+    /// Nothing in it changes.
+    Still,
+    /// They meet where one variable that moves one way only takes a value, which the program computes: a formula.
+    Crossing { variable: usize, level: Program },
+    /// The first root of a function of time: of formulas, or of dense output. The difference of the sides, if it is linear.
+    Root(Option<Sum>),
+}
+
+/// `constant + Σ factor · variable`.
+#[derive(Clone, Debug)]
+pub struct Sum {
+    pub constant: f64,
+    /// Variables and their factors.
+    pub terms: Vec<(usize, f64)>,
+}
+
+/// Linear equations: `x_k' = constant + Σ coefficient · variable`.
+#[derive(Clone, Debug)]
+pub struct Linear {
+    /// Per numeric parameter, in their order: the variables it depends on.
+    pub variables: Vec<Vec<usize>>,
+    /// Per numeric parameter: the constant, then the coefficients of those variables.
+    pub coefficients: Program,
+}
+
+/// Partial derivatives of the rates of a clause by what changes.
+#[derive(Clone, Debug, Default)]
+pub struct Jacobian {
+    /// Position of the rate in the clause, and number of the variable.
+    pub entries: Vec<(usize, usize)>,
+    pub values: Program,
+}

@@ -1,0 +1,182 @@
+//! What a model says: names resolved, expressions compiled, module kinds known.
+//!
+//! A [`Model`] is made by [`lang`](dlsys_lang) from text and read by everything downstream. It knows
+//! nothing of syntax (only [`Span`]s, so that messages can point at the text), and nothing of time: the
+//! growing tree belongs to [`structure`](dlsys_tree), the clock to [`sim`](dlsys_sim).
+//!
+//! - [`Kind`]: a module's name and number of parameters. `F(x)` and `F(x, y)` are two kinds.
+//! - [`Rule`]: what the text writes under one head: context, equations, productions.
+//! - [`Law`], [`Watch`]: how much work an equation or a comparison is; found by [`analyse`].
+//! - [`Condition`]: the logic of an `if`, over the signs of differences, because the simulation knows
+//!   better than a comparison of two rounded numbers whether two sides have met.
+//!
+//! # Examples
+//!
+//! ```
+//! use dlsys_model::Law;
+//! use dlsys_session::Session;
+//!
+//! let text = "
+//!     param r = 0.5 in 0 .. 1
+//!     initial string: F(1) A
+//!     F(x): solve dx/dt = r*x
+//! ";
+//! let model = Session::from_text("stem.dls", text, &[]).expect("a good model").model;
+//! assert_eq!((&*model.parameters[0].name, model.parameters[0].value), ("r", 0.5));
+//! let kind = model.kinds.find("F", 1).expect("it is in the initial string");
+//! let rule = &model.rules[model.kinds.get(kind).rules[0]];
+//! // Growth at a constant relative rate has a formula: nothing is integrated.
+//! assert!(!matches!(rule.solves[0].laws[0], Law::Numeric(_)));
+//! ```
+
+mod algebraic;
+mod analysis;
+mod appearance;
+mod chance;
+mod condition;
+mod driven;
+mod form;
+mod invariance;
+mod kind;
+mod law;
+mod measure;
+mod need;
+mod pulses;
+mod rank;
+mod remedy;
+mod rule;
+mod stepping;
+
+pub use algebraic::{Aggregate, Algebraic, Fold, Turn};
+pub use analysis::{AlgebraicDraft, Draft, analyse};
+pub use appearance::{
+    Appearance, BUILT_IN_COLORS, Contour, Gradient, NamedColor, Net, Rgb, SurfaceShape, Tropism,
+};
+pub use chance::{Clock, Distribution, Draw, NewClock, choose};
+pub use condition::{Comparison, Condition, Sign, Step, Truth};
+pub use driven::{Driven, DrivenForm, Flow, driven_form, outside_of_drivers};
+pub use invariance::never_reached;
+pub use kind::{
+    BUILT_IN_SURFACES, COMMAND_SURFACES, CUT, Class, DRAWN_WORDS, Kind, KindId, Kinds, base_of, class_of,
+};
+pub use law::{Jacobian, Law, Linear, Numeric, Obstacle, Sum, Watch};
+pub use measure::Measure;
+pub use rank::is_singular;
+pub use remedy::{Boundary, Remedy};
+pub use rule::{Interpretation, Outcome, Pattern, Produce, Rule, Solve, Successor, Switch};
+pub use stepping::Stepping;
+
+use std::sync::Arc;
+
+use dlsys_diagnostic::Span;
+use dlsys_expr::Curve;
+
+/// A checked model, ready to run.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// `title "…"`
+    pub title: Option<String>,
+    /// Angle of a turn without a parameter, in degrees (`angle`; 90 if not given).
+    pub angle: f64,
+    /// Default observation times (`frames`).
+    pub frames: Option<Frames>,
+    /// Discrete rules apply at its multiples (`period`; 1 if not given).
+    pub period: f64,
+    /// What can be set from outside (`param`), with the values in force.
+    pub parameters: Vec<Parameter>,
+    pub kinds: Kinds,
+    /// The initial string; its arguments read no variables.
+    pub axiom: Successor,
+    /// Where it is written.
+    pub axiom_span: Span,
+    pub rules: Vec<Rule>,
+    pub interpretations: Vec<Interpretation>,
+    pub appearance: Arc<Appearance>,
+    /// Per kind and parameter: no rule reads it, so that only drawing and output do.
+    pub drawn_only: Vec<Vec<bool>>,
+    /// Curves and tables, in the order of their declarations.
+    pub curves: Vec<Arc<Curve>>,
+}
+
+impl Model {
+    /// True if every parameter of every rule follows a formula: nothing is ever integrated numerically.
+    pub fn is_closed_form(&self) -> bool {
+        let mut solves = self.rules.iter().flat_map(|r| &r.solves);
+        solves.all(|s| s.laws.iter().all(Law::is_closed) && s.algebraic.closed.iter().all(|closed| *closed))
+    }
+}
+
+impl Model {
+    /// What a kind's parameters are called: as in its first rule, else by their numbers.
+    pub fn parameter_names(&self, kind: KindId) -> Vec<String> {
+        let kind = self.kinds.get(kind);
+        match kind.all_rules().next() {
+            // Behind those that are written, there may be hidden ones.
+            Some(rule) => self.rules[rule].parameters[..kind.arity].to_vec(),
+            None => (1..=kind.arity).map(|i| i.to_string()).collect(),
+        }
+    }
+}
+
+impl Default for Model {
+    /// The empty model: no modules, turns of 90 degrees.
+    fn default() -> Model {
+        Model {
+            title: None,
+            angle: 90.0,
+            frames: None,
+            period: 1.0,
+            parameters: Vec::new(),
+            kinds: Kinds::default(),
+            axiom: Successor::default(),
+            axiom_span: Span::default(),
+            rules: Vec::new(),
+            interpretations: Vec::new(),
+            appearance: Arc::default(),
+            drawn_only: Vec::new(),
+            curves: Vec::new(),
+        }
+    }
+}
+
+/// Equidistant observation times: `from + i * step` while not beyond `to`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Frames {
+    pub from: f64,
+    pub to: f64,
+    pub step: f64,
+}
+
+impl Frames {
+    /// More frames than this are a mistake, not a wish.
+    pub const LIMIT: usize = 10_000_000;
+
+    /// Number of observation times, both ends included. The last interval may be short of a whole step
+    /// by rounding (a billionth of it): `0 .. 1 step 0.1` has 11 times.
+    pub fn count(&self) -> usize {
+        ((self.to - self.from) / self.step + 1e-9).floor() as usize + 1
+    }
+
+    /// The times. Each is computed from its index, so that errors do not add up.
+    pub fn times(&self) -> impl Iterator<Item = f64> + use<> {
+        let frames = *self;
+        (0..self.count()).map(move |i| frames.time(i))
+    }
+
+    /// One of the times. That which is meant where rounding makes a neighbour of it: 0.3 from steps of 0.1, not
+    /// 0.30000000000000004.
+    pub fn time(&self, index: usize) -> f64 {
+        let t = self.from + index as f64 * self.step;
+        let short: f64 = format!("{t:.14e}").parse().unwrap_or(t);
+        if (short - t).abs() <= 4.0 * f64::EPSILON * t.abs() { short } else { t }
+    }
+}
+
+/// A `param`: a constant that can be set from outside.
+#[derive(Clone, Debug)]
+pub struct Parameter {
+    pub name: String,
+    pub value: f64,
+    pub range: Option<(f64, f64)>,
+    pub span: Span,
+}

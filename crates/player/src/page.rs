@@ -1,0 +1,128 @@
+//! A recording as one HTML file that plays it: no network, nothing but what it holds.
+//!
+//! The file has three parts that matter: the player and its shaders (`page/`, `shaders/`), a description of the recording as
+//! JSON, and its tracks (see `encode.rs`) in base64.
+
+use serde_json::{Value, json};
+
+use super::encode;
+use super::forms::MeshForm;
+use super::recording::Recording;
+use dlsys_geometry::scene::Material;
+use dlsys_render::{GENERATOR, Spoke};
+
+const PAGE: &str = include_str!("page/page.html");
+const STYLE: &str = include_str!("page/style.css");
+/// In the order in which they need one another.
+const SCRIPTS: [&str; 5] = [
+    include_str!("page/recording.js"),
+    include_str!("page/camera.js"),
+    include_str!("page/geometry.js"),
+    include_str!("page/painter.js"),
+    include_str!("page/player.js"),
+];
+
+/// The shaders, by name; without a version, which depends on where they run.
+pub const SHADERS: [(&str, &str); 2] =
+    [("surface", include_str!("shaders/surface.vert")), ("light", include_str!("shaders/light.frag"))];
+
+/// With what every page of ours begins, so that nobody else's file is taken for one.
+pub const MARK: &str = "<!doctype html>\n<!-- dlsys view: a recorded plant -->\n";
+
+/// The document.
+pub fn document(recording: &Recording) -> String {
+    let (tracks, outlines) = encode::tracks(recording);
+    let scripts = SCRIPTS.map(|script| script.trim_end()).join("\n\n");
+    let parts = [
+        ("title", escaped(&recording.title)),
+        ("generator", GENERATOR.to_owned()),
+        ("style", STYLE.trim_end().to_owned()),
+        ("script", scripts),
+        ("description", embedded(&description(recording, &outlines))),
+        ("tracks", encode::base64(&tracks)),
+    ];
+    let mut page = String::from(MARK);
+    let mut rest = PAGE;
+    // Parts are put where their names stand, once, so that nothing in a part is taken for a name.
+    while let Some((before, after)) = rest.split_once("{{") {
+        let (name, after) = after.split_once("}}").expect("names are closed");
+        page.push_str(before);
+        page.push_str(&parts.iter().find(|part| part.0 == name).expect("a known name").1);
+        rest = after;
+    }
+    page.push_str(rest);
+    page
+}
+
+/// JSON that may stand in a script element: nothing in it can end that.
+fn embedded(value: &Value) -> String {
+    value.to_string().replace('<', "\\u003c").replace('\u{2028}', "\\u2028").replace('\u{2029}', "\\u2029")
+}
+
+/// Text that may stand in HTML.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+/// Everything but the tracks.
+fn description(recording: &Recording, outlines: &[Vec<Spoke>]) -> Value {
+    let Recording { history, palette, forms, .. } = recording;
+    let color = |material: &Material| material.color.to_string();
+    let meshes = (0..forms.meshes()).map(|i| mesh(&forms.mesh_form(i, recording.accuracy, palette)));
+    let parameters = recording.parameters.iter().map(|p| {
+        let range = p.range.map(|(low, high)| json!([low, high]));
+        json!({ "name": p.name, "value": p.value, "range": range })
+    });
+    let events = history.happenings.iter().map(|h| json!([h.t, h.module, h.times, h.line]));
+    let size = (recording.bounds[1] - recording.bounds[0]) / recording.extent;
+    json!({
+        "generator": GENERATOR,
+        "title": recording.title,
+        "source": recording.source,
+        "parameters": parameters.collect::<Vec<_>>(),
+        "times": recording.times,
+        "modules": recording.modules,
+        "events": events.collect::<Vec<_>>(),
+        "productions": history.productions,
+        "leftOut": history.left_out,
+        "palette": palette.materials().iter().map(color).collect::<Vec<_>>(),
+        "outlines": outlines.iter().map(|outline| spokes(outline)).collect::<Vec<_>>(),
+        "meshes": meshes.collect::<Vec<_>>(),
+        "cuts": forms.cuts(),
+        "unit": recording.unit,
+        "extent": recording.extent,
+        "size": [size.x, size.y, size.z],
+        "shaders": SHADERS.into_iter().collect::<std::collections::BTreeMap<_, _>>(),
+    })
+}
+
+/// A number to some decimals, which is then short in JSON.
+fn rounded(x: f64, decimals: i32) -> f64 {
+    let scale = 10_f64.powi(decimals);
+    // No negative zero.
+    (x * scale).round() / scale + 0.0
+}
+
+fn spokes(outline: &[Spoke]) -> Vec<f64> {
+    let numbers = outline.iter().flat_map(|spoke| [spoke.place, spoke.normal]);
+    numbers.flatten().map(|x| rounded(x, 6)).collect()
+}
+
+/// Places in parts of the mesh's unit; colours as numbers, less one and negative where the thing's colour replaces them.
+fn mesh(form: &MeshForm) -> Value {
+    let vertices = &form.vertices;
+    let flat = |of: &dyn Fn(usize) -> [f64; 3], decimals| {
+        (0..vertices.len()).flat_map(of).map(|x| rounded(x, decimals)).collect::<Vec<_>>()
+    };
+    let colors = vertices.iter().map(|v| {
+        let [r, g, b] = [v.color.red, v.color.green, v.color.blue].map(i64::from);
+        let rgb = r << 16 | g << 8 | b;
+        if v.takes_tint { -rgb - 1 } else { rgb }
+    });
+    json!({
+        "places": flat(&|i| vertices[i].place.coords.into(), 6),
+        "normals": flat(&|i| vertices[i].normal.into(), 4),
+        "colors": colors.collect::<Vec<_>>(),
+        "triangles": form.triangles,
+    })
+}

@@ -1,0 +1,136 @@
+//! A scene as instances: each thing is a form and the numbers that place it.
+//!
+//! | form | numbers |
+//! |---|---|
+//! | a length of a stem | two cross-sections: centre, u, v |
+//! | a surface | where its origin, its first and its second axis (of its size) come to lie; the third is their product |
+//! | a patch | 16 control points, row by row |
+//! | a polygon | its corners |
+
+use std::collections::HashMap;
+
+use super::forms::Forms;
+use dlsys_geometry::scene::{MaterialId, OwnerId, Point, Scene};
+use dlsys_render::{CrossSection, lengths};
+
+/// What is placed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Form {
+    /// A length of a stem, with this contour of the model, or round.
+    Stem(Option<u32>),
+    /// A mesh, by its number among the [`Forms`].
+    Mesh(u32),
+    Patch,
+    /// A polygon of so many corners.
+    Polygon(u32),
+}
+
+impl Form {
+    /// Numbers that place it.
+    pub fn numbers(self) -> usize {
+        match self {
+            Form::Stem(_) => 18,
+            Form::Mesh(_) => 9,
+            Form::Patch => 48,
+            Form::Polygon(corners) => 3 * corners as usize,
+        }
+    }
+}
+
+/// Who a thing is, at any time: the module that drew it, and which of the things of that form it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Key {
+    /// See [`Lineage::id`](dlsys_tree::Lineage::id).
+    pub lineage: u64,
+    pub form: Form,
+    pub count: u32,
+}
+
+/// How a thing looks at a time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Look {
+    /// `None`: each part of a mesh has its own.
+    pub material: Option<MaterialId>,
+    /// Of a stem: 1 if a dome closes its start, plus 2 if one closes its end. Of a polygon: how it is cut into
+    /// triangles, by its number among the [`Forms`].
+    pub variant: u32,
+}
+
+/// A thing in its place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Item {
+    pub key: Key,
+    pub look: Look,
+    /// Index of the first of its numbers.
+    pub first: usize,
+}
+
+/// Everything that is to be seen at one instant.
+#[derive(Clone, Debug, Default)]
+pub struct Stage {
+    /// In string order within a kind of form.
+    pub items: Vec<Item>,
+    /// In scene units.
+    pub numbers: Vec<f64>,
+    /// What its things have in common.
+    pub forms: Forms,
+    counts: HashMap<(OwnerId, Form), u32>,
+}
+
+impl Stage {
+    /// Takes the place of what was there before. `default_width` (scene units) is that of lines of default width.
+    pub fn set(&mut self, scene: &Scene, default_width: f64) {
+        self.items.clear();
+        self.numbers.clear();
+        self.counts.clear();
+        // Lengths come stem by stem; a module's are counted in its own order, which lasts.
+        let mut stems = lengths(scene, default_width);
+        stems.sort_by_key(|length| length.segment);
+        for length in &stems {
+            let segment = &scene.segments[length.segment];
+            let [start, end] = length.caps.map(u32::from);
+            let look = Look { material: Some(segment.material), variant: start + 2 * end };
+            self.begin(scene, segment.owner, Form::Stem(segment.contour), look);
+            for CrossSection { centre, u, v } in length.ends {
+                [centre.coords, u, v].iter().for_each(|vector| self.numbers.extend(vector.iter()));
+            }
+        }
+        for polygon in &scene.polygons {
+            let look = Look {
+                material: Some(polygon.material),
+                variant: self.forms.triangulation(&polygon.vertices),
+            };
+            self.begin(scene, polygon.owner, Form::Polygon(polygon.vertices.len() as u32), look);
+            self.place(&polygon.vertices);
+        }
+        for surface in &scene.surfaces {
+            let placement = &surface.placement;
+            let form = Form::Mesh(self.forms.mesh(surface));
+            self.begin(scene, surface.owner, form, Look { material: surface.tint, variant: 0 });
+            self.numbers.extend(placement.origin.iter());
+            for axis in &placement.axes[..2] {
+                self.numbers.extend((axis * placement.scale).iter());
+            }
+        }
+        for patch in &scene.patches {
+            self.begin(scene, patch.owner, Form::Patch, Look { material: Some(patch.material), variant: 0 });
+            patch.net.iter().for_each(|row| self.place(row));
+        }
+    }
+
+    fn begin(&mut self, scene: &Scene, owner: OwnerId, form: Form, look: Look) {
+        let count = self.counts.entry((owner, form)).or_default();
+        let key = Key { lineage: scene.owner(owner).lineage.id, form, count: *count };
+        *count += 1;
+        self.items.push(Item { key, look, first: self.numbers.len() });
+    }
+
+    fn place(&mut self, points: &[Point]) {
+        self.numbers.extend(points.iter().flat_map(|p| p.iter()));
+    }
+
+    /// The numbers that place a thing.
+    pub fn numbers_of(&self, item: &Item) -> &[f64] {
+        &self.numbers[item.first..item.first + item.key.form.numbers()]
+    }
+}

@@ -1,0 +1,175 @@
+//! What all frames of an animation share, found by looking at all of them first.
+
+use super::camera::Camera;
+use super::extent::Extent;
+use super::light::Light;
+use super::{View, number, painter};
+use dlsys_geometry::scene::{Bounds, Point, Scene};
+
+/// The first pass: how much space an animation takes up, in space and in its view.
+#[derive(Clone, Debug)]
+pub struct Survey {
+    view: View,
+    /// Field of view in degrees; `None`: orthographic.
+    field: Option<f64>,
+    space: Bounds,
+    seen: Extent,
+}
+
+impl Survey {
+    /// Of nothing yet, in this view, orthographic.
+    pub fn new(view: View) -> Survey {
+        Survey { view, field: None, space: Bounds::default(), seen: Extent::EMPTY }
+    }
+
+    /// In perspective: the camera stands where all that is drawn in any frame is just within an angle of so many
+    /// degrees (see [`Camera::FIELDS`]; others are brought to the nearest).
+    pub fn with_perspective(self, field: f64) -> Survey {
+        Survey { field: Some(field), ..self }
+    }
+
+    /// Takes in the scene of a frame. The order does not matter.
+    pub fn add(&mut self, scene: &Scene) {
+        self.space.add(scene);
+        self.seen.merge(&Extent::of(scene, &self.view));
+    }
+
+    /// Takes in another survey in the same view, as of another thread.
+    pub fn merge(&mut self, other: &Survey) {
+        self.space.merge(&other.space);
+        self.seen.merge(&other.seen);
+    }
+
+    /// What all frames share.
+    pub fn fit(&self) -> Fit {
+        let default_width = self.space.default_width();
+        let extent = self.space.extent();
+        let bounds = self.space.corners(default_width);
+        // Where stems are wider than everything is long, their width is what there is to see.
+        let whole = bounds.map_or(0.0, |[low, high]| (high - low).max());
+        let size = extent.max(whole - extent);
+        let shadow = self.seen.shadow(default_width);
+        let camera = match (self.field, &shadow) {
+            (Some(field), Some(shadow)) => Camera::perspective(self.view, field, shadow),
+            _ => Camera::orthographic(self.view),
+        };
+        let depths = self.seen.depth().unwrap_or_default().map(|z| camera.depth(z));
+        Fit {
+            camera,
+            default_width,
+            extent,
+            accuracy: size * Fit::ACCURACY,
+            bounds,
+            picture: Picture::around(shadow.map(|shadow| camera.frame(&shadow))),
+            light: Light::new(depths, extent),
+        }
+    }
+}
+
+/// What all frames of an animation share.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fit {
+    pub camera: Camera,
+    /// Width of a line of default width, in scene units.
+    pub default_width: f64,
+    /// Largest side of the box around all points of all frames, in scene units; 0 if nothing is drawn.
+    pub extent: f64,
+    /// How far what is written may be from a curved surface or a round stem, in scene units; a fixed part of
+    /// the extent unless somebody chooses another.
+    pub accuracy: f64,
+    /// Opposite corners of the box around everything; `None` if nothing is drawn.
+    pub bounds: Option<[Point; 2]>,
+    /// The picture area of the view.
+    pub picture: Picture,
+    pub(super) light: Light,
+}
+
+impl Fit {
+    /// The default accuracy, in parts of the extent: half a pixel of a picture of a thousand.
+    pub const ACCURACY: f64 = 1.0 / 2000.0;
+
+    /// The accuracy if this one is asked for: no finer than what the last digits of coordinates can show.
+    pub fn with_accuracy(self, accuracy: f64) -> Fit {
+        /// Files tell apart a millionth of the extent.
+        const FINEST: f64 = 5e-7;
+        let size = self.accuracy / Fit::ACCURACY;
+        Fit { accuracy: accuracy.max(size * FINEST), ..self }
+    }
+
+    /// Opposite corners of the box around one scene, lines having their width.
+    pub fn bounds_of(&self, scene: &Scene) -> Option<[Point; 2]> {
+        Bounds::of(scene).corners(self.default_width)
+    }
+
+    /// Left, bottom, right and top, as this camera sees it, of what one survey took in; `None` if that is nothing.
+    pub(super) fn frame_of(&self, survey: &Survey) -> Option<[f64; 4]> {
+        survey.seen.shadow(self.default_width).map(|shadow| self.camera.frame(&shadow))
+    }
+}
+
+/// The picture area: a rectangle of what the camera sees, and the scale at which it is drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Picture {
+    /// Left, bottom, width and height, in scene units of the plane of focus.
+    pub area: [f64; 4],
+    /// Picture units in one scene unit: a power of ten such that the larger side of the area is between 100
+    /// and 1000 picture units. Numbers stay short, and people can still read lengths off them.
+    pub scale: f64,
+}
+
+impl Picture {
+    /// Margin on each side, in parts of the larger side of what is drawn.
+    const MARGIN: f64 = 0.04;
+    /// The least that the smaller side may be, in parts of the larger one. A filament a thousand times as
+    /// long as it is wide should still be a picture.
+    const SLIMMEST: f64 = 0.2;
+
+    /// The area around what is drawn: left, bottom, right and top.
+    pub(super) fn around(frame: Option<[f64; 4]>) -> Picture {
+        let [left, bottom, right, top] = frame.unwrap_or([-0.5, -0.5, 0.5, 0.5]);
+        let (width, height) = (right - left, top - bottom);
+        let larger = match width.max(height) {
+            larger if larger > 0.0 => larger,
+            _ => 1.0,
+        };
+        let side = |length: f64| length.max(larger * Picture::SLIMMEST) + 2.0 * Picture::MARGIN * larger;
+        let (w, h) = (side(width), side(height));
+        Picture::of([(left + right - w) / 2.0, (bottom + top - h) / 2.0, w, h])
+    }
+
+    /// Of an area, at the scale that suits it.
+    fn of(area: [f64; 4]) -> Picture {
+        let scale = 10_f64.powi(2 - area[2].max(area[3]).log10().floor() as i32);
+        Picture { area, scale }
+    }
+
+    /// Widened on both sides, or above and below, to this ratio of width to height.
+    pub(super) fn shaped(&self, ratio: f64) -> Picture {
+        let [left, bottom, width, height] = self.area;
+        let (w, h) = (width.max(height * ratio), height.max(width / ratio));
+        Picture::of([left - (w - width) / 2.0, bottom - (h - height) / 2.0, w, h])
+    }
+
+    /// `viewBox` of an SVG: left, top, width and height in picture units, y going down.
+    pub fn view_box(&self) -> [f64; 4] {
+        let [left, bottom, width, height] = self.area;
+        [left, -(bottom + height), width, height].map(|x| number::rounded(x * self.scale, painter::DECIMALS))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_have_a_margin_and_a_shape() {
+        let picture = Picture::around(Some([0.0, 0.0, 50.0, 0.0]));
+        assert_eq!(picture.area, [-2.0, -7.0, 54.0, 14.0]);
+        assert_eq!(picture.scale, 10.0);
+        assert_eq!(picture.view_box(), [-20.0, -70.0, 540.0, 140.0]);
+        assert_eq!(picture.shaped(1.0).area, [-2.0, -27.0, 54.0, 54.0]);
+        let nothing = Picture::around(None);
+        assert!(nothing.area[2] > 0.0);
+        assert_eq!(Survey::new(View::FRONT).fit().bounds, None);
+    }
+}

@@ -1,0 +1,106 @@
+//! Stems for those who make their own triangles, as graphics processors do: each length of a stem is what lies between two
+//! cross-sections, and a cross-section is a place and two vectors.
+//!
+//! These are the tubes of the OBJ format: lengths that continue one another share the cross-section in which they meet.
+
+use super::tube::{Section, Spoke, Tubes, circle, curve, sides_for};
+use dlsys_geometry::scene::{Point, Scene, Vector};
+
+/// Where a stem is cut across: the corner at (x, y) of its outline, in parts of the radius, stands at
+/// `centre + x u + y v`. Vectors are in scene units, counter-clockwise seen from further along; both are 0 at a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CrossSection {
+    pub centre: Point,
+    pub u: Vector,
+    pub v: Vector,
+}
+
+impl CrossSection {
+    /// At a right angle to the stem.
+    pub(super) fn across(centre: Point, section: &Section, radius: f64) -> CrossSection {
+        CrossSection { centre, u: section.u * radius, v: section.v * radius }
+    }
+
+    /// In the plane that halves the bend between two sections.
+    pub(super) fn between(centre: Point, before: &Section, after: &Section, radius: f64) -> CrossSection {
+        let plane = before.along + after.along;
+        let lean = before.along.dot(&plane);
+        // Along the side of the stem up to the plane.
+        let [u, v] = [before.u, before.v].map(|w| (w - before.along * (w.dot(&plane) / lean)) * radius);
+        CrossSection { centre, u, v }
+    }
+}
+
+/// What lies between two cross-sections.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Length {
+    /// Index among the scene's segments.
+    pub segment: usize,
+    /// At the start and at the end.
+    pub ends: [CrossSection; 2],
+    /// Whether a dome closes the start and the end.
+    pub caps: [bool; 2],
+}
+
+/// All stems of a scene, by segment within a stem; `default_width` is in scene units.
+pub fn lengths(scene: &Scene, default_width: f64) -> Vec<Length> {
+    // Sides do not matter: nobody makes the corners here.
+    let tubes = Tubes::new(scene, default_width, 3, 0.0);
+    (0..tubes.len()).flat_map(|i| tubes.lengths(i).collect::<Vec<_>>()).collect()
+}
+
+/// The outline of cross-sections of a contour of the model (`None`: a circle), with as many corners as a stem of this
+/// radius needs to be no further than `accuracy` from a round one; both in scene units.
+pub fn cross_section(contour: Option<&[[f64; 2]]>, radius: f64, accuracy: f64) -> Vec<Spoke> {
+    let sides = sides_for(radius, accuracy);
+    contour.map_or_else(|| circle(sides), |points| curve(points, sides))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dlsys_geometry::scene::{MaterialId, Owner, Segment, Width};
+    use dlsys_tree::Lineage;
+
+    #[test]
+    fn lengths_meet_where_a_stem_bends_and_steps() {
+        let mut scene = Scene::default();
+        let owner = scene.add_owner(Owner { name: "F".into(), lineage: Lineage::of_axiom(0) });
+        let mut add = |start: Point, direction: Vector, widths: [f64; 2], follows| {
+            let end = start + direction;
+            let (widths, material) = (widths.map(Width::Set), MaterialId::STEM);
+            let across = Vector::z();
+            scene.segments.push(Segment {
+                start,
+                end,
+                direction,
+                across,
+                widths,
+                contour: None,
+                material,
+                owner,
+                follows,
+            });
+            end
+        };
+        let bend = add(Point::origin(), Vector::y(), [0.2, 0.2], None);
+        let step = add(bend, Vector::new(0.6, 0.8, 0.0), [0.2, 0.2], Some(0));
+        add(step, Vector::new(0.6, 0.8, 0.0), [0.1, 0.0], Some(1));
+        let all = lengths(&scene, 1.0);
+        let [low, high, shoulder, tip] = &all[..] else { panic!("{all:?}") };
+        assert_eq!(low.ends[1], high.ends[0]);
+        assert_eq!(
+            [low.caps, high.caps, shoulder.caps, tip.caps],
+            [[true, false], [false; 2], [false; 2], [false; 2]]
+        );
+        assert_eq!((shoulder.ends[0], shoulder.ends[1]), (high.ends[1], tip.ends[0]));
+        assert_eq!((tip.ends[1].u, tip.ends[1].v), (Vector::zeros(), Vector::zeros()));
+        // The plane of the joint is equally inclined to both directions.
+        let normal = low.ends[1].u.cross(&low.ends[1].v).normalize();
+        assert!((normal.y - normal.dot(&Vector::new(0.6, 0.8, 0.0))).abs() < 1e-12);
+        // Outwards from a circle of the right radius.
+        assert!(
+            (low.ends[0].u.norm() - 0.1).abs() < 1e-12 && (shoulder.ends[1].v.norm() - 0.05).abs() < 1e-12
+        );
+    }
+}

@@ -1,0 +1,222 @@
+//! Scenes as files: SVG and PNG pictures, OBJ meshes, and the directory of an animation.
+//!
+//! An animation is written in two passes, because all its frames share one scale, one picture area and one
+//! default line width:
+//!
+//! ```text
+//! every scene ──▶ Survey ──fit──▶ Fit
+//! every scene ──▶ FrameWriter(Fit) ──bytes──▶ Staging ──file──▶ FrameDirectory
+//! ```
+//!
+//! or, where all frames go on one [`Sheet`],
+//!
+//! ```text
+//! every scene ──▶ SheetWriter(Fit, Sheet) ──part──▶ Assembly ──bytes──▶ FrameDirectory
+//! ```
+//!
+//! Nothing but [`FrameDirectory`] and its [`Staging`] touches the file system.
+//!
+//! # Examples
+//!
+//! Three frames of a growing stem, all on one scale:
+//!
+//! ```
+//! use dlsys_render::{Format, FrameWriter, Survey, View};
+//! use dlsys_session::Session;
+//!
+//! let session = Session::from_text("stem.dls", "initial string: F(1)\nF(x): solve dx/dt = x", &[]).unwrap();
+//! let mut simulation = session.simulate(Default::default()).expect("it starts");
+//! let (mut survey, mut scenes) = (Survey::new(View::FRONT), Vec::new());
+//! for time in [0.0, 1.0, 2.0] {
+//!     let mut string = Default::default();
+//!     simulation.at(time, &mut string).expect("it runs");
+//!     let mut scene = dlsys_geometry::turtle::blank(&session.model);
+//!     dlsys_geometry::turtle::draw(&session.model, &string, &mut scene).expect("it can be drawn");
+//!     survey.add(&scene);
+//!     scenes.push(scene);
+//! }
+//! let mut writer = FrameWriter::new(Format::Svg, survey.fit());
+//! let pictures: Vec<Vec<u8>> = scenes.iter().map(|scene| writer.write(scene, "a stem")).collect();
+//! writer.format = Format::Obj;
+//! let mesh = String::from_utf8(writer.write(&scenes[2], "a stem, t = 2")).unwrap();
+//! assert!(pictures[0].starts_with(b"<svg") && mesh.contains("\nusemtl stem\n"));
+//! ```
+
+mod camera;
+mod extent;
+mod fit;
+mod frames;
+mod glyphs;
+mod layout;
+mod lengths;
+mod light;
+mod manifest;
+mod name;
+mod number;
+mod obj;
+mod page;
+mod painter;
+mod png;
+mod raster;
+mod relay;
+mod sheet;
+mod stroke;
+mod svg;
+mod text;
+mod triangles;
+mod triangulate;
+mod tube;
+mod view;
+
+pub use camera::Camera;
+pub use fit::{Fit, Picture, Survey};
+pub use frames::{Error, FrameDirectory, MANIFEST, Staged, Staging, replace};
+pub use layout::{Layout, Sheet, Spacing};
+pub use lengths::{CrossSection, Length, cross_section, lengths};
+pub use light::Light;
+pub use manifest::{FrameRecord, Manifest};
+pub use page::{Page, Size, TooLarge};
+pub use sheet::{Assembly, Part, SheetError, SheetWriter};
+pub use triangulate::{normal, triangulate};
+pub use tube::Spoke;
+pub use view::{View, ViewError};
+
+use std::io::{self, Write};
+
+use dlsys_geometry::scene::Scene;
+
+/// Who wrote a file.
+pub const GENERATOR: &str = concat!("dlsys ", env!("CARGO_PKG_VERSION"));
+
+/// A file format for frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Format {
+    /// Scalable Vector Graphics 1.1: the scene seen by a [`Camera`].
+    Svg,
+    /// Portable Network Graphics: the same in pixels, what is nearer being in front to the pixel.
+    Png,
+    /// Wavefront OBJ with a material library: the scene in space.
+    Obj,
+}
+
+impl Format {
+    /// All formats, with their names, which are also the extensions of their files.
+    pub const NAMED: [(&'static str, Format); 3] =
+        [("svg", Format::Svg), ("png", Format::Png), ("obj", Format::Obj)];
+
+    /// The extension of its files.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Format::Svg => "svg",
+            Format::Png => "png",
+            Format::Obj => "obj",
+        }
+    }
+}
+
+/// A name that is no [`Format`].
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("unknown format `{0}`; known are svg, png and obj")]
+pub struct FormatError(pub String);
+
+impl std::str::FromStr for Format {
+    type Err = FormatError;
+
+    fn from_str(name: &str) -> Result<Format, FormatError> {
+        let known = Format::NAMED.into_iter().find(|(known, _)| *known == name);
+        known.map(|(_, format)| format).ok_or_else(|| FormatError(name.to_owned()))
+    }
+}
+
+/// The second pass: one frame after another, each as the bytes of its file.
+#[derive(Clone, Debug)]
+pub struct FrameWriter {
+    pub format: Format,
+    pub fit: Fit,
+    /// What pictures are drawn on (SVG and PNG).
+    pub page: Page,
+    /// Sides of the tubes that stems are made of (OBJ only); 0 for as many as the accuracy takes, and 8 at least.
+    pub sides: usize,
+    /// Threads that make the file of one frame (OBJ only), at least 1. The bytes do not depend on it.
+    pub threads: usize,
+}
+
+impl FrameWriter {
+    /// A writer of pictures 1000 pixels wide or high on the usual background, or of meshes with tubes as round as the
+    /// accuracy asks.
+    pub fn new(format: Format, fit: Fit) -> FrameWriter {
+        let page = Page::usual(fit.picture);
+        FrameWriter { format, fit, page, sides: 0, threads: 1 }
+    }
+
+    /// The file of a frame. `title` is for people: what it shows, and at which time.
+    pub fn write(&self, scene: &Scene, title: &str) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        // Memory takes whatever is written to it.
+        let _ = self.write_to(scene, title, &mut bytes);
+        bytes
+    }
+
+    /// Writes the file of a frame, a mesh in large parts as soon as they are made.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn write_to(&self, scene: &Scene, title: &str, out: &mut (dyn Write + Send)) -> io::Result<()> {
+        let scene = &*scene.tessellated(self.fit.accuracy);
+        match self.format {
+            Format::Svg => out.write_all(svg::document(scene, &self.fit, &self.page, title).as_bytes()),
+            Format::Png => out.write_all(&png::document(scene, &self.fit, &self.page, title)),
+            Format::Obj => obj::write(scene, &self.fit, self.sides, title, self.threads, out),
+        }
+    }
+
+    /// The file that all frames refer to, if there is one: its name and its bytes.
+    pub fn companion(&self, scene: &Scene) -> Option<(&'static str, Vec<u8>)> {
+        match self.format {
+            Format::Svg | Format::Png => None,
+            Format::Obj => Some((obj::MATERIALS, obj::materials(&scene.palette))),
+        }
+    }
+}
+
+/// How smooth edges are in pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Smoothness {
+    /// As in files: sixteen samples to a pixel.
+    Fine,
+    /// Four samples, for what moves.
+    Quick,
+}
+
+/// The pixels of a scene on a page, row by row from the top: red, green and blue, each times the opacity, and the opacity;
+/// 0 where nothing is drawn, whatever the page's background.
+pub fn pixels(scene: &Scene, fit: &Fit, page: &Page) -> Vec<[u8; 4]> {
+    pixels_by(scene, fit, page, Smoothness::Fine, 1)
+}
+
+/// The same, as smooth as it should be, made by so many threads; the pixels do not depend on that.
+pub fn pixels_by(
+    scene: &Scene,
+    fit: &Fit,
+    page: &Page,
+    smoothness: Smoothness,
+    threads: usize,
+) -> Vec<[u8; 4]> {
+    let scene = &*scene.tessellated(fit.accuracy);
+    png::picture(scene, fit, page.pixels, page.placement(), smoothness, threads).pixels
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn formats_are_known_by_name() {
+        assert_eq!("svg".parse(), Ok(Format::Svg));
+        assert_eq!("obj".parse::<Format>().map(Format::extension), Ok("obj"));
+        assert_eq!(
+            "pdf".parse::<Format>().unwrap_err().to_string(),
+            "unknown format `pdf`; known are svg, png and obj"
+        );
+    }
+}

@@ -1,0 +1,100 @@
+//! The light in which pictures are drawn, the same in SVG and PNG.
+//!
+//! One lamp, up on the left behind the viewer, fixed to the camera; a gloss; and things get darker with their distance. A
+//! surface that faces the viewer at the front of the plant keeps its colour. So does everything in a flat drawing: light
+//! comes up as the drawing gains depth, so that it does not come on at once in an animation.
+
+use dlsys_geometry::scene::Vector;
+
+/// Direction to the lamp: to the right, up, towards the viewer. Of unit length.
+pub(super) const LAMP: Vector = Vector::new(-0.36, 0.583, 0.728_361_861);
+/// What the lamp's direction counts, beside light that comes from everywhere.
+const DIFFUSE: f64 = 0.52;
+/// Strength and sharpness of the gloss (Blinn 1977).
+const GLOSS: f64 = 0.16;
+const SHARPNESS: i32 = 24;
+/// Light that is lost from the nearest to the farthest.
+const DISTANCE: f64 = 0.16;
+/// Depths, in parts of the extent, from which relief and distance are drawn in full.
+const RELIEF_FROM: f64 = 0.02;
+const DISTANCE_FROM: f64 = 0.2;
+
+/// Light on an animation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Light {
+    /// How much of the relief is drawn, from 0 (flat) to 1.
+    relief: f64,
+    /// Light that is lost for a unit of depth.
+    falloff: f64,
+    near: f64,
+}
+
+impl Light {
+    /// For things between these depths, the greater one nearer; `extent` is the largest side of the whole.
+    pub(super) fn new([far, near]: [f64; 2], extent: f64) -> Light {
+        let depth = if extent > 0.0 { ((near - far) / extent).max(0.0) } else { 0.0 };
+        let falloff =
+            if depth > 0.0 { DISTANCE * (depth / DISTANCE_FROM).min(1.0) / (near - far) } else { 0.0 };
+        Light { relief: (depth / RELIEF_FROM).min(1.0), falloff, near }
+    }
+
+    /// Whether light makes a difference at all.
+    pub(super) fn is_flat(&self) -> bool {
+        self.relief == 0.0
+    }
+
+    /// Strength of light, 1 leaving a colour as it is, on something with a unit normal that is turned to the viewer (to
+    /// the right, up, towards the viewer) at a depth.
+    pub(super) fn strength(&self, normal: Vector, depth: f64) -> f64 {
+        self.at_depth(depth) + self.of_normal(normal)
+    }
+
+    /// What the direction adds.
+    fn of_normal(&self, normal: Vector) -> f64 {
+        // Half-way between the lamp and the viewer.
+        let half = (LAMP + Vector::z()).normalize();
+        let gloss = normal.dot(&half).max(0.0).powi(SHARPNESS) - half.z.powi(SHARPNESS);
+        self.relief * (DIFFUSE * (normal.dot(&LAMP).max(0.0) - LAMP.z) + GLOSS * gloss)
+    }
+
+    /// What is left at a depth.
+    fn at_depth(&self, depth: f64) -> f64 {
+        1.0 - self.falloff * (self.near - depth).max(0.0)
+    }
+
+    /// Strength of light across a stem that runs in this direction (to the right, up, towards the viewer; any length)
+    /// from its left edge, looking along it, to its right edge, at places from -1 to 1.
+    pub(super) fn across<const N: usize>(&self, along: Vector, depth: f64, places: [f64; N]) -> [f64; N] {
+        let left = Vector::new(-along.y, along.x, 0.0).try_normalize(1e-9).unwrap_or_else(Vector::y);
+        // Towards the viewer, across the stem and its left.
+        let facing = along.cross(&left).try_normalize(0.0).unwrap_or_else(Vector::z);
+        let facing = if facing.z < 0.0 { -facing } else { facing };
+        places.map(|s| self.strength(left * -s + facing * (1.0 - s * s).max(0.0).sqrt(), depth))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn flat_drawings_keep_their_colours() {
+        let light = Light::new([0.0, 0.0], 10.0);
+        assert!(light.is_flat());
+        assert_eq!(light.strength(LAMP, 0.0), 1.0);
+        assert_eq!(light.across(Vector::x(), 0.0, [-1.0, 0.0, 1.0]), [1.0; 3]);
+    }
+
+    #[test]
+    fn light_comes_from_the_upper_left_and_fades_with_distance() {
+        assert!((LAMP.norm() - 1.0).abs() < 1e-9);
+        let light = Light::new([-5.0, 5.0], 10.0);
+        assert_eq!(light.strength(Vector::z(), 5.0), 1.0);
+        assert!((light.strength(Vector::z(), -5.0) - 0.84).abs() < 1e-12);
+        let lit = |x: f64, y: f64| light.strength(Vector::new(x, y, 0.0), 5.0);
+        assert!(lit(-1.0, 0.0) > lit(1.0, 0.0) && lit(0.0, 1.0) > lit(0.0, -1.0));
+        // A stem that grows upwards: its left is the lighter side.
+        let [left, right] = light.across(Vector::y(), 5.0, [-0.8, 0.8]);
+        assert!(left > right && right < 1.0, "{left} {right}");
+    }
+}

@@ -1,0 +1,96 @@
+//! Names of modules in files: the same from frame to frame, and unique within one.
+
+use std::collections::{HashMap, HashSet};
+use std::fmt::Write;
+use std::sync::Arc;
+
+use dlsys_geometry::scene::{Owner, OwnerId, Scene};
+
+/// The names of the modules of a scene, `KIND` + separator + `LINEAGE`: by what a module is called, and by
+/// who it is ([`Lineage::name`](dlsys_tree::Lineage::name)). They consist of ASCII letters, digits,
+/// `_`, `-` and the separator and begin with a letter or `_`, so that they are good as XML ids and as OBJ
+/// group names.
+pub(super) struct Names<'s> {
+    owners: &'s [Owner],
+    separator: char,
+    kinds: HashMap<&'s str, String>,
+    /// The names of those that share a lineage: unique by construction, save for a hash that meets another.
+    shared: HashMap<usize, String>,
+}
+
+impl<'s> Names<'s> {
+    pub(super) fn new(scene: &'s Scene, separator: char) -> Names<'s> {
+        let owners = scene.owners();
+        let mut kinds: HashMap<&str, String> = HashMap::new();
+        for (i, owner) in owners.iter().enumerate() {
+            if i == 0 || !Arc::ptr_eq(&owner.name, &owners[i - 1].name) {
+                kinds.entry(&owner.name).or_insert_with(|| plain(&owner.name));
+            }
+        }
+        let mut names = Names { owners, separator, kinds, shared: HashMap::new() };
+        let mut ids: Vec<u64> = owners.iter().map(|owner| owner.lineage.id).collect();
+        ids.sort_unstable();
+        if ids.windows(2).any(|pair| pair[0] == pair[1]) {
+            let twice: HashSet<u64> =
+                ids.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]).collect();
+            let mut seen: HashMap<String, usize> = HashMap::new();
+            for (i, _) in owners.iter().enumerate().filter(|(_, o)| twice.contains(&o.lineage.id)) {
+                let mut name = names.usual(i);
+                let count = seen.entry(name.clone()).or_insert(0);
+                *count += 1;
+                if *count > 1 {
+                    let _ = write!(name, "-{count}");
+                }
+                names.shared.insert(i, name);
+            }
+        }
+        names
+    }
+
+    pub(super) fn get(&self, id: OwnerId) -> String {
+        let shared = if self.shared.is_empty() { None } else { self.shared.get(&id.index()) };
+        shared.cloned().unwrap_or_else(|| self.usual(id.index()))
+    }
+
+    fn usual(&self, owner: usize) -> String {
+        let owner = &self.owners[owner];
+        let kind = self.kinds.get(&*owner.name).map_or("", String::as_str);
+        let mut name = String::with_capacity(kind.len() + 16);
+        name.push_str(kind);
+        name.push(self.separator);
+        name.push_str(&owner.lineage.name());
+        name
+    }
+}
+
+/// A name of a kind in ASCII letters, digits, `_` and `-`. The mark of a surface is dropped, `{` is
+/// `polygon`, other characters are written as `u` and their code.
+fn plain(name: &str) -> String {
+    let name = name.strip_prefix('@').unwrap_or(name);
+    let mut out = String::new();
+    for c in name.chars() {
+        match c {
+            'a'..='z' | 'A'..='Z' | '_' => out.push(c),
+            '0'..='9' | '-' if !out.is_empty() => out.push(c),
+            '{' | '}' => out.push_str("polygon"),
+            other => {
+                let _ = write!(out, "u{:x}", u32::from(other));
+            }
+        }
+    }
+    if out.is_empty() { "module".to_owned() } else { out }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_plain() {
+        for (name, expected) in
+            [("F_i", "F_i"), ("@L", "L"), ("F_α", "F_u3b1"), ("}", "polygon"), ("+", "u2b"), ("@", "module")]
+        {
+            assert_eq!(plain(name), expected);
+        }
+    }
+}

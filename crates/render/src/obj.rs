@@ -1,0 +1,216 @@
+//! A scene as a Wavefront OBJ mesh, with normals, materials, and one group for each module.
+//!
+//! A module's group is named `KIND.LINEAGE`, the same in every frame. Segments that share a ring of a tube
+//! share its vertices across their groups, so a tube is one closed mesh.
+//!
+//! The mesh is never in memory: parts of the text are made on several threads and go to the file at once.
+
+use std::io::{self, Write};
+use std::ops::Range;
+
+use super::name::Names;
+use super::text::{Corner, Text};
+use super::triangles::{Faces, Points, Ring, Solid};
+use super::{Fit, GENERATOR, number, relay};
+use dlsys_geometry::scene::{MaterialId, OwnerId, Palette, Point, Scene, Vector};
+
+/// Name of the material library that all frames refer to.
+pub(super) const MATERIALS: &str = "materials.mtl";
+/// Decimals of a normal.
+const NORMAL_DECIMALS: usize = 4;
+/// Points of a part of the text, about: some hundred kilobytes, which stay in a cache.
+const PART: usize = 6000;
+
+/// A part of the text; items by number, of faces in the order of owners.
+enum Part {
+    Vertices(Range<usize>),
+    Normals(Range<usize>),
+    Faces(Range<usize>),
+}
+
+/// Writes the document of one frame. Tubes have so many sides; 0: as many as it takes. The bytes do not depend on the
+/// number of threads.
+///
+/// # Errors
+/// Those of `out`.
+pub(super) fn write(
+    scene: &Scene,
+    fit: &Fit,
+    sides: usize,
+    title: &str,
+    threads: usize,
+    out: &mut (dyn Write + Send),
+) -> io::Result<()> {
+    let solid = Solid::new(scene, fit, sides);
+    if solid.counts.contains(&u32::MAX) {
+        return Err(io::Error::other("a mesh has at most 4e9 points: choose a coarser accuracy"));
+    }
+    let names = Names::new(scene, '.');
+    let order = solid.by_owner();
+    let points = solid.parts(0..solid.len(), PART);
+    let faces = whole_groups(&solid, &order);
+    let parts: Vec<Part> = (points.iter().cloned().map(Part::Vertices))
+        .chain(points.iter().cloned().map(Part::Normals))
+        .chain(faces.into_iter().map(Part::Faces))
+        .collect();
+    let title: String = title.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+    writeln!(out, "# {GENERATOR}\n# {title}\n# Up axis: +Y; front: +Z. Units: those of the model.")?;
+    writeln!(out, "mtllib {MATERIALS}")?;
+    let decimals = number::decimals_for(fit.extent);
+    let make = |part: usize, draft: &mut Draft| {
+        draft.text.clear();
+        match &parts[part] {
+            Part::Vertices(items) => {
+                solid.points(items.clone(), &mut Vertices { text: &mut draft.text, decimals });
+            }
+            Part::Normals(items) => solid.points(items.clone(), &mut Normals { text: &mut draft.text }),
+            Part::Faces(items) => draft.groups(&solid, &names, &order[items.clone()]),
+        }
+    };
+    relay::write(threads, parts.len(), make, |draft| draft.text.bytes(), out)
+}
+
+/// Parts of a list of items by owner in which no owner is cut.
+fn whole_groups(solid: &Solid, order: &[u32]) -> Vec<Range<usize>> {
+    let mut parts = solid.parts(order.iter().map(|&n| n as usize), PART);
+    let owner = |i: usize| solid.owner_of(order[i] as usize);
+    let mut start = 0;
+    for part in &mut parts {
+        part.start = start;
+        part.end = part.end.max(start);
+        while (1..order.len()).contains(&part.end) && owner(part.end - 1) == owner(part.end) {
+            part.end += 1;
+        }
+        start = part.end;
+    }
+    parts
+}
+
+/// Writes vertices and leaves out normals.
+struct Vertices<'t> {
+    text: &'t mut Text,
+    decimals: usize,
+}
+
+impl Points for Vertices<'_> {
+    fn vertex(&mut self, at: impl FnOnce() -> Point) {
+        self.text.triple(b"v", &at().coords, self.decimals);
+    }
+
+    fn normal(&mut self, _: impl FnOnce() -> Vector) {}
+}
+
+/// Writes normals and leaves out vertices.
+struct Normals<'t> {
+    text: &'t mut Text,
+}
+
+impl Points for Normals<'_> {
+    fn vertex(&mut self, _: impl FnOnce() -> Point) {}
+
+    fn normal(&mut self, of: impl FnOnce() -> Vector) {
+        self.text.triple(b"vn", &of(), NORMAL_DECIMALS);
+    }
+}
+
+/// The text of a part, and corners of rings, which belong to many faces.
+#[derive(Default)]
+struct Draft {
+    text: Text,
+    low: Corners,
+    high: Corners,
+}
+
+/// Corners of a ring, the first one once more after the last.
+#[derive(Default)]
+struct Corners {
+    of: Option<Ring>,
+    corners: Vec<Corner>,
+}
+
+impl Corners {
+    fn set(&mut self, ring: Ring) {
+        if self.of == Some(ring) {
+            return;
+        }
+        self.of = Some(ring);
+        self.corners.clear();
+        self.corners.extend((0..ring.sides).map(|k| {
+            let (vertex, normal) = ring.corner(k);
+            Corner::new(vertex, normal)
+        }));
+        self.corners.extend_from_within(..1);
+    }
+}
+
+impl Draft {
+    /// Groups of items that are given by owner.
+    fn groups(&mut self, solid: &Solid, names: &Names, items: &[u32]) {
+        let (mut group, mut of) = (None, None);
+        let palette = &solid.scene.palette;
+        solid.faces(items, self, |draft, owner: OwnerId, material: MaterialId| {
+            if group != Some(owner) {
+                group = Some(owner);
+                draft.text.words(&[b"g ", names.get(owner).as_bytes(), b"\n"]);
+            }
+            // Each part tells its material: what comes before it, is written on another thread.
+            if of != Some(material) {
+                of = Some(material);
+                draft.text.words(&[b"usemtl ", palette.get(material).name.as_bytes(), b"\n"]);
+            }
+        });
+    }
+}
+
+impl Faces for Draft {
+    fn face(&mut self, corners: [(u32, u32); 3]) {
+        let [a, b, c] = corners.map(|(vertex, normal)| Corner::new(vertex, normal));
+        self.text.line(|line| line.face([&a, &b, &c]));
+    }
+
+    fn strip(&mut self, from: Ring, to: Ring) {
+        if self.high.of == Some(from) {
+            std::mem::swap(&mut self.low, &mut self.high);
+        }
+        self.low.set(from);
+        self.high.set(to);
+        for (low, high) in self.low.corners.windows(2).zip(self.high.corners.windows(2)) {
+            let ([a, b], [d, c]) = (low, high) else { continue };
+            self.text.line(|line| {
+                if !from.point {
+                    line.face([a, b, c]);
+                }
+                if !to.point {
+                    line.face([a, c, d]);
+                }
+            });
+        }
+    }
+
+    fn fan(&mut self, pole: (u32, u32), ring: Ring, reversed: bool) {
+        let tip = Corner::new(pole.0, pole.1);
+        // Where the strip before it has left it.
+        if self.low.of == Some(ring) {
+            std::mem::swap(&mut self.low, &mut self.high);
+        }
+        self.high.set(ring);
+        for side in self.high.corners.windows(2) {
+            let [a, b] = side else { continue };
+            self.text.line(|line| line.face(if reversed { [&tip, b, a] } else { [&tip, a, b] }));
+        }
+    }
+}
+
+/// The material library.
+pub(super) fn materials(palette: &Palette) -> Vec<u8> {
+    let mut out = Text::default();
+    out.words(&[b"# ", GENERATOR.as_bytes(), b"\n"]);
+    for material in palette.materials() {
+        out.words(&[b"\nnewmtl ", material.name.as_bytes(), b"\n"]);
+        for (keyword, strength) in [(b"Ka", 0.2), (b"Kd", 1.0)] {
+            out.triple(keyword, &(Vector::from(material.color.channels()) * strength), NORMAL_DECIMALS);
+        }
+        out.words(&[b"Ks 0.05 0.05 0.05\nNs 20\nd 1\nillum 2\n"]);
+    }
+    out.bytes().to_vec()
+}

@@ -1,0 +1,274 @@
+//! The elements of an SVG picture, from back to front.
+//!
+//! Stems are strokes with round ends, polygons and the triangles of surfaces are filled paths, in the same light as
+//! everywhere ([`Light`](super::Light)). A stem that is thick enough for it to be seen has a gradient across. Everything
+//! is drawn from back to front, by the depth of its middle; a surface is one thing in that order, and its triangles are
+//! in order among themselves. What is equally deep is drawn in string order.
+//!
+//! In a picture of one frame every element has an id that lasts from frame to frame: the name of its module,
+//! `KIND-LINEAGE`, for the first that a module draws, then `KIND-LINEAGE.2` and so on. Where many frames share a picture,
+//! elements have no names, and neighbours of the same look are one path.
+
+use std::fmt::Write;
+
+use super::name::Names;
+use super::stroke::{Stroke, Strokes};
+use super::{Fit, number, triangulate};
+use dlsys_geometry::scene::{Color, MaterialId, OwnerId, Point, Polygon, Scene, Segment, Surface, Vector};
+
+/// Decimals of a coordinate. The larger side of a picture is 100 to 1000 units, so the last digit is a
+/// millionth to a hundred-thousandth of it.
+pub(super) const DECIMALS: usize = 3;
+/// Decimals of a corner of a surface: a built-in flower has hundreds, and they are most of a file.
+const SURFACE_DECIMALS: usize = 2;
+/// Steps in which the strength of light is rounded, and on surfaces that are small in the picture.
+pub(super) const SHADES: f64 = 40.0;
+const COARSE_SHADES: f64 = 8.0;
+/// Surfaces smaller than this part of the picture are small.
+const SMALL: f64 = 0.05;
+
+/// What the pictures of several frames share.
+#[derive(Clone, Copy)]
+pub(super) struct Style<'a> {
+    pub(super) fit: &'a Fit,
+    /// Picture units in a scene unit.
+    pub(super) scale: f64,
+    /// Larger side of the whole picture, in picture units.
+    pub(super) side: f64,
+}
+
+/// The elements of a scene, one a line. Names are those of modules; without them the elements have none, and `prefix`
+/// begins the ids of gradients, which must differ in a document.
+pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -> String {
+    let names = named.then(|| Names::new(scene, '-'));
+    let mut painter = Painter {
+        scene,
+        style,
+        names,
+        strokes: Strokes::new(scene, style, prefix),
+        run: None,
+        out: String::new(),
+    };
+    painter.paint();
+    let definitions = painter.strokes.definitions();
+    if definitions.is_empty() {
+        return painter.out;
+    }
+    format!("<defs>\n{definitions}</defs>\n{}", painter.out)
+}
+
+/// An element of the scene, by kind and index.
+#[derive(Clone, Copy)]
+enum Thing {
+    Segment(usize),
+    Polygon(usize),
+    Surface(usize),
+}
+
+/// A thing in painter's order.
+struct Layer {
+    /// Towards the viewer, in steps too small to see, so that rounding does not shuffle a flat plant.
+    depth: f64,
+    owner: OwnerId,
+    /// Which one of its owner's it is, from 1.
+    ordinal: u32,
+    thing: Thing,
+}
+
+struct Painter<'a> {
+    scene: &'a Scene,
+    style: Style<'a>,
+    names: Option<Names<'a>>,
+    strokes: Strokes<'a>,
+    /// Attributes and data of the nameless path that is being gathered.
+    run: Option<(String, String)>,
+    out: String,
+}
+
+impl Painter<'_> {
+    fn paint(&mut self) {
+        for layer in self.layers() {
+            let id = self.names.as_ref().map_or(String::new(), |names| {
+                let name = names.get(layer.owner);
+                if layer.ordinal == 1 {
+                    format!(" id=\"{name}\"")
+                } else {
+                    format!(" id=\"{name}.{}\"", layer.ordinal)
+                }
+            });
+            match layer.thing {
+                Thing::Segment(i) => self.segment(&self.scene.segments[i], i, &id),
+                Thing::Polygon(i) => self.polygon(&self.scene.polygons[i], &id),
+                Thing::Surface(i) => self.surface(&self.scene.surfaces[i], &id),
+            }
+        }
+        self.end_run();
+    }
+
+    /// Everything, from back to front.
+    fn layers(&self) -> Vec<Layer> {
+        let fit = self.style.fit;
+        let quantum = 1e-9 * if fit.extent > 0.0 { fit.extent } else { 1.0 };
+        let depth = |p: Point| (fit.camera.project(p).z / quantum).round();
+        let mut ordinals = vec![0_u32; self.scene.owners().len()];
+        let mut layers = Vec::new();
+        let mut add = |owner: OwnerId, depth: f64, thing: Thing| {
+            let ordinal = &mut ordinals[owner.index()];
+            *ordinal += 1;
+            layers.push(Layer { depth, owner, ordinal: *ordinal, thing });
+        };
+        for (i, s) in self.scene.segments.iter().enumerate() {
+            add(s.owner, depth(nalgebra::center(&s.start, &s.end)), Thing::Segment(i));
+        }
+        for (i, p) in self.scene.polygons.iter().enumerate() {
+            add(p.owner, depth(middle(&p.vertices)), Thing::Polygon(i));
+        }
+        for (i, s) in self.scene.surfaces.iter().enumerate() {
+            add(s.owner, depth(s.placement.point(middle(&s.mesh.vertices))), Thing::Surface(i));
+        }
+        // Stable: a module's own things stay in the order in which they were entered.
+        layers.sort_by(|a, b| a.depth.total_cmp(&b.depth).then(a.owner.cmp(&b.owner)));
+        layers
+    }
+
+    fn segment(&mut self, segment: &Segment, index: usize, id: &str) {
+        match self.strokes.stroke(segment, index, self.names.is_none()) {
+            None => {}
+            Some(Stroke::Element { name, attributes }) => {
+                self.end_run();
+                let _ = writeln!(self.out, "<{name}{id}{attributes}/>");
+            }
+            Some(Stroke::Path { attributes, data }) => self.path(attributes, &data, id),
+        }
+    }
+
+    fn polygon(&mut self, polygon: &Polygon, id: &str) {
+        let corners: Vec<Point> = polygon.vertices.iter().map(|&p| self.project(p)).collect();
+        let normal = self.style.fit.camera.direction(triangulate::normal(&polygon.vertices));
+        let fill = self.shade(polygon.material, normal, middle(&corners).z, area(&corners) > 0.0, SHADES);
+        let mut outline = String::new();
+        add_outline(&mut outline, &corners, DECIMALS);
+        self.path(format!(" fill=\"{fill}\""), &outline, id);
+    }
+
+    /// A group of paths, one for each run of triangles of one shade. A thin stroke of the same colour closes
+    /// the seams that anti-aliasing would leave between them.
+    fn surface(&mut self, surface: &Surface, id: &str) {
+        let (mesh, placement) = (&surface.mesh, &surface.placement);
+        let corners: Vec<Point> = mesh.vertices.iter().map(|&v| self.project(placement.point(v))).collect();
+        let normals: Vec<Vector> =
+            mesh.normals.iter().map(|&n| self.style.fit.camera.direction(placement.direction(n))).collect();
+        let size = placement.scale * self.style.scale;
+        // On a flower of a few pixels fine shades cannot be told apart, and they are most of a file.
+        let shades = if size < SMALL * self.style.side { COARSE_SHADES } else { SHADES };
+        let mut faces: Vec<(f64, Color, [Point; 3])> = mesh
+            .faces
+            .iter()
+            .map(|face| {
+                let places = face.corners.map(|i| corners[i as usize]);
+                let normal: Vector = face.corners.iter().map(|&i| normals[i as usize]).sum();
+                let normal = normal.try_normalize(1e-12).unwrap_or_else(Vector::z);
+                let depth = places.iter().map(|p| p.z).sum::<f64>() / 3.0;
+                let tint = surface.tint.filter(|_| face.takes_tint).unwrap_or(face.material);
+                (depth, self.shade(tint, normal, depth, area(&places) > 0.0, shades), places)
+            })
+            .collect();
+        faces.sort_by(|a, b| a.0.total_cmp(&b.0));
+        self.end_run();
+        let width = text((0.006 * size).clamp(0.01, 0.4));
+        let _ = writeln!(self.out, "<g{id} stroke-width=\"{width}\">");
+        for run in faces.chunk_by(|a, b| a.1 == b.1) {
+            let mut outline = String::new();
+            for (_, _, corners) in run {
+                add_outline(&mut outline, corners, SURFACE_DECIMALS);
+            }
+            let color = run[0].1;
+            let _ = writeln!(self.out, "<path fill=\"{color}\" stroke=\"{color}\" d=\"{outline}\"/>");
+        }
+        self.out.push_str("</g>\n");
+    }
+
+    /// A path, or, if it has no name and looks like the one before, more of that.
+    fn path(&mut self, attributes: String, data: &str, id: &str) {
+        if id.is_empty() {
+            if let Some((look, gathered)) = &mut self.run
+                && *look == attributes
+            {
+                gathered.push_str(data);
+                return;
+            }
+            self.end_run();
+            self.run = Some((attributes, data.to_owned()));
+        } else {
+            let _ = writeln!(self.out, "<path{id}{attributes} d=\"{data}\"/>");
+        }
+    }
+
+    fn end_run(&mut self) {
+        if let Some((attributes, data)) = self.run.take() {
+            let _ = writeln!(self.out, "<path{attributes} d=\"{data}\"/>");
+        }
+    }
+
+    fn project(&self, p: Point) -> Point {
+        self.style.project(p)
+    }
+
+    /// A material's colour on a surface with this unit normal, in the view's coordinates, at this place. Both sides are
+    /// alike: the one that is seen counts, and it is the front if it is `turned` like that.
+    fn shade(&self, material: MaterialId, normal: Vector, z: f64, front: bool, shades: f64) -> Color {
+        let normal = if front { normal } else { -normal };
+        let strength = self.style.fit.light.strength(normal, z / self.style.scale);
+        // Few shades, so that neighbours of nearly the same direction become one path.
+        self.scene.palette.get(material).color.lit((strength * shades).round() / shades)
+    }
+}
+
+impl Style<'_> {
+    /// Where a point comes to lie in the picture; y goes down, z is towards the viewer.
+    pub(super) fn project(&self, p: Point) -> Point {
+        let seen = self.fit.camera.project(p);
+        Point::new(seen.x * self.scale, -seen.y * self.scale, seen.z * self.scale)
+    }
+}
+
+/// A number as it is written.
+pub(super) fn text(x: f64) -> String {
+    let mut out = String::new();
+    number::push(&mut out, x, DECIMALS);
+    out
+}
+
+fn middle(points: &[Point]) -> Point {
+    let sum: Vector = points.iter().map(|p| p.coords).sum();
+    Point::from(sum / points.len().max(1) as f64)
+}
+
+/// Twice the area of an outline in the picture, positive if its corners go counter-clockwise to the eye (y going down).
+fn area(corners: &[Point]) -> f64 {
+    let Some(&origin) = corners.first() else { return 0.0 };
+    let next = corners.iter().cycle().skip(1);
+    let parts = corners
+        .iter()
+        .zip(next)
+        .map(|(p, q)| (p.y - origin.y) * (q.x - origin.x) - (q.y - origin.y) * (p.x - origin.x));
+    parts.sum()
+}
+
+/// Appends a closed outline to path data. All outlines turn the same way, so that where two of one path
+/// overlap, the rule of non-zero winding leaves no hole.
+fn add_outline(data: &mut String, corners: &[Point], decimals: usize) {
+    let mut place = |p: &Point, command: char| {
+        data.push(command);
+        number::push(data, p.x, decimals);
+        data.push(' ');
+        number::push(data, p.y, decimals);
+    };
+    let command = |i| if i == 0 { 'M' } else { 'L' };
+    if area(corners) > 0.0 {
+        corners.iter().rev().enumerate().for_each(|(i, p)| place(p, command(i)));
+    } else {
+        corners.iter().enumerate().for_each(|(i, p)| place(p, command(i)));
+    }
+    data.push('Z');
+}

@@ -1,0 +1,204 @@
+//! A scene as a PNG picture: stems as the tubes of the OBJ format, everything lit smoothly, what is nearer in front.
+
+use super::raster::{self, Corner, Image};
+use super::{Fit, Page, Smoothness, triangles};
+use dlsys_geometry::scene::{Color, Scene, Vector};
+
+/// How far a tube's outline may be from a circle, in pixels.
+const ROUNDNESS: f64 = 0.1;
+/// All of a channel, on a page.
+const FULL: u32 = 65535;
+/// Most triangles that tubes are given sides for; a picture with more has thin ones.
+const MOST_TRIANGLES: usize = 4_000_000;
+
+/// The file of one frame.
+pub(super) fn document(scene: &Scene, fit: &Fit, page: &Page, title: &str) -> Vec<u8> {
+    let [scale, right, down] = page.placement();
+    let image = picture(scene, fit, page.pixels, [scale, right, down], Smoothness::Fine, 1);
+    let mut canvas = Canvas::new(page);
+    canvas.add(&image, [0, 0], 1.0, Meeting::Over);
+    canvas.encode(title)
+}
+
+/// Pixels of a scene, transparent where nothing is. A point that the camera sees at x, y is at `a x + b` and `c - a y`
+/// pixels from the upper left corner.
+/// The pixels do not depend on the number of threads.
+pub(super) fn picture(
+    scene: &Scene,
+    fit: &Fit,
+    size: [u32; 2],
+    [a, b, c]: [f64; 3],
+    smoothness: Smoothness,
+    threads: usize,
+) -> Image {
+    let mesh = triangles::triangles(scene, fit, sides(scene, fit, a));
+    let scale = if fit.extent > 0.0 { 1.0 / fit.extent } else { 1.0 };
+    let places: Vec<[f64; 3]> = mesh
+        .vertices
+        .iter()
+        .map(|&p| {
+            let p = fit.camera.project(p);
+            [a * p.x + b, c - a * p.y, p.z]
+        })
+        .collect();
+    let normals: Vec<Vector> = mesh.normals.iter().map(|&n| fit.camera.direction(n)).collect();
+    let corners = |n: usize| {
+        mesh.faces[n].corners.map(|(vertex, _)| {
+            let [x, y, z] = places[vertex as usize];
+            Corner { x, y, depth: z * scale }
+        })
+    };
+    let shade = |n: usize, weights: [f64; 3]| {
+        let face = &mesh.faces[n];
+        let [p, q, r] = face.corners.map(|(vertex, _)| places[vertex as usize]);
+        // Of a surface that is seen from behind, the back is lit. Pixels go down.
+        let facing = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]) < 0.0;
+        let (mut normal, mut depth) = (Vector::zeros(), 0.0);
+        for (k, weight) in weights.into_iter().enumerate() {
+            let (vertex, at) = face.corners[k];
+            normal += normals[at as usize] * weight;
+            depth += places[vertex as usize][2] * weight;
+        }
+        let normal = normal.try_normalize(1e-12).unwrap_or_else(Vector::z) * if facing { 1.0 } else { -1.0 };
+        scene.palette.get(face.material).color.lit(fit.light.strength(normal, depth))
+    };
+    let count = mesh.faces.len();
+    match smoothness {
+        Smoothness::Fine => raster::draw(&raster::SIXTEEN, threads, size, count, corners, shade),
+        Smoothness::Quick => raster::draw(&raster::FOUR, threads, size, count, corners, shade),
+    }
+}
+
+/// Sides of tubes that look round at so many pixels for a scene unit.
+fn sides(scene: &Scene, fit: &Fit, scale: f64) -> usize {
+    let widths = scene.segments.iter().flat_map(|s| s.widths).map(|w| w.resolve(fit.default_width));
+    let radius = widths.fold(0.0, f64::max) * scale / 2.0;
+    // The side of a polygon is r (1 - cos(π/n)) from its circle.
+    let wanted = std::f64::consts::PI / (1.0 - (ROUNDNESS / radius.max(ROUNDNESS)).min(1.0)).acos();
+    let affordable = MOST_TRIANGLES / (2 * scene.segments.len().max(1));
+    // A multiple of four, so that in a flat drawing both edges have the width that was asked for.
+    (wanted.ceil() as usize).next_multiple_of(4).clamp(8, 64).min((affordable / 4 * 4).max(4))
+}
+
+/// A page that images are laid on, with 16 bits to a channel, so that many faint ones leave their trace.
+#[derive(Debug)]
+pub(super) struct Canvas<'a> {
+    page: &'a Page,
+    /// Colour times opacity, and opacity.
+    pixels: Vec<[u16; 4]>,
+}
+
+/// How what is laid on a page meets what is there, where both cover a pixel in part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Meeting {
+    /// By chance: each hides its share of the other.
+    Over,
+    /// Side by side: neighbours that share an edge leave nothing open between them.
+    Beside,
+}
+
+impl Canvas<'_> {
+    pub(super) fn new(page: &Page) -> Canvas<'_> {
+        let [width, height] = page.pixels.map(|side| side as usize);
+        Canvas { page, pixels: vec![[0; 4]; width * height] }
+    }
+
+    /// Lays an image over what is there, its upper left corner at this pixel; what is beyond the page is cut off.
+    pub(super) fn add(&mut self, image: &Image, [left, top]: [i64; 2], opacity: f64, meeting: Meeting) {
+        let [width, height] = self.page.pixels.map(i64::from);
+        let opacity = (opacity.clamp(0.0, 1.0) * 257.0).round() as u32;
+        for y in 0.max(-top)..(image.height as i64).min(height - top) {
+            for x in 0.max(-left)..(image.width as i64).min(width - left) {
+                let over = image.pixels[y as usize * image.width + x as usize];
+                if over[3] == 0 {
+                    continue;
+                }
+                let over = over.map(|channel| u32::from(channel) * opacity);
+                let under = &mut self.pixels[((y + top) * width + x + left) as usize];
+                let open = FULL - over[3].min(FULL);
+                let share = match meeting {
+                    Meeting::Over => open,
+                    // As much as there is room for.
+                    Meeting::Beside => (open * FULL / u32::from(under[3]).max(1)).min(FULL),
+                };
+                for (under, channel) in under.iter_mut().zip(over) {
+                    *under = (channel + (u32::from(*under) * share + FULL / 2) / FULL).min(FULL) as u16;
+                }
+            }
+        }
+    }
+
+    /// The file. `title` is for people.
+    pub(super) fn encode(&self, title: &str) -> Vec<u8> {
+        let background = self.page.background.map(|Color { red, green, blue }| [red, green, blue]);
+        let opaque = background.is_some();
+        let mut data = Vec::with_capacity(self.pixels.len() * if opaque { 3 } else { 4 });
+        for &[red, green, blue, opacity] in &self.pixels {
+            let (color, opacity) = ([red, green, blue].map(u32::from), u32::from(opacity));
+            match background {
+                Some(background) => data.extend([0, 1, 2].map(|k| {
+                    let channel = color[k] + u32::from(background[k]) * 257 * (FULL - opacity) / FULL;
+                    ((channel + 128) / 257).min(255) as u8
+                })),
+                None => {
+                    let whole = opacity.max(1);
+                    data.extend(color.map(|c| ((c * 255 + whole / 2) / whole).min(255) as u8));
+                    data.push(((opacity + 128) / 257) as u8);
+                }
+            }
+        }
+        let mut bytes = Vec::new();
+        let [width, height] = self.page.pixels;
+        let mut encoder = png::Encoder::new(&mut bytes, width, height);
+        encoder.set_color(if opaque { png::ColorType::Rgb } else { png::ColorType::Rgba });
+        encoder.set_depth(png::BitDepth::Eight);
+        // PNG's own texts are of another alphabet.
+        let _ = encoder.add_itxt_chunk("Title".to_owned(), title.to_owned());
+        // Writing to memory does not fail, and the sizes are right.
+        let written = encoder.write_header().and_then(|mut writer| {
+            writer.write_image_data(&data)?;
+            writer.finish()
+        });
+        debug_assert!(written.is_ok(), "{written:?}");
+        bytes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Picture;
+
+    fn half(color: [u8; 3]) -> Image {
+        let [red, green, blue] = color.map(|c| (u16::from(c) * 128 / 255) as u8);
+        Image { width: 1, height: 1, pixels: vec![[red, green, blue, 128]] }
+    }
+
+    fn page(background: Option<Color>) -> Page {
+        Page { picture: Picture { area: [0.0, 0.0, 1.0, 1.0], scale: 1.0 }, pixels: [1, 1], background }
+    }
+
+    fn pixel(bytes: &[u8]) -> Vec<u8> {
+        let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().expect("a PNG");
+        let mut data = vec![0; reader.output_buffer_size().expect("small")];
+        reader.next_frame(&mut data).expect("an image");
+        data
+    }
+
+    #[test]
+    fn images_cover_one_another_or_stand_side_by_side() {
+        let (white, clear) = (page(Some(Color::hex(0xffffff))), page(None));
+        let drawn = |page: &Page, meeting| {
+            let mut canvas = Canvas::new(page);
+            canvas.add(&half([255, 0, 0]), [0, 0], 1.0, meeting);
+            canvas.add(&half([255, 0, 0]), [0, 0], 1.0, meeting);
+            canvas.add(&half([255, 0, 0]), [5, -3], 1.0, meeting);
+            pixel(&canvas.encode("ä & <b>"))
+        };
+        assert_eq!(drawn(&clear, Meeting::Beside), [255, 0, 0, 255]);
+        assert_eq!(drawn(&clear, Meeting::Over)[3], 192);
+        assert!(drawn(&white, Meeting::Over)[1].abs_diff(64) <= 1);
+        assert_eq!(drawn(&white, Meeting::Beside), [255, 0, 0]);
+        assert_eq!(pixel(&Canvas::new(&clear).encode("")), [0; 4]);
+    }
+}

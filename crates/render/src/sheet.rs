@@ -1,0 +1,199 @@
+//! Writing a [`Sheet`]: each frame by itself, on any thread, then all of them in order.
+
+use std::fmt::Write;
+
+use super::layout::{Caption, Cell};
+use super::painter::{self, text};
+use super::png::{self, Canvas, Meeting};
+use super::raster::Image;
+use super::{Fit, Format, Layout, Page, Sheet, Smoothness, glyphs, svg};
+use dlsys_geometry::scene::{Color, Scene};
+
+/// Colour of captions.
+const INK: Color = Color::hex(0x555555);
+/// Longest document, in bytes.
+const LONGEST: usize = 1 << 30;
+
+/// What a sheet cannot hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SheetError {
+    #[error("an OBJ file is one mesh in space: it has no layout")]
+    Mesh,
+    #[error(
+        "the picture would be longer than 1 GiB from frame {frame} on; choose fewer frames, or PNG, which does not grow"
+    )]
+    TooLong { frame: usize },
+}
+
+/// Writes the frames of a sheet.
+#[derive(Clone, Debug)]
+pub struct SheetWriter {
+    format: Format,
+    fit: Fit,
+    sheet: Sheet,
+    page: Page,
+}
+
+/// One frame, ready to be put on the sheet.
+#[derive(Debug)]
+pub struct Part(Content);
+
+#[derive(Debug)]
+enum Content {
+    Elements(String),
+    /// With the pixel of its upper left corner.
+    Image(Image, [i64; 2]),
+}
+
+/// A sheet that is being filled.
+#[derive(Debug)]
+pub struct Assembly<'a> {
+    writer: &'a SheetWriter,
+    elements: String,
+    canvas: Option<Canvas<'a>>,
+    added: usize,
+}
+
+impl SheetWriter {
+    /// A writer on a page that has the area of the sheet's picture, or more.
+    ///
+    /// # Errors
+    /// If the format has no pictures.
+    pub fn new(format: Format, fit: Fit, sheet: Sheet, page: Page) -> Result<SheetWriter, SheetError> {
+        match format {
+            Format::Obj => Err(SheetError::Mesh),
+            Format::Svg | Format::Png => Ok(SheetWriter { format, fit, sheet, page }),
+        }
+    }
+
+    /// Name of the file: `overlay.svg`.
+    pub fn file(&self) -> String {
+        format!("{}.{}", self.sheet.layout.name(), self.format.extension())
+    }
+
+    pub fn page(&self) -> &Page {
+        &self.page
+    }
+
+    /// Draws the frame with this number. A frame that the sheet has no place for is left out.
+    pub fn part(&self, index: usize, scene: &Scene) -> Part {
+        let cell = self.sheet.cells.get(index);
+        let scene = &*scene.tessellated(self.fit.accuracy);
+        Part(match self.format {
+            Format::Png => {
+                let (size, corner, placement) = self.window(cell);
+                Content::Image(png::picture(scene, &self.fit, size, placement, Smoothness::Fine, 1), corner)
+            }
+            _ => {
+                let style = svg::style(&self.fit, &self.page);
+                Content::Elements(cell.map_or_else(String::new, |_| {
+                    painter::elements(scene, style, false, &format!("f{index}"))
+                }))
+            }
+        })
+    }
+
+    /// The pixels that a frame takes up: size, upper left corner, and how the camera's picture is placed in them.
+    fn window(&self, cell: Option<&Cell>) -> ([u32; 2], [i64; 2], [f64; 3]) {
+        let [a, b, c] = self.page.placement();
+        let frame = cell.and_then(|cell| cell.frame);
+        let (Some(cell), Some([left, bottom, right, top])) = (cell, frame) else {
+            return ([1, 1], [0, 0], [a, b, c]);
+        };
+        // A pixel more all round; what is beyond the page is of no use.
+        let range = |low: f64, high: f64, side: u32| {
+            let low = (low.floor() - 1.0).clamp(0.0, f64::from(side - 1));
+            let high = (high.ceil() + 1.0).clamp(low + 1.0, f64::from(side));
+            (low, (high - low) as u32)
+        };
+        let [width, height] = self.page.pixels;
+        let (x, wide) = range(a * left + b, a * right + b, width);
+        let (y, high) = range(c - a * top, c - a * bottom, height);
+        let [dx, dy] = cell.offset;
+        ([wide, high], [x as i64, y as i64], [a, b + a * dx - x, c - a * dy - y])
+    }
+
+    /// An empty sheet.
+    pub fn begin(&self) -> Assembly<'_> {
+        let canvas = (self.format == Format::Png).then(|| Canvas::new(&self.page));
+        Assembly { writer: self, elements: String::new(), canvas, added: 0 }
+    }
+}
+
+impl Assembly<'_> {
+    /// Puts the next frame on the sheet, over those before it.
+    ///
+    /// # Errors
+    /// If the document becomes too long.
+    pub fn add(&mut self, part: Part) -> Result<(), SheetError> {
+        let index = self.added;
+        self.added += 1;
+        let Some(cell) = self.writer.sheet.cells.get(index) else { return Ok(()) };
+        let meeting = if self.writer.sheet.layout == Layout::Stack { Meeting::Beside } else { Meeting::Over };
+        match part.0 {
+            Content::Image(image, corner) => {
+                if let Some(canvas) = &mut self.canvas {
+                    canvas.add(&image, corner, cell.opacity, meeting);
+                }
+            }
+            Content::Elements(elements) => {
+                self.add_group(index, cell, &elements);
+                if self.elements.len() > LONGEST {
+                    return Err(SheetError::TooLong { frame: index });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn add_group(&mut self, index: usize, cell: &Cell, elements: &str) {
+        let scale = self.writer.page.picture.scale;
+        let out = &mut self.elements;
+        let _ = write!(out, "<g id=\"frame-{index:04}\"");
+        if cell.offset != [0.0; 2] {
+            let [x, y] = [cell.offset[0] * scale, -cell.offset[1] * scale].map(text);
+            let _ = write!(out, " transform=\"translate({x} {y})\"");
+        }
+        if self.writer.sheet.lines {
+            // Rows that touch would show a seam wherever an edge is smoothed.
+            out.push_str(" shape-rendering=\"crispEdges\"");
+        }
+        if cell.opacity < 1.0 {
+            let _ = write!(out, " opacity=\"{}\"", text(cell.opacity));
+        }
+        let _ = writeln!(out, ">\n{elements}</g>");
+        if let Some(Caption { x, y, text: words }) = &cell.caption {
+            let [x, y, size] = [x * scale, -y * scale, self.writer.sheet.letters * scale].map(text);
+            let words = words.replace('&', "&amp;").replace('<', "&lt;");
+            let _ = writeln!(
+                out,
+                "<text x=\"{x}\" y=\"{y}\" font-size=\"{size}\" font-family=\"sans-serif\" text-anchor=\"middle\" fill=\"{INK}\">{words}</text>"
+            );
+        }
+    }
+
+    /// The file. `title` is for people: what it shows.
+    pub fn finish(self, title: &str) -> Vec<u8> {
+        let page = &self.writer.page;
+        let Some(mut canvas) = self.canvas else {
+            return svg::around(page, title, self.elements).into_bytes();
+        };
+        let [a, b, c] = page.placement();
+        let sheet = &self.writer.sheet;
+        let lines: Vec<glyphs::Line> = sheet
+            .cells
+            .iter()
+            .filter_map(|cell| cell.caption.as_ref())
+            .map(|caption| glyphs::Line {
+                middle: a * caption.x + b,
+                base: c - a * caption.y,
+                size: a * sheet.letters,
+                text: &caption.text,
+            })
+            .collect();
+        if !lines.is_empty() {
+            canvas.add(&glyphs::draw(page.pixels, &lines, INK), [0, 0], 1.0, Meeting::Over);
+        }
+        canvas.encode(title)
+    }
+}

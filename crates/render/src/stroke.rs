@@ -1,0 +1,237 @@
+//! Stems as SVG strokes: plain where they are thin or the drawing is flat, else with a gradient across, as light falls on a
+//! cylinder.
+//!
+//! The colours across a stem depend on its direction and depth only, so they are shared by all stems of about the same; where
+//! they are to be put is told by a small gradient of each stem's own, which pieces of one straight stem share. A
+//! stem that is cut in two looks like a whole one.
+
+use std::collections::HashMap;
+use std::fmt::Write;
+
+use super::number;
+use super::painter::{DECIMALS, SHADES, Style, text};
+use dlsys_geometry::scene::{Color, Point, Scene, Segment};
+
+/// Stems thinner than this part of the picture's larger side (2.5 pixels of 1000) have one colour.
+const THIN: f64 = 0.0025;
+/// Places across a stem at which its colour is told: its edges are at -1 and 1.
+const PLACES: [f64; 5] = [-1.0, -0.55, 0.0, 0.55, 1.0];
+/// Least cosine of the angle between two pieces of a straight line.
+const STRAIGHT: f64 = 0.999_99;
+/// How far a piece of a line reaches under the one that continues it, in parts of the picture's larger side: less
+/// can be seen as a seam.
+const OVERLAP: f64 = 0.0004;
+
+/// How a segment is drawn.
+pub(super) enum Stroke {
+    Element {
+        name: &'static str,
+        attributes: String,
+    },
+    /// Of which several can be one path, if their attributes are the same.
+    Path {
+        attributes: String,
+        data: String,
+    },
+}
+
+/// How a segment and its neighbours on a straight line meet.
+#[derive(Clone, Copy, Default)]
+struct Joints {
+    /// It continues one of another colour, and begins straight where that ends.
+    start: bool,
+    end: bool,
+}
+
+/// The stems of a picture.
+pub(super) struct Strokes<'a> {
+    scene: &'a Scene,
+    style: Style<'a>,
+    prefix: &'a str,
+    joints: Vec<Joints>,
+    /// Numbers of colours across, and of gradients.
+    profiles: HashMap<[Color; PLACES.len()], usize>,
+    gradients: HashMap<String, usize>,
+    definitions: String,
+}
+
+impl<'a> Strokes<'a> {
+    pub(super) fn new(scene: &'a Scene, style: Style<'a>, prefix: &'a str) -> Strokes<'a> {
+        let mut joints = vec![Joints::default(); scene.segments.len()];
+        for (i, segment) in scene.segments.iter().enumerate() {
+            let Some(before) = segment.follows else { continue };
+            let other = &scene.segments[before];
+            let [a, b] = [other.widths[1], segment.widths[0]].map(|w| w.resolve(style.fit.default_width));
+            if other.material != segment.material
+                && other.direction.dot(&segment.direction) > STRAIGHT
+                && (a - b).abs() <= 0.25 * a.max(b)
+            {
+                joints[before].end = true;
+                joints[i].start = true;
+            }
+        }
+        Strokes {
+            scene,
+            style,
+            prefix,
+            joints,
+            profiles: HashMap::new(),
+            gradients: HashMap::new(),
+            definitions: String::new(),
+        }
+    }
+
+    /// The gradients that were used.
+    pub(super) fn definitions(&mut self) -> String {
+        std::mem::take(&mut self.definitions)
+    }
+
+    /// A stroke; a dot if it is seen end on; a filled outline if its ends differ in width. `None` if it has no width.
+    pub(super) fn stroke(&mut self, segment: &Segment, index: usize, as_path: bool) -> Option<Stroke> {
+        let Style { fit, scale, side } = self.style;
+        let [a, b] = [segment.start, segment.end].map(|p| self.style.project(p));
+        let width = |i: usize, z: f64| {
+            segment.widths[i].resolve(fit.default_width) * scale * fit.camera.magnification(z / scale)
+        };
+        let (wa, wb) = (width(0, a.z), width(1, b.z));
+        let [x1, y1, mut x2, mut y2] = [a.x, a.y, b.x, b.y].map(text);
+        let (from, to) = (text(wa), text(wb));
+        if from == "0" && to == "0" {
+            return None;
+        }
+        let paint = self.paint(segment, [a, b], (wa + wb) / 2.0);
+        if from != to {
+            let attributes = format!(" fill=\"{paint}\"");
+            return Some(Stroke::Path { attributes, data: tapered(a, b, wa / 2.0, wb / 2.0) });
+        }
+        // Not every renderer draws the ends of a stroke without length.
+        if x1 == x2 && y1 == y2 {
+            let attributes = format!(" fill=\"{paint}\" cx=\"{x1}\" cy=\"{y1}\" r=\"{}\"", text(wa / 2.0));
+            return Some(Stroke::Element { name: "circle", attributes });
+        }
+        let Joints { start, end } = self.joints[index];
+        if start && !end {
+            let attributes = format!(" fill=\"{paint}\"");
+            return Some(Stroke::Path { attributes, data: half_round(a, b, wa / 2.0) });
+        }
+        let mut look = format!(" stroke=\"{paint}\" stroke-width=\"{from}\"");
+        if start {
+            let along = (b - a).xy().normalize() * (OVERLAP * side);
+            [x2, y2] = [b.x + along.x, b.y + along.y].map(text);
+            look.push_str(" stroke-linecap=\"butt\"");
+        }
+        if as_path {
+            return Some(Stroke::Path { attributes: look, data: format!("M{x1} {y1}L{x2} {y2}") });
+        }
+        let attributes = format!("{look} x1=\"{x1}\" y1=\"{y1}\" x2=\"{x2}\" y2=\"{y2}\"");
+        Some(Stroke::Element { name: "line", attributes })
+    }
+
+    /// The colour of a stem between two places of the picture, or a reference to its gradient.
+    fn paint(&mut self, segment: &Segment, [a, b]: [Point; 2], width: f64) -> String {
+        let light = self.style.fit.light;
+        let color = self.scene.palette.get(segment.material).color;
+        let depth = (a.z + b.z) / 2.0 / self.style.scale;
+        let along = self.style.fit.camera.direction(segment.direction);
+        let strengths = light.across(along, depth, PLACES);
+        let lit = |strength: f64| color.lit((strength * SHADES).round() / SHADES);
+        let (dx, dy) = (b.x - a.x, b.y - a.y);
+        let length = dx.hypot(dy);
+        if light.is_flat() || width < THIN * self.style.side || length < 1e-3 * width {
+            return lit(strengths.iter().sum::<f64>() / PLACES.len() as f64).to_string();
+        }
+        // In the picture y goes down; the stem's left is on the left of one who walks along it.
+        let (ux, uy) = (dx / length, dy / length);
+        let across = a.x * uy - a.y * ux;
+        let place = |side: f64| [uy, -ux].map(|n| text(n * (across + side * width / 2.0)));
+        let ([x1, y1], [x2, y2]) = (place(1.0), place(-1.0));
+        let profile = self.profile(strengths.map(lit));
+        let prefix = self.prefix;
+        let gradient =
+            format!(" xlink:href=\"#{prefix}s{profile}\" x1=\"{x1}\" y1=\"{y1}\" x2=\"{x2}\" y2=\"{y2}\"");
+        let number = match self.gradients.get(&gradient) {
+            Some(&number) => number,
+            None => {
+                let number = self.gradients.len() + 1;
+                let _ = writeln!(
+                    self.definitions,
+                    "<linearGradient id=\"{prefix}g{number}\"{gradient} gradientUnits=\"userSpaceOnUse\"/>"
+                );
+                self.gradients.insert(gradient, number);
+                number
+            }
+        };
+        format!("url(#{prefix}g{number})")
+    }
+
+    /// The number of these colours across.
+    fn profile(&mut self, colors: [Color; PLACES.len()]) -> usize {
+        let next = self.profiles.len() + 1;
+        let (prefix, definitions) = (self.prefix, &mut self.definitions);
+        *self.profiles.entry(colors).or_insert_with(|| {
+            let _ = write!(definitions, "<linearGradient id=\"{prefix}s{next}\">");
+            for (place, color) in PLACES.iter().zip(colors) {
+                let offset = text((place + 1.0) / 2.0);
+                let _ = write!(definitions, "<stop offset=\"{offset}\" stop-color=\"{color}\"/>");
+            }
+            definitions.push_str("</linearGradient>\n");
+            next
+        })
+    }
+}
+
+/// Appends a command of a path and its numbers.
+fn push(data: &mut String, command: &str, numbers: &[f64]) {
+    data.push_str(command);
+    for (i, &x) in numbers.iter().enumerate() {
+        if i > 0 {
+            data.push(' ');
+        }
+        number::push(data, x, DECIMALS);
+    }
+}
+
+/// The outline of a stroke that begins straight and ends round.
+fn half_round(a: Point, b: Point, r: f64) -> String {
+    let (dx, dy) = (b.x - a.x, b.y - a.y);
+    let distance = dx.hypot(dy);
+    let (nx, ny) = (-dy / distance * r, dx / distance * r);
+    let mut data = String::new();
+    push(&mut data, "M", &[a.x - nx, a.y - ny]);
+    push(&mut data, "L", &[b.x - nx, b.y - ny]);
+    push(&mut data, "A", &[r, r, 0.0, 0.0, 1.0, b.x + nx, b.y + ny]);
+    push(&mut data, "L", &[a.x + nx, a.y + ny]);
+    data.push('Z');
+    data
+}
+
+/// The outline around two circles and what lies between them. It turns as all outlines do (clockwise to the eye), so that
+/// several that overlap can be one path.
+fn tapered(a: Point, b: Point, ra: f64, rb: f64) -> String {
+    let (dx, dy) = (b.x - a.x, b.y - a.y);
+    let distance = dx.hypot(dy);
+    let mut data = String::new();
+    if distance <= (ra - rb).abs() {
+        // One circle holds the other.
+        let (c, r) = if ra > rb { (a, ra) } else { (b, rb) };
+        push(&mut data, "M", &[c.x - r, c.y]);
+        push(&mut data, "A", &[r, r, 0.0, 0.0, 1.0, c.x + r, c.y]);
+        push(&mut data, "A", &[r, r, 0.0, 0.0, 1.0, c.x - r, c.y]);
+    } else {
+        // The common tangents touch at this sine from the axis.
+        let sin = (ra - rb) / distance;
+        let cos = (1.0 - sin * sin).sqrt();
+        let (ex, ey) = (dx / distance, dy / distance);
+        let touch = |c: Point, r: f64, side: f64| {
+            [c.x + r * (sin * ex - side * cos * ey), c.y + r * (sin * ey + side * cos * ex)]
+        };
+        let large = |this: f64, other: f64| if this > other { 1.0 } else { 0.0 };
+        let [p, q, s, t] = [touch(a, ra, 1.0), touch(b, rb, 1.0), touch(b, rb, -1.0), touch(a, ra, -1.0)];
+        push(&mut data, "M", &p);
+        push(&mut data, "A", &[ra, ra, 0.0, large(ra, rb), 1.0, t[0], t[1]]);
+        push(&mut data, "L", &s);
+        push(&mut data, "A", &[rb, rb, 0.0, large(rb, ra), 1.0, q[0], q[1]]);
+    }
+    data.push('Z');
+    data
+}

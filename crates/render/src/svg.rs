@@ -1,0 +1,51 @@
+//! A scene as an SVG picture: the document around its [elements](super::painter).
+
+use svg::Document;
+use svg::node::Blob;
+use svg::node::element::{Group, Rectangle, Title};
+
+use super::painter::{self, Style, text};
+use super::{Fit, Page};
+use dlsys_geometry::scene::Scene;
+
+/// The document of one frame.
+pub(super) fn document(scene: &Scene, fit: &Fit, page: &Page, title: &str) -> String {
+    around(page, title, painter::elements(scene, style(fit, page), true, ""))
+}
+
+/// How frames are painted on a page.
+pub(super) fn style<'a>(fit: &'a Fit, page: &Page) -> Style<'a> {
+    let [_, _, width, height] = page.picture.view_box();
+    Style { fit, scale: page.picture.scale, side: width.max(height) }
+}
+
+/// The document of a page with these elements, each with its line's end.
+pub(super) fn around(page: &Page, title: &str, mut elements: String) -> String {
+    let view_box = page.picture.view_box();
+    let [left, top, width, height] = view_box;
+    elements.truncate(elements.trim_end().len());
+    // Characters that XML cannot hold have no place in a title.
+    let title: String = title.chars().filter(|c| !c.is_control()).collect();
+    let mut document = Document::new()
+        .set("viewBox", view_box.map(text).join(" "))
+        .set("width", page.pixels[0])
+        .set("height", page.pixels[1])
+        .add(Title::new(title));
+    if elements.contains("xlink:href") {
+        document = document.set("xmlns:xlink", "http://www.w3.org/1999/xlink");
+    }
+    if let Some(color) = page.background {
+        let background = Rectangle::new()
+            .set("x", text(left))
+            .set("y", text(top))
+            .set("width", text(width))
+            .set("height", text(height))
+            .set("fill", color.to_string());
+        document = document.add(background);
+    }
+    let things =
+        Group::new().set("stroke-linecap", "round").set("stroke-linejoin", "round").add(Blob::new(elements));
+    let mut out = document.add(things).to_string();
+    out.push('\n');
+    out
+}

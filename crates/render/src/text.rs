@@ -1,0 +1,289 @@
+//! Lines of numbers as bytes, written quickly: a mesh is little else.
+//!
+//! Digits are made eight at a time in the bytes of one integer, by multiplications (Khuong 2011; Lemire 2021), and
+//! copied as a whole into a line that has room for more than it needs.
+
+use super::number;
+use dlsys_geometry::scene::Vector;
+
+/// Text that grows by lines.
+#[derive(Default)]
+pub(super) struct Text {
+    bytes: Vec<u8>,
+    len: usize,
+}
+
+/// A line that is being put together.
+pub(super) struct Line<'t> {
+    buffer: &'t mut [u8; Line::SIZE],
+    len: usize,
+}
+
+/// A corner of a face with a blank before it, ` 12//34`: each is written for several faces.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Corner {
+    bytes: [u8; Corner::SIZE],
+    len: usize,
+}
+
+impl Text {
+    pub(super) fn clear(&mut self) {
+        self.len = 0;
+    }
+
+    pub(super) fn bytes(&self) -> &[u8] {
+        &self.bytes[..self.len]
+    }
+
+    /// Appends what is written to a line.
+    pub(super) fn line(&mut self, write: impl FnOnce(&mut Line)) {
+        self.reserve(Line::SIZE);
+        let Some(buffer) = self.bytes[self.len..].first_chunk_mut() else { return };
+        let mut line = Line { buffer, len: 0 };
+        write(&mut line);
+        self.len += line.len;
+    }
+
+    /// Appends words of any length.
+    pub(super) fn words(&mut self, words: &[&[u8]]) {
+        for word in words {
+            self.reserve(word.len());
+            self.bytes[self.len..self.len + word.len()].copy_from_slice(word);
+            self.len += word.len();
+        }
+    }
+
+    /// Makes room for so many bytes; what is there beyond the text, is of lines before.
+    fn reserve(&mut self, more: usize) {
+        if self.bytes.len() < self.len + more {
+            self.bytes.resize(2 * self.bytes.len() + more, 0);
+        }
+    }
+
+    /// Appends a keyword of at most two letters and three numbers, rounded to so many decimals, as [`number::push`] does.
+    pub(super) fn triple(&mut self, keyword: &[u8], v: &Vector, decimals: usize) {
+        let Some(power) = POWERS.get(decimals) else { return self.slow_triple(keyword, v, decimals) };
+        let mut fixed = [Fixed::default(); 3];
+        for (fixed, &x) in fixed.iter_mut().zip(v.iter()) {
+            match Fixed::new(x, *power) {
+                Some(found) => *fixed = found,
+                None => return self.slow_triple(keyword, v, decimals),
+            }
+        }
+        self.line(|line| {
+            line.word(keyword);
+            for fixed in fixed {
+                line.byte(b' ');
+                line.fixed(fixed, decimals);
+            }
+            line.byte(b'\n');
+        });
+    }
+
+    #[cold]
+    fn slow_triple(&mut self, keyword: &[u8], v: &Vector, decimals: usize) {
+        let mut line = String::new();
+        for &x in v.iter() {
+            line.push(' ');
+            number::push(&mut line, x, decimals);
+        }
+        self.words(&[keyword, line.as_bytes(), b"\n"]);
+    }
+}
+
+/// A number as [`number::push`] writes it.
+pub(super) struct Quick {
+    buffer: [u8; Line::SIZE],
+    len: usize,
+}
+
+impl Quick {
+    pub(super) fn as_str(&self) -> &str {
+        std::str::from_utf8(&self.buffer[..self.len]).unwrap_or_default()
+    }
+}
+
+/// A number rounded to so many decimals, if that is quickly done.
+pub(super) fn quick(x: f64, decimals: usize) -> Option<Quick> {
+    let fixed = Fixed::new(x, *POWERS.get(decimals)?)?;
+    let mut buffer = [0; Line::SIZE];
+    let mut line = Line { buffer: &mut buffer, len: 0 };
+    line.fixed(fixed, decimals);
+    let len = line.len;
+    Some(Quick { buffer, len })
+}
+
+impl Line<'_> {
+    /// Room for six corners, or three numbers, and a few bytes more than that.
+    const SIZE: usize = 192;
+
+    pub(super) fn byte(&mut self, byte: u8) {
+        self.buffer[self.len] = byte;
+        self.len += 1;
+    }
+
+    pub(super) fn word(&mut self, word: &[u8]) {
+        self.buffer[self.len..self.len + word.len()].copy_from_slice(word);
+        self.len += word.len();
+    }
+
+    /// Appends a face.
+    pub(super) fn face(&mut self, corners: [&Corner; 3]) {
+        self.byte(b'f');
+        for corner in corners {
+            self.buffer[self.len..self.len + Corner::SIZE].copy_from_slice(&corner.bytes);
+            self.len += corner.len;
+        }
+        self.byte(b'\n');
+    }
+
+    /// Appends the first `len` of eight bytes.
+    fn chunk(&mut self, bytes: u64, len: usize) {
+        self.buffer[self.len..self.len + 8].copy_from_slice(&bytes.to_le_bytes());
+        self.len += len;
+    }
+
+    fn fixed(&mut self, number: Fixed, decimals: usize) {
+        self.buffer[self.len] = b'-';
+        self.len += usize::from(number.negative);
+        let digits = digits(number.digits);
+        // Digits of the whole part, at least one.
+        let whole = 8 - decimals;
+        let skipped = (digits.trailing_zeros() as usize / 8).min(whole - 1);
+        let ascii = digits | ZEROS;
+        self.chunk(ascii >> (8 * skipped), whole - skipped);
+        let trailing = digits.leading_zeros() as usize / 8;
+        if trailing < decimals {
+            self.byte(b'.');
+            self.chunk(ascii >> (8 * whole), decimals - trailing);
+        }
+    }
+}
+
+impl Corner {
+    /// Two numbers of ten digits, a blank, two strokes, and a byte that is not used.
+    const SIZE: usize = 24;
+
+    /// Of a vertex and a normal, counted from 0; OBJ counts from 1.
+    pub(super) fn new(vertex: u32, normal: u32) -> Corner {
+        let mut corner = Corner { bytes: [b' '; Corner::SIZE], len: 1 };
+        corner.whole(u64::from(vertex) + 1);
+        corner.bytes[corner.len] = b'/';
+        corner.bytes[corner.len + 1] = b'/';
+        corner.len += 2;
+        corner.whole(u64::from(normal) + 1);
+        corner
+    }
+
+    fn whole(&mut self, n: u64) {
+        if n >= LIMIT {
+            let text = n.to_string();
+            self.bytes[self.len..self.len + text.len()].copy_from_slice(text.as_bytes());
+            self.len += text.len();
+            return;
+        }
+        let digits = digits(n);
+        let skipped = digits.trailing_zeros() as usize / 8;
+        self.bytes[self.len..self.len + 8]
+            .copy_from_slice(&((digits | ZEROS) >> (8 * skipped)).to_le_bytes());
+        self.len += 8 - skipped;
+    }
+}
+
+/// Numbers from here on have more than eight digits.
+const LIMIT: u64 = 100_000_000;
+/// Eight times the digit 0.
+const ZEROS: u64 = 0x3030_3030_3030_3030;
+/// By the number of decimals, of which fewer than eight are quick.
+const POWERS: [f64; 8] = [1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7];
+
+/// The eight digits of a number below [`LIMIT`], the first in the lowest byte.
+fn digits(n: u64) -> u64 {
+    let fours = (n / 10_000) | (n % 10_000) << 32;
+    // Quotients by 100 and by 10, in all parts at once.
+    let hundreds = ((fours * 10_486) >> 20) & 0x0000_007f_0000_007f;
+    let twos = hundreds | (fours - hundreds * 100) << 16;
+    let tens = ((twos * 103) >> 10) & 0x000f_000f_000f_000f;
+    tens | (twos - tens * 10) << 8
+}
+
+/// A number as an integer of its last decimals.
+#[derive(Clone, Copy, Default)]
+struct Fixed {
+    negative: bool,
+    digits: u64,
+}
+
+impl Fixed {
+    /// `None` where the integer might be another than that of the exact decimals: it is too large, or the number is
+    /// nearly half way between two.
+    fn new(x: f64, power: f64) -> Option<Fixed> {
+        let scaled = x.abs() * power;
+        if scaled.is_nan() || scaled >= LIMIT as f64 - 1.0 {
+            return None;
+        }
+        let below = scaled as u32;
+        let rest = scaled - f64::from(below);
+        // The product is wrong by 1e-8 at most.
+        if (rest - 0.5).abs() < 1e-7 {
+            return None;
+        }
+        let digits = u64::from(below) + u64::from(rest > 0.5);
+        Some(Fixed { negative: x < 0.0 && digits > 0, digits })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn corner(vertex: u32, normal: u32) -> String {
+        let mut text = Text::default();
+        let corner = Corner::new(vertex, normal);
+        text.line(|line| line.face([&corner, &corner, &Corner::new(0, 1)]));
+        String::from_utf8(text.bytes().to_vec()).expect("ASCII")
+    }
+
+    #[test]
+    fn corners_of_any_size() {
+        for n in [0, 6, 9, 98, 99, 12_345, 9_999_998, 99_999_998, 99_999_999, 1_234_567_890, u32::MAX] {
+            let [a, b] = [u64::from(n) + 1, u64::from(n / 3) + 1];
+            assert_eq!(corner(n, n / 3), format!("f {a}//{b} {a}//{b} 1//2\n"));
+        }
+    }
+
+    #[test]
+    fn the_quick_way_writes_what_the_slow_one_does() {
+        let slow = |x: f64, decimals: usize| {
+            let text = format!("{x:.decimals$}");
+            let text =
+                if decimals > 0 { text.trim_end_matches('0').trim_end_matches('.') } else { text.as_str() };
+            if text == "-0" { "0".to_owned() } else { text.to_owned() }
+        };
+        let check = |v: Vector, decimals: usize| {
+            let mut text = Text::default();
+            text.words(&[b"before\n"]);
+            text.triple(b"vn", &v, decimals);
+            let [x, y, z] = [v.x, v.y, v.z].map(|x| slow(x, decimals));
+            let expected = format!("before\nvn {x} {y} {z}\n");
+            assert_eq!(String::from_utf8_lossy(text.bytes()), expected, "{v:?} {decimals}");
+        };
+        let mut state = 1_u64;
+        for i in 0..100_000 {
+            let size = 10_f64.powi(i % 16 - 8);
+            let v = Vector::from_fn(|_, _| {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                let unit = (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
+                // Also numbers with few digits, among them ties.
+                if i % 3 == 0 { (unit * size * 1e4).round() / 1e4 } else { unit * size }
+            });
+            for decimals in [0, 2, 3, 4, 6, 7, 9, 12] {
+                check(v, decimals);
+            }
+        }
+        for x in [f64::NAN, f64::INFINITY, -1e300, -0.0, 0.5, 2.5, 99_999_999.0, 9.999_999_6, 1e8] {
+            check(Vector::new(x, -x, 1.0), 0);
+            check(Vector::new(x, -x, 1.0), 7);
+        }
+    }
+}

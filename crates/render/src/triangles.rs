@@ -1,0 +1,319 @@
+//! A scene as triangles: their numbers and order, whatever becomes of them.
+//!
+//! ```text
+//! Scene ──▶ Solid ──points, faces──▶ text of a file (obj), or Triangles in memory (png)
+//! ```
+//!
+//! Vertices and normals are numbered first; then every part of the mesh can be made by itself. So a file is
+//! written on several threads without the mesh being in memory.
+
+use std::ops::Range;
+
+use super::tube::Tubes;
+use super::{Fit, triangulate};
+use dlsys_geometry::scene::{MaterialId, OwnerId, Point, Scene, Vector};
+
+/// Takes vertices and normals, in the order of their numbers.
+pub(super) trait Points {
+    fn vertex(&mut self, at: impl FnOnce() -> Point);
+    fn normal(&mut self, of: impl FnOnce() -> Vector);
+}
+
+/// Takes triangles; corners are counter-clockwise, seen from outside, each a vertex and a normal by number.
+pub(super) trait Faces {
+    fn face(&mut self, corners: [(u32, u32); 3]);
+
+    /// The side between two rings of as many corners, the second one further along. At a point a side has one triangle.
+    fn strip(&mut self, from: Ring, to: Ring) {
+        for k in 0..from.sides {
+            let after = if k + 1 == from.sides { 0 } else { k + 1 };
+            let [a, b, c, d] = [from.corner(k), from.corner(after), to.corner(after), to.corner(k)];
+            if !from.point {
+                self.face([a, b, c]);
+            }
+            if !to.point {
+                self.face([a, c, d]);
+            }
+        }
+    }
+
+    /// The triangles between a ring and a pole, which is further along unless `reversed`.
+    fn fan(&mut self, pole: (u32, u32), ring: Ring, reversed: bool) {
+        for k in 0..ring.sides {
+            let after = if k + 1 == ring.sides { 0 } else { k + 1 };
+            let (a, b) = if reversed { (after, k) } else { (k, after) };
+            self.face([pole, ring.corner(a), ring.corner(b)]);
+        }
+    }
+}
+
+/// Vertices and normals around a tube, by number: one after the other from the first ones.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) struct Ring {
+    pub(super) vertex: u32,
+    pub(super) normal: u32,
+    pub(super) sides: u32,
+    /// All corners are one vertex.
+    pub(super) point: bool,
+    /// All corners have one normal.
+    pub(super) flat: bool,
+}
+
+impl Ring {
+    pub(super) fn corner(&self, k: u32) -> (u32, u32) {
+        (self.vertex + if self.point { 0 } else { k }, self.normal + if self.flat { 0 } else { k })
+    }
+}
+
+/// A part of a scene that is drawn at once and belongs to one module.
+#[derive(Clone, Copy)]
+enum Item {
+    /// A piece of a tube.
+    Stem(usize),
+    Polygon(usize),
+    Surface(usize),
+}
+
+/// Triangles of one material of one item.
+struct Run {
+    material: MaterialId,
+    item: Item,
+    /// Faces of the surface; of other items all.
+    faces: Range<usize>,
+}
+
+/// A scene as triangles that are yet to be made.
+pub(super) struct Solid<'s> {
+    pub(super) scene: &'s Scene,
+    tubes: Tubes<'s>,
+    /// Numbers of the first vertices and normals of each polygon and surface.
+    polygons: Vec<[u32; 2]>,
+    surfaces: Vec<[u32; 2]>,
+    /// Numbers of all vertices and normals.
+    pub(super) counts: [u32; 2],
+}
+
+impl<'s> Solid<'s> {
+    /// Of everything in a scene; stems are tubes with so many sides, 0: as many as it takes.
+    pub(super) fn new(scene: &'s Scene, fit: &Fit, sides: usize) -> Solid<'s> {
+        let tubes = Tubes::new(scene, fit.default_width, sides, fit.accuracy);
+        let mut counts = tubes.counts;
+        let mut number = |vertices: usize, normals: usize| {
+            let first = counts;
+            counts = [counts[0].saturating_add(vertices as u32), counts[1].saturating_add(normals as u32)];
+            first
+        };
+        let polygons = scene.polygons.iter().map(|polygon| number(polygon.vertices.len(), 1)).collect();
+        let surfaces = scene.surfaces.iter().map(|s| number(s.mesh.vertices.len(), s.mesh.normals.len()));
+        let surfaces = surfaces.collect();
+        Solid { scene, tubes, polygons, surfaces, counts }
+    }
+
+    /// Number of items: pieces of stems, polygons, surfaces.
+    pub(super) fn len(&self) -> usize {
+        self.tubes.len() + self.polygons.len() + self.surfaces.len()
+    }
+
+    fn item(&self, n: usize) -> Item {
+        let (stems, polygons) = (self.tubes.len(), self.polygons.len());
+        match n {
+            n if n < stems => Item::Stem(n),
+            n if n < stems + polygons => Item::Polygon(n - stems),
+            n => Item::Surface(n - stems - polygons),
+        }
+    }
+
+    fn owner(&self, item: Item) -> OwnerId {
+        match item {
+            Item::Stem(i) => self.tubes.segment(i).owner,
+            Item::Polygon(i) => self.scene.polygons[i].owner,
+            Item::Surface(i) => self.scene.surfaces[i].owner,
+        }
+    }
+
+    /// The module that an item belongs to.
+    pub(super) fn owner_of(&self, n: usize) -> OwnerId {
+        self.owner(self.item(n))
+    }
+
+    /// Roughly how much there is to an item, in points.
+    fn weight(&self, n: usize) -> usize {
+        match self.item(n) {
+            Item::Stem(_) => 16,
+            Item::Polygon(i) => self.scene.polygons[i].vertices.len(),
+            Item::Surface(i) => self.scene.surfaces[i].mesh.vertices.len(),
+        }
+    }
+
+    /// Cuts a list of items in parts of about as many points.
+    pub(super) fn parts(&self, items: impl Iterator<Item = usize>, points: usize) -> Vec<Range<usize>> {
+        let mut parts = Vec::new();
+        let (mut start, mut end, mut weight) = (0, 0, 0);
+        for item in items {
+            end += 1;
+            weight += self.weight(item);
+            if weight >= points {
+                parts.push(start..end);
+                (start, weight) = (end, 0);
+            }
+        }
+        if end > start {
+            parts.push(start..end);
+        }
+        parts
+    }
+
+    /// Makes the vertices and normals of some items, in order.
+    pub(super) fn points(&self, items: Range<usize>, out: &mut impl Points) {
+        let stems = self.tubes.len();
+        self.tubes.points(items.start.min(stems)..items.end.min(stems), out);
+        for n in items.start.max(stems)..items.end {
+            match self.item(n) {
+                Item::Stem(_) => {}
+                Item::Polygon(i) => {
+                    let polygon = &self.scene.polygons[i];
+                    out.normal(|| triangulate::normal(&polygon.vertices));
+                    for &p in &polygon.vertices {
+                        out.vertex(|| p);
+                    }
+                }
+                Item::Surface(i) => {
+                    let surface = &self.scene.surfaces[i];
+                    for &v in &surface.mesh.vertices {
+                        out.vertex(|| surface.placement.point(v));
+                    }
+                    for &n in &surface.mesh.normals {
+                        out.normal(|| surface.placement.direction(n));
+                    }
+                }
+            }
+        }
+    }
+
+    /// All items by owner, else in their order. A sort by counting: owners are numbers from 0.
+    pub(super) fn by_owner(&self) -> Vec<u32> {
+        let mut next = vec![0_u32; self.scene.owners().len() + 1];
+        for n in 0..self.len() {
+            next[self.owner_of(n).index() + 1] += 1;
+        }
+        for owner in 1..next.len() {
+            next[owner] += next[owner - 1];
+        }
+        let mut order = vec![0_u32; self.len()];
+        for n in 0..self.len() {
+            let place = &mut next[self.owner_of(n).index()];
+            order[*place as usize] = n as u32;
+            *place += 1;
+        }
+        order
+    }
+
+    /// Makes the triangles of items that are given [by owner](Solid::by_owner), by material within an owner: `begin`
+    /// is told the owner and the material before those that have them. All of an owner must be given at once.
+    pub(super) fn faces<Out: Faces>(
+        &self,
+        items: &[u32],
+        out: &mut Out,
+        mut begin: impl FnMut(&mut Out, OwnerId, MaterialId),
+    ) {
+        let owner = |n: u32| self.owner_of(n as usize);
+        let mut runs: Vec<Run> = Vec::new();
+        for group in items.chunk_by(|&a, &b| owner(a) == owner(b)) {
+            runs.clear();
+            for &n in group {
+                self.add_runs(self.item(n as usize), &mut runs);
+            }
+            // Stable, so that triangles stay in the order in which they were made.
+            if !runs.is_sorted_by_key(|run| run.material) {
+                runs.sort_by_key(|run| run.material);
+            }
+            for run in &runs {
+                begin(out, owner(group[0]), run.material);
+                self.faces_of(run, out);
+            }
+        }
+    }
+
+    fn add_runs(&self, item: Item, runs: &mut Vec<Run>) {
+        match item {
+            Item::Stem(i) => runs.push(Run { material: self.tubes.segment(i).material, item, faces: 0..0 }),
+            Item::Polygon(i) => {
+                runs.push(Run { material: self.scene.polygons[i].material, item, faces: 0..0 });
+            }
+            Item::Surface(i) => {
+                let surface = &self.scene.surfaces[i];
+                for (start, face) in surface.mesh.faces.iter().enumerate() {
+                    let material = surface.tint.filter(|_| face.takes_tint).unwrap_or(face.material);
+                    match runs.last_mut().filter(|run| start > 0 && run.material == material) {
+                        Some(run) => run.faces.end += 1,
+                        None => runs.push(Run { material, item, faces: start..start + 1 }),
+                    }
+                }
+            }
+        }
+    }
+
+    fn faces_of(&self, run: &Run, out: &mut impl Faces) {
+        match run.item {
+            Item::Stem(i) => self.tubes.faces(i, out),
+            Item::Polygon(i) => {
+                let vertices = &self.scene.polygons[i].vertices;
+                let [first, normal] = self.polygons[i];
+                for triangle in triangulate::triangulate(vertices, triangulate::normal(vertices)) {
+                    out.face(triangle.map(|k| (first + k as u32, normal)));
+                }
+            }
+            Item::Surface(i) => {
+                let [vertex, normal] = self.surfaces[i];
+                for face in &self.scene.surfaces[i].mesh.faces[run.faces.clone()] {
+                    out.face(face.corners.map(|k| (vertex + k, normal + k)));
+                }
+            }
+        }
+    }
+}
+
+/// A triangle: vertex and normal at each corner, by number.
+pub(super) struct Triangle {
+    pub(super) material: MaterialId,
+    pub(super) corners: [(u32, u32); 3],
+}
+
+/// A triangle mesh in memory.
+pub(super) struct Triangles {
+    pub(super) vertices: Vec<Point>,
+    pub(super) normals: Vec<Vector>,
+    pub(super) faces: Vec<Triangle>,
+    material: MaterialId,
+}
+
+impl Points for Triangles {
+    fn vertex(&mut self, at: impl FnOnce() -> Point) {
+        self.vertices.push(at());
+    }
+
+    fn normal(&mut self, of: impl FnOnce() -> Vector) {
+        self.normals.push(of());
+    }
+}
+
+impl Faces for Triangles {
+    fn face(&mut self, corners: [(u32, u32); 3]) {
+        self.faces.push(Triangle { material: self.material, corners });
+    }
+}
+
+/// Everything in a scene as triangles, in string order; stems as tubes with so many sides.
+pub(super) fn triangles(scene: &Scene, fit: &Fit, sides: usize) -> Triangles {
+    let solid = Solid::new(scene, fit, sides);
+    let [vertices, normals] = solid.counts.map(|count| count as usize);
+    let mut mesh = Triangles {
+        vertices: Vec::with_capacity(vertices),
+        normals: Vec::with_capacity(normals),
+        faces: Vec::with_capacity(2 * vertices),
+        material: MaterialId::STEM,
+    };
+    solid.points(0..solid.len(), &mut mesh);
+    solid.faces(&solid.by_owner(), &mut mesh, |mesh, _, material| mesh.material = material);
+    mesh
+}

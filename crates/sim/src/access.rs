@@ -1,0 +1,91 @@
+//! What random access in time needs of a simulation: to go on bit by bit, and to know what may be shown.
+//!
+//! A copy of a simulation goes on as the simulation does, to the same bits, so copies are the marks from which earlier
+//! times are reached again (`replay`). Between two entries of its queues a simulation knows everything: any time
+//! in between is a matter of evaluating formulas and dense output, forwards or backwards.
+
+use super::error::Error;
+use super::passing::is_before;
+use super::simulation::Simulation;
+use super::state::State;
+use dlsys_tree::Instant;
+
+/// Where [`Simulation::pass_some`] has stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Passed {
+    /// Nothing comes before the time that was asked for.
+    All,
+    /// After productions of one instant.
+    Event,
+    /// After as many entries as were allowed.
+    Some,
+}
+
+/// True if an event of an instant has taken place when time has passed up to `t`.
+pub fn happens_by(at: Instant, t: f64) -> bool {
+    is_before(at, true, Instant::new(t))
+}
+
+impl Simulation<'_> {
+    /// Lets time pass up to `t`, as [`Simulation::pass`], but at most so many entries of the queues (events, ends of
+    /// steps), and, if that is asked for, only to the next production.
+    ///
+    /// # Errors
+    /// As of [`Simulation::pass`].
+    pub fn pass_some(&mut self, t: f64, most: usize, one_event: bool) -> Result<Passed, Error> {
+        for _ in 0..most {
+            let before = self.stats.events;
+            match self.guarded(|simulation| simulation.advance_once(t))? {
+                None => return Ok(Passed::All),
+                // Not if a module has only gone over to other equations.
+                Some(_) if one_event && self.stats.events > before => return Ok(Passed::Event),
+                Some(_) => {}
+            }
+        }
+        Ok(Passed::Some)
+    }
+
+    /// True if nothing has been passed that comes after `t`: then [`Simulation::at`] may be asked for `t`, though
+    /// later times have been looked at before, and gives the bits that a run to `t` gives.
+    pub fn can_show(&self, t: f64) -> bool {
+        !self.has_failed() && self.last.is_none_or(|(at, event)| is_before(at, event, Instant::new(t)))
+    }
+
+    /// The time of the last thing that was passed; 0 at the start.
+    pub fn reached(&self) -> f64 {
+        self.reached_at().to_f64()
+    }
+
+    /// The same, to all its digits.
+    pub fn reached_at(&self) -> Instant {
+        self.last.map_or(Instant::ZERO, |(at, _)| at)
+    }
+
+    /// A measure of the work done so far, in units of very roughly a tenth of a microsecond. It grows
+    /// with time, and is the same in every run of the model.
+    pub fn work(&self) -> u64 {
+        /// A step of a module alone; one of a repair, with what it takes to look at its neighbours.
+        const STEP: [u64; 2] = [10, 100];
+        let stats = self.stats();
+        let steps = STEP[usize::from(self.looks_around)] * stats.steps;
+        4 * (stats.events + self.passed) + stats.rhs_evaluations / 8 + steps
+    }
+
+    /// Bytes that a copy takes, about.
+    pub fn size(&self) -> usize {
+        /// What a coupled component costs: its equations, a step, the working memory of the method.
+        const COMPONENT: usize = 400;
+        let numeric = |state: &State| state.step.as_ref().map_or(0, |step| size_of_val(&**step) + 400);
+        let states: usize =
+            self.plant.states.iter().flatten().map(|s| size_of::<State>() + 100 + numeric(s)).sum();
+        let known = if self.looks_around { 100 } else { 0 };
+        let events = 12 * self.plant.tree.len();
+        let coupled = COMPONENT * self.coupled.members.len();
+        self.plant.tree.size()
+            + events
+            + states
+            + coupled
+            + known * self.plant.tree.slots()
+            + 8 * self.plant.states.len()
+    }
+}

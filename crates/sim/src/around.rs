@@ -1,0 +1,109 @@
+//! What a module reads of others: its context, and the modules attached to it.
+
+use std::ops::Deref;
+
+use smallvec::SmallVec;
+
+use dlsys_expr::{Scratch, Value};
+use dlsys_model::Rule;
+use dlsys_tree::ModuleId;
+
+/// The modules that a rule looks at: those of its context in the order of its variables, then, for each of its
+/// aggregates, those attached to it that match.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Around {
+    modules: SmallVec<[ModuleId; 2]>,
+    /// Where the children of each aggregate end.
+    ends: SmallVec<[u32; 1]>,
+    context: u32,
+}
+
+impl Deref for Around {
+    type Target = [ModuleId];
+
+    fn deref(&self) -> &[ModuleId] {
+        &self.modules
+    }
+}
+
+impl<'a> IntoIterator for &'a Around {
+    type Item = &'a ModuleId;
+    type IntoIter = std::slice::Iter<'a, ModuleId>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.modules.iter()
+    }
+}
+
+impl Around {
+    pub fn clear(&mut self) {
+        self.modules.clear();
+        self.ends.clear();
+        self.context = 0;
+    }
+
+    /// Adds a module of the context.
+    pub fn push(&mut self, id: ModuleId) {
+        self.modules.push(id);
+        self.context = self.modules.len() as u32;
+    }
+
+    /// Takes back all modules of the context but so many.
+    pub fn truncate(&mut self, context: usize) {
+        self.modules.truncate(context);
+        self.context = context as u32;
+    }
+
+    /// Turns round the first modules of the context.
+    pub fn reverse(&mut self, first: usize) {
+        self.modules[..first].reverse();
+    }
+
+    /// Adds the children that an aggregate looks at.
+    pub fn push_children(&mut self, children: impl Iterator<Item = ModuleId>) {
+        self.modules.extend(children);
+        self.ends.push(self.modules.len() as u32);
+    }
+
+    /// The context alone.
+    pub fn context(&self) -> &[ModuleId] {
+        &self.modules[..self.context as usize]
+    }
+
+    /// The children of one aggregate.
+    pub fn children(&self, aggregate: usize) -> &[ModuleId] {
+        let end = |i: usize| self.ends.get(i).copied().unwrap_or(self.context) as usize;
+        let from = aggregate.checked_sub(1).map_or(self.context as usize, end);
+        &self.modules[from..end(aggregate).max(from)]
+    }
+}
+
+/// Appends the values of a rule's aggregates, `t` and `age` to the variables of module and context. `values` appends
+/// the parameters of a child.
+pub fn gather<T: Value>(
+    rule: &Rule,
+    around: &Around,
+    time: [T; 2],
+    variables: &mut Vec<T>,
+    scratch: &mut Scratch<T>,
+    wanted: impl Fn(usize) -> bool,
+    mut values: impl FnMut(ModuleId, &mut Vec<T>),
+) {
+    variables.resize(rule.variables - 2, T::constant(0.0));
+    variables.extend(time);
+    for (i, aggregate) in rule.aggregates.iter().enumerate() {
+        if !wanted(rule.first_aggregate + i) {
+            continue;
+        }
+        let mut children = around.children(i).iter();
+        let next = |variables: &mut Vec<T>| match children.next() {
+            Some(&child) => {
+                values(child, variables);
+                true
+            }
+            None => false,
+        };
+        let value = aggregate.evaluate(variables, next, scratch);
+        variables[rule.first_aggregate + i] = value;
+    }
+}

@@ -1,0 +1,558 @@
+//! Modules whose equations read one another: who they are, and their common step.
+//!
+//! Only those are coupled that read something of a neighbour which is integrated itself; a neighbour that follows a
+//! formula is an input. All of them are integrated together over a common step. What happens to some of them within
+//! it is repaired there (`repair`), or ends it for all.
+
+use super::course::Course;
+use super::equations::Equations;
+use super::error::Error;
+use super::fetch::fetch_ahead;
+use super::flash::{self, Glance, MAX_UNBOUNDED};
+use super::integrator::{Integrator, StepError, foresee};
+use super::linear::Linear;
+use super::motion::Motion;
+use super::plant::{Path, Plant};
+use super::queue::Who;
+use super::repair::Repairer;
+use super::simulation::Simulation;
+use super::state::{Control, State, What};
+use super::system::System;
+use super::watch::needs_search;
+use super::{Method, Scheduler};
+use dlsys_model::{Model, Rule};
+use dlsys_tree::{Instant, ModuleId, Visit};
+use std::collections::HashSet;
+
+/// The coupled modules and their common step.
+#[derive(Clone, Default)]
+pub struct Coupled {
+    /// Those of the common step in string order, then those that have come since; some may have gone.
+    pub members: Vec<ModuleId>,
+    pub system: System,
+    y: Vec<f64>,
+    pub integrator: Integrator,
+    pub control: Control,
+    /// The equations once more, if they are solved without steps.
+    linear: Option<Linear>,
+    /// A step has been made whose dense output nobody has asked for yet.
+    pending: bool,
+    /// Repairs have changed the members or their motion since the common step was made.
+    pub repaired: bool,
+    /// Modules that have lost a neighbour who reads them.
+    pub loosened: Vec<ModuleId>,
+    pub repairer: Repairer,
+    affected: Affected,
+    /// A solution without steps was looked for.
+    tried: bool,
+    /// Times that an event cut a motion without steps.
+    cuts: u32,
+    mark: Instant,
+    since_mark: usize,
+    /// Members whose rates may have flashes.
+    flashing: Vec<ModuleId>,
+}
+
+/// Most times that a step is tried whose algebraic components cannot be followed.
+const MAX_TRIES: usize = 100;
+
+/// Solving without steps begins anew, for all modules, at every event: after so many of them steps are made.
+const MAX_CUTS: u32 = 2;
+
+/// What an instant means for the coupled modules.
+#[derive(Clone, Default)]
+struct Affected {
+    /// Coupled modules whose equations or inputs have changed.
+    seeds: Vec<ModuleId>,
+    /// Of these, those that were not coupled before.
+    joined: Vec<ModuleId>,
+    /// Modules that need no longer be coupled.
+    freed: Vec<ModuleId>,
+    /// Modules that follow formulas, but watch a neighbour that has changed.
+    dependent: Vec<ModuleId>,
+}
+
+impl Simulation<'_> {
+    /// Finds out who is coupled now, given the modules that have begun new motions, and lets the coupled ones go on.
+    pub(super) fn couple(&mut self, begun: &[ModuleId]) -> Result<(), Error> {
+        let mut affected = std::mem::take(&mut self.coupled.affected);
+        self.find_affected(begun, &mut affected);
+        let coupled = self.couple_affected(&affected);
+        self.coupled.affected = affected;
+        coupled
+    }
+
+    fn couple_affected(&mut self, affected: &Affected) -> Result<(), Error> {
+        let Affected { seeds, joined, freed, dependent } = affected;
+        for &id in dependent {
+            if let Some(state) = self.plant.state_mut(id) {
+                state.pass_changes(self.now);
+            }
+            self.look_ahead(id, self.now)?;
+        }
+        for &id in freed {
+            let now = self.now;
+            let state = self.plant.state_mut(id).expect("seen above");
+            state.coupled = false;
+            state.pass_changes(now);
+            if state.restarted != self.group {
+                self.plant.materialise(id, now);
+                self.start_motions(id, self.forced);
+                self.look_ahead(id, now)?;
+            }
+        }
+        self.coupled.repaired |= !freed.is_empty();
+        for &id in joined {
+            self.plant.state_mut(id).expect("seen above").coupled = true;
+        }
+        for &id in seeds {
+            let now = self.now;
+            let state = self.plant.state_mut(id).expect("seen above");
+            state.pass_changes(now);
+            // Formulas go on as they were, whatever their module reads.
+            if !state.next.lasting || state.restarted == self.group {
+                state.next = state.next.again();
+            }
+        }
+        if seeds.is_empty() || self.repair(seeds, joined) {
+            return Ok(());
+        }
+        if self.coupled.linear.is_some() {
+            self.coupled.cuts += 1;
+        }
+        let now = self.now;
+        if let Some(course) = &self.plant.coupled {
+            let control = &mut self.coupled.control;
+            foresee(control, control.last_error, now.since(course.start()), now.resolution());
+        }
+        (self.coupled.mark, self.coupled.since_mark) = (now, 0);
+        self.restart_coupled(now)
+    }
+
+    /// Looks at the modules that have begun new motions, and at their neighbours.
+    fn find_affected(&mut self, begun: &[ModuleId], affected: &mut Affected) {
+        affected.seeds.clear();
+        affected.joined.clear();
+        affected.freed.clear();
+        affected.dependent.clear();
+        let mut near = std::mem::take(&mut self.coupled.loosened);
+        // Whose many neighbours are there already.
+        let mut known = HashSet::new();
+        for &id in begun {
+            near.push(id);
+            self.readers(id, |reader, context| {
+                near.push(reader);
+                if context.len() < 8 || known.insert(reader) {
+                    near.extend_from_slice(context);
+                }
+            });
+            if let Some(state) = self.plant.state(id) {
+                near.extend_from_slice(&state.context);
+            }
+        }
+        let visit = self.coupled.repairer.begin_visit();
+        near.retain(|id| {
+            let state = self.plant.state_mut(*id);
+            state.is_some_and(|state| std::mem::replace(&mut state.visited, visit) != visit)
+        });
+        near.sort_unstable();
+        let moved = |id: &ModuleId| self.plant.state(*id).is_some_and(|s| s.restarted == self.group);
+        for &id in &near {
+            let Some(state) = self.plant.state(id) else { continue };
+            let wanted = self.is_coupled(id);
+            let reads = state.rule.is_some_and(|r| self.model.rules[r].reads_context);
+            let new_input = reads && state.context.iter().any(moved);
+            if wanted {
+                if !state.coupled {
+                    affected.joined.push(id);
+                }
+                if !state.coupled || moved(&id) || new_input {
+                    affected.seeds.push(id);
+                }
+            } else if state.coupled {
+                affected.freed.push(id);
+            } else if new_input && !moved(&id) {
+                affected.dependent.push(id);
+            }
+        }
+        near.clear();
+        self.coupled.loosened = near;
+    }
+
+    /// True if a module must be integrated together with neighbours: because it reads one that is integrated, or reads
+    /// any and is integrated itself, or is integrated and read by one that reads.
+    fn is_coupled(&self, id: ModuleId) -> bool {
+        let Some(state) = self.plant.state(id) else { return false };
+        let Some(rule) = state.rule else { return false };
+        let numeric = |id: &ModuleId| self.plant.state(*id).is_some_and(|s| s.is_numeric());
+        if self.model.rules[rule].reads_context && (state.is_numeric() || state.context.iter().any(numeric)) {
+            return true;
+        }
+        // What is solved for is solved for here.
+        let solved = |s: usize| {
+            let algebraic = &self.model.rules[rule].solves[s].algebraic;
+            (0..algebraic.of.len()).any(|place| algebraic.is_solved(place, state.forced))
+        };
+        if state.solve.is_some_and(solved) {
+            return true;
+        }
+        let mut read = false;
+        if state.is_numeric() {
+            self.readers(id, |_, _| read = true);
+        }
+        read
+    }
+
+    /// Begins the common motion of the coupled modules at an instant.
+    fn restart_coupled(&mut self, at: Instant) -> Result<(), Error> {
+        let mut members = std::mem::take(&mut self.coupled.members);
+        members.clear();
+        members.extend(self.plant.tree.walk().filter_map(|visit| match visit {
+            Visit::Module(id) if matches!(self.plant.states.get(id.slot()), Some(Some(_))) => Some(id),
+            _ => None,
+        }));
+        let course = self.plant.coupled.take();
+        self.coupled.y.clear();
+        let mut count = 0;
+        for n in 0..members.len() {
+            fetch_ahead(&self.plant, &members, n);
+            let id = members[n];
+            if self.plant.state(id).is_none_or(|s| !s.coupled) {
+                continue;
+            }
+            members[count] = id;
+            count += 1;
+            let Plant { tree, states, .. } = &mut self.plant;
+            let state = states[id.slot()].as_mut().expect("a member");
+            let first = tree.places(id).start;
+            for &parameter in integrated(self.model, state) {
+                let motion = &mut state.motions[parameter];
+                let value = match *motion {
+                    Motion::Coupled(component) => {
+                        course.as_ref().and_then(|c| c.value(component as usize, at))
+                    }
+                    Motion::Step(component) => state
+                        .step
+                        .as_ref()
+                        .filter(|step| step.live)
+                        .map(|step| step.dense.value(component as usize, step.dense.position(at))),
+                    _ => None,
+                };
+                let place = first + parameter;
+                let value = value.unwrap_or(tree.values()[place]);
+                tree.set_value(place, value);
+                *motion = Motion::Coupled(self.coupled.y.len() as u32);
+                self.coupled.y.push(value);
+            }
+            state.pass_changes(at);
+            if !state.next.lasting {
+                state.next = state.next.again();
+                self.queue.cancel(Who::Module(id.slot() as u32));
+            }
+        }
+        members.truncate(count);
+        self.queue.cancel(Who::Coupled);
+        let frozen = self.settings.is_sliced();
+        self.coupled.system.rebuild(&self.model.rules, &self.plant, &members, at, Some, frozen);
+        self.coupled.flashing.clear();
+        if self.flashes && !self.settings.method.is_fixed_step() {
+            let flashing: Vec<ModuleId> = members.iter().copied().filter(|id| self.may_flash(*id)).collect();
+            self.coupled.flashing = flashing;
+        }
+        self.coupled.members = members;
+        (self.coupled.repaired, self.coupled.pending) = (false, false);
+        let without_steps = self.settings.method == Method::Auto
+            && (self.coupled.control.stiff || self.coupled.cuts < MAX_CUTS)
+            && !self.settings.is_sliced()
+            && !self.watches_coupled();
+        self.coupled.tried = without_steps;
+        self.coupled.linear = (without_steps)
+            .then(|| {
+                let tolerance = self.coupled_settings.tolerance;
+                Linear::new(&self.coupled.system, &self.model.rules, &self.coupled.y, tolerance)
+            })
+            .flatten();
+        // After each, all members are searched.
+        self.coupled.integrator.dear = true;
+        self.coupled.integrator.unwatched = self.model.rules.iter().all(|rule| rule.atoms.is_empty())
+            && self.coupled.flashing.is_empty()
+            && self.coupled.system.algebra.is_empty();
+        self.coupled.integrator.restart(self.settings.method, self.coupled.y.len());
+        if self.coupled.members.is_empty() {
+            return Ok(());
+        }
+        if self.coupled.linear.is_some() {
+            self.show_coupled(at);
+            return Ok(());
+        }
+        self.step_coupled(at)
+    }
+
+    /// True if some condition of the coupled modules can only be found by searching their common motion.
+    fn watches_coupled(&self) -> bool {
+        self.coupled.members.iter().any(|id| self.is_watched(*id))
+    }
+
+    fn is_watched(&self, id: ModuleId) -> bool {
+        let rule = self.plant.state(id).and_then(|s| s.rule);
+        rule.is_some_and(|r| !self.model.rules[r].atoms.is_empty())
+    }
+
+    /// Sees to it that the coupled modules' motion is known at an instant.
+    pub(super) fn show_coupled(&mut self, at: Instant) {
+        let Coupled { system, y, integrator, control, linear, pending, .. } = &mut self.coupled;
+        match linear {
+            Some(linear) => {
+                if self.plant.coupled.as_ref().is_none_or(|course| course.start() != at) {
+                    let dense = linear.at(at, &self.coupled_settings, control, &mut self.stats);
+                    self.plant.coupled = Some(Course::new(dense));
+                }
+            }
+            None => {
+                if std::mem::take(pending) {
+                    let mut equations = Equations::new(system, &self.model.rules, None);
+                    let stretches = match integrator.unwatched {
+                        true => integrator.refined(&mut equations, y, &self.coupled_settings),
+                        false => vec![integrator.dense(&mut equations, y)],
+                    };
+                    self.plant.coupled = Some(Course::of(stretches));
+                }
+            }
+        }
+    }
+
+    /// Makes a step of the coupled modules and searches it.
+    fn step_coupled(&mut self, from: Instant) -> Result<(), Error> {
+        let rules = &self.model.rules;
+        let Coupled { system, y, integrator, control, flashing, .. } = &mut self.coupled;
+        let mut equations = Equations::new(system, rules, None);
+        let limit = self.settings.slice_end(from);
+        let (mut course, mut tries) = (None, 0);
+        let settings = &self.coupled_settings;
+        let step = loop {
+            let stats = &mut self.stats;
+            let step = integrator.step(settings, control, &mut equations, y, from, limit, stats);
+            if step.is_err() || system.algebra.is_empty() && flashing.is_empty() {
+                break step;
+            }
+            let stretches = match system.algebra.is_empty() {
+                true => Ok(vec![integrator.dense(&mut equations, y)]),
+                false => integrator.blended(&mut equations, y, settings, control),
+            };
+            match stretches {
+                Ok(stretches) => {
+                    let found = Course::of(stretches);
+                    let h = found.end.since(from);
+                    self.plant.coupled = Some(found);
+                    let stiff = control.stiff || settings.method == Method::Radau;
+                    let nodes = integrator.nodes();
+                    let overlooked = flashing.iter().filter_map(|id| {
+                        let how = (settings.tolerance, stiff);
+                        let step = step_of(&self.plant, rules, *id, from, &nodes, how)?;
+                        match self.lookout.look(&step) {
+                            Glance::Clear => None,
+                            Glance::Overlooked(at) => Some(at),
+                            Glance::Unbounded(at) if tries <= MAX_UNBOUNDED => Some(at),
+                            Glance::Unbounded(at) => {
+                                let rule = self.plant.state(*id).and_then(|s| s.rule).unwrap_or(0);
+                                self.unbounded.entry(rule).or_insert(from.to_f64() + at * h);
+                                None
+                            }
+                        }
+                    });
+                    let overlooked = overlooked.reduce(f64::min);
+                    course = self.plant.coupled.take();
+                    let least = 64.0 * from.resolution();
+                    match overlooked {
+                        Some(at) if h > least && tries < MAX_TRIES => {
+                            tries += 1;
+                            stats.rejected += 1;
+                            control.size = (h * if at > 0.0 { at } else { 0.25 }).max(least);
+                        }
+                        _ => break step,
+                    }
+                }
+                Err(fault) => {
+                    tries += 1;
+                    stats.rejected += 1;
+                    if tries > MAX_TRIES || settings.method.is_fixed_step() {
+                        break Err(StepError::NotFinite(fault.component()));
+                    }
+                }
+            }
+        };
+        let end = match step {
+            Ok(end) => end,
+            Err(error) => {
+                // What cannot be solved for says more than that no step goes on.
+                let fault = equations.make_consistent(0.0, &mut y.clone()).err();
+                let component = match error {
+                    StepError::TooSmall(c) | StepError::Rate(c) | StepError::NotFinite(c) => c,
+                };
+                if fault.is_none() && self.arrest_coupled(component, from) {
+                    return Ok(());
+                }
+                return Err(match fault {
+                    Some(fault) => self.unsolved(fault, self.coupled.system.owner(fault.component()), from),
+                    None => self.coupled_error(error, from),
+                });
+            }
+        };
+        self.coupled.pending = course.is_none();
+        self.plant.coupled = course;
+        let members = std::mem::take(&mut self.coupled.members);
+        for (at, &id) in members.iter().enumerate() {
+            fetch_ahead(&self.plant, &members, at);
+            self.search_member(id, from);
+        }
+        self.coupled.members = members;
+        self.queue.schedule(Who::Coupled, end);
+        Ok(())
+    }
+
+    /// Finds a coupled module's next event before the end of the common step.
+    pub(super) fn search_member(&mut self, id: ModuleId, from: Instant) {
+        let Some(state) = self.plant.state(id) else { return };
+        let Some(rule) = state.rule.map(|r| &self.model.rules[r]) else { return };
+        if rule.atoms.is_empty() || state.next.lasting {
+            return;
+        }
+        if !needs_search(state, rule) {
+            self.look_ahead(id, from).expect("no step is made");
+            return;
+        }
+        self.show_coupled(from);
+        let who = Who::Module(id.slot() as u32);
+        let mut start = from;
+        loop {
+            let (Some(course), Some(state)) = (&self.plant.coupled, self.plant.state(id)) else { return };
+            let Some(rule) = state.rule.map(|r| &self.model.rules[r]) else { return };
+            // Everything that the module reads follows one polynomial up to there.
+            let knot = self.plant.knot(state, course, start);
+            let h = knot.since(start);
+            if h <= 0.0 {
+                return self.queue.cancel(who);
+            }
+            let path = Path::new(&self.plant, state, rule, start, h);
+            let found = self.watcher.search(&path, 1.0);
+            let last = knot.since(course.end) >= 0.0;
+            let state = self.plant.state_mut(id).expect("seen above");
+            state.next.changes.extend(found.changes);
+            state.next.near = found.near;
+            if found.event.is_some() {
+                let time = found.touched[0].time;
+                let what = if found.in_doubt { What::Doubt } else { What::Event };
+                (state.next.what, state.next.touched) = (what, found.touched);
+                return self.queue.schedule(who, time);
+            }
+            if last {
+                return self.queue.cancel(who);
+            }
+            start = knot;
+        }
+    }
+
+    /// Goes to the end of a step of the coupled modules, and on.
+    pub(super) fn pass_coupled_step(&mut self, at: Instant) -> Result<(), Error> {
+        let Coupled { mark, since_mark, .. } = &mut self.coupled;
+        if super::local::crawls(mark, since_mark, at) && !self.settings.method.is_fixed_step() {
+            return Err(self.coupled_error(StepError::TooSmall(0), at));
+        }
+        let slice_ends = |from| self.settings.slice_end(from).is_some_and(|end| end == at);
+        if self.coupled.repaired || slice_ends(self.coupled.system.start) {
+            // What the step has brought is read from its motion, which nobody may have asked for yet.
+            self.show_coupled(at);
+            return self.restart_coupled(at);
+        }
+        let Coupled { members, system, y, integrator, control, .. } = &mut self.coupled;
+        for (n, id) in members.iter().enumerate() {
+            fetch_ahead(&self.plant, members, n);
+            self.plant.state_mut(*id).expect("a member").pass_changes(at);
+        }
+        integrator.advance(y);
+        for (&(place, ..), &value) in system.places.iter().zip(y.iter()) {
+            self.plant.tree.set_value(place, value);
+        }
+        system.advance(at);
+        let stiff = control.stiff && self.settings.method == Method::Auto;
+        if stiff && !self.coupled.tried && !self.watches_coupled() {
+            return self.restart_coupled(at);
+        }
+        self.step_coupled(at)
+    }
+
+    /// True if events end the common step for all.
+    pub(super) fn is_cut_by_events(&self) -> bool {
+        if self.settings.is_sliced() {
+            return false;
+        }
+        self.settings.scheduler == Scheduler::Global
+            || self.settings.method.is_fixed_step()
+            || self.settings.method == Method::Radau
+            || self.coupled.control.stiff
+            || self.coupled.linear.is_some()
+    }
+
+    /// Where no common step leads on because some equations end there: if a boundary is there too, of the module that a
+    /// component belongs to or of one that it reads, it has been reached.
+    fn arrest_coupled(&mut self, component: usize, at: Instant) -> bool {
+        let Some((id, _)) = self.coupled.system.owner(component) else { return false };
+        let context = self.plant.state(id).map(|s| s.context.to_vec()).unwrap_or_default();
+        let all = std::iter::once(id).chain(context);
+        let arrested: Vec<()> = all.filter_map(|id| self.arrest(id, at)).collect();
+        !arrested.is_empty()
+    }
+
+    fn may_flash(&self, id: ModuleId) -> bool {
+        let clause = self.plant.state(id).and_then(|s| Some(&self.model.rules[s.rule?].solves[s.solve?]));
+        clause.is_some_and(|solve| solve.flashes)
+    }
+
+    /// True if something may have been overlooked of the present motion of some coupled modules, from now on.
+    pub(super) fn is_overlooked(&mut self, members: &[ModuleId]) -> bool {
+        if !self.flashes || self.settings.method.is_fixed_step() {
+            return false;
+        }
+        let flashing: Vec<ModuleId> = members.iter().copied().filter(|id| self.may_flash(*id)).collect();
+        let how = (self.coupled_settings.tolerance, false);
+        let (plant, rules, lookout) = (&self.plant, &self.model.rules, &mut self.lookout);
+        let nodes = &*self.coupled.repairer.nodes();
+        flashing.into_iter().any(|id| {
+            let step = step_of(plant, rules, id, self.now, nodes, how);
+            step.is_some_and(|step| lookout.look(&step) != Glance::Clear)
+        })
+    }
+
+    fn coupled_error(&self, error: StepError, at: Instant) -> Error {
+        let Coupled { system, y, .. } = &self.coupled;
+        let owner = |component: usize| system.owner(component);
+        if matches!(error, StepError::TooSmall(_) | StepError::NotFinite(_))
+            && let Some(fault) = Equations::new(system, &self.model.rules, None).fading(y)
+        {
+            return self.unsolved(fault, owner(fault.component()), at);
+        }
+        self.step_error(error, at, owner)
+    }
+}
+
+/// A step of a coupled module, from an instant to the end of what is known.
+fn step_of<'p>(
+    plant: &'p Plant,
+    rules: &'p [Rule],
+    id: ModuleId,
+    start: Instant,
+    nodes: &'p [f64],
+    (tolerance, stiff): (f64, bool),
+) -> Option<flash::Step<'p>> {
+    let state = plant.state(id)?;
+    let rule = &rules[state.rule?];
+    let (solve, end) = (&rule.solves[state.solve?], plant.coupled.as_ref()?.end);
+    Some(flash::Step { plant, state, rule, solve, start, end, nodes, own: None, tolerance, stiff })
+}
+
+/// The parameters of a coupled module that are integrated, then those that are solved for, in the order of their
+/// components.
+pub(super) fn integrated<'m>(model: &'m Model, state: &State) -> &'m [usize] {
+    let Some((rule, solve)) = state.rule.zip(state.solve) else { return &[] };
+    model.rules[rule].solves[solve].stepping.components(state.forced)
+}

@@ -1,0 +1,180 @@
+//! How the coupled modules move during their common step, and on stretches that were integrated again since it was made.
+
+use super::dense::{Coefficients, Dense};
+use dlsys_expr::{Dual, Interval};
+use dlsys_tree::Instant;
+
+/// The motion of all components from the last common step to its end.
+#[derive(Clone, Debug)]
+pub struct Course {
+    /// The common step, then the stretches of repairs.
+    stretches: Vec<Dense>,
+    /// By component: where it is found. Empty as long as there is the common step only.
+    tracks: Vec<Track>,
+    pub end: Instant,
+    /// What the components may be wrong by, relative, in the worst of the stretches.
+    pub error: f64,
+}
+
+/// The stretches, one after another, in which a component is found, and its number there.
+#[derive(Clone, Copy, Debug)]
+struct Track {
+    first: u32,
+    /// None yet if this is 0.
+    count: u32,
+    component: u32,
+}
+
+/// A component along a stretch of time that lies within one dense output.
+#[derive(Clone, Copy)]
+pub struct Piece<'c> {
+    dense: &'c Dense,
+    component: usize,
+    /// Position in the dense output at the start, and change of it from start to end.
+    from: f64,
+    scale: f64,
+}
+
+impl Course {
+    /// The components of a common step.
+    pub fn new(step: Dense) -> Course {
+        let (end, error) = (step.end, step.error);
+        Course { stretches: vec![step], tracks: Vec::new(), end, error }
+    }
+
+    /// The components of a common step that is several stretches.
+    pub fn of(stretches: Vec<Dense>) -> Course {
+        let end = stretches.last().expect("one at least").end;
+        let count = stretches.len() as u32;
+        let track = |component: u32| Track { first: 0, count, component };
+        let tracks =
+            if count == 1 { Vec::new() } else { (0..stretches[0].len() as u32).map(track).collect() };
+        let error = stretches.iter().map(|dense| dense.error).fold(0.0, f64::max);
+        Course { stretches, tracks, end, error }
+    }
+
+    /// The start of the common step.
+    pub fn start(&self) -> Instant {
+        self.stretches[0].start
+    }
+
+    /// True if all components follow the dense output of the common step to its end.
+    pub fn is_whole(&self) -> bool {
+        self.tracks.is_empty()
+    }
+
+    fn track(&self, component: usize) -> Track {
+        let whole = Track { first: 0, count: 1, component: component as u32 };
+        self.tracks.get(component).copied().unwrap_or(whole)
+    }
+
+    /// The dense output that a component follows from an instant on, and its number there.
+    fn stretch(&self, component: usize, at: Instant) -> Option<(&Dense, usize)> {
+        let Track { first, count, component } = self.track(component);
+        if count == 1 {
+            return Some((&self.stretches[first as usize], component as usize));
+        }
+        let own = &self.stretches[first as usize..(first + count) as usize];
+        let dense = own.iter().find(|dense| at.since(dense.end) < 0.0).or(own.last())?;
+        Some((dense, component as usize))
+    }
+
+    /// A component at an instant; None for one that has not been integrated yet.
+    pub fn value(&self, component: usize, at: Instant) -> Option<f64> {
+        let (dense, component) = self.stretch(component, at)?;
+        Some(dense.value(component, dense.position(at)))
+    }
+
+    /// The end of the dense output that a component follows from an instant on.
+    pub fn knot(&self, component: usize, from: Instant) -> Instant {
+        self.stretch(component, from).map_or(self.end, |(dense, _)| dense.end)
+    }
+
+    /// A component along a stretch of time.
+    pub fn piece(&self, component: usize, start: Instant, h: f64) -> Option<Piece<'_>> {
+        let (dense, component) = self.stretch(component, start)?;
+        Some(Piece::new(dense, component, start, h))
+    }
+
+    /// Adds a component that is not integrated yet.
+    pub fn add(&mut self, components: usize) -> usize {
+        for component in self.tracks.len()..components {
+            self.tracks.push(Track { first: 0, count: 1, component: component as u32 });
+        }
+        self.tracks.push(Track { first: 0, count: 0, component: 0 });
+        self.tracks.len() - 1
+    }
+
+    /// Puts stretches in place of what some components have followed. `components` are numbered as in the stretches.
+    pub fn replace(&mut self, stretches: &mut Vec<Dense>, components: &[u32], all: usize) {
+        for component in self.tracks.len()..all {
+            self.tracks.push(Track { first: 0, count: 1, component: component as u32 });
+        }
+        let (first, count) = (self.stretches.len() as u32, stretches.len() as u32);
+        for (number, &component) in components.iter().enumerate() {
+            self.tracks[component as usize] = Track { first, count, component: number as u32 };
+        }
+        self.error = stretches.iter().map(|dense| dense.error).fold(self.error, f64::max);
+        self.stretches.append(stretches);
+    }
+}
+
+impl<'c> Piece<'c> {
+    pub fn new(dense: &'c Dense, component: usize, start: Instant, h: f64) -> Piece<'c> {
+        if dense.start == start && dense.h == h {
+            return Piece { dense, component, from: 0.0, scale: 1.0 };
+        }
+        let scale = if dense.h == 0.0 { 0.0 } else { h / dense.h };
+        Piece { dense, component, from: dense.position(start), scale }
+    }
+
+    fn position(&self, position: f64) -> f64 {
+        (self.from + self.scale * position).min(1.0)
+    }
+
+    pub fn value(&self, position: f64) -> f64 {
+        self.dense.value(self.component, self.position(position))
+    }
+
+    /// The value at the start and its rate, per unit of position.
+    pub fn departure(&self) -> Dual<f64> {
+        let Dual { value, rate } = self.dense.departure(self.component, self.from);
+        Dual { value, rate: rate * self.scale }
+    }
+
+    /// Adds the polynomial, times a factor, to a sum of others of the same dense output and stretch; false if it is not of them.
+    pub fn add_to(&self, factor: f64, sum: &mut Option<(Piece<'c>, Coefficients)>) -> bool {
+        let (first, coefficients) = sum.get_or_insert((*self, Coefficients::default()));
+        self.dense.add_to(self.component, factor, coefficients);
+        std::ptr::eq(first.dense, self.dense)
+    }
+
+    /// Bounds of such a sum and of its rate from one position to another.
+    pub fn sum_over(&self, mut sum: Coefficients, lo: f64, hi: f64) -> Dual<Interval> {
+        self.scaled(self.dense.stretch(&mut sum, self.position(lo), self.position(hi)))
+    }
+
+    /// What it may be wrong by, as a part of its size.
+    pub fn error(&self) -> f64 {
+        self.dense.error
+    }
+
+    /// Bounds over the whole stretch.
+    pub fn bounds(&self) -> Interval {
+        if self.from == 0.0 && self.scale == 1.0 {
+            return self.dense.bounds(self.component);
+        }
+        self.over(0.0, 1.0).value
+    }
+
+    /// Bounds of the value and of its rate (per unit of position) from one position to another.
+    pub fn over(&self, lo: f64, hi: f64) -> Dual<Interval> {
+        self.scaled(self.dense.piece(self.component, self.position(lo), self.position(hi)))
+    }
+
+    /// Rates per unit of position of the stretch.
+    fn scaled(&self, Dual { value, rate }: Dual<Interval>) -> Dual<Interval> {
+        let s = self.scale;
+        Dual { value, rate: Interval { lo: rate.lo * s, hi: rate.hi * s, ..rate } }
+    }
+}

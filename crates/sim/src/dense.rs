@@ -1,0 +1,255 @@
+//! The solution within one step, as polynomials in Bernstein form.
+//!
+//! Every method's dense output is a polynomial; in Bernstein form its coefficients bound it (the convex
+//! hull property), so that a step can be searched for events without sampling it (Farouki 2012, sections
+//! 3 and 4). Both ends of the step are coefficients: evaluation there is exact.
+
+use dlsys_expr::{Dual, Interval, Value};
+use dlsys_tree::Instant;
+
+/// Highest degree of a dense output.
+pub const MAX_DEGREE: usize = 7;
+/// Where the error of interpolation is measured, and Bernstein polynomials of degree 7 and their slopes there.
+pub const PLACE: f64 = 0.7;
+const AT_PLACE: [[f64; 8]; 2] = bernstein(PLACE);
+
+const fn bernstein(at: f64) -> [[f64; 8]; 2] {
+    const CHOOSE: [f64; 8] = [1.0, 7.0, 21.0, 35.0, 35.0, 21.0, 7.0, 1.0];
+    const fn power(x: f64, n: usize) -> f64 {
+        if n == 0 { 1.0 } else { x * power(x, n - 1) }
+    }
+    let mut all = [[0.0; 8]; 2];
+    let mut i = 0;
+    while i < 8 {
+        all[0][i] = CHOOSE[i] * power(at, i) * power(1.0 - at, 7 - i);
+        all[1][i] = all[0][i] * (i as f64 / at - (7 - i) as f64 / (1.0 - at));
+        i += 1;
+    }
+    all
+}
+
+pub type Coefficients = [f64; MAX_DEGREE + 1];
+
+/// All components of the solution from `start` to `start + h`.
+#[derive(Clone, Debug)]
+pub struct Dense {
+    pub start: Instant,
+    pub end: Instant,
+    /// Length of the step.
+    pub h: f64,
+    /// What its components may be wrong by, as a part of their size.
+    pub error: f64,
+    degree: usize,
+    /// `degree + 1` coefficients for each component.
+    coefficients: Vec<f64>,
+}
+
+impl Dense {
+    /// A step to `end`, if that is known better than as `start` and `h`.
+    pub fn new(start: Instant, end: Option<Instant>, h: f64, degree: usize, coefficients: Vec<f64>) -> Dense {
+        debug_assert!(degree <= MAX_DEGREE);
+        Dense { start, end: end.unwrap_or_else(|| start.after(h)), h, error: 0.0, degree, coefficients }
+    }
+
+    /// Number of components.
+    pub fn len(&self) -> usize {
+        self.coefficients.len() / (self.degree + 1)
+    }
+
+    /// Position of an instant in the step: 0 at its start, 1 at its end.
+    pub fn position(&self, at: Instant) -> f64 {
+        if self.h == 0.0 { 0.0 } else { (at.since(self.start) / self.h).clamp(0.0, 1.0) }
+    }
+
+    fn of(&self, component: usize) -> &[f64] {
+        &self.coefficients[component * (self.degree + 1)..(component + 1) * (self.degree + 1)]
+    }
+
+    /// One component at a position, by de Casteljau's algorithm.
+    pub fn value(&self, component: usize, position: f64) -> f64 {
+        let c = self.of(component);
+        // Of the degrees that methods have most often, code without loops.
+        if let Ok(c) = c.try_into() {
+            return casteljau::<5>(c, position);
+        }
+        if let Ok(c) = c.try_into() {
+            return casteljau::<8>(c, position);
+        }
+        let mut all: Coefficients = [0.0; MAX_DEGREE + 1];
+        all[..=self.degree].copy_from_slice(c);
+        for level in (1..=self.degree).rev() {
+            for i in 0..level {
+                all[i] = mix(all[i], all[i + 1], position);
+            }
+        }
+        all[0]
+    }
+
+    /// The value of a polynomial of the highest degree.
+    pub fn at(coefficients: &[f64; MAX_DEGREE + 1], position: f64) -> f64 {
+        casteljau(coefficients, position)
+    }
+
+    /// The stretch from `lo` to `hi`, with other polynomials for some components.
+    pub fn with(&self, lo: f64, hi: f64, components: &[usize], others: &[[f64; MAX_DEGREE + 1]]) -> Dense {
+        let count = self.len();
+        let mut all = Vec::with_capacity(count * (MAX_DEGREE + 1));
+        for component in 0..count {
+            let mut c: Coefficients = [0.0; MAX_DEGREE + 1];
+            c[..=self.degree].copy_from_slice(self.of(component));
+            cut(&mut c[..=self.degree], lo, hi);
+            // The same polynomial, written as one of a higher degree.
+            for degree in self.degree..MAX_DEGREE {
+                for i in (0..=degree + 1).rev() {
+                    let s = i as f64 / (degree + 1) as f64;
+                    let before = if i > 0 { c[i - 1] } else { 0.0 };
+                    c[i] = if i > degree { before } else { mix(c[i], before, s) };
+                }
+            }
+            all.extend(c);
+        }
+        for (component, other) in components.iter().zip(others) {
+            all[component * (MAX_DEGREE + 1)..][..=MAX_DEGREE].copy_from_slice(other);
+        }
+        let start = if lo == 0.0 { self.start } else { self.start.after(lo * self.h) };
+        let end = if hi == 1.0 { self.end } else { self.start.after(hi * self.h) };
+        let h = if lo == 0.0 && hi == 1.0 { self.h } else { end.since(start) };
+        Dense { start, end, h, error: self.error, degree: MAX_DEGREE, coefficients: all }
+    }
+
+    /// One component at a position, and its rate there per unit of position.
+    pub fn departure(&self, component: usize, position: f64) -> Dual<f64> {
+        let mut c: Coefficients = [0.0; MAX_DEGREE + 1];
+        c[..=self.degree].copy_from_slice(self.of(component));
+        if self.degree == 0 {
+            return Dual { value: c[0], rate: 0.0 };
+        }
+        for level in (2..=self.degree).rev() {
+            for i in 0..level {
+                c[i] = mix(c[i], c[i + 1], position);
+            }
+        }
+        Dual { value: mix(c[0], c[1], position), rate: self.degree as f64 * (c[1] - c[0]) }
+    }
+
+    /// The value of one component and its rate, per unit of position, at [`PLACE`]; quick for polynomials of degree 7.
+    pub fn at_place(&self, component: usize) -> (f64, f64) {
+        let Ok(c): Result<&[f64; 8], _> = self.of(component).try_into() else {
+            let Dual { value, rate } = self.departure(component, PLACE);
+            return (value, rate);
+        };
+        AT_PLACE.map(|weights| weights.iter().zip(c).map(|(w, c)| w * c).sum()).into()
+    }
+
+    /// Bounds of one component over the whole step.
+    pub fn bounds(&self, component: usize) -> Interval {
+        hull(self.of(component))
+    }
+
+    /// Bounds of one component and of its rate (per unit of position) from `lo` to `hi`.
+    pub fn piece(&self, component: usize, lo: f64, hi: f64) -> Dual<Interval> {
+        let mut c: Coefficients = [0.0; MAX_DEGREE + 1];
+        c[..=self.degree].copy_from_slice(self.of(component));
+        self.stretch(&mut c, lo, hi)
+    }
+
+    /// Adds a component, times a factor, to the coefficients of a sum.
+    pub fn add_to(&self, component: usize, factor: f64, sum: &mut Coefficients) {
+        sum.iter_mut().zip(self.of(component)).for_each(|(sum, c)| *sum += factor * c);
+    }
+
+    /// Bounds of a polynomial of the degree of the components and of its rate (per unit of position) from `lo` to `hi`.
+    pub fn stretch(&self, c: &mut Coefficients, lo: f64, hi: f64) -> Dual<Interval> {
+        let c = &mut c[..=self.degree];
+        cut(c, lo, hi);
+        let width = hi - lo;
+        let mut rate = Interval::constant(0.0);
+        if self.degree > 0 {
+            let mut slopes: Coefficients = [0.0; MAX_DEGREE + 1];
+            for i in 0..self.degree {
+                slopes[i] = self.degree as f64 * (c[i + 1] - c[i]) / width;
+            }
+            rate = hull(&slopes[..self.degree]);
+        }
+        Dual { value: hull(c), rate }
+    }
+}
+
+/// Cuts off what is after `hi`, then what is before `lo`.
+fn cut(c: &mut [f64], lo: f64, hi: f64) {
+    let degree = c.len() - 1;
+    if hi < 1.0 {
+        for level in 1..=degree {
+            for i in (level..=degree).rev() {
+                c[i] = mix(c[i - 1], c[i], hi);
+            }
+        }
+    }
+    if lo > 0.0 {
+        let cut = lo / hi;
+        for level in (1..=degree).rev() {
+            for i in 0..level {
+                c[i] = mix(c[i], c[i + 1], cut);
+            }
+        }
+    }
+}
+
+/// The value of a polynomial with so many coefficients.
+#[inline(always)]
+fn casteljau<const N: usize>(coefficients: &[f64; N], position: f64) -> f64 {
+    let mut c = *coefficients;
+    for level in (1..N).rev() {
+        for i in 0..level {
+            c[i] = mix(c[i], c[i + 1], position);
+        }
+    }
+    c[0]
+}
+
+/// Exact at both ends, unlike `a + s (b - a)`.
+fn mix(a: f64, b: f64, s: f64) -> f64 {
+    a * (1.0 - s) + b * s
+}
+
+fn hull(values: &[f64]) -> Interval {
+    let mut all = Interval::constant(values[0]);
+    for &v in &values[1..] {
+        all.lo = all.lo.min(v);
+        all.hi = all.hi.max(v);
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn pieces_bound_the_polynomial_and_its_rate(
+            c in proptest::collection::vec(-10.0..10.0f64, 5),
+            a in 0.0..1.0f64, w in 0.01..1.0f64, s in 0.0..1.0f64,
+        ) {
+            let (lo, hi) = (a, (a + w).min(1.0));
+            prop_assume!(hi - lo > 1e-3);
+            let dense = Dense::new(Instant::ZERO, None, 1.0, 4, c);
+            let at = lo + s * (hi - lo);
+            let piece = dense.piece(0, lo, hi);
+            let value = dense.value(0, at);
+            prop_assert!(piece.value.lo - 1e-9 <= value && value <= piece.value.hi + 1e-9);
+            let e = 1e-6;
+            let slope = (dense.value(0, (at + e).min(1.0)) - dense.value(0, (at - e).max(0.0)))
+                / ((at + e).min(1.0) - (at - e).max(0.0));
+            prop_assert!(piece.rate.lo - 1e-3 <= slope && slope <= piece.rate.hi + 1e-3);
+        }
+
+        #[test]
+        fn ends_are_exact(c in proptest::collection::vec(-1e9..1e9f64, 5)) {
+            let dense = Dense::new(Instant::ZERO, None, 1.0, 4, c.clone());
+            prop_assert_eq!(dense.value(0, 0.0), c[0]);
+            prop_assert_eq!(dense.value(0, 1.0), c[4]);
+        }
+    }
+}

@@ -1,0 +1,279 @@
+//! What can go wrong while a model runs.
+
+use crate::memory::Shortage;
+use dlsys_diagnostic::{Diagnostic, Span};
+use dlsys_model::{Distribution, Remedy};
+use dlsys_tree::Lineage;
+
+/// A module in trouble: what an error message says of it.
+#[derive(Clone, Debug)]
+pub struct Site {
+    /// The module with its parameters, as in a string.
+    pub module: String,
+    pub lineage: Lineage,
+    /// The head of its rule.
+    pub rule: String,
+    /// The place in the text to point at.
+    pub span: Span,
+    pub time: f64,
+}
+
+impl Site {
+    /// The time as people read it; the float is in `time`.
+    fn when(&self) -> String {
+        super::brief(self.time, 12)
+    }
+}
+
+/// Two sides that have come so near each other that nobody can tell whether they have met.
+#[derive(Clone, Debug)]
+pub struct Near {
+    /// Where they meet, as written; empty if that is not known.
+    pub boundary: String,
+    /// How far they are apart.
+    pub gap: f64,
+    /// What they may be wrong by.
+    pub error: f64,
+}
+
+/// Why a parameter cannot be solved for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unsolved {
+    Singular,
+    Nothing,
+    NotFinite,
+    Fading,
+    Rough,
+}
+
+impl Unsolved {
+    fn message(self) -> &'static str {
+        match self {
+            Unsolved::Singular => "is not determined by its equations, which are singular,",
+            Unsolved::Nothing => "has no value that solves its equations",
+            Unsolved::NotFinite => "has no value: its equations are undefined",
+            Unsolved::Fading => "is hardly determined any more by its equations, which become singular,",
+            Unsolved::Rough => "changes too fast to be followed",
+        }
+    }
+}
+
+/// An error of a run. All name the rule, the module with its lineage, and the time.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum Error {
+    #[error(
+        "{} {} its domain at t = {} and no production applies", .site.module,
+        if *.born { "is born outside" } else { "left" }, .site.when()
+    )]
+    OutsideDomain {
+        site: Site,
+        /// It never was inside.
+        born: bool,
+        /// The comparisons that fail, with their places and what could be written for them.
+        failing: Vec<(Span, Option<Remedy>)>,
+    },
+    #[error("the equations of {} push against each other at t = {}", .site.module, .site.when())]
+    Chattering { site: Site },
+    #[error("productions go on without end at t = {}", .site.when())]
+    Cascade { site: Site, rounds: usize },
+    #[error("events pile up before t = {}", .site.when())]
+    Zeno { site: Site },
+    #[error("steps that are {period} apart cannot be told apart at t = {}", .site.when())]
+    PeriodTooShort { site: Site, period: f64 },
+    #[error("{what} of {} is not finite at t = {}", .site.module, .site.when())]
+    NotFinite { site: Site, what: String },
+    #[error("`{}` cannot be drawn from at t = {}: {why}", .distribution.name(), .site.when())]
+    BadDraw { site: Site, distribution: Distribution, why: Box<str> },
+    #[error("no successor can be chosen for {} at t = {}: {why}", .site.module, .site.when())]
+    BadWeights { site: Site, why: String },
+    #[error("the rate of an event of {} is negative at t = {}", .site.module, .site.when())]
+    NegativeRate { site: Site },
+    #[error(
+        "{} has come near {} and turned back at t = {}: whether it met it, the error of integration does not tell",
+        .site.module, if .near.boundary.is_empty() { "a boundary" } else { &.near.boundary }, .site.when()
+    )]
+    InDoubt { site: Site, near: Box<Near> },
+    #[error("the step size fell to nothing at t = {}", .site.when())]
+    StepTooSmall { site: Site },
+    #[error("{} of {} {} at t = {}", .unknown.0, .site.module, .unknown.1.message(), .site.when())]
+    Unsolved {
+        site: Site,
+        /// The parameter that is solved for, and why that fails.
+        unknown: Box<(String, Unsolved)>,
+    },
+    #[error("more than {limit} modules at t = {}", .site.when())]
+    TooManyModules {
+        site: Site,
+        limit: usize,
+        /// Productions that had followed one another at this instant.
+        rounds: usize,
+    },
+    #[error("{}", too_many(*.limit, .foreseen, .site))]
+    TooManyEvents {
+        site: Site,
+        limit: u64,
+        /// As many as it would take up to some time, at the present pace.
+        foreseen: Option<Box<(f64, f64)>>,
+    },
+    #[error("{limit} seconds are over at t = {}", .site.when())]
+    OutOfTime { site: Site, limit: f64 },
+    #[error("no memory for more than {modules} modules at t = {}", .site.when())]
+    OutOfMemory { site: Site, modules: usize, shortage: Box<Shortage> },
+}
+
+fn too_many(limit: u64, foreseen: &Option<Box<(f64, f64)>>, site: &Site) -> String {
+    match foreseen {
+        None => format!("more than {limit} productions and steps up to t = {}", site.when()),
+        Some(pace) => format!(
+            "time hardly goes on at t = {}: up to t = {} it would take {:.0e} productions and steps",
+            site.when(),
+            super::brief(pace.1, 12),
+            pace.0
+        ),
+    }
+}
+
+impl Error {
+    pub fn site(&self) -> &Site {
+        match self {
+            Error::OutsideDomain { site, .. }
+            | Error::Chattering { site }
+            | Error::Cascade { site, .. }
+            | Error::Zeno { site }
+            | Error::PeriodTooShort { site, .. }
+            | Error::NotFinite { site, .. }
+            | Error::BadDraw { site, .. }
+            | Error::BadWeights { site, .. }
+            | Error::NegativeRate { site }
+            | Error::StepTooSmall { site }
+            | Error::InDoubt { site, .. }
+            | Error::Unsolved { site, .. }
+            | Error::TooManyModules { site, .. }
+            | Error::TooManyEvents { site, .. }
+            | Error::OutOfTime { site, .. }
+            | Error::OutOfMemory { site, .. } => site,
+        }
+    }
+
+    /// The message as it is drawn.
+    pub fn diagnostic(&self) -> Diagnostic {
+        let site = self.site();
+        let mut d = Diagnostic::error(self.to_string());
+        if site.span != Span::default() {
+            d = d.at(site.span, self.remark());
+        }
+        if let Error::OutsideDomain { failing, .. } = self {
+            for (span, _) in failing {
+                d = d.at(*span, "this no longer holds");
+            }
+        }
+        let descent = match site.lineage.generation {
+            0 => format!("module {} of the initial string", site.lineage),
+            n => format!("lineage {}, {n} productions after the initial string", site.lineage),
+        };
+        d = d.note(format!("{} is {descent}; its rule is {}", site.module, site.rule));
+        match self {
+            Error::OutsideDomain { failing, .. } => {
+                let remedies = || failing.iter().filter_map(|(_, remedy)| remedy.as_ref());
+                let clauses = |part: fn(&Remedy) -> &Option<String>| {
+                    let quoted = remedies().filter_map(|r| part(r).as_ref()).map(|clause| format!("`{clause}`"));
+                    quoted.collect::<Vec<_>>().join(" or ")
+                };
+                let (produce, rest) = (clauses(|r| &r.produce), clauses(|r| &r.rest));
+                if produce.is_empty() && rest.is_empty() {
+                    return d.help("write a clause for what happens there: `if … = … produce …`");
+                }
+                let made = format!("say what it becomes there, in a clause of this rule such as {produce}");
+                let d = d.help_opt((!produce.is_empty()).then_some(made));
+                d.help_opt((!rest.is_empty()).then(|| format!("or let it stay as it is: {rest}")))
+            }
+            Error::Chattering { .. } => d.help(
+                "let one side hold at the boundary with an equation of its own, for example `dx/dt = 0`",
+            ),
+            Error::Cascade { rounds, .. } => d
+                .note(format!("{rounds} productions followed one another without time going on"))
+                .help("a successor that meets the condition again is replaced again at once: change the condition, or the successor's parameters"),
+            Error::Zeno { .. } => {
+                d.help("each life is shorter than the one before, and all of them end before this time: stop the production below some size")
+            }
+            Error::PeriodTooShort { .. } => {
+                d.help("times have 16 digits: choose a longer `period`, or stop the discrete rules before this time")
+            }
+            Error::NotFinite { .. } => {
+                d.help("look for a division by zero, a root or logarithm of a negative number, an element or an inverse that is not there, or growth without bound")
+            }
+            Error::BadDraw { distribution, .. } => {
+                d.help(distribution.demand())
+            }
+            Error::BadWeights { .. } => d.help(
+                "weights are at least 0, and one of them is greater; they need not add up to 1. To replace nothing at some values, say so in the clause's condition: `if … produce …`",
+            ),
+            Error::NegativeRate { .. } => {
+                d.help("a rate is at least 0: bound it, as in `at rate max(0, …)`, or say when there is none: `if … at rate … produce …`")
+            }
+            Error::InDoubt { near, .. } => d
+                .note(format!(
+                    "the two sides are {} apart there, and may be wrong by {}",
+                    super::brief(near.gap, 2),
+                    super::brief(near.error, 2)
+                ))
+                .help("if it does not get there, a smaller `--tolerance` shows it; if it is meant to, let what comes near count: `if x >= 1 - 1e-5` in place of `if x = 1`"),
+            Error::StepTooSmall { .. } => d.help(
+                "the solution may become infinite here, or the equations jump in a way that no `if` shows; a fixed step (`--method rk4 --step-size H`) shows how it behaves",
+            ),
+            Error::Unsolved { unknown, .. } => d.help(match unknown.1 {
+                Unsolved::Singular | Unsolved::Fading => "there the equations do not say how the parameter goes on: a double root, or two solutions that meet. Change the equations before this, or end the module's life at a condition that holds earlier",
+                Unsolved::Nothing => "the search begins with the value that the module was written with, or had just before: write one closer to the solution, or see whether there is one",
+                Unsolved::NotFinite => "look for a division by zero, or a root or logarithm of a negative number, at the written value too: the search begins there",
+                Unsolved::Rough => "it jumps, or turns without end, in a way that no `if` shows",
+            }),
+            Error::TooManyModules { rounds, .. } if *rounds > 8 => d
+                .note(format!("{rounds} productions followed one another without time going on"))
+                .help("a successor that meets the condition again is replaced again at once: change the condition, or the successor's parameters"),
+            Error::TooManyEvents { limit, foreseen: None, .. } => {
+                d.help(format!("if this is meant, allow more: `--max-events {}`", limit.saturating_mul(10)))
+            }
+            Error::TooManyEvents { foreseen: Some(pace), .. } => d
+                .help("a life, a rate or a step size is out of proportion to the times that are observed: compare their units")
+                .help_opt(
+                    // What would take years is not meant.
+                    (pace.0 < 1e15).then(|| format!("if this is meant, allow more: `--max-events {:.0e}`", pace.0)),
+                ),
+            Error::OutOfTime { limit, .. } => {
+                d.help(format!("if it is worth waiting for, allow more: `--max-seconds {}`", limit * 10.0))
+            }
+            Error::OutOfMemory { shortage, .. } => {
+                let wanted = format!("{:.0} MB more were wanted", shortage.wanted as f64 / 1e6);
+                let d = d.note(match shortage.there {
+                    Some(there) => format!("{wanted}, and there are {:.0} MB", there as f64 / 1e6),
+                    None => format!("{wanted}, and the system does not give them"),
+                });
+                d.help_opt(shortage.own_limit.then(|| "allow more with `--max-memory`, such as `--max-memory 8GB`".to_owned()))
+                    .help("if this structure is not meant to be so large, bound its growth, or stop it earlier: `--max-modules N` says where it gets too large")
+            }
+            Error::TooManyModules { limit, .. } => {
+                d.help(format!("if this is meant, allow more: `--max-modules {}`", limit.saturating_mul(10)))
+            }
+        }
+    }
+
+    fn remark(&self) -> &'static str {
+        match self {
+            Error::OutsideDomain { .. } => "no equation of this rule holds any more",
+            Error::Chattering { .. } => "on each side of the boundary the equations lead to the other",
+            Error::Cascade { .. } => "this production applies again and again",
+            Error::Zeno { .. } => "this production comes sooner and sooner",
+            Error::PeriodTooShort { .. } => "a discrete rule, which applies at the multiples of the period",
+            Error::NotFinite { .. } => "computed here",
+            Error::BadDraw { .. } => "drawn here",
+            Error::BadWeights { .. } => "by the weights of this clause",
+            Error::NegativeRate { .. } => "the rate of this clause",
+            Error::StepTooSmall { .. } => "these equations",
+            Error::InDoubt { .. } => "met, or only nearly?",
+            Error::Unsolved { .. } => "solved for here",
+            Error::TooManyModules { .. } => "this production made the last of them",
+            Error::TooManyEvents { .. } | Error::OutOfTime { .. } => "the run was here",
+            Error::OutOfMemory { .. } => "the run was here",
+        }
+    }
+}

@@ -1,0 +1,83 @@
+//! A parameter that is a function of time: evaluated, not integrated.
+
+use std::sync::Arc;
+
+use dlsys_expr::{Dual, Interval, Program, Value};
+
+use super::Motion;
+
+/// A formula over variables of which some move: time, and parameters that follow formulas themselves.
+#[derive(Clone, Debug)]
+pub struct Function {
+    program: Arc<Program>,
+    /// The variables at the start.
+    variables: Vec<f64>,
+    /// Which of them move, and how.
+    moving: Vec<(usize, Motion)>,
+    /// `t`; `age` is the next.
+    time: usize,
+    /// The value at the start.
+    start: f64,
+}
+
+impl Function {
+    /// A function of variables that move from given values on; None if it has no value there.
+    pub fn new(
+        program: &Arc<Program>,
+        variables: &[f64],
+        moving: Vec<(usize, Motion)>,
+        time: usize,
+    ) -> Option<Function> {
+        let (program, variables) = (program.clone(), variables.to_vec());
+        let mut function = Function { program, variables, moving, time, start: 0.0 };
+        function.start = function.at(0.0);
+        function.start.is_finite().then_some(function)
+    }
+
+    fn evaluate<T: Value>(
+        &self,
+        mut variables: Vec<T>,
+        motion: impl Fn(&Motion, f64) -> T,
+        time: [T; 2],
+    ) -> T {
+        for (variable, how) in &self.moving {
+            variables[*variable] = motion(how, self.variables[*variable]);
+        }
+        [variables[self.time], variables[self.time + 1]] = time;
+        let mut out = [T::constant(0.0)];
+        self.program.eval(&variables, &mut Vec::new(), &mut out);
+        out[0]
+    }
+
+    fn at(&self, tau: f64) -> f64 {
+        let time = [self.variables[self.time] + tau, self.variables[self.time + 1] + tau];
+        self.evaluate(self.variables.clone(), |motion, x| x + motion.value(tau), time)
+    }
+
+    /// The displacement.
+    pub fn value(&self, tau: f64) -> f64 {
+        self.at(tau) - self.start
+    }
+
+    pub fn rate(&self, tau: f64) -> f64 {
+        let still = |value: f64| Dual { value, rate: 0.0 };
+        let time = [self.time, self.time + 1].map(|v| Dual { value: self.variables[v] + tau, rate: 1.0 });
+        let motion = |motion: &Motion, x: f64| Dual { value: x + motion.value(tau), rate: motion.rate(tau) };
+        self.evaluate(self.variables.iter().map(|x| still(*x)).collect(), motion, time).rate
+    }
+
+    /// Bounds of displacement and rate from one time to another.
+    pub fn over(&self, from: f64, to: f64) -> Dual<Interval> {
+        let time = [self.time, self.time + 1].map(|v| {
+            let value = Interval::spanned(self.variables[v] + from, self.variables[v] + to);
+            Dual { value, rate: Interval::constant(1.0) }
+        });
+        let motion = |motion: &Motion, x: f64| {
+            let Dual { value, rate } = motion.over(from, to);
+            Dual { value: Interval { lo: x + value.lo, hi: x + value.hi, ..value }, rate }
+        };
+        let still = self.variables.iter().map(|x| Dual::constant(*x)).collect();
+        let Dual { value, rate } = self.evaluate(still, motion, time);
+        Dual { value: Interval { lo: value.lo - self.start, hi: value.hi - self.start, ..value }, rate }
+    }
+}

@@ -1,0 +1,135 @@
+//! How one parameter of one module moves from an instant on: by a formula, along dense output, or not at all.
+//!
+//! Time is counted from the start of the motion, values as displacements from the value there, so that a module born
+//! at t = 1e9 moves as precisely as one born at 0.
+
+mod driven;
+mod function;
+mod growth;
+mod riccati;
+mod sum;
+
+pub use driven::{Driven, Flow, Pace};
+pub use function::Function;
+use growth::Growth;
+pub use riccati::Riccati;
+pub use sum::{Sum, Terms};
+
+use dlsys_expr::{Dual, Interval, Value};
+
+/// The motion of a parameter.
+#[derive(Clone, Debug, Default)]
+pub enum Motion {
+    /// It stays.
+    #[default]
+    Rest,
+    /// Displacement `c_0 τ + c_1 τ² + c_2 τ³ + c_3 τ⁴`.
+    Polynomial([f64; 4]),
+    Riccati(Riccati),
+    Sum(Box<Sum>),
+    Driven(Box<Driven>),
+    Function(Box<Function>),
+    /// Dense output of a step of the module itself: the number of the component.
+    Step(u32),
+    /// Dense output of the coupled modules: the number of the component.
+    Coupled(u32),
+}
+
+impl Motion {
+    pub fn is_formula(&self) -> bool {
+        !matches!(self, Motion::Step(_) | Motion::Coupled(_))
+    }
+
+    /// The displacement at a time, of a motion that is a formula.
+    #[inline]
+    pub fn value(&self, tau: f64) -> f64 {
+        match self {
+            Motion::Rest => 0.0,
+            Motion::Polynomial(c) => tau * (c[0] + tau * (c[1] + tau * (c[2] + tau * c[3]))),
+            Motion::Riccati(law) => law.value(tau),
+            Motion::Sum(sum) => sum.value(tau),
+            Motion::Driven(driven) => driven.value(tau),
+            Motion::Function(function) => function.value(tau),
+            Motion::Step(_) | Motion::Coupled(_) => f64::NAN,
+        }
+    }
+
+    pub fn rate(&self, tau: f64) -> f64 {
+        match self {
+            Motion::Rest => 0.0,
+            Motion::Polynomial(c) => c[0] + tau * (2.0 * c[1] + tau * (3.0 * c[2] + tau * 4.0 * c[3])),
+            Motion::Riccati(law) => law.rate(law.value(tau)),
+            Motion::Sum(sum) => sum.rate(tau),
+            Motion::Driven(driven) => driven.rate(tau),
+            Motion::Function(function) => function.rate(tau),
+            Motion::Step(_) | Motion::Coupled(_) => f64::NAN,
+        }
+    }
+
+    /// Bounds of displacement and rate from one time to another.
+    pub fn over(&self, from: f64, to: f64) -> Dual<Interval> {
+        match self {
+            Motion::Rest => Dual { value: Interval::constant(0.0), rate: Interval::constant(0.0) },
+            Motion::Polynomial(c) => bound_polynomial(c, from, to),
+            Motion::Riccati(law) => law.over(from, to),
+            Motion::Sum(sum) => sum.over(from, to),
+            Motion::Driven(driven) => driven.over(from, to),
+            Motion::Function(function) => function.over(from, to),
+            Motion::Step(_) | Motion::Coupled(_) => Dual { value: Interval::ENTIRE, rate: Interval::ENTIRE },
+        }
+    }
+
+    /// The first time after 0 at which the displacement is `u`, of a motion that goes one way only; `rate` gives the
+    /// rate there.
+    pub fn reach(&self, u: f64, rate: impl FnOnce() -> f64) -> Option<f64> {
+        match self {
+            Motion::Polynomial([c, 0.0, 0.0, 0.0]) => {
+                let tau = u / c;
+                (tau > 0.0 && tau.is_finite()).then_some(tau)
+            }
+            Motion::Riccati(law) => law.reach(u, rate),
+            Motion::Driven(driven) => driven.reach(u, rate),
+            _ => None,
+        }
+    }
+
+    /// The time from which on there is no value.
+    pub fn end(&self) -> Option<f64> {
+        match self {
+            Motion::Riccati(law) => law.pole(),
+            Motion::Driven(driven) => driven.end(),
+            _ => None,
+        }
+    }
+
+    /// The motion as an algebraic sum, from the value `x`; None if it is none.
+    pub fn terms(&self, x: f64) -> Option<Terms> {
+        match self {
+            Motion::Rest => Some(Terms::constant(x)),
+            Motion::Polynomial(c) => Some(Terms::polynomial(x, c)),
+            // x + f (exp(d τ) - 1) / d
+            Motion::Riccati(law) => law.exponential().map(|(f, d)| {
+                if d == 0.0 { Terms::affine(x, f) } else { Terms::exponential(x - f / d, f / d, d) }
+            }),
+            Motion::Sum(sum) => Some(sum.terms(x)),
+            Motion::Driven(_) | Motion::Function(_) | Motion::Step(_) | Motion::Coupled(_) => None,
+        }
+    }
+}
+
+/// Bounds by Taylor's formula about the middle: the first terms exactly, the rest by their size.
+fn bound_polynomial(c: &[f64; 4], from: f64, to: f64) -> Dual<Interval> {
+    let (m, r) = (0.5 * (from + to), 0.5 * (to - from));
+    let value = m * (c[0] + m * (c[1] + m * (c[2] + m * c[3])));
+    let first = c[0] + m * (2.0 * c[1] + m * (3.0 * c[2] + m * 4.0 * c[3]));
+    let second = 2.0 * c[1] + m * (6.0 * c[2] + m * 12.0 * c[3]);
+    let third = 6.0 * c[2] + m * 24.0 * c[3];
+    let fourth = 24.0 * c[3];
+    let reach =
+        r * (first.abs() + r / 2.0 * (second.abs() + r / 3.0 * (third.abs() + r / 4.0 * fourth.abs())));
+    let slack = r * (second.abs() + r / 2.0 * (third.abs() + r / 3.0 * fourth.abs()));
+    Dual {
+        value: Interval { lo: value - reach, hi: value + reach, partial: false },
+        rate: Interval { lo: first - slack, hi: first + slack, partial: false },
+    }
+}

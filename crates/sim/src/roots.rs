@@ -1,0 +1,363 @@
+//! The first change of sign of a function over a step, found by exclusion.
+//!
+//! The function is known through bounds over any stretch of the step. A stretch on which the bounds
+//! exclude zero is passed; one on which the rate has a single sign holds at most one root, which its ends
+//! show; any other is halved (Moore 1966; Shampine, Gladwell and Brankin 1991 do the same for
+//! polynomials with Sturm sequences). So no pair of crossings inside a step is missed, and a touch is found
+//! where a sign test sees nothing.
+//!
+//! # Contract
+//!
+//! - The sign just after the start of the search is given by the caller (`Sign::Any` if not known). A zero
+//!   at the start itself is not a root: it has been judged before.
+//! - The first root is returned: an instant at which the sign becomes another, or zero is touched.
+//! - Zero means within `tolerance`, which should stand for the rounding of the function's values.
+//! - Work is bounded: after `MAX_PIECES` stretches the rest is judged by the signs at their ends only.
+
+use dlsys_expr::{Dual, Interval};
+use dlsys_model::Sign;
+
+/// Stretches narrower than this part of their position are not halved.
+const NARROW: f64 = 1e-13;
+/// Nor are those that end before this.
+const SMALL: f64 = 1e-30;
+const MAX_PIECES: usize = 1024;
+
+/// A function over a step, for positions 0 to 1.
+pub trait Function {
+    /// Bounds of the value and of its rate from `lo` to `hi`.
+    fn bounds(&mut self, lo: f64, hi: f64) -> Dual<Interval>;
+    fn value(&mut self, at: f64) -> f64;
+}
+
+/// A root found by [`first_root`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Root {
+    pub position: f64,
+    /// The sign at the root: zero, unless the function jumps over it.
+    pub at: Sign,
+    /// The sign just after the root; the same as before where zero is only touched.
+    pub after: Sign,
+}
+
+/// Finds the first root in `(from, to]`; see the contract above.
+pub fn first_root(f: &mut impl Function, from: f64, to: f64, start: Sign, tolerance: f64) -> Option<Root> {
+    let classify = |g: f64| if g.abs() <= tolerance { Sign::Zero } else { Sign::of(g) };
+    let mut sign = start;
+    let first = classify(f.value(from));
+    if first != Sign::Zero && sign == Sign::Any {
+        sign = first;
+    }
+    // Where it is undefined from here on it may be defined here.
+    if first != Sign::Zero && first != sign && sign != Sign::Undefined {
+        return Some(Root { position: from, at: Sign::Zero, after: first });
+    }
+    // Off zero: a root from here on is one that was not there before.
+    let mut armed = first != Sign::Zero;
+    let mut stack = vec![(from, to)];
+    let mut pieces = 0;
+    while let Some((lo, hi)) = stack.pop() {
+        pieces += 1;
+        let Dual { value: mut g, rate } = f.bounds(lo, hi);
+        if g.is_empty() {
+            if sign != Sign::Undefined {
+                return Some(Root { position: lo, at: Sign::Undefined, after: Sign::Undefined });
+            }
+            continue;
+        }
+        let middle = 0.5 * (lo + hi);
+        if !rate.partial && !g.partial {
+            // The mean value theorem often bounds more tightly than the expression itself.
+            let (centre, reach) = (f.value(middle), 0.5 * (hi - lo) * rate.magnitude());
+            if centre.is_finite() && reach.is_finite() {
+                g.lo = g.lo.max(centre - reach);
+                g.hi = g.hi.min(centre + reach);
+            }
+        }
+        let settled = match sign {
+            Sign::Plus => g.lo > tolerance,
+            Sign::Minus => g.hi < -tolerance,
+            Sign::Zero | Sign::Any => g.magnitude() <= tolerance,
+            Sign::Undefined => false,
+        };
+        if settled && !g.partial {
+            armed |= matches!(sign, Sign::Plus | Sign::Minus);
+            continue;
+        }
+        let monotone = !rate.partial && !g.partial && (rate.lo > 0.0 || rate.hi < 0.0);
+        let narrow = hi - lo <= NARROW * hi || hi <= SMALL || pieces > MAX_PIECES;
+        if !monotone && !narrow {
+            stack.extend([(middle, hi), (lo, middle)]);
+            continue;
+        }
+        let end = classify(f.value(hi));
+        if armed {
+            // Exactly: a value that merely comes within the tolerance may be about to cross.
+            let exact = Sign::of(f.value(hi));
+            // At the very end of the stretch, if it is about to cross within the rounding of the position.
+            if monotone && hi >= to && exact == sign && end == Sign::Zero {
+                let rate = f.bounds(lo.max(hi - 1e-9 * hi), hi).rate;
+                let steep = rate.lo.abs().min(rate.hi.abs()) * 16.0 * f64::EPSILON * hi;
+                if f.value(hi).abs() <= steep && (rate.hi < 0.0) == (sign == Sign::Plus) {
+                    return Some(Root { position: hi, at: Sign::Zero, after: opposite(sign) });
+                }
+            }
+            let crossed = if monotone { exact != sign } else { end != sign && end != Sign::Zero };
+            if crossed {
+                let position = bracket(f, lo, hi, sign);
+                if monotone {
+                    let after = if exact == Sign::Zero { opposite(sign) } else { exact };
+                    return Some(Root { position, at: Sign::Zero, after });
+                }
+                // Too narrow to see how it gets from one side to the other: it jumps, or as good as.
+                let near = [f.value(lo), f.value(position)].into_iter().any(|g| classify(g) == Sign::Zero);
+                let at = if near { Sign::Zero } else { exact };
+                return Some(Root { position, at, after: exact });
+            }
+            if !monotone {
+                // An extremum on zero, or near enough.
+                for (at, seen) in [(middle, classify(f.value(middle))), (hi, end)] {
+                    if seen == Sign::Zero {
+                        // A kink in a crossing looks like one, as far as its value is zero.
+                        let (beyond, after) = way_out(f, at, to, classify);
+                        if after == opposite(sign) {
+                            let position =
+                                if Sign::of(f.value(lo)) == sign { bracket(f, lo, beyond, sign) } else { lo };
+                            return Some(Root { position, at: Sign::Zero, after });
+                        }
+                        let position = if after == Sign::Zero {
+                            // It stays there: from where it is as small as it gets.
+                            let least = 2.0 * f.value(beyond).abs();
+                            first_where(lo, beyond, |x| f.value(x).abs() <= least)
+                        } else {
+                            first_where(lo, at, |x| classify(f.value(x)) == Sign::Zero)
+                        };
+                        return Some(Root { position, at: Sign::Zero, after });
+                    }
+                }
+            }
+        } else if end != Sign::Zero {
+            if sign == Sign::Any {
+                sign = end;
+            }
+            if end != sign {
+                // From zero on it goes, or it jumps.
+                let position = first_where(lo, hi, |x| classify(f.value(x)) != Sign::Zero);
+                let (there, later) = (f.value(position).abs(), f.value(hi).abs());
+                if sign == Sign::Undefined {
+                    return Some(Root { position, at: end, after: end });
+                }
+                return Some(if there > 4.0 * tolerance && there > 0.5 * later && later.is_finite() {
+                    Root { position, at: end, after: end }
+                } else {
+                    Root { position: lo, at: Sign::Zero, after: end }
+                });
+            }
+            armed = true;
+        }
+    }
+    None
+}
+
+/// A position where a function is no longer zero that is at `at`, and its sign there; zero if that is not nearby.
+fn way_out(f: &mut impl Function, at: f64, to: f64, classify: impl Fn(f64) -> Sign) -> (f64, Sign) {
+    /// Further away, zero is where it stays.
+    const NEARBY: f64 = 1e-6;
+    let (size, mut reach) = (at.max(SMALL), NARROW * at.max(SMALL));
+    loop {
+        let position = (at + reach).min(to);
+        let sign = classify(f.value(position));
+        if sign != Sign::Zero || position >= to || reach > NEARBY * size {
+            return (position, sign);
+        }
+        reach *= 2.0;
+    }
+}
+
+/// The first position at which something holds, which it does at `hi` and need not at `lo`; by bisection.
+fn first_where(mut lo: f64, mut hi: f64, mut holds: impl FnMut(f64) -> bool) -> f64 {
+    while hi - lo > f64::EPSILON * hi {
+        let middle = 0.5 * (lo + hi);
+        if middle <= lo || middle >= hi {
+            break;
+        }
+        if holds(middle) {
+            hi = middle;
+        } else {
+            lo = middle;
+        }
+    }
+    hi
+}
+
+fn opposite(sign: Sign) -> Sign {
+    match sign {
+        Sign::Plus => Sign::Minus,
+        Sign::Minus => Sign::Plus,
+        other => other,
+    }
+}
+
+/// The first position in `(lo, hi]` at which the sign is no longer `sign`, to the last bit.
+///
+/// False position with halved ends (Illinois; Dowell and Jarratt 1971), and bisection where that is slow.
+fn bracket(f: &mut impl Function, mut lo: f64, mut hi: f64, sign: Sign) -> f64 {
+    let (mut g_lo, mut g_hi) = (f.value(lo), f.value(hi));
+    for i in 0..200 {
+        if hi - lo <= f64::EPSILON * hi {
+            break;
+        }
+        let guess = hi - g_hi * (hi - lo) / (g_hi - g_lo);
+        let bisect = i % 4 == 3 || !(guess > lo && guess < hi);
+        // A stretch may be longer than the way to the root by any number of decades.
+        let at = match bisect {
+            true if lo == 0.0 => 1e-3 * hi,
+            true if hi > 16.0 * lo => (lo * hi).sqrt(),
+            true => 0.5 * (lo + hi),
+            false => guess,
+        };
+        if at <= lo || at >= hi {
+            break;
+        }
+        let g = f.value(at);
+        if Sign::of(g) == sign {
+            (lo, g_lo) = (at, g);
+            if !bisect {
+                g_hi *= 0.5;
+            }
+        } else {
+            (hi, g_hi) = (at, g);
+            if !bisect {
+                g_lo *= 0.5;
+            }
+            if g == 0.0 {
+                break;
+            }
+        }
+    }
+    hi
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dlsys_expr::{Binary, Unary, Value};
+
+    /// A function given once, for every type of value.
+    struct Given<F, G>(F, G);
+
+    impl<F: Fn(f64) -> f64, G: Fn(Dual<Interval>) -> Dual<Interval>> Function for Given<F, G> {
+        fn bounds(&mut self, lo: f64, hi: f64) -> Dual<Interval> {
+            (self.1)(Dual { value: Interval::spanned(lo, hi), rate: Interval::constant(1.0) })
+        }
+        fn value(&mut self, at: f64) -> f64 {
+            (self.0)(at)
+        }
+    }
+
+    macro_rules! given {
+        ($x:ident => $body:expr) => {
+            Given(
+                move |$x: f64| {
+                    type T = f64;
+                    #[allow(unused)]
+                    fn c(x: f64) -> T {
+                        T::constant(x)
+                    }
+                    $body(c, f64::binary, f64::unary)
+                },
+                move |$x: Dual<Interval>| {
+                    type T = Dual<Interval>;
+                    #[allow(unused)]
+                    fn c(x: f64) -> T {
+                        T::constant(x)
+                    }
+                    $body(c, T::binary, T::unary)
+                },
+            )
+        };
+    }
+
+    /// (x - a)(x - b)
+    fn parabola(a: f64, b: f64) -> impl Function {
+        given!(x => |c: fn(f64) -> T, op: fn(Binary, T, T) -> T, _: fn(Unary, T) -> T| {
+            op(Binary::Mul, op(Binary::Sub, x, c(a)), op(Binary::Sub, x, c(b)))
+        })
+    }
+
+    #[test]
+    fn both_crossings_of_a_close_pair_are_found() {
+        let (a, b) = (0.3, 0.3 + 1e-6);
+        let first = first_root(&mut parabola(a, b), 0.0, 1.0, Sign::Plus, 1e-15).expect("a root");
+        assert!((first.position - a).abs() < 1e-9, "{first:?}");
+        assert_eq!(first.after, Sign::Minus);
+        let second =
+            first_root(&mut parabola(a, b), first.position, 1.0, Sign::Minus, 1e-15).expect("a root");
+        assert!((second.position - b).abs() < 1e-9, "{second:?}");
+    }
+
+    #[test]
+    fn a_touch_is_found_once_and_a_near_miss_is_not() {
+        let touch = first_root(&mut parabola(0.3, 0.3), 0.0, 1.0, Sign::Plus, 1e-15).expect("a touch");
+        assert!((touch.position - 0.3).abs() < 1e-7 && touch.after == Sign::Plus, "{touch:?}");
+        let rest = first_root(&mut parabola(0.3, 0.3), touch.position, 1.0, Sign::Plus, 1e-15);
+        assert_eq!(rest, None);
+        let mut miss = given!(x => |c: fn(f64) -> T, op: fn(Binary, T, T) -> T, _: fn(Unary, T) -> T| {
+            let d = op(Binary::Sub, x, c(0.3));
+            op(Binary::Add, op(Binary::Mul, d, d), c(1e-12))
+        });
+        assert_eq!(first_root(&mut miss, 0.0, 1.0, Sign::Plus, 1e-15), None);
+    }
+
+    #[test]
+    fn a_crossing_with_a_kink_is_no_touch() {
+        // max(a (x - c), b (x - c)) has no rate at c; the tolerance is a thousand times what rounding makes of it.
+        for (a, b) in [(-1.0 / 2.6, -2.5), (-2.5, -1.0 / 2.6)] {
+            let mut f = given!(x => |c: fn(f64) -> T, op: fn(Binary, T, T) -> T, _: fn(Unary, T) -> T| {
+                let d = op(Binary::Sub, x, c(0.62));
+                op(Binary::Max, op(Binary::Mul, d, c(a)), op(Binary::Mul, d, c(b)))
+            });
+            let root = first_root(&mut f, 0.0, 1.0, Sign::Plus, 1e-13).expect("a root");
+            assert!((root.position - 0.62).abs() < 1e-15 && root.after == Sign::Minus, "{root:?}");
+            assert_eq!(first_root(&mut f, root.position, 1.0, root.after, 1e-15), None);
+        }
+    }
+
+    #[test]
+    fn a_crossing_at_the_very_end_is_not_left_to_what_follows() {
+        // As rounding has it, sin(2 π) is still below zero.
+        let mut f = given!(x => |c: fn(f64) -> T, op: fn(Binary, T, T) -> T, un: fn(Unary, T) -> T| {
+            let t = op(Binary::Add, x, c(1.0));
+            op(Binary::Sub, c(0.0), un(Unary::Sin, op(Binary::Mul, c(std::f64::consts::PI), t)))
+        });
+        let root = first_root(&mut f, 1e-14, 1.0, Sign::Plus, 1e-15).expect("a root");
+        assert_eq!((root.position, root.after), (1.0, Sign::Minus));
+    }
+
+    #[test]
+    fn a_root_with_nothing_beyond_it_is_found() {
+        // sqrt(0.5 - x) - 0.1 is undefined from 0.5 on.
+        let mut f = given!(x => |c: fn(f64) -> T, op: fn(Binary, T, T) -> T, un: fn(Unary, T) -> T| {
+            op(Binary::Sub, un(Unary::Sqrt, op(Binary::Sub, c(0.5), x)), c(0.1))
+        });
+        let root = first_root(&mut f, 0.0, 1.0, Sign::Plus, 1e-15).expect("a root");
+        assert!((root.position - 0.49).abs() < 1e-14, "{root:?}");
+    }
+
+    #[test]
+    fn the_identically_zero_function_has_no_roots() {
+        let mut zero = given!(x => |c: fn(f64) -> T, op: fn(Binary, T, T) -> T, _: fn(Unary, T) -> T| {
+            op(Binary::Mul, x, c(0.0))
+        });
+        assert_eq!(first_root(&mut zero, 0.0, 1.0, Sign::Zero, 1e-15), None);
+    }
+
+    #[test]
+    fn one_of_a_thousand_oscillations_is_the_first() {
+        let mut f = given!(x => |c: fn(f64) -> T, op: fn(Binary, T, T) -> T, un: fn(Unary, T) -> T| {
+            op(Binary::Sub, un(Unary::Sin, op(Binary::Mul, x, c(6000.0))), c(0.5))
+        });
+        let root = first_root(&mut f, 0.0, 1.0, Sign::Minus, 1e-15).expect("a root");
+        assert!((root.position - std::f64::consts::FRAC_PI_6 / 6000.0).abs() < 1e-15, "{root:?}");
+    }
+}

@@ -1,0 +1,199 @@
+//! What is taken as the truth for a method: the closed form where there is one, otherwise the tightest run of
+//! another method, with an estimate of its own error from a third.
+
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
+use super::compare::compare;
+use super::order::nominal_order;
+use super::record::{Accuracy, Record, Setup, Task, method_name};
+use dlsys_session::Session;
+use dlsys_sim::Method;
+
+/// The tightest tolerance that can be asked for.
+pub(super) const TIGHTEST: f64 = 1e-13;
+/// A tight run may take so many times as long as a point of the study.
+const PATIENCE: f64 = 3.0;
+
+/// True if `auto` solves the whole model exactly, so that it is the truth for all other methods.
+fn is_exact(session: &Session) -> bool {
+    session.model.is_closed_form()
+}
+
+/// The truth for a method.
+#[derive(Clone, Debug)]
+pub struct Reference {
+    pub setup: Setup,
+    pub record: Rc<Record>,
+    /// Estimate of its error: how far the run that it was checked with is from it. 0 for a closed form;
+    /// None if they have no time in common before they differ in structure.
+    pub error: Option<f64>,
+    /// The run that it was checked with, for people, and whether they disagree in structure.
+    pub check: String,
+    pub is_closed_form: bool,
+}
+
+impl Reference {
+    /// Times closer than this to a production of the reference are not told apart, for a run with this
+    /// setup: ten tolerances.
+    pub fn slack(setup: Setup) -> f64 {
+        match setup.accuracy {
+            Accuracy::Tolerance(tolerance) => 10.0 * tolerance,
+            // Its error is unknown: only what is simultaneous in the reference may be exchanged.
+            Accuracy::StepSize(_) | Accuracy::Slice(_) => 10.0 * TIGHTEST,
+        }
+    }
+}
+
+impl std::fmt::Display for Reference {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if self.is_closed_form {
+            return write!(f, "closed form ({})", self.check);
+        }
+        match self.error {
+            Some(error) => write!(f, "{}, which differs by {error:.0e} from {}", self.setup, self.check),
+            None => write!(f, "{}, which has nothing in common with {}", self.setup, self.check),
+        }
+    }
+}
+
+/// Tight runs of a model, made when they are first needed.
+pub struct References<'a> {
+    task: Task<'a>,
+    /// Step of the tight runs of methods that have a fixed one.
+    step_size: f64,
+    exact: bool,
+    /// By place in `Method::NAMED`, and whether relaxed.
+    runs: BTreeMap<(usize, bool), Rc<Record>>,
+}
+
+impl<'a> References<'a> {
+    /// `step_size`: that of tight runs of methods that have a fixed one.
+    pub fn new(task: Task<'a>, step_size: f64) -> References<'a> {
+        let task = Task { limit: PATIENCE * task.limit, ..task };
+        References { task, step_size, exact: is_exact(task.session), runs: BTreeMap::new() }
+    }
+
+    /// The truth for a method.
+    ///
+    /// # Errors
+    /// If no method comes to the last time: why the one that should have did not. If it is the judged one
+    /// alone that does, it is compared with itself, and the reference says so.
+    pub fn of(&mut self, judged: Method) -> Result<Reference, String> {
+        if self.exact && judged != Method::Auto {
+            let record = self.run(Method::Auto, false);
+            if record.stop.is_none() {
+                let setup = self.setup(Method::Auto, false);
+                let check = "auto".to_owned();
+                return Ok(Reference { setup, record, error: Some(0.0), check, is_closed_form: true });
+            }
+        }
+        let mut why = String::from("there is no other method of sufficient order");
+        let mut found: Vec<(Method, Rc<Record>)> = Vec::new();
+        for method in candidates(judged) {
+            // What `auto` does is what one of the others does: that one is not another method.
+            let own = (judged == Method::Auto).then(|| self.run(judged, false));
+            let record = self.run(method, false);
+            if own.is_some_and(|own| own.is_same_run(&record)) {
+                continue;
+            }
+            match &record.stop {
+                Some(stop) if found.is_empty() => why = format!("{}: {stop}", self.setup(method, false)),
+                Some(_) => {}
+                None => found.push((method, record)),
+            }
+            if found.len() == 2 {
+                break;
+            }
+        }
+        let independent = !found.is_empty();
+        if !independent {
+            let record = self.run(judged, false);
+            if record.stop.is_some() {
+                return Err(why);
+            }
+            found.push((judged, record));
+        }
+        let mut found = found.into_iter();
+        let (method, record) = found.next().ok_or_else(|| why.clone())?;
+        let (other, check) = match found.next() {
+            Some((other, record)) => (record, self.setup(other, false).to_string()),
+            None => {
+                let relaxed = self.setup(method, true);
+                // There is no third method: the same one, asked for less.
+                (self.run(method, true), relaxed.to_string())
+            }
+        };
+        let setup = self.setup(method, false);
+        let slack = Reference::slack(setup);
+        let compared = compare(&self.task.session.model, &other, &record, slack);
+        let doubt = if compared.agreement.is_right() {
+            String::new()
+        } else {
+            format!(" (THEY DISAGREE: {})", compared.agreement)
+        };
+        let own = if independent { String::new() } else { format!(" (NO OTHER METHOD: {why})") };
+        let check = format!("{check}{doubt}{own}");
+        Ok(Reference { setup, record, error: compared.error, check, is_closed_form: false })
+    }
+
+    /// The tight setup of a method; relaxed, ten times the tolerance or twice the step.
+    fn setup(&self, method: Method, relaxed: bool) -> Setup {
+        let accuracy = match (method.is_fixed_step(), relaxed) {
+            (true, relaxed) => Accuracy::StepSize(self.step_size * if relaxed { 2.0 } else { 1.0 }),
+            (false, false) => Accuracy::Tolerance(TIGHTEST),
+            (false, true) => Accuracy::Tolerance(10.0 * TIGHTEST),
+        };
+        Setup { method, accuracy }
+    }
+
+    fn run(&mut self, method: Method, relaxed: bool) -> Rc<Record> {
+        let place = Method::NAMED.iter().position(|(_, m)| *m == method).unwrap_or(Method::NAMED.len());
+        let setup = self.setup(method, relaxed);
+        let task = self.task;
+        Rc::clone(self.runs.entry((place, relaxed)).or_insert_with(|| Rc::new(task.record(setup, true))))
+    }
+}
+
+/// Methods that can be the reference of another, the best first: with step control before those without, then
+/// by order. Not `auto`, which is one of the others; and Euler's method is the truth about nothing.
+fn candidates(judged: Method) -> Vec<Method> {
+    let rank =
+        |method: Method| (method.is_fixed_step(), std::cmp::Reverse(nominal_order(method_name(method))));
+    let mut all: Vec<Method> = Method::NAMED
+        .iter()
+        .map(|(_, method)| *method)
+        .filter(|m| *m != judged && *m != Method::Auto && nominal_order(method_name(*m)) >= Some(4))
+        .collect();
+    all.sort_by_key(|m| rank(*m));
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nobody_judges_himself() {
+        let text = "initial string: A(0.1)\nA(x): solve dx/dt = x*(1 - x)";
+        let session = Session::from_text("logistic.dls", text, &[]).expect("good");
+        let times = [1.0, 3.0];
+        let task = Task {
+            session: &session,
+            times: &times,
+            limit: 10.0,
+            base: dlsys_sim::Settings { max_modules: 100, ..Default::default() },
+        };
+        let mut references = References::new(task, 1.0 / 1024.0);
+        for (_, judged) in Method::NAMED {
+            let reference = references.of(judged).expect("a reference");
+            assert_ne!(reference.setup.method, judged);
+            let exact = 1.0 / (1.0 + 9.0 * (-3.0f64).exp());
+            let error = (reference.record.states[1].get(0).parameters[0] - exact).abs();
+            assert!(error < 1e-12 && reference.error < Some(1e-11), "{reference}: {error:e}");
+        }
+        let own = references.run(Method::Auto, false);
+        let judge = references.of(Method::Auto).expect("a reference");
+        assert!(!own.is_same_run(&judge.record), "{judge}");
+    }
+}

@@ -1,0 +1,562 @@
+//! The growing structure: modules on axes, axes on modules.
+//!
+//! An axis is a doubly linked list of modules and branches; a branch holds an axis of its own. So a
+//! production costs what it replaces, and string order is a walk. Slots are used again, and a
+//! [`ModuleId`] carries the generation of its slot, so that an old id never means a new module.
+//!
+//! A module is a record of 28 bytes and its parameters; its birth and lineage are kept with those of its siblings
+//! (`brood`). At a million modules, what anything costs is the memory that it touches.
+
+use std::collections::TryReserveError;
+
+use smallvec::SmallVec;
+
+use super::brood::{Broods, NO_BROOD};
+use super::{Family, Instant, Lineage};
+use dlsys_model::{KindId, Successor};
+
+/// The branch that holds the main axis.
+pub(super) const TRUNK: u32 = 0;
+
+/// A module in a [`Tree`], while it lives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ModuleId {
+    slot: u32,
+    generation: u32,
+}
+
+impl ModuleId {
+    /// Small number, unique among living modules.
+    pub fn slot(self) -> usize {
+        self.slot as usize
+    }
+
+    pub(super) fn of_parts(slot: u32, generation: u32) -> ModuleId {
+        ModuleId { slot, generation }
+    }
+}
+
+/// What stands before or after on an axis: a module or a branch, by its slot; or nothing, and then it is known which
+/// branch the axis belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Link(pub(super) u32);
+
+impl Link {
+    const END: u32 = 1 << 31;
+
+    /// The end of a branch's axis.
+    fn end_of(branch: u32) -> Link {
+        Link(branch | Link::END)
+    }
+
+    /// The branch whose axis ends here.
+    pub(super) fn ended(self) -> Option<u32> {
+        (self.0 & Link::END != 0).then_some(self.0 & !Link::END)
+    }
+}
+
+/// No module has this label.
+pub const NO_LABEL: u16 = u16::MAX;
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Node {
+    /// `KindId::OPEN` for a branch.
+    pub kind: KindId,
+    /// Of the slot.
+    pub generation: u32,
+    pub before: Link,
+    pub after: Link,
+    /// Where the parameters begin; of a branch, what its own axis begins with.
+    pub first: u32,
+    pub brood: u32,
+    pub place: u16,
+    pub label: u16,
+}
+
+/// A module in a [`Tree`], looked at once.
+#[derive(Clone, Copy, Debug)]
+pub struct Look<'t> {
+    pub id: ModuleId,
+    pub kind: KindId,
+    pub label: u16,
+    pub birth: Instant,
+    pub values: &'t [f64],
+    /// Brood, and place in it.
+    member: (u32, u16),
+}
+
+/// The modules alive, their order and their parameters.
+#[derive(Clone, Debug)]
+pub struct Tree {
+    pub(super) nodes: Vec<Node>,
+    pub(super) broods: Broods,
+    free: Vec<u32>,
+    pub(super) values: Vec<f64>,
+    /// Free blocks of `values`, by their length.
+    free_values: Vec<Vec<u32>>,
+    pub(super) arities: Vec<u32>,
+    /// Parameters of each kind that are shown to others: hidden ones are its last.
+    pub(super) shown: Vec<u32>,
+    modules: usize,
+}
+
+impl Tree {
+    /// An empty structure; `arities` gives the number of parameters of each kind, and `shown` how many of them an
+    /// observer gets to see.
+    pub fn new(arities: Vec<u32>, shown: Vec<u32>) -> Tree {
+        let trunk = Node {
+            kind: KindId::OPEN,
+            generation: 0,
+            before: Link::end_of(TRUNK),
+            after: Link::end_of(TRUNK),
+            first: Link::end_of(TRUNK).0,
+            label: NO_LABEL,
+            brood: NO_BROOD,
+            place: 0,
+        };
+        Tree {
+            nodes: vec![trunk],
+            broods: Broods::default(),
+            free: Vec::new(),
+            values: Vec::new(),
+            free_values: Vec::new(),
+            arities,
+            shown,
+            modules: 0,
+        }
+    }
+
+    /// Number of modules, brackets not counted.
+    pub fn len(&self) -> usize {
+        self.modules
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.modules == 0
+    }
+
+    /// Number of modules and brackets, and of parameters at most.
+    pub fn extent(&self) -> (usize, usize) {
+        let branches = self.nodes.len() - 1 - self.free.len() - self.modules;
+        (self.modules + 2 * branches, self.values.len())
+    }
+
+    /// Bytes that it takes, about.
+    pub fn size(&self) -> usize {
+        size_of_val(&self.nodes[..])
+            + size_of_val(&self.values[..])
+            + self.broods.size()
+            + 4 * self.free.len()
+    }
+
+    /// Slots that have ever been used; `ModuleId::slot` is below this.
+    pub fn slots(&self) -> usize {
+        self.nodes.len()
+    }
+
+    pub fn is_alive(&self, id: ModuleId) -> bool {
+        self.nodes[id.slot()].generation == id.generation
+    }
+
+    pub(super) fn node(&self, id: ModuleId) -> &Node {
+        let node = &self.nodes[id.slot()];
+        debug_assert_eq!(node.generation, id.generation, "the module is no longer alive");
+        node
+    }
+
+    /// Who lives in a slot.
+    pub fn id(&self, slot: u32) -> ModuleId {
+        ModuleId { slot, generation: self.nodes[slot as usize].generation }
+    }
+
+    /// All that is known of who lives in a slot.
+    #[inline]
+    pub fn look(&self, slot: u32) -> Look<'_> {
+        let node = &self.nodes[slot as usize];
+        let Node { kind, label, brood, place, generation, .. } = *node;
+        let (birth, values) = (self.broods.birth(brood), &self.values[node.places(&self.arities)]);
+        Look { id: ModuleId { slot, generation }, kind, label, birth, values, member: (brood, place) }
+    }
+
+    /// The lineage of one that was looked at.
+    pub fn lineage_of(&self, look: &Look) -> Lineage {
+        self.broods.lineage(look.member.0, look.member.1)
+    }
+
+    pub fn kind(&self, id: ModuleId) -> KindId {
+        self.node(id).kind
+    }
+
+    pub fn birth(&self, id: ModuleId) -> Instant {
+        self.broods.birth(self.node(id).brood)
+    }
+
+    pub fn lineage(&self, id: ModuleId) -> Lineage {
+        let node = self.node(id);
+        self.broods.lineage(node.brood, node.place)
+    }
+
+    /// A number that the owner of the tree has given to a module; [`NO_LABEL`] from birth on.
+    pub fn label(&self, id: ModuleId) -> u16 {
+        self.node(id).label
+    }
+
+    pub fn set_label(&mut self, id: ModuleId, label: u16) {
+        self.nodes[id.slot()].label = label;
+    }
+
+    /// The label of a module that may be dead: then there is none.
+    pub fn label_if_alive(&self, id: ModuleId) -> Option<u16> {
+        let node = &self.nodes[id.slot()];
+        (node.generation == id.generation).then_some(node.label)
+    }
+
+    /// Places of a module's parameters in [`Tree::values`].
+    pub fn places(&self, id: ModuleId) -> std::ops::Range<usize> {
+        self.node(id).places(&self.arities)
+    }
+
+    pub fn parameters(&self, id: ModuleId) -> &[f64] {
+        &self.values[self.places(id)]
+    }
+
+    /// Number of a module's parameters that an observer gets to see.
+    pub fn shown(&self, id: ModuleId) -> usize {
+        self.shown[self.node(id).kind.index()] as usize
+    }
+
+    /// All parameters of all modules; a module's stand at [`Tree::places`].
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    pub fn set_value(&mut self, place: usize, value: f64) {
+        self.values[place] = value;
+    }
+
+    /// Puts a node into a free slot.
+    fn allocate(&mut self, mut node: Node) -> ModuleId {
+        match self.free.pop() {
+            Some(slot) => {
+                let place = &mut self.nodes[slot as usize];
+                node.generation = place.generation;
+                *place = node;
+                ModuleId { slot, generation: node.generation }
+            }
+            None => {
+                self.nodes.push(node);
+                ModuleId { slot: self.nodes.len() as u32 - 1, generation: 0 }
+            }
+        }
+    }
+
+    /// Gives values a place, and tells where it begins.
+    fn store(&mut self, values: &[f64]) -> u32 {
+        if values.is_empty() {
+            return 0;
+        }
+        match self.free_values.get_mut(values.len()).and_then(Vec::pop) {
+            Some(first) => {
+                self.values[first as usize..first as usize + values.len()].copy_from_slice(values);
+                first
+            }
+            None => {
+                self.values.extend_from_slice(values);
+                (self.values.len() - values.len()) as u32
+            }
+        }
+    }
+
+    /// True if modules of these kinds have a place without a list that grows.
+    #[inline]
+    pub fn has_room(&self, kinds: &[KindId], width: usize) -> bool {
+        let (nodes, values) = (&self.nodes, &self.values);
+        nodes.capacity() - nodes.len() + self.free.len() >= kinds.len()
+            && (values.capacity() - values.len() >= width || self.has_free_values(kinds))
+    }
+
+    /// True if the parameters of these kinds have a place that others have left.
+    fn has_free_values(&self, kinds: &[KindId]) -> bool {
+        kinds.iter().filter(|kind| !kind.is_bracket()).all(|kind| {
+            let arity = self.arities[kind.index()] as usize;
+            arity == 0 || self.free_values.get(arity).is_some_and(|free| free.len() >= kinds.len())
+        })
+    }
+
+    /// Lets the lists of nodes and values grow as they would.
+    ///
+    /// # Errors
+    /// If there is no memory for that.
+    pub fn make_room(&mut self, kinds: &[KindId], width: usize) -> Result<(), TryReserveError> {
+        self.nodes.try_reserve(kinds.len().saturating_sub(self.free.len()))?;
+        if self.has_free_values(kinds) { Ok(()) } else { self.values.try_reserve(width) }
+    }
+
+    fn release(&mut self, slot: u32) {
+        self.vacate(slot);
+        self.free.push(slot);
+    }
+
+    /// Ends the life of whoever is in a slot. The slot is not free yet.
+    fn vacate(&mut self, slot: u32) {
+        let node = &mut self.nodes[slot as usize];
+        node.generation = node.generation.wrapping_add(1);
+        let (arity, first) = (self.arities[node.kind.index()] as usize, node.first);
+        if arity > 0 {
+            if self.free_values.len() <= arity {
+                self.free_values.resize(arity + 1, Vec::new());
+            }
+            self.free_values[arity].push(first);
+        }
+    }
+
+    /// Sets what comes after `before`, which may be the beginning of an axis.
+    fn link_forward(&mut self, before: Link, after: Link) {
+        match before.ended() {
+            Some(branch) => self.nodes[branch as usize].first = after.0,
+            None => self.nodes[before.0 as usize].after = after,
+        }
+    }
+
+    /// Appends a string at the end of the main axis, in time proportional to its length. The new modules are added to
+    /// `made`.
+    pub fn append(
+        &mut self,
+        string: &Successor,
+        arguments: &[f64],
+        birth: Instant,
+        family: Family,
+        made: &mut Vec<ModuleId>,
+    ) {
+        let mut last = Link::end_of(TRUNK);
+        let mut next = Link(self.nodes[TRUNK as usize].first);
+        while next.ended().is_none() {
+            (last, next) = (next, self.nodes[next.0 as usize].after);
+        }
+        self.insert(last, next, string, arguments, birth, family, made);
+    }
+
+    /// Replaces a module by a string.
+    pub fn replace(
+        &mut self,
+        id: ModuleId,
+        string: &Successor,
+        arguments: &[f64],
+        birth: Instant,
+        family: Family,
+        made: &mut Vec<ModuleId>,
+    ) {
+        let Node { before, after, brood, .. } = *self.node(id);
+        self.broods.leave(brood);
+        if let [kind] = string.kinds[..]
+            && kind != KindId::OPEN
+        {
+            return self.succeed(id, kind, arguments, birth, family, made);
+        }
+        self.release(id.slot);
+        self.modules -= 1;
+        self.insert(before, after, string, arguments, birth, family, made);
+    }
+
+    /// Puts a single module into the place of another. Its neighbours need not know, and at a million modules their
+    /// memory is far away.
+    fn succeed(
+        &mut self,
+        id: ModuleId,
+        kind: KindId,
+        arguments: &[f64],
+        birth: Instant,
+        family: Family,
+        made: &mut Vec<ModuleId>,
+    ) {
+        self.vacate(id.slot);
+        let first = self.store(arguments);
+        let brood = self.broods.begin(family, birth, 0);
+        self.broods.count(brood, 1);
+        let node = &mut self.nodes[id.slot()];
+        (node.kind, node.first, node.brood, node.place, node.label) = (kind, first, brood, 0, NO_LABEL);
+        made.push(ModuleId { slot: id.slot, generation: node.generation });
+    }
+
+    /// Takes out a module and all that follows on its axis, with all branches. Slots that are to be kept stay empty until
+    /// they are given back with [`Tree::free_slot`].
+    pub fn cut(&mut self, id: ModuleId, keep: impl Fn(u32) -> bool) {
+        let before = self.node(id).before;
+        let mut axes = vec![Link(id.slot)];
+        let mut end = None;
+        while let Some(mut at) = axes.pop() {
+            while at.ended().is_none() {
+                let Node { kind, after, first, brood, .. } = self.nodes[at.0 as usize];
+                if kind == KindId::OPEN {
+                    axes.push(Link(first));
+                } else {
+                    self.broods.leave(brood);
+                    self.modules -= 1;
+                }
+                if keep(at.0) {
+                    self.vacate(at.0)
+                } else {
+                    self.release(at.0)
+                }
+                at = after;
+            }
+            end.get_or_insert(at);
+        }
+        self.link_forward(before, end.expect("an axis has an end"));
+    }
+
+    /// Gives back a slot that was kept when its module was cut off.
+    pub fn free_slot(&mut self, slot: u32) {
+        self.free.push(slot);
+    }
+
+    /// Puts a string between two neighbours.
+    #[allow(clippy::too_many_arguments)]
+    fn insert(
+        &mut self,
+        mut before: Link,
+        after: Link,
+        string: &Successor,
+        mut arguments: &[f64],
+        birth: Instant,
+        family: Family,
+        made: &mut Vec<ModuleId>,
+    ) {
+        // The branches that are open.
+        let mut branches: SmallVec<[u32; 8]> = SmallVec::new();
+        let mut place = 0;
+        // Of the present brood; a very long successor is several.
+        let (mut brood, mut members) = (NO_BROOD, 0);
+        for &kind in &string.kinds {
+            if kind == KindId::CLOSE {
+                let branch = branches.pop().expect("brackets match: the front end saw to it");
+                self.link_forward(before, Link::end_of(branch));
+                before = Link(branch);
+                continue;
+            }
+            // What is after it is not known yet.
+            let mut node = Node {
+                kind,
+                generation: 0,
+                before,
+                after: before,
+                first: 0,
+                label: NO_LABEL,
+                brood: NO_BROOD,
+                place: 0,
+            };
+            if kind == KindId::OPEN {
+                let slot = self.allocate(node).slot;
+                self.link_forward(before, Link(slot));
+                branches.push(slot);
+                before = Link::end_of(slot);
+                continue;
+            }
+            if brood == NO_BROOD || members == u16::MAX {
+                self.broods.count(brood, members);
+                brood = self.broods.begin(family, birth, place);
+                members = 0;
+            }
+            let own;
+            (own, arguments) = arguments.split_at(self.arities[kind.index()] as usize);
+            (node.first, node.brood, node.place) = (self.store(own), brood, members);
+            let id = self.allocate(node);
+            self.link_forward(before, Link(id.slot));
+            members += 1;
+            place += 1;
+            before = Link(id.slot);
+            made.push(id);
+        }
+        self.modules += place as usize;
+        self.broods.count(brood, members);
+        self.link_forward(before, after);
+        if after.ended().is_none() {
+            self.nodes[after.0 as usize].before = before;
+        }
+    }
+}
+
+impl Node {
+    pub fn places(&self, arities: &[u32]) -> std::ops::Range<usize> {
+        let first = self.first as usize;
+        first..first + arities[self.kind.index()] as usize
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::super::Visit;
+    use super::*;
+    use dlsys_expr::{Graph, Program};
+    use dlsys_model::Kinds;
+
+    /// A string of kinds without parameters, written with one letter each.
+    pub fn string(kinds: &mut Kinds, text: &str) -> Successor {
+        let ids = text.chars().map(|c| kinds.intern(&c.to_string(), 0)).collect();
+        let arguments = Program::compile(&Graph::default(), &[], 0);
+        Successor { kinds: ids, arguments, ..Successor::default() }
+    }
+
+    pub fn show(kinds: &Kinds, tree: &Tree) -> String {
+        tree.walk()
+            .map(|visit| match visit {
+                Visit::Open => "[".to_owned(),
+                Visit::Close => "]".to_owned(),
+                Visit::Module(id) => kinds.get(tree.kind(id)).name.clone(),
+            })
+            .collect()
+    }
+
+    pub fn grown(text: &str, swaps: &[(usize, &str)]) -> (Kinds, Tree) {
+        let mut kinds = Kinds::default();
+        let axiom = string(&mut kinds, text);
+        let successors: Vec<_> = swaps.iter().map(|(at, s)| (*at, string(&mut kinds, s))).collect();
+        let mut tree = Tree::new(vec![0; kinds.len()], vec![0; kinds.len()]);
+        tree.append(&axiom, &[], Instant::ZERO, Family::AXIOM, &mut Vec::new());
+        for (at, successor) in successors {
+            let ids: Vec<ModuleId> = tree
+                .walk()
+                .filter_map(|v| match v {
+                    Visit::Module(id) => Some(id),
+                    _ => None,
+                })
+                .collect();
+            let family = tree.lineage(ids[at]).family(0);
+            tree.replace(ids[at], &successor, &[], Instant::ZERO, family, &mut Vec::new());
+        }
+        (kinds, tree)
+    }
+
+    #[test]
+    fn productions_splice_the_string() {
+        let (kinds, tree) = grown("AB[C[D]E]F", &[(2, "X[Y]"), (0, ""), (0, "PQ")]);
+        assert_eq!(show(&kinds, &tree), "PQ[X[Y][D]E]F");
+        assert_eq!(tree.len(), 7);
+    }
+
+    #[test]
+    fn what_is_cut_leaves_room_for_others() {
+        let (mut kinds, mut tree) = grown("A[B[C]%D[E[F]G]H]IXYZ", &[]);
+        let more = string(&mut kinds, "XY[Z]");
+        let cut = kinds.find("%", 0).expect("%");
+        let find = |tree: &Tree, kind| {
+            let modules = tree.walk().filter_map(|v| if let Visit::Module(id) = v { Some(id) } else { None });
+            { modules }.find(|id| tree.kind(*id) == kind).expect("it is there")
+        };
+        let cut = find(&tree, cut);
+        assert_eq!(tree.following(cut).len(), 5);
+        tree.cut(cut, |slot| slot as usize == cut.slot());
+        assert_eq!((show(&kinds, &tree).as_str(), tree.len()), ("A[B[C]]IXYZ", 7));
+        assert!(!tree.is_alive(cut));
+        let mut made = Vec::new();
+        for _ in 0..3 {
+            let last = find(&tree, kinds.find("B", 0).expect("B"));
+            let family = tree.lineage(last).family(0);
+            let b = string(&mut kinds, "B[A]");
+            tree.replace(last, &b, &[], Instant::ZERO, family, &mut made);
+            tree.append(&more, &[], Instant::ZERO, Family::AXIOM, &mut made);
+        }
+        assert_eq!(show(&kinds, &tree), "A[B[A][A][A][C]]IXYZXY[Z]XY[Z]XY[Z]");
+        assert!(made.iter().all(|id| id.slot() != cut.slot()), "its slot is kept");
+    }
+}
