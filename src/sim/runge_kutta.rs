@@ -415,7 +415,9 @@ impl Workspace {
             let defect = self.k[2][component] - dense.h * self.k[1][component];
             let error = defect.abs() / PER_ERROR;
             if error.is_finite() {
-                let scale = y.abs().max(dense.h.abs() * self.k[0][component].abs()) + FLOOR;
+                // What begins from rest goes somewhere only after that.
+                let moved = (dense.h * self.k[0][component]).abs().max(self.k[2][component].abs());
+                let scale = y.abs().max(moved).max(self.stage[component].abs()) + FLOOR;
                 inside.relative = inside.relative.max(error / scale);
                 inside.absolute = inside.absolute.max(error / y.abs().max(1.0));
             }
