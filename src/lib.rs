@@ -3,45 +3,28 @@
 //! and which productions replace when a trajectory reaches the domain's boundary (Prusinkiewicz, Hammel and
 //! Mjolsness, *Animation of Plant Development*, SIGGRAPH '93).
 //!
-//! # A first model
+//! # A plant, and its picture
 //!
 //! ```
-//! use dlsys::session::Session;
-//! use dlsys::sim::Settings;
-//! use dlsys::tree::ModuleString;
-//!
-//! let text = "
+//! # fn main() -> Result<(), dlsys::Error> {
+//! let model = dlsys::Model::parse("
 //!     initial string: A(0)
 //!     A(x):
 //!       if x < 1  solve dx/dt = 1
 //!       if x = 1  produce F(x) [ +(30) A(0) ] A(0)
-//! ";
-//! let session = Session::from_text("bush.dls", text, &[]).expect("a good model");
-//! let mut simulation = session.simulate(Settings::default()).expect("a good start");
-//! let mut string = ModuleString::default();
-//! simulation.at(2.5, &mut string).expect("it runs");
-//! let names: Vec<&str> = string.iter().map(|m| session.model.kinds.get(m.kind).name.as_str()).collect();
-//! assert_eq!(names.join(" "), "F [ + F [ + A ] A ] F [ + A ] A");
+//! ")?;
+//! let mut run = model.run()?;
+//! let plant = run.at(2.5)?;
+//! assert_eq!(plant.to_string(), "F(1) [ +(30) F(1) [ +(30) A(0.5) ] A(0.5) ] F(1) [ +(30) A(0.5) ] A(0.5)");
+//! let svg = plant.picture(dlsys::Format::Svg)?;
+//! # assert!(svg.starts_with(b"<svg"));
+//! # Ok(())
+//! # }
 //! ```
 //!
-//! and to a picture:
-//!
-//! ```
-//! # let text = "initial string: F(1) [ +(30) @L(1) ] F(1) @K(1)";
-//! # let session = dlsys::session::Session::from_text("twig.dls", text, &[]).expect("a good model");
-//! # let mut simulation = session.simulate(Default::default()).expect("a good start");
-//! # let mut string = Default::default();
-//! # simulation.at(1.0, &mut string).expect("it runs");
-//! use dlsys::render::{Format, FrameWriter, Survey, View};
-//! use dlsys::scene::Scene;
-//!
-//! let mut scene = Scene::default();
-//! dlsys::turtle::draw(&session.model, &string, &mut scene).expect("finite");
-//! let mut survey = Survey::new(View::FRONT);
-//! survey.add(&scene);
-//! let svg = FrameWriter::new(Format::Svg, survey.fit()).write(&scene, "a twig");
-//! assert!(svg.starts_with(b"<svg"));
-//! ```
+//! [`Model::load`] reads a file, [`Plant::save`] writes one, and errors are the messages of the program. The module
+//! [`sim`] has the settings of a run (tolerance, method, seed, limits), [`replay`] goes back in time, [`render`] writes
+//! frames that share one picture area.
 //!
 //! # The stages
 //!
@@ -73,9 +56,14 @@
 //! `ARCHITECTURE.md` tells why things are as they are.
 
 pub mod cli;
+mod front;
 pub mod interrupt;
 pub mod repl;
 pub mod rescue;
+
+pub use dlsys_render::Format;
+pub use dlsys_sim::{Method, Scheduler, Settings};
+pub use front::{Error, Model, Module, Plant, Run};
 
 pub use dlsys_diagnostic as diagnostic;
 pub use dlsys_expr as expr;

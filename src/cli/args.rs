@@ -205,7 +205,7 @@ pub struct RunArgs {
     /// repeated [default: the number of all modules]
     #[arg(long = "measure", value_name = "HEAD: EXPR", requires = "seeds")]
     pub measures: Vec<String>,
-    /// Write the distributions of the measures as CSV
+    /// Write the distributions of the measures as CSV; - is standard output
     #[arg(long, value_name = "FILE", requires = "seeds")]
     pub csv: Option<PathBuf>,
     /// Draw the distributions of the measures over time as SVG: median, mean, bands of 50 and 90 per cent of specimens
@@ -500,10 +500,10 @@ pub struct SharedArgs {
     pub seed: u64,
     #[command(flatten)]
     pub budget: BudgetArgs,
-    /// Write times and counts of work as JSON
+    /// Write times and counts of work as JSON; - is standard output
     #[arg(long, value_name = "FILE")]
     pub stats: Option<PathBuf>,
-    /// Write every production that takes place, up to the last observed time, as a line of JSON
+    /// Write every production that takes place, up to the last observed time, as a line of JSON; - is standard output
     ///
     /// In the order of time. Fields: t; group, the same number for simultaneous events; lineage and id of the module
     /// that was replaced, and its name, module; rule, its head; clause, which `produce` of the rule, from 1; successor,

@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 
 use super::args::{IncludeArgs, Scheduler, SharedArgs};
+use super::output;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::lang::Setting;
 use crate::model::Frames;
@@ -340,8 +341,7 @@ impl Run {
             counts,
         };
         let text = serde_json::to_string_pretty(&file).expect("numbers become JSON") + "\n";
-        std::fs::write(path, text)
-            .map_err(|error| Failure::Model(format!("error: cannot write {}: {error}\n", path.display())))
+        output::write(path, &text)
     }
 }
 

@@ -18,18 +18,16 @@
 //! | `residual` | difference of the two sides of the condition at the located instant; `null` if not finite |
 
 use std::fmt::Write as _;
-use std::fs::File;
-use std::io::{BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::common::{Failure, Run};
+use super::output::Output;
 use super::run::number;
 use crate::sim::Event;
 
 /// An event log that is being written.
 pub struct EventLog {
-    path: PathBuf,
-    file: BufWriter<File>,
+    file: Output,
     /// Per rule: its head as a JSON string, and the lines of its `produce` clauses.
     rules: Vec<(String, Vec<usize>)>,
     /// Per kind: its name as a JSON string.
@@ -48,13 +46,11 @@ impl EventLog {
     pub fn create(path: Option<&Path>, run: &Run) -> Result<Option<EventLog>, Failure> {
         let Some(path) = path else { return Ok(None) };
         let (model, source) = (&run.session.model, &run.session.source);
-        let file = File::create(path).map_err(|error| cannot_write(path, &error))?;
         let lines = |rule: &crate::model::Rule| {
             rule.produces.iter().map(|p| source.position(p.span.start).0).collect::<Vec<_>>()
         };
         Ok(Some(EventLog {
-            path: path.to_owned(),
-            file: BufWriter::with_capacity(1 << 16, file),
+            file: Output::create(path)?,
             rules: model.rules.iter().map(|r| (json(&r.label), lines(r))).collect(),
             kinds: model.kinds.iter().map(|(_, kind)| json(&kind.name)).collect(),
             group: (0, 0),
@@ -66,14 +62,14 @@ impl EventLog {
     pub fn write(&mut self, events: &[Event]) -> Result<(), Failure> {
         for event in events {
             self.line(event);
-            self.file.write_all(self.text.as_bytes()).map_err(|e| cannot_write(&self.path, &e))?;
+            self.file.write(&self.text)?;
         }
         Ok(())
     }
 
     /// Brings everything to the disk.
-    pub fn finish(mut self) -> Result<(), Failure> {
-        self.file.flush().map_err(|error| cannot_write(&self.path, &error))
+    pub fn finish(self) -> Result<(), Failure> {
+        self.file.finish()
     }
 
     fn line(&mut self, event: &Event) {
@@ -104,8 +100,4 @@ impl EventLog {
         }
         out.push_str("}\n");
     }
-}
-
-fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {
-    Failure::Model(format!("error: cannot write {}: {error}\n", path.display()))
 }

@@ -12,6 +12,7 @@ mod explain;
 mod fmt;
 mod gallery;
 mod new;
+mod output;
 mod parallel;
 mod progress;
 mod reel;

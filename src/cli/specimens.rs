@@ -10,6 +10,7 @@ use serde_json::json;
 
 use super::args::{RunArgs, Seeds, TextFormat};
 use super::common::{Failure, Run, coloured, out_error};
+use super::output;
 use super::parallel;
 use super::progress::Progress;
 use crate::model::Measure;
@@ -141,6 +142,5 @@ fn specimen(run: &Run, seed: u64, measures: &[Measure]) -> Result<Vec<f64>, Fail
 
 fn write(path: Option<&Path>, text: impl FnOnce() -> String) -> Result<(), Failure> {
     let Some(path) = path else { return Ok(()) };
-    std::fs::write(path, text())
-        .map_err(|error| Failure::Model(format!("error: cannot write {}: {error}\n", path.display())))
+    output::write(path, &text())
 }

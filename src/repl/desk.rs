@@ -12,7 +12,7 @@ use super::stage::{Flow, Stage};
 use crate::cli::common::Failure;
 use crate::diagnostic::{Diagnostic, Severity};
 use crate::lang::Setting;
-use crate::session::{Refused, Session};
+use crate::session::{LoadError, Session};
 use crate::sim::{Settings, brief};
 
 /// Most messages that are printed of one text.
@@ -267,7 +267,7 @@ impl Desk {
     }
 
     /// All that is wrong with a text.
-    pub fn refusal(&self, refused: &Refused) -> Fault {
+    pub fn refusal(&self, refused: &LoadError) -> Fault {
         let wrong = |d: &&Diagnostic| d.severity == Severity::Error;
         let all: Vec<&Diagnostic> =
             refused.diagnostics.iter().filter(wrong).chain(&refused.settings).collect();

@@ -14,7 +14,7 @@ use crate::cli::{bad, dlsys, good};
 use crate::common::repository;
 
 /// All models of the repository, and the mistakes.
-fn models() -> Vec<PathBuf> {
+pub fn models() -> Vec<PathBuf> {
     let mut folders: Vec<PathBuf> = ["models", "tests/paper-models", "tests/errors"].map(repository).to_vec();
     let mut found = Vec::new();
     while let Some(folder) = folders.pop() {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use dlsys::session::{Refused, Session};
+use dlsys::session::{LoadError, Session};
 use dlsys::sim::Settings;
 use dlsys::tree::ModuleString;
 
@@ -30,7 +30,7 @@ impl Home {
         self.0.path().join(name)
     }
 
-    fn open(&self, others: &[PathBuf]) -> Result<Session, Box<Refused>> {
+    fn open(&self, others: &[PathBuf]) -> Result<Session, Box<LoadError>> {
         Session::open_with(&self.path("model.dls"), &[], others)
     }
 
@@ -44,7 +44,7 @@ impl Home {
     }
 
     /// What is said, without the name of the scratch folder.
-    fn said(&self, refused: &Refused) -> String {
+    fn said(&self, refused: &LoadError) -> String {
         let all: String = refused.diagnostics.iter().map(|d| d.render(&refused.source, false)).collect();
         all.replace(&self.0.path().display().to_string(), "~")
     }

@@ -1,6 +1,7 @@
 //! The quick way against the general way: random models of formulas must give the same bits, the same log of events and the
 //! same errors, whichever frames are asked for.
 
+use dlsys::session::Session;
 use dlsys::sim::Settings;
 use dlsys::tree::ModuleString;
 use proptest::prelude::*;
@@ -102,4 +103,46 @@ proptest! {
         prop_assert_eq!(&seen(&text, quick, &shown, &shown), &known, "{}", &text);
         prop_assert_eq!(&seen(&text, quick, &times, &shown), &known, "{}", &text);
     }
+}
+
+/// Every model of the repository on the fast path and on the reference path, compared bit by bit: strings, events, and errors.
+#[test]
+fn both_paths_grow_every_model_alike() {
+    let mut compared = 0;
+    for path in crate::editing::models() {
+        let Ok(session) = Session::open(&path, &[]) else { continue };
+        let outcome = |slow| {
+            let settings =
+                Settings { slow, log: true, max_modules: 3000, max_events: 30_000, ..Settings::default() };
+            let mut bits: Vec<(String, Vec<u64>)> = Vec::new();
+            let end = session.simulate(settings).and_then(|mut simulation| {
+                let mut string = ModuleString::default();
+                let shown = [0.0, 0.4, 1.3, 5.0].into_iter().try_for_each(|time| {
+                    simulation.at(time, &mut string)?;
+                    bits.extend(string.iter().map(|module| {
+                        let name = session.model.kinds.get(module.kind).name.clone();
+                        let age = (!module.kind.is_bracket()).then_some(module.age);
+                        let values = module.parameters.iter().copied().chain(age);
+                        (name, values.map(f64::to_bits).collect())
+                    }));
+                    Ok(())
+                });
+                bits.extend(simulation.take_events().iter().map(|event| {
+                    let numbers = [event.time.to_bits(), event.rule as u64, event.clause as u64, event.group];
+                    (format!("{:?}", event.lineage), numbers.to_vec())
+                }));
+                shown
+            });
+            (end.err().map(|error| error.to_string()), bits)
+        };
+        let (reference, fast) = (outcome(true), outcome(false));
+        compared += usize::from(!fast.1.is_empty());
+        // Where a budget ends a run depends on the path; what came before does not.
+        let is_budget = |outcome: &Option<String>| outcome.as_ref().is_some_and(|e| e.contains("more than"));
+        if !(is_budget(&reference.0) && is_budget(&fast.0)) {
+            assert_eq!(reference.0, fast.0, "{}", path.display());
+            assert!(reference.1 == fast.1, "{}: other strings or events", path.display());
+        }
+    }
+    assert!(compared > 150, "{compared} models ran");
 }

@@ -40,9 +40,10 @@ pub struct Session {
     folders: Vec<PathBuf>,
 }
 
-/// Why there is no session.
+/// Why a model cannot be loaded. As text: all messages, as the program prints them.
 #[derive(Debug)]
-pub struct Refused {
+#[non_exhaustive]
+pub struct LoadError {
     pub source: Source,
     /// What is wrong with the text.
     pub diagnostics: Vec<Diagnostic>,
@@ -51,6 +52,18 @@ pub struct Refused {
     /// The files that were read, or looked for.
     pub inputs: Vec<Input>,
 }
+
+impl std::fmt::Display for LoadError {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let settings = Source::new("settings", "");
+        let texts = self.diagnostics.iter().map(|d| d.render(&self.source, false));
+        let all: Vec<String> =
+            texts.chain(self.settings.iter().map(|d| d.render(&settings, false))).collect();
+        f.write_str(all.join("\n").trim_end())
+    }
+}
+
+impl std::error::Error for LoadError {}
 
 /// A file that was read or looked for, and what it was like just before.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -83,7 +96,7 @@ impl Session {
     ///
     /// # Errors
     /// What is wrong with the file, its text or the settings.
-    pub fn open(path: &Path, settings: &[Setting]) -> Result<Session, Box<Refused>> {
+    pub fn open(path: &Path, settings: &[Setting]) -> Result<Session, Box<LoadError>> {
         Session::open_with(path, settings, &[])
     }
 
@@ -91,12 +104,16 @@ impl Session {
     ///
     /// # Errors
     /// As of [`Session::open`].
-    pub fn open_with(path: &Path, settings: &[Setting], others: &[PathBuf]) -> Result<Session, Box<Refused>> {
+    pub fn open_with(
+        path: &Path,
+        settings: &[Setting],
+        others: &[PathBuf],
+    ) -> Result<Session, Box<LoadError>> {
         let name = path.display().to_string();
         let model = Input::now(path);
         let refuse = |source, diagnostic| {
             let inputs = vec![model.clone()];
-            Box::new(Refused { source, diagnostics: vec![diagnostic], settings: Vec::new(), inputs })
+            Box::new(LoadError { source, diagnostics: vec![diagnostic], settings: Vec::new(), inputs })
         };
         let bytes = read_whole(path, Source::LIMIT as u64).map_err(|error| {
             let diagnostic = Diagnostic::error(format!("the model cannot be read: {error}"))
@@ -112,7 +129,7 @@ impl Session {
 
     /// Takes a model's text from memory; `name` stands for the file in messages. Surfaces that it names are
     /// not found.
-    pub fn from_text(name: &str, text: &str, settings: &[Setting]) -> Result<Session, Box<Refused>> {
+    pub fn from_text(name: &str, text: &str, settings: &[Setting]) -> Result<Session, Box<LoadError>> {
         Session::read_text(name, text, settings, &NoFiles)
     }
 
@@ -121,9 +138,9 @@ impl Session {
         text: &str,
         settings: &[Setting],
         files: &dyn Files,
-    ) -> Result<Session, Box<Refused>> {
+    ) -> Result<Session, Box<LoadError>> {
         let source = Source::from_bytes(name, text.as_bytes().to_vec()).map_err(|e| {
-            Box::new(Refused {
+            Box::new(LoadError {
                 source: e.0,
                 diagnostics: vec![e.1],
                 settings: Vec::new(),
@@ -144,20 +161,24 @@ impl Session {
         name: &str,
         text: &str,
         settings: &[Setting],
-    ) -> Result<Session, Box<Refused>> {
+    ) -> Result<Session, Box<LoadError>> {
         let folders = Folders::new(folder, others);
         let read = Session::read_text(name, text, settings, &folders);
         folders.note(read)
     }
 
-    fn from_source(source: Source, settings: &[Setting], files: &dyn Files) -> Result<Session, Box<Refused>> {
+    fn from_source(
+        source: Source,
+        settings: &[Setting],
+        files: &dyn Files,
+    ) -> Result<Session, Box<LoadError>> {
         let loaded = lang::load_with(&source, settings, files);
         let source = loaded.source.unwrap_or(source);
         match loaded.model {
             Some(model) => {
                 Ok(Session { source, model, warnings: loaded.diagnostics, inputs: vec![], folders: vec![] })
             }
-            None => Err(Box::new(Refused {
+            None => Err(Box::new(LoadError {
                 source,
                 diagnostics: loaded.diagnostics,
                 settings: loaded.refused_settings,
@@ -216,7 +237,7 @@ impl Folders {
     }
 
     /// Puts what was read into what came of it.
-    fn note(self, mut read: Result<Session, Box<Refused>>) -> Result<Session, Box<Refused>> {
+    fn note(self, mut read: Result<Session, Box<LoadError>>) -> Result<Session, Box<LoadError>> {
         match &mut read {
             Ok(session) => (session.inputs, session.folders) = (self.inputs.into_inner(), self.paths),
             Err(refused) => refused.inputs = self.inputs.into_inner(),

@@ -17,6 +17,7 @@ use clap::Parser;
 
 use super::args::{Action, Command, FrameFormat, GalleryArgs, RenderArgs};
 use super::common::{Failure, out_error};
+use super::output;
 use super::progress::Progress;
 use super::render::render;
 use figures::{FIGURES, Picture, models};
@@ -49,7 +50,7 @@ fn draw(wanted: &[&Picture], out: &Path, args: &GalleryArgs) -> Result<(), Failu
     spare(out, &folder)?;
     make(&folder)?;
     for (name, text) in models() {
-        write(&folder.join(name), text)?;
+        output::write(&folder.join(name), text)?;
     }
     let mut drawn = Vec::new();
     let mut progress = Progress::of_printed("pictures", wanted.len());
@@ -62,7 +63,7 @@ fn draw(wanted: &[&Picture], out: &Path, args: &GalleryArgs) -> Result<(), Failu
         progress.inc();
     }
     let index = out.join("index.html");
-    write(&index, &page::page(&drawn))?;
+    output::write(&index, &page::page(&drawn))?;
     say(&format!("all        {}\n", index.display()))
 }
 
@@ -106,11 +107,6 @@ fn say(text: &str) -> Result<(), Failure> {
 fn make(folder: &PathBuf) -> Result<(), Failure> {
     std::fs::create_dir_all(folder)
         .map_err(|error| Failure::Model(format!("error: cannot make {}: {error}\n", folder.display())))
-}
-
-fn write(path: &PathBuf, text: &str) -> Result<(), Failure> {
-    std::fs::write(path, text)
-        .map_err(|error| Failure::Model(format!("error: cannot write {}: {error}\n", path.display())))
 }
 
 #[cfg(test)]
