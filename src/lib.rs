@@ -16,7 +16,7 @@
 //! let mut run = model.run()?;
 //! let plant = run.at(2.5)?;
 //! assert_eq!(plant.to_string(), "F(1) [ +(30) F(1) [ +(30) A(0.5) ] A(0.5) ] F(1) [ +(30) A(0.5) ] A(0.5)");
-//! let svg = plant.picture(dlsys::Format::Svg)?;
+//! let svg = plant.picture(dlsys::Format::SVG)?;
 //! # assert!(svg.starts_with(b"<svg"));
 //! # Ok(())
 //! # }
@@ -29,7 +29,7 @@
 //! # The stages
 //!
 //! ```text
-//! text ──lang──▶ Model ──sim──▶ Tree at any time t ──turtle──▶ Scene ──export──▶ SVG, PNG, OBJ
+//! text ──lang──▶ Model ──sim──▶ Tree at any time t ──turtle──▶ Scene ──render──▶ SVG, PNG, OBJ
 //! ```
 //!
 //! | module | what it is |
@@ -37,22 +37,21 @@
 //! | [`expr`] | pure mathematics: expressions, compiled, evaluated as numbers, bounds or derivatives |
 //! | [`lang`] | text to model; everything that can be said about a text |
 //! | [`model`] | what a model says: kinds of modules, rules, conditions |
-//! | [`structure`] | modules and how they hang together: tree, string, identity, birth |
+//! | [`tree`] | modules and how they hang together: tree, string, identity, birth |
 //! | [`sim`] | development in time: integration, event location, productions |
 //! | [`turtle`] | strings as geometry |
 //! | [`scene`] | geometry that knows no file format |
-//! | [`export`] | files |
-//! | [`view`] | a plant as something to walk around: recordings, a page that plays them, a window |
+//! | [`render`] | files |
+//! | [`player`] | a plant as something to walk around: recordings, a page that plays them, a window |
 //! | [`session`] | the pipeline as a whole |
 //! | [`replay`] | any time after any other |
 //! | [`repl`] | the interactive session |
-//! | [`report`] | how good the answers are, and what they cost |
+//! | [`study`] | how good the answers are, and what they cost |
 //! | [`cli`] | the program |
-//! | [`memory`] | whether there is memory for what comes next |
 //! | [`rescue`] | what is said and saved when the program is at fault |
 //! | [`diagnostic`] | messages that point at the text |
 //!
-//! Imports go down this arrow and never back; `lang`, `sim`, `turtle` and `export` do not know one another.
+//! Each is a crate of its own. Imports go down this arrow and never back; `lang`, `sim` and `turtle` do not know one another.
 //! `ARCHITECTURE.md` tells why things are as they are.
 
 pub mod cli;

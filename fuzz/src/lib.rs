@@ -64,9 +64,9 @@ fn paint(model: &Model, string: &ModuleString) {
     let mut survey = Survey::new(View::FRONT);
     survey.add(&scene);
     let fit = survey.fit();
-    for format in [Format::Svg, Format::Png, Format::Obj] {
+    for format in [Format::SVG, Format::PNG, Format::OBJ] {
         let bytes = FrameWriter::new(format, fit.clone()).write(&scene, "a frame");
-        if format == Format::Svg {
+        if format == Format::SVG {
             let text = String::from_utf8(bytes).expect("text");
             assert!(!text.contains("NaN") && !text.contains("\"inf") && !text.contains("-inf"), "{text}");
         }

@@ -1,7 +1,8 @@
-//! What is typed.
+//! Command-line arguments.
 
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::fmt::FmtArgs;
@@ -9,7 +10,7 @@ use super::new::NewArgs;
 use super::shell::{self, CompletionsArgs, ManArgs};
 use super::verify::VerifyArgs;
 use crate::lang::Setting;
-use crate::render::{Camera, Layout, Page};
+use crate::render::{Camera, Format, Layout, Page};
 use crate::scene::Color;
 use crate::sim::{Method, Settings};
 
@@ -228,8 +229,8 @@ pub struct RenderArgs {
     #[arg(short, long = "out", value_name = "DIR")]
     pub out: PathBuf,
     /// File format of the frames
-    #[arg(long, value_enum, default_value_t = FrameFormat::Svg)]
-    pub format: FrameFormat,
+    #[arg(long, value_parser = frame_format(), default_value = Format::SVG.extension())]
+    pub format: Format,
     /// A file for each frame, or all frames on one sheet
     ///
     /// frames: a file for each frame. overlay: all in one place, the older the fainter. stack: each below the one before,
@@ -328,8 +329,8 @@ pub struct GalleryArgs {
     #[arg(long = "figure", value_name = "N", value_parser = figure)]
     pub figures: Vec<u8>,
     /// File format of the pictures: svg or png
-    #[arg(long, value_enum, default_value_t = FrameFormat::Svg)]
-    pub format: FrameFormat,
+    #[arg(long, value_parser = frame_format(), default_value = Format::SVG.extension())]
+    pub format: Format,
     /// Print the lines, draw nothing
     #[arg(long)]
     pub list: bool,
@@ -531,14 +532,10 @@ pub enum TextFormat {
     Json,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum FrameFormat {
-    /// Vector graphics, one view
-    Svg,
-    /// Pixels, one view; what is nearer is in front to the pixel
-    Png,
-    /// Meshes in three dimensions
-    Obj,
+/// A format for frames, of those that there are.
+fn frame_format() -> impl TypedValueParser<Value = Format> {
+    let values = Format::all().map(|format| PossibleValue::new(format.extension()).help(format.about()));
+    PossibleValuesParser::new(values).try_map(|name| name.parse::<Format>())
 }
 
 fn number(text: &str) -> Result<f64, String> {

@@ -39,9 +39,9 @@ pub fn assert_golden(name: &str, text: &str) {
 #[test]
 fn golden_files() {
     let twig = scene("F_i(2)[+(60)F(1)]!(0.1)F_i(1){-(30)f(1)+(120)f(1)+(120)f(1)}");
-    assert_golden("twig.svg", &written(&twig, "front", Format::Svg));
+    assert_golden("twig.svg", &written(&twig, "front", Format::SVG));
     let bend = scene("!(0.5)F_i(2)+(30)F_i(1)");
-    let mut writer = FrameWriter::new(Format::Obj, fit(&bend, "front"));
+    let mut writer = FrameWriter::new(Format::OBJ, fit(&bend, "front"));
     writer.sides = 4;
     assert_golden("bend.obj", &String::from_utf8(writer.write(&bend, "a bend")).expect("UTF-8"));
     let (name, materials) = writer.companion(&bend).expect("a material library");
@@ -64,7 +64,7 @@ fn nodes(group: &usvg::Group) -> Vec<&usvg::Path> {
 #[test]
 fn pictures_are_read_back_and_never_cropped() {
     for view in ["front", "side", "top", "30,20", "-120,-70"] {
-        let text = written(&scene(TWIG), view, Format::Svg);
+        let text = written(&scene(TWIG), view, Format::SVG);
         let tree = usvg::Tree::from_str(&text, &usvg::Options::default()).expect("an SVG");
         let size = tree.size();
         let paths = nodes(tree.root());
@@ -83,7 +83,7 @@ fn pictures_are_read_back_and_never_cropped() {
 fn strokes_have_the_width_that_was_set() {
     let scene = scene("!(0.25)F(4)");
     let fit = fit(&scene, "front");
-    let text = written(&scene, "front", Format::Svg);
+    let text = written(&scene, "front", Format::SVG);
     let width = 0.25 * fit.picture.scale;
     assert!(text.contains(&format!("stroke-width=\"{width}\"")), "{text}");
     assert!(text.contains("id=\"F-"), "{text}");
@@ -98,13 +98,13 @@ fn ids_are_unique_and_last() {
         // Gradients have names without a hyphen.
         found.filter(|id| id.contains('-')).collect()
     };
-    let front = ids(&written(&scene(TWIG), "front", Format::Svg));
+    let front = ids(&written(&scene(TWIG), "front", Format::SVG));
     let mut sorted = front.clone();
     sorted.sort();
     sorted.dedup();
     assert_eq!(sorted.len(), front.len());
     assert_eq!(front.len(), 6);
-    let mut side = ids(&written(&scene(TWIG), "side", Format::Svg));
+    let mut side = ids(&written(&scene(TWIG), "side", Format::SVG));
     side.sort();
     assert_eq!(side, sorted);
 }
@@ -115,7 +115,7 @@ fn all_frames_share_one_picture() {
     let mut survey = Survey::new(View::FRONT);
     survey.add(&small);
     survey.add(&large);
-    let writer = FrameWriter::new(Format::Svg, survey.fit());
+    let writer = FrameWriter::new(Format::SVG, survey.fit());
     let view_box = |scene: &Scene| {
         let text = String::from_utf8(writer.write(scene, "")).expect("UTF-8");
         let rest = text.split("viewBox=\"").nth(1).expect("a view box").to_owned();
@@ -130,7 +130,7 @@ fn all_frames_share_one_picture() {
 fn read_obj(text: &str) -> Vec<tobj::Model> {
     let options = tobj::LoadOptions { single_index: false, ..Default::default() };
     let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, |_| {
-        let materials = FrameWriter::new(Format::Obj, fit(&Scene::default(), "front"));
+        let materials = FrameWriter::new(Format::OBJ, fit(&Scene::default(), "front"));
         let (_, bytes) = materials.companion(&Scene::default()).expect("a material library");
         tobj::load_mtl_buf(&mut bytes.as_slice())
     })
@@ -185,7 +185,7 @@ fn tubes_are_closed_and_face_outwards() {
         "!(0.2)F(1)[+(90)F(1)]F(1)",
     ];
     for text in strings {
-        let document = written(&scene(text), "front", Format::Obj);
+        let document = written(&scene(text), "front", Format::OBJ);
         assert_closed(&document);
         let all = triangles(&read_obj(&document));
         assert!(volume(&all) > 0.0, "{text}");
@@ -202,7 +202,7 @@ fn tubes_are_closed_and_face_outwards() {
 
 #[test]
 fn a_straight_tube_is_one_cylinder_however_it_is_divided() {
-    let volume_of = |text: &str| volume(&triangles(&read_obj(&written(&scene(text), "front", Format::Obj))));
+    let volume_of = |text: &str| volume(&triangles(&read_obj(&written(&scene(text), "front", Format::OBJ))));
     let (whole, parts) = (volume_of("!(0.2)F(3)"), volume_of("!(0.2)F_a(1)F_b(0.5)F_c(1.5)"));
     assert!((whole - parts).abs() < 1e-5);
     // An octagonal prism of radius 0.1, and the domes.
@@ -215,16 +215,16 @@ fn a_sharp_turn_or_a_short_piece_begins_a_new_tube() {
     for (text, tubes) in
         [("!(.2)F|F", 2), ("!(.2)F+(120)F", 2), ("!(.2)F+(90)F(.01)", 2), ("!(.2)F+(90)F", 1)]
     {
-        let all = triangles(&read_obj(&written(&scene(text), "front", Format::Obj)));
+        let all = triangles(&read_obj(&written(&scene(text), "front", Format::OBJ)));
         // Euler: a closed surface has V - E + F = 2, E = 3F/2.
-        let vertices = written(&scene(text), "front", Format::Obj).matches("\nv ").count();
+        let vertices = written(&scene(text), "front", Format::OBJ).matches("\nv ").count();
         assert_eq!(vertices as i64 - all.len() as i64 / 2, 2 * tubes, "{text}");
     }
 }
 
 #[test]
 fn a_bend_where_the_width_changes_has_no_spike() {
-    let text = written(&scene("!(0.4) F(2) +(70) !(0.6) F(2)"), "front", Format::Obj);
+    let text = written(&scene("!(0.4) F(2) +(70) !(0.6) F(2)"), "front", Format::OBJ);
     let (sin, cos) = 70.0_f64.to_radians().sin_cos();
     let corner = Vector::new(0.0, 2.0, 0.0);
     let axes = [(Vector::zeros(), corner), (corner, corner + 2.0 * Vector::new(-sin, cos, 0.0))];
@@ -239,7 +239,7 @@ fn a_bend_where_the_width_changes_has_no_spike() {
 
 #[test]
 fn groups_are_named_after_modules() {
-    let text = written(&scene(TWIG), "front", Format::Obj);
+    let text = written(&scene(TWIG), "front", Format::OBJ);
     let names: Vec<&str> = text.lines().filter_map(|line| line.strip_prefix("g ")).collect();
     assert_eq!(names.len(), 6);
     for (name, kind) in names.iter().zip(["F_i.", "L.", "F.", "polygon.", "F_i.", "K."]) {
@@ -253,9 +253,9 @@ fn groups_are_named_after_modules() {
 #[test]
 fn an_empty_scene_is_a_valid_frame() {
     let nothing = Scene::default();
-    let text = written(&nothing, "front", Format::Svg);
+    let text = written(&nothing, "front", Format::SVG);
     usvg::Tree::from_str(&text, &usvg::Options::default()).expect("an SVG");
-    assert!(triangles(&read_obj(&written(&nothing, "front", Format::Obj))).is_empty());
+    assert!(triangles(&read_obj(&written(&nothing, "front", Format::OBJ))).is_empty());
     let fit = fit(&nothing, "top");
     assert_eq!((fit.bounds, fit.extent), (None, 0.0));
 }
@@ -264,11 +264,11 @@ fn an_empty_scene_is_a_valid_frame() {
 fn any_scale_will_do() {
     for length in ["1e-80", "1e-9", "1e9", "1e80"] {
         let scene = scene(&format!("F({length})+(30)F({length})[+@L({length})]"));
-        let text = written(&scene, "30,20", Format::Svg);
+        let text = written(&scene, "30,20", Format::SVG);
         let tree = usvg::Tree::from_str(&text, &usvg::Options::default()).expect("an SVG");
         assert!(nodes(tree.root()).len() > 3, "{length}");
         assert!(!text.contains("NaN") && !text.contains("inf"), "{length}");
-        assert!(!written(&scene, "30,20", Format::Obj).contains("NaN"), "{length}");
+        assert!(!written(&scene, "30,20", Format::OBJ).contains("NaN"), "{length}");
     }
 }
 
@@ -302,12 +302,12 @@ proptest! {
     fn whatever_is_drawn_can_be_read(text in strings(), azimuth in -180.0..180.0, elevation in -90.0..90.0) {
         let mut scene = scene(&text);
         let view = format!("{azimuth},{elevation}");
-        let picture = written(&scene, &view, Format::Svg);
+        let picture = written(&scene, &view, Format::SVG);
         prop_assert!(usvg::Tree::from_str(&picture, &usvg::Options::default()).is_ok());
-        prop_assert_eq!(&picture, &written(&scene, &view, Format::Svg));
+        prop_assert_eq!(&picture, &written(&scene, &view, Format::SVG));
         scene.polygons.clear();
         scene.surfaces.clear();
-        let tubes = written(&scene, &view, Format::Obj);
+        let tubes = written(&scene, &view, Format::OBJ);
         assert_closed(&tubes);
         read_obj(&tubes);
     }

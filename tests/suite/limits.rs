@@ -153,13 +153,13 @@ fn no_format_ever_has_a_number_that_is_none() {
         if let Some(accuracy) = accuracy {
             fit = fit.with_accuracy(accuracy);
         }
-        for format in [Format::Svg, Format::Obj, Format::Png] {
+        for format in [Format::SVG, Format::OBJ, Format::PNG] {
             let mut file = Bounded(Vec::new());
             let written = FrameWriter::new(format, fit.clone()).write_to(&scene, "a drawing", &mut file);
             // Who asks for a thousandth of a thousandth gets large files; what they begin with is looked at.
             assert!(written.is_ok() || accuracy.is_some_and(|a| a < 1.0), "{text}: {format:?} is large");
             let bytes = file.0;
-            if format == Format::Png {
+            if format == Format::PNG {
                 continue;
             }
             let written = String::from_utf8_lossy(&bytes);
@@ -187,7 +187,7 @@ fn a_stem_wider_than_long_is_a_small_file() {
             Some(accuracy) => survey.fit().with_accuracy(accuracy),
             None => survey.fit(),
         };
-        let bytes = FrameWriter::new(Format::Obj, fit).write(&scene, "a stem").len();
+        let bytes = FrameWriter::new(Format::OBJ, fit).write(&scene, "a stem").len();
         assert!((1000..5_000_000).contains(&bytes), "{text}: {bytes}");
     }
 }

@@ -36,7 +36,7 @@ fn writer(scene: &Scene, format: Format) -> FrameWriter {
 }
 
 fn obj(scene: &Scene) -> String {
-    String::from_utf8(writer(scene, Format::Obj).write(scene, "organs")).expect("UTF-8")
+    String::from_utf8(writer(scene, Format::OBJ).write(scene, "organs")).expect("UTF-8")
 }
 
 /// Triangles of an OBJ: places and normals of their corners, and the numbers of their vertices.
@@ -169,7 +169,7 @@ fn surfaces_come_from_files_beside_the_model() {
     let tip = drawn.surfaces[0].mesh.vertices.iter().map(|&v| drawn.surfaces[0].placement.point(v).y);
     assert!((tip.fold(0.0, f64::max) - 3.0).abs() < 1e-9, "the leaf of the file, not the one built in");
     let corners = |i: usize| -> Vec<Point> {
-        let fine = drawn.tessellated(writer(&drawn, Format::Obj).fit.accuracy).into_owned();
+        let fine = drawn.tessellated(writer(&drawn, Format::OBJ).fit.accuracy).into_owned();
         let surface = &fine.surfaces[i];
         let mut all: Vec<Point> = surface.mesh.vertices.iter().map(|&v| surface.placement.point(v)).collect();
         all.sort_by(|a, b| a.coords.as_slice().partial_cmp(b.coords.as_slice()).expect("numbers"));
@@ -212,11 +212,11 @@ fn colours_and_gradients_reach_pictures_and_materials() {
     let text = "color rose = \"#e573a5\"\ngradient dry = \"#7d5a3c\", \"#ffffff\"\n\
         initial string: ;(rose) F(1) ;(dry, 0) F(1) ;(dry, 0.5) F(1) ;(dry, 7) F(1) ;(dry, 0) @P(1)";
     let scene = scene(text);
-    let svg = String::from_utf8(writer(&scene, Format::Svg).write(&scene, "colours")).expect("UTF-8");
+    let svg = String::from_utf8(writer(&scene, Format::SVG).write(&scene, "colours")).expect("UTF-8");
     for color in ["#e573a5", "#7d5a3c", "#bfae9f", "#ffffff"] {
         assert!(svg.contains(color), "{color}");
     }
-    let (_, materials) = writer(&scene, Format::Obj).companion(&scene).expect("a library");
+    let (_, materials) = writer(&scene, Format::OBJ).companion(&scene).expect("a library");
     let materials = String::from_utf8(materials).expect("UTF-8");
     assert_eq!(materials.matches("newmtl dry-").count(), 64);
     assert!(materials.contains("newmtl rose\n"));

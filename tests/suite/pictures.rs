@@ -67,7 +67,7 @@ fn drawn(scene: &Scene, view: &str, field: Option<f64>) -> Picture {
         survey = survey.with_perspective(field);
     }
     survey.add(scene);
-    Picture::read(&FrameWriter::new(Format::Png, survey.fit()).write(scene, "squares"))
+    Picture::read(&FrameWriter::new(Format::PNG, survey.fit()).write(scene, "squares"))
 }
 
 #[test]
@@ -105,7 +105,7 @@ fn in_perspective_nearer_is_larger() {
     // The same camera in SVG.
     let mut survey = Survey::new(View::FRONT).with_perspective(40.0);
     survey.add(&scene);
-    let text = FrameWriter::new(Format::Svg, survey.fit()).write(&scene, "");
+    let text = FrameWriter::new(Format::SVG, survey.fit()).write(&scene, "");
     let corner = format!("{:.3} {:.3}", large * 100.0, large * 100.0);
     assert!(String::from_utf8(text).expect("UTF-8").contains(&corner), "{corner}");
 }
@@ -132,7 +132,7 @@ fn pages_have_the_size_and_background_that_was_asked_for() {
     let scene = squares(&[(1.0, 0.0, 7.0)]);
     let mut survey = Survey::new(View::FRONT);
     survey.add(&scene);
-    let mut writer = FrameWriter::new(Format::Png, survey.fit());
+    let mut writer = FrameWriter::new(Format::PNG, survey.fit());
     writer.page = Page::new(writer.fit.picture, Size::Exact(64, 32), None).expect("small");
     let picture = Picture::read(&writer.write(&scene, ""));
     assert_eq!((picture.width, picture.height, picture.channels), (64, 32, 4));
@@ -170,7 +170,7 @@ fn sheet(layout: Layout, format: Format, spacing: Spacing) -> (Vec<u8>, Fit) {
 #[test]
 fn sheets_hold_a_group_for_each_frame() {
     for layout in [Layout::Overlay, Layout::Stack, Layout::Grid] {
-        let (bytes, _) = sheet(layout, Format::Svg, Spacing::default());
+        let (bytes, _) = sheet(layout, Format::SVG, Spacing::default());
         let text = String::from_utf8(bytes).expect("UTF-8");
         let tree = usvg::Tree::from_str(&text, &usvg::Options::default()).expect("an SVG");
         let groups = (0..3).filter(|i| text.contains(&format!("<g id=\"frame-{i:04}\""))).count();
@@ -184,17 +184,17 @@ fn sheets_hold_a_group_for_each_frame() {
 
 #[test]
 fn sheets_are_drawn_in_pixels_too() {
-    let (bytes, _) = sheet(Layout::Grid, Format::Png, Spacing::default());
+    let (bytes, _) = sheet(Layout::Grid, Format::PNG, Spacing::default());
     let row = Picture::read(&bytes);
     assert!(row.width == 1000 && row.height < 1000);
     for third in 0..3 {
         assert!(row.is_drawn_on(333 * third..333 * (third + 1)), "{third}");
     }
     let one_column = Spacing { columns: Some(1), ..Spacing::default() };
-    let column = Picture::read(&sheet(Layout::Grid, Format::Png, one_column).0);
+    let column = Picture::read(&sheet(Layout::Grid, Format::PNG, one_column).0);
     assert!(column.height == 1000 && column.width < 500);
     // The stem of the last frame of an overlay covers the older, fainter ones.
-    let (bytes, fit) = sheet(Layout::Overlay, Format::Png, Spacing::default());
+    let (bytes, fit) = sheet(Layout::Overlay, Format::PNG, Spacing::default());
     let overlay = Picture::read(&bytes);
     let [left, bottom, width, height] = fit.picture.area;
     let scale = overlay.width as f64 / width;

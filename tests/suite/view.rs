@@ -34,7 +34,7 @@ fn description(page: &str) -> Value {
     serde_json::from_str(script(page, "description")).expect("JSON")
 }
 
-/// A thing as the page has it: see `src/view/encode.rs`, which says how it is written.
+/// A thing as the page has it: see `crates/player/src/encode.rs`, which says how it is written.
 #[derive(Debug)]
 struct Track {
     kind: u64,

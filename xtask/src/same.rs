@@ -137,8 +137,6 @@ fn cases(root: &Path) -> Vec<Case> {
 
 /// What is done with a model.
 fn commands(model: &Path) -> Vec<Case> {
-    let text = fs::read_to_string(model).unwrap_or_default();
-    let has_frames = text.lines().any(|line| line.starts_with("frames"));
     let is_mistake = model.to_string_lossy().contains("tests/errors");
     let mut all = Vec::new();
     let mut add = |line: &str| {
@@ -160,9 +158,8 @@ fn commands(model: &Path) -> Vec<Case> {
     for rest in ["--scheduler global", "--scheduler global --method dop853 --tolerance 1e-9", "--seed 1"] {
         add(&format!("{run} {rest}"));
     }
-    let times = if has_frames { "" } else { "--at 0,1.7,4" };
     for format in ["svg", "png", "obj"] {
-        add(&format!("render {{model}} {times} --format {format} {bounds} --max-output 500MB -o out"));
+        add(&format!("render {{model}} --at 0,1.7,4 --format {format} {bounds} --max-output 500MB -o out"));
     }
     all
 }

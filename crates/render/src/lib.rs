@@ -35,9 +35,9 @@
 //!     survey.add(&scene);
 //!     scenes.push(scene);
 //! }
-//! let mut writer = FrameWriter::new(Format::Svg, survey.fit());
+//! let mut writer = FrameWriter::new(Format::SVG, survey.fit());
 //! let pictures: Vec<Vec<u8>> = scenes.iter().map(|scene| writer.write(scene, "a stem")).collect();
-//! writer.format = Format::Obj;
+//! writer.format = Format::OBJ;
 //! let mesh = String::from_utf8(writer.write(&scenes[2], "a stem, t = 2")).unwrap();
 //! assert!(pictures[0].starts_with(b"<svg") && mesh.contains("\nusemtl stem\n"));
 //! ```
@@ -45,6 +45,7 @@
 mod camera;
 mod extent;
 mod fit;
+mod format;
 mod frames;
 mod glyphs;
 mod layout;
@@ -70,6 +71,7 @@ mod view;
 
 pub use camera::Camera;
 pub use fit::{Fit, Picture, Survey};
+pub use format::{Content, Exporter, Format, FormatError};
 pub use frames::{Error, FrameDirectory, MANIFEST, Staged, Staging, replace};
 pub use layout::{Layout, Sheet, Spacing};
 pub use lengths::{CrossSection, Length, cross_section, lengths};
@@ -87,46 +89,6 @@ use dlsys_geometry::scene::Scene;
 
 /// Who wrote a file.
 pub const GENERATOR: &str = concat!("dlsys ", env!("CARGO_PKG_VERSION"));
-
-/// A file format for frames.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Format {
-    /// Scalable Vector Graphics 1.1: the scene seen by a [`Camera`].
-    Svg,
-    /// Portable Network Graphics: the same in pixels, what is nearer being in front to the pixel.
-    Png,
-    /// Wavefront OBJ with a material library: the scene in space.
-    Obj,
-}
-
-impl Format {
-    /// All formats, with their names, which are also the extensions of their files.
-    pub const NAMED: [(&'static str, Format); 3] =
-        [("svg", Format::Svg), ("png", Format::Png), ("obj", Format::Obj)];
-
-    /// The extension of its files.
-    pub fn extension(self) -> &'static str {
-        match self {
-            Format::Svg => "svg",
-            Format::Png => "png",
-            Format::Obj => "obj",
-        }
-    }
-}
-
-/// A name that is no [`Format`].
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown format `{0}`; known are svg, png and obj")]
-pub struct FormatError(pub String);
-
-impl std::str::FromStr for Format {
-    type Err = FormatError;
-
-    fn from_str(name: &str) -> Result<Format, FormatError> {
-        let known = Format::NAMED.into_iter().find(|(known, _)| *known == name);
-        known.map(|(_, format)| format).ok_or_else(|| FormatError(name.to_owned()))
-    }
-}
 
 /// The second pass: one frame after another, each as the bytes of its file.
 #[derive(Clone, Debug)]
@@ -163,19 +125,12 @@ impl FrameWriter {
     /// Those of `out`.
     pub fn write_to(&self, scene: &Scene, title: &str, out: &mut (dyn Write + Send)) -> io::Result<()> {
         let scene = &*scene.tessellated(self.fit.accuracy);
-        match self.format {
-            Format::Svg => out.write_all(svg::document(scene, &self.fit, &self.page, title).as_bytes()),
-            Format::Png => out.write_all(&png::document(scene, &self.fit, &self.page, title)),
-            Format::Obj => obj::write(scene, &self.fit, self.sides, title, self.threads, out),
-        }
+        self.format.exporter().write(scene, self, title, out)
     }
 
     /// The file that all frames refer to, if there is one: its name and its bytes.
     pub fn companion(&self, scene: &Scene) -> Option<(&'static str, Vec<u8>)> {
-        match self.format {
-            Format::Svg | Format::Png => None,
-            Format::Obj => Some((obj::MATERIALS, obj::materials(&scene.palette))),
-        }
+        self.format.exporter().companion(scene)
     }
 }
 
@@ -204,19 +159,4 @@ pub fn pixels_by(
 ) -> Vec<[u8; 4]> {
     let scene = &*scene.tessellated(fit.accuracy);
     png::picture(scene, fit, page.pixels, page.placement(), smoothness, threads).pixels
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn formats_are_known_by_name() {
-        assert_eq!("svg".parse(), Ok(Format::Svg));
-        assert_eq!("obj".parse::<Format>().map(Format::extension), Ok("obj"));
-        assert_eq!(
-            "pdf".parse::<Format>().unwrap_err().to_string(),
-            "unknown format `pdf`; known are svg, png and obj"
-        );
-    }
 }

@@ -5,17 +5,18 @@
 //!
 //! The mesh is never in memory: parts of the text are made on several threads and go to the file at once.
 
+use super::format::{Content, Exporter};
 use std::io::{self, Write};
 use std::ops::Range;
 
 use super::name::Names;
 use super::text::{Corner, Text};
 use super::triangles::{Faces, Points, Ring, Solid};
-use super::{Fit, GENERATOR, number, relay};
+use super::{Fit, FrameWriter, GENERATOR, number, relay};
 use dlsys_geometry::scene::{MaterialId, OwnerId, Palette, Point, Scene, Vector};
 
 /// Name of the material library that all frames refer to.
-pub(super) const MATERIALS: &str = "materials.mtl";
+const MATERIALS: &str = "materials.mtl";
 /// Decimals of a normal.
 const NORMAL_DECIMALS: usize = 4;
 /// Points of a part of the text, about: some hundred kilobytes, which stay in a cache.
@@ -28,12 +29,43 @@ enum Part {
     Faces(Range<usize>),
 }
 
+/// Wavefront OBJ.
+pub(super) struct Obj;
+
+impl Exporter for Obj {
+    fn name(&self) -> &'static str {
+        "obj"
+    }
+
+    fn about(&self) -> &'static str {
+        "Meshes in three dimensions"
+    }
+
+    fn content(&self) -> Content {
+        Content::Mesh
+    }
+
+    fn write(
+        &self,
+        scene: &Scene,
+        writer: &FrameWriter,
+        title: &str,
+        out: &mut (dyn Write + Send),
+    ) -> io::Result<()> {
+        write(scene, &writer.fit, writer.sides, title, writer.threads, out)
+    }
+
+    fn companion(&self, scene: &Scene) -> Option<(&'static str, Vec<u8>)> {
+        Some((MATERIALS, materials(&scene.palette)))
+    }
+}
+
 /// Writes the document of one frame. Tubes have so many sides; 0: as many as it takes. The bytes do not depend on the
 /// number of threads.
 ///
 /// # Errors
 /// Those of `out`.
-pub(super) fn write(
+fn write(
     scene: &Scene,
     fit: &Fit,
     sides: usize,
@@ -202,7 +234,7 @@ impl Faces for Draft {
 }
 
 /// The material library.
-pub(super) fn materials(palette: &Palette) -> Vec<u8> {
+fn materials(palette: &Palette) -> Vec<u8> {
     let mut out = Text::default();
     out.words(&[b"# ", GENERATOR.as_bytes(), b"\n"]);
     for material in palette.materials() {

@@ -1,7 +1,10 @@
 //! A scene as a PNG picture: stems as the tubes of the OBJ format, everything lit smoothly, what is nearer in front.
 
+use std::io::{self, Write};
+
+use super::format::{Content, Exporter};
 use super::raster::{self, Corner, Image};
-use super::{Fit, Page, Smoothness, triangles};
+use super::{Fit, FrameWriter, Page, Smoothness, triangles};
 use dlsys_geometry::scene::{Color, Scene, Vector};
 
 /// How far a tube's outline may be from a circle, in pixels.
@@ -11,13 +14,34 @@ const FULL: u32 = 65535;
 /// Most triangles that tubes are given sides for; a picture with more has thin ones.
 const MOST_TRIANGLES: usize = 4_000_000;
 
-/// The file of one frame.
-pub(super) fn document(scene: &Scene, fit: &Fit, page: &Page, title: &str) -> Vec<u8> {
-    let [scale, right, down] = page.placement();
-    let image = picture(scene, fit, page.pixels, [scale, right, down], Smoothness::Fine, 1);
-    let mut canvas = Canvas::new(page);
-    canvas.add(&image, [0, 0], 1.0, Meeting::Over);
-    canvas.encode(title)
+/// Portable Network Graphics.
+pub(super) struct Png;
+
+impl Exporter for Png {
+    fn name(&self) -> &'static str {
+        "png"
+    }
+
+    fn about(&self) -> &'static str {
+        "Pixels, one view; what is nearer is in front to the pixel"
+    }
+
+    fn content(&self) -> Content {
+        Content::Pixels
+    }
+
+    fn write(
+        &self,
+        scene: &Scene,
+        FrameWriter { fit, page, .. }: &FrameWriter,
+        title: &str,
+        out: &mut (dyn Write + Send),
+    ) -> io::Result<()> {
+        let image = picture(scene, fit, page.pixels, page.placement(), Smoothness::Fine, 1);
+        let mut canvas = Canvas::new(page);
+        canvas.add(&image, [0, 0], 1.0, Meeting::Over);
+        out.write_all(&canvas.encode(title))
+    }
 }
 
 /// Pixels of a scene, transparent where nothing is. A point that the camera sees at x, y is at `a x + b` and `c - a y`

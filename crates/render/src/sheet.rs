@@ -1,5 +1,6 @@
 //! Writing a [`Sheet`]: each frame by itself, on any thread, then all of them in order.
 
+use super::format::Content;
 use std::fmt::Write;
 
 use super::layout::{Caption, Cell};
@@ -36,10 +37,10 @@ pub struct SheetWriter {
 
 /// One frame, ready to be put on the sheet.
 #[derive(Debug)]
-pub struct Part(Content);
+pub struct Part(Drawn);
 
 #[derive(Debug)]
-enum Content {
+enum Drawn {
     Elements(String),
     /// With the pixel of its upper left corner.
     Image(Image, [i64; 2]),
@@ -60,9 +61,9 @@ impl SheetWriter {
     /// # Errors
     /// If the format has no pictures.
     pub fn new(format: Format, fit: Fit, sheet: Sheet, page: Page) -> Result<SheetWriter, SheetError> {
-        match format {
-            Format::Obj => Err(SheetError::Mesh),
-            Format::Svg | Format::Png => Ok(SheetWriter { format, fit, sheet, page }),
+        match format.content() {
+            Content::Mesh => Err(SheetError::Mesh),
+            _ => Ok(SheetWriter { format, fit, sheet, page }),
         }
     }
 
@@ -79,14 +80,14 @@ impl SheetWriter {
     pub fn part(&self, index: usize, scene: &Scene) -> Part {
         let cell = self.sheet.cells.get(index);
         let scene = &*scene.tessellated(self.fit.accuracy);
-        Part(match self.format {
-            Format::Png => {
+        Part(match self.format.content() {
+            Content::Pixels => {
                 let (size, corner, placement) = self.window(cell);
-                Content::Image(png::picture(scene, &self.fit, size, placement, Smoothness::Fine, 1), corner)
+                Drawn::Image(png::picture(scene, &self.fit, size, placement, Smoothness::Fine, 1), corner)
             }
             _ => {
                 let style = svg::style(&self.fit, &self.page);
-                Content::Elements(cell.map_or_else(String::new, |_| {
+                Drawn::Elements(cell.map_or_else(String::new, |_| {
                     painter::elements(scene, style, false, &format!("f{index}"))
                 }))
             }
@@ -115,7 +116,7 @@ impl SheetWriter {
 
     /// An empty sheet.
     pub fn begin(&self) -> Assembly<'_> {
-        let canvas = (self.format == Format::Png).then(|| Canvas::new(&self.page));
+        let canvas = (self.format.content() == Content::Pixels).then(|| Canvas::new(&self.page));
         Assembly { writer: self, elements: String::new(), canvas, added: 0 }
     }
 }
@@ -131,12 +132,12 @@ impl Assembly<'_> {
         let Some(cell) = self.writer.sheet.cells.get(index) else { return Ok(()) };
         let meeting = if self.writer.sheet.layout == Layout::Stack { Meeting::Beside } else { Meeting::Over };
         match part.0 {
-            Content::Image(image, corner) => {
+            Drawn::Image(image, corner) => {
                 if let Some(canvas) = &mut self.canvas {
                     canvas.add(&image, corner, cell.opacity, meeting);
                 }
             }
-            Content::Elements(elements) => {
+            Drawn::Elements(elements) => {
                 self.add_group(index, cell, &elements);
                 if self.elements.len() > LONGEST {
                     return Err(SheetError::TooLong { frame: index });

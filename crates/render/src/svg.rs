@@ -1,16 +1,42 @@
 //! A scene as an SVG picture: the document around its [elements](super::painter).
 
+use std::io::{self, Write};
+
+use super::format::{Content, Exporter};
 use svg::Document;
 use svg::node::Blob;
 use svg::node::element::{Group, Rectangle, Title};
 
 use super::painter::{self, Style, text};
-use super::{Fit, Page};
+use super::{Fit, FrameWriter, Page};
 use dlsys_geometry::scene::Scene;
 
-/// The document of one frame.
-pub(super) fn document(scene: &Scene, fit: &Fit, page: &Page, title: &str) -> String {
-    around(page, title, painter::elements(scene, style(fit, page), true, ""))
+/// Scalable Vector Graphics.
+pub(super) struct Svg;
+
+impl Exporter for Svg {
+    fn name(&self) -> &'static str {
+        "svg"
+    }
+
+    fn about(&self) -> &'static str {
+        "Vector graphics, one view"
+    }
+
+    fn content(&self) -> Content {
+        Content::Vectors
+    }
+
+    fn write(
+        &self,
+        scene: &Scene,
+        writer: &FrameWriter,
+        title: &str,
+        out: &mut (dyn Write + Send),
+    ) -> io::Result<()> {
+        let style = style(&writer.fit, &writer.page);
+        out.write_all(around(&writer.page, title, painter::elements(scene, style, true, "")).as_bytes())
+    }
 }
 
 /// How frames are painted on a page.

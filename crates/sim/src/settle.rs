@@ -287,6 +287,7 @@ impl Simulation<'_> {
             self.refresh(self.now)?;
         }
         self.afford_round(firing.len(), firing.first().map(|fire| fire.id))?;
+        let known = self.log.as_ref().map_or(0, Vec::len);
         self.record(firing);
         let mut all = std::mem::take(&mut self.arguments);
         all.clear();
@@ -297,6 +298,7 @@ impl Simulation<'_> {
             let rule = &model.rules[fire.rule];
             let clause = &rule.produces[fire.produce];
             if clause.is_fault {
+                self.take_back(known);
                 return Err(Error::NegativeRate { site: self.site(fire) });
             }
             let around = context_of(model, &self.plant, &self.steps.contexts, fire, &mut contexts);
@@ -315,7 +317,10 @@ impl Simulation<'_> {
                     self.note_choice(firing.len() - index, &clause.outcome, which);
                     ends.push((all.len(), which, family));
                 }
-                Err(misfortune) => return Err(misfortune.error(self.site(fire))),
+                Err(misfortune) => {
+                    self.take_back(known);
+                    return Err(misfortune.error(self.site(fire)));
+                }
             }
         }
         let mut first = 0;
@@ -354,6 +359,13 @@ impl Simulation<'_> {
         let Some(log) = &mut self.log else { return };
         let at = log.len() - from_end;
         log[at].successor = outcome.weights.is_some().then_some(which);
+    }
+
+    /// Takes productions out of the log again that do not take place.
+    fn take_back(&mut self, known: usize) {
+        if let Some(log) = &mut self.log {
+            log.truncate(known);
+        }
     }
 
     /// Writes productions that are about to take place into the log.

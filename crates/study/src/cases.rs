@@ -144,7 +144,7 @@ mod tests {
 
     #[test]
     fn the_list_is_the_directory() {
-        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("models/hard");
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/hard");
         let entries = std::fs::read_dir(folder).expect("the folder");
         let mut files: Vec<String> = entries
             .map(|entry| entry.expect("readable").file_name().into_string().expect("UTF-8"))

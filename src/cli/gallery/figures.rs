@@ -1,6 +1,6 @@
 //! Which pictures the gallery has.
 
-use crate::cli::args::FrameFormat;
+use crate::render::Format;
 
 /// A picture of the gallery.
 pub struct Picture {
@@ -143,8 +143,8 @@ impl Picture {
     }
 
     /// The picture's file in its folder.
-    pub fn file(&self, format: FrameFormat) -> String {
-        let extension = if format == FrameFormat::Png { "png" } else { "svg" };
+    pub fn file(&self, format: Format) -> String {
+        let extension = format.extension();
         let layout = self.flags.split_once("--layout ").and_then(|(_, rest)| rest.split(' ').next());
         format!("{}.{extension}", layout.unwrap_or("frame-0000"))
     }

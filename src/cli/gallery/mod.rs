@@ -15,11 +15,12 @@ use std::path::{Path, PathBuf};
 
 use clap::Parser;
 
-use super::args::{Action, Command, FrameFormat, GalleryArgs, RenderArgs};
+use super::args::{Action, Command, GalleryArgs, RenderArgs};
 use super::common::{Failure, out_error};
 use super::output;
 use super::progress::Progress;
 use super::render::render;
+use crate::render::Content;
 use figures::{FIGURES, Picture, models};
 
 /// Renders the figures that are asked for, or lists them.
@@ -31,7 +32,7 @@ pub fn gallery(args: &GalleryArgs) -> Result<(), Failure> {
             known.join(", ")
         )));
     }
-    if args.format == FrameFormat::Obj {
+    if args.format.content() == Content::Mesh {
         return Err(Failure::Usage(
             "error: the gallery is made of pictures: svg or png; for meshes type one of its lines (`--list`) with `--format obj`\n"
                 .to_owned(),
@@ -112,10 +113,11 @@ fn make(folder: &PathBuf) -> Result<(), Failure> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::Format;
 
     #[test]
     fn every_line_can_be_typed() {
-        let args = GalleryArgs { out: None, figures: Vec::new(), format: FrameFormat::Svg, list: false };
+        let args = GalleryArgs { out: None, figures: Vec::new(), format: Format::SVG, list: false };
         for picture in FIGURES {
             let typed = typed(picture, Path::new("there"), Path::new("here"), &args);
             let typed = typed.unwrap_or_else(|error| panic!("{}: {error:?}", picture.name));

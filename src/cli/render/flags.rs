@@ -1,19 +1,11 @@
 //! What the flags of `render` ask for, and which of them do not go together.
 
-use crate::cli::args::{Background, FrameFormat, RenderArgs};
+use crate::cli::args::{Background, RenderArgs};
 use crate::cli::common::Failure;
-use crate::render::{Format, Layout, Page, Picture, Size, Spacing, Survey, View};
+use crate::render::{Content, Format, Layout, Page, Picture, Size, Spacing, Survey, View};
 
 fn usage(message: impl std::fmt::Display) -> Failure {
     Failure::Usage(format!("error: {message}\n"))
-}
-
-pub fn format(args: &RenderArgs) -> Format {
-    match args.format {
-        FrameFormat::Svg => Format::Svg,
-        FrameFormat::Png => Format::Png,
-        FrameFormat::Obj => Format::Obj,
-    }
 }
 
 /// A survey of nothing yet, in the view that was asked for.
@@ -29,7 +21,9 @@ pub fn survey(args: &RenderArgs) -> Result<Survey, Failure> {
 /// Refuses flags that mean nothing with the format or the layout.
 pub fn agree(args: &RenderArgs) -> Result<(), Failure> {
     let extension = args.out.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
-    if !args.out.is_dir() && ["svg", "png", "obj", "gif", "mp4", "webm"].contains(&extension.as_str()) {
+    let is_file = |name: &str| extension == name;
+    let known = Format::all().map(Format::extension).chain(["gif", "mp4", "webm"]);
+    if !args.out.is_dir() && known.into_iter().any(is_file) {
         let name = args.out.with_extension("");
         return Err(usage(format!(
             "-o names a folder, and {} looks like a file: every frame is a file in it; `-o {}` and --format svg, png or obj, or `--at T` for one frame",
@@ -37,7 +31,7 @@ pub fn agree(args: &RenderArgs) -> Result<(), Failure> {
             name.display()
         )));
     }
-    if args.format == FrameFormat::Obj {
+    if args.format.content() == Content::Mesh {
         if args.layout != Layout::Frames {
             return Err(usage(format!(
                 "an OBJ file is one mesh in space, so frames cannot be laid out on a sheet as --layout {} does; \

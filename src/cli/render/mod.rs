@@ -21,7 +21,7 @@ use super::events::EventLog;
 use super::progress::Progress;
 use super::reel::{Pass, Shot, play};
 use crate::render::{
-    self, Fit, Format, FrameDirectory, FrameRecord, FrameWriter, Layout, Manifest, Page, Sheet, SheetWriter,
+    self, Content, Fit, FrameDirectory, FrameRecord, FrameWriter, Layout, Manifest, Page, Sheet, SheetWriter,
     Survey,
 };
 use crate::scene::Scene;
@@ -107,7 +107,7 @@ pub fn render_run(args: &RenderArgs, run: Run, stale: &(dyn Fn() -> bool + Sync)
         begun.elapsed().as_secs_f64(),
         written.names
     );
-    if written.bytes > LARGE && args.accuracy.is_none() && args.format != super::args::FrameFormat::Png {
+    if written.bytes > LARGE && args.accuracy.is_none() && args.format.content() != Content::Pixels {
         line +=
             "  large: --accuracy 0.02 makes surfaces of fewer pieces, --format png makes pictures of dots\n";
     }
@@ -176,7 +176,7 @@ impl Render<'_> {
 
     /// The second pass, if each frame has a file of its own.
     fn frames(&self, fit: Fit, clock: &mut Clock) -> Result<(Stats, Written), Failure> {
-        let mut writer = FrameWriter::new(flags::format(self.args), fit);
+        let mut writer = FrameWriter::new(self.args.format, fit);
         writer.page = flags::page(self.args, writer.page.picture)?;
         // Only now that the run is known to be good, the directory is touched.
         let mut directory = FrameDirectory::create(self.out, self.args.force)
@@ -237,7 +237,7 @@ impl Render<'_> {
         let sheet = Sheet::new(layout, &fit, &self.frames, &captions, flags::spacing(self.args));
         let page = flags::page(self.args, sheet.picture)?;
         let refuse = |error: render::SheetError| Failure::Usage(format!("error: {error}\n"));
-        let writer = SheetWriter::new(flags::format(self.args), fit.clone(), sheet, page).map_err(refuse)?;
+        let writer = SheetWriter::new(self.args.format, fit.clone(), sheet, page).map_err(refuse)?;
         let mut directory = FrameDirectory::create(self.out, self.args.force)
             .map_err(out_of_directory)?
             .limited(self.args.max_output);
@@ -280,8 +280,11 @@ impl Render<'_> {
     fn threads_for(&self, page: &Page) -> usize {
         const PIXELS_AT_ONCE: u64 = 100_000_000;
         let pixels = page.pixels.iter().map(|&side| u64::from(side)).product::<u64>();
-        let most =
-            if flags::format(self.args) == Format::Png { PIXELS_AT_ONCE / pixels.max(1) } else { u64::MAX };
+        let most = if self.args.format.content() == Content::Pixels {
+            PIXELS_AT_ONCE / pixels.max(1)
+        } else {
+            u64::MAX
+        };
         self.threads.min(most.clamp(1, 256) as usize)
     }
 
@@ -301,7 +304,7 @@ impl Render<'_> {
             model.parameters.iter().map(|p| (p.name.clone(), p.value.into())).collect();
         let settings = &run.settings;
         let method = Method::NAMED.iter().rev().find(|(_, m)| *m == settings.method).map(|(name, _)| *name);
-        let format = flags::format(args);
+        let format = args.format;
         let mut described = json!({
             "format": format.extension(),
             "layout": args.layout.name(),
@@ -317,7 +320,7 @@ impl Render<'_> {
         } else {
             described["tolerance"] = settings.tolerance.into();
         }
-        if format != Format::Obj {
+        if format.content() != Content::Mesh {
             described["size"] = json!(page.pixels);
             described["background"] = page.background.map(|color| color.to_string()).into();
         }
@@ -326,7 +329,7 @@ impl Render<'_> {
         let name =
             path.file_name().map_or(run.session.source.name.clone(), |n| n.to_string_lossy().into_owned());
         let mut manifest = Manifest::new(name, model.title.clone(), described);
-        manifest.view_box = (format == Format::Svg).then(|| page.picture.view_box());
+        manifest.view_box = (format.content() == Content::Vectors).then(|| page.picture.view_box());
         manifest.bounds = fit.bounds.map(|c| c.map(|p| [p.x, p.y, p.z]));
         manifest
     }
