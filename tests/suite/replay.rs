@@ -233,7 +233,7 @@ A(x, y):
 ";
 
 /// Criterion of speed, in units of work: stepping back 1,000 times is less than running ten times. Time is for people
-/// to measure, see the README.
+/// to measure, see the book (Speed against error).
 #[test]
 fn a_thousand_steps_back_are_less_work_than_ten_runs() {
     for (name, text, end) in [
