@@ -38,6 +38,7 @@
 //! | [`lang`] | text to model; everything that can be said about a text |
 //! | [`model`] | what a model says: kinds of modules, rules, conditions |
 //! | [`tree`] | modules and how they hang together: tree, string, identity, birth |
+//! | [`ode`] | steps, dense output, roots: nothing about plants |
 //! | [`sim`] | development in time: integration, event location, productions |
 //! | [`turtle`] | strings as geometry |
 //! | [`scene`] | geometry that knows no file format |
@@ -69,6 +70,7 @@ pub use dlsys_expr as expr;
 pub use dlsys_geometry::{scene, turtle};
 pub use dlsys_lang as lang;
 pub use dlsys_model as model;
+pub use dlsys_ode as ode;
 pub use dlsys_player as player;
 pub use dlsys_render as render;
 pub use dlsys_session::{self as session, replay};

@@ -29,8 +29,10 @@ mod interval;
 mod ops;
 mod polynomial;
 mod program;
+mod sign;
 #[cfg(test)]
 mod tests;
+mod time;
 
 pub use curve::{Array, Curve, CurveFault, MAX_POINTS, Part, Sort};
 pub use dual::Dual;
@@ -40,3 +42,5 @@ pub use interval::Interval;
 pub use ops::{Binary, Unary, Value};
 pub use polynomial::{Monomial, Polynomial};
 pub use program::{LANES, Lanes, Program, Scratch};
+pub use sign::Sign;
+pub use time::SimTime;

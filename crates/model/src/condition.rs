@@ -4,34 +4,8 @@
 //! these differences along the trajectory; at an event it *knows* that a difference is zero, though the
 //! rounded numbers differ in their last place. So conditions are not evaluated on numbers but on signs.
 
+use dlsys_expr::Sign;
 use smallvec::SmallVec;
-
-/// The sign of `a - b`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum Sign {
-    Minus,
-    Zero,
-    Plus,
-    /// Not yet known: it is zero now, and where it goes depends on equations that are being chosen.
-    Any,
-    /// One side is NaN. Every comparison with it is false, except `!=`.
-    #[default]
-    Undefined,
-}
-
-impl Sign {
-    pub fn of(x: f64) -> Sign {
-        if x < 0.0 {
-            Sign::Minus
-        } else if x > 0.0 {
-            Sign::Plus
-        } else if x == 0.0 {
-            Sign::Zero
-        } else {
-            Sign::Undefined
-        }
-    }
-}
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Comparison {

@@ -53,7 +53,8 @@ pub use appearance::{
     Appearance, BUILT_IN_COLORS, Contour, Gradient, NamedColor, Net, Rgb, SurfaceShape, Tropism,
 };
 pub use chance::{Clock, Distribution, Draw, NewClock, choose};
-pub use condition::{Comparison, Condition, Sign, Step, Truth};
+pub use condition::{Comparison, Condition, Step, Truth};
+pub use dlsys_expr::Sign;
 pub use driven::{Driven, DrivenForm, Flow, driven_form, outside_of_drivers};
 pub use invariance::never_reached;
 pub use kind::{

@@ -36,7 +36,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use dlsys_model::Model;
 use dlsys_sim::{Error, Event, Passed, Settings, Simulation, happens_by};
-use dlsys_tree::{Instant, Lineage, ModuleString};
+use dlsys_tree::{Lineage, ModuleString, SimTime};
 
 /// A model in time, with everything that is needed to go to any time at once.
 pub struct Replay<'m> {
@@ -68,7 +68,7 @@ pub struct Replay<'m> {
 /// A production, and what is known of the time just after it.
 struct Past {
     event: Event,
-    at: Instant,
+    at: SimTime,
     /// Modules after all that happens at that instant.
     modules: usize,
 }

@@ -8,7 +8,7 @@ use super::error::Error;
 use super::passing::is_before;
 use super::simulation::Simulation;
 use super::state::State;
-use dlsys_tree::Instant;
+use dlsys_tree::SimTime;
 
 /// Where [`Simulation::pass_some`] has stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,8 +22,8 @@ pub enum Passed {
 }
 
 /// True if an event of an instant has taken place when time has passed up to `t`.
-pub fn happens_by(at: Instant, t: f64) -> bool {
-    is_before(at, true, Instant::new(t))
+pub fn happens_by(at: SimTime, t: f64) -> bool {
+    is_before(at, true, SimTime::new(t))
 }
 
 impl Simulation<'_> {
@@ -48,7 +48,7 @@ impl Simulation<'_> {
     /// True if nothing has been passed that comes after `t`: then [`Simulation::at`] may be asked for `t`, though
     /// later times have been looked at before, and gives the bits that a run to `t` gives.
     pub fn can_show(&self, t: f64) -> bool {
-        !self.has_failed() && self.last.is_none_or(|(at, event)| is_before(at, event, Instant::new(t)))
+        !self.has_failed() && self.last.is_none_or(|(at, event)| is_before(at, event, SimTime::new(t)))
     }
 
     /// The time of the last thing that was passed; 0 at the start.
@@ -57,8 +57,8 @@ impl Simulation<'_> {
     }
 
     /// The same, to all its digits.
-    pub fn reached_at(&self) -> Instant {
-        self.last.map_or(Instant::ZERO, |(at, _)| at)
+    pub fn reached_at(&self) -> SimTime {
+        self.last.map_or(SimTime::ZERO, |(at, _)| at)
     }
 
     /// A measure of the work done so far, in units of very roughly a tenth of a microsecond. It grows

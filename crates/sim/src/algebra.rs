@@ -9,10 +9,10 @@
 //! Components that depend on one another in a circle, within a module or along the tree, are solved together by
 //! Newton's method; others one after another, in the order of their dependence (Tarjan's strongly connected components).
 
-use super::sparse::Pattern;
 use super::system::{Row, System};
 use dlsys_expr::{Scratch, eliminate};
 use dlsys_model::{Algebraic, Rule};
+use dlsys_ode::Pattern;
 
 /// A component that is solved for.
 #[derive(Clone, Copy, Debug)]

@@ -11,9 +11,9 @@
 use std::sync::LazyLock;
 
 use super::algebra::Fault;
-use super::dense::{Dense, MAX_DEGREE};
 use super::equations::Equations;
 use dlsys_expr::eliminate;
+use dlsys_ode::{Dense, MAX_DEGREE};
 
 const POINTS: usize = MAX_DEGREE + 1;
 /// Most stretches of a step.

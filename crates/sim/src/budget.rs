@@ -13,7 +13,7 @@ use super::queue::Who;
 use super::simulation::Simulation;
 use crate::memory::{self, Shortage};
 use dlsys_model::Successor;
-use dlsys_tree::{Instant, ModuleId, Visit};
+use dlsys_tree::{ModuleId, SimTime, Visit};
 
 /// Things after which the pace is looked at: so many at least, and so many for each module.
 const LOOK: u64 = 100_000;
@@ -35,7 +35,7 @@ pub(super) struct Budget {
     next: u64,
     /// Things done at the last look, and the time then.
     done: u64,
-    mark: Instant,
+    mark: SimTime,
     /// Looks in a row that have found the run far too slow, and by how much the first.
     slow: u32,
     first: f64,
@@ -68,7 +68,7 @@ impl Simulation<'_> {
 
     /// Sees to it that what comes next may still be done, on the way to some time.
     #[inline]
-    pub(super) fn watch_budget(&mut self, coming: Coming, until: Instant) -> Result<(), Error> {
+    pub(super) fn watch_budget(&mut self, coming: Coming, until: SimTime) -> Result<(), Error> {
         if self.done() < self.budget.next && self.budget.since.is_none() {
             return Ok(());
         }
@@ -76,7 +76,7 @@ impl Simulation<'_> {
     }
 
     #[cold]
-    fn look_at_budget(&mut self, coming: Coming, until: Instant) -> Result<(), Error> {
+    fn look_at_budget(&mut self, coming: Coming, until: SimTime) -> Result<(), Error> {
         if self.is_overtime() {
             let (site, limit) = (self.site_of_coming(coming), self.settings.max_seconds);
             return Err(Error::OutOfTime { site, limit });
@@ -140,7 +140,7 @@ impl Simulation<'_> {
     }
 
     /// A module, with the clause that it follows, or the production that it is about to make, as far as that is known.
-    fn site_of_module(&mut self, id: ModuleId, at: Instant) -> Site {
+    fn site_of_module(&mut self, id: ModuleId, at: SimTime) -> Site {
         let model = self.model;
         let career = self.plant.careers.get(self.plant.tree.label(id));
         let known = career.map(|career| (career.rule, career.produce()));

@@ -12,7 +12,7 @@ use super::motion::Motion;
 use super::state::Signs;
 use dlsys_expr::Program;
 use dlsys_model::{Law, Model, Rule, Sign, Solve, Watch};
-use dlsys_tree::{Instant, NO_LABEL};
+use dlsys_tree::{NO_LABEL, SimTime};
 
 /// A module with this label is not light, and that is known.
 pub const REFUSED: u16 = NO_LABEL - 1;
@@ -56,18 +56,18 @@ impl Career {
 #[derive(Clone, Debug, Default)]
 pub struct Life {
     pub known: bool,
-    pub birth: Instant,
+    pub birth: SimTime,
     /// Those it was born with.
     pub values: SmallVec<[f64; 4]>,
     pub motions: SmallVec<[Motion; 2]>,
     /// The event, if there is one.
-    pub at: Instant,
+    pub at: SimTime,
     /// The time from birth to the event, if that and the motions are the same whenever a module is born.
     pub tau: Option<f64>,
     /// The parameter that meets a level at the event, with the level.
     pub level: Option<(usize, f64)>,
     /// When it was replaced, if what follows is known.
-    pub replaced: Option<Instant>,
+    pub replaced: Option<SimTime>,
     /// Of the successor.
     pub arguments: Vec<f64>,
     /// Which of the successors that the production has.
@@ -105,7 +105,7 @@ pub struct Child {
 impl Life {
     /// True if a module of this birth and these values lives this life.
     #[inline]
-    pub fn is_of(&mut self, birth: Instant, values: &[f64]) -> bool {
+    pub fn is_of(&mut self, birth: SimTime, values: &[f64]) -> bool {
         if !self.known || !same_bits(&self.values, values) {
             return false;
         }
@@ -117,7 +117,7 @@ impl Life {
     }
 
     /// Lets the end be the same as that of the last one who lived this life, now. False if that cannot be said.
-    pub fn end_again(&mut self, now: Instant) -> bool {
+    pub fn end_again(&mut self, now: SimTime) -> bool {
         if !self.lasting || self.tau != Some(now.since(self.birth)) {
             return false;
         }

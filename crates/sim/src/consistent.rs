@@ -15,7 +15,7 @@ use super::simulation::Simulation;
 use super::system::{Source, Sum, System};
 use dlsys_expr::{Dual, eliminate};
 use dlsys_model::{Model, Truth};
-use dlsys_tree::{Instant, ModuleId, Visit};
+use dlsys_tree::{ModuleId, SimTime, Visit};
 
 /// Values that differ by more than so many tolerances have jumped; less is what they may err by.
 const JUMP: f64 = 10.0;
@@ -240,7 +240,7 @@ impl Simulation<'_> {
     }
 
     /// Brings up to date what is computed only when somebody looks, of all modules, at an instant.
-    pub(super) fn refresh(&mut self, at: Instant) -> Result<(), Error> {
+    pub(super) fn refresh(&mut self, at: SimTime) -> Result<(), Error> {
         if !self.algebra.lazy {
             return Ok(());
         }
@@ -274,7 +274,7 @@ impl Simulation<'_> {
     }
 
     /// An error of the algebraic parameters of a module.
-    pub(super) fn unsolved(&self, fault: Fault, owner: Option<(ModuleId, usize)>, at: Instant) -> Error {
+    pub(super) fn unsolved(&self, fault: Fault, owner: Option<(ModuleId, usize)>, at: SimTime) -> Error {
         let (id, parameter) = owner.unwrap_or_else(|| (self.anyone(), 0));
         let state = self.plant.state(id);
         let rule = state.and_then(|s| s.rule).unwrap_or(0);

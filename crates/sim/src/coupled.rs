@@ -21,7 +21,7 @@ use super::system::System;
 use super::watch::needs_search;
 use super::{Method, Scheduler};
 use dlsys_model::{Model, Rule};
-use dlsys_tree::{Instant, ModuleId, Visit};
+use dlsys_tree::{ModuleId, SimTime, Visit};
 use std::collections::HashSet;
 
 /// The coupled modules and their common step.
@@ -47,7 +47,7 @@ pub struct Coupled {
     tried: bool,
     /// Times that an event cut a motion without steps.
     cuts: u32,
-    mark: Instant,
+    mark: SimTime,
     since_mark: usize,
     /// Members whose rates may have flashes.
     flashing: Vec<ModuleId>,
@@ -204,7 +204,7 @@ impl Simulation<'_> {
     }
 
     /// Begins the common motion of the coupled modules at an instant.
-    fn restart_coupled(&mut self, at: Instant) -> Result<(), Error> {
+    fn restart_coupled(&mut self, at: SimTime) -> Result<(), Error> {
         let mut members = std::mem::take(&mut self.coupled.members);
         members.clear();
         members.extend(self.plant.tree.walk().filter_map(|visit| match visit {
@@ -299,7 +299,7 @@ impl Simulation<'_> {
     }
 
     /// Sees to it that the coupled modules' motion is known at an instant.
-    pub(super) fn show_coupled(&mut self, at: Instant) {
+    pub(super) fn show_coupled(&mut self, at: SimTime) {
         let Coupled { system, y, integrator, control, linear, pending, .. } = &mut self.coupled;
         match linear {
             Some(linear) => {
@@ -322,7 +322,7 @@ impl Simulation<'_> {
     }
 
     /// Makes a step of the coupled modules and searches it.
-    fn step_coupled(&mut self, from: Instant) -> Result<(), Error> {
+    fn step_coupled(&mut self, from: SimTime) -> Result<(), Error> {
         let rules = &self.model.rules;
         let Coupled { system, y, integrator, control, flashing, .. } = &mut self.coupled;
         let mut equations = Equations::new(system, rules, None);
@@ -411,7 +411,7 @@ impl Simulation<'_> {
     }
 
     /// Finds a coupled module's next event before the end of the common step.
-    pub(super) fn search_member(&mut self, id: ModuleId, from: Instant) {
+    pub(super) fn search_member(&mut self, id: ModuleId, from: SimTime) {
         let Some(state) = self.plant.state(id) else { return };
         let Some(rule) = state.rule.map(|r| &self.model.rules[r]) else { return };
         if rule.atoms.is_empty() || state.next.lasting {
@@ -453,7 +453,7 @@ impl Simulation<'_> {
     }
 
     /// Goes to the end of a step of the coupled modules, and on.
-    pub(super) fn pass_coupled_step(&mut self, at: Instant) -> Result<(), Error> {
+    pub(super) fn pass_coupled_step(&mut self, at: SimTime) -> Result<(), Error> {
         let Coupled { mark, since_mark, .. } = &mut self.coupled;
         if super::local::crawls(mark, since_mark, at) && !self.settings.method.is_fixed_step() {
             return Err(self.coupled_error(StepError::TooSmall(0), at));
@@ -495,7 +495,7 @@ impl Simulation<'_> {
 
     /// Where no common step leads on because some equations end there: if a boundary is there too, of the module that a
     /// component belongs to or of one that it reads, it has been reached.
-    fn arrest_coupled(&mut self, component: usize, at: Instant) -> bool {
+    fn arrest_coupled(&mut self, component: usize, at: SimTime) -> bool {
         let Some((id, _)) = self.coupled.system.owner(component) else { return false };
         let context = self.plant.state(id).map(|s| s.context.to_vec()).unwrap_or_default();
         let all = std::iter::once(id).chain(context);
@@ -523,7 +523,7 @@ impl Simulation<'_> {
         })
     }
 
-    fn coupled_error(&self, error: StepError, at: Instant) -> Error {
+    fn coupled_error(&self, error: StepError, at: SimTime) -> Error {
         let Coupled { system, y, .. } = &self.coupled;
         let owner = |component: usize| system.owner(component);
         if matches!(error, StepError::TooSmall(_) | StepError::NotFinite(_))
@@ -540,7 +540,7 @@ fn step_of<'p>(
     plant: &'p Plant,
     rules: &'p [Rule],
     id: ModuleId,
-    start: Instant,
+    start: SimTime,
     nodes: &'p [f64],
     (tolerance, stiff): (f64, bool),
 ) -> Option<flash::Step<'p>> {

@@ -1,8 +1,8 @@
 //! How the coupled modules move during their common step, and on stretches that were integrated again since it was made.
 
-use super::dense::{Coefficients, Dense};
 use dlsys_expr::{Dual, Interval};
-use dlsys_tree::Instant;
+use dlsys_ode::{Coefficients, Dense};
+use dlsys_tree::SimTime;
 
 /// The motion of all components from the last common step to its end.
 #[derive(Clone, Debug)]
@@ -11,7 +11,7 @@ pub struct Course {
     stretches: Vec<Dense>,
     /// By component: where it is found. Empty as long as there is the common step only.
     tracks: Vec<Track>,
-    pub end: Instant,
+    pub end: SimTime,
     /// What the components may be wrong by, relative, in the worst of the stretches.
     pub error: f64,
 }
@@ -48,13 +48,13 @@ impl Course {
         let count = stretches.len() as u32;
         let track = |component: u32| Track { first: 0, count, component };
         let tracks =
-            if count == 1 { Vec::new() } else { (0..stretches[0].len() as u32).map(track).collect() };
+            if count == 1 { Vec::new() } else { (0..stretches[0].components() as u32).map(track).collect() };
         let error = stretches.iter().map(|dense| dense.error).fold(0.0, f64::max);
         Course { stretches, tracks, end, error }
     }
 
     /// The start of the common step.
-    pub fn start(&self) -> Instant {
+    pub fn start(&self) -> SimTime {
         self.stretches[0].start
     }
 
@@ -69,7 +69,7 @@ impl Course {
     }
 
     /// The dense output that a component follows from an instant on, and its number there.
-    fn stretch(&self, component: usize, at: Instant) -> Option<(&Dense, usize)> {
+    fn stretch(&self, component: usize, at: SimTime) -> Option<(&Dense, usize)> {
         let Track { first, count, component } = self.track(component);
         if count == 1 {
             return Some((&self.stretches[first as usize], component as usize));
@@ -80,18 +80,18 @@ impl Course {
     }
 
     /// A component at an instant; None for one that has not been integrated yet.
-    pub fn value(&self, component: usize, at: Instant) -> Option<f64> {
+    pub fn value(&self, component: usize, at: SimTime) -> Option<f64> {
         let (dense, component) = self.stretch(component, at)?;
         Some(dense.value(component, dense.position(at)))
     }
 
     /// The end of the dense output that a component follows from an instant on.
-    pub fn knot(&self, component: usize, from: Instant) -> Instant {
+    pub fn knot(&self, component: usize, from: SimTime) -> SimTime {
         self.stretch(component, from).map_or(self.end, |(dense, _)| dense.end)
     }
 
     /// A component along a stretch of time.
-    pub fn piece(&self, component: usize, start: Instant, h: f64) -> Option<Piece<'_>> {
+    pub fn piece(&self, component: usize, start: SimTime, h: f64) -> Option<Piece<'_>> {
         let (dense, component) = self.stretch(component, start)?;
         Some(Piece::new(dense, component, start, h))
     }
@@ -120,7 +120,7 @@ impl Course {
 }
 
 impl<'c> Piece<'c> {
-    pub fn new(dense: &'c Dense, component: usize, start: Instant, h: f64) -> Piece<'c> {
+    pub fn new(dense: &'c Dense, component: usize, start: SimTime, h: f64) -> Piece<'c> {
         if dense.start == start && dense.h == h {
             return Piece { dense, component, from: 0.0, scale: 1.0 };
         }

@@ -19,7 +19,7 @@ use super::queue::Who;
 use super::settle::Firing;
 use super::simulation::Simulation;
 use dlsys_model::{Model, Rule, Sign, Truth};
-use dlsys_tree::{Instant, ModuleId};
+use dlsys_tree::{ModuleId, SimTime};
 
 /// What is known of the steps.
 #[derive(Clone, Debug, Default)]
@@ -80,12 +80,12 @@ impl Simulation<'_> {
         let (now, period) = (self.now, self.model.period);
         let mut next = (now.to_f64() / period).floor().max(self.steps.passed) + 1.0;
         // What is made within the resolution of time of a step is made at that step.
-        while Instant::multiple(next - 1.0, period).since(now) > now.resolution() {
+        while SimTime::multiple(next - 1.0, period).since(now) > now.resolution() {
             next -= 1.0;
         }
-        while Instant::multiple(next, period).since(now) <= now.resolution() {
+        while SimTime::multiple(next, period).since(now) <= now.resolution() {
             next += 1.0;
-            if Instant::multiple(next, period).since(Instant::multiple(next - 1.0, period))
+            if SimTime::multiple(next, period).since(SimTime::multiple(next - 1.0, period))
                 <= now.resolution()
             {
                 let id = self.steps.population[0];
@@ -96,7 +96,7 @@ impl Simulation<'_> {
         }
         self.steps.passed = next - 1.0;
         self.steps.scheduled = true;
-        self.queue.schedule(Who::Step, Instant::multiple(next, period));
+        self.queue.schedule(Who::Step, SimTime::multiple(next, period));
         Ok(())
     }
 

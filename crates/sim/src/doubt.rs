@@ -19,12 +19,12 @@
 //! are so near to theirs that the error of integration does not tell the two apart have it, too.
 
 use super::plant::Path;
-use super::roots::{Function, first_root};
 use super::simulation::Simulation;
 use super::state::{Change, Signs, What};
 use super::watch::{Meeting, Watcher, opposite, produces, sign_of};
 use dlsys_expr::{Dual, Interval};
 use dlsys_model::Sign;
+use dlsys_ode::{Function, first_root};
 use dlsys_tree::ModuleId;
 
 /// The speed of a difference at a position is that around it, to as much of the path on both sides.

@@ -3,10 +3,10 @@
 use super::algebra::Fault;
 use super::columns::Readings;
 use super::course::Course;
-use super::runge_kutta::Rates;
 use super::system::{Row, System};
 use dlsys_expr::{Lanes, Program, Scratch};
 use dlsys_model::Rule;
+use dlsys_ode::Rates;
 
 /// The code of a row's rates.
 pub fn program<'s>(rules: &'s [Rule], row: &Row) -> &'s Program {

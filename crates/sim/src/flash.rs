@@ -15,12 +15,12 @@
 
 use smallvec::SmallVec;
 
-use super::dense::Dense;
 use super::plant::{Path, Plant};
 use super::state::State;
 use dlsys_expr::{Interval, Program, Scratch};
 use dlsys_model::{Rule, Solve};
-use dlsys_tree::Instant;
+use dlsys_ode::Dense;
+use dlsys_tree::SimTime;
 
 /// Rates so many times larger than all that were seen are a surprise.
 const SURPRISE: f64 = 8.0;
@@ -47,8 +47,8 @@ pub struct Step<'p> {
     pub state: &'p State,
     pub rule: &'p Rule,
     pub solve: &'p Solve,
-    pub start: Instant,
-    pub end: Instant,
+    pub start: SimTime,
+    pub end: SimTime,
     /// Where in the step the method has evaluated rates.
     pub nodes: &'p [f64],
     /// The dense output, if the module is integrated alone.

@@ -2,7 +2,7 @@
 
 use super::simulation::Simulation;
 use dlsys_model::KindId;
-use dlsys_tree::{Instant, Lineage, ModuleId, Visit};
+use dlsys_tree::{Lineage, ModuleId, SimTime, Visit};
 
 /// A module as it is seen from another.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,7 +45,7 @@ impl Simulation<'_> {
             _ => None,
         };
         let id = probe.plant.tree.walk().filter_map(modules).nth(number)?;
-        let at = Instant::new(t);
+        let at = SimTime::new(t);
         if at.since(probe.now) > 0.0 {
             probe.now = at;
         }

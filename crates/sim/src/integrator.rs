@@ -1,13 +1,13 @@
 //! Steps of controlled error.
 
 use super::algebra::Fault;
-use super::dense::Dense;
 use super::equations::Equations;
-use super::implicit::Implicit;
-use super::runge_kutta::{Inside, Nodes, Rates, Trial, Workspace};
 use super::state::Control;
 use super::{Method, Settings, Stats};
-use dlsys_tree::Instant;
+use dlsys_ode::Dense;
+use dlsys_ode::Implicit;
+use dlsys_ode::{Inside, Nodes, Rates, Trial, Workspace};
+use dlsys_tree::SimTime;
 
 /// Makes the steps of one system of equations after another.
 #[derive(Clone, Default)]
@@ -22,7 +22,7 @@ pub struct Integrator {
     /// Nothing is looked for inside steps; frames that fall into them are refined ([`Integrator::refined`]).
     pub unwatched: bool,
     /// Start, length and end of the step just made.
-    step: (Instant, f64, Instant),
+    step: (SimTime, f64, SimTime),
     /// What it may be wrong by, relative.
     error: f64,
     /// Its dense output, where that is known already.
@@ -137,10 +137,10 @@ impl Integrator {
         control: &mut Control,
         system: &mut impl Rates,
         y: &[f64],
-        start: Instant,
-        limit: Option<Instant>,
+        start: SimTime,
+        limit: Option<SimTime>,
         stats: &mut Stats,
-    ) -> Result<Instant, StepError> {
+    ) -> Result<SimTime, StepError> {
         self.method = self.choose(settings, control);
         let method = self.method;
         let inner = if method == Method::Radau { INNER_TOLERANCE_IMPLICIT } else { INNER_TOLERANCE };
@@ -158,7 +158,7 @@ impl Integrator {
         }
         let grid = settings.grid();
         let mut h = match grid {
-            Some(grid) => Instant::new(next_grid_time(start, grid)).since(start),
+            Some(grid) => SimTime::new(next_grid_time(start, grid)).since(start),
             // What was learnt at another time may be less than time can tell here.
             None if control.size > 0.0 => control.size.max(64.0 * start.resolution()),
             None => self.workspace.first_size(method, system, y, tolerance),
@@ -263,7 +263,7 @@ impl Integrator {
             suspect(control, self.workspace.stiffness(method, h), method);
         }
         let end = match (grid, limit) {
-            (Some(grid), _) => Instant::new(next_grid_time(start, grid)),
+            (Some(grid), _) => SimTime::new(next_grid_time(start, grid)),
             (None, Some(limit)) if h == room => limit,
             _ => start.after(h),
         };
@@ -278,7 +278,7 @@ impl Integrator {
         method: Method,
         system: &mut impl Rates,
         y: &[f64],
-        start: Instant,
+        start: SimTime,
         h: f64,
     ) -> Inside {
         if method != Method::Dop853 || self.unwatched {
@@ -460,7 +460,7 @@ fn growth(error: f64, last: f64, order: u32) -> f64 {
 }
 
 /// The first multiple of the step size after an instant.
-pub fn next_grid_time(now: Instant, grid: f64) -> f64 {
+pub fn next_grid_time(now: SimTime, grid: f64) -> f64 {
     let t = now.to_f64();
     let mut n = (t / grid).floor() + 1.0;
     if n * grid - t <= now.resolution() {

@@ -14,8 +14,8 @@
 //! - `phase`: from an instant to the next; `motion`: formulas; `local`, `coupled`, `system`, `linear`:
 //!   numeric integration.
 //! - `access`: going to and fro; `inspect`: all that is known of one module.
-//! - `plant`, `state`: the modules and how they move; `watch`, `roots`: the search for events.
-//! - `integrator`, `runge_kutta`, `tableau`, `implicit`, `radau`, `sparse`, `dense`: one step, and the solution inside it.
+//! - `plant`, `state`: the modules and how they move; `watch`, `doubt`: the search for events.
+//! - `integrator`: step control; the steps themselves are in [`dlsys_ode`].
 //!
 //! A parameter whose equation has a formula is evaluated, never stepped, and a module that reads none of its
 //! neighbours keeps a clock of its own. Equations are integrated as if their `if`s did not exist: within a step every
@@ -68,7 +68,6 @@ mod consistent;
 mod coupled;
 mod course;
 mod cut;
-mod dense;
 mod derive;
 mod doubt;
 mod equations;
@@ -78,7 +77,6 @@ mod exact;
 mod fetch;
 mod flash;
 mod gather;
-mod implicit;
 mod inspect;
 mod integrator;
 mod known_rates;
@@ -95,20 +93,16 @@ mod phase;
 mod plant;
 mod queue;
 mod quick;
-mod radau;
 mod repair;
-mod roots;
-mod runge_kutta;
 mod settle;
 mod simulation;
-mod sparse;
 mod state;
 mod system;
-mod tableau;
 mod transition;
 mod watch;
 
 pub use access::{Passed, happens_by};
+pub use dlsys_ode::Method;
 pub use error::{Error, Near, Site, Unsolved};
 pub use event::Event;
 pub use inspect::{Inspection, Seen};
@@ -119,41 +113,6 @@ pub use transition::{Stand, Transition};
 /// Rates of events that have no formula are integrated with at most this tolerance, so that their times are the same to
 /// nine digits whatever the tolerance is.
 const CLOCK_TOLERANCE: f64 = 1e-11;
-
-/// How equations are integrated.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Method {
-    /// The exact solution where there is one, otherwise the method that suits the equations.
-    #[default]
-    Auto,
-    /// Forward Euler with a fixed step: order 1. What the paper's authors used (section 8).
-    Euler,
-    /// The classical Runge-Kutta method with a fixed step: order 4.
-    Rk4,
-    /// Dormand and Prince's pair of orders 5 and 4 with step control.
-    Dopri5,
-    /// Dormand and Prince's pair of orders 8, 5 and 3, for tight tolerances (Hairer's DOP853).
-    Dop853,
-    /// Radau IIA collocation with step control: implicit and L-stable, for stiff equations.
-    Radau,
-}
-
-impl Method {
-    /// Methods by the names they have on the command line.
-    pub const NAMED: [(&'static str, Method); 6] = [
-        ("auto", Method::Auto),
-        ("dopri5", Method::Dopri5),
-        ("dop853", Method::Dop853),
-        ("radau", Method::Radau),
-        ("rk4", Method::Rk4),
-        ("euler", Method::Euler),
-    ];
-
-    /// True if the method needs a step size and ignores the tolerance.
-    pub fn is_fixed_step(self) -> bool {
-        matches!(self, Method::Euler | Method::Rk4)
-    }
-}
 
 /// Who is solved again after an event, among modules that are integrated together.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -246,10 +205,10 @@ impl Settings {
     }
 
     /// The end of the slice of time after an instant, if there are slices.
-    fn slice_end(&self, after: dlsys_tree::Instant) -> Option<dlsys_tree::Instant> {
+    fn slice_end(&self, after: dlsys_tree::SimTime) -> Option<dlsys_tree::SimTime> {
         match self.scheduler {
             Scheduler::Local { slice } => {
-                Some(dlsys_tree::Instant::new(integrator::next_grid_time(after, slice)))
+                Some(dlsys_tree::SimTime::new(integrator::next_grid_time(after, slice)))
             }
             _ => None,
         }

@@ -17,7 +17,7 @@ use super::settle::Firing;
 use super::simulation::Simulation;
 use super::state::{Change, What};
 use dlsys_model::{Comparison, KindId, Outcome, Sign};
-use dlsys_tree::{Instant, Look, ModuleId, NO_LABEL};
+use dlsys_tree::{Look, ModuleId, NO_LABEL, SimTime};
 
 impl Simulation<'_> {
     /// Begins the life of a module whose kind may be light; false if it is not.
@@ -125,7 +125,7 @@ impl Simulation<'_> {
     }
 
     /// The instant of the event of the light module in a slot.
-    pub(super) fn event_of(&mut self, slot: u32) -> Instant {
+    pub(super) fn event_of(&mut self, slot: u32) -> SimTime {
         let (label, life) = self.life(slot);
         let at = life.at;
         self.plant.careers.keep(label, life);
@@ -336,7 +336,7 @@ impl Simulation<'_> {
 
 /// The parameters at the event, appended to `out`. Where the instant is known from a level, the value is that level, not
 /// a rounding of it.
-fn values_at_event(life: &Life, at: Instant, out: &mut Vec<f64>) {
+fn values_at_event(life: &Life, at: SimTime, out: &mut Vec<f64>) {
     let tau = at.since(life.birth).max(0.0);
     for (i, &x) in life.values.iter().enumerate() {
         out.push(match (life.motions.get(i), life.level) {

@@ -6,12 +6,12 @@ use super::flash::{self, Glance, MAX_UNBOUNDED};
 use super::integrator::{StepError, foresee};
 use super::motion::Motion;
 use super::plant::Plant;
-use super::runge_kutta::Rates;
 use super::simulation::Simulation;
 use super::state::{Control, State, Step};
 use dlsys_expr::{Program, Scratch};
 use dlsys_model::{Jacobian, Rule};
-use dlsys_tree::{Instant, ModuleId};
+use dlsys_ode::Rates;
+use dlsys_tree::{ModuleId, SimTime};
 use smallvec::SmallVec;
 
 /// So many steps must bring time on by more than this part of it, or there is a singularity.
@@ -19,7 +19,7 @@ const MANY_STEPS: usize = 10_000;
 const CRAWL: f64 = 1e-5;
 
 /// Counts a step; true if time hardly goes on.
-pub fn crawls(mark: &mut Instant, since_mark: &mut usize, at: Instant) -> bool {
+pub fn crawls(mark: &mut SimTime, since_mark: &mut usize, at: SimTime) -> bool {
     *since_mark += 1;
     if *since_mark < MANY_STEPS {
         return false;
@@ -53,7 +53,7 @@ impl<'a> Alone<'a> {
         plant: &'a Plant,
         state: &'a State,
         rule: &'a Rule,
-        from: Instant,
+        from: SimTime,
         mut variables: Vec<f64>,
         scratch: Scratch<f64>,
         y: &mut Vec<f64>,
@@ -137,7 +137,7 @@ impl Rates for Alone<'_> {
 
 impl Simulation<'_> {
     /// Makes a step of a module from its values in the tree; returns its length.
-    pub(super) fn step_alone(&mut self, id: ModuleId, from: Instant) -> Result<f64, Error> {
+    pub(super) fn step_alone(&mut self, id: ModuleId, from: SimTime) -> Result<f64, Error> {
         let model = self.model;
         let state = self.plant.state(id).expect("a module with a rule");
         let (index, solve) = (state.rule.expect("has a rule"), state.solve.expect("has equations"));
@@ -247,7 +247,7 @@ impl Simulation<'_> {
     pub(super) fn step_error(
         &self,
         error: StepError,
-        at: Instant,
+        at: SimTime,
         owner: impl Fn(usize) -> Option<(ModuleId, usize)>,
     ) -> Error {
         let (StepError::TooSmall(component) | StepError::Rate(component) | StepError::NotFinite(component)) =

@@ -14,7 +14,7 @@ use super::motion::{Flow, Riccati};
 use super::simulation::Simulation;
 use dlsys_expr::{LANES, Lanes, Program};
 use dlsys_model::{Driven, Law};
-use dlsys_tree::{Instant, ModuleId, ModuleString, Version, Visit};
+use dlsys_tree::{ModuleId, ModuleString, SimTime, Version, Visit};
 
 /// Who moves, in the structure of some version.
 #[derive(Debug, Default)]
@@ -47,7 +47,7 @@ struct Cast {
 /// so that they are the same at all times.
 #[derive(Clone, Copy, Debug)]
 struct Row {
-    birth: Instant,
+    birth: SimTime,
     /// Where the parameters of one of them begin in the tree.
     from: u32,
     /// Where they end in the list of places; they begin where those of the row before end.
@@ -60,7 +60,7 @@ impl Cast {
         self.places.clear();
     }
 
-    fn add(&mut self, birth: Instant, values: &[f64], own: Range<usize>, to: usize) {
+    fn add(&mut self, birth: SimTime, values: &[f64], own: Range<usize>, to: usize) {
         self.places.push(to as u32);
         let end = self.places.len() as u32;
         if let Some(last) = self.rows.last_mut()
@@ -76,7 +76,7 @@ impl Cast {
 
 impl Simulation<'_> {
     /// Writes the structure into a string.
-    pub(super) fn observe(&mut self, t: f64, now: Instant, out: &mut ModuleString) -> Result<(), Error> {
+    pub(super) fn observe(&mut self, t: f64, now: SimTime, out: &mut ModuleString) -> Result<(), Error> {
         self.refresh(now)?;
         let mut gallery = std::mem::take(&mut self.gallery);
         let version = Version { source: self.source, structure: self.structure };
@@ -119,7 +119,7 @@ impl Simulation<'_> {
     }
 
     /// The first pass.
-    fn hang(&self, gallery: &mut Gallery, t: f64, now: Instant, out: &mut ModuleString) {
+    fn hang(&self, gallery: &mut Gallery, t: f64, now: SimTime, out: &mut ModuleString) {
         let Gallery { columns, others, .. } = gallery;
         columns.iter_mut().for_each(Cast::clear);
         columns.resize(self.plant.careers.len(), Cast::default());
@@ -148,7 +148,7 @@ impl Simulation<'_> {
         &self,
         career: &Career,
         cast: &Cast,
-        now: Instant,
+        now: SimTime,
         again: bool,
         registers: &mut Vec<Lanes>,
         out: &mut [f64],

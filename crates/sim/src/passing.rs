@@ -10,15 +10,15 @@ use super::error::Error;
 use super::queue::{Entry, Who};
 use super::simulation::Simulation;
 use super::state::What;
-use dlsys_tree::{Instant, ModuleId};
+use dlsys_tree::{ModuleId, SimTime};
 
 /// The light events of one float.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Front {
     time: f64,
     /// The instants, if they are not all `first`.
-    instants: Vec<Instant>,
-    first: Instant,
+    instants: Vec<SimTime>,
+    first: SimTime,
     /// In order of instants and slots.
     members: Vec<u32>,
     /// How many of them are gone.
@@ -26,7 +26,7 @@ pub(super) struct Front {
 }
 
 impl Front {
-    fn head(&self) -> Option<(Instant, u32)> {
+    fn head(&self) -> Option<(SimTime, u32)> {
         let slot = *self.members.get(self.passed)?;
         Some((self.instants.get(self.passed).copied().unwrap_or(self.first), slot))
     }
@@ -56,12 +56,12 @@ impl Front {
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Coming {
     /// The slot of a light module.
-    Light(Instant, u32),
+    Light(SimTime, u32),
     Other(Entry),
 }
 
 impl Coming {
-    pub fn at(&self) -> Instant {
+    pub fn at(&self) -> SimTime {
         match self {
             Coming::Light(at, _) => *at,
             Coming::Other(entry) => entry.at,
@@ -71,7 +71,7 @@ impl Coming {
 
 /// True if what comes at an instant is passed on the way to another: events of that instant itself take place, what is
 /// known up to there is enough.
-pub(super) fn is_before(at: Instant, event: bool, until: Instant) -> bool {
+pub(super) fn is_before(at: SimTime, event: bool, until: SimTime) -> bool {
     let ahead = at.since(until);
     if event { ahead <= until.resolution() } else { ahead < 0.0 }
 }
@@ -115,7 +115,7 @@ impl Simulation<'_> {
     }
 
     /// The first light event.
-    fn light_head(&mut self) -> Option<(Instant, u32)> {
+    fn light_head(&mut self) -> Option<(SimTime, u32)> {
         let next = self.agenda.earliest();
         if let Some(head) = self.front.head() {
             if next.is_none_or(|next| next > self.front.time) {
@@ -143,7 +143,7 @@ impl Simulation<'_> {
             self.front.first = self.event_of(some);
         }
         if members.iter().skip(1).any(|slot| self.event_of(*slot) != self.front.first) {
-            let mut all: Vec<(Instant, u32)> =
+            let mut all: Vec<(SimTime, u32)> =
                 members.iter().map(|slot| (self.event_of(*slot), *slot)).collect();
             all.sort_unstable_by(|a, b| a.partial_cmp(b).unwrap_or(Ordering::Equal));
             members.clear();
@@ -172,7 +172,7 @@ impl Simulation<'_> {
 
     /// Passes the next thing that is known to come, if that is before `t`; tells whether it was an event.
     pub(super) fn advance_once(&mut self, t: f64) -> Result<Option<bool>, Error> {
-        let until = Instant::new(t);
+        let until = SimTime::new(t);
         let Some(coming) = self.coming() else { return Ok(None) };
         let event = match coming {
             Coming::Other(entry) => self.is_event(entry.who),
@@ -195,9 +195,9 @@ impl Simulation<'_> {
 
     /// True for the end of what is known if it comes at the very instant up to which time passes, and what happens then is
     /// known only, or comes up only, when one has gone on from there.
-    fn is_in_the_way(&mut self, coming: Coming, until: Instant) -> bool {
+    fn is_in_the_way(&mut self, coming: Coming, until: SimTime) -> bool {
         let Coming::Other(entry) = coming else { return false };
-        let within = |at: Instant| at.since(until) <= until.resolution();
+        let within = |at: SimTime| at.since(until) <= until.resolution();
         if !within(entry.at) {
             return false;
         }
@@ -209,7 +209,7 @@ impl Simulation<'_> {
         }
         // A step more may lead where nobody wanted to go.
         self.front.head().is_some_and(|(at, _)| within(at))
-            || self.agenda.earliest().map(Instant::new).is_some_and(within)
+            || self.agenda.earliest().map(SimTime::new).is_some_and(within)
             || self.queue.valid().any(|other| within(other.at) && self.is_event(other.who))
     }
 
@@ -288,7 +288,7 @@ impl Simulation<'_> {
     }
 
     /// True if all of the front has one instant, and nothing else happens then.
-    fn only_the_front(&mut self, at: Instant) -> bool {
+    fn only_the_front(&mut self, at: SimTime) -> bool {
         let far = |time: f64| time - at.to_f64() > 2.0 * at.resolution();
         self.front.instants.is_empty()
             && self.agenda.earliest().is_none_or(far)
@@ -296,10 +296,10 @@ impl Simulation<'_> {
     }
 
     /// Opens everything that happens at an instant; tells the first module of it.
-    fn gather(&mut self, at: Instant) -> Result<Option<ModuleId>, Error> {
+    fn gather(&mut self, at: SimTime) -> Result<Option<ModuleId>, Error> {
         let mut group = std::mem::take(&mut self.group_entries);
         group.clear();
-        let mut first: Option<(Instant, f64)> = None;
+        let mut first: Option<(SimTime, f64)> = None;
         let mut later = Vec::new();
         while let Some(coming) = self.coming() {
             if coming.at().since(at) > at.resolution() {
@@ -328,7 +328,7 @@ impl Simulation<'_> {
                     None => first = Some((birth, at.since(birth))),
                     // Those born together have clocks that are as good as their age is short.
                     Some((elder, age)) if elder == birth => {
-                        if coming.at().since(birth) - age > Instant::new(age).resolution() {
+                        if coming.at().since(birth) - age > SimTime::new(age).resolution() {
                             later.push(coming);
                             continue;
                         }

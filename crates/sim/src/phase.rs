@@ -1,6 +1,5 @@
 //! From an instant to the next: how the parameters of a module move, and what is known to come.
 
-use super::dense::Dense;
 use super::error::Error;
 use super::motion::{Driven, Flow, Function, Motion, Pace, Riccati, Terms};
 use super::plant::{Path, Plant};
@@ -10,7 +9,8 @@ use super::state::{Change, Next, What};
 use super::watch::needs_search;
 use dlsys_expr::Value;
 use dlsys_model::{Law, Sign, Solve};
-use dlsys_tree::{Instant, ModuleId};
+use dlsys_ode::Dense;
+use dlsys_tree::{ModuleId, SimTime};
 use smallvec::SmallVec;
 
 /// The first stretch that is searched on formulas, if nothing is known of their pace, in units of time.
@@ -220,7 +220,7 @@ impl Simulation<'_> {
     }
 
     /// Finds out what comes next for a module that is not coupled, from an instant on, and puts it into the queue.
-    pub(super) fn look_ahead(&mut self, id: ModuleId, from: Instant) -> Result<(), Error> {
+    pub(super) fn look_ahead(&mut self, id: ModuleId, from: SimTime) -> Result<(), Error> {
         let model = self.model;
         let who = Who::Module(id.slot() as u32);
         let Plant { tree, states, .. } = &mut self.plant;
@@ -272,7 +272,7 @@ impl Simulation<'_> {
     }
 
     /// Where no step leads on because the equations end there: if a boundary is there too, it has been reached.
-    pub(super) fn arrest(&mut self, id: ModuleId, at: Instant) -> Option<()> {
+    pub(super) fn arrest(&mut self, id: ModuleId, at: SimTime) -> Option<()> {
         let model = self.model;
         let state = self.plant.state(id)?;
         let rule = &model.rules[state.rule?];
@@ -299,7 +299,7 @@ impl Simulation<'_> {
     }
 
     /// Goes on to the next stretch of a module.
-    pub(super) fn pass_window(&mut self, id: ModuleId, at: Instant) -> Result<(), Error> {
+    pub(super) fn pass_window(&mut self, id: ModuleId, at: SimTime) -> Result<(), Error> {
         let state = self.plant.state_mut(id).expect("scheduled");
         state.pass_changes(at);
         if state.is_numeric() {
@@ -310,7 +310,7 @@ impl Simulation<'_> {
     }
 
     /// Makes the end of a module's own step the start of its next.
-    fn rebase(&mut self, id: ModuleId, at: Instant) {
+    fn rebase(&mut self, id: ModuleId, at: SimTime) {
         let state = self.plant.state(id).expect("scheduled");
         let first = self.plant.tree.places(id).start;
         let ends: Vec<(usize, f64)> = (state.motions.iter().enumerate())

@@ -3,12 +3,12 @@
 use super::around::{Around, gather};
 use super::career::Careers;
 use super::course::{Course, Piece};
-use super::dense::Dense;
 use super::motion::Motion;
 use super::state::State;
 use dlsys_expr::{Dual, Interval, Value};
 use dlsys_model::{Rule, Sum};
-use dlsys_tree::{Instant, ModuleId, Tree};
+use dlsys_ode::Dense;
+use dlsys_tree::{ModuleId, SimTime, Tree};
 use smallvec::SmallVec;
 
 /// What rounding makes of a value, relative.
@@ -67,7 +67,7 @@ impl Plant {
 
     /// A parameter, moving since `state.since` from the value `x`, at an instant.
     #[inline]
-    fn moved(&self, state: &State, motion: &Motion, x: f64, at: Instant) -> f64 {
+    fn moved(&self, state: &State, motion: &Motion, x: f64, at: SimTime) -> f64 {
         match motion {
             Motion::Rest => x,
             Motion::Step(component) => match state.step.as_ref().filter(|s| s.live) {
@@ -83,7 +83,7 @@ impl Plant {
     }
 
     /// The parameters of a module at an instant, appended to `out`; not of a light one, whose motions are not here.
-    pub fn values(&self, id: ModuleId, at: Instant, out: &mut Vec<f64>) {
+    pub fn values(&self, id: ModuleId, at: SimTime, out: &mut Vec<f64>) {
         debug_assert!(self.careers.get(self.tree.label(id)).is_none_or(|career| career.is_over_at_birth()));
         let values = self.tree.parameters(id);
         match self.state(id).filter(|s| !s.motions.is_empty()) {
@@ -98,19 +98,19 @@ impl Plant {
     }
 
     /// One parameter of a module at an instant.
-    pub fn value(&self, id: ModuleId, parameter: usize, at: Instant) -> f64 {
+    pub fn value(&self, id: ModuleId, parameter: usize, at: SimTime) -> f64 {
         let x = self.tree.parameters(id)[parameter];
         let moving = self.state(id).and_then(|s| Some((s, s.motions.get(parameter)?)));
         moving.map_or(x, |(state, motion)| self.moved(state, motion, x, at))
     }
 
     /// Makes the values at an instant those of the tree, and the motions begin there, all at rest.
-    pub fn materialise(&mut self, id: ModuleId, at: Instant) {
+    pub fn materialise(&mut self, id: ModuleId, at: SimTime) {
         self.materialise_except(id, at, &[]);
     }
 
     /// The same, but for parameters whose values then are given.
-    pub fn materialise_except(&mut self, id: ModuleId, at: Instant, given: &[(usize, f64)]) {
+    pub fn materialise_except(&mut self, id: ModuleId, at: SimTime, given: &[(usize, f64)]) {
         let places = self.tree.places(id);
         let mut moved: SmallVec<[(usize, f64); 4]> = SmallVec::new();
         let Some(state) = self.state(id) else { return };
@@ -132,7 +132,7 @@ impl Plant {
     }
 
     /// The end of the stretch, from an instant on, in which all coupled components that a module reads follow one polynomial.
-    pub fn knot(&self, state: &State, course: &Course, from: Instant) -> Instant {
+    pub fn knot(&self, state: &State, course: &Course, from: SimTime) -> SimTime {
         let mut knot = course.end;
         if course.is_whole() {
             return knot;
@@ -151,7 +151,7 @@ impl Plant {
     }
 
     /// The variables of a rule at an instant: parameters, those of the context, aggregates, `t` and `age`.
-    pub fn variables(&self, rule: &Rule, id: ModuleId, around: &Around, at: Instant, out: &mut Vec<f64>) {
+    pub fn variables(&self, rule: &Rule, id: ModuleId, around: &Around, at: SimTime, out: &mut Vec<f64>) {
         out.clear();
         self.values(id, at, out);
         for module in around.context() {
@@ -175,7 +175,7 @@ impl Plant {
         (rule, reads): (&Rule, &[bool]),
         id: ModuleId,
         around: &Around,
-        at: Instant,
+        at: SimTime,
         out: &mut Vec<f64>,
     ) {
         if !rule.aggregates.is_empty() {
@@ -197,7 +197,7 @@ pub struct Path<'p> {
     pub plant: &'p Plant,
     pub state: &'p State,
     pub rule: &'p Rule,
-    pub start: Instant,
+    pub start: SimTime,
     pub h: f64,
     age: f64,
     /// Which variables are wanted; all where this is empty.
@@ -207,7 +207,7 @@ pub struct Path<'p> {
 }
 
 impl<'p> Path<'p> {
-    pub fn new(plant: &'p Plant, state: &'p State, rule: &'p Rule, start: Instant, h: f64) -> Path<'p> {
+    pub fn new(plant: &'p Plant, state: &'p State, rule: &'p Rule, start: SimTime, h: f64) -> Path<'p> {
         let age = start.since(plant.tree.birth(state.id));
         Path { plant, state, rule, start, h, age, wanted: &rule.watched, step: None }
     }
@@ -217,7 +217,7 @@ impl<'p> Path<'p> {
         plant: &'p Plant,
         state: &'p State,
         rule: &'p Rule,
-        (start, h): (Instant, f64),
+        (start, h): (SimTime, f64),
         step: Option<&'p Dense>,
     ) -> Path<'p> {
         Path { wanted: &[], step, ..Path::new(plant, state, rule, start, h) }

@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use dlsys_tree::Instant;
+use dlsys_tree::SimTime;
 
 /// Who an entry is about: a slot of the tree, the coupled modules together, or all that discrete rules apply to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -15,7 +15,7 @@ pub enum Who {
 
 #[derive(Clone, Copy, Debug)]
 pub struct Entry {
-    pub at: Instant,
+    pub at: SimTime,
     pub who: Who,
     serial: u32,
 }
@@ -74,7 +74,7 @@ impl Queue {
     }
 
     /// Puts in what is known now, in place of what was.
-    pub fn schedule(&mut self, who: Who, at: Instant) {
+    pub fn schedule(&mut self, who: Who, at: SimTime) {
         self.cancel(who);
         let serial = *self.serial(who);
         self.heap.push(Entry { at, who, serial });

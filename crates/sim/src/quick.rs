@@ -15,7 +15,7 @@ use super::simulation::Simulation;
 use super::state::{Change, Signs, What};
 use super::watch::{opposite, rate_at};
 use dlsys_model::{Law, Rule, Sign, Solve, Truth, Watch};
-use dlsys_tree::{Instant, ModuleId};
+use dlsys_tree::{ModuleId, SimTime};
 
 /// What a newborn module is going to do. It lives on the stack for a moment: a box would cost more than its size.
 #[allow(clippy::large_enum_variant)]
@@ -46,7 +46,7 @@ pub(super) struct First {
 
 /// Where the two sides of an atom meet.
 pub(super) struct Meeting {
-    pub time: Instant,
+    pub time: SimTime,
     /// The time from birth, if it was found as that.
     pub tau: Option<f64>,
     /// The parameter that meets a level, and the level.
@@ -204,7 +204,7 @@ impl Simulation<'_> {
         atom: usize,
         watch: &Watch,
         motions: &[Motion],
-        birth: Instant,
+        birth: SimTime,
     ) -> Option<Meeting> {
         let Watch::Crossing { variable, level } = watch else { return None };
         let (variable, time) = (*variable, rule.time_variable());
@@ -217,7 +217,7 @@ impl Simulation<'_> {
         let tau = if !level.is_finite() {
             return None;
         } else if variable == time {
-            return Some(Meeting { time: Instant::new(level), tau: None, level: None });
+            return Some(Meeting { time: SimTime::new(level), tau: None, level: None });
         } else if variable == time + 1 {
             level - self.variables[variable]
         } else {

@@ -19,17 +19,17 @@
 
 use super::coupled::integrated;
 use super::course::Course;
-use super::dense::Dense;
 use super::equations::{Equations, Memory};
 use super::integrator::{CERTAINTY, INNER_TOLERANCE, Integrator};
 use super::motion::Motion;
 use super::neighbours::reads;
 use super::queue::Who;
-use super::runge_kutta::Nodes;
 use super::simulation::Simulation;
 use super::state::Control;
 use super::system::System;
-use dlsys_tree::{Instant, ModuleId};
+use dlsys_ode::Dense;
+use dlsys_ode::Nodes;
+use dlsys_tree::{ModuleId, SimTime};
 use smallvec::SmallVec;
 
 /// What repairs have learnt, and their memory: nothing is allocated for one but its motion.
@@ -312,7 +312,7 @@ impl Simulation<'_> {
         let tolerance = self.coupled_settings.tolerance;
         let known = &mut self.coupled.control.error;
         *known = (*known + INNER_TOLERANCE * tolerance).min(CERTAINTY * tolerance);
-        let now: Instant = self.now;
+        let now: SimTime = self.now;
         for &id in &region.members {
             let state = self.plant.state_mut(id).expect("a member");
             state.pass_changes(now);

@@ -29,7 +29,7 @@ use super::{Method, Settings, Stats};
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_expr::Scratch;
 use dlsys_model::{CUT, KindId, Model};
-use dlsys_tree::{Family, Instant, Lineage, ModuleId, ModuleString, Seed, Tree};
+use dlsys_tree::{Family, Lineage, ModuleId, ModuleString, Seed, SimTime, Tree};
 
 /// A model developing in time; observe it with [`Simulation::at`].
 ///
@@ -58,7 +58,7 @@ pub struct Simulation<'m> {
     /// Slots of light modules that were cut off before their events.
     pub(super) ghosts: HashSet<u32>,
     /// Time of the last event.
-    pub(super) now: Instant,
+    pub(super) now: SimTime,
     /// Number of the last instant at which something happened.
     pub(super) group: u64,
     /// Modules that the instant concerns.
@@ -94,7 +94,7 @@ pub struct Simulation<'m> {
     pub(super) algebra: Consistency,
     pub(super) alone: Integrator,
     /// Whose step it made last, and to when.
-    pub(super) alone_last: Option<(ModuleId, Instant)>,
+    pub(super) alone_last: Option<(ModuleId, SimTime)>,
     /// What step control has learnt, per kind and number of the clause: modules of one kind that live through the
     /// same under different rules take the same steps.
     pub(super) hints: Vec<Vec<Control>>,
@@ -107,7 +107,7 @@ pub struct Simulation<'m> {
     /// Events in a row of modules that hardly lived.
     pub(super) stalled: usize,
     /// Since when nothing has happened but changes of equations, at one instant, and how many.
-    pub(super) standing: (Instant, usize),
+    pub(super) standing: (SimTime, usize),
     pub(super) known_rates: KnownRates,
     pub(super) stats: Stats,
     /// Productions since they were last taken, if they are recorded.
@@ -122,7 +122,7 @@ pub struct Simulation<'m> {
     pub(super) budget: Budget,
     /// Entries of the queues passed so far; the last of them, and whether it was an event.
     pub(super) passed: u64,
-    pub(super) last: Option<(Instant, bool)>,
+    pub(super) last: Option<(SimTime, bool)>,
     // Memory that is used again and again.
     pub(super) variables: Vec<f64>,
     pub(super) scratch: Scratch<f64>,
@@ -178,7 +178,7 @@ impl<'m> Simulation<'m> {
             front: Front::default(),
             cuts: model.kinds.find(CUT, 0),
             ghosts: HashSet::new(),
-            now: Instant::ZERO,
+            now: SimTime::ZERO,
             group: 0,
             opened: Vec::new(),
             ready: Vec::new(),
@@ -210,7 +210,7 @@ impl<'m> Simulation<'m> {
             unbounded: BTreeMap::new(),
             flashes: model.rules.iter().flat_map(|rule| &rule.solves).any(|solve| solve.flashes),
             stalled: 0,
-            standing: (Instant::ZERO, 0),
+            standing: (SimTime::ZERO, 0),
             known_rates: KnownRates::default(),
             stats: Stats::default(),
             log: settings.log.then(Vec::new),
@@ -248,7 +248,7 @@ impl<'m> Simulation<'m> {
         chance::arguments(self.seed, axiom, Family::AXIOM, &mut variables, scratch, &mut arguments)
             .map_err(|misfortune| misfortune.error(site()))?;
         let tree = &mut self.plant.tree;
-        tree.append(&self.model.axiom, &arguments, Instant::ZERO, Family::AXIOM, &mut self.fresh);
+        tree.append(&self.model.axiom, &arguments, SimTime::ZERO, Family::AXIOM, &mut self.fresh);
         if self.hands_on {
             let skipped = |kind| self.model.kinds.get(kind).skipped;
             self.neighbours.hand_on(None, &self.model.axiom.kinds, &self.fresh, skipped);
@@ -297,7 +297,7 @@ impl<'m> Simulation<'m> {
     /// are there. After an error, every further call gives the same error.
     pub fn at(&mut self, t: f64, out: &mut ModuleString) -> Result<(), Error> {
         self.pass(t)?;
-        let at = Instant::new(t);
+        let at = SimTime::new(t);
         // An event within the resolution of time of `t` may have taken place a little after it.
         let now = if at.since(self.now) < 0.0 { self.now } else { at };
         self.show_coupled(now);
@@ -379,7 +379,7 @@ impl<'m> Simulation<'m> {
         if hint > 0.0 { hint } else { 1.0 }
     }
 
-    pub(super) fn not_finite(&self, id: ModuleId, parameter: usize, at: Instant) -> Error {
+    pub(super) fn not_finite(&self, id: ModuleId, parameter: usize, at: SimTime) -> Error {
         let (rule, solve) = self.plant.rule_and_clause(id);
         let rule_index = rule.unwrap_or(0);
         let compiled = &self.model.rules[rule_index];

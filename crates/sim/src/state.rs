@@ -3,10 +3,10 @@
 use smallvec::SmallVec;
 
 use super::around::Around;
-use super::dense::Dense;
 use super::motion::Motion;
 use dlsys_model::Sign;
-use dlsys_tree::{Instant, ModuleId};
+use dlsys_ode::Dense;
+use dlsys_tree::{ModuleId, SimTime};
 
 pub type Signs = SmallVec<[Sign; 8]>;
 pub type Switches = SmallVec<[bool; 8]>;
@@ -26,7 +26,7 @@ pub struct State {
     /// The sign of each atom of the rule, just after the last instant at which it was examined.
     pub signs: Signs,
     /// When the motions began; the values in the tree are those of then.
-    pub since: Instant,
+    pub since: SimTime,
     /// How each parameter moves; empty means that none does.
     pub motions: SmallVec<[Motion; 2]>,
     /// The module's own step, if it is integrated alone.
@@ -56,7 +56,7 @@ pub struct Step {
     /// The step is of the present motion.
     pub live: bool,
     /// Time in the past, and the number of steps since then.
-    pub mark: Instant,
+    pub mark: SimTime,
     pub since_mark: usize,
 }
 
@@ -119,7 +119,7 @@ impl Next {
 #[derive(Clone, Copy, Debug)]
 pub struct Change {
     pub atom: usize,
-    pub time: Instant,
+    pub time: SimTime,
     pub at: Sign,
     pub after: Sign,
     /// The parameter that meets a level there, and the level.
@@ -154,7 +154,7 @@ impl State {
             solve: None,
             switches: SmallVec::new(),
             signs: SmallVec::new(),
-            since: Instant::ZERO,
+            since: SimTime::ZERO,
             motions: SmallVec::new(),
             step: None,
             window: 0.0,
@@ -202,7 +202,7 @@ impl State {
     }
 
     /// Takes over the signs that have changed without consequence up to an instant.
-    pub fn pass_changes(&mut self, until: Instant) {
+    pub fn pass_changes(&mut self, until: SimTime) {
         let signs = &mut self.signs;
         self.next.changes.retain(|change| {
             let passed = change.time.since(until) <= 0.0;

@@ -9,7 +9,7 @@ use super::motion::Motion;
 use super::plant::Plant;
 use super::state::State;
 use dlsys_model::{Rule, Solve};
-use dlsys_tree::{Instant, ModuleId};
+use dlsys_tree::{ModuleId, SimTime};
 use smallvec::SmallVec;
 
 /// A rule and one of its aggregates.
@@ -50,7 +50,7 @@ pub struct System {
     pub switches: Vec<f64>,
     /// Place in the tree's values, and owner with its parameter, of each component.
     pub places: Vec<(usize, ModuleId, usize)>,
-    pub start: Instant,
+    pub start: SimTime,
     /// Some rates read the time of the simulation.
     pub timed: bool,
 }
@@ -60,7 +60,7 @@ pub struct System {
 pub struct Formula {
     pub motion: Motion,
     pub x: f64,
-    since: Instant,
+    since: SimTime,
     /// Time since then, at the start of the step.
     pub offset: f64,
 }
@@ -80,7 +80,7 @@ pub struct Row {
     pub rates: usize,
     pub algebraic: usize,
     first_given: usize,
-    birth: Instant,
+    birth: SimTime,
     pub age: f64,
 }
 
@@ -107,7 +107,7 @@ impl System {
         rules: &[Rule],
         plant: &Plant,
         members: &[ModuleId],
-        start: Instant,
+        start: SimTime,
         unknown: impl Fn(u32) -> Option<u32>,
         frozen: bool,
     ) {
@@ -247,7 +247,7 @@ impl System {
     }
 
     /// A system without rows.
-    pub fn at(start: Instant) -> System {
+    pub fn at(start: SimTime) -> System {
         System { start, ..System::default() }
     }
 
@@ -268,7 +268,7 @@ impl System {
         (first_source, sources): (usize, usize),
         switches: impl Iterator<Item = f64>,
         (first_rate, given): (usize, &[u32]),
-        birth: Instant,
+        birth: SimTime,
     ) {
         let first_switch = self.switches.len();
         self.switches.extend(switches);
@@ -332,7 +332,7 @@ impl System {
     }
 
     /// Moves the start of the step.
-    pub fn advance(&mut self, start: Instant) {
+    pub fn advance(&mut self, start: SimTime) {
         self.start = start;
         for row in &mut self.rows {
             row.age = start.since(row.birth);

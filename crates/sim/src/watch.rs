@@ -8,11 +8,11 @@ use smallvec::SmallVec;
 
 use super::doubt::{Ahead, Question};
 use super::plant::Path;
-use super::roots::{Function, Root, first_root};
 use super::state::{Change, Signs, State};
 use dlsys_expr::{Binary, Dual, Interval, Program, Scratch, Value};
 use dlsys_model::{Condition, Rule, Sign, Solve, Truth, Watch};
-use dlsys_tree::Instant;
+use dlsys_ode::{Function, Root, first_root};
+use dlsys_tree::SimTime;
 
 /// Zero, for a difference of two sides, in units of their rounding.
 pub const TOUCH: f64 = 256.0 * f64::EPSILON;
@@ -70,7 +70,7 @@ struct Watched {
 #[derive(Clone, Copy, Debug)]
 pub struct Meeting {
     pub position: f64,
-    pub time: Instant,
+    pub time: SimTime,
     pub at: Sign,
     pub after: Sign,
     pub level: Option<(usize, f64)>,
@@ -398,7 +398,7 @@ impl Watcher {
         }
         let t = path.rule.time_variable();
         let time = if variable == t {
-            Instant::new(level)
+            SimTime::new(level)
         } else if variable == t + 1 {
             path.plant.tree.birth(path.state.id).after(level)
         } else {

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Family, Instant, Lineage};
+use super::{Family, Lineage, SimTime};
 
 /// No brood: brackets are of none.
 pub(super) const NO_BROOD: u32 = u32::MAX;
@@ -20,7 +20,7 @@ const UNCOUNTED: u64 = 255;
 struct Brood {
     mixed: u64,
     trail: u64,
-    birth: Instant,
+    birth: SimTime,
 }
 
 /// All broods, by number; numbers are used again.
@@ -41,7 +41,7 @@ impl Broods {
     }
 
     /// A new brood, of nobody yet, whose modules stand at these places of the successor (brackets not counted).
-    pub fn begin(&mut self, family: Family, birth: Instant, first: u32) -> u32 {
+    pub fn begin(&mut self, family: Family, birth: SimTime, first: u32) -> u32 {
         let brood = Brood { mixed: family.mixed, trail: family.trail & TRAIL, birth };
         let number = match self.free.pop() {
             Some(number) => {
@@ -84,7 +84,7 @@ impl Broods {
         }
     }
 
-    pub fn birth(&self, number: u32) -> Instant {
+    pub fn birth(&self, number: u32) -> SimTime {
         self.all[number as usize].birth
     }
 

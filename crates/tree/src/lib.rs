@@ -5,11 +5,10 @@
 //!   an observer gets.
 //! - [`Lineage`]: who a module is, for as long as it lives, in every run.
 //! - [`Seed`]: random numbers, each of which belongs to a module.
-//! - [`Instant`]: when it was born, to more digits than a float has.
+//! - [`SimTime`]: when it was born, to more digits than a float has.
 
 mod brood;
 mod chance;
-mod instant;
 mod lineage;
 mod string;
 mod tree;
@@ -17,7 +16,7 @@ mod walk;
 mod ways;
 
 pub use chance::{Purpose, Seed, key};
-pub use instant::Instant;
+pub use dlsys_expr::SimTime;
 pub use lineage::{Family, Lineage};
 pub use string::{Module, ModuleString, Version};
 pub use tree::{Look, ModuleId, NO_LABEL, Tree};

@@ -1,7 +1,7 @@
 //! The structure at one instant, in string order.
 
 use super::brood::{Broods, NO_BROOD};
-use super::{Instant, Lineage};
+use super::{Lineage, SimTime};
 use dlsys_model::KindId;
 
 /// All modules alive at `time`, in string order, brackets included.
@@ -16,12 +16,12 @@ pub struct ModuleString {
     /// Time of the simulation.
     pub time: f64,
     /// What ages are counted to.
-    now: Instant,
+    now: SimTime,
     entries: Vec<Entry>,
     parameters: Vec<f64>,
     broods: Broods,
     /// Birth and lineage of modules that come from nowhere.
-    strangers: Vec<(Instant, Lineage)>,
+    strangers: Vec<(SimTime, Lineage)>,
     version: Option<Version>,
 }
 
@@ -59,7 +59,7 @@ pub struct Module<'a> {
 impl ModuleString {
     /// Empties the string and sets its time, keeping its memory.
     pub fn reset(&mut self, time: f64) {
-        (self.time, self.now, self.version) = (time, Instant::ZERO, None);
+        (self.time, self.now, self.version) = (time, SimTime::ZERO, None);
         self.entries.clear();
         self.parameters.clear();
         self.strangers.clear();
@@ -67,7 +67,7 @@ impl ModuleString {
     }
 
     /// Empties the string, for so many entries and parameters, of modules of these broods, at an instant.
-    pub(super) fn begin(&mut self, time: f64, now: Instant, broods: &Broods, extent: (usize, usize)) {
+    pub(super) fn begin(&mut self, time: f64, now: SimTime, broods: &Broods, extent: (usize, usize)) {
         self.reset(time);
         self.now = now;
         self.entries.reserve(extent.0);
@@ -110,7 +110,7 @@ impl ModuleString {
     }
 
     /// Sets the time that the string shows, and the instant that ages are counted to.
-    pub fn show(&mut self, time: f64, now: Instant) {
+    pub fn show(&mut self, time: f64, now: SimTime) {
         (self.time, self.now) = (time, now);
     }
 

@@ -12,7 +12,7 @@ use std::collections::TryReserveError;
 use smallvec::SmallVec;
 
 use super::brood::{Broods, NO_BROOD};
-use super::{Family, Instant, Lineage};
+use super::{Family, Lineage, SimTime};
 use dlsys_model::{KindId, Successor};
 
 /// The branch that holds the main axis.
@@ -79,7 +79,7 @@ pub struct Look<'t> {
     pub id: ModuleId,
     pub kind: KindId,
     pub label: u16,
-    pub birth: Instant,
+    pub birth: SimTime,
     pub values: &'t [f64],
     /// Brood, and place in it.
     member: (u32, u16),
@@ -187,7 +187,7 @@ impl Tree {
         self.node(id).kind
     }
 
-    pub fn birth(&self, id: ModuleId) -> Instant {
+    pub fn birth(&self, id: ModuleId) -> SimTime {
         self.broods.birth(self.node(id).brood)
     }
 
@@ -324,7 +324,7 @@ impl Tree {
         &mut self,
         string: &Successor,
         arguments: &[f64],
-        birth: Instant,
+        birth: SimTime,
         family: Family,
         made: &mut Vec<ModuleId>,
     ) {
@@ -342,7 +342,7 @@ impl Tree {
         id: ModuleId,
         string: &Successor,
         arguments: &[f64],
-        birth: Instant,
+        birth: SimTime,
         family: Family,
         made: &mut Vec<ModuleId>,
     ) {
@@ -365,7 +365,7 @@ impl Tree {
         id: ModuleId,
         kind: KindId,
         arguments: &[f64],
-        birth: Instant,
+        birth: SimTime,
         family: Family,
         made: &mut Vec<ModuleId>,
     ) {
@@ -418,7 +418,7 @@ impl Tree {
         after: Link,
         string: &Successor,
         mut arguments: &[f64],
-        birth: Instant,
+        birth: SimTime,
         family: Family,
         made: &mut Vec<ModuleId>,
     ) {
@@ -512,7 +512,7 @@ pub(super) mod tests {
         let axiom = string(&mut kinds, text);
         let successors: Vec<_> = swaps.iter().map(|(at, s)| (*at, string(&mut kinds, s))).collect();
         let mut tree = Tree::new(vec![0; kinds.len()], vec![0; kinds.len()]);
-        tree.append(&axiom, &[], Instant::ZERO, Family::AXIOM, &mut Vec::new());
+        tree.append(&axiom, &[], SimTime::ZERO, Family::AXIOM, &mut Vec::new());
         for (at, successor) in successors {
             let ids: Vec<ModuleId> = tree
                 .walk()
@@ -522,7 +522,7 @@ pub(super) mod tests {
                 })
                 .collect();
             let family = tree.lineage(ids[at]).family(0);
-            tree.replace(ids[at], &successor, &[], Instant::ZERO, family, &mut Vec::new());
+            tree.replace(ids[at], &successor, &[], SimTime::ZERO, family, &mut Vec::new());
         }
         (kinds, tree)
     }
@@ -553,8 +553,8 @@ pub(super) mod tests {
             let last = find(&tree, kinds.find("B", 0).expect("B"));
             let family = tree.lineage(last).family(0);
             let b = string(&mut kinds, "B[A]");
-            tree.replace(last, &b, &[], Instant::ZERO, family, &mut made);
-            tree.append(&more, &[], Instant::ZERO, Family::AXIOM, &mut made);
+            tree.replace(last, &b, &[], SimTime::ZERO, family, &mut made);
+            tree.append(&more, &[], SimTime::ZERO, Family::AXIOM, &mut made);
         }
         assert_eq!(show(&kinds, &tree), "A[B[A][A][A][C]]IXYZXY[Z]XY[Z]XY[Z]");
         assert!(made.iter().all(|id| id.slot() != cut.slot()), "its slot is kept");

@@ -1,7 +1,7 @@
 //! String order: all modules and brackets, one after another.
 
 use super::tree::{Link, TRUNK};
-use super::{Instant, ModuleId, ModuleString, Tree};
+use super::{ModuleId, ModuleString, SimTime, Tree};
 use dlsys_model::KindId;
 
 /// What a walk in string order meets.
@@ -23,7 +23,7 @@ impl Tree {
     pub fn write(
         &self,
         time: f64,
-        now: Instant,
+        now: SimTime,
         out: &mut ModuleString,
         mut note: impl FnMut(ModuleId, u16, usize),
     ) {

@@ -21,10 +21,10 @@ mod steps;
 #[cfg(test)]
 mod tests;
 
-use super::dense::Dense;
 use super::state::Control;
 use super::{Settings, Stats};
-use dlsys_tree::Instant;
+use dlsys_ode::Dense;
+use dlsys_tree::SimTime;
 use poles::Poles;
 use series::{Orthant, Series};
 use steps::Steps;
@@ -71,7 +71,7 @@ pub struct Linear {
     problem: Problem,
     /// The unknown of each component of the coupled modules.
     unknown: Vec<u32>,
-    start: Instant,
+    start: SimTime,
     orthant: Orthant,
     series: Option<Series>,
     /// Of what is larger than every error of the series.
@@ -82,7 +82,7 @@ pub struct Linear {
 
 impl Linear {
     /// None if neighbours weigh on each other with different signs: they swing.
-    fn of(problem: Problem, unknown: Vec<u32>, start: Instant) -> Option<Linear> {
+    fn of(problem: Problem, unknown: Vec<u32>, start: SimTime) -> Option<Linear> {
         let finite = problem.entries.iter().map(|e| &e.2).chain(&problem.b).chain(&problem.y);
         if !finite.into_iter().all(|x| x.is_finite()) {
             return None;
@@ -94,7 +94,7 @@ impl Linear {
 
     /// The components at an instant, as the dense output of a step that stays where it is. Not numbers if there are
     /// none: growth beyond all bounds. `control` is what is known of steps, should there have to be any.
-    pub fn at(&mut self, at: Instant, settings: &Settings, control: &Control, stats: &mut Stats) -> Dense {
+    pub fn at(&mut self, at: SimTime, settings: &Settings, control: &Control, stats: &mut Stats) -> Dense {
         let tau = at.since(self.start).max(0.0);
         let mut y = match tau {
             0.0 => self.problem.y.clone(),

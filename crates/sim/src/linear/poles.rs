@@ -10,7 +10,7 @@
 
 use super::rational::{ALPHA_0, POLES, RESIDUES};
 use super::{Problem, ROUNDING};
-use crate::sparse::{Pattern, Wide};
+use dlsys_ode::{Pattern, Wide};
 
 /// Lanes of an elimination: the seven poles and one that does nothing.
 const LANES: usize = 8;

@@ -1,12 +1,12 @@
 //! The equations in steps, where no other way can answer for its error.
 
 use super::Problem;
-use crate::dense::Dense;
 use crate::integrator::Integrator;
-use crate::runge_kutta::Rates;
 use crate::state::Control;
 use crate::{Settings, Stats};
-use dlsys_tree::Instant;
+use dlsys_ode::Dense;
+use dlsys_ode::Rates;
+use dlsys_tree::SimTime;
 
 /// Steps from the start of the phase, whose time is zero here. Nobody's looking has any influence on them.
 #[derive(Clone)]
@@ -15,8 +15,8 @@ pub struct Steps {
     control: Control,
     /// The state at the start of the last step, and where that goes from and to; or, before the first, the start of all.
     y: Vec<f64>,
-    from: Instant,
-    end: Instant,
+    from: SimTime,
+    end: SimTime,
     /// The last step, if somebody has looked.
     dense: Option<Dense>,
 }
@@ -25,13 +25,13 @@ impl Steps {
     pub fn new(problem: &Problem, settings: &Settings, control: Control) -> Steps {
         let mut integrator = Integrator::default();
         integrator.restart(settings.method, problem.y.len());
-        let (from, end) = (Instant::ZERO, Instant::ZERO);
+        let (from, end) = (SimTime::ZERO, SimTime::ZERO);
         Steps { integrator, control, y: problem.y.clone(), from, end, dense: None }
     }
 
     /// True if a time can only be reached from the start.
     pub fn have_passed(&self, tau: f64) -> bool {
-        Instant::new(tau).since(self.from) < 0.0
+        SimTime::new(tau).since(self.from) < 0.0
     }
 
     /// The state at a time that is not before the last step. None if steps do not come that far.
@@ -42,11 +42,11 @@ impl Steps {
         settings: &Settings,
         stats: &mut Stats,
     ) -> Option<Vec<f64>> {
-        let at = Instant::new(tau);
+        let at = SimTime::new(tau);
         let Steps { integrator, control, y, from, end, dense } = self;
         let mut flow = Flow { problem };
         while end.since(at) < 0.0 {
-            if end.since(Instant::ZERO) > 0.0 {
+            if end.since(SimTime::ZERO) > 0.0 {
                 integrator.advance(y);
             }
             *from = *end;
@@ -55,7 +55,7 @@ impl Steps {
         }
         let dense = dense.get_or_insert_with(|| integrator.dense(&mut flow, y));
         let position = dense.position(at);
-        Some((0..dense.len()).map(|component| dense.value(component, position)).collect())
+        Some((0..dense.components()).map(|component| dense.value(component, position)).collect())
     }
 }
 

@@ -129,7 +129,7 @@ fn error(problem: &Problem, tau: f64, found: &[f64]) -> Option<f64> {
 
 fn linear(problem: &Problem) -> Option<Linear> {
     let unknown = (0..problem.y.len() as u32).collect();
-    Linear::of(problem.clone(), unknown, Instant::ZERO)
+    Linear::of(problem.clone(), unknown, SimTime::ZERO)
 }
 
 /// Errors of whatever is accepted, way by way, over random equations of one kind. There must be as many answers as that.
@@ -241,9 +241,9 @@ fn the_promise_is_kept_whatever_way_is_taken() {
         let Some(mut linear) = linear(&problem) else { continue };
         let settings = Settings { tolerance: problem.tolerance, ..Settings::default() };
         let (mut before, mut stats) = (linear.clone(), Stats::default());
-        let at = Instant::new(tau);
+        let at = SimTime::new(tau);
         let dense = linear.at(at, &settings, &Control::default(), &mut stats);
-        let found: Vec<f64> = (0..dense.len()).map(|i| dense.value(i, 0.0)).collect();
+        let found: Vec<f64> = (0..dense.components()).map(|i| dense.value(i, 0.0)).collect();
         if let Some(error) = error(&problem, tau, &found) {
             assert!(error <= 100.0, "{error} tolerances: seed {seed}, t = {tau}, {stats:?}\n{problem:?}");
         }
@@ -255,7 +255,7 @@ fn the_promise_is_kept_whatever_way_is_taken() {
         // To the same bits after other looks, forwards and back.
         for part in [0.01, 0.5, 0.9, 2.0] {
             if part < 1.0 || stats.steps == 0 {
-                before.at(Instant::new(part * tau), &settings, &Control::default(), &mut stats);
+                before.at(SimTime::new(part * tau), &settings, &Control::default(), &mut stats);
             }
         }
         let again = before.at(at, &settings, &Control::default(), &mut stats);

@@ -3,7 +3,7 @@
 use super::Method;
 use super::dense::{Dense, PLACE};
 use super::tableau::{DOP853, DOPRI5, Tableau, dop853_dense, dop853_error, dopri5_dense};
-use dlsys_tree::Instant;
+use dlsys_expr::SimTime;
 
 /// A system of equations `y' = f(tau, y)`, `tau` counted from the start of the step.
 pub trait Rates {
@@ -133,14 +133,14 @@ impl Method {
     }
 
     /// Where a step evaluates rates that its estimate of errors depends on, as parts of it.
-    pub(super) fn nodes(self) -> Nodes {
+    pub fn nodes(self) -> Nodes {
         let Some(tableau) = self.tableau() else { return Nodes::from_slice(&[0.0, 0.5, 1.0]) };
         let counts = |(_, weight): &(&f64, &f64)| **weight != 0.0;
         tableau.c.iter().zip(tableau.e[0]).filter(counts).map(|(c, _)| *c).collect()
     }
 
     /// Order of the error estimate.
-    pub(super) fn error_order(self) -> u32 {
+    pub fn error_order(self) -> u32 {
         self.tableau().map_or(1, |t| t.error_order)
     }
 
@@ -363,7 +363,7 @@ impl Workspace {
     }
 
     /// The dense output of the step just tried, up to `end` if that is known better than as `start` and `h`.
-    pub fn dense(&self, method: Method, start: Instant, end: Option<Instant>, y: &[f64], h: f64) -> Dense {
+    pub fn dense(&self, method: Method, start: SimTime, end: Option<SimTime>, y: &[f64], h: f64) -> Dense {
         let degree = match method {
             Method::Euler => 1,
             Method::Rk4 => 3,
@@ -520,7 +520,7 @@ mod tests {
             workspace.start(&mut system, &y).expect("finite");
             workspace.attempt(method, &mut system, &y, h, 1.0);
             workspace.finish(method, &mut system, &y, h);
-            let dense = workspace.dense(method, Instant::ZERO, None, &y, h);
+            let dense = workspace.dense(method, SimTime::ZERO, None, &y, h);
             y.copy_from_slice(&workspace.end);
             let exact = |s: f64| (system.t + s * h).sin().exp();
             end = end.max((y[0] - exact(1.0)).abs());
@@ -577,7 +577,7 @@ mod tests {
             workspace.start(&mut system, &[1.0]).expect("finite");
             workspace.attempt(Method::Dop853, &mut system, &[1.0], 1.0, 1e-9);
             workspace.finish(Method::Dop853, &mut system, &[1.0], 1.0);
-            let dense = workspace.dense(Method::Dop853, Instant::ZERO, None, &[1.0], 1.0);
+            let dense = workspace.dense(Method::Dop853, SimTime::ZERO, None, &[1.0], 1.0);
             let error =
                 |i: i32| (dense.value(0, f64::from(i) / 100.0) - (z * f64::from(i) / 100.0).exp()).abs();
             let worst = (0..=100).map(error).fold(0.0, f64::max);

@@ -5,7 +5,7 @@
 //! collocation reads `sum_j L_j'(c_i) Z_j = h f(c_i h, y + Z_i)`: the matrix `L_j'(c_i)` is the inverse of
 //! the Runge-Kutta matrix A, and is found here without forming A.
 
-use super::super::sparse::{Complex, Field};
+use crate::sparse::{Complex, Field};
 
 /// Coefficients for `S` stages, `S` odd, with `L = (S + 1) / 2` lanes: the real eigenvalue, then one of each
 /// pair.

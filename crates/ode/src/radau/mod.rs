@@ -9,7 +9,7 @@
 mod collocation;
 mod method;
 
-use super::sparse::Pattern;
+use crate::sparse::Pattern;
 use method::Method;
 
 /// A system y' = f(tau, y); `tau` is the time since the beginning of the step tried.

@@ -3,9 +3,9 @@
 //! Section numbers are those of E. Hairer, G. Wanner, Solving Ordinary Differential Equations II (2nd ed.
 //! 1996).
 
-use super::super::sparse::{Field, Pattern, Wide};
 use super::collocation::Collocation;
 use super::{Attempt, Stiff};
+use crate::sparse::{Field, Pattern, Wide};
 
 /// Longest extrapolation of the collocation polynomial, in lengths of the step before.
 const EXTRAPOLATE: f64 = 10.0;

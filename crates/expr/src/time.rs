@@ -5,29 +5,29 @@
 /// A module born at t = 1e9 with a life of 1e-6 needs its birth to better than the 1e-7 that separate
 /// neighbouring floats there. Ages and durations are differences of instants, rounded once.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd, Default)]
-pub struct Instant {
+pub struct SimTime {
     high: f64,
     low: f64,
 }
 
-impl Instant {
-    pub const ZERO: Instant = Instant { high: 0.0, low: 0.0 };
+impl SimTime {
+    pub const ZERO: SimTime = SimTime { high: 0.0, low: 0.0 };
 
-    pub fn new(t: f64) -> Instant {
-        Instant { high: t, low: 0.0 }
+    pub fn new(t: f64) -> SimTime {
+        SimTime { high: t, low: 0.0 }
     }
 
     /// The product of a whole number and a duration.
-    pub fn multiple(n: f64, duration: f64) -> Instant {
+    pub fn multiple(n: f64, duration: f64) -> SimTime {
         let high = n * duration;
-        Instant { high, low: n.mul_add(duration, -high) }
+        SimTime { high, low: n.mul_add(duration, -high) }
     }
 
     /// The instant after a duration.
-    pub fn after(self, duration: f64) -> Instant {
+    pub fn after(self, duration: f64) -> SimTime {
         let (high, error) = two_sum(self.high, duration);
         let (high, low) = two_sum(high, self.low + error);
-        Instant { high, low }
+        SimTime { high, low }
     }
 
     /// The instant after a duration as a float; None if it is infinite, or no later: far from zero a short time cannot be
@@ -38,7 +38,7 @@ impl Instant {
     }
 
     /// The duration since an earlier instant.
-    pub fn since(self, earlier: Instant) -> f64 {
+    pub fn since(self, earlier: SimTime) -> f64 {
         let (difference, error) = two_sum(self.high, -earlier.high);
         difference + (error + (self.low - earlier.low))
     }
@@ -68,7 +68,7 @@ mod tests {
 
     #[test]
     fn durations_survive_far_from_zero() {
-        let birth = Instant::new(1e9);
+        let birth = SimTime::new(1e9);
         let mut now = birth;
         for _ in 0..1000 {
             now = now.after(1e-9);

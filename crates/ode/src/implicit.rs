@@ -4,7 +4,7 @@ use super::dense::Dense;
 use super::radau::{Attempt, Radau, Stiff};
 use super::runge_kutta::{Rates, Trial, Workspace};
 use super::sparse::Pattern;
-use dlsys_tree::Instant;
+use dlsys_expr::SimTime;
 
 /// Tighter than this, five stages need fewer evaluations than three.
 const FIVE_STAGES_BELOW: f64 = 1e-5;
@@ -122,7 +122,7 @@ impl Implicit {
     }
 
     /// The dense output of the step just tried.
-    pub fn dense(&mut self, start: Instant, y: &[f64], h: f64) -> Dense {
+    pub fn dense(&mut self, start: SimTime, y: &[f64], h: f64) -> Dense {
         self.radau.dense(y, &mut self.coefficients);
         Dense::new(start, None, h, self.stages, self.coefficients.clone())
     }

@@ -14,8 +14,8 @@
 //! - Zero means within `tolerance`, which should stand for the rounding of the function's values.
 //! - Work is bounded: after `MAX_PIECES` stretches the rest is judged by the signs at their ends only.
 
+use dlsys_expr::Sign;
 use dlsys_expr::{Dual, Interval};
-use dlsys_model::Sign;
 
 /// Stretches narrower than this part of their position are not halved.
 const NARROW: f64 = 1e-13;

@@ -4,8 +4,8 @@
 //! hull property), so that a step can be searched for events without sampling it (Farouki 2012, sections
 //! 3 and 4). Both ends of the step are coefficients: evaluation there is exact.
 
+use dlsys_expr::SimTime;
 use dlsys_expr::{Dual, Interval, Value};
-use dlsys_tree::Instant;
 
 /// Highest degree of a dense output.
 pub const MAX_DEGREE: usize = 7;
@@ -33,8 +33,8 @@ pub type Coefficients = [f64; MAX_DEGREE + 1];
 /// All components of the solution from `start` to `start + h`.
 #[derive(Clone, Debug)]
 pub struct Dense {
-    pub start: Instant,
-    pub end: Instant,
+    pub start: SimTime,
+    pub end: SimTime,
     /// Length of the step.
     pub h: f64,
     /// What its components may be wrong by, as a part of their size.
@@ -46,18 +46,18 @@ pub struct Dense {
 
 impl Dense {
     /// A step to `end`, if that is known better than as `start` and `h`.
-    pub fn new(start: Instant, end: Option<Instant>, h: f64, degree: usize, coefficients: Vec<f64>) -> Dense {
+    pub fn new(start: SimTime, end: Option<SimTime>, h: f64, degree: usize, coefficients: Vec<f64>) -> Dense {
         debug_assert!(degree <= MAX_DEGREE);
         Dense { start, end: end.unwrap_or_else(|| start.after(h)), h, error: 0.0, degree, coefficients }
     }
 
     /// Number of components.
-    pub fn len(&self) -> usize {
+    pub fn components(&self) -> usize {
         self.coefficients.len() / (self.degree + 1)
     }
 
     /// Position of an instant in the step: 0 at its start, 1 at its end.
-    pub fn position(&self, at: Instant) -> f64 {
+    pub fn position(&self, at: SimTime) -> f64 {
         if self.h == 0.0 { 0.0 } else { (at.since(self.start) / self.h).clamp(0.0, 1.0) }
     }
 
@@ -92,7 +92,7 @@ impl Dense {
 
     /// The stretch from `lo` to `hi`, with other polynomials for some components.
     pub fn with(&self, lo: f64, hi: f64, components: &[usize], others: &[[f64; MAX_DEGREE + 1]]) -> Dense {
-        let count = self.len();
+        let count = self.components();
         let mut all = Vec::with_capacity(count * (MAX_DEGREE + 1));
         for component in 0..count {
             let mut c: Coefficients = [0.0; MAX_DEGREE + 1];
@@ -234,7 +234,7 @@ mod tests {
         ) {
             let (lo, hi) = (a, (a + w).min(1.0));
             prop_assume!(hi - lo > 1e-3);
-            let dense = Dense::new(Instant::ZERO, None, 1.0, 4, c);
+            let dense = Dense::new(SimTime::ZERO, None, 1.0, 4, c);
             let at = lo + s * (hi - lo);
             let piece = dense.piece(0, lo, hi);
             let value = dense.value(0, at);
@@ -247,7 +247,7 @@ mod tests {
 
         #[test]
         fn ends_are_exact(c in proptest::collection::vec(-1e9..1e9f64, 5)) {
-            let dense = Dense::new(Instant::ZERO, None, 1.0, 4, c.clone());
+            let dense = Dense::new(SimTime::ZERO, None, 1.0, 4, c.clone());
             prop_assert_eq!(dense.value(0, 0.0), c[0]);
             prop_assert_eq!(dense.value(0, 1.0), c[4]);
         }
