@@ -8,8 +8,9 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use super::args::{IncludeArgs, Scheduler, SharedArgs};
+use super::args::IncludeArgs;
 use super::output;
+use super::shared::{Scheduler, SharedArgs};
 use crate::diagnostic::{Diagnostic, Span};
 use crate::lang::Setting;
 use crate::model::Frames;

@@ -19,8 +19,10 @@ mod reel;
 mod render;
 mod report;
 pub(crate) mod run;
+mod shared;
 mod shell;
 mod specimens;
+mod values;
 mod verify;
 mod view;
 

@@ -3,10 +3,11 @@
 use std::io::Write;
 use std::time::Instant;
 
-use super::args::{CheckArgs, RunArgs, TextFormat};
+use super::args::{CheckArgs, RunArgs};
 use super::common::{Failure, Run, count_of, out_error};
 use super::events::EventLog;
 use super::progress::Progress;
+use super::shared::TextFormat;
 use crate::model::Model;
 use crate::sim::{Passed, describe};
 use crate::tree::ModuleString;

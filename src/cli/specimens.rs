@@ -8,11 +8,13 @@ use std::path::Path;
 
 use serde_json::json;
 
-use super::args::{RunArgs, Seeds, TextFormat};
+use super::args::RunArgs;
 use super::common::{Failure, Run, coloured, out_error};
 use super::output;
 use super::parallel;
 use super::progress::Progress;
+use super::shared::TextFormat;
+use super::values::Seeds;
 use crate::model::Measure;
 use crate::sim::Settings;
 use crate::study::{Course, Spread, band_svg, spread_csv, spread_table};

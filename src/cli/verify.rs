@@ -4,9 +4,10 @@
 
 use clap::Args;
 
-use super::args::{ReportArgs, positive};
+use super::args::ReportArgs;
 use super::common::{Failure, Run, coloured, count_of, tell};
 use super::progress::Progress;
+use super::values::positive;
 use crate::session::Session;
 use crate::sim::{Method, Settings};
 use crate::study::{

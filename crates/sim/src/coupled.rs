@@ -4,12 +4,13 @@
 //! formula is an input. All of them are integrated together over a common step. What happens to some of them within
 //! it is repaired there (`repair`), or ends it for all.
 
+use super::couple::Affected;
 use super::course::Course;
 use super::equations::Equations;
 use super::error::Error;
 use super::fetch::fetch_ahead;
 use super::flash::{self, Glance, MAX_UNBOUNDED};
-use super::integrator::{Integrator, StepError, foresee};
+use super::integrator::{Integrator, StepError};
 use super::linear::Linear;
 use super::motion::Motion;
 use super::plant::{Path, Plant};
@@ -22,7 +23,6 @@ use super::watch::needs_search;
 use super::{Method, Scheduler};
 use dlsys_model::{Model, Rule};
 use dlsys_tree::{ModuleId, SimTime, Visit};
-use std::collections::HashSet;
 
 /// The coupled modules and their common step.
 #[derive(Clone, Default)]
@@ -34,7 +34,7 @@ pub struct Coupled {
     pub integrator: Integrator,
     pub control: Control,
     /// The equations once more, if they are solved without steps.
-    linear: Option<Linear>,
+    pub(super) linear: Option<Linear>,
     /// A step has been made whose dense output nobody has asked for yet.
     pending: bool,
     /// Repairs have changed the members or their motion since the common step was made.
@@ -42,13 +42,13 @@ pub struct Coupled {
     /// Modules that have lost a neighbour who reads them.
     pub loosened: Vec<ModuleId>,
     pub repairer: Repairer,
-    affected: Affected,
+    pub(super) affected: Affected,
     /// A solution without steps was looked for.
     tried: bool,
     /// Times that an event cut a motion without steps.
-    cuts: u32,
-    mark: SimTime,
-    since_mark: usize,
+    pub(super) cuts: u32,
+    pub(super) mark: SimTime,
+    pub(super) since_mark: usize,
     /// Members whose rates may have flashes.
     flashing: Vec<ModuleId>,
 }
@@ -59,152 +59,9 @@ const MAX_TRIES: usize = 100;
 /// Solving without steps begins anew, for all modules, at every event: after so many of them steps are made.
 const MAX_CUTS: u32 = 2;
 
-/// What an instant means for the coupled modules.
-#[derive(Clone, Default)]
-struct Affected {
-    /// Coupled modules whose equations or inputs have changed.
-    seeds: Vec<ModuleId>,
-    /// Of these, those that were not coupled before.
-    joined: Vec<ModuleId>,
-    /// Modules that need no longer be coupled.
-    freed: Vec<ModuleId>,
-    /// Modules that follow formulas, but watch a neighbour that has changed.
-    dependent: Vec<ModuleId>,
-}
-
 impl Simulation<'_> {
-    /// Finds out who is coupled now, given the modules that have begun new motions, and lets the coupled ones go on.
-    pub(super) fn couple(&mut self, begun: &[ModuleId]) -> Result<(), Error> {
-        let mut affected = std::mem::take(&mut self.coupled.affected);
-        self.find_affected(begun, &mut affected);
-        let coupled = self.couple_affected(&affected);
-        self.coupled.affected = affected;
-        coupled
-    }
-
-    fn couple_affected(&mut self, affected: &Affected) -> Result<(), Error> {
-        let Affected { seeds, joined, freed, dependent } = affected;
-        for &id in dependent {
-            if let Some(state) = self.plant.state_mut(id) {
-                state.pass_changes(self.now);
-            }
-            self.look_ahead(id, self.now)?;
-        }
-        for &id in freed {
-            let now = self.now;
-            let state = self.plant.state_mut(id).expect("seen above");
-            state.coupled = false;
-            state.pass_changes(now);
-            if state.restarted != self.group {
-                self.plant.materialise(id, now);
-                self.start_motions(id, self.forced);
-                self.look_ahead(id, now)?;
-            }
-        }
-        self.coupled.repaired |= !freed.is_empty();
-        for &id in joined {
-            self.plant.state_mut(id).expect("seen above").coupled = true;
-        }
-        for &id in seeds {
-            let now = self.now;
-            let state = self.plant.state_mut(id).expect("seen above");
-            state.pass_changes(now);
-            // Formulas go on as they were, whatever their module reads.
-            if !state.next.lasting || state.restarted == self.group {
-                state.next = state.next.again();
-            }
-        }
-        if seeds.is_empty() || self.repair(seeds, joined) {
-            return Ok(());
-        }
-        if self.coupled.linear.is_some() {
-            self.coupled.cuts += 1;
-        }
-        let now = self.now;
-        if let Some(course) = &self.plant.coupled {
-            let control = &mut self.coupled.control;
-            foresee(control, control.last_error, now.since(course.start()), now.resolution());
-        }
-        (self.coupled.mark, self.coupled.since_mark) = (now, 0);
-        self.restart_coupled(now)
-    }
-
-    /// Looks at the modules that have begun new motions, and at their neighbours.
-    fn find_affected(&mut self, begun: &[ModuleId], affected: &mut Affected) {
-        affected.seeds.clear();
-        affected.joined.clear();
-        affected.freed.clear();
-        affected.dependent.clear();
-        let mut near = std::mem::take(&mut self.coupled.loosened);
-        // Whose many neighbours are there already.
-        let mut known = HashSet::new();
-        for &id in begun {
-            near.push(id);
-            self.readers(id, |reader, context| {
-                near.push(reader);
-                if context.len() < 8 || known.insert(reader) {
-                    near.extend_from_slice(context);
-                }
-            });
-            if let Some(state) = self.plant.state(id) {
-                near.extend_from_slice(&state.context);
-            }
-        }
-        let visit = self.coupled.repairer.begin_visit();
-        near.retain(|id| {
-            let state = self.plant.state_mut(*id);
-            state.is_some_and(|state| std::mem::replace(&mut state.visited, visit) != visit)
-        });
-        near.sort_unstable();
-        let moved = |id: &ModuleId| self.plant.state(*id).is_some_and(|s| s.restarted == self.group);
-        for &id in &near {
-            let Some(state) = self.plant.state(id) else { continue };
-            let wanted = self.is_coupled(id);
-            let reads = state.rule.is_some_and(|r| self.model.rules[r].reads_context);
-            let new_input = reads && state.context.iter().any(moved);
-            if wanted {
-                if !state.coupled {
-                    affected.joined.push(id);
-                }
-                if !state.coupled || moved(&id) || new_input {
-                    affected.seeds.push(id);
-                }
-            } else if state.coupled {
-                affected.freed.push(id);
-            } else if new_input && !moved(&id) {
-                affected.dependent.push(id);
-            }
-        }
-        near.clear();
-        self.coupled.loosened = near;
-    }
-
-    /// True if a module must be integrated together with neighbours: because it reads one that is integrated, or reads
-    /// any and is integrated itself, or is integrated and read by one that reads.
-    fn is_coupled(&self, id: ModuleId) -> bool {
-        let Some(state) = self.plant.state(id) else { return false };
-        let Some(rule) = state.rule else { return false };
-        let numeric = |id: &ModuleId| self.plant.state(*id).is_some_and(|s| s.is_numeric());
-        if self.model.rules[rule].reads_context && (state.is_numeric() || state.context.iter().any(numeric)) {
-            return true;
-        }
-        // What is solved for is solved for here.
-        let solved = |s: usize| {
-            let algebraic = &self.model.rules[rule].solves[s].algebraic;
-            (0..algebraic.of.len()).any(|place| algebraic.is_solved(place, state.forced))
-        };
-        if state.solve.is_some_and(solved) {
-            return true;
-        }
-        let mut read = false;
-        if state.is_numeric() {
-            self.readers(id, |_, _| read = true);
-        }
-        read
-    }
-
     /// Begins the common motion of the coupled modules at an instant.
-    fn restart_coupled(&mut self, at: SimTime) -> Result<(), Error> {
+    pub(super) fn restart_coupled(&mut self, at: SimTime) -> Result<(), Error> {
         let mut members = std::mem::take(&mut self.coupled.members);
         members.clear();
         members.extend(self.plant.tree.walk().filter_map(|visit| match visit {

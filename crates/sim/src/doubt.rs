@@ -19,9 +19,10 @@
 //! are so near to theirs that the error of integration does not tell the two apart have it, too.
 
 use super::plant::Path;
+use super::signs::{opposite, produces, sign_of};
 use super::simulation::Simulation;
 use super::state::{Change, Signs, What};
-use super::watch::{Meeting, Watcher, opposite, produces, sign_of};
+use super::watch::{Meeting, Watcher};
 use dlsys_expr::{Dual, Interval};
 use dlsys_model::Sign;
 use dlsys_ode::{Function, first_root};

@@ -11,9 +11,9 @@ use super::lookup::{NEAR, sign_at_birth};
 use super::motion::Motion;
 use super::queue::Who;
 use super::settle::Firing;
+use super::signs::{opposite, rate_at};
 use super::simulation::Simulation;
 use super::state::{Change, Signs, What};
-use super::watch::{opposite, rate_at};
 use dlsys_model::{Law, Rule, Sign, Solve, Truth, Watch};
 use dlsys_tree::{ModuleId, SimTime};
 

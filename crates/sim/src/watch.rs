@@ -8,9 +8,10 @@ use smallvec::SmallVec;
 
 use super::doubt::{Ahead, Question};
 use super::plant::Path;
+use super::signs::{matters, opposite, produces, rate_at, sign_of};
 use super::state::{Change, Signs, State};
 use dlsys_expr::{Binary, Dual, Interval, Program, Scratch, Value};
-use dlsys_model::{Condition, Rule, Sign, Solve, Truth, Watch};
+use dlsys_model::{Rule, Sign, Watch};
 use dlsys_ode::{Function, Root, first_root};
 use dlsys_tree::SimTime;
 
@@ -476,73 +477,7 @@ pub fn path_together(path: &Path, position: f64) -> f64 {
     position + path.start.after(position * path.h).resolution() / path.h
 }
 
-/// 1, -1, or 0 where there is no sign.
-pub fn sign_of(sign: Sign) -> f64 {
-    match sign {
-        Sign::Plus => 1.0,
-        Sign::Minus => -1.0,
-        _ => 0.0,
-    }
-}
-
-pub fn opposite(sign: Sign) -> Sign {
-    match sign {
-        Sign::Plus => Sign::Minus,
-        Sign::Minus => Sign::Plus,
-        other => other,
-    }
-}
-
-/// The rate of a parameter where it has a value, as the equation is written; 0 where that is no more than the
-/// rounding of it. `variables` are those of the rule with the switches.
-pub fn rate_at(
-    clause: Option<&Solve>,
-    variables: &[f64],
-    parameter: usize,
-    value: f64,
-    scratch: &mut Scratch<f64>,
-    rates: &mut Vec<f64>,
-) -> f64 {
-    let Some(clause) = clause else { return 0.0 };
-    let Some(index) = clause.of.iter().position(|p| *p == parameter) else { return 0.0 };
-    let mut variables: SmallVec<[f64; 16]> = SmallVec::from_slice(variables);
-    rates.resize(clause.rates.outputs(), 0.0);
-    let mut rate = |x: f64| {
-        variables[parameter] = x;
-        clause.rates.eval(&variables, scratch, rates);
-        rates[index]
-    };
-    let here = rate(value);
-    // The rate changes by this much over the rounding of the value.
-    let nearby = rate(value * (1.0 + 8.0 * f64::EPSILON));
-    if here.abs() <= (nearby - here).abs() { 0.0 } else { here }
-}
-
 /// True if what comes first is known by a formula.
 fn first_is_exact(watched: &[Watched], position: f64) -> bool {
     watched.iter().any(|w| w.tolerance.is_nan() && w.ahead.next.is_some_and(|m| m.position == position))
-}
-
-/// Whether a production may follow if an atom's sides meet.
-pub fn produces(rule: &Rule, signs: &[Sign], atom: usize) -> bool {
-    let holds = |at: Sign| {
-        let sign = |i: usize| if i == atom { at } else { signs[i] };
-        rule.produces.iter().any(|p| p.guard.judge(sign) == Truth::Yes)
-    };
-    !holds(signs[atom]) && (holds(Sign::Zero) || holds(opposite(signs[atom])))
-}
-
-/// Whether anything follows from the signs at an instant and just after it.
-fn matters(rule: &Rule, state: &State, at: &[Sign], after: &[Sign]) -> bool {
-    let holds = |condition: &Condition, signs: &[Sign]| condition.judge(|i| signs[i]) == Truth::Yes;
-    if rule.produces.iter().any(|p| holds(&p.guard, at) || holds(&p.guard, after)) {
-        return true;
-    }
-    // The first `solve` that holds is active.
-    if rule.solves.iter().position(|s| holds(&s.guard, after)) != state.solve {
-        return true;
-    }
-    let Some(solve) = state.solve else { return false };
-    (rule.solves[solve].switches.iter().zip(&state.switches))
-        .any(|(switch, &on)| holds(&switch.condition, after) != on)
 }

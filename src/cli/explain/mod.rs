@@ -34,8 +34,9 @@ mod words;
 
 use std::io::Write;
 
-use super::args::{ExplainArgs, TextFormat};
+use super::args::ExplainArgs;
 use super::common::{Failure, open, out_error};
+use super::shared::TextFormat;
 use crate::session::Session;
 
 /// Prints the classes of work of a model.

@@ -1,7 +1,8 @@
 //! What the flags of `render` ask for, and which of them do not go together.
 
-use crate::cli::args::{Background, RenderArgs};
+use crate::cli::args::RenderArgs;
 use crate::cli::common::Failure;
+use crate::cli::values::Background;
 use crate::render::{Content, Format, Layout, Page, Picture, Size, Spacing, Survey, View};
 
 fn usage(message: impl std::fmt::Display) -> Failure {

@@ -15,11 +15,12 @@ use std::time::Instant;
 
 use serde_json::json;
 
-use super::args::{RenderArgs, Seeds};
+use super::args::RenderArgs;
 use super::common::{Clock, Failure, Run, count_of, out_error, size_of};
 use super::events::EventLog;
 use super::progress::Progress;
 use super::reel::{Pass, Shot, play};
+use super::values::Seeds;
 use crate::render::{
     self, Content, Fit, FrameDirectory, FrameRecord, FrameWriter, Layout, Manifest, Page, Sheet, SheetWriter,
     Survey,

@@ -1,0 +1,103 @@
+//! Orders of methods and of their dense output; what interpolation is measured to be wrong by.
+
+use super::*;
+
+/// y' = y cos(t), y(0) = 1: y = exp(sin t).
+struct Growth {
+    t: f64,
+}
+
+impl Rates for Growth {
+    fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]) {
+        out[0] = y[0] * (self.t + tau).cos();
+    }
+
+    fn couplings(&self) -> Vec<(u32, u32)> {
+        vec![(0, 0)]
+    }
+
+    fn partials(&mut self, tau: f64, _: &[f64], out: &mut Vec<f64>) {
+        out.push((self.t + tau).cos());
+    }
+
+    fn modules(&self) -> u64 {
+        1
+    }
+}
+
+/// Largest error at step ends, and in the middle of steps, on [0, 2].
+fn errors(method: Method, steps: usize) -> (f64, f64) {
+    let h = 2.0 / steps as f64;
+    let mut workspace = Workspace::default();
+    workspace.resize(1);
+    let mut y = vec![1.0];
+    let (mut end, mut inside): (f64, f64) = (0.0, 0.0);
+    for i in 0..steps {
+        let mut system = Growth { t: i as f64 * h };
+        workspace.start(&mut system, &y).expect("finite");
+        workspace.attempt(method, &mut system, &y, h, 1.0);
+        workspace.finish(method, &mut system, &y, h);
+        let dense = workspace.dense(method, SimTime::ZERO, None, &y, h);
+        y.copy_from_slice(&workspace.end);
+        let exact = |s: f64| (system.t + s * h).sin().exp();
+        end = end.max((y[0] - exact(1.0)).abs());
+        for s in [0.25, 0.5, 0.8] {
+            inside = inside.max((dense.value(0, s) - exact(s)).abs());
+        }
+    }
+    (end, inside)
+}
+
+#[test]
+fn methods_and_their_dense_outputs_have_their_order() {
+    for (method, order, steps) in [
+        (Method::Euler, 1.0, [20, 80]),
+        (Method::Rk4, 4.0, [20, 80]),
+        (Method::Dopri5, 5.0, [20, 80]),
+        (Method::Dop853, 8.0, [8, 16]),
+    ] {
+        let (coarse, fine) = (errors(method, steps[0]), errors(method, steps[1]));
+        let slope = |a: f64, b: f64| (a / b).ln() / (steps[1] as f64 / steps[0] as f64).ln();
+        let (ends, inside) = (slope(coarse.0, fine.0), slope(coarse.1, fine.1));
+        assert!((ends - order).abs() < 0.7, "{method:?}: order {ends}");
+        // A dense output of degree p over one step errs like h^(p+1), as the ends do after many.
+        assert!((inside - order).abs() < 0.7, "{method:?}: dense order {inside}");
+    }
+}
+
+/// y' = zy.
+struct Decay(f64);
+
+impl Rates for Decay {
+    fn rates(&mut self, _: f64, y: &[f64], out: &mut [f64]) {
+        out[0] = self.0 * y[0];
+    }
+
+    fn couplings(&self) -> Vec<(u32, u32)> {
+        vec![(0, 0)]
+    }
+
+    fn partials(&mut self, _: f64, _: &[f64], out: &mut Vec<f64>) {
+        out.push(self.0);
+    }
+
+    fn modules(&self) -> u64 {
+        1
+    }
+}
+
+#[test]
+fn interpolation_is_as_wrong_as_it_is_measured() {
+    for z in [-25.0, -16.0, -12.0, -10.0, -8.3, -7.0, -6.0, -5.0, -4.0, -2.0, -1.0, 1.0, 2.0] {
+        let (mut workspace, mut system) = (Workspace::default(), Decay(z));
+        workspace.resize(1);
+        workspace.start(&mut system, &[1.0]).expect("finite");
+        workspace.attempt(Method::Dop853, &mut system, &[1.0], 1.0, 1e-9);
+        workspace.finish(Method::Dop853, &mut system, &[1.0], 1.0);
+        let dense = workspace.dense(Method::Dop853, SimTime::ZERO, None, &[1.0], 1.0);
+        let error = |i: i32| (dense.value(0, f64::from(i) / 100.0) - (z * f64::from(i) / 100.0).exp()).abs();
+        let worst = (0..=100).map(error).fold(0.0, f64::max);
+        let measured = workspace.measure_interpolation(&mut system, &[1.0], &dense).absolute;
+        assert!(measured >= 0.75 * worst && measured <= 2.0 * worst, "z = {z}: {measured}, not {worst}");
+    }
+}

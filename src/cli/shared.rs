@@ -1,0 +1,116 @@
+//! Arguments that several commands have: what is run, until when, how, and on which budget.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use super::args::IncludeArgs;
+use super::values::*;
+use crate::lang::Setting;
+use crate::sim::{Method, Settings};
+
+/// What a run may take, so that what runs away ends with a message.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct BudgetArgs {
+    /// More modules than this are an error
+    #[arg(long, value_name = "N", default_value_t = Settings::MODULES)]
+    pub max_modules: usize,
+    /// More productions and steps than this are an error, such as 1e12
+    ///
+    /// So is a run in which time hardly goes on, such that it would take a hundred times as many.
+    #[arg(long, value_name = "N", default_value = "1e10", value_parser = events)]
+    pub max_events: u64,
+    /// A simulation that takes longer than this is an error [default: none does]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
+    pub max_seconds: Option<f64>,
+    /// A simulation for which dlsys would take more memory than this is an error, such as 500MB or 8GB [default: what the
+    /// system has]
+    #[arg(long, value_name = "BYTES", value_parser = bytes)]
+    pub max_memory: Option<u64>,
+}
+
+impl BudgetArgs {
+    /// Settings with these limits.
+    pub fn settings(&self) -> Settings {
+        Settings {
+            max_modules: self.max_modules,
+            max_events: self.max_events,
+            max_seconds: self.max_seconds.unwrap_or(f64::INFINITY),
+            max_memory: self.max_memory.unwrap_or(u64::MAX),
+            ..Settings::default()
+        }
+    }
+}
+
+/// Flags of everything that runs a model.
+#[derive(Debug, Args)]
+pub struct SharedArgs {
+    /// Model file (*.dls)
+    pub model: PathBuf,
+    /// Times to observe
+    #[arg(long, value_name = "T1,T2,…", allow_negative_numbers = true, value_delimiter = ',', value_parser = time, conflicts_with_all = ["from", "to", "step"])]
+    pub at: Option<Vec<f64>>,
+    /// First of equidistant times to observe [default: the model's `frames`]
+    #[arg(long, value_name = "A", allow_negative_numbers = true, value_parser = time)]
+    pub from: Option<f64>,
+    /// Last of them
+    #[arg(long, value_name = "B", allow_negative_numbers = true, value_parser = time)]
+    pub to: Option<f64>,
+    /// Time between them
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
+    pub step: Option<f64>,
+    /// Set a `param` of the model; can be repeated
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
+    pub settings: Vec<Setting>,
+    #[command(flatten)]
+    pub include: IncludeArgs,
+    /// Error aimed at in every parameter, relative to max(1, |value|)
+    #[arg(long, value_name = "TOL", allow_negative_numbers = true, default_value = "1e-6", value_parser = tolerance)]
+    pub tolerance: f64,
+    /// How equations are integrated: auto, dopri5, dop853, radau, rk4, euler; all but auto integrate what has formulas, too
+    #[arg(long, default_value = "auto", value_parser = method)]
+    pub method: Method,
+    /// Step of the methods with a fixed one (rk4, euler)
+    #[arg(long, value_name = "H", allow_negative_numbers = true, value_parser = positive)]
+    pub step_size: Option<f64>,
+    /// How time is advanced for modules that read their neighbours
+    #[arg(long, value_enum, default_value_t = Scheduler::Auto)]
+    pub scheduler: Scheduler,
+    /// Length of the slices of time of the scheduler `local`; its error is of that order
+    #[arg(long, value_name = "DT", allow_negative_numbers = true, value_parser = positive)]
+    pub slice: Option<f64>,
+    /// Seed of random numbers, for models that draw them: the same seed gives the same plant
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    #[command(flatten)]
+    pub budget: BudgetArgs,
+    /// Write times and counts of work as JSON; - is standard output
+    #[arg(long, value_name = "FILE")]
+    pub stats: Option<PathBuf>,
+    /// Write every production that takes place, up to the last observed time, as a line of JSON; - is standard output
+    ///
+    /// In the order of time. Fields: t; group, the same number for simultaneous events; lineage and id of the module
+    /// that was replaced, and its name, module; rule, its head; clause, which `produce` of the rule, from 1; successor,
+    /// where a clause has several, which of them, from 1; line of that clause in the model; residual, by how much the two sides of an `=` differ at the located instant (null if
+    /// that is not finite). An error at t = 0 leaves the file empty, a later one leaves what happened before it.
+    #[arg(long, value_name = "FILE")]
+    pub events: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Scheduler {
+    /// After an event, only as many neighbours as the tolerance asks for are solved again
+    Auto,
+    /// One clock for all modules, cut at every event: the reference
+    Global,
+    /// Neighbours are seen as they were at the start of a slice of time (--slice): the paper's approximation
+    Local,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum TextFormat {
+    /// For people
+    Text,
+    /// One JSON object; of `run` one a line and a time
+    Json,
+}

@@ -1,0 +1,185 @@
+//! Values of command-line arguments: how each is read, and what is said of one that is none.
+
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+
+use crate::lang::Setting;
+use crate::render::{Camera, Format, Layout, Page};
+use crate::scene::Color;
+use crate::sim::Method;
+
+/// A format for frames, of those that there are.
+pub(super) fn frame_format() -> impl TypedValueParser<Value = Format> {
+    let values = Format::all().map(|format| PossibleValue::new(format.extension()).help(format.about()));
+    PossibleValuesParser::new(values).try_map(|name| name.parse::<Format>())
+}
+
+pub(super) fn number(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(x) if x.is_finite() => Ok(x),
+        _ => Err(match text.trim().replacen(',', ".", 1) {
+            point if text.contains(',') && point.parse::<f64>().is_ok() => {
+                format!("not a number; the decimal sign is a point: {point}")
+            }
+            _ => "not a number".to_owned(),
+        }),
+    }
+}
+
+/// A number of things, which may be written as 1e12.
+pub(super) fn events(text: &str) -> Result<u64, String> {
+    match number(text)? {
+        n if n >= 1.0 && n.fract() == 0.0 => Ok(n as u64),
+        _ => Err("must be a whole number from 1".to_owned()),
+    }
+}
+
+/// A number of bytes with its unit: 500MB, 2GB.
+pub(super) fn bytes(text: &str) -> Result<u64, String> {
+    let text = text.trim();
+    let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
+    let unit = match text[digits.len()..].to_ascii_lowercase().as_str() {
+        "" | "b" => 1.0,
+        "kb" | "k" => 1e3,
+        "mb" | "m" => 1e6,
+        "gb" | "g" => 1e9,
+        "tb" | "t" => 1e12,
+        _ => return Err("expected a number of bytes, such as 500MB or 2GB".to_owned()),
+    };
+    match number(digits).map_err(|_| "expected a number of bytes, such as 500MB or 2GB")? * unit {
+        n if n >= 1.0 => Ok(n as u64),
+        _ => Err("must be at least one byte".to_owned()),
+    }
+}
+
+pub(super) fn time(text: &str) -> Result<f64, String> {
+    match number(text)? {
+        t if t >= 0.0 => Ok(t),
+        _ => Err("time begins at 0".to_owned()),
+    }
+}
+
+pub(super) fn positive(text: &str) -> Result<f64, String> {
+    match number(text)? {
+        x if x > 0.0 => Ok(x),
+        _ => Err("must be greater than 0".to_owned()),
+    }
+}
+
+pub(super) fn tolerance(text: &str) -> Result<f64, String> {
+    match number(text)? {
+        x if (1e-13..=0.1).contains(&x) => Ok(x),
+        _ => Err("must be between 1e-13 and 0.1".to_owned()),
+    }
+}
+
+/// What pictures are drawn on; `None` is nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Background(pub Option<Color>);
+
+pub(super) fn background(text: &str) -> Result<Background, String> {
+    if text == "none" {
+        return Ok(Background(None));
+    }
+    let digits = text.strip_prefix('#').filter(|digits| digits.len() == 6);
+    let rgb = digits.filter(|d| d.bytes().all(|b| b.is_ascii_hexdigit())).map(|d| u32::from_str_radix(d, 16));
+    match rgb {
+        Some(Ok(rgb)) => Ok(Background(Some(Color::hex(rgb)))),
+        _ => {
+            Err("expected none or a colour like #ffffff (in quotes: the shell takes # for a comment)"
+                .to_owned())
+        }
+    }
+}
+
+pub(super) fn field_of_view(text: &str) -> Result<f64, String> {
+    match number(text)? {
+        x if Camera::FIELDS.contains(&x) => Ok(x),
+        _ => Err(format!("must be between {} and {} degrees", Camera::FIELDS.start(), Camera::FIELDS.end())),
+    }
+}
+
+pub(super) fn layout(text: &str) -> Result<Layout, String> {
+    let names: Vec<&str> = Layout::NAMED.iter().map(|(name, _)| *name).collect();
+    let found = Layout::NAMED.iter().find(|(name, _)| *name == text);
+    found.map(|(_, layout)| *layout).ok_or_else(|| format!("layouts are {}", names.join(", ")))
+}
+
+pub(super) fn columns(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(n) if n >= 1 => Ok(n),
+        _ => Err("must be a number from 1".to_owned()),
+    }
+}
+
+pub(super) fn threads(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(n) if (1..=256).contains(&n) => Ok(n),
+        _ => Err("must be between 1 and 256".to_owned()),
+    }
+}
+
+pub(super) fn pixels(text: &str) -> Result<u32, String> {
+    match text.parse::<u32>() {
+        Ok(n) if (1..=Page::MOST_ON_A_SIDE).contains(&n) => Ok(n),
+        _ => Err(format!("must be between 1 and {} pixels", Page::MOST_ON_A_SIDE)),
+    }
+}
+
+pub(super) fn size(text: &str) -> Result<(u32, u32), String> {
+    let (width, height) = text.split_once('x').ok_or("expected WIDTHxHEIGHT, such as 1280x720")?;
+    Ok((pixels(width)?, pixels(height)?))
+}
+
+pub(super) fn figure(text: &str) -> Result<u8, String> {
+    text.parse()
+        .map_err(|_| "expected the number of a figure of the paper, such as 6; --list shows them".to_owned())
+}
+
+/// Seeds from one to another, both included.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Seeds {
+    pub first: u64,
+    pub last: u64,
+}
+
+impl Seeds {
+    pub fn count(self) -> usize {
+        (self.last - self.first) as usize + 1
+    }
+
+    pub fn iter(self) -> impl Iterator<Item = u64> {
+        self.first..=self.last
+    }
+}
+
+pub(super) fn seeds(text: &str) -> Result<Seeds, String> {
+    const MOST: u64 = 10_000_000;
+    let wanted = "expected FIRST..LAST, such as 0..99";
+    let (first, last) = text.split_once("..").ok_or(wanted)?;
+    let number =
+        |text: &str| text.trim().trim_start_matches('=').parse::<u64>().map_err(|_| wanted.to_owned());
+    let (first, last) = (number(first)?, number(last)?);
+    match last.checked_sub(first) {
+        None => Err(format!("{last} is before {first}")),
+        Some(more) if more >= MOST => Err(format!("more than {MOST} specimens")),
+        Some(_) => Ok(Seeds { first, last }),
+    }
+}
+
+pub(super) fn runs(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(n) if (1..=1000).contains(&n) => Ok(n),
+        _ => Err("must be between 1 and 1000".to_owned()),
+    }
+}
+
+pub(super) fn setting(text: &str) -> Result<Setting, String> {
+    let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE")?;
+    Ok(Setting { name: name.trim().to_owned(), value: number(value)? })
+}
+
+pub(super) fn method(text: &str) -> Result<Method, String> {
+    let names: Vec<&str> = Method::NAMED.iter().map(|(name, _)| *name).collect();
+    let found = Method::NAMED.iter().find(|(name, _)| *name == text);
+    found.map(|(_, method)| *method).ok_or_else(|| format!("methods are {}", names.join(", ")))
+}
