@@ -2,12 +2,14 @@
 //! by explicit methods of two orders and by an implicit one. Where two of them disagree by more than the tolerance allows,
 //! and none of them has said anything, one is wrong.
 //!
-//! A model follows from a number. `MODELS=10000 SEED=1 cargo test --release --test suite random -- --nocapture` tries more
+//! A model follows from a number. `MODELS=10000 SEED=1 FIRST=0 VERBOSE=1 cargo test --release --test suite random -- --nocapture` tries more
 //! of them, and others.
 
 use dlsys::sim::{Method, Scheduler, Settings};
 
-use crate::common::{Plain, run};
+use dlsys::tree::ModuleString;
+
+use crate::common::{Plain, plain, session};
 
 /// Random numbers (SplitMix64; Steele, Lea, Flood 2014).
 struct Dice(u64);
@@ -204,6 +206,19 @@ fn difference(a: &[Vec<Plain>], b: &[Vec<Plain>]) -> Option<f64> {
     Some(most)
 }
 
+/// The strings of a model at some times; whether the run has warned of events that its tolerance does not decide.
+fn develop(text: &str, settings: Settings, times: &[f64], warned: &mut bool) -> Outcome {
+    let session = session(text);
+    let mut simulation = session.simulate(settings)?;
+    let (mut string, mut all) = (ModuleString::default(), Vec::new());
+    for &t in times {
+        simulation.at(t, &mut string)?;
+        all.push(plain(&session.model, &string));
+    }
+    *warned |= simulation.remarks().iter().any(|remark| remark.message.contains("comes so near"));
+    Ok(all)
+}
+
 /// True for errors that say that the model is at fault, by any way of solving it.
 fn is_of_the_model(error: &dlsys::sim::Error) -> bool {
     use dlsys::sim::Error::*;
@@ -215,7 +230,8 @@ fn random_models_come_out_alike_by_four_ways() {
     let number = |name: &str, or: u64| std::env::var(name).ok().and_then(|n| n.parse().ok()).unwrap_or(or);
     let (count, seed) = (number("MODELS", 300), number("SEED", 1));
     println!("{count} models from seed {seed}");
-    let auto = Settings { max_modules: 2000, ..Settings::default() };
+    // A run of these takes a few milliseconds; one that takes a minute hangs, and is a fault.
+    let auto = Settings { max_modules: 2000, max_seconds: 60.0, ..Settings::default() };
     let ways = [
         ("auto", auto),
         ("global", Settings { scheduler: Scheduler::Global, ..auto }),
@@ -224,19 +240,23 @@ fn random_models_come_out_alike_by_four_ways() {
     ];
     let times = [0.7, 1.9, 4.0];
     let mut faults = Vec::new();
-    let mut refused = 0;
-    for n in 0..count {
+    let (mut refused, mut told) = (0, 0);
+    for n in number("FIRST", 0)..count {
+        if std::env::var_os("VERBOSE").is_some() {
+            println!("{n}");
+        }
         let seed = seed.wrapping_mul(1_000_003).wrapping_add(n);
         let text = model(seed);
-        let solve = |(name, settings): &(&str, Settings)| {
+        let mut warned = false;
+        let mut solve = |(name, settings): &(&str, Settings)| {
             let begun = std::time::Instant::now();
-            let outcome = run(&text, *settings, &times);
+            let outcome = develop(&text, *settings, &times, &mut warned);
             if begun.elapsed().as_secs() > 4 {
                 println!("model {seed} takes {name} {:.0} s:\n{text}", begun.elapsed().as_secs_f64());
             }
             outcome
         };
-        let outcomes: Vec<Outcome> = ways.iter().map(solve).collect();
+        let outcomes: Vec<Outcome> = ways.iter().map(&mut solve).collect();
         let mut said = Vec::new();
         let reference = outcomes.iter().rev().find_map(|o| o.as_ref().ok());
         for ((name, settings), outcome) in ways.iter().zip(&outcomes) {
@@ -249,6 +269,8 @@ fn random_models_come_out_alike_by_four_ways() {
                 (Err(error), _) => said.push(format!("{name}: {error}")),
                 (Ok(found), Some(reference)) => match difference(found, reference) {
                     Some(error) if error <= 100.0 * settings.tolerance + 1e-6 => {}
+                    // The runs have said that a tolerance does not decide whether there is an event.
+                    _ if warned => told += 1,
                     Some(error) => {
                         said.push(format!("{name}: off by {:.1} tolerances", error / settings.tolerance))
                     }
@@ -265,7 +287,10 @@ fn random_models_come_out_alike_by_four_ways() {
             faults.push(format!("model {seed}: {}\n{text}", said.join("; ")));
         }
     }
-    println!("{} models at fault, {refused} runs refused with a reason", faults.len());
+    println!(
+        "{} models at fault, {refused} runs refused with a reason, {told} runs with other events and a warning",
+        faults.len()
+    );
     assert!(faults.is_empty(), "{} of {count}:\n{}", faults.len(), faults[..faults.len().min(12)].join("\n"));
     assert!(refused * 20 <= 4 * count as usize, "{refused} runs refused of {}", 4 * count);
 }

@@ -295,7 +295,9 @@ impl Simulation<'_> {
             let last = knot.since(course.end) >= 0.0;
             let state = self.plant.state_mut(id).expect("seen above");
             state.next.changes.extend(found.changes);
-            state.next.near = found.near;
+            let (before, index) = (std::mem::replace(&mut state.next.near, found.near), state.rule);
+            self.note_approach(index.unwrap_or(0), found.near, before, knot);
+            let state = self.plant.state_mut(id).expect("seen above");
             if found.event.is_some() {
                 let time = found.touched[0].time;
                 let what = if found.in_doubt { What::Doubt } else { What::Event };

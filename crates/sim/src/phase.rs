@@ -261,13 +261,14 @@ impl Simulation<'_> {
         };
         let state = self.plant.state_mut(id).expect("seen above");
         let lasting = limit.is_infinite();
-        let near = found.near;
+        let (near, before, index) = (found.near, state.next.near, state.rule);
         state.next = Next { what, touched: found.touched, changes: found.changes, lasting, near };
         if what == What::Nothing {
             self.queue.cancel(who);
         } else {
             self.queue.schedule(who, at);
         }
+        self.note_approach(index.unwrap_or(0), near, before, at);
         Ok(())
     }
 

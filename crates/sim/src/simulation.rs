@@ -102,6 +102,9 @@ pub struct Simulation<'m> {
     pub(super) lookout: Lookout,
     /// Rules whose rates could not be bounded, and when first.
     pub(super) unbounded: BTreeMap<usize, f64>,
+    /// Atoms of rules, with the number of the rule, whose sides have come so near each other that the error of integration does not
+    /// tell whether they meet; and when first.
+    pub(super) approached: BTreeMap<(usize, usize), f64>,
     /// Some rates may have flashes.
     pub(super) flashes: bool,
     /// Events in a row of modules that hardly lived.
@@ -208,6 +211,7 @@ impl<'m> Simulation<'m> {
             watcher: Watcher::default(),
             lookout: Lookout::default(),
             unbounded: BTreeMap::new(),
+            approached: BTreeMap::new(),
             flashes: model.rules.iter().flat_map(|rule| &rule.solves).any(|solve| solve.flashes),
             stalled: 0,
             standing: (SimTime::ZERO, 0),
@@ -261,6 +265,14 @@ impl<'m> Simulation<'m> {
         Ok(())
     }
 
+    /// Keeps what a search has found of atoms whose sides are too near each other to tell.
+    pub(super) fn note_approach(&mut self, rule: usize, found: u64, before: u64, at: SimTime) {
+        let fresh = found & !before;
+        for atom in (0..64).filter(|atom| fresh & 1 << atom != 0) {
+            self.approached.entry((rule, atom)).or_insert(at.to_f64());
+        }
+    }
+
     /// Work done so far.
     pub fn stats(&self) -> Stats {
         let coupled = self.coupled.integrator.evaluations() + self.repair_evaluations();
@@ -275,7 +287,8 @@ impl<'m> Simulation<'m> {
     }
 
     /// What there is to say of the run so far: rules whose rates could not be bounded somewhere, so that a rate that is large
-    /// there for a very short time may have been overlooked.
+    /// there for a very short time may have been overlooked; and sides of conditions that have come nearer each other than the error
+    /// of integration, so that a production may have been due.
     pub fn remarks(&self) -> Vec<Diagnostic> {
         let remark = |(&rule, &t): (&usize, &f64)| {
             let rule = &self.model.rules[rule];
@@ -283,7 +296,19 @@ impl<'m> Simulation<'m> {
                 .at(rule.span, "these equations")
                 .help("a rate that is very large there for a very short time may be overlooked: see what is divided by, or taken the logarithm of, or compare with `--method rk4 --step-size H`")
         };
-        self.unbounded.iter().map(remark).collect()
+        let near = |(&(rule, atom), &t): (&(usize, usize), &f64)| {
+            let rule = &self.model.rules[rule];
+            let boundary = rule.boundaries[atom].to_string();
+            let boundary = if boundary.is_empty() { "a boundary" } else { &boundary };
+            Diagnostic::warning(format!(
+                "{} comes so near {boundary} by t = {} that the error of integration does not tell whether it meets it",
+                rule.label,
+                brief(t, 6)
+            ))
+            .at(rule.atoms[atom], "as long as that is so, nothing follows")
+            .help("a smaller `--tolerance` tells more; if what comes near is to count, say how near: `if x >= y - 1e-5`")
+        };
+        self.unbounded.iter().map(remark).chain(self.approached.iter().map(near)).collect()
     }
 
     /// The productions since the last call, in the order of time.

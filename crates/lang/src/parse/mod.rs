@@ -8,6 +8,7 @@
 
 mod build;
 mod expected;
+mod expression;
 mod hints;
 
 use std::collections::HashSet;
