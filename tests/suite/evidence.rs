@@ -57,7 +57,7 @@ fn neighbours_that_equalise_never_meet() {
             {
                 let text = format!(
                     "initial string: B(0.2) C(0.8)\nB(x) > C(y): solve dx/dt = {rate}*(y - x){extra}\n\
-                     B(y) < C(x):\n  solve dx/dt = {rate}*(y - x){extra}\n  if x = y produce E\n  if x < y produce G\n"
+                     B(y) < C(x):\n  solve dx/dt = {rate}*(y - x){extra}\n  if x = y produce E\n  if x - y < 0 produce G\n"
                 );
                 let settings = Settings { method, tolerance, ..Settings::default() };
                 let found = first_event(&text, settings, 400.0);
@@ -160,4 +160,22 @@ fn a_pulse_that_only_the_dense_output_has_seen_is_seen() {
         let y = end[0][0].1[0];
         assert!((y - exact).abs() < 1e-3, "{y}, not {exact}\n{text}");
     }
+}
+
+#[test]
+fn kinks_between_neighbours_do_not_push() {
+    // The kink is written as a difference and 0, which are small where the values are not.
+    let text = "initial string: C(1.2, 0) C(0.72, 0) C(0.88, 0) C(1.53, 0) C(0.95, 0) C(0.36, 0) C(1.25, 0) C(1.31, 0) C(0.71, 0) C(1.49, 0) C(0.45, 0) C(0.12, 0) C(0.81, 0)
+C(l, m) < C(x, n) > C(r, o):
+  solve dx/dt = 1.67*abs(l - x) - 1.67*x + 3.4*(r - x) + 1.04*exp(-x) - 0.98*x
+  if x = 0.57 & n = 0 produce C(x/2, 1) C(x/2, 1)
+C(l, m) < C(x, n):
+  solve dx/dt = 1.67*(l - x) + 1.04*exp(-x) - 0.98*x
+  if x = 0.57 & n = 0 produce C(x/2, 1) C(x/2, 1)
+C(x, n) > C(r, o):
+  solve dx/dt = 3.4*(r - x) + 1.04*exp(-x) - 0.98*x
+  if x = 0.57 & n = 0 produce C(x/2, 1) C(x/2, 1)
+";
+    let outcome = run(text, Settings::default(), &[4.0]);
+    assert!(outcome.is_ok(), "{outcome:?}");
 }

@@ -96,7 +96,9 @@ impl Watcher {
         let start = side * self.difference(path, atom).value(question.from);
         // Most are far from the band, and need not be told how wide it is.
         let [a, b] = [self.out[2 * atom], self.out[2 * atom + 1]];
-        let is_far = start.abs() > FAR * question.error * a.abs().max(b.abs()).max(start.abs());
+        // `x - y` and 0 are small where `x` and `y` are not.
+        let size = self.values.iter().fold(a.abs().max(b.abs()), |m, x| m.max(x.abs()));
+        let is_far = start.abs() > FAR * question.error * size;
         let noise = if is_far { 0.0 } else { self.noise(path, atom, question.from) };
         // A neighbour's value is known to approach by nothing but the numbers, and these may meet at last by rounding.
         let around = path.rule.reads_context && !path.state.context.is_empty() && question.decides;
@@ -114,8 +116,17 @@ impl Watcher {
                         let f = &mut watcher.difference(path, atom);
                         first_root(f, question.from, down, sign, 0.0).map(|root| root.position)
                     };
-                    let position = if start > 0.0 { crossing(self) } else { None };
-                    let position = position.unwrap_or(question.from);
+                    let position = if start > 0.0 {
+                        crossing(self).unwrap_or(question.from)
+                    } else if self.heads(path, question, sign) {
+                        // On the wrong side by the error, and on its way to the right one: it crosses when it comes back.
+                        let f = &mut self.difference(path, atom);
+                        let there = first_root(f, question.from, down, opposite(sign), 0.0);
+                        let back = there.and_then(|root| first_root(f, root.position, down, sign, 0.0));
+                        back.map_or(down, |root| root.position)
+                    } else {
+                        question.from
+                    };
                     let meeting = Watcher::meeting_at(path, position, opposite(sign));
                     return Ahead { next: Some(meeting), ..Ahead::default() };
                 }
@@ -193,6 +204,13 @@ impl Watcher {
         let rate = self.difference(path, question.atom).bounds(enters, crossing).rate;
         let speed = (-sign_of(question.sign) * rate.lo).min(-sign_of(question.sign) * rate.hi);
         !rate.partial && speed * (crossing - enters) > STEADY * noise
+    }
+
+    /// True if the difference moves towards a side at first.
+    fn heads(&mut self, path: &Path, question: Question, towards: Sign) -> bool {
+        let end = (question.from + NEARBY).min(question.limit);
+        let rate = self.difference(path, question.atom).bounds(question.from, end).rate;
+        !rate.partial && sign_of(towards) * rate.lo > 0.0 && sign_of(towards) * rate.hi > 0.0
     }
 
     /// Where the difference, on its side, becomes less than the noise.
