@@ -179,3 +179,24 @@ C(x, n) > C(r, o):
     let outcome = run(text, Settings::default(), &[4.0]);
     assert!(outcome.is_ok(), "{outcome:?}");
 }
+
+#[test]
+fn sides_that_stay_within_the_error_get_a_warning_and_a_crossing_gets_none() {
+    let remarks = |text: &str, method: Method, to: f64| -> Vec<String> {
+        let session = session(text);
+        let mut simulation = session.simulate(Settings { method, ..Settings::default() }).expect("it starts");
+        simulation.pass(to).expect("it runs");
+        simulation.remarks().into_iter().map(|remark| remark.message).collect()
+    };
+    let equal = "initial string: B(0.2) C(0.8)\nB(x) > C(y): solve dx/dt = y - x - 0.1*x^3\n\
+                 B(y) < C(x):\n  solve dx/dt = y - x - 0.1*x^3\n  if x = y produce E\n";
+    for method in [Method::Auto, Method::Dopri5, Method::Dop853, Method::Radau] {
+        let said = remarks(equal, method, 40.0);
+        assert!(
+            said.len() == 1 && said[0].starts_with("B(y) < C(x) comes so near x = y by t = "),
+            "{said:?}"
+        );
+        assert_eq!(remarks(&sine(0.9), method, 4.0), Vec::<String>::new());
+        assert_eq!(remarks(&sine(0.0), method, 4.0), Vec::<String>::new());
+    }
+}

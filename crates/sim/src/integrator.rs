@@ -232,7 +232,7 @@ impl Integrator {
                     rejected = true;
                 }
                 Trial::Done { error, rounding } => {
-                    let inside = self.look_inside(method, system, y, start, h);
+                    let (inside, output) = self.look_inside(method, system, y, start, h);
                     if inside.absolute > INSIDE * settings.tolerance && wiggles < MANY_REJECTIONS {
                         stats.rejected += 1;
                         wiggles += 1;
@@ -240,6 +240,8 @@ impl Integrator {
                         rejected = true;
                         continue;
                     }
+                    // Only of a step that is taken: a rejected one leaves nothing behind.
+                    self.output = output;
                     if grid.is_none() {
                         // Rounding is no reason to shorten a step that is good, only not to lengthen it.
                         let most = if rejected || rounding > 0.5 { 1.0 } else { 10.0 };
@@ -272,7 +274,7 @@ impl Integrator {
     }
 
     /// What the dense output of a step that has just been tried is wrong by inside, where that is not known from the
-    /// estimate of its end.
+    /// estimate of its end; and the dense output, if it was made for that.
     fn look_inside(
         &mut self,
         method: Method,
@@ -280,15 +282,14 @@ impl Integrator {
         y: &[f64],
         start: SimTime,
         h: f64,
-    ) -> Inside {
+    ) -> (Inside, Option<Dense>) {
         if method != Method::Dop853 || self.unwatched {
-            return Inside::default();
+            return (Inside::default(), None);
         }
         self.workspace.finish(method, system, y, h);
         let dense = self.workspace.dense(method, start, None, y, h);
         let error = self.workspace.measure_interpolation(system, y, &dense);
-        self.output = Some(dense);
-        error
+        (error, Some(dense))
     }
 
     /// The dense output of the step just made from `y`. Nobody need ask for it: a method may have to evaluate rates for

@@ -103,8 +103,8 @@ pub struct Simulation<'m> {
     /// Rules whose rates could not be bounded, and when first.
     pub(super) unbounded: BTreeMap<usize, f64>,
     /// Atoms of rules, with the number of the rule, whose sides have come so near each other that the error of integration does not
-    /// tell whether they meet; and when first.
-    pub(super) approached: BTreeMap<(usize, usize), f64>,
+    /// tell whether they meet; when first, and of how many modules it is not known yet.
+    pub(super) approached: BTreeMap<(usize, usize), (f64, usize)>,
     /// Some rates may have flashes.
     pub(super) flashes: bool,
     /// Events in a row of modules that hardly lived.
@@ -267,9 +267,16 @@ impl<'m> Simulation<'m> {
 
     /// Keeps what a search has found of atoms whose sides are too near each other to tell.
     pub(super) fn note_approach(&mut self, rule: usize, found: u64, before: u64, at: SimTime) {
-        let fresh = found & !before;
-        for atom in (0..64).filter(|atom| fresh & 1 << atom != 0) {
-            self.approached.entry((rule, atom)).or_insert(at.to_f64());
+        for atom in (0..64).filter(|atom| (found ^ before) & 1 << atom != 0) {
+            if found & 1 << atom != 0 {
+                self.approached.entry((rule, atom)).or_insert((at.to_f64(), 0)).1 += 1;
+            } else if let Some((_, open)) = self.approached.get_mut(&(rule, atom)) {
+                // They have met, and that was found.
+                *open -= 1;
+                if *open == 0 {
+                    self.approached.remove(&(rule, atom));
+                }
+            }
         }
     }
 
@@ -296,7 +303,7 @@ impl<'m> Simulation<'m> {
                 .at(rule.span, "these equations")
                 .help("a rate that is very large there for a very short time may be overlooked: see what is divided by, or taken the logarithm of, or compare with `--method rk4 --step-size H`")
         };
-        let near = |(&(rule, atom), &t): (&(usize, usize), &f64)| {
+        let near = |(&(rule, atom), &(t, _)): (&(usize, usize), &(f64, usize))| {
             let rule = &self.model.rules[rule];
             let boundary = rule.boundaries[atom].to_string();
             let boundary = if boundary.is_empty() { "a boundary" } else { &boundary };
