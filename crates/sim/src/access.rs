@@ -4,10 +4,9 @@
 //! times are reached again (`replay`). Between two entries of its queues a simulation knows everything: any time
 //! in between is a matter of evaluating formulas and dense output, forwards or backwards.
 
-use super::error::Error;
-use super::passing::is_before;
-use super::simulation::Simulation;
-use super::state::State;
+use crate::error::Error;
+use crate::kernel::Simulation;
+use crate::schedule::is_before;
 use dlsys_tree::SimTime;
 
 /// Where [`Simulation::pass_some`] has stopped.
@@ -34,11 +33,11 @@ impl Simulation<'_> {
     /// As of [`Simulation::pass`].
     pub fn pass_some(&mut self, t: f64, most: usize, one_event: bool) -> Result<Passed, Error> {
         for _ in 0..most {
-            let before = self.stats.events;
+            let before = self.log.stats.events;
             match self.guarded(|simulation| simulation.advance_once(t))? {
                 None => return Ok(Passed::All),
                 // Not if a module has only gone over to other equations.
-                Some(_) if one_event && self.stats.events > before => return Ok(Passed::Event),
+                Some(_) if one_event && self.log.stats.events > before => return Ok(Passed::Event),
                 Some(_) => {}
             }
         }
@@ -48,7 +47,8 @@ impl Simulation<'_> {
     /// True if nothing has been passed that comes after `t`: then [`Simulation::at`] may be asked for `t`, though
     /// later times have been looked at before, and gives the bits that a run to `t` gives.
     pub fn can_show(&self, t: f64) -> bool {
-        !self.has_failed() && self.last.is_none_or(|(at, event)| is_before(at, event, SimTime::new(t)))
+        !self.has_failed()
+            && self.schedule.last.is_none_or(|(at, event)| is_before(at, event, SimTime::new(t)))
     }
 
     /// The time of the last thing that was passed; 0 at the start.
@@ -58,7 +58,7 @@ impl Simulation<'_> {
 
     /// The same, to all its digits.
     pub fn reached_at(&self) -> SimTime {
-        self.last.map_or(SimTime::ZERO, |(at, _)| at)
+        self.schedule.last.map_or(SimTime::ZERO, |(at, _)| at)
     }
 
     /// A measure of the work done so far, in units of very roughly a tenth of a microsecond. It grows
@@ -67,25 +67,7 @@ impl Simulation<'_> {
         /// A step of a module alone; one of a repair, with what it takes to look at its neighbours.
         const STEP: [u64; 2] = [10, 100];
         let stats = self.stats();
-        let steps = STEP[usize::from(self.looks_around)] * stats.steps;
-        4 * (stats.events + self.passed) + stats.rhs_evaluations / 8 + steps
-    }
-
-    /// Bytes that a copy takes, about.
-    pub fn size(&self) -> usize {
-        /// What a coupled component costs: its equations, a step, the working memory of the method.
-        const COMPONENT: usize = 400;
-        let numeric = |state: &State| state.step.as_ref().map_or(0, |step| size_of_val(&**step) + 400);
-        let states: usize =
-            self.plant.states.iter().flatten().map(|s| size_of::<State>() + 100 + numeric(s)).sum();
-        let known = if self.looks_around { 100 } else { 0 };
-        let events = 12 * self.plant.tree.len();
-        let coupled = COMPONENT * self.coupled.members.len();
-        self.plant.tree.size()
-            + events
-            + states
-            + coupled
-            + known * self.plant.tree.slots()
-            + 8 * self.plant.states.len()
+        let steps = STEP[usize::from(self.setup.looks_around)] * stats.steps;
+        4 * (stats.events + self.schedule.passed) + stats.rhs_evaluations / 8 + steps
     }
 }

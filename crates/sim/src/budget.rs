@@ -7,21 +7,22 @@
 
 use std::time::{Duration, Instant as Wall};
 
-use super::error::{Error, Site};
-use super::passing::Coming;
-use super::queue::Who;
-use super::simulation::Simulation;
+use crate::Settings;
+use crate::error::{Error, Site};
 use crate::memory::{self, Shortage};
+use crate::setup::Setup;
+use crate::world::World;
+use crate::world::state::State;
 use dlsys_model::Successor;
-use dlsys_tree::{ModuleId, SimTime, Visit};
+use dlsys_tree::SimTime;
 
-/// Things after which the pace is looked at: so many at least, and so many for each module.
+/// Productions and steps after which the pace is looked at: so many at least, and so many for each module.
 const LOOK: u64 = 100_000;
 const LOOK_PER_MODULE: u64 = 25;
 /// Looks in a row that must find the run too slow, none much better than the first.
 const LOOKS: u32 = 4;
 const BETTER: f64 = 2.0;
-/// Times what it may take, that a run is foreseen to take.
+/// A run is stopped if it is foreseen to need so many times what it may.
 const FAR_TOO_MANY: f64 = 100.0;
 
 /// Bytes a module in lists of what happens at one instant, and in a string that is observed.
@@ -30,10 +31,10 @@ const IN_STRING: u64 = 160;
 
 /// What was spent so far.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Budget {
-    /// When to look next, in things done.
+pub struct Budget {
+    /// The count of productions and steps at which to look next.
     next: u64,
-    /// Things done at the last look, and the time then.
+    /// The count at the last look, and the time then.
     done: u64,
     mark: SimTime,
     /// Looks in a row that have found the run far too slow, and by how much the first.
@@ -44,176 +45,175 @@ pub(super) struct Budget {
     since: Option<Wall>,
 }
 
-impl Simulation<'_> {
-    /// Productions and steps so far. One entry of the queue may be many productions, and most are one.
-    fn done(&self) -> u64 {
-        self.stats.events.max(self.passed)
-    }
+/// A limit that was exceeded.
+#[derive(Clone, Copy, Debug)]
+pub enum Limit {
+    Events(u64),
+    Seconds(f64),
+}
 
+impl Limit {
+    pub fn error(self, site: Site) -> Error {
+        match self {
+            Limit::Events(limit) => Error::TooManyEvents { site, limit, foreseen: None },
+            Limit::Seconds(limit) => Error::OutOfTime { site, limit },
+        }
+    }
+}
+
+impl Budget {
     /// Begins to count seconds, if they are limited.
-    pub(super) fn start_clock(&mut self) {
-        self.budget.since = self.settings.max_seconds.is_finite().then(Wall::now);
+    pub fn start_clock(&mut self, settings: &Settings) {
+        self.since = settings.max_seconds.is_finite().then(Wall::now);
     }
 
-    pub(super) fn stop_clock(&mut self) {
-        if let Some(since) = self.budget.since.take() {
-            self.budget.spent += since.elapsed();
+    /// Ends what [`Budget::start_clock`] has begun.
+    pub fn stop_clock(&mut self) {
+        if let Some(since) = self.since.take() {
+            self.spent += since.elapsed();
         }
     }
 
-    fn is_overtime(&self) -> bool {
-        let Some(since) = self.budget.since else { return false };
-        (self.budget.spent + since.elapsed()).as_secs_f64() > self.settings.max_seconds
+    fn is_overtime(&self, settings: &Settings) -> bool {
+        let Some(since) = self.since else { return false };
+        (self.spent + since.elapsed()).as_secs_f64() > settings.max_seconds
     }
 
-    /// Sees to it that what comes next may still be done, on the way to some time.
+    /// True if it is time to look at the pace, after so many productions and steps.
     #[inline]
-    pub(super) fn watch_budget(&mut self, coming: Coming, until: SimTime) -> Result<(), Error> {
-        if self.done() < self.budget.next && self.budget.since.is_none() {
-            return Ok(());
-        }
-        self.look_at_budget(coming, until)
+    pub fn is_due(&self, done: u64) -> bool {
+        done >= self.next || self.since.is_some()
     }
 
+    /// Checks that the next entry of the schedule may still be passed, on the way to some time.
+    ///
+    /// # Errors
+    /// If a limit is exceeded, or is foreseen to be exceeded by far; `site` names the module whose turn it is.
     #[cold]
-    fn look_at_budget(&mut self, coming: Coming, until: SimTime) -> Result<(), Error> {
-        if self.is_overtime() {
-            let (site, limit) = (self.site_of_coming(coming), self.settings.max_seconds);
-            return Err(Error::OutOfTime { site, limit });
+    pub fn check(
+        &mut self,
+        settings: &Settings,
+        done: u64,
+        modules: usize,
+        (at, until): (SimTime, SimTime),
+        site: impl FnOnce() -> Site,
+    ) -> Result<(), Error> {
+        if self.is_overtime(settings) {
+            return Err(Error::OutOfTime { site: site(), limit: settings.max_seconds });
         }
-        let (done, limit) = (self.done(), self.settings.max_events);
-        if done < self.budget.next {
+        let limit = settings.max_events;
+        if done < self.next {
             return Ok(());
         }
         if done >= limit {
-            return Err(Error::TooManyEvents { site: self.site_of_coming(coming), limit, foreseen: None });
+            return Err(Error::TooManyEvents { site: site(), limit, foreseen: None });
         }
-        let at = coming.at();
-        let (some, time) = (done - self.budget.done, at.since(self.budget.mark));
+        let (some, time) = (done - self.done, at.since(self.mark));
         let foreseen = some as f64 * (until.since(at).max(0.0) / time.max(0.0));
-        if until.to_f64().is_finite() && self.budget.next > 0 && foreseen > FAR_TOO_MANY * limit as f64 {
-            if self.budget.slow == 0 || time > BETTER * self.budget.first {
-                (self.budget.slow, self.budget.first) = (0, time);
+        if until.to_f64().is_finite() && self.next > 0 && foreseen > FAR_TOO_MANY * limit as f64 {
+            if self.slow == 0 || time > BETTER * self.first {
+                (self.slow, self.first) = (0, time);
             }
-            self.budget.slow += 1;
-            if self.budget.slow >= LOOKS {
+            self.slow += 1;
+            if self.slow >= LOOKS {
                 let foreseen = Some(Box::new((foreseen, until.to_f64())));
-                return Err(Error::TooManyEvents { site: self.site_of_coming(coming), limit, foreseen });
+                return Err(Error::TooManyEvents { site: site(), limit, foreseen });
             }
         } else {
-            self.budget.slow = 0;
+            self.slow = 0;
         }
-        (self.budget.done, self.budget.mark) = (done, at);
-        let window = LOOK.max(LOOK_PER_MODULE * self.plant.tree.len() as u64);
-        self.budget.next = (done + window).min(limit);
+        (self.done, self.mark) = (done, at);
+        let window = LOOK.max(LOOK_PER_MODULE * modules as u64);
+        self.next = (done + window).min(limit);
         Ok(())
     }
 
-    /// The same in the middle of an instant, after a round of productions: `id` is who is next.
-    pub(super) fn watch_round(&mut self, id: impl FnOnce(&mut Self) -> Site) -> Result<(), Error> {
-        if self.stats.events > self.settings.max_events {
-            let limit = self.settings.max_events;
-            return Err(Error::TooManyEvents { site: id(self), limit, foreseen: None });
-        }
-        if self.is_overtime() {
-            let limit = self.settings.max_seconds;
-            return Err(Error::OutOfTime { site: id(self), limit });
-        }
-        Ok(())
-    }
-
-    /// Whose turn it is.
-    fn site_of_coming(&mut self, coming: Coming) -> Site {
-        let at = coming.at();
-        let id = match coming {
-            Coming::Light(_, slot) => self.plant.tree.id(slot),
-            Coming::Other(entry) => match entry.who {
-                Who::Module(slot) => match &self.plant.states[slot as usize] {
-                    Some(state) => state.id,
-                    None => self.anyone(),
-                },
-                Who::Step => self.steps.first().unwrap_or_else(|| self.anyone()),
-                Who::Coupled => self.anyone(),
-            },
-        };
-        self.site_of_module(id, at)
-    }
-
-    /// A module, with the clause that it follows, or the production that it is about to make, as far as that is known.
-    fn site_of_module(&mut self, id: ModuleId, at: SimTime) -> Site {
-        let model = self.model;
-        let career = self.plant.careers.get(self.plant.tree.label(id));
-        let known = career.map(|career| (career.rule, career.produce()));
-        if let Some((rule, produce)) = known {
-            let span = produce.map_or(model.rules[rule].span, |p| model.rules[rule].produces[p].span);
-            return self.site_of(id, rule, span, at.to_f64());
-        }
-        let kind = model.kinds.get(self.plant.tree.kind(id));
-        let state = self.plant.state(id);
-        let own = state.and_then(|state| Some((state.rule?, state.solve)));
-        let first = || kind.rules.first().or(kind.steps.first()).copied().unwrap_or(0);
-        let (rule, solve) = own.unwrap_or_else(|| (first(), None));
-        let Some(found) = model.rules.get(rule) else {
-            return self.site_of_axiom(at.to_f64());
-        };
-        let span = solve.map_or(found.span, |solve| found.solves[solve].span);
-        self.site_of(id, rule, span, at.to_f64())
-    }
-
-    /// Asks for memory before it is needed.
-    pub(super) fn afford(&mut self, bytes: u64, site: impl FnOnce(&mut Self) -> Site) -> Result<(), Error> {
-        let used = self.plant.tree.size() as u64;
-        memory::ask(bytes, self.settings.max_memory, used).map_err(|shortage| {
-            let site = site(self);
-            self.out_of_memory(shortage, site)
-        })
-    }
-
-    pub(super) fn out_of_memory(&self, shortage: Shortage, site: Site) -> Error {
-        Error::OutOfMemory { modules: self.plant.tree.len(), shortage: Box::new(shortage), site }
-    }
-
-    /// Asks for the lists that so many productions of one instant take.
-    pub(super) fn afford_round(&mut self, productions: usize, id: Option<ModuleId>) -> Result<(), Error> {
-        let bytes = productions as u64 * (IN_LISTS + if self.steps.due { 2 * IN_LISTS } else { 0 });
-        // Lists are there twice while they grow.
-        self.afford(3 * bytes, |simulation| match id {
-            Some(id) => simulation.site_of_module(id, simulation.now),
-            None => simulation.site_of_axiom(simulation.now.to_f64()),
-        })
-    }
-
-    /// Asks for what it takes to write the structure out.
-    pub(super) fn afford_string(&mut self) -> Result<(), Error> {
-        let (nodes, values) = self.plant.tree.extent();
-        let bytes = nodes as u64 * IN_STRING + 16 * values as u64;
-        self.afford(bytes, |simulation| {
-            let some = simulation.plant.tree.walk().find_map(|visit| match visit {
-                Visit::Module(id) => Some(id),
-                _ => None,
-            });
-            match some {
-                Some(id) => simulation.site_of_module(id, simulation.now),
-                None => simulation.site_of_axiom(simulation.now.to_f64()),
-            }
-        })
-    }
-
-    /// Sees to it that a successor has a place. Where lists must grow for that, they are twice as long afterwards, and all
-    /// that is known of modules is going to be: that is asked for at once.
-    #[inline]
-    pub(super) fn room_for(&mut self, successor: &Successor) -> Result<(), Shortage> {
-        match self.plant.tree.has_room(&successor.kinds, successor.width()) {
-            true => Ok(()),
-            false => self.grow(successor),
+    /// The limit that is exceeded within an instant, after a round of productions.
+    pub fn exceeded(&self, settings: &Settings, events: u64) -> Option<Limit> {
+        match events > settings.max_events {
+            true => Some(Limit::Events(settings.max_events)),
+            false => self.is_overtime(settings).then_some(Limit::Seconds(settings.max_seconds)),
         }
     }
+}
 
-    #[cold]
-    fn grow(&mut self, successor: &Successor) -> Result<(), Shortage> {
-        let wanted = 2 * self.size() as u64 + IN_LISTS * self.plant.tree.slots() as u64;
-        memory::ask(wanted, self.settings.max_memory, self.plant.tree.size() as u64)?;
-        let grown = self.plant.tree.make_room(&successor.kinds, successor.width());
-        grown.map_err(|_| Shortage { wanted, there: None, own_limit: false })
+/// Asks for memory before it is needed; `site` names a module that needs it.
+///
+/// # Errors
+/// If it is not there.
+pub fn afford(setup: &Setup, world: &World, bytes: u64, site: impl FnOnce() -> Site) -> Result<(), Error> {
+    memory::ask(bytes, setup.settings.max_memory, world.tree.size() as u64)
+        .map_err(|shortage| out_of_memory(world, shortage, site()))
+}
+
+/// Asks for the lists that so many productions of one instant take; `steps` if a derivation step is among them.
+///
+/// # Errors
+/// As of [`afford`].
+pub fn afford_round(
+    setup: &Setup,
+    world: &World,
+    productions: usize,
+    steps: bool,
+    site: impl FnOnce() -> Site,
+) -> Result<(), Error> {
+    let bytes = productions as u64 * (IN_LISTS + if steps { 2 * IN_LISTS } else { 0 });
+    // Lists are there twice while they grow.
+    afford(setup, world, 3 * bytes, site)
+}
+
+/// Asks for what it takes to write the structure out.
+///
+/// # Errors
+/// As of [`afford`].
+pub fn afford_string(setup: &Setup, world: &World, site: impl FnOnce() -> Site) -> Result<(), Error> {
+    let (nodes, values) = world.tree.extent();
+    afford(setup, world, nodes as u64 * IN_STRING + 16 * values as u64, site)
+}
+
+/// The error of memory that is not there.
+pub fn out_of_memory(world: &World, shortage: Shortage, site: Site) -> Error {
+    Error::OutOfMemory { modules: world.tree.len(), shortage: Box::new(shortage), site }
+}
+
+/// Makes room for a successor. Where lists must grow for that, they are twice as long afterwards, and everything that is
+/// kept of modules grows with them: that is asked for at once.
+///
+/// # Errors
+/// If the memory is not there.
+#[inline]
+pub fn room_for(
+    setup: &Setup,
+    world: &mut World,
+    coupled: usize,
+    successor: &Successor,
+) -> Result<(), Shortage> {
+    match world.tree.has_room(&successor.kinds, successor.width()) {
+        true => Ok(()),
+        false => grow(setup, world, coupled, successor),
     }
+}
+
+#[cold]
+fn grow(setup: &Setup, world: &mut World, coupled: usize, successor: &Successor) -> Result<(), Shortage> {
+    let wanted = 2 * size(setup, world, coupled) as u64 + IN_LISTS * world.tree.slots() as u64;
+    memory::ask(wanted, setup.settings.max_memory, world.tree.size() as u64)?;
+    let grown = world.tree.make_room(&successor.kinds, successor.width());
+    grown.map_err(|_| Shortage { wanted, there: None, own_limit: false })
+}
+
+/// Bytes that a copy of a simulation takes, about; `coupled` is the number of coupled modules.
+pub fn size(setup: &Setup, world: &World, coupled: usize) -> usize {
+    /// The cost of a coupled component: its equations, a step, the working memory of the method.
+    const COMPONENT: usize = 400;
+    let numeric = |state: &State| state.step.as_ref().map_or(0, |step| size_of_val(&**step) + 400);
+    let states: usize = world.states.iter().flatten().map(|s| size_of::<State>() + 100 + numeric(s)).sum();
+    let known = if setup.looks_around { 100 } else { 0 };
+    let events = 12 * world.tree.len();
+    world.tree.size()
+        + events
+        + states
+        + COMPONENT * coupled
+        + known * world.tree.slots()
+        + 8 * world.states.len()
 }

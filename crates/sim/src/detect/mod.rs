@@ -1,0 +1,74 @@
+//! Detection: the search of a stretch of time for zero crossings, for doubts about them, and for pulses between stages.
+//!
+//! - [`watch`]: the next event of a module on a stretch
+//! - [`doubt`]: crossings that the error of integration may hide or feign
+//! - [`flash`]: rates that are large between the stages of a step
+//! - [`signs`]: signs of the differences that conditions compare
+
+pub mod doubt;
+pub mod flash;
+pub mod signs;
+pub mod watch;
+
+use std::collections::BTreeMap;
+
+use crate::world::brief;
+use dlsys_diagnostic::Diagnostic;
+use dlsys_model::Model;
+use dlsys_tree::SimTime;
+use flash::Lookout;
+use watch::Watcher;
+
+/// The detectors, and the remarks that they have collected.
+#[derive(Clone, Debug, Default)]
+pub struct Detector {
+    pub watcher: Watcher,
+    pub lookout: Lookout,
+    /// Rules whose rates could not be bounded, and when first.
+    pub unbounded: BTreeMap<usize, f64>,
+    /// Atoms of rules, with the number of the rule, whose sides have come nearer each other than the error of integration;
+    /// when first, and the number of modules for which it is still open whether they meet.
+    approached: BTreeMap<(usize, usize), (f64, usize)>,
+}
+
+impl Detector {
+    /// Records the atoms of a search whose sides are nearer each other than the error of integration.
+    pub fn note_approach(&mut self, rule: usize, found: u64, before: u64, at: SimTime) {
+        for atom in (0..64).filter(|atom| (found ^ before) & 1 << atom != 0) {
+            if found & 1 << atom != 0 {
+                self.approached.entry((rule, atom)).or_insert((at.to_f64(), 0)).1 += 1;
+            } else if let Some((_, open)) = self.approached.get_mut(&(rule, atom)) {
+                // They have met, and that was found.
+                *open -= 1;
+                if *open == 0 {
+                    self.approached.remove(&(rule, atom));
+                }
+            }
+        }
+    }
+
+    /// What there is to say of the run so far: rules whose rates could not be bounded somewhere, so that a rate that is large
+    /// there for a very short time may have been overlooked; and sides of conditions that have come nearer each other than the error
+    /// of integration, so that a production may have been due.
+    pub fn remarks(&self, model: &Model) -> Vec<Diagnostic> {
+        let remark = |(&rule, &t): (&usize, &f64)| {
+            let rule = &model.rules[rule];
+            Diagnostic::warning(format!("the rates of {} have no bounds near t = {}", rule.label, brief(t, 6)))
+                .at(rule.span, "these equations")
+                .help("a rate that is very large there for a very short time may be overlooked: see what is divided by, or taken the logarithm of, or compare with `--method rk4 --step-size H`")
+        };
+        let near = |(&(rule, atom), &(t, _)): (&(usize, usize), &(f64, usize))| {
+            let rule = &model.rules[rule];
+            let boundary = rule.boundaries[atom].to_string();
+            let boundary = if boundary.is_empty() { "a boundary" } else { &boundary };
+            Diagnostic::warning(format!(
+                "{} comes so near {boundary} by t = {} that the error of integration does not tell whether it meets it",
+                rule.label,
+                brief(t, 6)
+            ))
+            .at(rule.atoms[atom], "as long as that is so, nothing follows")
+            .help("a smaller `--tolerance` tells more; if what comes near is to count, say how near: `if x >= y - 1e-5`")
+        };
+        self.unbounded.iter().map(remark).chain(self.approached.iter().map(near)).collect()
+    }
+}

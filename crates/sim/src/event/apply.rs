@@ -1,0 +1,249 @@
+//! The application of productions: modules are replaced in parallel, on the values before any of them was replaced.
+
+use std::sync::LazyLock;
+
+use smallvec::SmallVec;
+
+use super::chance::{self, Undrawn};
+use super::{EventStage, Firing, clear};
+use crate::budget;
+use crate::error::{Error, Site};
+use crate::log::Event;
+use crate::memory::Shortage;
+use crate::scratch::Scratch;
+use crate::world::World;
+use crate::world::context::Around;
+use crate::world::life::{End, LifeClass};
+use dlsys_model::{Comparison, KindId, Model, Rule, Sign, Successor};
+use dlsys_tree::{Lineage, ModuleId};
+
+/// The context of a rule without one.
+static NO_CONTEXT: LazyLock<Around> = LazyLock::new(Around::default);
+
+/// The reason why a production cannot be applied.
+#[derive(Clone, Debug)]
+pub enum Refusal {
+    /// The successor has no parameters.
+    Undrawn(Undrawn),
+    /// The rate of the event was negative.
+    NegativeRate,
+    TooManyModules {
+        limit: usize,
+        rounds: usize,
+    },
+    OutOfMemory(Shortage),
+}
+
+impl From<Undrawn> for Refusal {
+    fn from(undrawn: Undrawn) -> Refusal {
+        Refusal::Undrawn(undrawn)
+    }
+}
+
+impl Refusal {
+    pub fn error(self, world: &World, site: Site) -> Error {
+        match self {
+            Refusal::Undrawn(undrawn) => undrawn.error(site),
+            Refusal::NegativeRate => Error::NegativeRate { site },
+            Refusal::TooManyModules { limit, rounds } => Error::TooManyModules { site, limit, rounds },
+            Refusal::OutOfMemory(shortage) => budget::out_of_memory(world, shortage, site),
+        }
+    }
+}
+
+/// The distance of an instant from the boundary of a production: see [`Event::residual`]. The variables in `scratch` are
+/// those of the instant; `zero` tells which signs are zero there.
+pub fn residual(rule: &Rule, produce: usize, zero: impl Fn(usize) -> bool, scratch: &mut Scratch) -> f64 {
+    let mut sides: SmallVec<[f64; 16]> = smallvec::smallvec![0.0; rule.sides.outputs()];
+    rule.sides.eval(&scratch.variables, &mut scratch.registers, &mut sides);
+    (rule.produces[produce].guard.atoms())
+        .filter(|(atom, comparison)| *comparison == Comparison::Equal || zero(*atom))
+        .map(|(atom, _)| (sides[2 * atom] - sides[2 * atom + 1]).abs())
+        .fold(0.0, f64::max)
+}
+
+impl EventStage<'_, '_> {
+    /// The round to which a derivation step belongs. No module reads a lazy one, so these may be replaced first; all
+    /// others are replaced together.
+    pub fn replace_with_steps(
+        &mut self,
+        lazy: &mut Vec<u32>,
+        firing: &mut Vec<Firing>,
+        rounds: usize,
+    ) -> Result<(), Error> {
+        if firing.is_empty() && !lazy.is_empty() {
+            self.replace_all_lazy(std::mem::take(lazy), rounds)?;
+        } else if !firing.is_empty() {
+            self.materialise_all(lazy, firing);
+        }
+        let mut steps = std::mem::take(&mut self.events.steps.firing);
+        firing.append(&mut steps);
+        self.replace(firing, rounds)?;
+        self.events.steps.firing = steps;
+        clear(&mut self.events.steps.firing);
+        clear(firing);
+        clear(lazy);
+        Ok(())
+    }
+
+    /// Materialises all modules of a round, the lazy ones first, so that all are replaced in parallel.
+    pub fn materialise_all(&mut self, lazy: &[u32], firing: &mut Vec<Firing>) {
+        for fire in firing.iter() {
+            self.materialise(fire.id);
+        }
+        let mut all = Vec::new();
+        for &slot in lazy {
+            let id = self.world.tree.id(slot);
+            let at_birth = match self.world.lives.get(self.world.tree.label(id)) {
+                Some(LifeClass { rule, end: Some(End::AtBirth { produce }), .. }) => Some((*rule, *produce)),
+                _ => None,
+            };
+            self.materialise(id);
+            match at_birth {
+                Some((rule, produce)) => all.push(Firing { id, rule, produce }),
+                None => all.extend(self.fire_predicted(slot as usize)),
+            }
+        }
+        all.append(firing);
+        *firing = all;
+    }
+
+    /// The place of a production.
+    pub fn site(&self, fire: &Firing) -> Site {
+        let span = self.setup.model.rules[fire.rule].produces[fire.produce].span;
+        self.world.site(self.setup.model, fire.id, fire.rule, span, self.instant.at)
+    }
+
+    /// Makes room for a successor.
+    #[inline]
+    pub fn room(&mut self, successor: &Successor, rounds: usize) -> Result<(), Refusal> {
+        let limit = self.setup.settings.max_modules;
+        if self.world.tree.len() + successor.kinds.len() > limit {
+            return Err(Refusal::TooManyModules { limit, rounds });
+        }
+        let coupled = self.flows.coupled.members.len();
+        budget::room_for(self.setup, self.world, coupled, successor).map_err(Refusal::OutOfMemory)
+    }
+
+    /// Writes a production into the log, if there is one.
+    pub fn record(
+        &mut self,
+        (kind, lineage): (KindId, Lineage),
+        (rule, clause): (usize, usize),
+        successor: Option<usize>,
+        residual: f64,
+    ) {
+        let Some(log) = &mut self.log.events else { return };
+        let (time, group) = (self.instant.at.to_f64(), self.instant.number);
+        log.push(Event { time, lineage, kind, rule, clause, successor, residual, group, transition: None });
+    }
+
+    /// Replaces all modules in parallel: every successor is computed before any is put in.
+    pub fn replace(&mut self, firing: &[Firing], rounds: usize) -> Result<(), Error> {
+        if self.flows.lazy_algebra {
+            let now = self.instant.at;
+            self.flow().refresh(now)?;
+        }
+        self.afford_round(firing.len(), firing.first().map(|fire| fire.id))?;
+        self.note_predecessors(firing);
+        let mut arguments = std::mem::take(&mut self.events.arguments);
+        let mut ends = std::mem::take(&mut self.events.argument_ends);
+        arguments.clear();
+        ends.clear();
+        let (mut contexts, model) = (0, self.setup.model);
+        let known = self.log.events.as_ref().map_or(0, Vec::len);
+        for fire in firing {
+            let rule = &model.rules[fire.rule];
+            let clause = &rule.produces[fire.produce];
+            let around = context_of(model, self.world, &self.events.steps.contexts, fire, &mut contexts);
+            self.world.variables(rule, fire.id, around, self.instant.at, &mut self.scratch.variables);
+            let lineage = self.world.tree.lineage(fire.id);
+            let residual = if self.log.events.is_some() { self.residual(fire) } else { 0.0 };
+            let made = match clause.is_fault {
+                true => Err(Refusal::NegativeRate),
+                false => chance::successor(self.setup.seed, clause, lineage, self.scratch, &mut arguments)
+                    .map_err(Refusal::from),
+            };
+            match made {
+                Ok((which, family)) => {
+                    ends.push((arguments.len(), which, family));
+                    let (kind, chosen) =
+                        (self.world.tree.kind(fire.id), clause.outcome.weights.is_some().then_some(which));
+                    self.record((kind, lineage), (fire.rule, fire.produce), chosen, residual);
+                }
+                Err(refusal) => {
+                    // None of this round takes place.
+                    self.log.take_back(known);
+                    return Err(refusal.error(self.world, self.site(fire)));
+                }
+            }
+        }
+        let mut first = 0;
+        for (fire, &(end, which, family)) in firing.iter().zip(&ends) {
+            let successor = &model.rules[fire.rule].produces[fire.produce].outcome.successors[which];
+            if let Err(refusal) = self.room(successor, rounds) {
+                return Err(refusal.error(self.world, self.site(fire)));
+            }
+            let (kind, now) = (self.world.tree.kind(fire.id), self.instant.at);
+            self.flow().forget(fire.id);
+            let mut made = std::mem::take(&mut self.events.fresh);
+            let known = made.len();
+            self.world.tree.replace(fire.id, successor, &arguments[first..end], now, family, &mut made);
+            self.note_successor(fire.id, successor, &made[known..]);
+            self.hand_on(fire.id, kind, successor, &made[known..]);
+            self.events.fresh = made;
+            first = end;
+        }
+        self.events.arguments = arguments;
+        self.events.argument_ends = ends;
+        self.world.structure += 1;
+        self.events.changed = true;
+        let world = &self.world;
+        self.events.opened.retain(|id| world.state(*id).is_some());
+        self.log.stats.events += firing.len() as u64;
+        self.log.stats.peak_modules = self.log.stats.peak_modules.max(self.world.tree.len() as u64);
+        Ok(())
+    }
+
+    /// The residual of the production of a materialised module. By the variables in `self.scratch`.
+    fn residual(&mut self, fire: &Firing) -> f64 {
+        let rule = &self.setup.model.rules[fire.rule];
+        if rule.discrete {
+            return 0.0;
+        }
+        let Some(state) = self.world.state(fire.id) else {
+            return residual(rule, fire.produce, |_| false, self.scratch);
+        };
+        let zero = |atom: usize| match &state.open {
+            Some(open) => open.at[atom] == Sign::Zero,
+            None => state.next.touched.iter().any(|change| change.atom == atom),
+        };
+        residual(rule, fire.produce, zero, self.scratch)
+    }
+
+    /// Asks for the lists that so many productions of the instant take; `first` is one of the modules.
+    pub fn afford_round(&mut self, productions: usize, first: Option<ModuleId>) -> Result<(), Error> {
+        budget::afford_round(self.setup, self.world, productions, self.events.steps.due, || {
+            let now = self.instant.at;
+            match first {
+                Some(id) => self.world.site_of_module(self.setup.model, id, now),
+                None => crate::world::site_of_axiom(now.to_f64()),
+            }
+        })
+    }
+}
+
+/// The context of a production. Those of a step are kept in the order of its productions; `passed` counts them.
+fn context_of<'c>(
+    model: &Model,
+    world: &'c World,
+    steps: &'c [Around],
+    fire: &Firing,
+    passed: &mut usize,
+) -> &'c Around {
+    if !model.rules[fire.rule].discrete {
+        return world.state(fire.id).map_or(&NO_CONTEXT, |state| &state.context);
+    }
+    *passed += 1;
+    &steps[*passed - 1]
+}

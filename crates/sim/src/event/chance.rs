@@ -1,0 +1,127 @@
+//! What chance decides when a production takes place: which successor, with which parameters, and how long the clocks of
+//! its modules run.
+//!
+//! All ways in which events are taken (`settle`, `light`, and the beginning of a run) come here, so they agree. What is
+//! drawn belongs to the lineage of the module that it is drawn for ([`Seed`]), never to the order of events.
+
+use smallvec::SmallVec;
+
+use crate::error::{Error, Site};
+use crate::scratch::Scratch;
+use dlsys_diagnostic::Span;
+use dlsys_expr::Scratch as Registers;
+use dlsys_model::{Distribution, Outcome, Produce, Successor, choose};
+use dlsys_tree::{Family, Lineage, Purpose, Seed};
+
+/// The reason why a successor has no parameters.
+#[derive(Clone, Debug)]
+pub enum Undrawn {
+    /// A distribution has parameters that it cannot have.
+    Draw {
+        span: Span,
+        distribution: Distribution,
+        why: String,
+    },
+    Weights {
+        why: String,
+    },
+    /// An argument is no finite number.
+    NotFinite,
+}
+
+impl Undrawn {
+    pub fn error(self, site: Site) -> Error {
+        match self {
+            Undrawn::Draw { span, distribution, why } => {
+                Error::BadDraw { site: Site { span, ..site }, distribution, why: why.into() }
+            }
+            Undrawn::Weights { why } => Error::BadWeights { site, why },
+            Undrawn::NotFinite => Error::NotFinite { site, what: "a parameter of the successor".to_owned() },
+        }
+    }
+}
+
+/// Chooses the successor of a module and appends its parameters to `out`; returns its number and the lineage of what is
+/// made. The variables in `scratch` are those of the rule.
+pub fn successor(
+    seed: Seed,
+    clause: &Produce,
+    lineage: Lineage,
+    scratch: &mut Scratch,
+    out: &mut Vec<f64>,
+) -> Result<(usize, Family), Undrawn> {
+    let Scratch { variables, registers, .. } = scratch;
+    let which = decide(seed, &clause.outcome, clause.key, lineage, variables, registers)?;
+    let family = lineage.family(Outcome::production(clause.key, which));
+    arguments(seed, &clause.outcome.successors[which], family, variables, registers, out)?;
+    Ok((which, family))
+}
+
+/// The number of the successor that takes the place of a module.
+fn decide(
+    seed: Seed,
+    outcome: &Outcome,
+    key: u64,
+    lineage: Lineage,
+    variables: &[f64],
+    scratch: &mut Registers<f64>,
+) -> Result<usize, Undrawn> {
+    let Some(program) = &outcome.weights else { return Ok(0) };
+    let mut weights: SmallVec<[f64; 8]> = smallvec::smallvec![0.0; program.outputs()];
+    program.eval(variables, scratch, &mut weights);
+    let u = seed.unit(lineage, Purpose::Choice(key));
+    choose(&weights, u).map_err(|why| Undrawn::Weights { why })
+}
+
+/// Appends the values of all parameters of a successor, hidden ones included, to `out`. `variables` are those of the
+/// rule; draws are put behind them.
+pub fn arguments(
+    seed: Seed,
+    successor: &Successor,
+    family: Family,
+    variables: &mut Vec<f64>,
+    scratch: &mut Registers<f64>,
+    out: &mut Vec<f64>,
+) -> Result<(), Undrawn> {
+    for draw in &successor.draws {
+        let mut parameters: SmallVec<[f64; 4]> = smallvec::smallvec![0.0; draw.parameters.outputs()];
+        draw.parameters.eval(variables, scratch, &mut parameters);
+        if !draw.conditional
+            && let Some(why) = draw.distribution.fault(&parameters)
+        {
+            return Err(Undrawn::Draw { span: draw.span, distribution: draw.distribution, why });
+        }
+        let u = seed.unit_of_child(family, draw.place, Purpose::Parameter(draw.number));
+        variables.push(draw.distribution.quantile(&parameters, u));
+    }
+    let first = out.len();
+    out.resize(first + successor.arguments.outputs(), 0.0);
+    successor.arguments.eval(variables, scratch, &mut out[first..]);
+    if out[first..].iter().any(|x| !x.is_finite()) {
+        return Err(why_not_finite(successor, variables, scratch));
+    }
+    if !successor.clocks.is_empty() {
+        let written: SmallVec<[f64; 32]> = SmallVec::from_slice(&out[first..]);
+        out.truncate(first);
+        let mut copied = 0;
+        for clock in &successor.clocks {
+            out.extend_from_slice(&written[copied..clock.after]);
+            copied = clock.after;
+            out.push(seed.endurance(family.child(clock.place), clock.key));
+        }
+        out.extend_from_slice(&written[copied..]);
+    }
+    Ok(())
+}
+
+/// A draw with wrong parameters, if there is one that was let pass.
+fn why_not_finite(successor: &Successor, variables: &[f64], scratch: &mut Registers<f64>) -> Undrawn {
+    for draw in &successor.draws {
+        let mut parameters: SmallVec<[f64; 4]> = smallvec::smallvec![0.0; draw.parameters.outputs()];
+        draw.parameters.eval(variables, scratch, &mut parameters);
+        if let Some(why) = draw.distribution.fault(&parameters) {
+            return Undrawn::Draw { span: draw.span, distribution: draw.distribution, why };
+        }
+    }
+    Undrawn::NotFinite
+}

@@ -1,0 +1,140 @@
+//! Consistent values: what is given by a value or an equation, at an instant.
+//!
+//! When modules are born, change their equations or get other neighbours, their algebraic parameters are solved for
+//! before anything is judged, together with those of all modules that depend on them. What nobody but the drawing and
+//! successors read is not kept up to date: it is computed when somebody looks.
+
+use super::EventStage;
+use crate::error::Error;
+use crate::flow::algebraic::{Solved, is_algebraic};
+use dlsys_model::Truth;
+use dlsys_tree::ModuleId;
+
+/// Values that differ by more than so many tolerances have jumped; less is what they may err by.
+const JUMP: f64 = 10.0;
+/// Most times at one instant that values change, and what they decide with them.
+const MAX_ROUNDS: usize = 100;
+
+impl EventStage<'_, '_> {
+    /// Makes the algebraic parameters consistent of all modules that the instant concerns. `chosen`: they have their
+    /// equations, and what has been followed may have jumped. True if something has changed that conditions may read.
+    pub fn level(&mut self, chosen: bool) -> Result<bool, Error> {
+        if !self.setup.is_algebraic {
+            return Ok(false);
+        }
+        self.events.level_rounds += 1;
+        let mut wanted: Vec<ModuleId> = Vec::new();
+        for &id in self.events.opened.iter().chain(&self.events.ready) {
+            let Some(state) = self.world.state_mut(id) else { continue };
+            let Some(rule) = state.rule.map(|r| &self.setup.model.rules[r]) else { continue };
+            let elsewhere = state.open.as_ref().is_none_or(|open| open.flow.is_none());
+            if !chosen && !elsewhere {
+                continue;
+            }
+            if state.solve.is_none() && !chosen {
+                // The equations that it is going to have, as far as can be told.
+                let signs = &state.signs;
+                let may = |guard: &dlsys_model::Condition| guard.judge(|i| signs[i]) != Truth::No;
+                state.solve = rule.solves.iter().position(|s| may(&s.guard));
+                let switches = state.solve.map_or(&[][..], |s| &rule.solves[s].switches);
+                state.switches = switches.iter().map(|s| may(&s.condition)).collect();
+            }
+            wanted.push(id);
+        }
+        // One that has got several rules at the instant is there several times.
+        let mut once = std::collections::HashSet::new();
+        wanted.retain(|id| once.insert(*id));
+        // And whoever depends on them.
+        let mut known: std::collections::HashSet<ModuleId> = wanted.iter().copied().collect();
+        let mut at = 0;
+        while at < wanted.len() {
+            let mut found = Vec::new();
+            self.neighbours.readers(self.world, self.setup.model, wanted[at], |reader, _| found.push(reader));
+            found.retain(|id| is_algebraic(self.setup.model, self.world, *id) && known.insert(*id));
+            wanted.append(&mut found);
+            at += 1;
+        }
+        wanted.retain(|id| is_algebraic(self.setup.model, self.world, *id));
+        if wanted.is_empty() {
+            return Ok(false);
+        }
+        let Solved { places, before, values } = self.flow().solve_algebraic(&wanted)?;
+        let mut changed: Vec<ModuleId> = Vec::new();
+        for ((&(_, id, parameter), &before), &value) in places.iter().zip(&before).zip(&values) {
+            let state = self.world.state(id).expect("wanted");
+            let in_question = self.events.ready.contains(&id) && state.open.is_none();
+            let elsewhere = in_question || state.open.as_ref().is_some_and(|open| open.flow.is_none());
+            let size = value.abs().max(before.abs()).max(1.0);
+            let step = (value - before).abs();
+            let jumps = step > JUMP * self.setup.settings.tolerance * size;
+            if !(jumps || elsewhere && value.to_bits() != before.to_bits()) {
+                continue;
+            }
+            self.world.rebase(id, self.instant.at);
+            let place = self.world.tree.places(id).start + parameter;
+            self.world.tree.set_value(place, value);
+            if jumps || step > 1e-12 * size {
+                changed.push(id);
+            }
+        }
+        changed.dedup();
+        if changed.is_empty() {
+            return Ok(false);
+        }
+        let mut again = changed.clone();
+        for &id in &changed {
+            self.neighbours.readers(self.world, self.setup.model, id, |reader, _| again.push(reader));
+        }
+        again.sort_unstable();
+        again.dedup();
+        let mut matters = false;
+        for id in again {
+            matters |= self.place_again(id, changed.contains(&id));
+        }
+        if matters && self.events.level_rounds > MAX_ROUNDS {
+            let id = changed[0];
+            let rule = self.world.state(id).and_then(|s| s.rule).unwrap_or(0);
+            let site = self.world.site(
+                self.setup.model,
+                id,
+                rule,
+                self.setup.model.rules[rule].span,
+                self.instant.at,
+            );
+            return Err(Error::Chattering { site });
+        }
+        Ok(matters)
+    }
+
+    /// Judges the signs of a module anew by its values; true if it has any.
+    fn place_again(&mut self, id: ModuleId, own: bool) -> bool {
+        let Some(state) = self.world.state(id) else { return false };
+        let Some(rule) = state.rule else { return false };
+        let compiled = &self.setup.model.rules[rule];
+        let is_open = state.open.is_some();
+        // What was followed here has its signs, unless it has jumped itself.
+        if !own && is_open && state.open.as_ref().is_some_and(|open| open.flow.is_some()) {
+            return false;
+        }
+        if compiled.atoms.is_empty() {
+            if own && !is_open && !self.events.ready.contains(&id) {
+                self.events.ready.push(id);
+            }
+            return false;
+        }
+        self.world.rebase(id, self.instant.at);
+        let around = self.world.state(id).expect("seen above").context.clone();
+        let (signs, clear) = self.signs_of_values(id, compiled, &around, None);
+        let now = self.instant.at;
+        let state = self.world.state_mut(id).expect("seen above");
+        state.pass_changes(now);
+        let same = is_open && state.signs == signs && state.open.as_ref().is_some_and(|o| o.at == signs);
+        state.signs = signs;
+        state.place(clear);
+        if !is_open {
+            self.events.opened.push(id);
+            self.events.ready.retain(|other| *other != id);
+        }
+        !same
+    }
+}

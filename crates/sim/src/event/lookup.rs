@@ -1,0 +1,164 @@
+//! Which rule applies to a module, in which context, and how its signs stand there.
+//!
+//! The first rule whose context is present applies, looked up again whenever the structure has changed
+//! (LANGUAGE, "Rules").
+
+use super::EventStage;
+use std::collections::HashSet;
+
+use crate::event::{LONG, clear};
+use crate::world::context::Around;
+use crate::world::state::{Signs, State};
+use dlsys_model::{KindId, Successor};
+use dlsys_tree::ModuleId;
+
+impl EventStage<'_, '_> {
+    /// Finds the rule and context of every module for which they may be new, and opens it if they are.
+    pub fn look_up(&mut self) {
+        let model = self.setup.model;
+        let mut fresh = std::mem::take(&mut self.events.fresh);
+        self.cut_branches(&fresh);
+        if fresh.len() > LONG {
+            // A cascade: growing bit by bit, the list would be there twice.
+            self.events.firing_lazy.reserve_exact(fresh.len());
+        }
+        for id in fresh.drain(..) {
+            // It may have been replaced already, within the same instant.
+            if !self.world.tree.is_alive(id) {
+                continue;
+            }
+            let kind = self.world.tree.kind(id);
+            if self.events.steps.has_rules[kind.index()] {
+                self.events.steps.join(id);
+            }
+            if self.setup.kinds_with_context[kind.index()] {
+                self.events.to_look.push(id);
+            } else if let Some(&rule) = model.kinds.get(kind).rules.first()
+                && !self.begin_predicted(id, rule)
+            {
+                self.take_up(id, rule, &Around::default());
+            }
+        }
+        clear(&mut fresh);
+        self.events.fresh = fresh;
+        if std::mem::take(&mut self.events.lost) {
+            self.neighbours.forget();
+            self.events.to_look = self.contextual();
+        }
+        if !self.events.to_look.is_empty() {
+            self.look_around();
+        }
+    }
+
+    /// Looks up the modules whose neighbours have changed.
+    fn look_around(&mut self) {
+        let model = self.setup.model;
+        let mut to_look = std::mem::take(&mut self.events.to_look);
+        let mut context = Around::default();
+        if self.setup.gathers {
+            // A module with many children has been put in by each of them that is new.
+            let mut seen = HashSet::new();
+            to_look.retain(|id| seen.insert(*id));
+        }
+        for id in to_look.drain(..) {
+            if !self.world.tree.is_alive(id) {
+                continue;
+            }
+            let rules = &model.kinds.get(self.world.tree.kind(id)).rules;
+            let applies =
+                rules.iter().copied().find(|&rule| self.context(id, &model.rules[rule], true, &mut context));
+            let state = self.world.state(id);
+            let Some(rule) = applies else {
+                if state.is_none_or(|s| s.rule.is_some()) {
+                    self.world.rebase(id, self.instant.at);
+                    self.flow().forget(id);
+                    self.world.new_state(id).restarted = self.instant.number;
+                    self.events.ready.push(id);
+                }
+                continue;
+            };
+            if state.is_none_or(|s| s.rule != Some(rule) || s.context != context) {
+                self.take_up(id, rule, &context);
+            }
+        }
+        self.events.to_look = to_look;
+        let world = &self.world;
+        self.events
+            .opened
+            .retain(|id| world.state(*id).is_some_and(|s| s.rule.is_some()) || world.is_lazy(*id));
+    }
+
+    /// Gives a module its rule and opens it.
+    pub fn take_up(&mut self, id: ModuleId, rule: usize, context: &Around) {
+        let compiled = &self.setup.model.rules[rule];
+        let error = self.flows.error_of(self.world, id);
+        self.world.rebase(id, self.instant.at);
+        let now = self.instant.at;
+        if let Some(state) = self.world.state_mut(id) {
+            state.pass_changes(now);
+        }
+        let followed =
+            self.world.state(id).filter(|s| s.rule == Some(rule)).map(|s| Signs::from_slice(&s.signs));
+        let followed = followed.map(|signs| (signs, error));
+        let (mut signs, clear) = self.signs_of_values(id, compiled, context, followed);
+        let before = self.world.state(id);
+        // A limit that is only approached may have been reached by rounding.
+        if let Some(State { rule: Some(last), solve: Some(solve), signs: known, .. }) = before
+            && *last == rule
+        {
+            for (atom, &unreachable) in compiled.solves[*solve].unreachable.iter().enumerate() {
+                if unreachable {
+                    signs[atom] = known[atom];
+                }
+            }
+        }
+        let was_open = before.is_some_and(|s| s.open.is_some());
+        if before.is_none() {
+            self.world.new_state(id);
+        }
+        let state = self.world.state_mut(id).expect("just made");
+        if state.coupled {
+            self.flows.coupled.loosened.extend_from_slice(&state.context);
+        }
+        state.context = context.clone();
+        state.solve = None;
+        state.signs = signs;
+        state.switches.clear();
+        state.next = if state.rule == Some(rule) { state.next.again() } else { Default::default() };
+        state.rule = Some(rule);
+        state.since = self.instant.at;
+        if compiled.is_plain() {
+            // Nothing to judge and nothing to choose.
+            state.solve = (!compiled.solves.is_empty()).then_some(0);
+            state.open = None;
+            self.events.ready.push(id);
+            return;
+        }
+        state.place(clear);
+        if !was_open {
+            self.events.opened.push(id);
+        }
+    }
+
+    /// The modules whose rules have contexts, in string order.
+    pub fn contextual(&self) -> Vec<ModuleId> {
+        match self.setup.looks_around {
+            true => self.world.modules_of(&self.setup.kinds_with_context).collect(),
+            false => Vec::new(),
+        }
+    }
+
+    /// Lets those who looked at a module that has been replaced look again, and hands its neighbours on.
+    pub fn hand_on(&mut self, id: ModuleId, kind: KindId, successor: &Successor, made: &[ModuleId]) {
+        if !self.setup.hands_on {
+            return;
+        }
+        let skipped = |kind| self.setup.model.kinds.get(kind).skipped;
+        self.events.to_look.extend_from_slice(self.neighbours.lookers(id));
+        self.neighbours.bury(id);
+        self.neighbours.hand_on(Some(id), &successor.kinds, made, skipped);
+        // What was skipped may turn into something that stands between others.
+        let counts = |kind: &KindId| !kind.is_bracket() && !skipped(*kind);
+        self.events.lost |= skipped(kind) && successor.kinds.iter().any(counts);
+    }
+}

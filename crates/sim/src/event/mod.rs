@@ -1,0 +1,151 @@
+//! Event iteration: what happens at one instant, until nothing happens any more.
+//!
+//! ```text
+//! look up rules and contexts ─▶ judge at the instant ─▶ apply productions in parallel ─┐
+//!   (lookup, matching)            (iterate)     │         (apply, lazy, derivation)     │
+//!        ▲                                      │ nothing holds                         │
+//!        └──────────────────────────────────────┼───────────────────────────────────────┘
+//!                                               ▼
+//!            select modes ─▶ where do the zero signs go? ─▶ judge just after ─▶ start flows
+//!              (modes)
+//! ```
+//!
+//! All modules whose conditions hold are replaced in parallel, on the values before any was replaced; then the string is
+//! examined again at the same instant, until nothing holds. Only the modules that the instant concerns are *open*; all
+//! others go on as they were.
+
+mod apply;
+pub mod chance;
+mod consistency;
+mod cut;
+pub mod derivation;
+mod exact;
+mod iterate;
+mod lazy;
+mod lookup;
+mod matching;
+mod modes;
+mod opening;
+mod ties;
+pub mod transition;
+
+use crate::budget::Budget;
+use crate::detect::Detector;
+use crate::flow::{FlowStage, Flows, lazy as lives};
+use crate::log::Log;
+use crate::schedule::{NextEvent, Schedule};
+use crate::scratch::Scratch;
+use crate::setup::Setup;
+use crate::world::neighbours::Neighbours;
+use crate::world::{Instant, World};
+use derivation::Steps;
+use dlsys_tree::{Family, ModuleId};
+use transition::Recorder;
+
+pub use iterate::MAX_ROUNDS;
+
+/// Lists that were longer are not kept for the next instant.
+const LONG: usize = 1 << 18;
+
+/// A life of no more than so many resolutions of time is short.
+pub const SHORT_LIFE: f64 = 64.0;
+
+/// A production that applies.
+#[derive(Clone, Debug)]
+pub struct Firing {
+    pub id: ModuleId,
+    pub rule: usize,
+    pub produce: usize,
+}
+
+/// What an instant concerns, and what is left to do at it.
+#[derive(Clone, Debug, Default)]
+pub struct Events {
+    /// Modules that the instant concerns.
+    pub opened: Vec<ModuleId>,
+    /// Modules that it concerns, and that have their equations already.
+    ready: Vec<ModuleId>,
+    /// Modules that were made at the instant and have not been looked up yet.
+    pub fresh: Vec<ModuleId>,
+    /// The structure has changed since contexts were matched.
+    changed: bool,
+    /// Modules whose neighbours have changed.
+    to_look: Vec<ModuleId>,
+    /// The remembered neighbours may be wrong.
+    lost: bool,
+    /// Modules that rest on a boundary and have a context: their neighbours may move it.
+    resting: Vec<ModuleId>,
+    /// Discrete rules.
+    pub steps: Steps,
+    /// Productions that are known to apply.
+    pub firing: Vec<Firing>,
+    /// Slots of lazy modules whose event it is.
+    pub firing_lazy: Vec<u32>,
+    /// Times that algebraic values have changed at the present instant.
+    level_rounds: usize,
+    recorder: Option<Recorder>,
+    // Memory that is used again and again.
+    pub batch: Vec<NextEvent>,
+    made: Vec<ModuleId>,
+    attached: Vec<ModuleId>,
+    arguments: Vec<f64>,
+    /// Of each production: where its arguments end, which successor it has, and the lineage of that.
+    argument_ends: Vec<(usize, usize, Family)>,
+}
+
+impl Events {
+    pub fn new(setup: &Setup) -> Events {
+        let settings = &setup.settings;
+        Events {
+            steps: Steps::new(setup.model),
+            changed: true,
+            recorder: (settings.log && settings.transitions).then(Recorder::default),
+            ..Events::default()
+        }
+    }
+}
+
+/// The parts that event iteration works on.
+pub struct EventStage<'s, 'm> {
+    pub setup: &'s Setup<'m>,
+    pub instant: &'s mut Instant,
+    pub world: &'s mut World,
+    pub neighbours: &'s mut Neighbours,
+    pub schedule: &'s mut Schedule,
+    pub flows: &'s mut Flows,
+    pub detector: &'s mut Detector,
+    pub events: &'s mut Events,
+    pub log: &'s mut Log,
+    pub budget: &'s Budget,
+    pub scratch: &'s mut Scratch,
+}
+
+impl<'m> EventStage<'_, 'm> {
+    /// The parts that flows work on.
+    fn flow(&mut self) -> FlowStage<'_, 'm> {
+        FlowStage {
+            setup: self.setup,
+            instant: self.instant,
+            world: self.world,
+            neighbours: self.neighbours,
+            schedule: self.schedule,
+            flows: self.flows,
+            detector: self.detector,
+            log: self.log,
+            scratch: self.scratch,
+        }
+    }
+
+    /// Gives a lazy module the state that it would have, had it never been lazy.
+    fn materialise(&mut self, id: ModuleId) {
+        lives::materialise(self.world, &self.setup.model.rules, id, self.instant, self.scratch);
+    }
+}
+
+/// Empties a list, and gives back its memory if that is much.
+fn clear<T>(list: &mut Vec<T>) {
+    list.clear();
+    if list.capacity() > LONG {
+        *list = Vec::new();
+    }
+}

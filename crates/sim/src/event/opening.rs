@@ -1,0 +1,196 @@
+//! Modules that an instant concerns: how they are opened, and the fast path past all that.
+
+use smallvec::SmallVec;
+
+use super::{EventStage, Firing};
+use crate::error::Error;
+use crate::flow::prediction::{PredictedEnd, Prediction, predict};
+use crate::motion::Motion;
+use crate::schedule::{NextEvent, Owner};
+use crate::world::brief;
+use crate::world::context::Around;
+use crate::world::state::{Change, Open, State, What};
+use dlsys_model::{Sign, Truth, Watch};
+use dlsys_tree::ModuleId;
+
+impl EventStage<'_, '_> {
+    /// Opens everything that happens at one instant; returns the first module of it.
+    pub fn open_batch(&mut self, batch: &[NextEvent]) -> Result<Option<ModuleId>, Error> {
+        let all_lazy = batch.iter().all(|next| match next {
+            NextEvent::Lazy(..) => true,
+            NextEvent::Other(entry) => entry.owner == Owner::Derivation,
+        });
+        let mut oldest = None;
+        for next in batch {
+            let owner = match *next {
+                NextEvent::Lazy(_, slot) if all_lazy => {
+                    self.events.firing_lazy.push(slot);
+                    oldest = oldest.or(Some(self.world.tree.id(slot)));
+                    continue;
+                }
+                NextEvent::Lazy(_, slot) => {
+                    self.materialise(self.world.tree.id(slot));
+                    Owner::Module(slot)
+                }
+                NextEvent::Other(entry) => entry.owner,
+            };
+            let first = match owner {
+                Owner::Coupled => None,
+                Owner::Derivation => {
+                    self.begin_step();
+                    None
+                }
+                Owner::Module(slot) => match self.fire_predicted(slot as usize) {
+                    Some(firing) => {
+                        let id = firing.id;
+                        self.events.firing.push(firing);
+                        Some(id)
+                    }
+                    None => Some(self.touch_alone(slot as usize)?),
+                },
+            };
+            oldest = oldest.or(first);
+        }
+        self.join_ties();
+        Ok(oldest)
+    }
+
+    /// Opens a module because of signs that are zero now.
+    pub fn touch(&mut self, id: ModuleId, touched: &[Change]) {
+        let now = self.instant.at;
+        let Some(state) = self.world.state_mut(id) else { return };
+        state.pass_changes(now);
+        let fresh = state.open.is_none();
+        let open = state.follow();
+        for change in touched {
+            open.at[change.atom] = change.at;
+            open.guess[change.atom] = change.after;
+        }
+        if fresh {
+            self.events.opened.push(id);
+        }
+        self.world.rebase(id, now);
+        // Where the instant is known from a level, the value there is that level, not a rounding of it.
+        for (parameter, level) in touched.iter().filter_map(|change| change.level) {
+            let place = self.world.tree.places(id).start + parameter;
+            self.world.tree.set_value(place, level);
+        }
+    }
+
+    /// Opens the modules that rest on a boundary and look at their neighbours: it may be that those move now.
+    pub fn open_resting(&mut self) {
+        let mut resting = std::mem::take(&mut self.events.resting);
+        for id in resting.drain(..) {
+            let state = self.world.state(id);
+            if state.is_some_and(|s| s.rule.is_some() && s.open.is_none() && s.signs.contains(&Sign::Zero)) {
+                self.touch(id, &[]);
+            }
+        }
+        self.events.resting = resting;
+    }
+
+    /// Remembers those of the modules that rest on a boundary and have a context.
+    pub fn note_resting(&mut self, modules: &[ModuleId]) {
+        for &id in modules {
+            let state = self.world.state(id);
+            let rests = |s: &State| {
+                // What stands still until an event of its own is not moved by others.
+                let watch = s.rule.map_or(&[][..], |rule| self.setup.model.rules[rule].watch(s.solve));
+                let mut atoms = s.signs.iter().zip(watch);
+                atoms.any(|(sign, watch)| *sign == Sign::Zero && !matches!(watch, Watch::Still))
+            };
+            if state.is_some_and(|s| !s.context.is_empty() && rests(s)) {
+                self.events.resting.push(id);
+            }
+        }
+    }
+
+    /// Opens a module whose event it is.
+    pub fn touch_alone(&mut self, slot: usize) -> Result<ModuleId, Error> {
+        let state = self.world.states[slot].as_mut().expect("scheduled");
+        let id = state.id;
+        if state.next.what == What::Doubt {
+            let atom = state.next.touched[0].atom;
+            return Err(self.flow().in_doubt(id, atom));
+        }
+        if state.next.what == What::Fault {
+            let ends: Vec<Option<f64>> = state.motions.iter().map(Motion::end).collect();
+            let first = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1);
+            let parameter = ends.iter().enumerate().filter_map(|(i, e)| Some((i, (*e)?))).min_by(first);
+            let since = state.since;
+            let mut error =
+                self.world.not_finite(self.setup.model, id, parameter.map_or(0, |p| p.0), self.instant.at);
+            if let Error::NotFinite { site, .. } = &mut error {
+                // The values that the formula began with; at its end there are none.
+                site.module += &format!(" (as of t = {})", brief(since.to_f64(), 6));
+            }
+            return Err(error);
+        }
+        let touched = std::mem::take(&mut state.next.touched);
+        self.flow().learn(id);
+        self.touch(id, &touched);
+        Ok(id)
+    }
+
+    /// Begins the life of a newborn module by its prediction; false if it has none.
+    pub fn begin_predicted(&mut self, id: ModuleId, index: usize) -> bool {
+        let rule = &self.setup.model.rules[index];
+        // Algebraic parameters must be made consistent first.
+        if self.setup.numeric_only || !self.setup.fast_path || rule.is_algebraic() {
+            return false;
+        }
+        if self.world.lives.rule(self.world.tree.kind(id)).is_some() {
+            return self.begin_lazily(id, index);
+        }
+        let now = self.instant.at;
+        self.world.variables(rule, id, &Around::default(), now, &mut self.scratch.variables);
+        let Some(prediction) = predict(rule, now, self.scratch) else { return false };
+        let Prediction { solve, signs, motions, end, .. } = prediction;
+        let owner = Owner::Module(id.slot() as u32);
+        let change = match end {
+            Some(PredictedEnd::AtBirth { .. }) => return false,
+            Some(PredictedEnd::Event { change, .. }) => {
+                self.schedule.schedule(owner, change.time);
+                Some(change)
+            }
+            None => {
+                self.schedule.cancel(owner);
+                None
+            }
+        };
+        let state = self.world.make_state(id);
+        state.renew(id);
+        (state.rule, state.solve, state.signs) = (Some(index), solve, signs);
+        (state.since, state.motions) = (now, motions);
+        state.next.what = if change.is_none() { What::Nothing } else { What::Event };
+        state.next.touched = change.into_iter().collect();
+        state.restarted = self.instant.number;
+        true
+    }
+
+    /// The production that a module's event is, if that is all there is to it; its values are then those of the event.
+    pub fn fire_predicted(&mut self, slot: usize) -> Option<Firing> {
+        let state = self.world.states.get(slot)?.as_ref()?;
+        if !self.setup.fast_path || state.next.what != What::Event || state.is_numeric() || state.coupled {
+            return None;
+        }
+        let (id, rule) = (state.id, state.rule?);
+        if self.setup.kinds_with_context[self.world.tree.kind(id).index()] || !state.next.changes.is_empty() {
+            return None;
+        }
+        let touched = &state.next.touched;
+        let at = |i: usize| {
+            touched.iter().find(|change| change.atom == i).map_or(state.signs[i], |change| change.at)
+        };
+        let produces = &self.setup.model.rules[rule].produces;
+        let produce = produces.iter().position(|p| p.guard.judge(at) == Truth::Yes)?;
+        let levels: SmallVec<[(usize, f64); 2]> = touched.iter().filter_map(|c| c.level).collect();
+        self.world.rebase_except(id, self.instant.at, &levels);
+        Some(Firing { id, rule, produce })
+    }
+}
+
+/// What is open about a module, which must be.
+pub fn open(state: &mut State) -> &mut Open {
+    state.open.get_or_insert_with(Box::default)
+}

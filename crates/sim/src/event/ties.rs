@@ -1,0 +1,77 @@
+//! Ties: two modules of which one sees the other, whose events happen at one instant in truth but at two as integrated.
+
+use super::EventStage;
+use crate::detect::doubt::FAR;
+use crate::detect::signs::{opposite, produces};
+use crate::world::path::Path;
+use crate::world::state::{Change, Signs, What};
+use dlsys_model::Sign;
+use dlsys_tree::ModuleId;
+
+impl EventStage<'_, '_> {
+    /// Lets modules that look at one whose event it is, and cannot be told to have theirs later, have it now.
+    pub fn join_ties(&mut self) {
+        if !self.setup.looks_around {
+            return;
+        }
+        let mut known = 0;
+        // Those that join may be looked at, too.
+        while known < self.events.opened.len() + self.events.firing.len() {
+            let id = match self.events.opened.get(known) {
+                Some(id) => *id,
+                None => self.events.firing[known - self.events.opened.len()].id,
+            };
+            known += 1;
+            let other = self.flows.error_of(self.world, id);
+            for at in 0..self.neighbours.lookers(id).len() {
+                let looker = self.neighbours.lookers(id)[at];
+                if let Some(change) = self.tie(looker, other) {
+                    let before = self.events.opened.len();
+                    self.touch(looker, &[change]);
+                    known = if self.events.opened.len() > before && known > before { before } else { known };
+                }
+            }
+        }
+    }
+
+    /// The production of a module that it cannot be told to have later than now, beside an event of one whose values may be
+    /// wrong by so much.
+    fn tie(&mut self, id: ModuleId, other: f64) -> Option<Change> {
+        let state = self.world.state(id).filter(|s| s.is_numeric() && s.open.is_none())?;
+        let rule = &self.setup.model.rules[state.rule?];
+        if rule.produces.is_empty() || rule.atoms.is_empty() {
+            return None;
+        }
+        // What is known to come, or how far that is known, is mostly far away.
+        let known = match (&state.next.what, &self.world.coupled, &state.step) {
+            (What::Event, ..) => state.next.touched[0].time,
+            (_, Some(course), _) if state.coupled => course.end,
+            (_, _, Some(step)) => step.dense.end,
+            _ => self.instant.at,
+        };
+        let path = Path::new(self.world, state, rule, self.instant.at, 64.0 * self.instant.at.resolution());
+        let error = path.error();
+        let reach = self.flows.reach_of(self.world, id);
+        let factor = if error > 0.0 { 1.0 + other / error } else { 0.0 };
+        if known.since(self.instant.at) > FAR * factor * error * reach.max(self.instant.at.resolution()) {
+            return None;
+        }
+        let mut signs = Signs::from_slice(&state.signs);
+        for change in state.next.changes.iter().filter(|change| change.time.since(self.instant.at) <= 0.0) {
+            signs[change.atom] = change.after;
+        }
+        let atom = (0..rule.atoms.len()).find(|&atom| {
+            error > 0.0
+                && matches!(signs[atom], Sign::Plus | Sign::Minus)
+                && produces(rule, &signs, atom)
+                && self.detector.watcher.is_about_to_meet(&path, atom, signs[atom], factor)
+        })?;
+        Some(Change {
+            atom,
+            time: self.instant.at,
+            at: Sign::Zero,
+            after: opposite(signs[atom]),
+            level: None,
+        })
+    }
+}

@@ -1,0 +1,465 @@
+//! Algebraic components: what is solved for, along with what is integrated.
+//!
+//! The equations are differential-algebraic of index 1: wherever the integrated components are known, so are these.
+//! Therefore the integrator sees an ordinary differential equation, in which each evaluation of rates solves for the
+//! algebraic components first (the state space form of Hairer and Wanner 1996, VI.1). Compared with the other way out,
+//! which differentiates the equations and integrates what is solved for, nothing drifts and there is nothing to project
+//! back; and an explicit value costs one evaluation.
+//!
+//! Components that depend on one another in a circle, within a module or along the tree, are solved together by
+//! Newton's method; others one after another, in the order of their dependence (Tarjan's strongly connected components).
+
+use crate::flow::coupled::system::{Row, System};
+use dlsys_expr::{Scratch, eliminate};
+use dlsys_model::{Algebraic, Rule};
+use dlsys_ode::Pattern;
+
+/// A component that is solved for.
+#[derive(Clone, Copy, Debug)]
+pub struct Unknown {
+    pub component: u32,
+    row: u32,
+    /// Among the algebraic parameters of the row's clause.
+    place: u32,
+}
+
+/// What is solved for, in the order in which that is done.
+#[derive(Clone, Debug, Default)]
+pub struct Algebra {
+    pub unknowns: Vec<Unknown>,
+    blocks: Vec<Block>,
+    /// By component: the unknown that it is.
+    number: Vec<u32>,
+}
+
+/// Unknowns that are solved for together.
+#[derive(Clone, Debug)]
+struct Block {
+    unknowns: Vec<u32>,
+    /// One explicit value that does not depend on itself.
+    explicit: bool,
+}
+
+/// Why there is no solution.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Fault {
+    /// The partial derivatives by what is solved for are singular there; a component.
+    Singular(usize),
+    /// Newton's method finds nothing.
+    None(usize),
+    /// A value on the way is not finite.
+    NotFinite(usize),
+    /// The partial derivatives become singular before long.
+    Fading(usize),
+    /// It moves too fast to be followed.
+    Rough(usize),
+}
+
+impl Fault {
+    pub fn component(self) -> usize {
+        match self {
+            Fault::Singular(c)
+            | Fault::None(c)
+            | Fault::NotFinite(c)
+            | Fault::Fading(c)
+            | Fault::Rough(c) => c,
+        }
+    }
+}
+
+const NONE: u32 = u32::MAX;
+
+/// Most corrections.
+const MAX_CORRECTIONS: usize = 60;
+/// A correction of no more than this part of the unknown is the last: the next one would be its square.
+const SMALL: f64 = 1e-9;
+/// Nor is one that does not help, of no more than this part of the unknown or of 1, as tolerances are.
+const NOISE: f64 = 1e-13;
+/// A pivot of no more than this part of its row is none.
+const SINGULAR: f64 = 1e-13;
+/// Where steps have become nothing, unknowns that matter so little in their equations, for what else is in them, are why.
+const FADING: f64 = 1e-2;
+/// So few unknowns are eliminated with pivoting.
+const FEW: usize = 48;
+/// No more of them, if elimination without pivoting fails.
+const MANY: usize = 1000;
+
+/// Working memory.
+#[derive(Default)]
+struct Memory {
+    variables: Vec<f64>,
+    values: Vec<f64>,
+    partials: Vec<f64>,
+    scratch: Scratch<f64>,
+}
+
+impl Algebra {
+    /// The algebraic components of a system of rows.
+    pub fn new(system: &System, rules: &[Rule]) -> Algebra {
+        let mut algebra = Algebra::default();
+        for (n, row) in system.rows.iter().enumerate().filter(|(_, row)| row.algebraic > 0) {
+            for (component, &place) in (row.first_rate + row.rates..).zip(system.given(row)) {
+                let unknown = Unknown { component: component as u32, row: n as u32, place };
+                if algebra.number.len() <= component {
+                    algebra.number.resize(component + 1, NONE);
+                }
+                algebra.number[component] = algebra.unknowns.len() as u32;
+                algebra.unknowns.push(unknown);
+            }
+        }
+        if !algebra.unknowns.is_empty() {
+            algebra.sort(system, rules);
+        }
+        algebra
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.unknowns.is_empty()
+    }
+
+    /// True for a component that is solved for.
+    pub fn is_solved(&self, component: u32) -> bool {
+        self.number.get(component as usize).is_some_and(|n| *n != NONE)
+    }
+
+    /// Puts the unknowns into the order of their dependence, those on a circle together (Tarjan 1972, with a stack of its
+    /// own: chains may be as long as the world).
+    fn sort(&mut self, system: &System, rules: &[Rule]) {
+        let n = self.unknowns.len();
+        let mut depends: Vec<Vec<u32>> = vec![Vec::new(); n];
+        for row in system.rows.iter().filter(|row| row.algebraic > 0) {
+            let jacobian = &of(rules, row).jacobian;
+            system.visit_partials(rules, row, jacobian, |partial| {
+                let position = jacobian.entries[partial.entry].0 as u32;
+                let own = system.given(row).iter().position(|place| *place == position);
+                let to = self.number.get(partial.component as usize).copied().unwrap_or(NONE);
+                if let Some(own) = own
+                    && to != NONE
+                {
+                    let from = self.number[row.first_rate + row.rates + own];
+                    depends[from as usize].push(to);
+                }
+            });
+        }
+        let (mut index, mut low, mut on_stack) = (vec![NONE; n], vec![0u32; n], vec![false; n]);
+        let (mut stack, mut calls, mut next) = (Vec::new(), Vec::new(), 0u32);
+        for start in 0..n {
+            if index[start] != NONE {
+                continue;
+            }
+            calls.push((start, 0));
+            while let Some((v, edge)) = calls.pop() {
+                if edge == 0 {
+                    (index[v], low[v]) = (next, next);
+                    next += 1;
+                    stack.push(v as u32);
+                    on_stack[v] = true;
+                }
+                if let Some(&w) = depends[v].get(edge) {
+                    calls.push((v, edge + 1));
+                    let w = w as usize;
+                    if index[w] == NONE {
+                        calls.push((w, 0));
+                    } else if on_stack[w] {
+                        low[v] = low[v].min(index[w]);
+                    }
+                    continue;
+                }
+                if low[v] == index[v] {
+                    let mut unknowns = Vec::new();
+                    while let Some(w) = stack.pop() {
+                        on_stack[w as usize] = false;
+                        unknowns.push(w);
+                        if w as usize == v {
+                            break;
+                        }
+                    }
+                    // Along the structure, for elimination from the tips to the root.
+                    unknowns.sort_unstable();
+                    let alone = unknowns.len() == 1 && !depends[v].contains(&(v as u32));
+                    let Unknown { row, place, .. } = self.unknowns[v];
+                    let explicit = alone && of(rules, &system.rows[row as usize]).explicit[place as usize];
+                    self.blocks.push(Block { unknowns, explicit });
+                }
+                if let Some(&(parent, _)) = calls.last() {
+                    low[parent] = low[parent].min(low[v]);
+                }
+            }
+        }
+    }
+
+    /// Solves for the algebraic components of a state, from the values that they have there.
+    pub fn solve(
+        &self,
+        system: &System,
+        rules: &[Rule],
+        tau: f64,
+        inputs: &[f64],
+        y: &mut [f64],
+    ) -> Result<(), Fault> {
+        let mut memory = Memory::default();
+        let mut solver = Solver { algebra: self, system, rules, tau, inputs, memory: &mut memory };
+        for block in &self.blocks {
+            match block.explicit {
+                true => {
+                    let unknown = self.unknowns[block.unknowns[0] as usize];
+                    let value = solver.value(unknown, y);
+                    if !value.is_finite() {
+                        return Err(Fault::NotFinite(unknown.component as usize));
+                    }
+                    y[unknown.component as usize] = value;
+                }
+                false => solver.newton(block, y)?,
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Algebra {
+    /// What has brought the steps to a stop: unknowns whose equations become singular, and which therefore turn ever
+    /// faster.
+    pub fn fading(&self, system: &System, rules: &[Rule], inputs: &[f64], y: &[f64]) -> Option<Fault> {
+        let mut memory = Memory::default();
+        let mut solver = Solver { algebra: self, system, rules, tau: 0.0, inputs, memory: &mut memory };
+        let implicit = self.blocks.iter().filter(|block| !block.explicit);
+        let mut known = implicit.map(|block| (block, solver.condition(block, y)));
+        let (block, _) = known.find(|(_, condition)| *condition < FADING)?;
+        Some(Fault::Fading(self.unknowns[block.unknowns[0] as usize].component as usize))
+    }
+}
+
+/// The algebraic parameters of a row's clause.
+fn of<'r>(rules: &'r [Rule], row: &Row) -> &'r Algebraic {
+    &rules[row.rule].solves[row.solve].algebraic
+}
+
+/// A solution at one instant.
+struct Solver<'s> {
+    algebra: &'s Algebra,
+    system: &'s System,
+    rules: &'s [Rule],
+    tau: f64,
+    inputs: &'s [f64],
+    memory: &'s mut Memory,
+}
+
+impl Solver<'_> {
+    fn variables(&mut self, row: &Row, y: &[f64]) {
+        let variables = &mut self.memory.variables;
+        self.system.variables(self.rules, row, self.tau, y, self.inputs, variables);
+    }
+
+    /// The value of an explicit component, or what is left of the equation of an implicit one.
+    fn value(&mut self, unknown: Unknown, y: &[f64]) -> f64 {
+        let row = self.system.rows[unknown.row as usize];
+        self.variables(&row, y);
+        let program = &of(self.rules, &row).values;
+        let Memory { variables, values, scratch, .. } = &mut *self.memory;
+        values.resize(program.outputs(), 0.0);
+        program.eval(variables, scratch, values);
+        values[unknown.place as usize]
+    }
+
+    /// What is left of the equations of a block.
+    fn residuals(&mut self, block: &Block, y: &[f64], out: &mut Vec<f64>) {
+        out.clear();
+        for &n in &block.unknowns {
+            let unknown = self.algebra.unknowns[n as usize];
+            let row = &self.system.rows[unknown.row as usize];
+            let explicit = of(self.rules, row).explicit[unknown.place as usize];
+            let value = self.value(unknown, y);
+            out.push(if explicit { y[unknown.component as usize] - value } else { value });
+        }
+    }
+
+    /// The partial derivatives of the equations of a block by its unknowns: row, column and value.
+    fn partials(&mut self, block: &Block, y: &[f64]) -> Vec<(u32, u32, f64)> {
+        let mut all = self.all_partials(block, y);
+        all.retain_mut(|(_, component, _)| {
+            let unknown = self.algebra.number.get(*component as usize).copied().unwrap_or(NONE);
+            let column = block.unknowns.binary_search(&unknown);
+            *component = column.unwrap_or_default() as u32;
+            column.is_ok()
+        });
+        all
+    }
+
+    /// How much the unknowns of a block matter in their equations, as a part of what matters most there.
+    fn condition(&mut self, block: &Block, y: &[f64]) -> f64 {
+        const MOMENT: f64 = 1e-6;
+        let (mut before, mut after) = (Vec::new(), Vec::new());
+        self.residuals(block, y, &mut before);
+        let tau = std::mem::replace(&mut self.tau, MOMENT);
+        self.residuals(block, y, &mut after);
+        self.tau = tau;
+        let mut sizes: Vec<f64> = before.iter().zip(&after).map(|(a, b)| (b - a).abs() / MOMENT).collect();
+        for (row, _, value) in self.all_partials(block, y) {
+            sizes[row as usize] = sizes[row as usize].max(value.abs());
+        }
+        let mut largest = vec![0.0_f64; sizes.len()];
+        for (row, _, value) in self.partials(block, y) {
+            largest[row as usize] = largest[row as usize].max(value.abs());
+        }
+        largest.iter().zip(&sizes).map(|(own, all)| own / all).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The partial derivatives of the equations of a block: row, component and value.
+    fn all_partials(&mut self, block: &Block, y: &[f64]) -> Vec<(u32, u32, f64)> {
+        let mut all = Vec::new();
+        for (i, &n) in block.unknowns.iter().enumerate() {
+            let unknown = self.algebra.unknowns[n as usize];
+            let row = self.system.rows[unknown.row as usize];
+            let algebraic = of(self.rules, &row);
+            let jacobian = &algebraic.jacobian;
+            self.variables(&row, y);
+            let Memory { variables, partials, scratch, .. } = &mut *self.memory;
+            partials.resize(jacobian.values.outputs(), 0.0);
+            jacobian.values.eval(variables, scratch, partials);
+            let slopes = self.system.slopes(self.rules, &row, variables, self.tau, y, self.inputs);
+            let explicit = algebraic.explicit[unknown.place as usize];
+            if explicit {
+                all.push((i as u32, unknown.component, 1.0));
+            }
+            self.system.visit_partials(self.rules, &row, jacobian, |partial| {
+                if jacobian.entries[partial.entry].0 == unknown.place as usize {
+                    let value = partial.value(partials, &slopes);
+                    all.push((i as u32, partial.component, if explicit { -value } else { value }));
+                }
+            });
+        }
+        all
+    }
+
+    /// Newton's method, damped so that the correction that would follow gets smaller (Deuflhard 2004, 3.3).
+    fn newton(&mut self, block: &Block, y: &mut [f64]) -> Result<(), Fault> {
+        let component = |i: usize| self.algebra.unknowns[block.unknowns[i] as usize].component as usize;
+        let places: Vec<usize> = (0..block.unknowns.len()).map(component).collect();
+        let bad = |r: &[f64]| r.iter().position(|x| !x.is_finite());
+        let mut left = Vec::new();
+        self.residuals(block, y, &mut left);
+        if let Some(i) = bad(&left) {
+            return Err(Fault::NotFinite(places[i]));
+        }
+        let (mut trial, mut last) = (Vec::new(), f64::INFINITY);
+        for _ in 0..MAX_CORRECTIONS {
+            let matrix = Matrix::new(self.partials(block, y), places.len());
+            let Some(correction) = matrix.solve(&left) else {
+                // Where nothing is left to correct it does not matter how.
+                return Err(Fault::Singular(places[0]));
+            };
+            let start: Vec<f64> = places.iter().map(|p| y[*p]).collect();
+            // One scale for this correction and the next: a solution may be zero, and on the way to it everything is
+            // large for what it is added to.
+            let scale = start.iter().fold(1e-300, |most: f64, x| most.max(x.abs()));
+            let length = |c: &[f64]| {
+                let of = |(c, x): (&f64, &f64)| c.abs() / x.abs().max(1e-3 * scale).max(1e-12);
+                c.iter().zip(&start).map(of).fold(0.0, f64::max)
+            };
+            let whole = length(&correction);
+            // Next to zero, rounding in the equations is all that is left long before it is small for the unknown.
+            let noise = (correction.iter().zip(&start)).all(|(c, x)| c.abs() <= NOISE * x.abs().max(1.0));
+            if whole == 0.0 {
+                return Ok(());
+            }
+            let mut part = 1.0;
+            loop {
+                for ((place, from), c) in places.iter().zip(&start).zip(&correction) {
+                    y[*place] = from - part * c;
+                }
+                self.residuals(block, y, &mut trial);
+                // Rounding is all that is left, or nearly.
+                if part == 1.0 && whole <= SMALL {
+                    return Ok(());
+                }
+                if bad(&trial).is_none()
+                    && let Some(next) = matrix.solve(&trial)
+                    && length(&next) <= (1.0 - 0.25 * part) * whole
+                {
+                    break;
+                }
+                if noise {
+                    for (place, from) in places.iter().zip(&start) {
+                        y[*place] = *from;
+                    }
+                    return Ok(());
+                }
+                part *= 0.5;
+                if part < 1e-6 {
+                    return Err(if bad(&trial).is_some() {
+                        Fault::NotFinite(places[0])
+                    } else {
+                        Fault::None(places[0])
+                    });
+                }
+            }
+            std::mem::swap(&mut left, &mut trial);
+            // At a double root corrections only halve.
+            if part == 1.0 && whole < 1e-6 && whole > 0.4 * last {
+                return Err(Fault::Singular(places[0]));
+            }
+            last = whole;
+        }
+        Err(Fault::None(places[0]))
+    }
+}
+
+/// The partial derivatives of a block.
+enum Matrix {
+    Dense(usize, Vec<f64>),
+    Sparse(Pattern, Vec<f64>, Vec<f64>),
+    Singular,
+}
+
+impl Matrix {
+    fn new(entries: Vec<(u32, u32, f64)>, n: usize) -> Matrix {
+        if n > FEW {
+            let couplings: Vec<(u32, u32)> = entries.iter().map(|e| (e.0, e.1)).collect();
+            if let Some(pattern) = Pattern::new(n, &couplings) {
+                let mut values = vec![0.0; pattern.entries()];
+                for &(i, j, value) in &entries {
+                    if let Some(place) = pattern.entry(i as usize, j as usize) {
+                        values[place] += value;
+                    }
+                }
+                let mut factors = Vec::new();
+                // The matrix itself: no shift, and the sign turned round.
+                if pattern.factor(&values, 0.0, -1.0, &mut factors) {
+                    return Matrix::Sparse(pattern, values, factors);
+                }
+            }
+            if n > MANY {
+                return Matrix::Singular;
+            }
+        }
+        let mut matrix = vec![0.0; n * n];
+        for (i, j, value) in entries {
+            matrix[i as usize * n + j as usize] += value;
+        }
+        Matrix::Dense(n, matrix)
+    }
+
+    fn solve(&self, right: &[f64]) -> Option<Vec<f64>> {
+        let mut x = right.to_vec();
+        match self {
+            Matrix::Singular => return None,
+            Matrix::Dense(n, matrix) => {
+                debug_assert_eq!(*n, right.len());
+                let pivot = eliminate(&mut matrix.clone(), &mut x);
+                if pivot.is_nan() || pivot <= SINGULAR {
+                    return None;
+                }
+            }
+            Matrix::Sparse(pattern, values, factors) => {
+                pattern.solve(factors, &mut x);
+                // Elimination without pivoting: one correction takes back what it lost.
+                let mut product = vec![0.0; x.len()];
+                pattern.multiply(values, &x, &mut product);
+                let mut rest: Vec<f64> = right.iter().zip(&product).map(|(b, p)| b - p).collect();
+                pattern.solve(factors, &mut rest);
+                x.iter_mut().zip(rest).for_each(|(x, r)| *x += r);
+            }
+        }
+        x.iter().all(|x| x.is_finite()).then_some(x)
+    }
+}

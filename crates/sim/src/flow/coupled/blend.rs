@@ -1,0 +1,110 @@
+//! Dense output of algebraic components: polynomials through points at which they were solved for.
+//!
+//! Between the ends of a step the integrated components are polynomials, and what depends on them is solved for at eight
+//! points (Chebyshev's, ends included) and interpolated. Between the points the interpolant is compared with the solution
+//! itself; where it errs by more than a step may, the stretch is halved. So events on such components are found like all
+//! others, on polynomials with bounds.
+//!
+//! A stretch begins exactly where the one before ended: with the value that an event was located on, say. Solving there
+//! again gives another value within the tolerance; the difference dies off within the first stretch.
+
+use std::sync::LazyLock;
+
+use crate::flow::coupled::algebra::Fault;
+use crate::flow::coupled::equations::Equations;
+use dlsys_expr::eliminate;
+use dlsys_ode::{Dense, MAX_DEGREE};
+
+const POINTS: usize = MAX_DEGREE + 1;
+/// Most stretches of a step.
+const MAX_STRETCHES: usize = 64;
+/// Where the interpolant is compared.
+const BETWEEN: [f64; 3] = [0.02, 0.37, 0.9];
+
+/// The points, and for each coefficient in Bernstein form the weights of the values there.
+static INTERPOLATION: LazyLock<([f64; POINTS], [[f64; POINTS]; POINTS])> = LazyLock::new(|| {
+    let angle = |i: usize| std::f64::consts::PI * i as f64 / MAX_DEGREE as f64;
+    let points: [f64; POINTS] = std::array::from_fn(|i| 0.5 - 0.5 * angle(i).cos());
+    let mut choose = [1.0; POINTS];
+    for j in 1..POINTS {
+        choose[j] = choose[j - 1] * (POINTS - j) as f64 / j as f64;
+    }
+    let basis = |s: f64, j: usize| choose[j] * s.powi(j as i32) * (1.0 - s).powi((MAX_DEGREE - j) as i32);
+    let mut weights = [[0.0; POINTS]; POINTS];
+    for i in 0..POINTS {
+        let mut matrix: Vec<f64> =
+            points.iter().flat_map(|s| (0..POINTS).map(|j| basis(*s, j)).collect::<Vec<_>>()).collect();
+        let mut unit = [0.0; POINTS];
+        unit[i] = 1.0;
+        eliminate(&mut matrix, &mut unit);
+        for (j, weight) in unit.into_iter().enumerate() {
+            weights[j][i] = weight;
+        }
+    }
+    (points, weights)
+});
+
+impl Equations<'_> {
+    /// The dense output of a step from `start`, with its algebraic components, as one stretch or several.
+    pub fn blend(&mut self, step: &Dense, start: &[f64], tolerance: f64) -> Result<Vec<Dense>, Fault> {
+        let unknowns: Vec<usize> =
+            self.system.algebra.unknowns.iter().map(|unknown| unknown.component as usize).collect();
+        let mut stretches: Vec<Dense> = Vec::new();
+        let mut last = start.to_vec();
+        // To be done, the next one last.
+        let mut pieces = vec![(0.0, 1.0)];
+        while let Some((lo, hi)) = pieces.pop() {
+            let (points, weights) = &*INTERPOLATION;
+            let mut values = vec![[0.0; POINTS]; unknowns.len()];
+            let mut state = last.clone();
+            for (i, s) in points.iter().enumerate() {
+                self.follow(step, lo + s * (hi - lo), &mut state)?;
+                for (values, &c) in values.iter_mut().zip(&unknowns) {
+                    values[i] = state[c];
+                }
+            }
+            let end = state.clone();
+            let mut all: Vec<[f64; POINTS]> = (values.iter())
+                .map(|v| std::array::from_fn(|j| weights[j].iter().zip(v).map(|(w, v)| w * v).sum()))
+                .collect();
+            for (c, v) in all.iter_mut().zip(&values) {
+                (c[0], c[MAX_DEGREE]) = (v[0], v[MAX_DEGREE]);
+            }
+            let mut fits = true;
+            let mut state = last.clone();
+            for s in BETWEEN {
+                self.follow(step, lo + s * (hi - lo), &mut state)?;
+                let close = |(c, place): (&[f64; POINTS], &usize)| {
+                    let there = state[*place];
+                    (Dense::at(c, s) - there).abs() <= tolerance * there.abs().max(1.0)
+                };
+                fits &= all.iter().zip(&unknowns).all(close);
+            }
+            if !fits {
+                if stretches.len() + pieces.len() + 2 > MAX_STRETCHES {
+                    return Err(Fault::Rough(unknowns.first().copied().unwrap_or(0)));
+                }
+                let middle = 0.5 * (lo + hi);
+                pieces.extend([(middle, hi), (lo, middle)]);
+                continue;
+            }
+            for (c, place) in all.iter_mut().zip(&unknowns) {
+                c[0] = last[*place];
+            }
+            stretches.push(step.with(lo, hi, &unknowns, &all));
+            last = end;
+        }
+        Ok(stretches)
+    }
+
+    /// Goes to a position in a step, from a state near there.
+    fn follow(&mut self, step: &Dense, position: f64, state: &mut [f64]) -> Result<(), Fault> {
+        let system = self.system;
+        for (component, value) in state.iter_mut().enumerate() {
+            if !system.algebra.is_solved(component as u32) {
+                *value = step.value(component, position);
+            }
+        }
+        self.make_consistent(position * step.h, state)
+    }
+}

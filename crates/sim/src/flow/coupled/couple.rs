@@ -1,0 +1,155 @@
+//! Which modules are integrated together: found from those whose equations have begun, before a common step is made.
+
+use crate::flow::FlowStage;
+use std::collections::HashSet;
+
+use crate::error::Error;
+use crate::flow::integrator::foresee;
+use dlsys_tree::ModuleId;
+
+/// What an instant means for the coupled modules.
+#[derive(Clone, Default)]
+pub struct Affected {
+    /// Coupled modules whose equations or inputs have changed.
+    pub seeds: Vec<ModuleId>,
+    /// Of these, those that were not coupled before.
+    pub joined: Vec<ModuleId>,
+    /// Modules that need no longer be coupled.
+    pub freed: Vec<ModuleId>,
+    /// Modules that follow formulas, but watch a neighbour that has changed.
+    pub dependent: Vec<ModuleId>,
+}
+
+impl FlowStage<'_, '_> {
+    /// Finds out who is coupled now, given the modules that have begun new motions, and lets the coupled ones go on.
+    pub fn couple(&mut self, begun: &[ModuleId]) -> Result<(), Error> {
+        let mut affected = std::mem::take(&mut self.flows.coupled.affected);
+        self.find_affected(begun, &mut affected);
+        let coupled = self.couple_affected(&affected);
+        self.flows.coupled.affected = affected;
+        coupled
+    }
+
+    fn couple_affected(&mut self, affected: &Affected) -> Result<(), Error> {
+        let Affected { seeds, joined, freed, dependent } = affected;
+        for &id in dependent {
+            if let Some(state) = self.world.state_mut(id) {
+                state.pass_changes(self.instant.at);
+            }
+            self.look_ahead(id, self.instant.at)?;
+        }
+        for &id in freed {
+            let now = self.instant.at;
+            let state = self.world.state_mut(id).expect("seen above");
+            state.coupled = false;
+            state.pass_changes(now);
+            if state.restarted != self.instant.number {
+                self.world.rebase(id, now);
+                self.start_motions(id, self.setup.numeric_only);
+                self.look_ahead(id, now)?;
+            }
+        }
+        self.flows.coupled.repaired |= !freed.is_empty();
+        for &id in joined {
+            self.world.state_mut(id).expect("seen above").coupled = true;
+        }
+        for &id in seeds {
+            let now = self.instant.at;
+            let state = self.world.state_mut(id).expect("seen above");
+            state.pass_changes(now);
+            // Formulas go on as they were, whatever their module reads.
+            if !state.next.lasting || state.restarted == self.instant.number {
+                state.next = state.next.again();
+            }
+        }
+        if seeds.is_empty() || self.repair(seeds, joined) {
+            return Ok(());
+        }
+        if self.flows.coupled.linear.is_some() {
+            self.flows.coupled.cuts += 1;
+        }
+        let now = self.instant.at;
+        if let Some(course) = &self.world.coupled {
+            let control = &mut self.flows.coupled.control;
+            foresee(control, control.last_error, now.since(course.start()), now.resolution());
+        }
+        (self.flows.coupled.mark, self.flows.coupled.since_mark) = (now, 0);
+        self.restart_coupled(now)
+    }
+
+    /// Looks at the modules that have begun new motions, and at their neighbours.
+    fn find_affected(&mut self, begun: &[ModuleId], affected: &mut Affected) {
+        affected.seeds.clear();
+        affected.joined.clear();
+        affected.freed.clear();
+        affected.dependent.clear();
+        let mut near = std::mem::take(&mut self.flows.coupled.loosened);
+        // Whose many neighbours are there already.
+        let mut known = HashSet::new();
+        for &id in begun {
+            near.push(id);
+            self.neighbours.readers(self.world, self.setup.model, id, |reader, context| {
+                near.push(reader);
+                if context.len() < 8 || known.insert(reader) {
+                    near.extend_from_slice(context);
+                }
+            });
+            if let Some(state) = self.world.state(id) {
+                near.extend_from_slice(&state.context);
+            }
+        }
+        let visit = self.flows.coupled.repairer.begin_visit();
+        near.retain(|id| {
+            let state = self.world.state_mut(*id);
+            state.is_some_and(|state| std::mem::replace(&mut state.visited, visit) != visit)
+        });
+        near.sort_unstable();
+        let moved = |id: &ModuleId| self.world.state(*id).is_some_and(|s| s.restarted == self.instant.number);
+        for &id in &near {
+            let Some(state) = self.world.state(id) else { continue };
+            let wanted = self.is_coupled(id);
+            let reads = state.rule.is_some_and(|r| self.setup.model.rules[r].reads_context);
+            let new_input = reads && state.context.iter().any(moved);
+            if wanted {
+                if !state.coupled {
+                    affected.joined.push(id);
+                }
+                if !state.coupled || moved(&id) || new_input {
+                    affected.seeds.push(id);
+                }
+            } else if state.coupled {
+                affected.freed.push(id);
+            } else if new_input && !moved(&id) {
+                affected.dependent.push(id);
+            }
+        }
+        near.clear();
+        self.flows.coupled.loosened = near;
+    }
+
+    /// True if a module must be integrated together with neighbours: because it reads one that is integrated, or reads
+    /// any and is integrated itself, or is integrated and read by one that reads.
+    fn is_coupled(&self, id: ModuleId) -> bool {
+        let Some(state) = self.world.state(id) else { return false };
+        let Some(rule) = state.rule else { return false };
+        let numeric = |id: &ModuleId| self.world.state(*id).is_some_and(|s| s.is_numeric());
+        if self.setup.model.rules[rule].reads_context
+            && (state.is_numeric() || state.context.iter().any(numeric))
+        {
+            return true;
+        }
+        // What is solved for is solved for here.
+        let solved = |s: usize| {
+            let algebraic = &self.setup.model.rules[rule].solves[s].algebraic;
+            (0..algebraic.of.len()).any(|place| algebraic.is_solved(place, state.forced))
+        };
+        if state.solve.is_some_and(solved) {
+            return true;
+        }
+        let mut read = false;
+        if state.is_numeric() {
+            self.neighbours.readers(self.world, self.setup.model, id, |_, _| read = true);
+        }
+        read
+    }
+}

@@ -1,0 +1,108 @@
+//! From the equations of coupled modules to a matrix.
+
+use super::{Linear, Problem};
+use crate::flow::coupled::system::{Formula, Source, System};
+use crate::motion::Motion;
+use dlsys_expr::Scratch;
+use dlsys_model::Rule;
+
+/// The unknowns as they are numbered.
+#[derive(Default)]
+struct Unknowns {
+    problem: Problem,
+    /// The unknown that stands for each formula; `NONE` as long as there is none.
+    inputs: Vec<u32>,
+}
+
+const NONE: u32 = u32::MAX;
+
+impl Unknowns {
+    /// Makes what a source says an unknown of its own if it is a formula: None if that solves no linear equation.
+    fn number(&mut self, source: &Source, formulas: &[Formula]) -> Option<()> {
+        let Source::Formula(i) = *source else { return Some(()) };
+        if self.inputs[i as usize] != NONE {
+            return Some(());
+        }
+        let formula = &formulas[i as usize];
+        let x = formula.x + formula.motion.value(formula.offset);
+        let (rate, decay) = match &formula.motion {
+            Motion::Polynomial([c, 0.0, 0.0, 0.0]) => (*c, 0.0),
+            Motion::Riccati(law) => (formula.motion.rate(formula.offset), law.exponential()?.1),
+            _ => return None,
+        };
+        let n = self.problem.y.len() as u32;
+        self.inputs[i as usize] = n;
+        // x' = rate + decay (x - x(start))
+        self.problem.entries.push((n, n, decay));
+        self.problem.y.push(x);
+        self.problem.b.push(rate - decay * x);
+        Some(())
+    }
+}
+
+impl Linear {
+    /// The equations of coupled modules, if they are linear and so is everything that they read, and if there is a way to
+    /// solve them without steps.
+    pub fn new(system: &System, rules: &[Rule], y: &[f64], tolerance: f64) -> Option<Linear> {
+        if !system.algebra.is_empty() {
+            return None;
+        }
+        let mut unknown = vec![NONE; y.len()];
+        let mut all = Unknowns { inputs: vec![NONE; system.formulas.len()], ..Unknowns::default() };
+        all.problem.tolerance = tolerance;
+        // Unknowns are numbered in string order: what stands left of a module before it.
+        for row in &system.rows {
+            let rule = &rules[row.rule];
+            let solve = &rule.solves[row.solve];
+            if row.forced {
+                return None;
+            }
+            let linear = solve.linear.as_ref()?;
+            let sources = &system.sources[row.first_source..row.first_source + row.sources];
+            let before = rule.parameters.len() + rule.left.iter().map(|p| p.width).sum::<usize>();
+            let read = |v: usize| linear.variables.iter().flatten().any(|r| *r == v);
+            for (v, source) in sources.iter().enumerate().take(before) {
+                if read(v) {
+                    all.number(source, &system.formulas)?;
+                }
+            }
+            for component in row.first_rate..row.first_rate + solve.numeric.len() {
+                unknown[component] = all.problem.y.len() as u32;
+                all.problem.y.push(y[component]);
+                all.problem.b.push(0.0);
+            }
+            for (v, source) in sources.iter().enumerate().skip(before) {
+                if read(v) {
+                    all.number(source, &system.formulas)?;
+                }
+            }
+        }
+        let Unknowns { mut problem, inputs } = all;
+        let (mut variables, mut scratch, mut out): (Vec<f64>, Scratch<f64>, Vec<f64>) = Default::default();
+        for row in &system.rows {
+            let linear = rules[row.rule].solves[row.solve].linear.as_ref()?;
+            system.variables(rules, row, 0.0, y, &[], &mut variables);
+            out.resize(linear.coefficients.outputs(), 0.0);
+            linear.coefficients.eval(&variables, &mut scratch, &mut out);
+            let mut next = out.iter();
+            for (i, reads) in linear.variables.iter().enumerate() {
+                let n = unknown[row.first_rate + i];
+                problem.b[n as usize] += next.next()?;
+                for &v in reads {
+                    let coefficient = *next.next()?;
+                    match system.sources[row.first_source + v] {
+                        Source::Fixed(x) => problem.b[n as usize] += coefficient * x,
+                        Source::State(component) => {
+                            problem.entries.push((n, unknown[component as usize], coefficient));
+                        }
+                        Source::Formula(input) => {
+                            problem.entries.push((n, inputs[input as usize], coefficient));
+                        }
+                        Source::Input(_) | Source::Sum(_) => return None,
+                    }
+                }
+            }
+        }
+        Linear::of(problem, unknown, system.start)
+    }
+}

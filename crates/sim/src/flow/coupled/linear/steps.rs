@@ -1,0 +1,87 @@
+//! The equations in steps, where no other way can answer for its error.
+
+use super::Problem;
+use crate::flow::integrator::Integrator;
+use crate::world::state::Control;
+use crate::{Settings, Stats};
+use dlsys_ode::Dense;
+use dlsys_ode::Rates;
+use dlsys_tree::SimTime;
+
+/// Steps from the start of the phase, whose time is zero here. Nobody's looking has any influence on them.
+#[derive(Clone)]
+pub struct Steps {
+    integrator: Integrator,
+    control: Control,
+    /// The state at the start of the last step, and where that goes from and to; or, before the first, the start of all.
+    y: Vec<f64>,
+    from: SimTime,
+    end: SimTime,
+    /// The last step, if somebody has looked.
+    dense: Option<Dense>,
+}
+
+impl Steps {
+    pub fn new(problem: &Problem, settings: &Settings, control: Control) -> Steps {
+        let mut integrator = Integrator::default();
+        integrator.restart(settings.method, problem.y.len());
+        let (from, end) = (SimTime::ZERO, SimTime::ZERO);
+        Steps { integrator, control, y: problem.y.clone(), from, end, dense: None }
+    }
+
+    /// True if a time can only be reached from the start.
+    pub fn have_passed(&self, tau: f64) -> bool {
+        SimTime::new(tau).since(self.from) < 0.0
+    }
+
+    /// The state at a time that is not before the last step. None if steps do not come that far.
+    pub fn at(
+        &mut self,
+        problem: &Problem,
+        tau: f64,
+        settings: &Settings,
+        stats: &mut Stats,
+    ) -> Option<Vec<f64>> {
+        let at = SimTime::new(tau);
+        let Steps { integrator, control, y, from, end, dense } = self;
+        let mut flow = Flow { problem };
+        while end.since(at) < 0.0 {
+            if end.since(SimTime::ZERO) > 0.0 {
+                integrator.advance(y);
+            }
+            *from = *end;
+            *dense = None;
+            *end = integrator.step(settings, control, &mut flow, y, *from, None, stats).ok()?;
+        }
+        let dense = dense.get_or_insert_with(|| integrator.dense(&mut flow, y));
+        let position = dense.position(at);
+        Some((0..dense.components()).map(|component| dense.value(component, position)).collect())
+    }
+}
+
+/// The right-hand side.
+struct Flow<'a> {
+    problem: &'a Problem,
+}
+
+impl Rates for Flow<'_> {
+    fn rates(&mut self, _: f64, y: &[f64], out: &mut [f64]) {
+        out.copy_from_slice(&self.problem.b);
+        for &(row, column, value) in &self.problem.entries {
+            out[row as usize] += value * y[column as usize];
+        }
+    }
+
+    fn couplings(&self) -> Vec<(u32, u32)> {
+        self.problem.entries.iter().map(|e| (e.0, e.1)).collect()
+    }
+
+    fn partials(&mut self, _: f64, _: &[f64], out: &mut Vec<f64>) {
+        out.clear();
+        out.extend(self.problem.entries.iter().map(|e| e.2));
+    }
+
+    fn modules(&self) -> u64 {
+        self.problem.y.len() as u64
+    }
+}

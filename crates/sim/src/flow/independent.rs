@@ -1,0 +1,277 @@
+//! Modules that are integrated alone, each with steps of its own.
+
+use crate::Method;
+use crate::detect::flash::{self, Glance, MAX_UNBOUNDED};
+use crate::error::Error;
+use crate::flow::FlowStage;
+use crate::flow::integrator::{StepError, foresee};
+use crate::motion::Motion;
+use crate::world::state::{Control, State, Step};
+use crate::world::{World, describe};
+use dlsys_expr::{Program, Scratch};
+use dlsys_model::{Jacobian, Rule};
+use dlsys_ode::Rates;
+use dlsys_tree::{ModuleId, SimTime};
+use smallvec::SmallVec;
+
+/// So many steps must bring time on by more than this part of it, or there is a singularity.
+const MANY_STEPS: usize = 10_000;
+const CRAWL: f64 = 1e-5;
+
+/// Counts a step; true if time hardly goes on.
+pub fn crawls(mark: &mut SimTime, since_mark: &mut usize, at: SimTime) -> bool {
+    *since_mark += 1;
+    if *since_mark < MANY_STEPS {
+        return false;
+    }
+    let crawls = at.since(*mark) <= CRAWL * at.to_f64();
+    (*since_mark, *mark) = (0, at);
+    crawls
+}
+
+/// The equations of one module whose neighbours rest or follow formulas that it does not read.
+struct Alone<'a> {
+    program: &'a Program,
+    jacobian: &'a Jacobian,
+    /// Row, column and entry in the clause's Jacobian.
+    partials: SmallVec<[(u32, u32, usize); 4]>,
+    /// All variables; those that move are filled in.
+    variables: Vec<f64>,
+    /// Where each component stands among the variables.
+    numeric: SmallVec<[usize; 4]>,
+    formulas: SmallVec<[(usize, &'a Motion, f64); 4]>,
+    /// Time since the formulas began, and `t` and `age`, at the start of the step.
+    offset: f64,
+    time: usize,
+    t: f64,
+    age: f64,
+    scratch: Scratch<f64>,
+}
+
+impl<'a> Alone<'a> {
+    fn new(
+        world: &'a World,
+        state: &'a State,
+        rule: &'a Rule,
+        from: SimTime,
+        mut variables: Vec<f64>,
+        scratch: Scratch<f64>,
+        y: &mut Vec<f64>,
+    ) -> Alone<'a> {
+        y.clear();
+        let own = world.tree.parameters(state.id);
+        world.variables(rule, state.id, &state.context, from, &mut variables);
+        variables[..own.len()].copy_from_slice(own);
+        let (t, age) = (from.to_f64(), from.since(world.tree.birth(state.id)));
+        variables.extend(state.switches.iter().map(|&on| f64::from(u8::from(on))));
+        let solve = &rule.solves[state.solve.expect("numeric motions have equations")];
+        let program = if state.forced { &solve.rates } else { &solve.numeric_rates };
+        let mut numeric: SmallVec<[usize; 4]> = smallvec::smallvec![0; program.outputs()];
+        let mut formulas = SmallVec::new();
+        y.resize(program.outputs(), 0.0);
+        for (i, motion) in state.motions.iter().enumerate() {
+            match motion {
+                Motion::Rest => {}
+                Motion::Step(c) | Motion::Coupled(c) => {
+                    numeric[*c as usize] = i;
+                    y[*c as usize] = own[i];
+                }
+                formula => formulas.push((i, formula, own[i])),
+            }
+        }
+        let (offset, time) = (from.since(state.since), rule.time_variable());
+        let component = |variable: usize| numeric.iter().position(|v| *v == variable).map(|c| c as u32);
+        let partials = (solve.jacobian.entries.iter().enumerate())
+            .filter_map(|(entry, &(row, variable))| {
+                Some((component(solve.of[row])?, component(variable)?, entry))
+            })
+            .collect();
+        let jacobian = &solve.jacobian;
+        Alone { program, jacobian, partials, variables, numeric, formulas, offset, time, t, age, scratch }
+    }
+}
+
+impl Alone<'_> {
+    /// Fills in the variables that move.
+    fn move_to(&mut self, tau: f64, y: &[f64]) {
+        for (&variable, &value) in self.numeric.iter().zip(y) {
+            self.variables[variable] = value;
+        }
+        for &(variable, motion, x) in &self.formulas {
+            self.variables[variable] = x + motion.value(self.offset + tau);
+        }
+        self.variables[self.time] = self.t + tau;
+        self.variables[self.time + 1] = self.age + tau;
+    }
+}
+
+/// Most times that a step is cut because of what it may have overlooked.
+const MAX_TRIES: usize = 100;
+
+impl Rates for Alone<'_> {
+    fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]) {
+        self.move_to(tau, y);
+        self.program.eval(&self.variables, &mut self.scratch, out);
+    }
+
+    fn couplings(&self) -> Vec<(u32, u32)> {
+        self.partials.iter().map(|&(row, column, _)| (row, column)).collect()
+    }
+
+    fn partials(&mut self, tau: f64, y: &[f64], out: &mut Vec<f64>) {
+        self.move_to(tau, y);
+        let mut all: SmallVec<[f64; 16]> = smallvec::smallvec![0.0; self.jacobian.values.outputs()];
+        self.jacobian.values.eval(&self.variables, &mut self.scratch, &mut all);
+        out.clear();
+        out.extend(self.partials.iter().map(|&(.., entry)| all[entry]));
+    }
+
+    fn modules(&self) -> u64 {
+        1
+    }
+
+    fn is_timed(&self) -> bool {
+        self.program.reads().contains(&self.time)
+    }
+}
+
+impl FlowStage<'_, '_> {
+    /// Makes a step of a module from its values in the tree; returns its length.
+    pub fn step_alone(&mut self, id: ModuleId, from: SimTime) -> Result<f64, Error> {
+        let model = self.setup.model;
+        let state = self.world.state(id).expect("a module with a rule");
+        let (index, solve) = (state.rule.expect("has a rule"), state.solve.expect("has equations"));
+        let rule = &model.rules[index];
+        let mut y = std::mem::take(&mut self.flows.y);
+        let variables = std::mem::take(&mut self.scratch.variables);
+        let hint = self.flows.hints[self.world.tree.kind(id).index()][solve];
+        let going_on = state.step.as_ref().filter(|s| s.live);
+        let mut control = going_on.map_or(hint, |s| s.control);
+        // What was learnt elsewhere says nothing of how well this module is known.
+        control.error = state.step.as_ref().map_or(0.0, |s| s.control.error);
+        let step = {
+            let scratch = std::mem::take(&mut self.scratch.registers);
+            let mut system = Alone::new(self.world, state, rule, from, variables, scratch, &mut y);
+            // One that goes on from its own last step need not evaluate its rates again.
+            if going_on.is_some_and(|s| self.flows.alone_last == Some((id, s.dense.end)))
+                && y.len() == self.flows.alone.size()
+            {
+                self.flows.alone.advance(&mut y);
+            } else {
+                self.flows.alone.restart(self.setup.settings.method, y.len());
+            }
+            let fixed = self.setup.settings.method.is_fixed_step();
+            let settings = self.setup.settings.for_clocks(rule.solves[solve].is_delicate);
+            let stiff = control.stiff || self.setup.settings.method == Method::Radau;
+            let flashes = rule.solves[solve].flashes && !fixed;
+            let mut tries = 0;
+            let step = loop {
+                let stats = &mut self.log.stats;
+                let step = self.flows.alone.step(&settings, &mut control, &mut system, &y, from, None, stats);
+                let step = step.map(|_| self.flows.alone.dense(&mut system, &y));
+                let Ok(dense) = &step else { break step };
+                tries += 1;
+                let least = 64.0 * from.resolution();
+                if !flashes || tries > MAX_TRIES {
+                    break step;
+                }
+                let (world, solve) = (&self.world, &rule.solves[solve]);
+                let (nodes, tolerance) = (&*self.flows.alone.nodes(), self.setup.settings.tolerance);
+                let (start, end, own) = (from, dense.end, Some(dense));
+                let step_made =
+                    flash::Step { world, state, rule, solve, start, end, nodes, own, tolerance, stiff };
+                match self.detector.lookout.look(&step_made) {
+                    Glance::Unbounded(at) if tries > MAX_UNBOUNDED => {
+                        self.detector.unbounded.entry(index).or_insert(from.to_f64() + at * dense.h);
+                        break step;
+                    }
+                    Glance::Overlooked(at) | Glance::Unbounded(at) if dense.h > least => {
+                        stats.rejected += 1;
+                        let part = if at > 0.0 { at } else { 0.25 };
+                        control.size = (part * dense.h).max(least);
+                    }
+                    _ => break step,
+                }
+            };
+            (self.scratch.variables, self.scratch.registers) = (system.variables, system.scratch);
+            step
+        };
+        self.flows.y = y;
+        let dense = step.map_err(|error| {
+            let own = |component: usize| {
+                let state = self.world.state(id)?;
+                let is_it = |m: &Motion| matches!(m, Motion::Step(c) if *c as usize == component);
+                Some((id, state.motions.iter().position(is_it)?))
+            };
+            self.step_error(error, from, own)
+        })?;
+        let h = dense.h;
+        self.flows.alone_last = Some((id, dense.end));
+        let fixed = self.setup.settings.method.is_fixed_step();
+        let state = self.world.state_mut(id).expect("seen above");
+        let crawling = match &mut state.step {
+            Some(step) => {
+                if !step.live {
+                    (step.mark, step.since_mark) = (from, 0);
+                }
+                (step.dense, step.control, step.live) = (dense, control, true);
+                crawls(&mut step.mark, &mut step.since_mark, from)
+            }
+            step => {
+                *step = Some(Box::new(Step { dense, control, live: true, mark: from, since_mark: 0 }));
+                false
+            }
+        };
+        if crawling && !fixed {
+            return Err(self.step_error(StepError::TooSmall(0), from, |_| Some((id, 0))));
+        }
+        Ok(h)
+    }
+
+    /// Learns from an event some time into a module's own step.
+    pub fn learn(&mut self, id: ModuleId) {
+        let now = self.instant.at;
+        let Some(state) = self.world.state(id) else { return };
+        let (Some(solve), Some(step)) = (state.solve, &state.step) else { return };
+        let kind = self.world.tree.kind(id).index();
+        if step.live {
+            // What comes next begins with what was learnt here.
+            let mut control = step.control;
+            let (lived, error) = (now.since(step.dense.start), control.last_error);
+            foresee(&mut control, error, lived, now.resolution());
+            self.flows.hints[kind][solve] = Control { last_error: 1.0, ..control };
+        }
+    }
+
+    /// An error of a step, with the module and parameter that own the component.
+    pub fn step_error(
+        &self,
+        error: StepError,
+        at: SimTime,
+        owner: impl Fn(usize) -> Option<(ModuleId, usize)>,
+    ) -> Error {
+        let (StepError::TooSmall(component) | StepError::Rate(component) | StepError::NotFinite(component)) =
+            error;
+        let (id, parameter) = owner(component).unwrap_or_else(|| (self.flows.anyone(self.world), 0));
+        let index = self.world.state(id).and_then(|s| s.rule).unwrap_or(0);
+        let rule = &self.setup.model.rules[index];
+        let solve = self.world.state(id).and_then(|s| s.solve);
+        let span = solve.map_or(rule.span, |s| rule.solves[s].span);
+        let mut site = self.world.site(self.setup.model, id, index, span, at);
+        let mut values = Vec::new();
+        self.world.values(id, at, &mut values);
+        site.module = describe(self.setup.model, self.world.tree.kind(id), &values);
+        let name = rule.parameters.get(parameter).cloned().unwrap_or_default();
+        if let Some(clock) = rule.clocks.iter().find(|clock| clock.parameter == parameter)
+            && !matches!(error, StepError::TooSmall(_))
+        {
+            site.span = rule.produces[clock.produce].span;
+            return Error::NotFinite { site, what: "the rate of an event".to_owned() };
+        }
+        match error {
+            StepError::TooSmall(_) => Error::StepTooSmall { site },
+            StepError::Rate(_) => Error::NotFinite { site, what: format!("the rate of {name}") },
+            StepError::NotFinite(_) => Error::NotFinite { site, what: name },
+        }
+    }
+}

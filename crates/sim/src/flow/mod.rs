@@ -1,0 +1,331 @@
+//! Flows: how parameters move from one instant to the next, and the next event of each module.
+//!
+//! ```text
+//! start_motions ─▶ closed_form            a formula, evaluated and never stepped
+//!               ─▶ independent            steps of the module alone
+//!               ─▶ coupled                one step for all modules that read one another
+//! look_ahead    ─▶ detect (zero crossings) ─▶ schedule
+//! prediction: the whole life of a module whose parameters all have closed forms, as one function
+//! ```
+
+pub mod algebraic;
+pub mod closed_form;
+pub mod coupled;
+mod independent;
+pub mod integrator;
+pub mod known_rates;
+pub mod lazy;
+pub mod prediction;
+mod rates;
+
+use crate::detect::Detector;
+use crate::detect::watch::needs_search;
+use crate::error::{Error, Near};
+use crate::log::Log;
+use crate::motion::Motion;
+use crate::schedule::{Owner, Schedule};
+use crate::scratch::Scratch;
+use crate::setup::Setup;
+use crate::world::neighbours::Neighbours;
+use crate::world::path::Path;
+use crate::world::state::{Change, Control, Next, What};
+use crate::world::{Instant, World};
+use coupled::Coupled;
+use dlsys_model::{Model, Sign};
+use dlsys_ode::Dense;
+use dlsys_tree::{ModuleId, SimTime};
+use integrator::Integrator;
+use known_rates::KnownRates;
+use smallvec::SmallVec;
+
+pub use integrator::next_grid_time;
+
+/// Two sides that differ by less than this part of the tolerance have met, where the equations end.
+const ARRIVED: f64 = 0.01;
+/// Growth of the stretches that are searched on closed forms.
+const WIDENING: f64 = 4.0;
+
+/// What flows keep from step to step.
+#[derive(Clone)]
+pub struct Flows {
+    pub coupled: Coupled,
+    /// Some algebraic parameters are computed only where they are observed.
+    pub lazy_algebra: bool,
+    /// Steps of modules that are integrated alone, and the module and end of the last one.
+    alone: Integrator,
+    alone_last: Option<(ModuleId, SimTime)>,
+    /// The experience of step control, by kind and number of the clause: modules of one kind under different rules take
+    /// the same steps.
+    hints: Vec<Vec<Control>>,
+    pub known_rates: KnownRates,
+    motions: Vec<Motion>,
+    y: Vec<f64>,
+}
+
+impl Flows {
+    pub fn new(model: &Model) -> Flows {
+        let hints = (model.kinds.iter()).map(|(_, kind)| {
+            let clauses = kind.rules.iter().map(|r| model.rules[*r].solves.len()).max();
+            vec![Control::default(); clauses.unwrap_or(0)]
+        });
+        let mut algebraic = model.rules.iter().flat_map(|rule| &rule.solves).map(|solve| &solve.algebraic);
+        Flows {
+            coupled: Coupled::default(),
+            lazy_algebra: algebraic.any(|a| (0..a.of.len()).any(|place| a.is_lazy(place))),
+            alone: Integrator::default(),
+            alone_last: None,
+            hints: hints.collect(),
+            known_rates: KnownRates::default(),
+            motions: Vec::new(),
+            y: Vec::new(),
+        }
+    }
+
+    /// The estimated error now of integrated values that a module reads, relative; 0 where nothing is integrated.
+    pub fn error_of(&self, world: &World, id: ModuleId) -> f64 {
+        let Some(state) = world.state(id) else { return 0.0 };
+        let own = state.step.as_ref().filter(|_| state.is_numeric()).map_or(0.0, |step| step.dense.error);
+        let common = if world.coupled.is_some() { self.coupled.control.error } else { 0.0 };
+        own.max(common)
+    }
+
+    /// The time scale of a module's equations, as far as it is known.
+    pub fn reach_of(&self, world: &World, id: ModuleId) -> f64 {
+        let Some(state) = world.state(id) else { return 1.0 };
+        if state.coupled && self.coupled.control.size > 0.0 {
+            return self.coupled.control.size;
+        }
+        let hint = state.solve.map_or(0.0, |solve| self.hints[world.tree.kind(id).index()][solve].size);
+        if hint > 0.0 { hint } else { 1.0 }
+    }
+
+    /// Some living module: to name one where no more is known.
+    pub fn anyone(&self, world: &World) -> ModuleId {
+        let named = self.coupled.members.iter().copied().find(|id| world.state(*id).is_some());
+        named
+            .or_else(|| world.states.iter().flatten().find(|s| s.is_alive).map(|s| s.id))
+            .expect("there are modules")
+    }
+    /// Evaluations of the equations of one module so far.
+    pub fn evaluations(&self) -> u64 {
+        self.alone.evaluations() + self.coupled.evaluations()
+    }
+
+    /// True if equations were stiff, so that the implicit method was taken.
+    pub fn has_been_stiff(&self) -> bool {
+        self.alone.is_implicit() || self.coupled.integrator.is_implicit()
+    }
+}
+
+/// The parts that flows work on.
+pub struct FlowStage<'s, 'm> {
+    pub setup: &'s Setup<'m>,
+    pub instant: &'s Instant,
+    pub world: &'s mut World,
+    pub neighbours: &'s Neighbours,
+    pub schedule: &'s mut Schedule,
+    pub flows: &'s mut Flows,
+    pub detector: &'s mut Detector,
+    pub log: &'s mut Log,
+    pub scratch: &'s mut Scratch,
+}
+
+impl FlowStage<'_, '_> {
+    /// Gives each parameter of a module its motion from the present on. Numeric motions get their component; the
+    /// steps are made later.
+    pub fn start_motions(&mut self, id: ModuleId, forced: bool) {
+        let model = self.setup.model;
+        let state = self.world.state(id).expect("a module with a rule");
+        let rule = &model.rules[state.rule.expect("a module with a rule")];
+        let Some(solve) = state.solve.map(|s| &rule.solves[s]) else {
+            self.set_motions(id, false, &[]);
+            return;
+        };
+        if solve.of.is_empty() && solve.algebraic.is_empty() {
+            self.set_motions(id, false, &[]);
+            return;
+        }
+        let mut motions = std::mem::take(&mut self.flows.motions);
+        motions.clear();
+        motions.resize(rule.parameters.len(), Motion::Rest);
+        let mut refused = false;
+        if forced {
+            for (component, &parameter) in solve.of.iter().enumerate() {
+                motions[parameter] = Motion::Step(component as u32);
+            }
+            closed_form::solved(solve, true, &mut motions);
+        } else {
+            let read = (rule, solve.stepping.laws_read());
+            self.world.variables_read(read, id, &state.context, self.instant.at, &mut self.scratch.variables);
+            self.scratch.variables.extend(state.switches.iter().map(|&on| f64::from(u8::from(on))));
+            refused = !closed_form::formulas(solve, rule.time_variable(), self.scratch, &mut motions)
+                || !closed_form::functions(solve, rule.time_variable(), self.scratch, &mut motions);
+        }
+        if refused {
+            self.flows.motions = motions;
+            self.start_motions(id, true);
+            return;
+        }
+        self.set_motions(id, forced, &motions);
+        self.flows.motions = motions;
+    }
+
+    fn set_motions(&mut self, id: ModuleId, forced: bool, motions: &[Motion]) {
+        let now = self.instant.at;
+        let state = self.world.state_mut(id).expect("a module with a rule");
+        state.since = now;
+        state.forced = forced;
+        state.motions.clear();
+        state.motions.extend(motions.iter().cloned());
+        state.window = 0.0;
+        if let Some(step) = &mut state.step {
+            step.live = false;
+        }
+    }
+
+    /// Finds out what comes next for a module that is not coupled, from an instant on, and puts it into the queue.
+    pub fn look_ahead(&mut self, id: ModuleId, from: SimTime) -> Result<(), Error> {
+        let model = self.setup.model;
+        let who = Owner::Module(id.slot() as u32);
+        let World { tree, states, .. } = &mut self.world;
+        let state = states[id.slot()].as_mut().expect("a module with a rule");
+        let rule = &model.rules[state.rule.expect("a module with a rule")];
+        // The steps of coupled modules are not their own.
+        let numeric = state.is_numeric() && !state.coupled;
+        state.next = state.next.again();
+        let (h, limit) = if numeric {
+            match self.step_alone(id, from) {
+                Ok(h) => (h, 1.0),
+                Err(error) => return self.arrest(id, from).ok_or(error),
+            }
+        } else if needs_search(state, rule) {
+            let h = if state.window > 0.0 {
+                WIDENING * state.window
+            } else {
+                closed_form::time_scale(state, tree)
+            };
+            // Not shorter than time itself can tell.
+            let h = h.max(64.0 * from.resolution());
+            state.window = h;
+            (h, 1.0)
+        } else {
+            (1.0, f64::INFINITY)
+        };
+        let state = self.world.state(id).expect("seen above");
+        let path = Path::new(self.world, state, rule, from, h);
+        let found = self.detector.watcher.search(&path, limit);
+        let end = (state.motions.iter()).filter_map(Motion::end).reduce(f64::min);
+        let end = end.map(|tau| state.since.after(tau));
+        let (what, at) = match found.event {
+            Some(_) if found.in_doubt => (What::Doubt, found.touched[0].time),
+            Some(_) => (What::Event, found.touched[0].time),
+            None if numeric => (What::Window, state.step.as_ref().map_or(from, |s| s.dense.end)),
+            None if limit.is_finite() => (What::Window, from.after(h)),
+            None => (What::Nothing, from),
+        };
+        let (what, at) = match end {
+            Some(end) if what == What::Nothing || end.since(at) < 0.0 => (What::Fault, end),
+            _ => (what, at),
+        };
+        let state = self.world.state_mut(id).expect("seen above");
+        let lasting = limit.is_infinite();
+        let (near, before, index) = (found.near, state.next.near, state.rule);
+        state.next = Next { what, touched: found.touched, changes: found.changes, lasting, near };
+        if what == What::Nothing {
+            self.schedule.cancel(who);
+        } else {
+            self.schedule.schedule(who, at);
+        }
+        self.detector.note_approach(index.unwrap_or(0), near, before, at);
+        Ok(())
+    }
+
+    /// Where no step leads on because the equations end there: if a boundary is there too, it has been reached.
+    pub fn arrest(&mut self, id: ModuleId, at: SimTime) -> Option<()> {
+        let model = self.setup.model;
+        let state = self.world.state(id)?;
+        let rule = &model.rules[state.rule?];
+        self.world.variables(rule, id, &state.context, at, &mut self.scratch.variables);
+        let mut sides = vec![0.0; rule.sides.outputs()];
+        rule.sides.eval(&self.scratch.variables, &mut self.scratch.registers, &mut sides);
+        let near = |atom: &usize| {
+            let (a, b) = (sides[2 * atom], sides[2 * atom + 1]);
+            (a - b).abs() <= ARRIVED * self.setup.settings.tolerance * a.abs().max(b.abs()).max(1.0)
+        };
+        let signed = |atom: &usize| matches!(state.signs[*atom], Sign::Plus | Sign::Minus);
+        let touched: SmallVec<[Change; 1]> = (0..rule.atoms.len())
+            .filter(signed)
+            .filter(near)
+            .map(|atom| Change { atom, time: at, at: Sign::Zero, after: state.signs[atom], level: None })
+            .collect();
+        if touched.is_empty() {
+            return None;
+        }
+        let state = self.world.state_mut(id)?;
+        state.next = Next { what: What::Event, touched, ..Next::default() };
+        self.schedule.schedule(Owner::Module(id.slot() as u32), at);
+        Some(())
+    }
+
+    /// Goes on to the next stretch of a module.
+    pub fn pass_window(&mut self, id: ModuleId, at: SimTime) -> Result<(), Error> {
+        let state = self.world.state_mut(id).expect("scheduled");
+        state.pass_changes(at);
+        if state.is_numeric() {
+            // The numeric parameters begin anew; formulas go on from where they began.
+            self.rebase(id, at);
+        }
+        self.look_ahead(id, at)
+    }
+
+    /// Makes the end of a module's own step the start of its next.
+    fn rebase(&mut self, id: ModuleId, at: SimTime) {
+        let state = self.world.state(id).expect("scheduled");
+        let first = self.world.tree.places(id).start;
+        let ends: Vec<(usize, f64)> = (state.motions.iter().enumerate())
+            .filter_map(|(parameter, motion)| match motion {
+                Motion::Step(c) => {
+                    let dense: &Dense = &state.step.as_ref()?.dense;
+                    Some((first + parameter, dense.value(*c as usize, dense.position(at))))
+                }
+                _ => None,
+            })
+            .collect();
+        for (place, value) in ends {
+            self.world.tree.set_value(place, value);
+        }
+    }
+
+    /// Forgets all about a module that has been replaced, or has lost its rule.
+    pub fn forget(&mut self, id: ModuleId) {
+        // What was kept of it stays as memory for the next that lives there.
+        if let Some(state) = self.world.state_mut(id) {
+            state.is_alive = false;
+            if state.coupled {
+                self.flows.coupled.repaired = true;
+                self.flows.coupled.loosened.extend_from_slice(&state.context);
+            }
+            self.schedule.cancel(Owner::Module(id.slot() as u32));
+        }
+    }
+
+    /// Two sides of a condition that have come too near each other for anybody to tell whether they have met.
+    pub fn in_doubt(&mut self, id: ModuleId, atom: usize) -> Error {
+        let index = self.world.rule_and_clause(id).0.unwrap_or(0);
+        let rule = &self.setup.model.rules[index];
+        self.world.rebase(id, self.instant.at);
+        let site = self.world.site(self.setup.model, id, index, rule.atoms[atom], self.instant.at);
+        let mut sides = vec![0.0; rule.sides.outputs()];
+        if let Some(state) = self.world.state(id) {
+            self.world.variables(rule, id, &state.context, self.instant.at, &mut self.scratch.variables);
+            rule.sides.eval(&self.scratch.variables, &mut self.scratch.registers, &mut sides);
+        }
+        let gap = (sides[2 * atom] - sides[2 * atom + 1]).abs();
+        let error = self
+            .world
+            .state(id)
+            .map_or(0.0, |state| Path::new(self.world, state, rule, self.instant.at, 0.0).error());
+        let boundary = rule.boundaries[atom].to_string();
+        Error::InDoubt { site, near: Box::new(Near { boundary, gap, error: error.max(gap) }) }
+    }
+}

@@ -1,0 +1,70 @@
+//! The record of a run: productions as they took place, and the work that was done.
+
+use super::Stats;
+use dlsys_model::KindId;
+use dlsys_tree::Lineage;
+
+/// The record of a run.
+#[derive(Clone, Debug, Default)]
+pub struct Log {
+    pub stats: Stats,
+    /// Productions since they were last taken, if they are recorded.
+    pub events: Option<Vec<Event>>,
+}
+
+impl Log {
+    /// Discards productions beyond the first `known`: they do not take place.
+    pub fn take_back(&mut self, known: usize) {
+        if let Some(events) = &mut self.events {
+            events.truncate(known);
+        }
+    }
+}
+
+/// A production that took place.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Event {
+    pub time: f64,
+    /// The module that was replaced.
+    pub lineage: Lineage,
+    pub kind: KindId,
+    /// Index into the model's rules.
+    pub rule: usize,
+    /// Index into the rule's `produces`.
+    pub clause: usize,
+    /// Index of the successor that chance has chosen, where a clause has several.
+    pub successor: Option<usize>,
+    /// How far the located instant is from the boundary: the largest difference between the two sides of a
+    /// comparison that is met with equality there.
+    pub residual: f64,
+    /// Events of one instant have one number; it grows by one from instant to instant.
+    pub group: u64,
+    /// What it changes, if that is recorded. None where the predecessor was itself made at this instant: the
+    /// transition of the first of the cascade tells all.
+    pub transition: Option<Box<Transition>>,
+}
+
+/// A module, or a bracket, at an instant.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stand {
+    pub kind: KindId,
+    pub values: Vec<f64>,
+    /// Of the values, per unit of time.
+    pub rates: Vec<f64>,
+    pub age: f64,
+}
+
+/// What a production changes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Transition {
+    /// The limit from the left.
+    pub before: Stand,
+    /// In string order, brackets included.
+    pub after: Vec<Stand>,
+    /// The rates before are known: not those of the initial string at t = 0.
+    pub moved: bool,
+    /// Something that is drawn follows the predecessor on its axis.
+    pub followed: bool,
+    /// Further productions at the same instant that were needed to get from one to the other.
+    pub cascade: usize,
+}

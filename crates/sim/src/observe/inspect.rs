@@ -1,0 +1,93 @@
+//! All that is known of one module at a time.
+
+use crate::flow::lazy;
+use crate::kernel::Simulation;
+use dlsys_model::KindId;
+use dlsys_tree::{Lineage, ModuleId, SimTime, Visit};
+
+/// A module as it is seen from another.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Seen {
+    pub kind: KindId,
+    pub lineage: Lineage,
+    /// At the time of the inspection.
+    pub parameters: Vec<f64>,
+}
+
+/// A module with its rates and its neighbours.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Inspection {
+    pub module: Seen,
+    /// Derivatives of the parameters by time, in the model's unit.
+    pub rates: Vec<f64>,
+    /// Time of birth.
+    pub birth: f64,
+    /// The rule that applies and its `solve` clause, as indices into the model's; None if there is none, or, of a rule,
+    /// if no rule's context is there.
+    pub rule: Option<usize>,
+    pub solve: Option<usize>,
+    /// The modules that the rule's context has found, left to right as written.
+    pub context: Vec<Seen>,
+    /// The nearest modules that count as context, to the left and to the right (LANGUAGE, "Context").
+    pub left: Option<Seen>,
+    pub right: Option<Seen>,
+}
+
+impl Simulation<'_> {
+    /// Looks at a module, by its number in string order, from 0, brackets not counted, at a time that can be shown
+    /// ([`Simulation::can_show`]). None if there is no such module, or if the simulation has failed.
+    ///
+    /// It costs a copy of the simulation, which itself is not touched.
+    pub fn inspect(&self, t: f64, number: usize) -> Option<Inspection> {
+        let mut probe = self.clone();
+        probe.pass(t).ok()?;
+        let modules = |visit| match visit {
+            Visit::Module(id) => Some(id),
+            _ => None,
+        };
+        let id = probe.world.tree.walk().filter_map(modules).nth(number)?;
+        let at = SimTime::new(t);
+        if at.since(probe.instant.at) > 0.0 {
+            probe.instant.at = at;
+        }
+        let now = probe.instant.at;
+        probe.flow_stage().show_coupled(now);
+        probe.materialise(id);
+        probe.flow_stage().refresh(now).ok()?;
+        let (rule, solve, context) = match probe.world.state(id) {
+            Some(state) => (state.rule, state.solve, state.context.to_vec()),
+            None => (None, None, Vec::new()),
+        };
+        let mut rates = Vec::new();
+        probe.flow_stage().rates_ahead(id, 0.0, &mut rates);
+        rates.truncate(probe.world.tree.shown(id));
+        let skipped = |kind| self.setup.model.kinds.get(kind).skipped;
+        let left = probe.world.tree.left(id, skipped);
+        let right = probe.world.tree.right(id, skipped);
+        Some(Inspection {
+            module: probe.seen(id),
+            rates,
+            birth: probe.world.tree.birth(id).to_f64(),
+            rule,
+            solve,
+            context: context.into_iter().map(|id| probe.seen(id)).collect(),
+            left: left.map(|id| probe.seen(id)),
+            right: right.map(|id| probe.seen(id)),
+        })
+    }
+
+    /// Gives a lazy module its state.
+    fn materialise(&mut self, id: ModuleId) {
+        let rules = &self.setup.model.rules;
+        lazy::materialise(&mut self.world, rules, id, &self.instant, &mut self.scratch);
+    }
+
+    fn seen(&mut self, id: ModuleId) -> Seen {
+        self.materialise(id);
+        let mut parameters = Vec::new();
+        self.world.values(id, self.instant.at, &mut parameters);
+        let tree = &self.world.tree;
+        parameters.truncate(tree.shown(id));
+        Seen { kind: tree.kind(id), lineage: tree.lineage(id), parameters }
+    }
+}

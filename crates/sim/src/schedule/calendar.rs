@@ -1,0 +1,286 @@
+//! The events of light modules, in order of time.
+//!
+//! An entry is 12 bytes: the time as a float, and the slot. Instants to all their digits are computed again for those
+//! that come first (`light`), so entries of one float are one bundle here, and order within it is decided there. A
+//! light module stays what it is until its event, so nothing is ever taken back.
+
+use std::collections::VecDeque;
+
+/// An entry's slot has this bit if it is the number of a run; a tree has no such slots.
+const RUN: u32 = 1 << 31;
+/// Children of an entry in the heap: four lie in one line of the cache.
+const ARITY: usize = 4;
+/// A heap that can hold no more than this keeps its memory.
+const LARGE: usize = 1 << 16;
+/// Lines beside the heap.
+const LINES: usize = 4;
+/// Times that are remembered, so that equal ones meet.
+const RECENT: usize = 16;
+const NOWHERE: u32 = u32::MAX;
+
+/// The time in halves, so that four bytes less are needed.
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    high: u32,
+    low: u32,
+    slot: u32,
+}
+
+impl Entry {
+    #[inline]
+    fn new(time: f64, slot: u32) -> Entry {
+        let bits = time.to_bits();
+        Entry { high: (bits >> 32) as u32, low: bits as u32, slot }
+    }
+
+    #[inline]
+    fn time(self) -> f64 {
+        f64::from_bits(u64::from(self.high) << 32 | u64::from(self.low))
+    }
+}
+
+/// Events in order, in which many of one time are one entry: a thousand cells that divide together cost one place in
+/// the order, and one push each.
+///
+/// What is put in is mostly later than all before it of its kind: newborns that live as long as each other. Such events
+/// wait in a few lines, first in, first out; the heap is for what comes out of turn. A line is read and written in the
+/// order of memory, a heap of a million events at ten places for each.
+#[derive(Clone, Debug)]
+pub struct CalendarQueue {
+    lines: [VecDeque<Entry>; LINES],
+    /// The last time of each line.
+    ends: [f64; LINES],
+    heap: Vec<Entry>,
+    /// The first place of the heap is empty: most events are followed by a later one, which is put there.
+    hole: bool,
+    runs: Vec<Vec<u32>>,
+    free_runs: Vec<u32>,
+    /// Times lately put in, by a hash, with their runs.
+    recent: [(u64, u32); RECENT],
+    /// The earliest entry and the line where it stands (none for the heap), once somebody has asked.
+    first: Option<(Entry, Option<usize>)>,
+}
+
+impl Default for CalendarQueue {
+    fn default() -> CalendarQueue {
+        CalendarQueue {
+            lines: Default::default(),
+            ends: [f64::NEG_INFINITY; LINES],
+            heap: Vec::new(),
+            hole: false,
+            runs: Vec::new(),
+            free_runs: Vec::new(),
+            recent: [(u64::MAX, NOWHERE); RECENT],
+            first: None,
+        }
+    }
+}
+
+fn recent_place(time: f64) -> usize {
+    (time.to_bits().wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 60) as usize
+}
+
+impl CalendarQueue {
+    /// Puts in an event. The time is a number.
+    pub fn push(&mut self, time: f64, slot: u32) {
+        let recent = &mut self.recent[recent_place(time)];
+        if recent.0 != time.to_bits() {
+            *recent = (time.to_bits(), NOWHERE);
+            return self.push_entry(time, slot);
+        }
+        if recent.1 == NOWHERE {
+            let run = self.free_runs.pop().unwrap_or(self.runs.len() as u32);
+            if run as usize == self.runs.len() {
+                self.runs.push(Vec::new());
+            }
+            recent.1 = run;
+            self.push_entry(time, run | RUN);
+        }
+        let run = self.recent[recent_place(time)].1;
+        self.runs[run as usize].push(slot);
+    }
+
+    /// The earliest time.
+    #[inline]
+    pub fn earliest(&mut self) -> Option<f64> {
+        self.first().map(|(entry, _)| entry.time())
+    }
+
+    /// The slot of which the earliest event is, unless it is many.
+    pub fn earliest_slot(&mut self) -> Option<u32> {
+        self.first().map(|(entry, _)| entry.slot).filter(|slot| slot & RUN == 0)
+    }
+
+    #[inline]
+    fn first(&mut self) -> Option<(Entry, Option<usize>)> {
+        if self.first.is_none() {
+            self.first = self.find_first();
+        }
+        self.first
+    }
+
+    fn find_first(&self) -> Option<(Entry, Option<usize>)> {
+        let mut first = self.first_of_heap().map(|entry| (entry, None));
+        for (line, entries) in self.lines.iter().enumerate() {
+            if let Some(&entry) = entries.front()
+                && first.is_none_or(|(other, _)| entry.time() < other.time())
+            {
+                first = Some((entry, Some(line)));
+            }
+        }
+        first
+    }
+
+    fn first_of_heap(&self) -> Option<Entry> {
+        if !self.hole {
+            return self.heap.first().copied();
+        }
+        let children = self.heap.get(1..self.heap.len().min(ARITY + 1))?;
+        children.iter().copied().reduce(|a, b| if b.time() < a.time() { b } else { a })
+    }
+
+    /// Takes out everything of the earliest time.
+    pub fn pop(&mut self, out: &mut Vec<u32>) {
+        let Some(time) = self.earliest() else { return };
+        while let Some((_, line)) = self.first().filter(|(entry, _)| entry.time() == time) {
+            let Some(Entry { slot, .. }) = (match line {
+                Some(line) => self.pop_line(line),
+                None => self.pop_heap(),
+            }) else {
+                return;
+            };
+            self.first = None;
+            if slot & RUN == 0 {
+                out.push(slot);
+                continue;
+            }
+            let number = slot & !RUN;
+            let recent = &mut self.recent[recent_place(time)];
+            if recent.1 == number {
+                recent.1 = NOWHERE;
+            }
+            let run = &mut self.runs[number as usize];
+            match out.is_empty() {
+                true => std::mem::swap(out, run),
+                false => out.append(run),
+            }
+            self.free_runs.push(number);
+        }
+    }
+
+    fn push_entry(&mut self, time: f64, slot: u32) {
+        let entry = Entry::new(time, slot);
+        // The line that it fits best: the others stay free for what comes earlier.
+        let mut line = None;
+        for (i, end) in self.ends.iter().enumerate() {
+            if *end <= time && line.is_none_or(|other: usize| *end > self.ends[other]) {
+                line = Some(i);
+            }
+        }
+        if self.first.is_some_and(|(first, _)| time < first.time()) {
+            self.first = Some((entry, line));
+        }
+        if let Some(line) = line {
+            self.ends[line] = time;
+            return self.lines[line].push_back(entry);
+        }
+        if self.hole {
+            self.hole = false;
+            return self.sift_down(entry);
+        }
+        let mut at = self.heap.len();
+        self.heap.push(entry);
+        while at > 0 {
+            let above = (at - 1) / ARITY;
+            if self.heap[above].time() <= time {
+                break;
+            }
+            self.heap[at] = self.heap[above];
+            at = above;
+        }
+        self.heap[at] = entry;
+    }
+
+    fn pop_line(&mut self, line: usize) -> Option<Entry> {
+        let entry = self.lines[line].pop_front();
+        if self.lines[line].is_empty() {
+            self.ends[line] = f64::NEG_INFINITY;
+        }
+        entry
+    }
+
+    fn pop_heap(&mut self) -> Option<Entry> {
+        self.fill_hole();
+        self.hole = !self.heap.is_empty();
+        self.heap.first().copied()
+    }
+
+    fn fill_hole(&mut self) {
+        if std::mem::take(&mut self.hole)
+            && let Some(last) = self.heap.pop()
+            && !self.heap.is_empty()
+        {
+            self.sift_down(last);
+        }
+        // What goes from the heap into lines is not to be paid for twice.
+        if self.heap.capacity() > LARGE && self.heap.len() < self.heap.capacity() / 2 {
+            self.heap.shrink_to(self.heap.len() + self.heap.len() / 4);
+        }
+    }
+
+    /// Puts an entry into the first place, and sets the heap in order.
+    fn sift_down(&mut self, entry: Entry) {
+        let heap = &mut self.heap[..];
+        let wanted = entry.time();
+        let mut at = 0;
+        loop {
+            let first = ARITY * at + 1;
+            let Some(children) = heap.get(first..(first + ARITY).min(heap.len())) else { break };
+            let mut least = 0;
+            let Some(mut time) = children.first().map(|child| child.time()) else { break };
+            for (i, child) in children.iter().enumerate().skip(1) {
+                let its = child.time();
+                if its < time {
+                    (least, time) = (i, its);
+                }
+            }
+            if time >= wanted {
+                break;
+            }
+            heap[at] = children[least];
+            at = first + least;
+        }
+        heap[at] = entry;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Against a sorted list; few different times, so that many meet.
+        #[test]
+        fn bundles_come_in_order(steps in proptest::collection::vec((0..3u8, 0..40u32), 0..300)) {
+            let mut agenda = CalendarQueue::default();
+            let mut list: Vec<(u32, u32)> = Vec::new();
+            for (slot, (what, time)) in (0..).zip(steps) {
+                if what == 0 {
+                    let mut out = Vec::new();
+                    agenda.pop(&mut out);
+                    let mut found = out;
+                    found.sort_unstable();
+                    let first = list.iter().map(|e| e.0).min();
+                    let wanted: Vec<u32> = list.iter().filter(|e| Some(e.0) == first).map(|e| e.1).collect();
+                    prop_assert_eq!(found, wanted);
+                    list.retain(|e| Some(e.0) != first);
+                } else {
+                    agenda.push(f64::from(time), slot);
+                    list.push((time, slot));
+                }
+                prop_assert_eq!(agenda.earliest(), list.iter().map(|e| f64::from(e.0)).reduce(f64::min));
+            }
+        }
+    }
+}

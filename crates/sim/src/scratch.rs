@@ -1,0 +1,12 @@
+//! Working memory that is used again and again; nothing in it lasts beyond one stage.
+
+use dlsys_expr::Scratch as Registers;
+
+/// Memory for the variables of a rule and for the evaluation of its programs.
+#[derive(Clone, Debug, Default)]
+pub struct Scratch {
+    /// The variables of a rule: own parameters, those of the context, aggregates, `t`, `age`, switches.
+    pub variables: Vec<f64>,
+    pub registers: Registers<f64>,
+    pub rates: Vec<f64>,
+}

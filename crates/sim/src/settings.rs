@@ -1,0 +1,127 @@
+//! Settings of a run, and the statistics of its work.
+
+use crate::Method;
+use crate::flow::next_grid_time;
+use dlsys_tree::SimTime;
+
+/// Rates of events that have no formula are integrated with at most this tolerance, so that their times are the same to
+/// nine digits whatever the tolerance is.
+const CLOCK_TOLERANCE: f64 = 1e-11;
+
+/// The modules that are integrated again after an event, among those that are integrated together.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Scheduler {
+    /// As many of the neighbours as the tolerance asks for.
+    #[default]
+    Auto,
+    /// All: one clock, and time is cut at every event. The reference.
+    Global,
+    /// Nobody: equations see their neighbours as they were at the start of the slice of time, or at the module's last
+    /// event in it. The approximation that the paper makes for speed (section 5); its error is of the order of the
+    /// slice.
+    Local {
+        /// Length of a slice, in units of time; slices end at its multiples.
+        slice: f64,
+    },
+}
+
+/// How a simulation is run.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    pub method: Method,
+    pub scheduler: Scheduler,
+    /// Error aimed at in every parameter at every time, relative to max(1, |value|).
+    pub tolerance: f64,
+    /// Step of the methods that have a fixed one, in units of time. Steps end at its multiples.
+    pub step_size: f64,
+    /// What random numbers follow from.
+    pub seed: u64,
+    /// More modules than this are an error.
+    pub max_modules: usize,
+    /// More productions and steps than this are an error; so is a run that is foreseen to need a hundred times as many, at
+    /// a pace that hardly brings time on.
+    pub max_events: u64,
+    /// More seconds than this, spent in calls of the simulation, are an error. Infinite by default.
+    pub max_seconds: f64,
+    /// More bytes of memory than this, of the process as a whole where the system tells them, are an error. By
+    /// default only what the system has not got.
+    pub max_memory: u64,
+    /// Productions are recorded for [`Simulation::take_events`].
+    pub log: bool,
+    /// Everything is done the general way; for tests of the quick one.
+    #[doc(hidden)]
+    pub slow: bool,
+    /// With `log`: what each production changes is recorded, too ([`Event::transition`]). Every event then costs work
+    /// for all modules whose rules have a context.
+    pub transitions: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Settings {
+        Settings {
+            method: Method::Auto,
+            scheduler: Scheduler::Auto,
+            tolerance: 1e-6,
+            step_size: 0.01,
+            seed: 0,
+            max_modules: Settings::MODULES,
+            max_events: Settings::EVENTS,
+            max_seconds: f64::INFINITY,
+            max_memory: u64::MAX,
+            log: false,
+            slow: false,
+            transitions: false,
+        }
+    }
+}
+
+impl Settings {
+    /// What a run may take unless something else is said: so much that only what runs away takes more.
+    pub const MODULES: usize = 10_000_000;
+    pub const EVENTS: u64 = 10_000_000_000;
+
+    /// The grid on which steps of fixed size end.
+    pub(crate) fn grid(&self) -> Option<f64> {
+        self.method.is_fixed_step().then_some(self.step_size)
+    }
+
+    /// For equations that decide by chance: there is no tolerance in when an event happens that has no time of its own.
+    pub(crate) fn for_clocks(&self, has_clocks: bool) -> Settings {
+        match has_clocks {
+            true => Settings { tolerance: self.tolerance.min(CLOCK_TOLERANCE), ..*self },
+            false => *self,
+        }
+    }
+
+    /// True if neighbours are seen as they were at the start of a slice of time.
+    pub(crate) fn is_sliced(&self) -> bool {
+        matches!(self.scheduler, Scheduler::Local { .. })
+    }
+
+    /// The end of the slice of time after an instant, if there are slices.
+    pub(crate) fn slice_end(&self, after: SimTime) -> Option<SimTime> {
+        match self.scheduler {
+            Scheduler::Local { slice } => Some(SimTime::new(next_grid_time(after, slice))),
+            _ => None,
+        }
+    }
+}
+
+/// Work done by a simulation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Stats {
+    /// Productions applied.
+    pub events: u64,
+    /// Steps accepted.
+    pub steps: u64,
+    /// Steps tried again with a smaller size.
+    pub rejected: u64,
+    /// Evaluations of the equations of one module.
+    pub rhs_evaluations: u64,
+    /// Modules alive, brackets not counted.
+    pub modules: u64,
+    /// Most modules that were alive at once.
+    pub peak_modules: u64,
+    /// Rules whose rates could not be bounded somewhere: [`Simulation::remarks`].
+    pub unbounded: u64,
+}

@@ -1,0 +1,71 @@
+//! The facts of a run that do not change: the model, the settings, and what follows from both.
+
+use super::{Method, Settings};
+use dlsys_model::{CUT, KindId, Model};
+use dlsys_tree::Seed;
+
+/// The facts of a run. Every stage reads them, none writes them.
+#[derive(Clone)]
+pub struct Setup<'m> {
+    pub model: &'m Model,
+    pub settings: Settings,
+    /// The settings of modules that are integrated together.
+    pub coupled_settings: Settings,
+    pub seed: Seed,
+    /// Every equation is integrated, also where it has a closed form.
+    pub numeric_only: bool,
+    /// The fast path is enabled (closed forms that are predicted at birth).
+    pub fast_path: bool,
+    /// The kind of `%`, if the model has it.
+    pub cuts: Option<KindId>,
+    /// Some rule has a context.
+    pub looks_around: bool,
+    /// By kind: some of its rules have a context.
+    pub kinds_with_context: Vec<bool>,
+    /// Neighbours are remembered.
+    pub hands_on: bool,
+    /// Some rule has an aggregate.
+    pub gathers: bool,
+    /// No rule has a context, is algebraic or discrete, and no transition is recorded: a production of a lazy module concerns
+    /// no other module.
+    pub plain: bool,
+    /// Some parameters are algebraic.
+    pub is_algebraic: bool,
+    /// Some rates may have pulses.
+    pub has_pulses: bool,
+}
+
+impl<'m> Setup<'m> {
+    pub fn new(model: &'m Model, settings: Settings) -> Setup<'m> {
+        let has_context = |rule: &usize| model.rules[*rule].looks_around();
+        let kinds_with_context: Vec<bool> =
+            model.kinds.iter().map(|(_, kind)| kind.rules.iter().any(has_context)).collect();
+        let looks_around = kinds_with_context.contains(&true);
+        let hands_on = looks_around || model.rules.iter().any(|rule| rule.discrete && rule.context_len() > 0);
+        let gathers = model.rules.iter().any(|rule| !rule.aggregates.is_empty());
+        let solves = || model.rules.iter().flat_map(|rule| &rule.solves);
+        let is_algebraic = solves().any(|solve| !solve.algebraic.is_empty());
+        let is_discrete = model.rules.iter().any(|rule| rule.discrete);
+        Setup {
+            model,
+            settings,
+            coupled_settings: settings.for_clocks(solves().any(|solve| solve.is_delicate)),
+            seed: Seed::new(settings.seed),
+            numeric_only: settings.method != Method::Auto,
+            fast_path: !settings.transitions && !settings.slow,
+            cuts: model.kinds.find(CUT, 0),
+            looks_around,
+            kinds_with_context,
+            hands_on,
+            gathers,
+            plain: !hands_on && !gathers && !is_algebraic && !is_discrete && !settings.transitions,
+            is_algebraic,
+            has_pulses: solves().any(|solve| solve.flashes),
+        }
+    }
+
+    /// True for a kind of which no module counts as a context.
+    pub fn skips(&self, kind: KindId) -> bool {
+        self.model.kinds.get(kind).skipped
+    }
+}

@@ -1,0 +1,311 @@
+//! The world: the modules of the structure and how their parameters move.
+//!
+//! - [`World`]: the tree, the states of materialised modules, the lives of lazy ones, the solution of the coupled ones
+//! - [`state`]: rule, clause, signs, trajectories and next event of one module
+//! - [`path`]: the variables of a rule along a stretch of time
+//! - [`context`], [`neighbours`]: the modules that a rule reads, and the modules that read one
+//! - [`life`]: lazy modules
+
+pub mod context;
+pub mod course;
+pub mod life;
+pub mod neighbours;
+pub mod path;
+pub mod state;
+
+use crate::error::{Error, Site};
+use crate::motion::Motion;
+use context::{Around, gather};
+use course::Course;
+use dlsys_diagnostic::Span;
+use dlsys_model::{KindId, Model, Rule};
+use dlsys_tree::{Lineage, ModuleId, SimTime, Tree, Visit};
+use life::Lives;
+use smallvec::SmallVec;
+use state::State;
+
+/// The instant under examination: that of the last event, or that of an observation.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Instant {
+    pub at: SimTime,
+    /// Number of the last instant at which something happened.
+    pub number: u64,
+}
+
+/// The growing structure with the motions of its parameters.
+#[derive(Clone, Debug)]
+pub struct World {
+    /// Its values are those at the start of each motion.
+    pub tree: Tree,
+    /// By slot of the tree, as far as there are any; None for modules without rules, and for light ones.
+    pub states: Vec<Option<Box<State>>>,
+    /// What is known of light modules, whose labels in the tree are numbers of life classes.
+    pub lives: Lives,
+    /// How the coupled modules move.
+    pub coupled: Option<Course>,
+    /// Number of changes of the structure.
+    pub structure: u64,
+}
+
+impl World {
+    /// A world without modules.
+    pub fn new(model: &Model, kinds_with_context: &[bool]) -> World {
+        let kinds = || model.kinds.iter().map(|(_, kind)| kind);
+        let (widths, arities) = (kinds().map(|k| k.width() as u32), kinds().map(|k| k.arity as u32));
+        World {
+            tree: Tree::new(widths.collect(), arities.collect()),
+            states: Vec::new(),
+            lives: Lives::new(model, kinds_with_context),
+            coupled: None,
+            structure: 0,
+        }
+    }
+
+    /// The state of a living module that has one.
+    pub fn state(&self, id: ModuleId) -> Option<&State> {
+        self.states.get(id.slot())?.as_deref().filter(|s| s.id == id && s.is_alive)
+    }
+
+    pub fn state_mut(&mut self, id: ModuleId) -> Option<&mut State> {
+        self.states.get_mut(id.slot())?.as_deref_mut().filter(|s| s.id == id && s.is_alive)
+    }
+
+    /// The memory for a module's state; it may be that of another, dead one.
+    pub fn make_state(&mut self, id: ModuleId) -> &mut State {
+        let slot = id.slot();
+        if self.states.len() <= slot {
+            self.states.resize(slot + 1, None);
+        }
+        self.states[slot].get_or_insert_with(|| Box::new(State::new(id)))
+    }
+
+    /// Gives a module a state that knows nothing yet.
+    pub fn new_state(&mut self, id: ModuleId) -> &mut State {
+        let state = self.make_state(id);
+        *state = State::new(id);
+        state
+    }
+
+    /// True for a module that is alive and light.
+    pub fn is_lazy(&self, id: ModuleId) -> bool {
+        self.tree.label_if_alive(id).is_some_and(|label| self.lives.get(label).is_some())
+    }
+
+    /// The rule and the clause that a module lives under.
+    pub fn rule_and_clause(&self, id: ModuleId) -> (Option<usize>, Option<usize>) {
+        match self.lives.get(self.tree.label(id)) {
+            Some(class) => (Some(class.rule), class.solve),
+            None => self.state(id).map_or((None, None), |s| (s.rule, s.solve)),
+        }
+    }
+
+    /// A parameter, moving since `state.since` from the value `x`, at an instant.
+    #[inline]
+    fn moved(&self, state: &State, motion: &Motion, x: f64, at: SimTime) -> f64 {
+        match motion {
+            Motion::Rest => x,
+            Motion::Step(component) => match state.step.as_ref().filter(|s| s.live) {
+                Some(step) => step.dense.value(*component as usize, step.dense.position(at)),
+                None => x,
+            },
+            Motion::Coupled(component) => match &self.coupled {
+                Some(course) => course.value(*component as usize, at).unwrap_or(x),
+                None => x,
+            },
+            formula => x + formula.value(at.since(state.since).max(0.0)),
+        }
+    }
+
+    /// The parameters of a module at an instant, appended to `out`; not of a light one, whose motions are not here.
+    pub fn values(&self, id: ModuleId, at: SimTime, out: &mut Vec<f64>) {
+        debug_assert!(self.lives.get(self.tree.label(id)).is_none_or(|class| class.is_over_at_birth()));
+        let values = self.tree.parameters(id);
+        match self.state(id).filter(|s| !s.motions.is_empty()) {
+            None => out.extend_from_slice(values),
+            Some(state) => {
+                for (&x, motion) in values.iter().zip(&state.motions[..]) {
+                    let rests = matches!(motion, Motion::Rest);
+                    out.push(if rests { x } else { self.moved(state, motion, x, at) });
+                }
+            }
+        }
+    }
+
+    /// One parameter of a module at an instant.
+    pub fn value(&self, id: ModuleId, parameter: usize, at: SimTime) -> f64 {
+        let x = self.tree.parameters(id)[parameter];
+        let moving = self.state(id).and_then(|s| Some((s, s.motions.get(parameter)?)));
+        moving.map_or(x, |(state, motion)| self.moved(state, motion, x, at))
+    }
+
+    /// Makes the values at an instant those of the tree, and the motions begin there, all at rest.
+    pub fn rebase(&mut self, id: ModuleId, at: SimTime) {
+        self.rebase_except(id, at, &[]);
+    }
+
+    /// The same, but for parameters whose values then are given.
+    pub fn rebase_except(&mut self, id: ModuleId, at: SimTime, given: &[(usize, f64)]) {
+        let places = self.tree.places(id);
+        let mut moved: SmallVec<[(usize, f64); 4]> = SmallVec::new();
+        let Some(state) = self.state(id) else { return };
+        for ((i, place), motion) in places.enumerate().zip(&state.motions[..]) {
+            if let Some(&(_, value)) = given.iter().find(|(parameter, _)| *parameter == i) {
+                moved.push((place, value));
+            } else if !matches!(motion, Motion::Rest) {
+                moved.push((place, self.moved(state, motion, self.tree.values()[place], at)));
+            }
+        }
+        for (place, value) in moved {
+            self.tree.set_value(place, value);
+        }
+        let Some(state) = self.state_mut(id) else { return };
+        state.since = at;
+        for motion in &mut state.motions {
+            *motion = Motion::Rest;
+        }
+    }
+
+    /// The end of the stretch, from an instant on, in which all coupled components that a module reads follow one polynomial.
+    pub fn knot(&self, state: &State, course: &Course, from: SimTime) -> SimTime {
+        let mut knot = course.end;
+        if course.is_whole() {
+            return knot;
+        }
+        for &id in std::iter::once(&state.id).chain(&state.context) {
+            for motion in self.state(id).map_or(&[][..], |s| &s.motions) {
+                if let Motion::Coupled(component) = motion {
+                    let end = course.knot(*component as usize, from);
+                    if end.since(knot) < 0.0 {
+                        knot = end;
+                    }
+                }
+            }
+        }
+        knot
+    }
+
+    /// The variables of a rule at an instant: parameters, those of the context, aggregates, `t` and `age`.
+    pub fn variables(&self, rule: &Rule, id: ModuleId, around: &Around, at: SimTime, out: &mut Vec<f64>) {
+        out.clear();
+        self.values(id, at, out);
+        for module in around.context() {
+            self.values(*module, at, out);
+        }
+        let time = [at.to_f64(), at.since(self.tree.birth(id))];
+        if rule.aggregates.is_empty() {
+            out.resize(rule.variables - 2, 0.0);
+            out.extend(time);
+            return;
+        }
+        let values = |child, out: &mut Vec<f64>| self.values(child, at, out);
+        gather(rule, around, time, out, &mut Vec::new(), |_| true, values);
+    }
+
+    /// The same where only some variables are read: what is not read may be any number.
+    pub fn variables_read(
+        &self,
+        (rule, reads): (&Rule, &[bool]),
+        id: ModuleId,
+        around: &Around,
+        at: SimTime,
+        out: &mut Vec<f64>,
+    ) {
+        if !rule.aggregates.is_empty() {
+            return self.variables(rule, id, around, at, out);
+        }
+        out.clear();
+        self.values(id, at, out);
+        let context = reads.get(out.len()..rule.variables - 2).unwrap_or_default();
+        if context.contains(&true) {
+            around.context().iter().for_each(|module| self.values(*module, at, out));
+        }
+        out.resize(rule.variables - 2, 0.0);
+        out.extend([at.to_f64(), at.since(self.tree.birth(id))]);
+    }
+
+    /// The modules of the kinds that are marked, in string order.
+    pub fn modules_of<'w>(&'w self, kinds: &'w [bool]) -> impl Iterator<Item = ModuleId> + 'w {
+        self.tree.walk().filter_map(|visit| match visit {
+            Visit::Module(id) if kinds[self.tree.kind(id).index()] => Some(id),
+            _ => None,
+        })
+    }
+
+    /// The place of an error: a module with the values of the tree, and a rule.
+    pub fn site(&self, model: &Model, id: ModuleId, rule: usize, span: Span, at: SimTime) -> Site {
+        Site {
+            module: describe(model, self.tree.kind(id), self.tree.parameters(id)),
+            lineage: self.tree.lineage(id),
+            rule: model.rules[rule].label.clone(),
+            span,
+            time: at.to_f64(),
+        }
+    }
+
+    /// The error of a parameter that is no finite number.
+    pub fn not_finite(&self, model: &Model, id: ModuleId, parameter: usize, at: SimTime) -> Error {
+        let (rule, solve) = self.rule_and_clause(id);
+        let rule_index = rule.unwrap_or(0);
+        let compiled = &model.rules[rule_index];
+        let span = solve.map_or(compiled.span, |s| compiled.solves[s].span);
+        let site = self.site(model, id, rule_index, span, at);
+        if let Some(clock) = compiled.clocks.iter().find(|clock| clock.parameter == parameter) {
+            let span = compiled.produces[clock.produce].span;
+            return Error::NotFinite { site: Site { span, ..site }, what: "the rate of an event".to_owned() };
+        }
+        Error::NotFinite { site, what: compiled.parameters.get(parameter).cloned().unwrap_or_default() }
+    }
+
+    /// The place of a module with the clause that it follows, or the production that it is about to make, as far as it is
+    /// known.
+    pub fn site_of_module(&self, model: &Model, id: ModuleId, at: SimTime) -> Site {
+        if let Some(class) = self.lives.get(self.tree.label(id)) {
+            let rule = &model.rules[class.rule];
+            let span = class.produce().map_or(rule.span, |p| rule.produces[p].span);
+            return self.site(model, id, class.rule, span, at);
+        }
+        let kind = model.kinds.get(self.tree.kind(id));
+        let own = self.state(id).and_then(|state| Some((state.rule?, state.solve)));
+        let first = || kind.rules.first().or(kind.steps.first()).copied().unwrap_or(0);
+        let (rule, solve) = own.unwrap_or_else(|| (first(), None));
+        let Some(found) = model.rules.get(rule) else { return site_of_axiom(at.to_f64()) };
+        let span = solve.map_or(found.span, |solve| found.solves[solve].span);
+        self.site(model, id, rule, span, at)
+    }
+
+    /// The place of an error in the rule that a module lives under.
+    pub fn site_of_rule(&self, model: &Model, id: ModuleId, at: SimTime) -> Site {
+        let rule = self.rule_and_clause(id).0.unwrap_or(0);
+        self.site(model, id, rule, model.rules[rule].span, at)
+    }
+}
+
+/// The place of an error where no module can be named.
+pub fn site_of_axiom(time: f64) -> Site {
+    Site {
+        module: "the initial string".to_owned(),
+        lineage: Lineage::of_axiom(0),
+        rule: "initial string".to_owned(),
+        span: Span::default(),
+        time,
+    }
+}
+
+/// A module as it is written, numbers to six digits: for people.
+pub fn describe(model: &Model, kind: KindId, parameters: &[f64]) -> String {
+    let (name, arity) = (&model.kinds.get(kind).name, model.kinds.get(kind).arity);
+    // Hidden parameters are no part of how it is written.
+    let parameters = &parameters[..parameters.len().min(arity)];
+    if parameters.is_empty() {
+        return name.clone();
+    }
+    let shown: Vec<String> = parameters.iter().map(|x| brief(*x, 6)).collect();
+    format!("{name}({})", shown.join(", "))
+}
+
+/// A number to some digits, with an exponent where that is shorter: for people.
+pub fn brief(x: f64, digits: usize) -> String {
+    let rounded: f64 = format!("{x:.*e}", digits - 1).parse().unwrap_or(x);
+    let (plain, exponent) = (rounded.to_string(), format!("{rounded:e}"));
+    if plain.len() <= digits + 6 { plain } else { exponent }
+}

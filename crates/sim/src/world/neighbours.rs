@@ -1,0 +1,273 @@
+//! The nearest neighbours of each module, and the modules that have looked at it.
+//!
+//! The nearest module that is not skipped, on either side, is remembered once it has been found, and handed on from a
+//! module to its successor. So finding a context costs the same however many finished branches stand between: they are
+//! not passed again. What is remembered stays right until the neighbour dies, because nothing else can come between;
+//! only where a skipped module turns into one that counts is everything forgotten.
+//!
+//! Whoever was looked at, matching or not, knows who looked: when it dies, those look again, and nobody else.
+
+use std::collections::HashMap;
+
+use smallvec::SmallVec;
+
+use crate::world::World;
+use crate::world::state::State;
+use dlsys_model::{KindId, Model};
+use dlsys_tree::{ModuleId, Tree};
+
+/// A module with more neighbours than this is taken to read all that it has looked at.
+const MANY: usize = 32;
+
+/// A neighbour, as far as it is known.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Link {
+    #[default]
+    Unknown,
+    /// There is none.
+    End,
+    Module(ModuleId),
+}
+
+impl From<Option<ModuleId>> for Link {
+    fn from(found: Option<ModuleId>) -> Link {
+        found.map_or(Link::End, Link::Module)
+    }
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Near {
+    /// Whose neighbours these are; of another, nothing is known.
+    of: Option<ModuleId>,
+    left: Link,
+    right: Link,
+}
+
+/// What is remembered, by slot of the tree.
+#[derive(Clone, Debug, Default)]
+pub struct Neighbours {
+    near: Vec<Near>,
+    /// What stands left of what stood right of a module that has died at this instant.
+    forwards: Forwards,
+    lookers: Vec<SmallVec<[ModuleId; 4]>>,
+}
+
+/// Links by module. Most instants concern few modules: then a list is enough.
+#[derive(Clone, Debug, Default)]
+struct Forwards {
+    few: Vec<(ModuleId, Link)>,
+    many: HashMap<ModuleId, Link>,
+}
+
+impl Forwards {
+    fn get(&self, id: ModuleId) -> Option<Link> {
+        let known = self.few.iter().find(|(of, _)| *of == id).map(|(_, link)| *link);
+        if self.many.is_empty() { known } else { known.or_else(|| self.many.get(&id).copied()) }
+    }
+
+    fn insert(&mut self, id: ModuleId, link: Link) {
+        const FEW: usize = 8;
+        if let Some((_, known)) = self.few.iter_mut().find(|(of, _)| *of == id) {
+            *known = link;
+        } else if self.few.len() < FEW {
+            self.few.push((id, link));
+        } else {
+            self.many.insert(id, link);
+        }
+    }
+
+    fn clear(&mut self) {
+        self.few.clear();
+        // One large instant is no reason to sweep a large table at every small one.
+        if !self.many.is_empty() {
+            self.many = HashMap::new();
+        }
+    }
+}
+
+impl Neighbours {
+    fn near(&mut self, id: ModuleId) -> &mut Near {
+        let slot = id.slot();
+        if self.near.len() <= slot {
+            self.near.resize(slot + 1, Near::default());
+        }
+        let near = &mut self.near[slot];
+        if near.of != Some(id) {
+            *near = Near { of: Some(id), ..Near::default() };
+        }
+        near
+    }
+
+    /// The left neighbour, as [`Tree::left`] finds it.
+    pub fn left(&mut self, tree: &Tree, id: ModuleId, skipped: impl Fn(KindId) -> bool) -> Option<ModuleId> {
+        let known = self.near(id).left;
+        let left = self.forwarded(tree, known);
+        self.near(id).left = left;
+        match left {
+            Link::End => None,
+            Link::Module(found) if tree.is_alive(found) => Some(found),
+            _ => {
+                let found = tree.left(id, skipped);
+                self.near(id).left = found.into();
+                found
+            }
+        }
+    }
+
+    /// A left neighbour, or what has taken its place at this instant. The way there is made short for the next who asks:
+    /// a million branches may ask one after another.
+    fn forwarded(&mut self, tree: &Tree, known: Link) -> Link {
+        let mut way: SmallVec<[ModuleId; 8]> = SmallVec::new();
+        let mut link = known;
+        while let Link::Module(id) = link
+            && !tree.is_alive(id)
+            && let Some(next) = self.forwards.get(id)
+        {
+            way.push(id);
+            link = next;
+        }
+        for id in way {
+            self.forwards.insert(id, link);
+        }
+        link
+    }
+
+    /// Says that everybody has looked who had to look at this instant.
+    pub fn end_instant(&mut self) {
+        self.forwards.clear();
+    }
+
+    /// The right neighbour, as [`Tree::right`] finds it.
+    pub fn right(&mut self, tree: &Tree, id: ModuleId, skipped: impl Fn(KindId) -> bool) -> Option<ModuleId> {
+        match self.near(id).right {
+            Link::End => None,
+            Link::Module(found) if tree.is_alive(found) => Some(found),
+            _ => {
+                let found = tree.right(id, skipped);
+                self.near(id).right = found.into();
+                found
+            }
+        }
+    }
+
+    /// Remembers that a module looked at another.
+    pub fn note(&mut self, tree: &Tree, looker: ModuleId, seen: ModuleId) {
+        let slot = seen.slot();
+        if self.lookers.len() <= slot {
+            self.lookers.resize(slot + 1, SmallVec::new());
+        }
+        let lookers = &mut self.lookers[slot];
+        if lookers.last() == Some(&looker) {
+            return;
+        }
+        if lookers.len() == lookers.capacity() {
+            // Those who have gone, and who have looked twice.
+            lookers.sort_unstable();
+            lookers.dedup();
+            lookers.retain(|id| tree.is_alive(*id));
+        }
+        lookers.push(looker);
+    }
+
+    /// Those who have looked at a slot's module, living and dead; some maybe at an earlier one.
+    pub fn lookers(&self, id: ModuleId) -> &[ModuleId] {
+        self.lookers.get(id.slot()).map_or(&[], |all| all)
+    }
+
+    /// Calls a function with each module whose equations or conditions read something of this one that may change, and
+    /// with its context; with some twice.
+    pub fn readers(
+        &self,
+        world: &World,
+        model: &Model,
+        id: ModuleId,
+        mut each: impl FnMut(ModuleId, &[ModuleId]),
+    ) {
+        for &looker in self.lookers(id) {
+            if let Some(state) = world.state(looker)
+                && reads(model, state, id)
+            {
+                each(looker, &state.context);
+            }
+        }
+    }
+
+    /// Forgets who looked at a module that has died.
+    pub fn bury(&mut self, id: ModuleId) {
+        if let Some(lookers) = self.lookers.get_mut(id.slot()) {
+            lookers.clear();
+        }
+    }
+
+    /// Forgets all neighbours.
+    pub fn forget(&mut self) {
+        self.near.clear();
+        self.end_instant();
+    }
+
+    /// Hands the neighbours of a module on to what has taken its place: `made` are the modules of a string of `kinds`.
+    /// Without a module, the string is the initial one.
+    pub fn hand_on(
+        &mut self,
+        dead: Option<ModuleId>,
+        kinds: &[KindId],
+        made: &[ModuleId],
+        skipped: impl Fn(KindId) -> bool,
+    ) {
+        let (left, right) = match dead {
+            Some(id) => {
+                let near = *self.near(id);
+                (near.left, near.right)
+            }
+            None => (Link::End, Link::End),
+        };
+        let mut made = made.iter().copied();
+        // What stands left of the next module, and the last on the same axis.
+        let (mut before, mut last): (Link, Option<ModuleId>) = (left, None);
+        let mut outer = Vec::new();
+        let mut first = None;
+        for &kind in kinds {
+            if kind == KindId::OPEN {
+                outer.push((before, last.take()));
+            } else if kind == KindId::CLOSE {
+                if let Some(last) = last {
+                    self.near(last).right = Link::End;
+                }
+                (before, last) = outer.pop().expect("brackets match: the front end saw to it");
+            } else if let Some(id) = made.next() {
+                *self.near(id) = Near { of: Some(id), left: before, right: Link::Unknown };
+                if !skipped(kind) {
+                    if let Some(last) = last {
+                        self.near(last).right = Link::Module(id);
+                    }
+                    if outer.is_empty() {
+                        first.get_or_insert(id);
+                    }
+                    (before, last) = (Link::Module(id), Some(id));
+                }
+            }
+        }
+        if let Some(last) = last {
+            self.near(last).right = right;
+        }
+        let Some(dead) = dead else { return };
+        self.forwards.insert(dead, before);
+        if let Link::Module(id) = right
+            && self.near(id).left == Link::Module(dead)
+        {
+            self.near(id).left = before;
+        }
+        if let Link::Module(id) = left
+            && self.near(id).right == Link::Module(dead)
+        {
+            self.near(id).right = first.map_or(right, Link::Module);
+        }
+    }
+}
+
+/// True if the equations or conditions of a module that has looked at another read something of it that may change.
+pub fn reads(model: &Model, state: &State, seen: ModuleId) -> bool {
+    // A module that has looked at many has looked at children, and reads them.
+    state.rule.is_some_and(|rule| model.rules[rule].reads_context)
+        && (state.context.len() > MANY || state.context.contains(&seen))
+}

@@ -1,0 +1,265 @@
+//! The variables of a rule along a stretch of time: values, rates and bounds at any position of it.
+
+use super::World;
+use super::context::gather;
+use crate::motion::Motion;
+use crate::world::course::Piece;
+use crate::world::state::State;
+use dlsys_expr::{Dual, Interval, Value};
+use dlsys_model::{Rule, Sum};
+use dlsys_ode::Dense;
+use dlsys_tree::{ModuleId, SimTime};
+
+/// The rounding error of a value, relative to it.
+const ROUNDING: f64 = 64.0 * f64::EPSILON;
+
+/// The variables of a module's rule along a stretch of time: positions 0 to 1 of `h` from `start`.
+pub struct Path<'p> {
+    pub world: &'p World,
+    pub state: &'p State,
+    pub rule: &'p Rule,
+    pub start: SimTime,
+    pub h: f64,
+    age: f64,
+    /// Which variables are wanted; all where this is empty.
+    wanted: &'p [bool],
+    /// The module's own step, if it is not yet among what is known.
+    step: Option<&'p Dense>,
+}
+
+impl<'p> Path<'p> {
+    pub fn new(world: &'p World, state: &'p State, rule: &'p Rule, start: SimTime, h: f64) -> Path<'p> {
+        let age = start.since(world.tree.birth(state.id));
+        Path { world, state, rule, start, h, age, wanted: &rule.watched, step: None }
+    }
+
+    /// The path of all variables that equations read; along a step of the module's own, if that is given.
+    pub fn of_equations(
+        world: &'p World,
+        state: &'p State,
+        rule: &'p Rule,
+        (start, h): (SimTime, f64),
+        step: Option<&'p Dense>,
+    ) -> Path<'p> {
+        Path { wanted: &[], step, ..Path::new(world, state, rule, start, h) }
+    }
+
+    /// What numeric motions follow along this stretch.
+    fn piece<'s>(&'s self, state: &'s State, motion: &Motion) -> Option<Piece<'s>> {
+        match motion {
+            Motion::Step(c) => {
+                let own = self.step.filter(|_| state.id == self.state.id);
+                let dense = own.or(state.step.as_ref().map(|step| &step.dense))?;
+                Some(Piece::new(dense, *c as usize, self.start, self.h))
+            }
+            Motion::Coupled(c) => self.world.coupled.as_ref()?.piece(*c as usize, self.start, self.h),
+            _ => None,
+        }
+    }
+
+    /// Bounds of an own parameter over the whole stretch, if it follows dense output.
+    pub fn dense_bounds(&self, parameter: usize) -> Option<Interval> {
+        let motion = self.state.motions.get(parameter)?;
+        Some(self.piece(self.state, motion)?.bounds())
+    }
+
+    /// Gives each variable that is wanted to one of three functions: values that rest, pieces of dense output, and formulas
+    /// with their start value and the time since it.
+    fn each<T: Value>(
+        &self,
+        out: &mut Vec<T>,
+        rest: impl Fn(f64) -> T,
+        piece: impl Fn(&Piece) -> T,
+        formula: impl Fn(&Motion, f64, f64) -> T,
+        time: impl Fn(f64) -> T,
+    ) {
+        out.clear();
+        let wanted = |i: usize| self.wanted.get(i).copied().unwrap_or(true);
+        let append = |id: ModuleId, reads: &dyn Fn(usize) -> bool, out: &mut Vec<T>| {
+            let values = self.world.tree.parameters(id);
+            if !(out.len()..out.len() + values.len()).any(reads) {
+                // Any value will do.
+                return out.extend(values.iter().map(|x| rest(*x)));
+            }
+            let Some(state) = self.world.state(id).filter(|s| !s.motions.is_empty()) else {
+                return out.extend(values.iter().map(|x| rest(*x)));
+            };
+            let offset = self.start.since(state.since);
+            for (&x, motion) in values.iter().zip(&state.motions) {
+                let reads = reads(out.len());
+                out.push(match motion {
+                    _ if !reads => rest(x),
+                    Motion::Rest => rest(x),
+                    Motion::Step(_) | Motion::Coupled(_) => match self.piece(state, motion) {
+                        Some(along) => piece(&along),
+                        None => rest(x),
+                    },
+                    motion => formula(motion, x, offset),
+                });
+            }
+        };
+        for &id in std::iter::once(&self.state.id).chain(self.state.context.context()) {
+            append(id, &wanted, out);
+        }
+        let times = [time(self.start.to_f64()), time(self.age)];
+        if self.rule.aggregates.is_empty() {
+            out.resize(self.rule.variables - 2, T::constant(0.0));
+            out.extend(times);
+            return;
+        }
+        let child = |id, out: &mut Vec<T>| append(id, &|_| true, out);
+        gather(self.rule, &self.state.context, times, out, &mut Vec::new(), wanted, child);
+    }
+
+    /// All variables at the start.
+    pub fn start(&self, out: &mut Vec<f64>) {
+        self.world.variables(self.rule, self.state.id, &self.state.context, self.start, out);
+    }
+
+    pub fn at(&self, position: f64, out: &mut Vec<f64>) {
+        let tau = position * self.h;
+        self.each(
+            out,
+            |x| x,
+            |piece| piece.value(position),
+            |motion, x, offset| x + motion.value(offset + tau),
+            |t| t + tau,
+        );
+    }
+
+    /// Values at the start with their rates, per unit of position.
+    pub fn departure(&self, out: &mut Vec<Dual<f64>>) {
+        let h = self.h;
+        self.each(
+            out,
+            Dual::constant,
+            |piece| piece.departure(),
+            |motion, x, offset| Dual { value: x + motion.value(offset), rate: h * motion.rate(offset) },
+            |t| Dual { value: t, rate: h },
+        );
+    }
+
+    /// All variables that equations read at a position.
+    pub fn everything_at(&self, position: f64, out: &mut Vec<f64>) {
+        self.at(position, out);
+        out.extend(self.state.switches.iter().map(|&on| f64::from(u8::from(on))));
+    }
+
+    /// Bounds of all variables that equations read. If `held`, what is integrated stays as it is in the middle.
+    pub fn everything_over(&self, lo: f64, hi: f64, held: bool, out: &mut Vec<Interval>) {
+        let h = self.h;
+        self.each(
+            out,
+            Interval::constant,
+            |piece| match held {
+                true => Interval::constant(piece.value(0.5 * (lo + hi))),
+                false => piece.over(lo, hi).value,
+            },
+            |motion, x, offset| {
+                let value = motion.over(offset + lo * h, offset + hi * h).value;
+                Interval { lo: x + value.lo, hi: x + value.hi, ..value }
+            },
+            |t| Interval::spanned(t + lo * h, t + hi * h),
+        );
+        out.extend(self.state.switches.iter().map(|&on| Interval::constant(f64::from(u8::from(on)))));
+    }
+
+    /// Bounds of values and rates from one position to another.
+    pub fn over(&self, lo: f64, hi: f64, out: &mut Vec<Dual<Interval>>) {
+        let h = self.h;
+        self.each(
+            out,
+            Dual::constant,
+            |piece| piece.over(lo, hi),
+            |motion, x, offset| {
+                let Dual { value, rate } = motion.over(offset + lo * h, offset + hi * h);
+                let shifted = Interval { lo: x + value.lo, hi: x + value.hi, ..value };
+                Dual { value: shifted, rate: Interval { lo: h * rate.lo, hi: h * rate.hi, ..rate } }
+            },
+            |t| Dual { value: Interval::spanned(t + lo * h, t + hi * h), rate: Interval::constant(h) },
+        );
+    }
+
+    /// Bounds of a sum of variables, and of its rate, if those that move do so along one dense output.
+    pub fn sum_over(&self, sum: &Sum, lo: f64, hi: f64) -> Option<Dual<Interval>> {
+        let (mut constant, mut moving) = (sum.constant, None);
+        for &(variable, factor) in &sum.terms {
+            let mut parameter = variable;
+            let mut modules = std::iter::once(&self.state.id).chain(self.state.context.context());
+            let id = *modules.find(|id| {
+                let count = self.world.tree.parameters(**id).len();
+                let is_here = parameter < count;
+                parameter -= if is_here { 0 } else { count };
+                is_here
+            })?;
+            let state = self.world.state(id);
+            match state.and_then(|state| Some((state, state.motions.get(parameter)?))) {
+                Some((state, motion)) if !matches!(motion, Motion::Rest) => {
+                    if !self.piece(state, motion)?.add_to(factor, &mut moving) {
+                        return None;
+                    }
+                }
+                _ => constant += factor * self.world.tree.parameters(id)[parameter],
+            }
+        }
+        let (first, coefficients) = moving?;
+        let Dual { value, rate } = first.sum_over(coefficients, lo, hi);
+        Some(Dual { value: Interval { lo: value.lo + constant, hi: value.hi + constant, ..value }, rate })
+    }
+
+    /// What the values may be at a position, given the errors of integration and of rounding.
+    pub fn uncertain(&self, position: f64, out: &mut Vec<Interval>) {
+        let tau = position * self.h;
+        let around = |x: f64, more: f64| {
+            let width = ROUNDING * x.abs() + more;
+            Interval { lo: x - width, hi: x + width, partial: false }
+        };
+        self.each(
+            out,
+            |x| around(x, 0.0),
+            // Beyond the position the step may lead anywhere.
+            |piece| {
+                around(piece.value(position), piece.error() * piece.over(0.0, position).value.magnitude())
+            },
+            |motion, x, offset| around(x + motion.value(offset + tau), ROUNDING * x.abs()),
+            |t| around(t + tau, 0.0),
+        );
+    }
+
+    /// What integrated values along the path may be wrong by, as a part of their size; 0 if there are none.
+    pub fn error(&self) -> f64 {
+        let course = self.world.coupled.as_ref().map_or(0.0, |course| course.error);
+        if self.state.coupled && course > 0.0 {
+            return course;
+        }
+        let error = |state: &State| {
+            let of = |motion: &Motion| match motion {
+                Motion::Coupled(_) => course,
+                Motion::Step(_) => state.step.as_ref().map_or(0.0, |step| step.dense.error),
+                _ => 0.0,
+            };
+            state.motions.iter().map(of).fold(0.0, f64::max)
+        };
+        let others = self.state.context.iter().filter_map(|id| self.world.state(*id));
+        others.map(error).fold(error(self.state), f64::max)
+    }
+
+    /// Bounds of values over the whole stretch, given the errors of integration.
+    pub fn whole(&self, out: &mut Vec<Interval>) {
+        let h = self.h;
+        self.each(
+            out,
+            Interval::constant,
+            |piece| {
+                let bounds = piece.bounds();
+                let width = piece.error() * bounds.magnitude();
+                Interval { lo: bounds.lo - width, hi: bounds.hi + width, ..bounds }
+            },
+            |motion, x, offset| {
+                let value = motion.over(offset, offset + h).value;
+                Interval { lo: x + value.lo, hi: x + value.hi, ..value }
+            },
+            |t| Interval::spanned(t, t + h),
+        );
+    }
+}

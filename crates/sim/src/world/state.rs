@@ -1,0 +1,215 @@
+//! What the simulation keeps of a module that has rules.
+
+use smallvec::SmallVec;
+
+use crate::motion::Motion;
+use crate::world::context::Around;
+use dlsys_model::Sign;
+use dlsys_ode::Dense;
+use dlsys_tree::{ModuleId, SimTime};
+
+pub type Signs = SmallVec<[Sign; 8]>;
+pub type Switches = SmallVec<[bool; 8]>;
+
+/// A module's rule, its equations, and how far it is known to go.
+#[derive(Clone, Debug)]
+pub struct State {
+    pub id: ModuleId,
+    /// False when the module has been replaced, and its memory waits for another.
+    pub is_alive: bool,
+    /// The rule that applies; None where no rule's context is there.
+    pub rule: Option<usize>,
+    pub context: Around,
+    pub solve: Option<usize>,
+    /// Conditions inside the active equations.
+    pub switches: Switches,
+    /// The sign of each atom of the rule, just after the last instant at which it was examined.
+    pub signs: Signs,
+    /// When the motions began; the values in the tree are those of then.
+    pub since: SimTime,
+    /// How each parameter moves; empty means that none does.
+    pub motions: SmallVec<[Motion; 2]>,
+    /// The module's own step, if it is integrated alone.
+    pub step: Option<Box<Step>>,
+    /// Length of the last stretch of formulas that was searched; 0 if none was.
+    pub window: f64,
+    /// All equations are integrated numerically, formulas or not.
+    pub forced: bool,
+    /// It is integrated together with others.
+    pub coupled: bool,
+    /// Number of the last walk through neighbours that came by.
+    pub visited: u64,
+    pub next: Next,
+    /// Set while an instant is examined that concerns the module.
+    pub open: Option<Box<Open>>,
+    /// Its motions are about to begin.
+    pub waits: bool,
+    /// Number of the instant at which its motions last began.
+    pub restarted: u64,
+}
+
+/// A step, or a window of formulas, of one module.
+#[derive(Clone, Debug)]
+pub struct Step {
+    pub dense: Dense,
+    pub control: Control,
+    /// The step is of the present motion.
+    pub live: bool,
+    /// Time in the past, and the number of steps since then.
+    pub mark: SimTime,
+    pub since_mark: usize,
+}
+
+/// What step control remembers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Control {
+    /// Length of the next step to be tried; 0 if nothing is known.
+    pub size: f64,
+    pub last_error: f64,
+    /// Signs of stiffness in a row.
+    pub suspicion: u32,
+    pub stiff: bool,
+    /// The sum of what the steps so far are estimated to be wrong by, relative; no more than the tolerance.
+    pub error: f64,
+}
+
+impl Default for Control {
+    fn default() -> Control {
+        Control { size: 0.0, last_error: 1.0, suspicion: 0, stiff: false, error: 0.0 }
+    }
+}
+
+/// What is known to come.
+#[derive(Clone, Debug, Default)]
+pub struct Next {
+    pub what: What,
+    /// Signs that are zero then.
+    pub touched: SmallVec<[Change; 1]>,
+    /// Signs that change before then, without consequence.
+    pub changes: Vec<Change>,
+    /// All this follows from formulas, and holds whatever a common step brings.
+    pub lasting: bool,
+    /// Atoms, one bit each, whose sides have come so near each other that nobody can tell on which side of zero they are.
+    pub near: u64,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum What {
+    /// Nothing, ever.
+    #[default]
+    Nothing,
+    /// A production, or a change of equations.
+    Event,
+    /// The end of the stretch that has been searched.
+    Window,
+    /// The end of the solution.
+    Fault,
+    /// Two sides come near each other and part again, and cannot be told from such as have met.
+    Doubt,
+}
+
+impl Next {
+    /// Nothing known, of a module that goes on.
+    pub fn again(&self) -> Next {
+        Next { near: self.near, ..Next::default() }
+    }
+}
+
+/// A sign that changes.
+#[derive(Clone, Copy, Debug)]
+pub struct Change {
+    pub atom: usize,
+    pub time: SimTime,
+    pub at: Sign,
+    pub after: Sign,
+    /// The parameter that meets a level there, and the level.
+    pub level: Option<(usize, f64)>,
+}
+
+/// What is still open about a module at the instant under examination.
+#[derive(Clone, Debug, Default)]
+pub struct Open {
+    /// The signs at the instant.
+    pub at: Signs,
+    /// Where zero signs are expected to go: known if they were followed there.
+    pub guess: Signs,
+    /// The equations that brought the module here. None if it comes from elsewhere: then its signs are
+    /// computed from values, not followed along a trajectory.
+    pub flow: Option<(Option<usize>, Switches)>,
+    /// Clauses whose equations were tried.
+    pub tried: SmallVec<[usize; 4]>,
+    /// Times that switches were found the other way.
+    pub flips: usize,
+    /// No side is near the other: signs are what they are.
+    pub clear: bool,
+}
+
+impl State {
+    pub fn new(id: ModuleId) -> State {
+        State {
+            id,
+            is_alive: true,
+            rule: None,
+            context: Around::default(),
+            solve: None,
+            switches: SmallVec::new(),
+            signs: SmallVec::new(),
+            since: SimTime::ZERO,
+            motions: SmallVec::new(),
+            step: None,
+            window: 0.0,
+            forced: false,
+            coupled: false,
+            visited: 0,
+            next: Next::default(),
+            open: None,
+            waits: false,
+            restarted: 0,
+        }
+    }
+
+    /// Makes the memory of a dead module that of a new one.
+    pub fn renew(&mut self, id: ModuleId) {
+        (self.id, self.is_alive) = (id, true);
+        self.context.clear();
+        self.switches.clear();
+        (self.step, self.open) = (None, None);
+        self.next.changes.clear();
+        (self.next.lasting, self.next.near) = (false, 0);
+        (self.window, self.forced, self.coupled) = (0.0, false, false);
+    }
+
+    /// True if some parameter is integrated by the module's own steps.
+    pub fn is_numeric(&self) -> bool {
+        self.motions.iter().any(|m| !m.is_formula())
+    }
+
+    /// Opens the module as one that was followed along its trajectory.
+    pub fn follow(&mut self) -> &mut Open {
+        if self.open.is_none() {
+            let flow = Some((self.solve, Switches::from_slice(&self.switches)));
+            let (at, guess) = (Signs::from_slice(&self.signs), Signs::from_slice(&self.signs));
+            self.open = Some(Box::new(Open { at, guess, flow, ..Open::default() }));
+        }
+        self.open.as_mut().expect("just opened")
+    }
+
+    /// Opens the module as one whose signs are known from its values only.
+    pub fn place(&mut self, clear: bool) {
+        let guess = self.signs.iter().map(|&s| if s == Sign::Zero { Sign::Any } else { s }).collect();
+        let at = Signs::from_slice(&self.signs);
+        self.open = Some(Box::new(Open { at, guess, clear, ..Open::default() }));
+    }
+
+    /// Takes over the signs that have changed without consequence up to an instant.
+    pub fn pass_changes(&mut self, until: SimTime) {
+        let signs = &mut self.signs;
+        self.next.changes.retain(|change| {
+            let passed = change.time.since(until) <= 0.0;
+            if passed {
+                signs[change.atom] = change.after;
+            }
+            !passed
+        });
+    }
+}
