@@ -27,7 +27,7 @@ pub struct Read {
 }
 
 impl Stepping {
-    pub(super) fn new(rule: &Rule, solve: &Solve) -> Stepping {
+    pub fn new(rule: &Rule, solve: &Solve) -> Stepping {
         let algebraic = &solve.algebraic;
         let components = [false, true].map(|forced| {
             let numeric = (0..solve.of.len()).filter(|i| forced || solve.numeric.contains(i));
