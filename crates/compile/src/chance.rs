@@ -4,7 +4,8 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 
-use crate::rules::{Atoms, RuleBuilder};
+use crate::conditions::Atoms;
+use crate::rules::RuleBuilder;
 use crate::scope::{Lowered, Scope, Variables, plural};
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_expr::{Binary, Graph, Interval, Node, NodeId, Program, Unary};

@@ -6,10 +6,10 @@ use crate::advice;
 use crate::appearance::surface_hint;
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{
-    BUILT_IN_SURFACES, COMMAND_SURFACES, Class, Condition, DRAWN_WORDS, KindId, Kinds, Model, Pattern,
-    Remedy, Rule, Sign, Step, Turn, base_of, class_of,
+    BUILT_IN_SURFACES, COMMAND_SURFACES, Class, Condition, DRAWN_WORDS, KindId, Model, Pattern, Remedy, Rule,
+    Sign, Step, Turn, base_of, class_of,
 };
-use dlsys_syntax::ast::{self, HeadModule};
+use dlsys_syntax::ast;
 use dlsys_syntax::print;
 use dlsys_syntax::suggest::{meant, nearest};
 
@@ -17,124 +17,6 @@ use dlsys_syntax::suggest::{meant, nearest};
 const MAX_RULES: usize = 1000;
 /// Most messages about modules that do nothing.
 const MAX_INERT: usize = 20;
-
-/// Kinds by the names that a context can call them.
-struct ByName<'k> {
-    exact: HashMap<&'k str, Vec<KindId>>,
-    base: HashMap<&'k str, Vec<KindId>>,
-}
-
-impl<'k> ByName<'k> {
-    fn new(kinds: &'k Kinds) -> ByName<'k> {
-        let mut index = ByName { exact: HashMap::new(), base: HashMap::new() };
-        for (id, kind) in kinds.iter() {
-            index.exact.entry(&kind.name).or_default().push(id);
-            index.base.entry(kind.base()).or_default().push(id);
-        }
-        index
-    }
-
-    /// A name without `_` stands for all kinds with that base name, any other for itself.
-    fn matching(&self, name: &str) -> &[KindId] {
-        let exact = class_of(name) != Class::Word || name.contains('_');
-        let index = if exact { &self.exact } else { &self.base };
-        index.get(name).map_or(&[], Vec::as_slice)
-    }
-}
-
-/// Matches the modules of contexts to kinds, and says which nothing can match.
-pub fn resolve_contexts(
-    model: &mut Model,
-    rules: &[&ast::Rule],
-    gathered: &[Vec<HeadModule>],
-    diagnostics: &mut Vec<Diagnostic>,
-) {
-    let names = ByName::new(&model.kinds);
-    for ((rule, written), gathered) in model.rules.iter_mut().zip(rules).zip(gathered) {
-        let sides = [(&mut rule.left, &written.left), (&mut rule.right, &written.right)];
-        for (patterns, heads) in sides {
-            for (pattern, head) in patterns.iter_mut().zip(heads) {
-                resolve(&model.kinds, &names, pattern, head, "this context is never there", diagnostics);
-            }
-        }
-        for (aggregate, head) in rule.aggregates.iter_mut().zip(gathered) {
-            let never = "nothing of this name is ever attached to a module";
-            resolve(&model.kinds, &names, &mut aggregate.pattern, head, never, diagnostics);
-        }
-    }
-}
-
-fn resolve(
-    kinds: &Kinds,
-    names: &ByName,
-    pattern: &mut Pattern,
-    head: &HeadModule,
-    never: &str,
-    diagnostics: &mut Vec<Diagnostic>,
-) {
-    let name = &*head.name.text;
-    let named = names.matching(name);
-    pattern.kinds = named.iter().copied().filter(|id| kinds.get(*id).arity == pattern.arity).collect();
-    if pattern.kinds.is_empty() {
-        let error = match named.first().map(|id| kinds.get(*id)) {
-            Some(kind) => Diagnostic::error(format!(
-                "`{}` has {}, not {}",
-                kind.name,
-                crate::scope::plural(kind.arity, "parameter"),
-                pattern.arity
-            ))
-            .at(head.span, "the number of parameters must agree, or the context is never there")
-            .help(format!("name each of them, used or not: `{}`", advice::head_with(head, kind.arity))),
-            None => Diagnostic::warning(format!("there is no module `{name}`"))
-                .at(head.span, never)
-                .help(advice::no_such_module(kinds, name)),
-        };
-        diagnostics.push(error);
-    } else if pattern.kinds.iter().all(|id| kinds.get(*id).skipped) {
-        diagnostics.push(
-            Diagnostic::error(format!("`{name}` is passed over in the search for context"))
-                .at(head.span, never)
-                .help(if class_of(name) == Class::Word {
-                    format!("take `{name}` out of `ignore`, or name it in `consider`")
-                } else {
-                    format!("symbols and surfaces count as context only if a `consider` names them: `consider {name} …`, with all other modules that count")
-                }),
-        );
-    }
-}
-
-/// `ignore` and `consider`.
-pub fn filter_contexts(
-    kinds: &mut Kinds,
-    ignored: &[&ast::Name],
-    considered: &[&ast::Name],
-    diagnostics: &mut Vec<Diagnostic>,
-) {
-    let find = |kinds: &Kinds, name: &ast::Name, diagnostics: &mut Vec<Diagnostic>| -> Vec<KindId> {
-        let found = ByName::new(kinds).matching(&name.text).to_vec();
-        if found.is_empty() {
-            diagnostics.push(
-                Diagnostic::warning(format!("there is no module `{}`", name.text))
-                    .at(name.span, "nothing to skip or to consider")
-                    .help(advice::no_such_module(kinds, &name.text)),
-            );
-        }
-        found
-    };
-    if !considered.is_empty() {
-        let chosen: HashSet<KindId> =
-            considered.iter().flat_map(|name| find(kinds, name, diagnostics)).collect();
-        let all: Vec<KindId> = kinds.iter().map(|(id, _)| id).collect();
-        for id in all {
-            kinds.get_mut(id).skipped = !chosen.contains(&id);
-        }
-    }
-    for name in ignored {
-        for id in find(kinds, name, diagnostics) {
-            kinds.get_mut(id).skipped = true;
-        }
-    }
-}
 
 /// Rules and clauses that can never be reached.
 pub fn reachability(

@@ -11,7 +11,8 @@
 use std::collections::HashMap;
 
 use crate::advice;
-use crate::analysis::{AlgebraicDraft, is_singular};
+use crate::analysis::is_singular;
+use crate::declared::DeclaredAlgebraic;
 use crate::rules::RuleBuilder;
 use crate::scope::Variables;
 use dlsys_diagnostic::{Diagnostic, Span};
@@ -27,7 +28,7 @@ pub(super) struct Equations {
     /// By parameter; those that are the constant 0 are left out.
     pub rates: Vec<(usize, NodeId)>,
     /// Explicit ones first.
-    pub algebraic: Vec<AlgebraicDraft>,
+    pub algebraic: Vec<DeclaredAlgebraic>,
 }
 
 /// `0 = …`
@@ -65,7 +66,7 @@ impl RuleBuilder<'_> {
         clause: Span,
     ) -> Option<Equations> {
         let mut rates: Vec<(usize, NodeId)> = Vec::new();
-        let (mut values, mut zeros): (Vec<AlgebraicDraft>, Vec<Zero>) = Default::default();
+        let (mut values, mut zeros): (Vec<DeclaredAlgebraic>, Vec<Zero>) = Default::default();
         let mut seen: HashMap<usize, Span> = HashMap::new();
         let mut good = true;
         for equation in equations {
@@ -110,7 +111,7 @@ impl RuleBuilder<'_> {
                     zeros.push(Zero { residual: node, unknown, span: *span });
                 }
                 (ast::Equation::Value { parameter: name, .. }, Some(parameter)) => {
-                    values.push(AlgebraicDraft { parameter, node, explicit: true, span: name.span });
+                    values.push(DeclaredAlgebraic { parameter, node, explicit: true, span: name.span });
                 }
                 (_, Some(parameter)) if self.scope.graph.as_constant(node) != Some(0.0) => {
                     rates.push((parameter, node));
@@ -160,7 +161,7 @@ impl RuleBuilder<'_> {
     /// depends on itself.
     fn put_in(
         &mut self,
-        values: &mut [AlgebraicDraft],
+        values: &mut [DeclaredAlgebraic],
         zeros: &mut [Zero],
         rates: &mut [(usize, NodeId)],
         head: &HeadModule,
@@ -211,7 +212,7 @@ impl RuleBuilder<'_> {
         named: &[usize],
         head: &HeadModule,
         clause: Span,
-    ) -> Option<Vec<AlgebraicDraft>> {
+    ) -> Option<Vec<DeclaredAlgebraic>> {
         if zeros.is_empty() {
             return Some(Vec::new());
         }
@@ -279,10 +280,10 @@ impl RuleBuilder<'_> {
                 return None;
             }
         }
-        let mut all: Vec<AlgebraicDraft> = (equation_of.into_iter())
+        let mut all: Vec<DeclaredAlgebraic> = (equation_of.into_iter())
             .map(|(parameter, i)| {
                 let Zero { residual, span, .. } = zeros[i];
-                AlgebraicDraft { parameter, node: residual, explicit: false, span }
+                DeclaredAlgebraic { parameter, node: residual, explicit: false, span }
             })
             .collect();
         all.sort_by_key(|entry| entry.parameter);
@@ -290,7 +291,7 @@ impl RuleBuilder<'_> {
     }
 
     /// False if implicit equations are singular whatever the values are.
-    fn check_rank(&mut self, implicit: &[AlgebraicDraft], head: &HeadModule, variables: usize) -> bool {
+    fn check_rank(&mut self, implicit: &[DeclaredAlgebraic], head: &HeadModule, variables: usize) -> bool {
         let own = head.parameters.len();
         let alone = |v: &u32| (*v as usize) < own || *v as usize + 2 >= variables;
         let graph = &self.scope.graph;

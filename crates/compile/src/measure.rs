@@ -1,7 +1,5 @@
 //! What is measured of a model's strings, written like the head of a rule and an expression: `F(x): x`.
 
-use std::collections::HashMap;
-
 use crate::chance::Clocks;
 use crate::rules::RuleBuilder;
 use crate::scope::{Scope, plural};
@@ -27,15 +25,7 @@ pub fn measure(
     globals::declare(&read(&own, files).1, settings, &mut scope, files);
     scope.diagnostics.clear();
     let mut kinds = model.kinds.clone();
-    let mut builder = RuleBuilder {
-        document: &document,
-        scope: &mut scope,
-        kinds: &mut kinds,
-        clocks: Clocks::default(),
-        occurs: HashMap::new(),
-        gathered: Vec::new(),
-        drawn: HashMap::new(),
-    };
+    let mut builder = RuleBuilder::new(&document, &mut scope, &mut kinds, Clocks::default());
     let (mut variables, count) = builder.variables(&head, &[], &[], 0);
     variables.aggregates = None;
     let value = match expression {

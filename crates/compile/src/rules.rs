@@ -1,25 +1,17 @@
-//! Rules, strings and interpretations: from the syntax tree to the model.
+//! Strings, heads and interpretations: the parts of a model that are made of modules, lowered to the graph.
 
 use std::collections::HashMap;
 use std::sync::Arc;
 
 use crate::advice;
-use crate::analysis::{Draft, never_reached};
-use crate::chance::{Clocks, production_keys};
-use crate::equations::Equations;
-use crate::gather::watched;
+use crate::chance::Clocks;
+use crate::declared::DeclaredPattern;
 use crate::scope::{RESERVED, Scope, Variables};
 use dlsys_diagnostic::{Diagnostic, Span};
-use dlsys_expr::{Binary, Graph, Node, NodeId, Program, Unary};
-use dlsys_model::{
-    Boundary, CUT, Class, Clock, Comparison, Condition, DRAWN_WORDS, Interpretation, Jacobian, KindId, Kinds,
-    Pattern, Produce, Rule, Solve, Step, Turn, base_of, class_of,
-};
-use dlsys_syntax::ast::{self, Action, Document, Expression, HeadModule};
+use dlsys_expr::NodeId;
+use dlsys_model::{CUT, Class, DRAWN_WORDS, Interpretation, KindId, Kinds, base_of, class_of};
+use dlsys_syntax::ast::{self, Document, Expression, HeadModule};
 use dlsys_syntax::print;
-
-/// Longest condition, in comparisons and connectives, after functions are put in.
-const MAX_CONDITION: usize = 10_000;
 
 /// Builds the parts of a model that are made of modules.
 pub struct RuleBuilder<'b> {
@@ -29,22 +21,31 @@ pub struct RuleBuilder<'b> {
     pub clocks: Clocks,
     /// Each kind that stands in a string, with the first place where it does.
     pub occurs: HashMap<KindId, Span>,
-    /// The heads of the aggregates of each rule.
-    pub gathered: Vec<Vec<HeadModule>>,
     /// The same of drawings, where they are not those of the kind itself.
     pub drawn: HashMap<KindId, Span>,
 }
 
-/// The pairs of expressions that the conditions of a rule compare.
-#[derive(Default)]
-pub(super) struct Atoms {
-    sides: Vec<(NodeId, NodeId)>,
-    spans: Vec<Span>,
-    boundaries: Vec<Boundary>,
-    index: HashMap<(NodeId, NodeId), u32>,
-}
+impl<'b> RuleBuilder<'b> {
+    /// A builder that has seen no strings yet.
+    pub fn new(
+        document: &'b Document,
+        scope: &'b mut Scope,
+        kinds: &'b mut Kinds,
+        clocks: Clocks,
+    ) -> RuleBuilder<'b> {
+        RuleBuilder { document, scope, kinds, clocks, occurs: HashMap::new(), drawn: HashMap::new() }
+    }
 
-impl RuleBuilder<'_> {
+    /// Number of hidden parameters of a module.
+    pub(super) fn hidden(&self, module: &HeadModule) -> usize {
+        self.clocks.width(&module.name.text, module.parameters.len())
+    }
+
+    /// A module of a context, whose kinds are found when all are known.
+    pub(super) fn pattern(&self, head: HeadModule) -> DeclaredPattern {
+        DeclaredPattern { width: head.parameters.len() + self.hidden(&head), head }
+    }
+
     pub(super) fn error(&mut self, error: Diagnostic) {
         self.scope.diagnostics.push(error);
     }
@@ -64,7 +65,7 @@ impl RuleBuilder<'_> {
         for module in std::iter::once(own).chain(left).chain(right) {
             parameters.extend(module.parameters.iter().zip(count..));
             // Behind those that are written, a module has hidden ones.
-            let hidden = self.clocks.width(&module.name.text, module.parameters.len());
+            let hidden = self.hidden(module);
             count += (module.parameters.len() + hidden) as u32;
         }
         for (parameter, number) in parameters {
@@ -100,7 +101,7 @@ impl RuleBuilder<'_> {
         (Variables { names, aggregates, ..Variables::default() }, count as usize)
     }
 
-    fn not_a_bracket(&mut self, head: &HeadModule, is_context: bool) -> bool {
+    pub(super) fn not_a_bracket(&mut self, head: &HeadModule, is_context: bool) -> bool {
         let bracket = matches!(&*head.name.text, "[" | "]");
         if bracket {
             self.error(
@@ -157,237 +158,6 @@ impl RuleBuilder<'_> {
         Some((kind, Interpretation { span: head.span, drawn: drawn? }))
     }
 
-    /// A rule, and the kinds it is for. `PatternNames` are matched to kinds once all kinds are known.
-    pub fn rule(&mut self, rule: &ast::Rule) -> Option<(Rule, Draft)> {
-        let mut good = self.not_a_bracket(&rule.predecessor, false);
-        for context in rule.left.iter().chain(&rule.right) {
-            good &= self.not_a_bracket(context, true);
-        }
-        let names: &[&str] = match &*rule.predecessor.name.text {
-            "±" => &["+", "-"],
-            name => &[name],
-        };
-        let hidden = |me: &Self, m: &HeadModule| me.clocks.width(&m.name.text, m.parameters.len());
-        for name in names {
-            self.kinds.intern(name, rule.predecessor.parameters.len());
-        }
-        let written = self.aggregates_in(rule);
-        let own = rule.predecessor.parameters.len() + hidden(self, &rule.predecessor);
-        let (mut variables, count) = self.variables(&rule.predecessor, &rule.left, &rule.right, written);
-        self.scope.comparisons.clear();
-        self.scope.gathered.clear();
-        good &= self.locals(rule, &mut variables);
-
-        // All conditions first: they share their atoms.
-        let mut atoms = Atoms::default();
-        let mut guards = Vec::new();
-        for clause in &rule.clauses {
-            let mut node = None;
-            let guard = match clause.guard {
-                None => Some(Condition::default()),
-                Some(guard) => {
-                    node = self.scope.condition(&self.document.expressions, guard, &variables);
-                    // Under a rate it is the clock that says when.
-                    match (node, &clause.hazard) {
-                        (Some(_), Some(_)) => Some(Condition::default()),
-                        (node, _) => node.and_then(|node| self.decompose(node, clause.span, &mut atoms)),
-                    }
-                }
-            };
-            good &= guard.is_some();
-            guards.push((guard.unwrap_or_default(), node));
-        }
-        let mut clocks = Vec::new();
-        let mut hazards = Vec::new();
-        let mut faults = Vec::new();
-        let mut drafts = Vec::new();
-        let mut produces = Vec::new();
-        let mut keys = production_keys(rule);
-        for (clause, (guard, node)) in rule.clauses.iter().zip(&guards) {
-            let Action::Produce(successors) = &clause.action else { continue };
-            let key = keys.next().map_or(0, |(_, key)| key);
-            let mut guard = guard.clone();
-            if clause.hazard.is_some() {
-                match self.hazard(clause, (&rule.predecessor, key), *node, &variables) {
-                    Some(hazard) => {
-                        guard = self.clock_is_down(&hazard, &mut atoms)?;
-                        faults.extend(self.negative_rate(&hazard, clause.span, count, &mut atoms));
-                        clocks.push(Clock { parameter: hazard.parameter, produce: produces.len() });
-                        hazards.push(hazard);
-                    }
-                    None => good = false,
-                }
-            }
-            match self.outcome(successors, &variables, count) {
-                Some(outcome) => {
-                    produces.push(Produce { guard, span: clause.span, key, is_fault: false, outcome });
-                }
-                None => good = false,
-            }
-        }
-        produces.extend(faults);
-        for (clause, (guard, node)) in rule.clauses.iter().zip(&guards) {
-            let Action::Solve(equations) = &clause.action else { continue };
-            let equations = self.equations(equations, &rule.predecessor, &variables, clause.span);
-            let Some(mut equations) = equations else {
-                good = false;
-                continue;
-            };
-            equations.rates.extend(hazards.iter().filter_map(|hazard| self.clock_rate(hazard, *node)));
-            let (smooth, switches) = self.smooth(equations.all(), own, count, clause.span, &mut atoms)?;
-            equations.set_all(smooth);
-            drafts.push((guard.clone(), clause.span, equations, switches));
-        }
-        if !good {
-            return None;
-        }
-        if let (true, Some(first)) = (drafts.is_empty(), clocks.first()) {
-            // Clocks run, though nothing else does.
-            let span = produces[first.produce].span;
-            let rates = hazards.iter().filter_map(|hazard| self.clock_rate(hazard, None)).collect();
-            let (rates, switches) = self.smooth(rates, own, count, span, &mut atoms)?;
-            drafts.push((Condition::default(), span, Equations { rates, algebraic: Vec::new() }, switches));
-        }
-        let context = count - own - 2;
-        let (aggregates, terms) = self.aggregates(count);
-        let sides = atoms.sides.clone();
-        let mut draft = Draft { rates: Vec::new(), algebraic: Vec::new(), sides, terms };
-        let solves = drafts
-            .into_iter()
-            .map(|(guard, span, Equations { rates, algebraic }, switches)| {
-                let total = count + switches.len();
-                let graph = &mut self.scope.graph;
-                // A value that has no rate is not known to approach anything.
-                let given = |graph: &Graph, (a, b): (NodeId, NodeId)| {
-                    let read = graph.variables(&[a, b]);
-                    algebraic.iter().any(|entry| read.contains(&(entry.parameter as u32)))
-                };
-                let unreachable = (atoms.sides.iter())
-                    .map(|&sides| {
-                        !given(graph, sides) && never_reached(graph, sides, &rates, own, context, total)
-                    })
-                    .collect();
-                let roots: Vec<NodeId> = rates.iter().map(|(_, node)| *node).collect();
-                draft.rates.push(rates.clone());
-                draft.algebraic.push(algebraic);
-                Solve {
-                    guard,
-                    span,
-                    of: rates.iter().map(|(parameter, _)| *parameter).collect(),
-                    rates: Program::compile(&self.scope.graph, &roots, total),
-                    switches,
-                    unreachable,
-                    // The analysis of the whole model fills in the rest.
-                    laws: Vec::new(),
-                    numeric: Vec::new(),
-                    numeric_rates: Program::default(),
-                    linear: None,
-                    jacobian: Jacobian::default(),
-                    algebraic: Default::default(),
-                    watch: Vec::new(),
-                    flashes: false,
-                    is_delicate: false,
-                    stepping: Default::default(),
-                }
-            })
-            .collect();
-        let sides: Vec<NodeId> = atoms.sides.iter().flat_map(|(a, b)| [*a, *b]).collect();
-        let sides = Program::compile(&self.scope.graph, &sides, count);
-        let first = count - 2 - written as usize;
-        let pattern = |m: &HeadModule| {
-            let arity = m.parameters.len();
-            Pattern { kinds: Vec::new(), arity, width: arity + hidden(self, m) }
-        };
-        let names = |m: &HeadModule| {
-            let clocks = std::iter::repeat_n("clock".to_owned(), hidden(self, m));
-            m.parameters.iter().map(|p| p.text.to_string()).chain(clocks).collect::<Vec<_>>()
-        };
-        let compiled = Rule {
-            index: 0,
-            label: print::head(rule),
-            span: rule.head,
-            discrete: rule.discrete,
-            parameters: names(&rule.predecessor),
-            context_names: rule.left.iter().chain(&rule.right).flat_map(names).collect(),
-            left: rule.left.iter().map(pattern).collect(),
-            right: rule.right.iter().map(pattern).collect(),
-            right_shape: rule.right_shape.iter().map(|part| turn(*part)).collect(),
-            variables: count,
-            watched: watched(&sides, &aggregates, count, first),
-            aggregates,
-            first_aggregate: first,
-            sides,
-            atoms: atoms.spans,
-            boundaries: atoms.boundaries,
-            solves,
-            produces,
-            hidden: hidden(self, &rule.predecessor),
-            clocks,
-            moving_context: Vec::new(),
-            reads_context: false,
-            watch_at_rest: Vec::new(),
-        };
-        Some((compiled, draft))
-    }
-
-    /// Takes a condition apart into comparisons of two sides.
-    pub(super) fn decompose(&mut self, root: NodeId, span: Span, atoms: &mut Atoms) -> Option<Condition> {
-        enum Task {
-            Visit(NodeId),
-            Emit(Step),
-        }
-        let mut steps = Vec::new();
-        let mut tasks = vec![Task::Visit(root)];
-        while let Some(task) = tasks.pop() {
-            if steps.len() > MAX_CONDITION {
-                self.error(
-                    Diagnostic::error("this condition is too long")
-                        .at(span, format!("more than {MAX_CONDITION} comparisons and connectives"))
-                        .help("functions that call functions multiply what they compare: compute a shared part once"),
-                );
-                return None;
-            }
-            let id = match task {
-                Task::Emit(step) => {
-                    steps.push(step);
-                    continue;
-                }
-                Task::Visit(id) => id,
-            };
-            match self.scope.graph.node(id) {
-                Node::Const(bits) => steps.push(Step::Constant(f64::from_bits(bits) != 0.0)),
-                Node::Unary(Unary::Not, a) => tasks.extend([Task::Emit(Step::Not), Task::Visit(a)]),
-                Node::Binary(op @ (Binary::And | Binary::Or), a, b) => {
-                    let step = if op == Binary::And { Step::And } else { Step::Or };
-                    tasks.extend([Task::Emit(step), Task::Visit(b), Task::Visit(a)]);
-                }
-                Node::Binary(op, a, b) => {
-                    let comparison = match op {
-                        Binary::Lt => Comparison::Less,
-                        Binary::Le => Comparison::LessOrEqual,
-                        Binary::Eq => Comparison::Equal,
-                        _ => Comparison::NotEqual,
-                    };
-                    let known = self.scope.comparisons.get(&id);
-                    let (at, boundary) = known.map_or((span, None), |(at, sides)| (*at, Some(&**sides)));
-                    let never = [a, b]
-                        .into_iter()
-                        .any(|side| self.scope.graph.as_constant(side).is_some_and(f64::is_nan));
-                    if never {
-                        self.scope.diagnostics.push(
-                            Diagnostic::warning("this comparison never holds")
-                                .at(at, "one of its sides has no value (NaN)")
-                                .help(advice::not_finite(f64::NAN)),
-                        );
-                    }
-                    steps.push(atoms.step(a, b, comparison, at, boundary));
-                }
-                node => unreachable!("{node:?} is no condition"),
-            }
-        }
-        Some(Condition(steps))
-    }
-
     /// The value of an expression of constants, for declarations such as `angle`.
     pub fn constant(&mut self, expression: Expression) -> Option<f64> {
         self.scope.constant_value(&self.document.expressions, expression)
@@ -409,34 +179,4 @@ fn draws_nothing(module: &ast::Module, head: &HeadModule) -> Diagnostic {
             "drawings do not repeat themselves: let a rule make the parts, `{}: … produce F(1) {name}{arguments}`, or draw a module with another name",
             print::head_module(head)
         ))
-}
-
-fn turn(part: ast::Turn) -> Turn {
-    match part {
-        ast::Turn::Module => Turn::Module,
-        ast::Turn::Open => Turn::Open,
-        ast::Turn::Close => Turn::Close,
-    }
-}
-
-impl Atoms {
-    /// The step that compares two sides; each pair is kept once, whichever way round it is written.
-    fn step(
-        &mut self,
-        a: NodeId,
-        b: NodeId,
-        comparison: Comparison,
-        span: Span,
-        sides: Option<&[String; 2]>,
-    ) -> Step {
-        let (pair, comparison) = if a <= b { ((a, b), comparison) } else { ((b, a), comparison.mirrored()) };
-        let atom = *self.index.entry(pair).or_insert_with(|| {
-            self.sides.push(pair);
-            self.spans.push(span);
-            let known = sides.map(|[left, right]| Boundary::new(left, right, a > b));
-            self.boundaries.push(known.unwrap_or_default());
-            self.sides.len() as u32 - 1
-        });
-        Step::Atom(atom, comparison)
-    }
 }

@@ -7,7 +7,8 @@ use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 use crate::analysis::{driven_form, outside_of_drivers};
-use crate::rules::{Atoms, RuleBuilder};
+use crate::conditions::Atoms;
+use crate::rules::RuleBuilder;
 use dlsys_diagnostic::Span;
 use dlsys_expr::{Binary, Graph, Node, NodeId, Part, Unary};
 use dlsys_model::Switch;

@@ -40,10 +40,10 @@ impl Algebraic {
         self.of.is_empty()
     }
 
-    /// True if the place is one whose parameter is solved for along with those that are integrated: `forced` if no
+    /// True if the place is one whose parameter is solved for along with those that are integrated: `numeric_only` if no
     /// formulas are used.
-    pub fn is_solved(&self, place: usize, forced: bool) -> bool {
-        if forced { !self.is_lazy(place) } else { self.needed[place] && !self.closed[place] }
+    pub fn is_solved(&self, place: usize, numeric_only: bool) -> bool {
+        if numeric_only { !self.is_lazy(place) } else { self.needed[place] && !self.closed[place] }
     }
 
     /// True if the parameter is computed only when somebody looks.

@@ -54,7 +54,7 @@ pub use law::{Driven, Flow, Jacobian, Law, Linear, Numeric, Obstacle, Sum, Watch
 pub use measure::Measure;
 pub use remedy::{Boundary, Remedy};
 pub use rule::{Interpretation, Outcome, Pattern, Produce, Rule, Solve, Successor, Switch};
-pub use stepping::Stepping;
+pub use stepping::{Read, Stepping};
 
 use std::sync::Arc;
 

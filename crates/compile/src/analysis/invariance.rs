@@ -153,7 +153,7 @@ impl Surface<'_> {
 }
 
 /// SplitMix64 (Steele, Lea, Flood 2014): the points are the same in every run.
-pub(super) struct Random(u64);
+pub struct Random(u64);
 
 impl Random {
     pub fn new() -> Random {

@@ -1,50 +1,52 @@
-//! Which parameters anybody reads: "model only what a scene needs".
+//! Which parameters are read at all: a parameter that no rate, condition or production reads costs nothing.
 
 use std::collections::HashSet;
 
-use super::Draft;
 use dlsys_expr::{Graph, NodeId};
-use dlsys_model::Model;
+use dlsys_model::Kinds;
+
+use crate::declared::ResolvedRule;
 
 /// Kinds with the numbers of their parameters.
 type Read = HashSet<(usize, usize)>;
 
 /// What the variables of rules stand for.
-struct Owners<'m> {
-    model: &'m Model,
+struct Owners<'r> {
+    rules: &'r [ResolvedRule],
+    /// Per rule: the kinds that it is for.
     kinds_of: Vec<Vec<usize>>,
     /// Per rule: what each aggregate reads.
     terms: Vec<Vec<Vec<usize>>>,
 }
 
 impl Owners<'_> {
-    fn new<'m>(graph: &Graph, model: &'m Model, drafts: &[Draft]) -> Owners<'m> {
-        let mut kinds_of: Vec<Vec<usize>> = vec![Vec::new(); model.rules.len()];
-        for (id, kind) in model.kinds.iter() {
+    fn new<'r>(graph: &Graph, kinds: &Kinds, rules: &'r [ResolvedRule]) -> Owners<'r> {
+        let mut kinds_of: Vec<Vec<usize>> = vec![Vec::new(); rules.len()];
+        for (id, kind) in kinds.iter() {
             for rule in kind.all_rules() {
                 kinds_of[rule].push(id.index());
             }
         }
-        let reads = |node: &NodeId| graph.variables(&[*node]).into_iter().map(|v| v as usize).collect();
-        let terms = drafts.iter().map(|draft| draft.terms.iter().map(reads).collect()).collect();
-        Owners { model, kinds_of, terms }
+        let terms =
+            rules.iter().map(|rule| rule.declared.terms().map(|term| reads(graph, &[term])).collect());
+        Owners { rules, kinds_of, terms: terms.collect() }
     }
 
     /// Adds the parameters that a variable of a rule stands for.
     fn add(&self, index: usize, v: usize, read: &mut Read) {
-        let rule = &self.model.rules[index];
-        let own = rule.parameters.len();
+        let rule = &self.rules[index];
+        let (own, first_aggregate) = (rule.declared.own(), rule.declared.first_aggregate);
         if v < own {
             read.extend(self.kinds_of[index].iter().map(|kind| (*kind, v)));
             return;
         }
-        if v >= rule.first_aggregate {
-            if let Some(terms) = self.terms[index].get(v - rule.first_aggregate) {
-                let pattern = &rule.aggregates[v - rule.first_aggregate].pattern;
+        if v >= first_aggregate {
+            if let Some(terms) = self.terms[index].get(v - first_aggregate) {
+                let pattern = &rule.children[v - first_aggregate];
                 for &v in terms {
-                    match v.checked_sub(rule.variables) {
+                    match v.checked_sub(rule.declared.variables) {
                         Some(p) => read.extend(pattern.kinds.iter().map(|k| (k.index(), p))),
-                        None if v < rule.first_aggregate => self.add(index, v, read),
+                        None if v < first_aggregate => self.add(index, v, read),
                         None => {}
                     }
                 }
@@ -52,7 +54,7 @@ impl Owners<'_> {
             return;
         }
         let mut first = own;
-        for pattern in rule.left.iter().chain(&rule.right) {
+        for pattern in rule.context() {
             if v < first + pattern.width {
                 read.extend(pattern.kinds.iter().map(|k| (k.index(), v - first)));
                 return;
@@ -62,30 +64,34 @@ impl Owners<'_> {
     }
 }
 
+/// The variables that expressions read.
+fn reads(graph: &Graph, nodes: &[NodeId]) -> Vec<usize> {
+    graph.variables(nodes).into_iter().map(|v| v as usize).collect()
+}
+
 /// The parameters that rates and conditions read, by themselves or through algebraic parameters.
-pub fn needed(graph: &Graph, model: &Model, drafts: &[Draft]) -> Read {
-    let owners = Owners::new(graph, model, drafts);
+pub fn needed(graph: &Graph, kinds: &Kinds, rules: &[ResolvedRule]) -> Read {
+    let owners = Owners::new(graph, kinds, rules);
     let mut read = Read::new();
-    for (index, draft) in drafts.iter().enumerate() {
+    for (index, ResolvedRule { declared, .. }) in rules.iter().enumerate() {
         // An implicit one is followed from its start: solved for now and then, it might be another solution.
-        for entry in draft.algebraic.iter().flatten().filter(|entry| !entry.explicit) {
+        for entry in declared.algebraic().filter(|entry| !entry.explicit) {
             owners.add(index, entry.parameter, &mut read);
         }
-        let sides = draft.sides.iter().flat_map(|(a, b)| [*a, *b]);
-        let nodes: Vec<NodeId> = sides.chain(draft.rates.iter().flatten().map(|r| r.1)).collect();
-        for v in graph.variables(&nodes) {
-            owners.add(index, v as usize, &mut read);
+        let nodes: Vec<NodeId> = declared.side_nodes().chain(declared.rates().map(|rate| rate.1)).collect();
+        for v in reads(graph, &nodes) {
+            owners.add(index, v, &mut read);
         }
     }
     loop {
         let known = read.len();
-        for (index, draft) in drafts.iter().enumerate() {
-            for clause in &draft.algebraic {
+        for (index, ResolvedRule { declared, .. }) in rules.iter().enumerate() {
+            for clause in &declared.solves {
                 let is_read = |p: usize| owners.kinds_of[index].iter().any(|kind| read.contains(&(*kind, p)));
-                let known = clause.iter().filter(|e| !e.explicit || is_read(e.parameter));
+                let known = clause.algebraic.iter().filter(|e| !e.explicit || is_read(e.parameter));
                 let nodes: Vec<NodeId> = known.map(|e| e.node).collect();
-                for v in graph.variables(&nodes) {
-                    owners.add(index, v as usize, &mut read);
+                for v in reads(graph, &nodes) {
+                    owners.add(index, v, &mut read);
                 }
             }
         }
@@ -96,23 +102,22 @@ pub fn needed(graph: &Graph, model: &Model, drafts: &[Draft]) -> Read {
 }
 
 /// Per kind and parameter: nothing but the drawing reads it.
-pub fn drawn_only(graph: &Graph, model: &Model, drafts: &[Draft]) -> Vec<Vec<bool>> {
-    let owners = Owners::new(graph, model, drafts);
+pub fn drawn_only(graph: &Graph, kinds: &Kinds, rules: &[ResolvedRule]) -> Vec<Vec<bool>> {
+    let owners = Owners::new(graph, kinds, rules);
     let mut read = Read::new();
-    for (index, (rule, draft)) in model.rules.iter().zip(drafts).enumerate() {
-        let sides: Vec<NodeId> = draft.sides.iter().flat_map(|(a, b)| [*a, *b]).collect();
-        let mut variables: Vec<usize> = graph.variables(&sides).into_iter().map(|v| v as usize).collect();
-        let algebraic = draft.algebraic.iter().flatten().map(|e| (e.parameter, e.node));
-        for (parameter, node) in draft.rates.iter().flatten().copied().chain(algebraic) {
-            let others = graph.variables(&[node]).into_iter().map(|v| v as usize);
-            variables.extend(others.filter(|v| *v != parameter));
+    for (index, ResolvedRule { declared, .. }) in rules.iter().enumerate() {
+        let sides: Vec<NodeId> = declared.side_nodes().collect();
+        let mut variables = reads(graph, &sides);
+        let algebraic = declared.algebraic().map(|entry| (entry.parameter, entry.node));
+        for (parameter, node) in declared.rates().chain(algebraic) {
+            variables.extend(reads(graph, &[node]).into_iter().filter(|v| *v != parameter));
         }
-        variables.extend(rule.produces.iter().flat_map(|p| p.outcome.reads()));
+        variables.extend(declared.produces.iter().flat_map(|p| p.outcome.reads()));
         for v in variables {
             owners.add(index, v, &mut read);
         }
     }
-    (model.kinds.iter())
+    (kinds.iter())
         .map(|(id, kind)| (0..kind.arity).map(|p| !read.contains(&(id.index(), p))).collect())
         .collect()
 }

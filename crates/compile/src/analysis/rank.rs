@@ -3,8 +3,8 @@
 //! The determinant of the partial derivatives, as a function of all variables, is zero everywhere if it is zero at many
 //! random points (Schwartz 1980, Zippel 1979).
 
-use super::AlgebraicDraft;
 use super::invariance::Random;
+use crate::declared::DeclaredAlgebraic;
 use dlsys_expr::{Graph, NodeId, Program, eliminate};
 
 /// Points at which the matrix is tested.
@@ -15,7 +15,7 @@ const ENOUGH: usize = 6;
 const SMALL: f64 = 1e-11;
 
 /// True if equations that read variables below `variables` cannot determine the parameters that they are meant for.
-pub fn is_singular(graph: &mut Graph, equations: &[AlgebraicDraft], variables: usize) -> bool {
+pub fn is_singular(graph: &mut Graph, equations: &[DeclaredAlgebraic], variables: usize) -> bool {
     let n = equations.len();
     let mut partials: Vec<NodeId> = Vec::new();
     for equation in equations {
