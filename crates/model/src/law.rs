@@ -88,15 +88,22 @@ impl Law {
     }
 }
 
-/// How the instant at which the two sides of a comparison meet is found.
+/// How the zero of a difference of two sides is found: the zero-crossing function of a comparison.
 #[derive(Clone, Debug)]
-pub enum Watch {
-    /// Nothing in it changes.
-    Still,
-    /// They meet where one variable that moves one way only takes a value, which the program computes: a formula.
-    Crossing { variable: usize, level: Program },
-    /// The first root of a function of time: of formulas, or of dense output. The difference of the sides, if it is linear.
-    Root(Option<Sum>),
+pub enum ZeroCrossing {
+    /// Nothing in it changes: its sign stays.
+    Constant,
+    /// The sides meet where one variable that moves one way only takes a value, which the program computes: the instant
+    /// is a formula.
+    Formula {
+        /// The variable that moves.
+        variable: usize,
+        /// The value at which the sides meet, a function of the variables that stand still.
+        level: Program,
+    },
+    /// The first root of a function of time (formulas or dense output) is searched for. The difference of the sides, if
+    /// it is linear.
+    Search(Option<Sum>),
 }
 
 /// `constant + Σ factor · variable`.

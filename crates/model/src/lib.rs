@@ -6,7 +6,7 @@
 //!
 //! - [`Kind`]: a module's name and number of parameters. `F(x)` and `F(x, y)` are two kinds.
 //! - [`Rule`]: what the text writes under one head: context, equations, productions.
-//! - [`Law`], [`Watch`]: how much work an equation or a comparison is; found by [`analyse`].
+//! - [`Law`], [`ZeroCrossing`]: how much work an equation or a comparison is; found by [`analyse`].
 //! - [`Condition`]: the logic of an `if`, over the signs of differences, because the simulation knows
 //!   better than a comparison of two rounded numbers whether two sides have met.
 //!
@@ -50,7 +50,7 @@ pub use dlsys_expr::{Comparison, Fold, Sign, Truth};
 pub use kind::{
     BUILT_IN_SURFACES, COMMAND_SURFACES, CUT, Class, DRAWN_WORDS, Kind, KindId, Kinds, base_of, class_of,
 };
-pub use law::{Driven, Flow, Jacobian, Law, Linear, Numeric, Obstacle, Sum, Watch};
+pub use law::{Driven, Flow, Jacobian, Law, Linear, Numeric, Obstacle, Sum, ZeroCrossing};
 pub use measure::Measure;
 pub use remedy::{Boundary, Remedy};
 pub use rule::{Interpretation, Outcome, Pattern, Produce, Rule, Solve, Successor, Switch};

@@ -364,7 +364,7 @@ impl Simulation<'_> {
 
     fn may_flash(&self, id: ModuleId) -> bool {
         let clause = self.plant.state(id).and_then(|s| Some(&self.model.rules[s.rule?].solves[s.solve?]));
-        clause.is_some_and(|solve| solve.flashes)
+        clause.is_some_and(|solve| solve.has_pulses)
     }
 
     /// True if something may have been overlooked of the present motion of some coupled modules, from now on.

@@ -161,9 +161,9 @@ impl Simulation<'_> {
                 self.alone.restart(self.settings.method, y.len());
             }
             let fixed = self.settings.method.is_fixed_step();
-            let settings = self.settings.for_clocks(rule.solves[solve].is_delicate);
+            let settings = self.settings.for_clocks(rule.solves[solve].has_hazard_clock);
             let stiff = control.stiff || self.settings.method == Method::Radau;
-            let flashes = rule.solves[solve].flashes && !fixed;
+            let flashes = rule.solves[solve].has_pulses && !fixed;
             let mut tries = 0;
             let step = loop {
                 let stats = &mut self.stats;

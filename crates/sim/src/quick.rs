@@ -14,7 +14,7 @@ use super::settle::Firing;
 use super::signs::{opposite, rate_at};
 use super::simulation::Simulation;
 use super::state::{Change, Signs, What};
-use dlsys_model::{Law, Rule, Sign, Solve, Truth, Watch};
+use dlsys_model::{Law, Rule, Sign, Solve, Truth, ZeroCrossing};
 use dlsys_tree::{ModuleId, SimTime};
 
 /// What a newborn module is going to do. It lives on the stack for a moment: a box would cost more than its size.
@@ -161,7 +161,7 @@ impl Simulation<'_> {
         let mut first: Option<Change> = None;
         let mut lasting = Some(None);
         for (atom, watch) in rule.watch(solve).iter().enumerate() {
-            if matches!(watch, Watch::Root(_)) {
+            if matches!(watch, ZeroCrossing::Search(_)) {
                 return None;
             }
             let Some(meeting) = self.crossing(rule, clause, atom, watch, motions, self.now) else {
@@ -202,11 +202,11 @@ impl Simulation<'_> {
         rule: &Rule,
         clause: Option<&Solve>,
         atom: usize,
-        watch: &Watch,
+        watch: &ZeroCrossing,
         motions: &[Motion],
         birth: SimTime,
     ) -> Option<Meeting> {
-        let Watch::Crossing { variable, level } = watch else { return None };
+        let ZeroCrossing::Formula { variable, level } = watch else { return None };
         let (variable, time) = (*variable, rule.time_variable());
         if clause.is_some_and(|s| s.unreachable[atom]) {
             return None;

@@ -24,7 +24,7 @@ use super::event::Event;
 use super::plant::Plant;
 use super::simulation::Simulation;
 use super::state::{Change, Open, State};
-use dlsys_model::{Comparison, Model, Outcome, Sign, Truth, Watch};
+use dlsys_model::{Comparison, Model, Outcome, Sign, Truth, ZeroCrossing};
 use dlsys_tree::ModuleId;
 
 /// Most rounds of productions at one instant.
@@ -190,7 +190,7 @@ impl Simulation<'_> {
                 // What stands still until an event of its own is not moved by others.
                 let watch = s.rule.map_or(&[][..], |rule| self.model.rules[rule].watch(s.solve));
                 let mut atoms = s.signs.iter().zip(watch);
-                atoms.any(|(sign, watch)| *sign == Sign::Zero && !matches!(watch, Watch::Still))
+                atoms.any(|(sign, watch)| *sign == Sign::Zero && !matches!(watch, ZeroCrossing::Constant))
             };
             if state.is_some_and(|s| !s.context.is_empty() && rests(s)) {
                 self.resting.push(id);

@@ -171,7 +171,7 @@ impl<'m> Simulation<'m> {
             model,
             settings,
             coupled_settings: settings
-                .for_clocks(model.rules.iter().flat_map(|r| &r.solves).any(|s| s.is_delicate)),
+                .for_clocks(model.rules.iter().flat_map(|r| &r.solves).any(|s| s.has_hazard_clock)),
             seed: Seed::new(settings.seed),
             forced: settings.method != Method::Auto,
             quick: !settings.transitions && !settings.slow,
@@ -212,7 +212,7 @@ impl<'m> Simulation<'m> {
             lookout: Lookout::default(),
             unbounded: BTreeMap::new(),
             approached: BTreeMap::new(),
-            flashes: model.rules.iter().flat_map(|rule| &rule.solves).any(|solve| solve.flashes),
+            flashes: model.rules.iter().flat_map(|rule| &rule.solves).any(|solve| solve.has_pulses),
             stalled: 0,
             standing: (SimTime::ZERO, 0),
             known_rates: KnownRates::default(),

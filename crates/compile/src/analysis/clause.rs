@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use dlsys_expr::{Graph, NodeId, Program};
-use dlsys_model::{Algebraic, Jacobian, Law, Linear, Solve, Watch};
+use dlsys_model::{Algebraic, Jacobian, Law, Linear, Solve, ZeroCrossing};
 
 use super::crossings::crossing;
 use super::laws::{jacobian, laws, linear};
@@ -21,8 +21,8 @@ pub struct ClauseAnalysis {
     linear: Option<Linear>,
     jacobian: Jacobian,
     algebraic: Algebraic,
-    watch: Vec<Watch>,
-    is_delicate: bool,
+    watch: Vec<ZeroCrossing>,
+    has_hazard_clock: bool,
 }
 
 impl ClauseAnalysis {
@@ -53,8 +53,8 @@ impl ClauseAnalysis {
             jacobian: self.jacobian,
             algebraic: self.algebraic,
             watch: self.watch,
-            flashes: pulses,
-            is_delicate: self.is_delicate,
+            has_pulses: pulses,
+            has_hazard_clock: self.has_hazard_clock,
             stepping,
         }
     }
@@ -91,7 +91,7 @@ pub fn analyse_clause(
     ClauseAnalysis {
         of: rates.iter().map(|(parameter, _)| *parameter).collect(),
         rates: Program::compile(graph, &all, total),
-        is_delicate: clocked && !numeric.is_empty(),
+        has_hazard_clock: clocked && !numeric.is_empty(),
         laws,
         numeric,
         numeric_rates,

@@ -1,7 +1,7 @@
 //! How the instant is found at which the two sides of a comparison meet.
 
 use dlsys_expr::{Binary, Graph, Monomial, NodeId, Polynomial, Program, Unary};
-use dlsys_model::{Sum, Watch};
+use dlsys_model::{Sum, ZeroCrossing};
 
 use super::variability::Constants;
 
@@ -12,22 +12,22 @@ pub fn crossing(
     constants: &Constants,
     monotone: &dyn Fn(usize) -> bool,
     total: usize,
-) -> Watch {
+) -> ZeroCrossing {
     if constants.all_constant(graph, &[a, b]) {
-        return Watch::Still;
+        return ZeroCrossing::Constant;
     }
     let difference = graph.binary(Binary::Sub, a, b);
     let Some(p) = graph.polynomial(difference, |v| !constants.is_constant(v)) else {
-        return Watch::Root(None);
+        return ZeroCrossing::Search(None);
     };
     let moving: Vec<(&[(u32, u32)], NodeId)> =
         p.terms.iter().filter(|(m, _)| !m.is_empty()).map(|(m, c)| (&m[..], *c)).collect();
     match moving[..] {
-        [] => Watch::Still,
+        [] => ZeroCrossing::Constant,
         [(&[(variable, 1)], slope)] => {
             let v = variable as usize;
             if v >= constants.own && v < constants.time || v < constants.own && !monotone(v) {
-                return Watch::Root(sum(graph, &p));
+                return ZeroCrossing::Search(sum(graph, &p));
             }
             let level = match p.terms.get(&Monomial::new()) {
                 None => graph.constant(0.0),
@@ -36,9 +36,9 @@ pub fn crossing(
                     graph.binary(Binary::Div, minus, slope)
                 }
             };
-            Watch::Crossing { variable: v, level: Program::compile(graph, &[level], total) }
+            ZeroCrossing::Formula { variable: v, level: Program::compile(graph, &[level], total) }
         }
-        _ => Watch::Root(sum(graph, &p)),
+        _ => ZeroCrossing::Search(sum(graph, &p)),
     }
 }
 

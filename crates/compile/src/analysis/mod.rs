@@ -1,4 +1,4 @@
-//! The analysis of a model: how much work each equation and each condition is (see [`Law`] and [`Watch`]).
+//! The analysis of a model: how much work each equation and each condition is (see [`Law`] and [`ZeroCrossing`]).
 //!
 //! It works on the expression graph. Whether a rate is affine, quadratic or polynomial is a property of its
 //! coefficients, so spelling does not matter. Everything that a module's own equation of the moment leaves alone is
@@ -25,7 +25,7 @@ mod stepping;
 mod variability;
 
 use dlsys_expr::{Graph, NodeId, Program};
-use dlsys_model::{Aggregate, Jacobian, Kinds, Rule, Watch};
+use dlsys_model::{Aggregate, Jacobian, Kinds, Rule, ZeroCrossing};
 
 use crate::declared::ResolvedRule;
 use crate::gather::watched;
@@ -75,7 +75,7 @@ pub fn analyse(graph: &mut Graph, kinds: &Kinds, rules: Vec<ResolvedRule>) -> An
 
 /// What is found out about one rule by itself.
 pub struct RuleAnalysis {
-    watch_at_rest: Vec<Watch>,
+    watch_at_rest: Vec<ZeroCrossing>,
     reads_context: bool,
     clauses: Vec<ClauseAnalysis>,
 }
@@ -88,7 +88,7 @@ fn analyse_rule(
 ) -> RuleAnalysis {
     let declared = &rule.declared;
     let still = Constants::at_rest(declared, moving);
-    let watch_at_rest: Vec<Watch> = (declared.sides.iter())
+    let watch_at_rest: Vec<ZeroCrossing> = (declared.sides.iter())
         .map(|&sides| crossing(graph, sides, &still, &|_| true, declared.variables))
         .collect();
     let mut reads_context = declared.sides.iter().any(|(a, b)| still.reads_context(graph, &[*a, *b]));
