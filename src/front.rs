@@ -3,8 +3,8 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use dlsys_compile::Setting;
 use dlsys_geometry::{scene::Scene, turtle};
-use dlsys_lang::Setting;
 use dlsys_render::{Format, FrameWriter, Survey, View};
 use dlsys_session::{LoadError, Session};
 use dlsys_sim::{Settings, Simulation, describe};

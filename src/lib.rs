@@ -29,13 +29,14 @@
 //! # The stages
 //!
 //! ```text
-//! text ──lang──▶ Model ──sim──▶ Tree at any time t ──turtle──▶ Scene ──render──▶ SVG, PNG, OBJ
+//! text ──syntax──▶ Document ──compile──▶ Model ──sim──▶ Tree at any time t ──turtle──▶ Scene ──render──▶ SVG, PNG, OBJ
 //! ```
 //!
 //! | module | what it is |
 //! |---|---|
 //! | [`expr`] | pure mathematics: expressions, compiled, evaluated as numbers, bounds or derivatives |
-//! | [`lang`] | text to model; everything that can be said about a text |
+//! | [`syntax`] | the notation: text to syntax tree and back, layout, the words of the language |
+//! | [`compile`] | the syntax tree to the model: names, rules, checks, formulas |
 //! | [`model`] | what a model says: kinds of modules, rules, conditions |
 //! | [`tree`] | modules and how they hang together: tree, string, identity, birth |
 //! | [`ode`] | steps, dense output, roots: nothing about plants |
@@ -52,7 +53,7 @@
 //! | [`rescue`] | what is said and saved when the program is at fault |
 //! | [`diagnostic`] | messages that point at the text |
 //!
-//! Each is a crate of its own. Imports go down this arrow and never back; `lang`, `sim` and `turtle` do not know one another.
+//! Each is a crate of its own. Imports go down this arrow and never back; `compile`, `sim` and `turtle` do not know one another.
 //! `ARCHITECTURE.md` tells why things are as they are.
 
 pub mod cli;
@@ -65,10 +66,10 @@ pub use dlsys_render::Format;
 pub use dlsys_sim::{Method, Scheduler, Settings};
 pub use front::{Error, Model, Module, Plant, Run};
 
+pub use dlsys_compile as compile;
 pub use dlsys_diagnostic as diagnostic;
 pub use dlsys_expr as expr;
 pub use dlsys_geometry::{scene, turtle};
-pub use dlsys_lang as lang;
 pub use dlsys_model as model;
 pub use dlsys_ode as ode;
 pub use dlsys_player as player;
@@ -76,6 +77,7 @@ pub use dlsys_render as render;
 pub use dlsys_session::{self as session, replay};
 pub use dlsys_sim as sim;
 pub use dlsys_study as study;
+pub use dlsys_syntax as syntax;
 pub use dlsys_tree as tree;
 
 /// The listings of the book's chapter about the library are compiled and run.

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use dlsys::diagnostic::Source;
 use dlsys::render::{Format, FrameWriter, Survey, View};
-use dlsys::lang::Files;
+use dlsys::compile::Files;
 use dlsys::model::Model;
 use dlsys::session::Session;
 use dlsys::sim::{Settings, Simulation};
@@ -40,9 +40,9 @@ pub fn front(bytes: &[u8]) {
 /// Lays a model out; what comes of it stays as it is when it is laid out again.
 pub fn format(bytes: &[u8]) {
     let Some(source) = source(bytes) else { return };
-    let Ok(once) = dlsys::lang::format::format(&source) else { return };
+    let Ok(once) = dlsys::syntax::format::format(&source) else { return };
     let Some(again) = self::source(once.as_bytes()) else { return };
-    let twice = dlsys::lang::format::format(&again).expect("what was laid out parses");
+    let twice = dlsys::syntax::format::format(&again).expect("what was laid out parses");
     assert_eq!(once, twice, "laid out once and twice");
 }
 
@@ -92,7 +92,7 @@ pub fn files(bytes: &[u8]) {
         "include \"input.dls\"\ninitial string: A(1)\n",
     ] {
         let source = Source::from_bytes("input.dls", text.as_bytes().to_vec()).expect("text");
-        let loaded = dlsys::lang::load_with(&source, &[], &Same(bytes));
+        let loaded = dlsys::compile::load_with(&source, &[], &Same(bytes));
         let read = loaded.source.as_ref().unwrap_or(&source);
         loaded.diagnostics.iter().for_each(|d| drop(d.render(read, false)));
         let Some(model) = loaded.model else { continue };

@@ -10,7 +10,7 @@ use super::shared::*;
 use super::shell::{self, CompletionsArgs, ManArgs};
 use super::values::*;
 use super::verify::VerifyArgs;
-use crate::lang::Setting;
+use crate::compile::Setting;
 use crate::render::{Format, Layout};
 use crate::sim::Method;
 

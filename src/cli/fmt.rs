@@ -8,8 +8,8 @@ use clap::Args;
 
 use super::common::{Failure, coloured, out_error, tell};
 use crate::diagnostic::{Diagnostic, Source};
-use crate::lang::format::format;
 use crate::session::read_whole;
+use crate::syntax::format::format;
 
 #[derive(Debug, Args)]
 pub struct FmtArgs {

@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 
 use super::args::IncludeArgs;
 use super::values::*;
-use crate::lang::Setting;
+use crate::compile::Setting;
 use crate::sim::{Method, Settings};
 
 /// What a run may take, so that what runs away ends with a message.

@@ -2,7 +2,7 @@
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
-use crate::lang::Setting;
+use crate::compile::Setting;
 use crate::render::{Camera, Format, Layout, Page};
 use crate::scene::Color;
 use crate::sim::Method;

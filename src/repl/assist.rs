@@ -12,8 +12,8 @@ use rustyline::{Context, Helper};
 
 use super::commands::{self, Argument};
 use super::grammar::{self, Line};
-use crate::lang::words;
 use crate::model::Model;
+use crate::syntax::words;
 
 /// Names of the model in hand.
 #[derive(Clone, Debug, Default)]
@@ -40,7 +40,7 @@ impl Names {
         names.parameters = model.parameters.iter().map(|p| p.name.clone()).collect();
         let plain = |name: &String| name.chars().all(|c| c.is_alphanumeric() || c == '_');
         names.others =
-            crate::lang::outline::outline(text).into_iter().map(|e| e.name).filter(plain).collect();
+            crate::syntax::outline::outline(text).into_iter().map(|e| e.name).filter(plain).collect();
         for list in [&mut names.kinds, &mut names.plots, &mut names.others] {
             list.sort();
             list.dedup();
@@ -107,7 +107,7 @@ impl Assistant {
             return None;
         }
         let mut all =
-            owned(&mut words::CLAUSES.into_iter().chain(words::functions()).chain(words::PARTICLES));
+            owned(&mut words::CLAUSES.into_iter().chain(crate::compile::functions()).chain(words::PARTICLES));
         all.extend(owned(&mut words::ENDINGS.into_iter()));
         all.extend(names.kinds.iter().chain(&names.others).cloned());
         all.extend(owned(&mut words::declarations()));
@@ -216,7 +216,7 @@ pub fn coloured(text: &str, names: &Names) -> String {
                 ink::COMMAND
             } else if words::declarations().any(|w| w == word) || words::CLAUSES.contains(&word) {
                 ink::WORD
-            } else if words::functions().any(|w| w == word) {
+            } else if crate::compile::functions().any(|w| w == word) {
                 ink::FUNCTION
             } else if listed(&names.kinds) {
                 ink::MODULE

@@ -1,6 +1,6 @@
 //! The commands: their names, how they are used, and what `help` says of them.
 
-use crate::lang::did_you_mean;
+use crate::syntax::suggest::did_you_mean;
 
 /// What stands after a command, for completion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -366,7 +366,7 @@ pub fn wrapped(text: &str, indent: usize, columns: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lang::words;
+    use crate::syntax::words;
 
     #[test]
     fn no_command_is_a_word_of_the_language() {

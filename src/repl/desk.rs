@@ -10,8 +10,8 @@ use super::assist::Names;
 use super::draft::{Change, Draft};
 use super::stage::{Flow, Stage};
 use crate::cli::common::Failure;
+use crate::compile::Setting;
 use crate::diagnostic::{Diagnostic, Severity};
-use crate::lang::Setting;
 use crate::session::{LoadError, Session};
 use crate::sim::{Settings, brief};
 
@@ -215,7 +215,7 @@ impl Desk {
         // A param that was set and is no more is no mistake of what was typed.
         let declared = |setting: &&Setting| {
             // It may be declared in a file that the text includes.
-            let mut entries = crate::lang::outline::outline(text).into_iter();
+            let mut entries = crate::syntax::outline::outline(text).into_iter();
             entries.any(|entry| entry.name == setting.name || entry.name.starts_with("include "))
         };
         let kept: Vec<Setting> = set.iter().filter(declared).cloned().collect();

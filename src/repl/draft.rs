@@ -6,7 +6,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::lang::outline::{Entry, outline};
+use crate::syntax::outline::{Entry, outline};
 
 /// Most texts that `undo` remembers.
 const MOST_UNDONE: usize = 100;

@@ -11,7 +11,7 @@
 //! clause. On a terminal a rule of several lines ends with an empty one.
 
 use super::commands;
-use crate::lang::words;
+use crate::syntax::words;
 
 /// What a line begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -9,10 +9,10 @@ use super::show::{is_called, known_name};
 use super::stage::{Stage, misused};
 use super::travel::time_of;
 use crate::interrupt;
-use crate::lang::did_you_mean;
 use crate::model::{KindId, Model};
 use crate::replay::Stop;
 use crate::sim::brief;
+use crate::syntax::suggest::did_you_mean;
 use crate::tree::{Lineage, ModuleString};
 
 /// What is plotted.

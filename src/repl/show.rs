@@ -4,9 +4,9 @@ use super::assist::coloured;
 use super::commands;
 use super::desk::{Desk, Fault};
 use super::stage::{Stage, misused};
-use crate::lang::did_you_mean;
 use crate::model::{KindId, Model};
 use crate::sim::{Seen, brief, describe};
+use crate::syntax::suggest::did_you_mean;
 use crate::tree::{Lineage, Module, ModuleString};
 
 /// Lines of a string, or rows of a table, that are printed unless more are asked for.
@@ -53,7 +53,7 @@ impl Stage<'_> {
             [name] => {
                 let mut wanted = vec![false; text.lines().count()];
                 let position = |byte: usize| text[..byte].matches('\n').count();
-                for entry in crate::lang::outline::outline(text) {
+                for entry in crate::syntax::outline::outline(text) {
                     let range = entry.span.range();
                     let part = |c: char| c.is_alphanumeric() || c == '_' || c == '@';
                     let own = &text[range.clone()];

@@ -5,10 +5,10 @@ use super::desk::{Desk, Fault};
 use super::grammar::{Line, Statement, first_word};
 use crate::cli::embedded;
 use crate::interrupt;
-use crate::lang::{did_you_mean, words};
 use crate::replay::{Replay, Stop};
 use crate::session::Session;
 use crate::sim::{self, brief};
+use crate::syntax::{suggest::did_you_mean, words};
 use crate::tree::ModuleString;
 
 /// What comes after a statement.

@@ -364,7 +364,7 @@ fn arrays_match_and_let() {
 }
 
 fn canonical(text: &str) -> String {
-    dlsys::lang::format::format(&dlsys::diagnostic::Source::new("a.dls", text)).expect("it parses")
+    dlsys::syntax::format::format(&dlsys::diagnostic::Source::new("a.dls", text)).expect("it parses")
 }
 
 #[test]

@@ -111,7 +111,7 @@ impl<'a> Reader<'a> {
         match words[..] {
             ["dlsys", "fragment"] => {
                 let source = Source::new(format!("line {}", block.line), &block.text);
-                let said = dlsys::lang::parse::parse(&source).1;
+                let said = dlsys::syntax::parse::parse(&source).1;
                 self.no_faults(block, &said, &source);
             }
             ["dlsys", "wrong", ..] => {

@@ -334,7 +334,7 @@ or(x) < rate: produce at(1)
 fn weights_and_rates_have_a_layout() {
     let text = "initial string: A(1)\nA(x):\n  if x<2\n at rate  3*x produce 2:F or x :G\n or 1:[ A(1) ]A(2)\n at rate 1\n  produce F\n";
     let laid_out = |text: &str| {
-        dlsys::lang::format::format(&dlsys::diagnostic::Source::new("t", text)).expect("a layout")
+        dlsys::syntax::format::format(&dlsys::diagnostic::Source::new("t", text)).expect("a layout")
     };
     let once = laid_out(text);
     assert_eq!(

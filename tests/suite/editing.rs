@@ -7,7 +7,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use dlsys::diagnostic::Source;
-use dlsys::lang::{format::format, parse, print};
+use dlsys::syntax::{format::format, parse, print};
 use proptest::prelude::*;
 
 use crate::cli::{bad, dlsys, good};

@@ -2,10 +2,11 @@
 
 use std::time::{Duration, Instant};
 
+use dlsys::compile::load;
 use dlsys::diagnostic::{Severity, Source};
-use dlsys::lang::ast::{Document, Expr, ExprId, Expressions, Operator};
-use dlsys::lang::{MAX_DEPTH, load, parse, print};
 use dlsys::model::Comparison;
+use dlsys::syntax::ast::{Document, Expr, ExprId, Expressions, Operator};
+use dlsys::syntax::{MAX_DEPTH, parse, print};
 use proptest::prelude::*;
 
 /// The value of a constant expression, through the whole front end.

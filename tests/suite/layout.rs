@@ -4,9 +4,9 @@
 //! anybody would write, of which many still parse.
 
 use dlsys::diagnostic::Source;
-use dlsys::lang::{format::format, parse, print};
 use dlsys::session::Session;
 use dlsys::sim::Settings;
+use dlsys::syntax::{format::format, parse, print};
 use dlsys::tree::ModuleString;
 
 use crate::common::{plain, repository};

@@ -207,8 +207,10 @@ fn largest_step(session: &Session, from: f64, to: f64, interval: f64) -> f64 {
 fn petals_move_smoothly() {
     // A petal all its life; a flower from when it begins to grow until its petals fall, opening in between.
     for (name, settings, from, to) in [("petal", None, 0.0, 7.0), ("campanula", Some("n_0"), 1.2, 9.4)] {
-        let settings: Vec<dlsys::lang::Setting> =
-            settings.iter().map(|&name| dlsys::lang::Setting { name: name.to_owned(), value: 0.0 }).collect();
+        let settings: Vec<dlsys::compile::Setting> = settings
+            .iter()
+            .map(|&name| dlsys::compile::Setting { name: name.to_owned(), value: 0.0 })
+            .collect();
         let path = repository(&format!("models/{name}.dls"));
         let session = Session::open(&path, &settings).expect("a good model");
         let steps: Vec<f64> =

@@ -20,10 +20,12 @@
 //! assert_eq!(program.eval_one(&[3.0]), 1.5);
 //! ```
 
+mod comparison;
 mod curve;
 mod derivative;
 mod dual;
 mod elimination;
+mod fold;
 mod graph;
 mod interval;
 mod ops;
@@ -34,9 +36,11 @@ mod sign;
 mod tests;
 mod time;
 
+pub use comparison::{Comparison, Truth};
 pub use curve::{Array, Curve, CurveFault, MAX_POINTS, Part, Sort};
 pub use dual::Dual;
 pub use elimination::eliminate;
+pub use fold::Fold;
 pub use graph::{Graph, Integral, Lookup, Node, NodeId};
 pub use interval::Interval;
 pub use ops::{Binary, Unary, Value};

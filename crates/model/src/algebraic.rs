@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use super::{Jacobian, Pattern};
 use dlsys_diagnostic::Span;
-use dlsys_expr::{Binary, Program, Scratch, Value};
+use dlsys_expr::{Fold, Program, Scratch, Value};
 
 /// The parameters of a `solve` that have a value or an equation instead of a rate.
 ///
@@ -40,46 +40,15 @@ impl Algebraic {
         self.of.is_empty()
     }
 
-    /// True if the place is one whose parameter is solved for along with those that are integrated: `forced` if no
+    /// True if the place is one whose parameter is solved for along with those that are integrated: `numeric_only` if no
     /// formulas are used.
-    pub fn is_solved(&self, place: usize, forced: bool) -> bool {
-        if forced { !self.is_lazy(place) } else { self.needed[place] && !self.closed[place] }
+    pub fn is_solved(&self, place: usize, numeric_only: bool) -> bool {
+        if numeric_only { !self.is_lazy(place) } else { self.needed[place] && !self.closed[place] }
     }
 
     /// True if the parameter is computed only when somebody looks.
     pub fn is_lazy(&self, place: usize) -> bool {
         !self.needed[place] && !self.closed[place]
-    }
-}
-
-/// How the values of many modules become one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Fold {
-    Sum,
-    Count,
-    Largest,
-    Smallest,
-}
-
-impl Fold {
-    /// As it is written.
-    pub fn name(self) -> &'static str {
-        match self {
-            Fold::Sum => "sum",
-            Fold::Count => "count",
-            Fold::Largest => "largest",
-            Fold::Smallest => "smallest",
-        }
-    }
-
-    /// What there is with one more value.
-    pub fn add<T: Value>(self, all: Option<T>, one: T) -> T {
-        match (all, self) {
-            (None, _) => one,
-            (Some(all), Fold::Sum | Fold::Count) => T::binary(Binary::Add, all, one),
-            (Some(all), Fold::Largest) => T::binary(Binary::Max, all, one),
-            (Some(all), Fold::Smallest) => T::binary(Binary::Min, all, one),
-        }
     }
 }
 

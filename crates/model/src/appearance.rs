@@ -1,6 +1,6 @@
 //! How modules look, as far as a model says: colours, surfaces, contours, tropism.
 //!
-//! Plain data without geometry of its own: [`lang`](dlsys_lang) fills it in, the turtle makes materials and
+//! Plain data without geometry of its own: `dlsys-compile` fills it in, the turtle makes materials and
 //! meshes of it.
 
 use std::sync::Arc;

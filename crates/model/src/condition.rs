@@ -4,76 +4,8 @@
 //! these differences along the trajectory; at an event it *knows* that a difference is zero, though the
 //! rounded numbers differ in their last place. So conditions are not evaluated on numbers but on signs.
 
-use dlsys_expr::Sign;
+use dlsys_expr::{Comparison, Sign, Truth};
 use smallvec::SmallVec;
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Comparison {
-    Less,
-    LessOrEqual,
-    Equal,
-    NotEqual,
-    GreaterOrEqual,
-    Greater,
-}
-
-impl Comparison {
-    /// How the comparison is written.
-    pub fn symbol(self) -> &'static str {
-        match self {
-            Comparison::Less => "<",
-            Comparison::LessOrEqual => "<=",
-            Comparison::Equal => "=",
-            Comparison::NotEqual => "!=",
-            Comparison::GreaterOrEqual => ">=",
-            Comparison::Greater => ">",
-        }
-    }
-
-    /// The comparison with its sides exchanged.
-    pub fn mirrored(self) -> Comparison {
-        match self {
-            Comparison::Less => Comparison::Greater,
-            Comparison::LessOrEqual => Comparison::GreaterOrEqual,
-            Comparison::GreaterOrEqual => Comparison::LessOrEqual,
-            Comparison::Greater => Comparison::Less,
-            same => same,
-        }
-    }
-
-    /// The comparison that holds where this one does not.
-    pub fn negated(self) -> Comparison {
-        match self {
-            Comparison::Less => Comparison::GreaterOrEqual,
-            Comparison::LessOrEqual => Comparison::Greater,
-            Comparison::Equal => Comparison::NotEqual,
-            Comparison::NotEqual => Comparison::Equal,
-            Comparison::GreaterOrEqual => Comparison::Less,
-            Comparison::Greater => Comparison::LessOrEqual,
-        }
-    }
-
-    /// Whether it holds for a difference of this sign.
-    fn judge(self, sign: Sign) -> Truth {
-        use Comparison::*;
-        let holds = match sign {
-            Sign::Any => return Truth::Maybe,
-            Sign::Undefined => self == NotEqual,
-            Sign::Minus => matches!(self, Less | LessOrEqual | NotEqual),
-            Sign::Zero => matches!(self, LessOrEqual | Equal | GreaterOrEqual),
-            Sign::Plus => matches!(self, GreaterOrEqual | Greater | NotEqual),
-        };
-        if holds { Truth::Yes } else { Truth::No }
-    }
-}
-
-/// Three-valued logic (Kleene).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Truth {
-    No,
-    Maybe,
-    Yes,
-}
 
 /// One step of a condition in postfix order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -4,8 +4,9 @@
 //! is a formula is never searched for. The classes are facts about the mathematics of a rule; the simulation
 //! looks them up.
 
-use super::Driven;
-use dlsys_expr::Program;
+use std::sync::Arc;
+
+use dlsys_expr::{Curve, Program};
 
 /// How the equation of a parameter is solved. Coefficients are computed when a module takes the equation up,
 /// from the variables of its rule.
@@ -28,6 +29,31 @@ pub enum Law {
     Driven(Box<Driven>),
     /// Integrated numerically.
     Numeric(Numeric),
+}
+
+/// The growth of one parameter by a formula; `x' = h(time) q(x)`.
+#[derive(Clone, Debug)]
+pub struct Driven {
+    pub flow: Flow,
+    /// Coefficients of q, in the order that [`Flow`] says.
+    pub coefficients: Program,
+    /// H, to be taken from the start of the motion on; None for time itself.
+    pub pace: Option<Arc<Program>>,
+    /// H goes one way only.
+    pub monotone: bool,
+    /// The curves in h.
+    pub curves: Vec<Arc<Curve>>,
+}
+
+/// The form of q.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Flow {
+    /// `c + b x + a x²`: c, b, a.
+    Quadratic,
+    /// `x (a + b ln x)`: a, b.
+    Gompertz,
+    /// `a x + b x^p`: a, b, p.
+    Bernoulli,
 }
 
 /// Why a parameter is integrated numerically, and how it can be.
@@ -62,15 +88,22 @@ impl Law {
     }
 }
 
-/// How the instant at which the two sides of a comparison meet is found.
+/// How the zero of a difference of two sides is found: the zero-crossing function of a comparison.
 #[derive(Clone, Debug)]
-pub enum Watch {
-    /// Nothing in it changes.
-    Still,
-    /// They meet where one variable that moves one way only takes a value, which the program computes: a formula.
-    Crossing { variable: usize, level: Program },
-    /// The first root of a function of time: of formulas, or of dense output. The difference of the sides, if it is linear.
-    Root(Option<Sum>),
+pub enum ZeroCrossing {
+    /// Nothing in it changes: its sign stays.
+    Constant,
+    /// The sides meet where one variable that moves one way only takes a value, which the program computes: the instant
+    /// is a formula.
+    Formula {
+        /// The variable that moves.
+        variable: usize,
+        /// The value at which the sides meet, a function of the variables that stand still.
+        level: Program,
+    },
+    /// The first root of a function of time (formulas or dense output) is searched for. The difference of the sides, if
+    /// it is linear.
+    Search(Option<Sum>),
 }
 
 /// `constant + Σ factor · variable`.

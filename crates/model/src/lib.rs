@@ -1,12 +1,12 @@
 //! What a model says: names resolved, expressions compiled, module kinds known.
 //!
-//! A [`Model`] is made by [`lang`](dlsys_lang) from text and read by everything downstream. It knows
+//! A [`Model`] is made by `dlsys-compile` from text and read by everything downstream. It knows
 //! nothing of syntax (only [`Span`]s, so that messages can point at the text), and nothing of time: the
 //! growing tree belongs to [`structure`](dlsys_tree), the clock to [`sim`](dlsys_sim).
 //!
 //! - [`Kind`]: a module's name and number of parameters. `F(x)` and `F(x, y)` are two kinds.
 //! - [`Rule`]: what the text writes under one head: context, equations, productions.
-//! - [`Law`], [`Watch`]: how much work an equation or a comparison is; found by [`analyse`].
+//! - [`Law`], [`ZeroCrossing`]: how much work an equation or a comparison is; found by [`analyse`].
 //! - [`Condition`]: the logic of an `if`, over the signs of differences, because the simulation knows
 //!   better than a comparison of two rounded numbers whether two sides have met.
 //!
@@ -30,42 +30,31 @@
 //! ```
 
 mod algebraic;
-mod analysis;
 mod appearance;
 mod chance;
 mod condition;
-mod driven;
-mod form;
-mod invariance;
 mod kind;
 mod law;
 mod measure;
-mod need;
-mod pulses;
-mod rank;
 mod remedy;
 mod rule;
 mod stepping;
 
-pub use algebraic::{Aggregate, Algebraic, Fold, Turn};
-pub use analysis::{AlgebraicDraft, Draft, analyse};
+pub use algebraic::{Aggregate, Algebraic, Turn};
 pub use appearance::{
     Appearance, BUILT_IN_COLORS, Contour, Gradient, NamedColor, Net, Rgb, SurfaceShape, Tropism,
 };
 pub use chance::{Clock, Distribution, Draw, NewClock, choose};
-pub use condition::{Comparison, Condition, Step, Truth};
-pub use dlsys_expr::Sign;
-pub use driven::{Driven, DrivenForm, Flow, driven_form, outside_of_drivers};
-pub use invariance::never_reached;
+pub use condition::{Condition, Step};
+pub use dlsys_expr::{Comparison, Fold, Sign, Truth};
 pub use kind::{
     BUILT_IN_SURFACES, COMMAND_SURFACES, CUT, Class, DRAWN_WORDS, Kind, KindId, Kinds, base_of, class_of,
 };
-pub use law::{Jacobian, Law, Linear, Numeric, Obstacle, Sum, Watch};
+pub use law::{Driven, Flow, Jacobian, Law, Linear, Numeric, Obstacle, Sum, ZeroCrossing};
 pub use measure::Measure;
-pub use rank::is_singular;
 pub use remedy::{Boundary, Remedy};
 pub use rule::{Interpretation, Outcome, Pattern, Produce, Rule, Solve, Successor, Switch};
-pub use stepping::Stepping;
+pub use stepping::{Read, Stepping};
 
 use std::sync::Arc;
 

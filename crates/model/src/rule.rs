@@ -9,7 +9,7 @@
 
 use super::{
     Aggregate, Algebraic, Boundary, Clock, Condition, Draw, Jacobian, KindId, Law, Linear, NewClock,
-    Stepping, Turn, Watch,
+    Stepping, Turn, ZeroCrossing,
 };
 use dlsys_diagnostic::Span;
 use dlsys_expr::{Program, Scratch, Value};
@@ -61,7 +61,7 @@ pub struct Rule {
     /// Rates or conditions read some of them.
     pub reads_context: bool,
     /// How each atom is watched while no clause is active; the clauses say it for themselves.
-    pub watch_at_rest: Vec<Watch>,
+    pub watch_at_rest: Vec<ZeroCrossing>,
 }
 
 impl Rule {
@@ -80,7 +80,7 @@ impl Rule {
     }
 
     /// How each atom is watched under a clause.
-    pub fn watch(&self, solve: Option<usize>) -> &[Watch] {
+    pub fn watch(&self, solve: Option<usize>) -> &[ZeroCrossing] {
         solve.map_or(&self.watch_at_rest, |s| &self.solves[s].watch)
     }
 
@@ -144,11 +144,11 @@ pub struct Solve {
     pub jacobian: Jacobian,
     /// Parameters with a value or an equation instead of a rate.
     pub algebraic: Algebraic,
-    pub watch: Vec<Watch>,
+    pub watch: Vec<ZeroCrossing>,
     /// Rates depend on time in a way that may be over before a step notices: not as polynomials.
-    pub flashes: bool,
+    pub has_pulses: bool,
     /// The clock of an event at a rate runs, and something is integrated numerically.
-    pub is_delicate: bool,
+    pub has_hazard_clock: bool,
     pub stepping: Stepping,
 }
 

@@ -22,8 +22,8 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
+use dlsys_compile::{Files, NoFiles, Setting};
 use dlsys_diagnostic::{Diagnostic, Source};
-use dlsys_lang::{self as lang, Files, NoFiles, Setting};
 use dlsys_model::{Measure, Model};
 use dlsys_sim::{self as sim, Simulation};
 
@@ -172,7 +172,7 @@ impl Session {
         settings: &[Setting],
         files: &dyn Files,
     ) -> Result<Session, Box<LoadError>> {
-        let loaded = lang::load_with(&source, settings, files);
+        let loaded = dlsys_compile::load_with(&source, settings, files);
         let source = loaded.source.unwrap_or(source);
         match loaded.model {
             Some(model) => {
@@ -198,7 +198,7 @@ impl Session {
             values.map(|p| Setting { name: p.name.clone(), value: p.value }).collect();
         let source = Source::new("measure", text);
         let folders = Folders { paths: self.folders.clone(), inputs: RefCell::default() };
-        let read = lang::measure(&self.source, &folders, &settings, &self.model, &source);
+        let read = dlsys_compile::measure(&self.source, &folders, &settings, &self.model, &source);
         read.map_err(|said| (source, said))
     }
 

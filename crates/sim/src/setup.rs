@@ -49,7 +49,7 @@ impl<'m> Setup<'m> {
         Setup {
             model,
             settings,
-            coupled_settings: settings.for_clocks(solves().any(|solve| solve.is_delicate)),
+            coupled_settings: settings.for_clocks(solves().any(|solve| solve.has_hazard_clock)),
             seed: Seed::new(settings.seed),
             numeric_only: settings.method != Method::Auto,
             fast_path: !settings.transitions && !settings.slow,
@@ -60,7 +60,7 @@ impl<'m> Setup<'m> {
             gathers,
             plain: !hands_on && !gathers && !is_algebraic && !is_discrete && !settings.transitions,
             is_algebraic,
-            has_pulses: solves().any(|solve| solve.flashes),
+            has_pulses: solves().any(|solve| solve.has_pulses),
         }
     }
 

@@ -17,7 +17,7 @@
 //! #= set r = 0.1                        a param
 //! ```
 
-use dlsys_lang::Setting;
+use dlsys_compile::Setting;
 use dlsys_sim::Method;
 
 /// Names of the errors that a case may demand.

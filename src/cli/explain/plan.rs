@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::curves::CurvePlan;
 use super::{given, words};
 use crate::diagnostic::Source;
-use crate::model::{Class, Condition, DRAWN_WORDS, Kind, Law, Model, Produce, Rule, Solve, Watch};
+use crate::model::{Class, Condition, DRAWN_WORDS, Kind, Law, Model, Produce, Rule, Solve, ZeroCrossing};
 use crate::session::Session;
 
 /// Everything that is said about a model. Field names are those of the JSON.
@@ -351,13 +351,13 @@ impl Facts<'_> {
     fn watch(&self, rule: &Rule, solve: Option<usize>, atom: usize) -> (&'static str, String) {
         let watch = &rule.watch(solve)[atom];
         let solve = solve.map(|s| &rule.solves[s]);
-        if matches!(watch, Watch::Still) {
+        if matches!(watch, ZeroCrossing::Constant) {
             return ("nothing to find", "nothing in it changes from one event to the next".to_owned());
         }
         if solve.is_some_and(|s| s.unreachable[atom]) {
             return ("never met", "the equations approach it and never arrive".to_owned());
         }
-        if let Watch::Crossing { variable, .. } = watch
+        if let ZeroCrossing::Formula { variable, .. } = watch
             && self.clock(rule, *variable).is_some()
         {
             return (
@@ -365,7 +365,7 @@ impl Facts<'_> {
                 "a formula tells when the integral of the rate is what was drawn".to_owned(),
             );
         }
-        if let Watch::Crossing { variable, level } = watch {
+        if let ZeroCrossing::Formula { variable, level } = watch {
             return ("closed-form time", words::crossing(rule, *variable, level));
         }
         let mut reads = rule.sides.output_reads(2 * atom);

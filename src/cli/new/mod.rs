@@ -86,8 +86,8 @@ fn text(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use crate::diagnostic::Source;
-    use crate::lang::format::format;
     use crate::session::Session;
+    use crate::syntax::format::format;
 
     #[test]
     fn the_model_is_good_and_tidy() {

@@ -14,7 +14,7 @@ use super::player::{Player, SPEEDS};
 use super::trial::{Outcome, Runner};
 use super::worker::{Desk, Facts, News, Order, Shown, work};
 use super::{Options, panel, timeline};
-use dlsys_lang::Setting;
+use dlsys_compile::Setting;
 use dlsys_render::Page;
 
 /// After so long without a picture, the window says that it waits.

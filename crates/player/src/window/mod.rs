@@ -26,7 +26,7 @@ mod worker;
 
 use std::path::PathBuf;
 
-use dlsys_lang::Setting;
+use dlsys_compile::Setting;
 use dlsys_sim::Settings;
 
 pub use trial::Trial;

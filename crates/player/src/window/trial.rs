@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use eframe::egui::{self, ColorImage, Event, ViewportCommand};
 
 use super::app::Window;
-use dlsys_lang::Setting;
+use dlsys_compile::Setting;
 
 /// After so long the trial has failed.
 const PATIENCE: Duration = Duration::from_secs(120);

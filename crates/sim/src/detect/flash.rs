@@ -5,7 +5,7 @@
 //! arithmetic over pieces of the step, along its dense output, and compared with the rates that were seen: where they
 //! may be much larger, the step is cut.
 //!
-//! Which rates may have flashes is known from the model ([`Solve::flashes`](dlsys_model::Solve::flashes)): those that are
+//! Which rates may have flashes is known from the model ([`Solve::has_pulses`](dlsys_model::Solve::has_pulses)): those that are
 //! no polynomials in what moves, and those that read what follows a formula, which a step does not resolve. What moves by
 //! the step itself is resolved by it, to the tolerance, and a polynomial of that has no flashes.
 //!

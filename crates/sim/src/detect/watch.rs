@@ -11,7 +11,7 @@ use crate::detect::signs::{Reach, matters, opposite, produces, rate_at, reach, s
 use crate::world::path::Path;
 use crate::world::state::{Change, Signs, State};
 use dlsys_expr::{Binary, Dual, Interval, Program, Scratch, Value};
-use dlsys_model::{Rule, Sign, Watch};
+use dlsys_model::{Rule, Sign, ZeroCrossing};
 use dlsys_ode::{Function, Root, first_root};
 use dlsys_tree::SimTime;
 
@@ -88,7 +88,7 @@ pub struct Difference<'w, 'p> {
 impl Function for Difference<'_, '_> {
     fn bounds(&mut self, lo: f64, hi: f64) -> Dual<Interval> {
         // Values that move together may differ by much less than each of them moves.
-        if let Watch::Root(Some(sum)) = &self.path.rule.watch(self.path.state.solve)[self.atom]
+        if let ZeroCrossing::Search(Some(sum)) = &self.path.rule.watch(self.path.state.solve)[self.atom]
             && let Some(bounds) = self.path.sum_over(sum, lo, hi)
         {
             return bounds;
@@ -128,14 +128,14 @@ enum How<'w> {
 }
 
 /// How an atom is watched, given how the parameters move.
-fn how<'w>(watch: &'w Watch, state: &State) -> How<'w> {
+fn how<'w>(watch: &'w ZeroCrossing, state: &State) -> How<'w> {
     match watch {
-        Watch::Still => How::Not,
-        Watch::Crossing { variable, level } => match state.motions.get(*variable) {
+        ZeroCrossing::Constant => How::Not,
+        ZeroCrossing::Formula { variable, level } => match state.motions.get(*variable) {
             Some(motion) if !motion.is_formula() => How::Search,
             _ => How::Formula(*variable, level),
         },
-        Watch::Root(_) => How::Search,
+        ZeroCrossing::Search(_) => How::Search,
     }
 }
 
@@ -306,8 +306,8 @@ impl Watcher {
 
     /// True if a parameter that is integrated stays away from the one value at which its atom's sides meet: most steps
     /// need no more than a look at its bounds.
-    fn keeps_clear(&mut self, path: &Path, watch: &Watch, sign: Sign, error: f64) -> bool {
-        let Watch::Crossing { variable, level } = watch else { return false };
+    fn keeps_clear(&mut self, path: &Path, watch: &ZeroCrossing, sign: Sign, error: f64) -> bool {
+        let ZeroCrossing::Formula { variable, level } = watch else { return false };
         if !matches!(sign, Sign::Plus | Sign::Minus) {
             return false;
         }

@@ -10,7 +10,7 @@ use crate::schedule::{NextEvent, Owner};
 use crate::world::brief;
 use crate::world::context::Around;
 use crate::world::state::{Change, Open, State, What};
-use dlsys_model::{Sign, Truth, Watch};
+use dlsys_model::{Sign, Truth, ZeroCrossing};
 use dlsys_tree::ModuleId;
 
 impl EventStage<'_, '_> {
@@ -97,7 +97,7 @@ impl EventStage<'_, '_> {
                 // What stands still until an event of its own is not moved by others.
                 let watch = s.rule.map_or(&[][..], |rule| self.setup.model.rules[rule].watch(s.solve));
                 let mut atoms = s.signs.iter().zip(watch);
-                atoms.any(|(sign, watch)| *sign == Sign::Zero && !matches!(watch, Watch::Still))
+                atoms.any(|(sign, watch)| *sign == Sign::Zero && !matches!(watch, ZeroCrossing::Constant))
             };
             if state.is_some_and(|s| !s.context.is_empty() && rests(s)) {
                 self.events.resting.push(id);

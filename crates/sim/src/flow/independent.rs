@@ -161,9 +161,9 @@ impl FlowStage<'_, '_> {
                 self.flows.alone.restart(self.setup.settings.method, y.len());
             }
             let fixed = self.setup.settings.method.is_fixed_step();
-            let settings = self.setup.settings.for_clocks(rule.solves[solve].is_delicate);
+            let settings = self.setup.settings.for_clocks(rule.solves[solve].has_hazard_clock);
             let stiff = control.stiff || self.setup.settings.method == Method::Radau;
-            let flashes = rule.solves[solve].flashes && !fixed;
+            let flashes = rule.solves[solve].has_pulses && !fixed;
             let mut tries = 0;
             let step = loop {
                 let stats = &mut self.log.stats;

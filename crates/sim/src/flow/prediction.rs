@@ -15,7 +15,7 @@ use crate::motion::Motion;
 use crate::scratch::Scratch;
 use crate::world::life::{End, Life, LifeClass};
 use crate::world::state::{Change, Signs};
-use dlsys_model::{Condition, Law, Rule, Sign, Solve, Truth, Watch};
+use dlsys_model::{Condition, Law, Rule, Sign, Solve, Truth, ZeroCrossing};
 use dlsys_tree::SimTime;
 
 /// The life of a module from its birth to its first event.
@@ -85,7 +85,7 @@ impl Prediction {
     fn find_first_event(&mut self, rule: &Rule, birth: SimTime, scratch: &mut Scratch) -> Option<()> {
         let mut first: Option<Change> = None;
         for (atom, watch) in rule.watch(self.solve).iter().enumerate() {
-            if matches!(watch, Watch::Root(_)) {
+            if matches!(watch, ZeroCrossing::Search(_)) {
                 return None;
             }
             let Some(crossing) = crossing(rule, self.solve, atom, &self.motions, birth, scratch) else {
@@ -195,7 +195,7 @@ fn crossing(
     birth: SimTime,
     scratch: &mut Scratch,
 ) -> Option<Crossing> {
-    let Watch::Crossing { variable, level } = &rule.watch(solve)[atom] else { return None };
+    let ZeroCrossing::Formula { variable, level } = &rule.watch(solve)[atom] else { return None };
     let (variable, time) = (*variable, rule.time_variable());
     let clause = solve.map(|s| &rule.solves[s]);
     if clause.is_some_and(|s| s.unreachable[atom]) {

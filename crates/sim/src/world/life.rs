@@ -11,7 +11,7 @@ use smallvec::SmallVec;
 use crate::motion::Motion;
 use crate::world::state::Signs;
 use dlsys_expr::Program;
-use dlsys_model::{Law, Model, Rule, Sign, Solve, Watch};
+use dlsys_model::{Law, Model, Rule, Sign, Solve, ZeroCrossing};
 use dlsys_tree::{NO_LABEL, SimTime};
 
 /// A module with this label is not light, and that is known.
@@ -240,10 +240,10 @@ fn is_timeless(rule: &Rule) -> bool {
         Law::Driven(law) => blind(&law.coefficients) && law.pace.as_ref().is_none_or(|pace| blind(pace)),
         Law::Sum { .. } | Law::Numeric(_) => false,
     };
-    let watch_is_blind = |watch: &Watch| match watch {
-        Watch::Still => true,
-        Watch::Crossing { variable, level } => *variable != time && blind(level),
-        Watch::Root(_) => false,
+    let watch_is_blind = |watch: &ZeroCrossing| match watch {
+        ZeroCrossing::Constant => true,
+        ZeroCrossing::Formula { variable, level } => *variable != time && blind(level),
+        ZeroCrossing::Search(_) => false,
     };
     let solve_is_blind =
         |s: &Solve| blind(&s.rates) && s.laws.iter().all(law_is_blind) && s.watch.iter().all(watch_is_blind);

@@ -392,7 +392,7 @@ impl FlowStage<'_, '_> {
     fn may_flash(&self, id: ModuleId) -> bool {
         let clause =
             self.world.state(id).and_then(|s| Some(&self.setup.model.rules[s.rule?].solves[s.solve?]));
-        clause.is_some_and(|solve| solve.flashes)
+        clause.is_some_and(|solve| solve.has_pulses)
     }
 
     /// True if something may have been overlooked of the present motion of some coupled modules, from now on.

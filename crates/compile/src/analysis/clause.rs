@@ -1,0 +1,151 @@
+//! One `solve` clause: its equations classified, compiled and put together.
+
+use std::sync::Arc;
+
+use dlsys_expr::{Graph, NodeId, Program};
+use dlsys_model::{Algebraic, Jacobian, Law, Linear, Solve, ZeroCrossing};
+
+use super::crossings::crossing;
+use super::laws::{jacobian, laws, linear};
+use super::stepping::{Layout, StepEquations};
+use super::variability::Constants;
+use crate::declared::{DeclaredSolve, ResolvedRule};
+
+/// What is found out about the equations of a clause.
+pub struct ClauseAnalysis {
+    of: Vec<usize>,
+    rates: Program,
+    pub laws: Vec<Law>,
+    numeric: Vec<usize>,
+    numeric_rates: Program,
+    linear: Option<Linear>,
+    jacobian: Jacobian,
+    algebraic: Algebraic,
+    watch: Vec<ZeroCrossing>,
+    has_hazard_clock: bool,
+}
+
+impl ClauseAnalysis {
+    /// The compiled clause.
+    pub fn compile(self, solve: DeclaredSolve, pulses: bool, layout: &Layout) -> Solve {
+        let equations = StepEquations {
+            of: &self.of,
+            rates: &self.rates,
+            laws: &self.laws,
+            numeric: &self.numeric,
+            numeric_rates: &self.numeric_rates,
+            linear: self.linear.as_ref(),
+            jacobian: &self.jacobian,
+            algebraic: &self.algebraic,
+        };
+        let stepping = equations.stepping(layout);
+        Solve {
+            guard: solve.guard,
+            span: solve.span,
+            of: self.of,
+            rates: self.rates,
+            switches: solve.switches,
+            unreachable: solve.unreachable,
+            laws: self.laws,
+            numeric: self.numeric,
+            numeric_rates: self.numeric_rates,
+            linear: self.linear,
+            jacobian: self.jacobian,
+            algebraic: self.algebraic,
+            watch: self.watch,
+            has_pulses: pulses,
+            has_hazard_clock: self.has_hazard_clock,
+            stepping,
+        }
+    }
+}
+
+/// Classifies the equations of a clause. `is_needed` tells whether something reads a parameter of the module.
+pub fn analyse_clause(
+    graph: &mut Graph,
+    rule: &ResolvedRule,
+    solve: &DeclaredSolve,
+    constants: &Constants,
+    is_needed: &dyn Fn(usize) -> bool,
+) -> ClauseAnalysis {
+    let declared = &rule.declared;
+    let rates = &solve.rates;
+    let total = declared.variables + solve.switches.len();
+    let laws = laws(graph, rates, constants, total);
+    let monotone = |variable: usize| {
+        let position = rates.iter().position(|(p, _)| *p == variable);
+        let given = solve.algebraic.iter().any(|entry| entry.parameter == variable);
+        !given && position.is_none_or(|i| is_monotone(&laws[i]))
+    };
+    let watch = (declared.sides.iter())
+        .map(|&sides| crossing(graph, sides, constants, &monotone, declared.variables))
+        .collect();
+    let algebraic = algebraic(graph, solve, &laws, constants, total, is_needed);
+    let jacobian = jacobian(graph, rates, constants, total);
+    let numeric: Vec<usize> = (0..rates.len()).filter(|i| !laws[*i].is_closed()).collect();
+    let roots: Vec<NodeId> = numeric.iter().map(|i| rates[*i].1).collect();
+    let numeric_rates = Program::compile(graph, &roots, total);
+    let linear = linear(graph, &roots, constants, total);
+    let clocked = rates.iter().any(|(p, _)| declared.clocks.iter().any(|clock| clock.parameter == *p));
+    let all: Vec<NodeId> = rates.iter().map(|rate| rate.1).collect();
+    ClauseAnalysis {
+        of: rates.iter().map(|(parameter, _)| *parameter).collect(),
+        rates: Program::compile(graph, &all, total),
+        has_hazard_clock: clocked && !numeric.is_empty(),
+        laws,
+        numeric,
+        numeric_rates,
+        linear,
+        jacobian,
+        algebraic,
+        watch,
+    }
+}
+
+/// True if a parameter that follows this law moves one way only.
+fn is_monotone(law: &Law) -> bool {
+    match law {
+        Law::Polynomial(coefficients) => coefficients.outputs() == 1,
+        Law::Quadratic(_) => true,
+        Law::Driven(driven) => driven.monotone,
+        _ => false,
+    }
+}
+
+/// What is known of the parameters that have a value or an equation instead of a rate.
+fn algebraic(
+    graph: &mut Graph,
+    solve: &DeclaredSolve,
+    laws: &[Law],
+    constants: &Constants,
+    total: usize,
+    is_needed: &dyn Fn(usize) -> bool,
+) -> Algebraic {
+    let entries = &solve.algebraic;
+    let nodes: Vec<NodeId> = entries.iter().map(|entry| entry.node).collect();
+    let follows_formula = |v: u32| {
+        let v = v as usize;
+        let by_law = solve.rates.iter().position(|(p, _)| *p == v).is_some_and(|i| laws[i].is_closed());
+        constants.is_constant(v as u32) || v == constants.time || v == constants.time + 1 || by_law
+    };
+    let closed: Vec<bool> = (entries.iter())
+        .map(|entry| entry.explicit && graph.variables(&[entry.node]).into_iter().all(follows_formula))
+        .collect();
+    let formulas = (nodes.iter().zip(&closed))
+        .map(|(node, closed)| match closed {
+            true => Arc::new(Program::compile(graph, &[*node], total)),
+            false => Arc::default(),
+        })
+        .collect();
+    let rows: Vec<(usize, NodeId)> = entries.iter().map(|entry| (entry.parameter, entry.node)).collect();
+    Algebraic {
+        of: rows.iter().map(|row| row.0).collect(),
+        explicit: entries.iter().map(|entry| entry.explicit).collect(),
+        closed,
+        needed: rows.iter().map(|row| is_needed(row.0)).collect(),
+        values: Program::compile(graph, &nodes, total),
+        formulas,
+        jacobian: jacobian(graph, &rows, constants, total),
+        spans: entries.iter().map(|entry| entry.span).collect(),
+    }
+}

@@ -1,0 +1,57 @@
+//! How the instant is found at which the two sides of a comparison meet.
+
+use dlsys_expr::{Binary, Graph, Monomial, NodeId, Polynomial, Program, Unary};
+use dlsys_model::{Sum, ZeroCrossing};
+
+use super::variability::Constants;
+
+/// How the meeting of two sides is found. `monotone` tells of an own parameter that it moves one way only.
+pub fn crossing(
+    graph: &mut Graph,
+    (a, b): (NodeId, NodeId),
+    constants: &Constants,
+    monotone: &dyn Fn(usize) -> bool,
+    total: usize,
+) -> ZeroCrossing {
+    if constants.all_constant(graph, &[a, b]) {
+        return ZeroCrossing::Constant;
+    }
+    let difference = graph.binary(Binary::Sub, a, b);
+    let Some(p) = graph.polynomial(difference, |v| !constants.is_constant(v)) else {
+        return ZeroCrossing::Search(None);
+    };
+    let moving: Vec<(&[(u32, u32)], NodeId)> =
+        p.terms.iter().filter(|(m, _)| !m.is_empty()).map(|(m, c)| (&m[..], *c)).collect();
+    match moving[..] {
+        [] => ZeroCrossing::Constant,
+        [(&[(variable, 1)], slope)] => {
+            let v = variable as usize;
+            if v >= constants.own && v < constants.time || v < constants.own && !monotone(v) {
+                return ZeroCrossing::Search(sum(graph, &p));
+            }
+            let level = match p.terms.get(&Monomial::new()) {
+                None => graph.constant(0.0),
+                Some(&rest) => {
+                    let minus = graph.unary(Unary::Neg, rest);
+                    graph.binary(Binary::Div, minus, slope)
+                }
+            };
+            ZeroCrossing::Formula { variable: v, level: Program::compile(graph, &[level], total) }
+        }
+        _ => ZeroCrossing::Search(sum(graph, &p)),
+    }
+}
+
+/// A polynomial as a sum with factors that are known, if it is one.
+fn sum(graph: &Graph, p: &Polynomial) -> Option<Sum> {
+    let mut sum = Sum { constant: 0.0, terms: Vec::new() };
+    for (monomial, &factor) in &p.terms {
+        let factor = graph.as_constant(factor)?;
+        match monomial[..] {
+            [] => sum.constant = factor,
+            [(variable, 1)] => sum.terms.push((variable as usize, factor)),
+            _ => return None,
+        }
+    }
+    Some(sum)
+}

@@ -1,0 +1,384 @@
+//! Equations whose solution is a formula of an integral that is known: `x' = h(time) q(x)`.
+//!
+//! h is a sum of curves and growth functions of time, each with its antiderivative known to the graph; q is one of the
+//! rates with a formula: quadratic, Gompertz's `x (a + b ln x)`, or Bernoulli's `a x + b x^p`, to which the growth laws of
+//! Richards and von Bertalanffy belong. With H the integral of h, the solution is that of `dx/ds = q(x)` at `s = H(time)`.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use dlsys_expr::{Binary, Curve, Graph, Integral, Monomial, Node, NodeId, Part, Program, Unary};
+use dlsys_model::{Driven, Flow};
+
+/// Variables at and above this number stand for parts of a rate; those of functions begin above them.
+const STAND_IN: u32 = 1 << 23;
+/// ln x, and x to the power that [`Parts::power`] is.
+const LOGARITHM: u32 = STAND_IN;
+const POWER: u32 = STAND_IN + 1;
+/// Curves and growth functions.
+const FIRST_DRIVER: u32 = STAND_IN + 2;
+
+/// Highest power of `age` beside them.
+const MAX_AGE_DEGREE: u32 = 3;
+/// Points at which it is tested whether coefficients are proportional (Schwartz 1980, Zippel 1979).
+const POINTS: usize = 8;
+
+/// A rate taken apart, before it is code.
+pub struct DrivenForm {
+    flow: Flow,
+    coefficients: Vec<NodeId>,
+    pace: Option<NodeId>,
+    monotone: bool,
+    curves: Vec<Arc<Curve>>,
+}
+
+impl DrivenForm {
+    pub fn compile(self, graph: &Graph, total: usize) -> Driven {
+        Driven {
+            flow: self.flow,
+            coefficients: Program::compile(graph, &self.coefficients, total),
+            pace: self.pace.map(|pace| Arc::new(Program::compile(graph, &[pace], total))),
+            monotone: self.monotone,
+            curves: self.curves,
+        }
+    }
+}
+
+/// A part of h: an expression with its antiderivative along time.
+#[derive(Clone, Copy)]
+struct Driver {
+    node: NodeId,
+    /// d(argument)/dt
+    speed: NodeId,
+    integral: Integral,
+}
+
+/// What stands in for what.
+#[derive(Default)]
+struct Parts {
+    drivers: Vec<Driver>,
+    images: HashMap<NodeId, NodeId>,
+    power: Option<NodeId>,
+}
+
+/// Parts of an expression that have an antiderivative along time: curves and growth functions of `age` or `t`. Expressions
+/// inside of them are not looked at.
+fn drivers(
+    graph: &mut Graph,
+    root: NodeId,
+    is_constant: &dyn Fn(u32) -> bool,
+    time: u32,
+) -> (Vec<Driver>, Vec<NodeId>) {
+    let is_time = |v: u32| v == time || v == time + 1;
+    let (mut found, mut outside) = (Vec::new(), Vec::new());
+    let mut stack = vec![root];
+    let mut seen = std::collections::HashSet::from([root]);
+    while let Some(id) = stack.pop() {
+        let reads = graph.variables(&[id]);
+        let timely =
+            reads.iter().copied().any(is_time) && reads.iter().all(|v| is_time(*v) || is_constant(*v));
+        if timely
+            && let Some(integral) = graph.integral_of(id)
+            && let Some(speed) = speed(graph, integral.argument, is_constant, time)
+        {
+            found.push(Driver { node: id, speed, integral });
+            continue;
+        }
+        outside.push(id);
+        for operand in graph.node(id).operands().into_iter().flatten() {
+            if seen.insert(operand) {
+                stack.push(operand);
+            }
+        }
+    }
+    found.sort_by_key(|driver| driver.node);
+    (found, outside)
+}
+
+/// The rate of an argument that is linear in time, with a constant coefficient.
+fn speed(
+    graph: &mut Graph,
+    argument: NodeId,
+    is_constant: &dyn Fn(u32) -> bool,
+    time: u32,
+) -> Option<NodeId> {
+    let polynomial = graph.polynomial(argument, |v| v == time || v == time + 1)?;
+    let constant = |graph: &Graph, id: NodeId| graph.variables(&[id]).into_iter().all(is_constant);
+    if polynomial.degree() != 1 || !polynomial.terms.values().all(|c| constant(graph, *c)) {
+        return None;
+    }
+    let slopes: Vec<NodeId> = [time, time + 1].iter().filter_map(|v| polynomial.coefficient(*v, 1)).collect();
+    slopes.into_iter().reduce(|a, b| graph.binary(Binary::Add, a, b))
+}
+
+/// The expressions of a rate that are outside of curves and growth functions of time, and these themselves: for whoever
+/// would change the former only.
+pub fn outside_of_drivers(
+    graph: &mut Graph,
+    root: NodeId,
+    is_constant: &dyn Fn(u32) -> bool,
+    time: u32,
+) -> Vec<NodeId> {
+    drivers(graph, root, is_constant, time).1
+}
+
+/// The form of a rate, if it is `h(time) q(x)`. `parameter` is the number of x, `time` that of `t`; `age` is the next.
+/// What is solved otherwise anyhow, rates without curves and growth functions that are quadratic, is left to that.
+pub fn driven_form(
+    graph: &mut Graph,
+    parameter: u32,
+    rate: NodeId,
+    is_constant: &dyn Fn(u32) -> bool,
+    time: u32,
+) -> Option<DrivenForm> {
+    let mut parts = Parts { drivers: drivers(graph, rate, is_constant, time).0, ..Parts::default() };
+    for (i, driver) in parts.drivers.iter().enumerate() {
+        let stand_in = graph.var(FIRST_DRIVER + i as u32);
+        parts.images.insert(driver.node, stand_in);
+    }
+    growth_terms(graph, parameter, rate, is_constant, &mut parts);
+    let images = &parts.images;
+    let form = graph.rewrite(&[rate], |_, id, _| images.get(&id).copied())[0];
+    let age = time + 1;
+    let counts = |v: u32| v == parameter || v == age || (STAND_IN..STAND_IN + (1 << 20)).contains(&v);
+    let polynomial = graph.polynomial(form, counts)?;
+    let constant = |graph: &Graph, id: NodeId| graph.variables(&[id]).into_iter().all(is_constant);
+    if polynomial.terms.is_empty() || !polynomial.terms.values().all(|c| constant(graph, *c)) {
+        return None;
+    }
+    // The coefficient of each product of a part of q and a part of h.
+    let (mut of_x, mut of_time): (Vec<Monomial>, Vec<Monomial>) = (Vec::new(), Vec::new());
+    let mut table: HashMap<(usize, usize), NodeId> = HashMap::new();
+    let place = |list: &mut Vec<Monomial>, item: Monomial| {
+        list.iter().position(|known| *known == item).unwrap_or_else(|| {
+            list.push(item);
+            list.len() - 1
+        })
+    };
+    for (monomial, coefficient) in &polynomial.terms {
+        let in_time = |v: &u32| *v == age || *v >= FIRST_DRIVER;
+        let (h, q): (Monomial, Monomial) = monomial.iter().copied().partition(|(v, _)| in_time(v));
+        let single = match h[..] {
+            [] => true,
+            [(v, n)] if v == age => n <= MAX_AGE_DEGREE,
+            [(_, n)] => n == 1,
+            _ => false,
+        };
+        if !single {
+            return None;
+        }
+        table.insert((place(&mut of_x, q), place(&mut of_time, h)), *coefficient);
+    }
+    let (flow, order) = flow(parameter, &of_x)?;
+    let driven = of_time.iter().flatten().any(|(v, _)| *v >= FIRST_DRIVER);
+    let one_pace = of_time.len() == 1;
+    // Without a curve only what has no other formula; x' = age x is integrated, as ever.
+    if !driven && (flow == Flow::Quadratic || !(one_pace && of_time[0].is_empty())) {
+        return None;
+    }
+    let coefficients: Option<Vec<Vec<NodeId>>> =
+        (0..of_x.len()).map(|i| (0..of_time.len()).map(|j| table.get(&(i, j)).copied()).collect()).collect();
+    let one = graph.constant(1.0);
+    let (of_q, of_h): (Vec<NodeId>, Vec<NodeId>) = match (of_x.len(), of_time.len()) {
+        (_, 1) => (coefficients?.into_iter().map(|row| row[0]).collect(), vec![one]),
+        (1, _) => (vec![one], coefficients?.swap_remove(0)),
+        _ => {
+            let rows = coefficients?;
+            if !proportional(graph, &rows, time) {
+                return None;
+            }
+            let h = rows[0].iter().map(|c| graph.binary(Binary::Div, *c, rows[0][0])).collect();
+            (rows.iter().map(|row| row[0]).collect(), h)
+        }
+    };
+    let trivial = one_pace && of_time[0].is_empty();
+    let pace = (!trivial).then(|| pace(graph, &parts, age, &of_time, &of_h));
+    let zero = graph.constant(0.0);
+    let mut coefficients: Vec<NodeId> =
+        order.into_iter().map(|place| place.map_or(zero, |i: usize| of_q[i])).collect();
+    if flow == Flow::Bernoulli {
+        coefficients.push(exponent(graph, parameter, &of_x, parts.power)?);
+    }
+    let curve_of = |driver: &Driver| match graph.node(driver.node) {
+        Node::Curve(curve, part, _) => Some((graph.curve_of(curve).clone(), part)),
+        _ => None,
+    };
+    let known: Vec<Option<(Arc<Curve>, Part)>> = parts.drivers.iter().map(curve_of).collect();
+    let steady = match known.first() {
+        Some(Some((curve, part))) => curve.keeps_sign(*part),
+        _ => false,
+    };
+    let monotone =
+        trivial || one_pace && of_time[0].first().is_some_and(|(v, _)| *v == FIRST_DRIVER) && steady;
+    let mut curves: Vec<Arc<Curve>> = known.into_iter().flatten().map(|(curve, _)| curve).collect();
+    curves.dedup_by(|a, b| Arc::ptr_eq(a, b));
+    Some(DrivenForm { flow, coefficients, pace, monotone, curves })
+}
+
+/// Lets variables stand in for logarithms and powers of x.
+fn growth_terms(
+    graph: &mut Graph,
+    parameter: u32,
+    rate: NodeId,
+    is_constant: &dyn Fn(u32) -> bool,
+    parts: &mut Parts,
+) {
+    let (logarithm, power_of_x) = (graph.var(LOGARITHM), graph.var(POWER));
+    let still = |graph: &Graph, id: NodeId| graph.variables(&[id]).into_iter().all(is_constant);
+    for id in graph.reachable(&[rate]) {
+        let (base, exponent) = match graph.node(id) {
+            Node::Unary(Unary::Ln, base) => (base, None),
+            Node::Unary(Unary::Sqrt, base) => (base, Some(graph.constant(0.5))),
+            Node::Binary(Binary::Pow, base, exponent)
+                if !still(graph, base) && still(graph, exponent) && !is_count(graph, base, exponent) =>
+            {
+                (base, Some(exponent))
+            }
+            _ => continue,
+        };
+        // κ x, or κ / x.
+        let (scale, sign) = match scale_of(graph, base, parameter, &still) {
+            Some(scale) => (scale, 1.0),
+            None => match graph.node(base) {
+                Node::Binary(Binary::Div, top, below) if still(graph, top) => {
+                    match scale_of(graph, below, parameter, &still) {
+                        Some(scale) => (graph.binary(Binary::Div, top, scale), -1.0),
+                        None => continue,
+                    }
+                }
+                _ => continue,
+            },
+        };
+        let signed = |graph: &mut Graph, id| if sign < 0.0 { graph.unary(Unary::Neg, id) } else { id };
+        let image = match exponent {
+            None => {
+                let (constant, own) = (graph.unary(Unary::Ln, scale), signed(graph, logarithm));
+                graph.binary(Binary::Add, constant, own)
+            }
+            Some(exponent) => {
+                let own = signed(graph, exponent);
+                if *parts.power.get_or_insert(own) != own {
+                    continue;
+                }
+                let factor = graph.binary(Binary::Pow, scale, exponent);
+                graph.binary(Binary::Mul, factor, power_of_x)
+            }
+        };
+        parts.images.insert(id, image);
+    }
+}
+
+/// True for a power that a polynomial in x takes in.
+fn is_count(graph: &Graph, base: NodeId, exponent: NodeId) -> bool {
+    let whole = graph.as_constant(exponent).is_some_and(|n| n == n.trunc() && (0.0..=8.0).contains(&n));
+    whole && !matches!(graph.node(base), Node::Binary(Binary::Div, ..))
+}
+
+/// κ of an expression `κ x`.
+fn scale_of(
+    graph: &mut Graph,
+    base: NodeId,
+    parameter: u32,
+    still: &dyn Fn(&Graph, NodeId) -> bool,
+) -> Option<NodeId> {
+    let polynomial = graph.polynomial(base, |v| v == parameter)?;
+    let scale = polynomial.coefficient(parameter, 1)?;
+    (polynomial.terms.len() == 1 && still(graph, scale)).then_some(scale)
+}
+
+/// The form of q with these monomials, and which of them each coefficient belongs to.
+fn flow(x: u32, monomials: &[Monomial]) -> Option<(Flow, Vec<Option<usize>>)> {
+    let find = |wanted: Monomial| monomials.iter().position(|m| *m == wanted);
+    let power = |n: u32| find(if n == 0 { Monomial::new() } else { vec![(x, n)] });
+    let places = [power(0), power(1), power(2)];
+    let matched = |places: &[Option<usize>]| places.iter().flatten().count() == monomials.len();
+    if matched(&places) {
+        return Some((Flow::Quadratic, places.to_vec()));
+    }
+    let gompertz = [power(1), find(vec![(x, 1), (LOGARITHM, 1)])];
+    if matched(&gompertz) {
+        return Some((Flow::Gompertz, gompertz.to_vec()));
+    }
+    let higher = monomials.iter().position(|m| {
+        matches!(m[..], [(POWER, 1)])
+            || m[..] == [(x, 1), (POWER, 1)]
+            || matches!(m[..], [(v, n)] if v == x && n > 1)
+    });
+    let bernoulli = [power(1), higher];
+    matched(&bernoulli).then(|| (Flow::Bernoulli, bernoulli.to_vec()))
+}
+
+/// p of Bernoulli's equation.
+fn exponent(graph: &mut Graph, x: u32, monomials: &[Monomial], power: Option<NodeId>) -> Option<NodeId> {
+    let one = graph.constant(1.0);
+    for monomial in monomials {
+        match monomial[..] {
+            [(POWER, 1)] => return power,
+            [(v, 1), (POWER, 1)] if v == x => return Some(graph.binary(Binary::Add, one, power?)),
+            [(v, n)] if v == x && n > 1 => return Some(graph.constant(f64::from(n))),
+            _ => {}
+        }
+    }
+    None
+}
+
+/// True if all rows are multiples of one.
+fn proportional(graph: &mut Graph, rows: &[Vec<NodeId>], time: u32) -> bool {
+    let nodes: Vec<NodeId> = rows.concat();
+    let most = graph.variables(&nodes).last().map_or(0, |v| *v + 1).max(time);
+    let program = Program::compile(graph, &nodes, most as usize);
+    let mut seed: u64 = 0x5eed;
+    let mut defined = 0;
+    for _ in 0..4 * POINTS {
+        let point: Vec<f64> = (0..most)
+            .map(|_| {
+                // Steele, Lea and Flood's mixing (2014), as numbers from 0.2 to 1.7.
+                seed = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
+                let mut z = (seed ^ (seed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+                z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+                0.2 + 1.5 * ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+            })
+            .collect();
+        let mut out = vec![0.0; nodes.len()];
+        program.eval(&point, &mut Vec::new(), &mut out);
+        let width = rows[0].len();
+        if out.iter().any(|x| !x.is_finite()) || out[0] == 0.0 {
+            continue;
+        }
+        defined += 1;
+        let off = |i: usize, j: usize| {
+            let (a, b) = (out[i * width + j] * out[0], out[i * width] * out[j]);
+            (a - b).abs() > 1e-12 * a.abs().max(b.abs())
+        };
+        if (1..rows.len()).any(|i| (1..width).any(|j| off(i, j))) {
+            return false;
+        }
+        if defined == POINTS {
+            return true;
+        }
+    }
+    false
+}
+
+/// H as an expression.
+fn pace(graph: &mut Graph, parts: &Parts, age: u32, of_time: &[Monomial], of_h: &[NodeId]) -> NodeId {
+    let age_node = graph.var(age);
+    let mut whole: Option<NodeId> = None;
+    for (monomial, &factor) in of_time.iter().zip(of_h) {
+        let term = match monomial[..] {
+            [(v, 1)] if v >= FIRST_DRIVER => {
+                let driver = parts.drivers[(v - FIRST_DRIVER) as usize];
+                graph.binary(Binary::Div, driver.integral.whole, driver.speed)
+            }
+            [(_, n)] => {
+                let exponent = graph.constant(f64::from(n + 1));
+                let power = graph.binary(Binary::Pow, age_node, exponent);
+                graph.binary(Binary::Div, power, exponent)
+            }
+            _ => age_node,
+        };
+        let term = graph.binary(Binary::Mul, factor, term);
+        whole = Some(whole.map_or(term, |sum| graph.binary(Binary::Add, sum, term)));
+    }
+    whole.unwrap_or(age_node)
+}

@@ -1,0 +1,264 @@
+//! Surfaces that a flow cannot reach.
+//!
+//! A value that is only approached is never reached (LANGUAGE, "Events"): logistic growth comes as close
+//! to its limit as one likes, and closer than rounded numbers can tell. That the limit is not an event
+//! cannot be seen on the numbers of a trajectory; it is seen on the equations. The surface `a = b` is
+//! invariant if the rate of `a - b` is zero everywhere on it, and by uniqueness of solutions no trajectory
+//! enters an invariant surface.
+//!
+//! The rate is written as a polynomial in all that moves (`form`), with the surface put in for one of the parameters, and
+//! must vanish term by term, within the bounds of rounding of its coefficients. A limit and a threshold just short of
+//! it are so told apart as far as the numbers in the text can be. Only parameters that stand still are given random
+//! values (Schwartz 1980, Zippel 1979): what is zero at all of them is zero. What cannot be shown is not assumed.
+
+use super::form::{Form, Indeterminates, Known, forms};
+use dlsys_expr::{Binary, Dual, Graph, NodeId, Program};
+
+/// Points at which the rate is tested, if there are parameters that stand still.
+const POINTS: usize = 24;
+/// Fewer defined points than this prove nothing.
+const ENOUGH: usize = 6;
+
+/// True if a flow can never bring `a - b` from another value to zero.
+///
+/// - `own`: the variables `0..own` are the module's parameters; `rates` gives the derivatives of those that move.
+/// - `context`: the variables `own..own + context` move in ways that are not known here.
+/// - The next two are `t` and `age`, whose rate is 1; any after them are truth values that stand still.
+pub fn never_reached(
+    graph: &mut Graph,
+    (a, b): (NodeId, NodeId),
+    rates: &[(usize, NodeId)],
+    own: usize,
+    context: usize,
+    variables: usize,
+) -> bool {
+    let known = |v: u32| (v as usize) < own || (v as usize) >= own + context;
+    let read = graph.variables(&[a, b]);
+    if !read.iter().all(|v| known(*v)) {
+        return false;
+    }
+    let moves = |v: u32| rates.iter().any(|(parameter, _)| *parameter == v as usize);
+    let time = (own + context) as u32;
+    let gap = graph.binary(Binary::Sub, a, b);
+    // The rate of the difference along the flow.
+    let mut rate = graph.constant(0.0);
+    for &v in &read {
+        let speed = match rates.iter().find(|(parameter, _)| *parameter == v as usize) {
+            Some((_, speed)) => *speed,
+            None if v == time || v == time + 1 => graph.constant(1.0),
+            None => continue,
+        };
+        let slope = graph.derivative(gap, v);
+        let part = graph.binary(Binary::Mul, slope, speed);
+        rate = graph.binary(Binary::Add, rate, part);
+    }
+    let stands = |v: u32| !moves(v) && ((v as usize) < own || v > time + 1);
+    let pivots: Vec<u32> = read.into_iter().filter(|v| moves(*v)).collect();
+    pivots.into_iter().any(|pivot| {
+        let (bend, slope) = (graph.derivative(rate, pivot), graph.derivative(gap, pivot));
+        let surface = Surface { graph, gap, slope, rate, bend, pivot, variables };
+        let still: Vec<u32> = graph.variables(&[gap, rate]).into_iter().filter(|v| stands(*v)).collect();
+        surface.is_invariant(&still, time + 2)
+    })
+}
+
+/// A difference of two sides, its rate, and their derivatives by a parameter.
+struct Surface<'g> {
+    graph: &'g Graph,
+    gap: NodeId,
+    slope: NodeId,
+    rate: NodeId,
+    bend: NodeId,
+    pivot: u32,
+    variables: usize,
+}
+
+impl Surface<'_> {
+    /// True if the rate is shown to vanish on the surface, whatever the variables are that stand still.
+    fn is_invariant(&self, still: &[u32], first_flag: u32) -> bool {
+        let mut random = Random::new();
+        let points = if still.is_empty() { 1 } else { POINTS };
+        let mut defined = 0;
+        for _ in 0..points {
+            let mut point = vec![f64::NAN; self.variables];
+            for &v in still {
+                let drawn = random.magnitude();
+                point[v as usize] = if v >= first_flag { f64::from(u8::from(drawn > 0.5)) } else { drawn };
+            }
+            match self.vanishes_at(&point, still) {
+                Some(true) => defined += 1,
+                Some(false) => return false,
+                None => {}
+            }
+        }
+        defined >= ENOUGH.min(points)
+    }
+
+    /// Whether the rate is zero on the surface, given the variables that stand still; None if nothing is defined there.
+    fn vanishes_at(&self, point: &[f64], still: &[u32]) -> Option<bool> {
+        let mut all = Indeterminates::default();
+        let number = all.variable(self.pivot);
+        let fixed = |v: u32| still.contains(&v).then(|| Form::number(Known::exactly(point[v as usize])));
+        let Some(gap) = forms(self.graph, &[self.gap], &fixed, &mut all) else { return Some(false) };
+        // Where the surface is: the parameter in terms of all others, or as a number.
+        let linear = gap[0].solved_for(number).filter(|(slope, _)| !slope.may_be_zero());
+        let place = match linear.and_then(|(slope, rest)| rest.over(slope)?.scaled(Known::exactly(-1.0))) {
+            Some(place) => place,
+            None => Form::number(self.root(point, still)?),
+        };
+        if !place.is_finite() {
+            return None;
+        }
+        let on_surface = |v: u32| if v == self.pivot { Some(place.clone()) } else { fixed(v) };
+        let roots = [self.rate, self.bend, self.slope];
+        let Some(found) = forms(self.graph, &roots, &on_surface, &mut all) else { return Some(false) };
+        let [rate, bend, slope] = &found[..] else { return Some(false) };
+        if !rate.is_finite() {
+            return None;
+        }
+        // Where the difference has a double root, its rate vanishes whatever the flow does. Without a Lipschitz constant
+        // solutions are not unique: x' = -sqrt(x) does arrive at 0.
+        Some(rate.vanishes() && !slope.vanishes() && slope.is_finite() && bend.is_finite())
+    }
+
+    /// Where the difference is zero as a function of the one parameter that it reads besides those that stand still
+    /// (Newton's method).
+    fn root(&self, point: &[f64], still: &[u32]) -> Option<Known> {
+        let read = self.graph.variables(&[self.gap]);
+        if !read.iter().all(|v| *v == self.pivot || still.contains(v)) {
+            return None;
+        }
+        let program = Program::compile(self.graph, &[self.gap], self.variables);
+        let mut duals: Vec<Dual<f64>> = point.iter().map(|&value| Dual { value, rate: 0.0 }).collect();
+        let mut scratch = Vec::new();
+        let pivot = self.pivot as usize;
+        for start in [1.0, 0.1, 10.0, -1.0] {
+            duals[pivot] = Dual { value: start, rate: 1.0 };
+            for _ in 0..60 {
+                let mut out = [Dual { value: 0.0, rate: 0.0 }];
+                program.eval(&duals, &mut scratch, &mut out);
+                let step = out[0].value / out[0].rate;
+                if !step.is_finite() {
+                    break;
+                }
+                let x = duals[pivot].value - step;
+                duals[pivot].value = x;
+                if step.abs() <= 4.0 * f64::EPSILON * x.abs() {
+                    return Some(Known { value: x, error: 4.0 * f64::EPSILON * x.abs() + step.abs() });
+                }
+            }
+        }
+        None
+    }
+}
+
+/// SplitMix64 (Steele, Lea, Flood 2014): the points are the same in every run.
+pub struct Random(u64);
+
+impl Random {
+    pub fn new() -> Random {
+        Random(0x5eed)
+    }
+
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// A number of either sign, most often positive, between 1/100 and 100.
+    pub fn magnitude(&mut self) -> f64 {
+        let unit = (self.next() >> 11) as f64 / (1u64 << 53) as f64;
+        let size = 10f64.powf(4.0 * unit - 2.0);
+        if self.next().is_multiple_of(4) { -size } else { size }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dlsys_expr::{Binary, Graph};
+
+    /// x' = r (1 - x/m) x with m = 3; variables x, t, age.
+    fn logistic(g: &mut Graph) -> NodeId {
+        let (x, one, m) = (g.var(0), g.constant(1.0), g.constant(3.0));
+        let q = g.binary(Binary::Div, x, m);
+        let rest = g.binary(Binary::Sub, one, q);
+        g.binary(Binary::Mul, rest, x)
+    }
+
+    #[test]
+    fn the_limit_of_logistic_growth_is_never_reached_but_what_is_below_is() {
+        let mut g = Graph::default();
+        let rate = logistic(&mut g);
+        let (x, limit, below) = (g.var(0), g.constant(3.0), g.constant(3.0 * (1.0 - 2f64.powi(-40))));
+        assert!(never_reached(&mut g, (x, limit), &[(0, rate)], 1, 0, 3));
+        assert!(!never_reached(&mut g, (x, below), &[(0, rate)], 1, 0, 3));
+        // However it is written.
+        let (one, third) = (g.constant(1.0), g.binary(Binary::Div, x, limit));
+        assert!(never_reached(&mut g, (third, one), &[(0, rate)], 1, 0, 3));
+    }
+
+    #[test]
+    fn what_ends_in_finite_time_arrives() {
+        let mut g = Graph::default();
+        let (x, zero) = (g.var(0), g.constant(0.0));
+        let root = g.unary(dlsys_expr::Unary::Sqrt, x);
+        let rate = g.unary(dlsys_expr::Unary::Neg, root);
+        assert!(!never_reached(&mut g, (x, zero), &[(0, rate)], 1, 0, 3));
+    }
+
+    #[test]
+    fn growth_that_ends_on_its_threshold_arrives() {
+        // x' = (1 - age) age, which is zero at age 1 but not on the whole surface x = 1/6.
+        let mut g = Graph::default();
+        let (x, age, one, sixth) = (g.var(0), g.var(2), g.constant(1.0), g.constant(1.0 / 6.0));
+        let rest = g.binary(Binary::Sub, one, age);
+        let rate = g.binary(Binary::Mul, rest, age);
+        assert!(!never_reached(&mut g, (x, sixth), &[(0, rate)], 1, 0, 3));
+    }
+
+    #[test]
+    fn a_threshold_short_of_a_limit_is_told_from_the_limit() {
+        let mut g = Graph::default();
+        let (x, one, t) = (g.var(0), g.constant(1.0), g.var(1));
+        let gap = g.binary(Binary::Sub, one, x);
+        let square = g.binary(Binary::Mul, gap, gap);
+        for short in [1e-4, 1e-8, 1e-12, 1e-15] {
+            let below = g.constant(1.0 - short);
+            assert!(!never_reached(&mut g, (x, below), &[(0, gap)], 1, 0, 3), "{short}");
+            // The square of a difference of a few roundings says nothing.
+            assert!(short < 1e-14 || !never_reached(&mut g, (x, below), &[(0, square)], 1, 0, 3), "{short}");
+        }
+        assert!(never_reached(&mut g, (x, one), &[(0, square)], 1, 0, 3));
+        // A pulse around t = 300 underflows wherever one looks by chance.
+        let far = g.constant(300.0);
+        let since = g.binary(Binary::Sub, t, far);
+        let square = g.binary(Binary::Mul, since, since);
+        let minus = g.unary(dlsys_expr::Unary::Neg, square);
+        let pulse = g.unary(dlsys_expr::Unary::Exp, minus);
+        let driven = g.binary(Binary::Add, gap, pulse);
+        assert!(!never_reached(&mut g, (x, one), &[(0, driven)], 1, 0, 3));
+        // Times what vanishes it does not matter.
+        let paced = g.binary(Binary::Mul, gap, pulse);
+        assert!(never_reached(&mut g, (x, one), &[(0, paced)], 1, 0, 3));
+    }
+
+    #[test]
+    fn a_parameter_may_approach_another_one() {
+        // x' = m - x approaches m, which stands still; y' = 2 (x - y) approaches nothing that moves.
+        let mut g = Graph::default();
+        let (x, y, m, two) = (g.var(0), g.var(1), g.var(2), g.constant(2.0));
+        let rate = g.binary(Binary::Sub, m, x);
+        let gap = g.binary(Binary::Sub, x, y);
+        let other = g.binary(Binary::Mul, two, gap);
+        let rates = [(0, rate), (1, other)];
+        assert!(never_reached(&mut g, (x, m), &rates, 3, 0, 5));
+        assert!(!never_reached(&mut g, (x, y), &rates, 3, 0, 5));
+        // Two that follow the same equation never meet.
+        let twin = g.binary(Binary::Sub, m, y);
+        assert!(never_reached(&mut g, (x, y), &[(0, rate), (1, twin)], 3, 0, 5));
+    }
+}

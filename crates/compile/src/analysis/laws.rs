@@ -1,0 +1,197 @@
+//! How each equation of a clause is solved: by a formula, or in steps.
+
+use std::collections::HashSet;
+
+use dlsys_expr::{Binary, Graph, Monomial, Node, NodeId, Polynomial, Program, Unary};
+use dlsys_model::{Jacobian, Law, Linear, Numeric, Obstacle};
+
+use super::driven::driven_form;
+use super::variability::Constants;
+
+/// Highest degree in `age` of a rate that is integrated as a polynomial.
+const MAX_AGE_DEGREE: u32 = 3;
+
+/// Classifies the equations of a clause. Those that others depend on come first, whatever their order.
+pub fn laws(graph: &mut Graph, rates: &[(usize, NodeId)], constants: &Constants, total: usize) -> Vec<Law> {
+    let mut laws: Vec<Option<Law>> = vec![None; rates.len()];
+    // Parameters known to be sums of exponentials and polynomials.
+    let mut sums: HashSet<u32> = HashSet::new();
+    loop {
+        let mut progress = false;
+        for (i, &(parameter, rate)) in rates.iter().enumerate() {
+            if laws[i].is_some() {
+                continue;
+            }
+            let law = closed(graph, parameter as u32, rate, constants, &sums, total)
+                .or_else(|| Some((driven(graph, parameter as u32, rate, constants, total)?, false)));
+            if let Some((law, is_sum)) = law {
+                laws[i] = Some(law);
+                if is_sum {
+                    sums.insert(parameter as u32);
+                }
+                progress = true;
+            }
+        }
+        if !progress {
+            break;
+        }
+    }
+    let numeric = |graph: &mut Graph, parameter: usize, rate: NodeId| Numeric {
+        coupled: constants.reads_context(graph, &[rate]),
+        linear: affine(graph, rate, constants).is_some(),
+        obstacle: obstacle(graph, parameter as u32, rate, constants),
+    };
+    laws.into_iter()
+        .zip(rates)
+        .map(|(law, &(parameter, rate))| law.unwrap_or_else(|| Law::Numeric(numeric(graph, parameter, rate))))
+        .collect()
+}
+
+/// Why [`closed`] finds no formula.
+fn obstacle(graph: &mut Graph, parameter: u32, rate: NodeId, constants: &Constants) -> Obstacle {
+    if constants.reads_context(graph, &[rate]) {
+        return Obstacle::Neighbours;
+    }
+    let Some(by_self) = graph.polynomial(rate, |v| v == parameter) else { return Obstacle::NotPolynomial };
+    if by_self.degree() > 2 {
+        return Obstacle::Degree(by_self.degree());
+    }
+    let factors: Vec<NodeId> = (1..3).filter_map(|power| by_self.coefficient(parameter, power)).collect();
+    // A square with a coefficient that stands still has no formula beside an inflow that moves.
+    if constants.all_constant(graph, &factors) { Obstacle::Inflow } else { Obstacle::Factor }
+}
+
+/// The law of a parameter, if it is one with a formula, and whether that is a sum of exponentials and polynomials.
+fn closed(
+    graph: &mut Graph,
+    parameter: u32,
+    rate: NodeId,
+    constants: &Constants,
+    sums: &HashSet<u32>,
+    total: usize,
+) -> Option<(Law, bool)> {
+    let zero = graph.constant(0.0);
+    let by_self = graph.polynomial(rate, |v| v == parameter)?;
+    if by_self.degree() > 2 {
+        return None;
+    }
+    let coefficients: Vec<NodeId> =
+        (0..3).map(|power| by_self.coefficient(parameter, power).unwrap_or(zero)).collect();
+    let [inflow, factor, square] = coefficients[..] else { unreachable!("three of them") };
+    if constants.all_constant(graph, &coefficients) {
+        if by_self.degree() == 0 {
+            return Some((Law::Polynomial(Program::compile(graph, &[inflow], total)), true));
+        }
+        let is_sum = by_self.degree() == 1;
+        return Some((Law::Quadratic(Program::compile(graph, &coefficients, total)), is_sum));
+    }
+    if square != zero || !constants.all_constant(graph, &[factor]) {
+        return None;
+    }
+    let age = constants.time as u32 + 1;
+    if factor == zero
+        && let Some(by_age) = graph.polynomial(inflow, |v| v == age)
+        && by_age.degree() <= MAX_AGE_DEGREE
+    {
+        let powers: Vec<NodeId> =
+            (0..=by_age.degree()).map(|power| by_age.coefficient(age, power).unwrap_or(zero)).collect();
+        if constants.all_constant(graph, &powers) {
+            return Some((Law::Polynomial(Program::compile(graph, &powers, total)), true));
+        }
+    }
+    is_sum(graph, inflow, constants, sums).then(|| {
+        let factor = Program::compile(graph, &[factor], total);
+        (Law::Sum { factor, inflow: Program::compile(graph, &[inflow], total) }, true)
+    })
+}
+
+/// The law of a parameter that follows curves, growth functions of time, or a growth law.
+fn driven(
+    graph: &mut Graph,
+    parameter: u32,
+    rate: NodeId,
+    constants: &Constants,
+    total: usize,
+) -> Option<Law> {
+    let is_constant = |v: u32| constants.is_constant(v);
+    let form = driven_form(graph, parameter, rate, &is_constant, constants.time as u32)?;
+    Some(Law::Driven(Box::new(form.compile(graph, total))))
+}
+
+/// True if an expression is made of constants, time, exponentials, sines and cosines of time, and parameters that are
+/// such themselves, by addition and multiplication.
+fn is_sum(graph: &mut Graph, root: NodeId, constants: &Constants, sums: &HashSet<u32>) -> bool {
+    let is_time = |v: u32| v as usize == constants.time || v as usize == constants.time + 1;
+    for id in graph.reachable(&[root]) {
+        if constants.all_constant(graph, &[id]) {
+            continue;
+        }
+        let good = match graph.node(id) {
+            Node::Const(_) => true,
+            Node::Var(v) => is_time(v) || sums.contains(&v),
+            Node::Unary(Unary::Neg, _) | Node::Binary(Binary::Add | Binary::Sub | Binary::Mul, ..) => true,
+            Node::Unary(Unary::Exp | Unary::Sin | Unary::Cos, a) => {
+                let by_time = graph.polynomial(a, is_time);
+                by_time.is_some_and(|p| {
+                    let coefficients: Vec<NodeId> = p.terms.values().copied().collect();
+                    p.degree() <= 1 && constants.all_constant(graph, &coefficients)
+                })
+            }
+            Node::Binary(Binary::Div, _, b) => constants.all_constant(graph, &[b]),
+            Node::Binary(Binary::Pow, _, b) => {
+                graph.as_constant(b).is_some_and(|n| (0.0..=4.0).contains(&n) && n == n.trunc())
+            }
+            Node::Select(c, ..) => constants.all_constant(graph, &[c]),
+            _ => false,
+        };
+        if !good {
+            return false;
+        }
+    }
+    true
+}
+
+/// A rate as `constant + Σ coefficient · variable`, if it is that, with constant coefficients.
+fn affine(graph: &mut Graph, rate: NodeId, constants: &Constants) -> Option<Polynomial> {
+    let polynomial = graph.polynomial(rate, |v| !constants.is_constant(v))?;
+    let time = |m: &Monomial| m.iter().any(|(v, _)| *v as usize >= constants.time);
+    (polynomial.degree() <= 1 && !polynomial.terms.keys().any(time)).then_some(polynomial)
+}
+
+/// The rates as linear equations, if all are that, with constant coefficients.
+pub fn linear(graph: &mut Graph, rates: &[NodeId], constants: &Constants, total: usize) -> Option<Linear> {
+    let zero = graph.constant(0.0);
+    let (mut variables, mut roots) = (Vec::new(), Vec::new());
+    for &rate in rates {
+        let polynomial = affine(graph, rate, constants)?;
+        roots.push(polynomial.terms.get(&Monomial::new()).copied().unwrap_or(zero));
+        let mut row = Vec::new();
+        for (monomial, &coefficient) in &polynomial.terms {
+            if let [(variable, 1)] = monomial[..] {
+                row.push(variable as usize);
+                roots.push(coefficient);
+            }
+        }
+        variables.push(row);
+    }
+    Some(Linear { variables, coefficients: Program::compile(graph, &roots, total) })
+}
+
+/// Partial derivatives of expressions, one row each, by what changes.
+pub fn jacobian(
+    graph: &mut Graph,
+    rates: &[(usize, NodeId)],
+    constants: &Constants,
+    total: usize,
+) -> Jacobian {
+    let (mut entries, mut roots) = (Vec::new(), Vec::new());
+    for (row, &(_, rate)) in rates.iter().enumerate() {
+        for variable in graph.variables(&[rate]) {
+            if (variable as usize) < constants.time && !constants.is_constant(variable) {
+                entries.push((row, variable as usize));
+                roots.push(graph.derivative(rate, variable));
+            }
+        }
+    }
+    Jacobian { entries, values: Program::compile(graph, &roots, total) }
+}

@@ -1,0 +1,182 @@
+//! The analysis of a model: how much work each equation and each condition is (see [`Law`] and [`ZeroCrossing`]).
+//!
+//! It works on the expression graph. Whether a rate is affine, quadratic or polynomial is a property of its
+//! coefficients, so spelling does not matter. Everything that a module's own equation of the moment leaves alone is
+//! a constant, and so is a neighbour's parameter for which no rule has an equation.
+//!
+//! [`analyse`] takes all rules at once, because what a neighbour does is part of the question, and gives compiled rules.
+//!
+//! - `variability`: which variables stand still while a clause is active;
+//! - `laws`: how each equation is solved; `driven`: equations with a known integral;
+//! - `crossings`: how the zero of each difference is found; `invariance`: differences that are never zero;
+//! - `need`: parameters that nothing reads; `pulses`: rates that a step may overlook;
+//! - `stepping`: the variables of a step; `form`, `rank`: numbers with bounds of their errors, singular equations.
+
+mod clause;
+mod crossings;
+mod driven;
+mod form;
+mod invariance;
+mod laws;
+mod need;
+mod pulses;
+mod rank;
+mod stepping;
+mod variability;
+
+use dlsys_expr::{Graph, NodeId, Program};
+use dlsys_model::{Aggregate, Jacobian, Kinds, Rule, ZeroCrossing};
+
+use crate::declared::ResolvedRule;
+use crate::gather::watched;
+use clause::{ClauseAnalysis, analyse_clause};
+use crossings::crossing;
+use stepping::Layout;
+use variability::{Constants, Moving};
+
+pub use driven::{driven_form, outside_of_drivers};
+pub use invariance::never_reached;
+pub use rank::is_singular;
+
+/// The compiled rules of a model, and what the analysis found out about its kinds.
+pub struct Analysed {
+    pub rules: Vec<Rule>,
+    /// Per kind and parameter: nothing but drawing and output reads it.
+    pub drawn_only: Vec<Vec<bool>>,
+}
+
+/// Classifies all equations and conditions, and compiles the rules.
+pub fn analyse(graph: &mut Graph, kinds: &Kinds, rules: Vec<ResolvedRule>) -> Analysed {
+    let moving = Moving::new(graph, kinds, &rules);
+    let aggregates: Vec<Vec<Aggregate>> =
+        rules.iter().enumerate().map(|(i, rule)| aggregates(graph, &moving, i, rule)).collect();
+    let needed = need::needed(graph, kinds, &rules);
+    let found: Vec<RuleAnalysis> = (rules.iter().enumerate())
+        .map(|(i, rule)| {
+            let of: Vec<usize> =
+                kinds.iter().filter(|(_, k)| k.rules.contains(&i)).map(|(id, _)| id.index()).collect();
+            let is_needed = |p: usize| of.iter().any(|kind| needed.contains(&(*kind, p)));
+            analyse_rule(graph, rule, moving.context(i), &is_needed)
+        })
+        .collect();
+    let pulses = pulses::find(graph, kinds, &rules, &found, &moving);
+    let drawn_only = need::drawn_only(graph, kinds, &rules);
+    let parts = rules.into_iter().zip(found).zip(aggregates).zip(pulses).enumerate();
+    let rules = parts
+        .map(|(i, (((rule, found), aggregates), pulses))| {
+            let first = rule.declared.own();
+            let context = moving.context(i).iter().enumerate();
+            let moving = context.filter(|(_, moves)| **moves).map(|(v, _)| first + v).collect();
+            compile_rule(graph, rule, found, aggregates, moving, &pulses)
+        })
+        .collect();
+    Analysed { rules, drawn_only }
+}
+
+/// What is found out about one rule by itself.
+pub struct RuleAnalysis {
+    watch_at_rest: Vec<ZeroCrossing>,
+    reads_context: bool,
+    clauses: Vec<ClauseAnalysis>,
+}
+
+fn analyse_rule(
+    graph: &mut Graph,
+    rule: &ResolvedRule,
+    moving: &[bool],
+    is_needed: &dyn Fn(usize) -> bool,
+) -> RuleAnalysis {
+    let declared = &rule.declared;
+    let still = Constants::at_rest(declared, moving);
+    let watch_at_rest: Vec<ZeroCrossing> = (declared.sides.iter())
+        .map(|&sides| crossing(graph, sides, &still, &|_| true, declared.variables))
+        .collect();
+    let mut reads_context = declared.sides.iter().any(|(a, b)| still.reads_context(graph, &[*a, *b]));
+    let mut clauses = Vec::with_capacity(declared.solves.len());
+    for solve in &declared.solves {
+        let constants = still.under(solve);
+        let nodes: Vec<NodeId> = solve.rates.iter().map(|rate| rate.1).collect();
+        reads_context |= constants.reads_context(graph, &nodes);
+        let given: Vec<NodeId> = solve.algebraic.iter().map(|entry| entry.node).collect();
+        reads_context |= constants.reads_context(graph, &given);
+        clauses.push(analyse_clause(graph, rule, solve, &constants, is_needed));
+    }
+    RuleAnalysis { watch_at_rest, reads_context, clauses }
+}
+
+/// Compiles the aggregates of a rule, with the derivatives of their terms by what changes.
+fn aggregates(graph: &mut Graph, moving: &Moving, index: usize, rule: &ResolvedRule) -> Vec<Aggregate> {
+    let declared = &rule.declared;
+    let (own, count, first) = (declared.own(), declared.variables, declared.first_aggregate);
+    let context = moving.context(index);
+    let mut all = Vec::with_capacity(declared.aggregates.len());
+    for (i, (aggregate, pattern)) in declared.aggregates.iter().zip(&rule.children).enumerate() {
+        let changes = |v: usize| match v {
+            v if v >= count => moving.in_pattern(pattern, v - count),
+            v if v < own => declared.moves(v),
+            v if v < first => context[v - own],
+            _ => false,
+        };
+        let total = count + pattern.width;
+        let (mut entries, mut roots) = (Vec::new(), Vec::new());
+        for v in graph.variables(&[aggregate.term]) {
+            if changes(v as usize) {
+                entries.push((0, v as usize));
+                roots.push(graph.derivative(aggregate.term, v));
+            }
+        }
+        let head = &aggregate.pattern.head;
+        all.push(Aggregate {
+            fold: aggregate.fold,
+            pattern: pattern.clone(),
+            term: Program::compile(graph, &[aggregate.term], total),
+            jacobian: Jacobian { entries, values: Program::compile(graph, &roots, total) },
+            moves: context[first - own + i],
+            label: format!("{} over {}", aggregate.fold.name(), dlsys_syntax::print::head_module(head)),
+            span: head.span,
+        });
+    }
+    all
+}
+
+/// Puts together what was declared and what was found out. `moving` are the variables of the context that move.
+fn compile_rule(
+    graph: &Graph,
+    rule: ResolvedRule,
+    found: RuleAnalysis,
+    aggregates: Vec<Aggregate>,
+    moving: Vec<usize>,
+    pulses: &[bool],
+) -> Rule {
+    let layout = Layout::of(&rule);
+    let ResolvedRule { declared, left, right, .. } = rule;
+    let count = declared.variables;
+    let sides: Vec<NodeId> = declared.side_nodes().collect();
+    let sides = Program::compile(graph, &sides, count);
+    let solves = declared.solves.into_iter().zip(found.clauses).zip(pulses);
+    Rule {
+        index: declared.index,
+        label: declared.label,
+        span: declared.span,
+        discrete: declared.discrete,
+        parameters: declared.parameters,
+        context_names: declared.context_names,
+        left,
+        right,
+        right_shape: declared.right_shape,
+        watched: watched(&sides, &aggregates, count, declared.first_aggregate),
+        aggregates,
+        first_aggregate: declared.first_aggregate,
+        variables: count,
+        sides,
+        atoms: declared.atoms,
+        boundaries: declared.boundaries,
+        solves: solves.map(|((solve, clause), pulses)| clause.compile(solve, *pulses, &layout)).collect(),
+        produces: declared.produces,
+        hidden: declared.hidden,
+        clocks: declared.clocks,
+        moving_context: moving,
+        reads_context: found.reads_context,
+        watch_at_rest: found.watch_at_rest,
+    }
+}

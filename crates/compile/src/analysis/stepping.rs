@@ -1,0 +1,103 @@
+//! The components of a clause's equations, and the variables that its steps read.
+
+use dlsys_expr::Program;
+use dlsys_model::{Algebraic, Jacobian, Law, Linear, Read, Stepping};
+
+use super::ResolvedRule;
+
+/// How the variables of a rule are laid out.
+pub struct Layout {
+    /// Number of the module's own parameters.
+    own: usize,
+    /// Number of the parameters of each module of the context.
+    context: Vec<usize>,
+    /// Number of all variables.
+    variables: usize,
+    /// There are aggregates among them.
+    aggregates: bool,
+}
+
+impl Layout {
+    pub fn of(rule: &ResolvedRule) -> Layout {
+        Layout {
+            own: rule.declared.own(),
+            context: rule.context().map(|pattern| pattern.width).collect(),
+            variables: rule.declared.variables,
+            aggregates: !rule.children.is_empty(),
+        }
+    }
+}
+
+/// The equations of a clause; the fields are those of [`dlsys_model::Solve`].
+pub struct StepEquations<'e> {
+    pub of: &'e [usize],
+    pub rates: &'e Program,
+    pub laws: &'e [Law],
+    pub numeric: &'e [usize],
+    pub numeric_rates: &'e Program,
+    pub linear: Option<&'e Linear>,
+    pub jacobian: &'e Jacobian,
+    pub algebraic: &'e Algebraic,
+}
+
+impl StepEquations<'_> {
+    /// What the steps of the clause read.
+    pub fn stepping(&self, layout: &Layout) -> Stepping {
+        let algebraic = self.algebraic;
+        let components = [false, true].map(|numeric_only| {
+            let numeric = (0..self.of.len()).filter(|i| numeric_only || self.numeric.contains(i));
+            let solved = (0..algebraic.of.len()).filter(|place| algebraic.is_solved(*place, numeric_only));
+            numeric.map(|i| self.of[i]).chain(solved.map(|place| algebraic.of[place])).collect()
+        });
+        let linear = self.linear;
+        let programs = [self.rates, self.numeric_rates, &self.jacobian.values];
+        let mut read = read_by(programs.into_iter().chain(linear.map(|l| &l.coefficients)), layout.variables);
+        let entries = self.jacobian.entries.iter().map(|(_, variable)| *variable);
+        for variable in linear.into_iter().flat_map(|l| l.variables.iter().flatten().copied()).chain(entries)
+        {
+            read[variable] = true;
+        }
+        // What is solved for, and what is added up over children, reads by ways of its own.
+        if !algebraic.is_empty() || layout.aggregates {
+            read.fill(true);
+        }
+        let widths = layout.context.iter().copied().enumerate();
+        let own = (0..layout.own).map(|parameter| (None, parameter));
+        let context = widths.flat_map(|(n, width)| (0..width).map(move |parameter| (Some(n), parameter)));
+        let reads = (own.chain(context).enumerate())
+            .map(|(variable, (neighbour, parameter))| Read { variable, neighbour, parameter })
+            .filter(|one| read[one.variable])
+            .collect();
+        let mut laws = Vec::new();
+        let mut few = !layout.aggregates && algebraic.is_empty();
+        for law in self.laws {
+            match law {
+                Law::Polynomial(program) | Law::Quadratic(program) => laws.push(program),
+                Law::Driven(driven) => {
+                    laws.extend([&driven.coefficients].into_iter().chain(driven.pace.as_deref()))
+                }
+                Law::Numeric(_) => {}
+                Law::Sum { .. } => few = false,
+            }
+        }
+        let mut laws_read = read_by(laws.into_iter(), layout.variables);
+        if !few {
+            laws_read.fill(true);
+        }
+        laws_read.iter_mut().take(layout.own).for_each(|own| *own = true);
+        let time = layout.variables - 2;
+        let timed = [self.rates, &algebraic.values].iter().any(|program| program.reads().contains(&time));
+        Stepping::new(components, reads, laws_read, timed)
+    }
+}
+
+/// Of each variable: whether some program reads it.
+fn read_by<'p>(programs: impl Iterator<Item = &'p Program>, variables: usize) -> Vec<bool> {
+    let mut all = vec![false; variables];
+    for &variable in programs.flat_map(Program::reads) {
+        if let Some(read) = all.get_mut(variable) {
+            *read = true;
+        }
+    }
+    all
+}

@@ -1,0 +1,345 @@
+//! From a document to a model: all declarations and rules in turn, then what needs all of them.
+//!
+//! ```text
+//! globals, appearance ─▶ items ─▶ kinds ─▶ contexts ─▶ analysis ─▶ Model ─▶ checks
+//! ```
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use crate::analysis::{Analysed, analyse};
+use crate::chance::Clocks;
+use crate::clauses::names_of;
+use crate::declared::DeclaredRule;
+use crate::rules::RuleBuilder;
+use crate::scope::{Scope, Variables};
+use crate::{Setting, appearance, check, contexts, dead_rules, globals};
+use dlsys_diagnostic::{Diagnostic, Span};
+use dlsys_model::{
+    Appearance, DRAWN_WORDS, Frames, Interpretation, KindId, Kinds, Model, Parameter, Successor,
+};
+use dlsys_syntax::Files;
+use dlsys_syntax::ast::{self, Action, Document, Expression, HeadModule, Item};
+
+/// How the initial string is called where it is given twice or not at all.
+const INITIAL_STRING: &str = "the initial string";
+
+/// Builds the model; errors go to the scope. `unread` tells that parts of the text are missing, so that
+/// nothing is said about what may stand in them.
+pub fn build(
+    document: &Document,
+    settings: &[Setting],
+    scope: &mut Scope,
+    unread: bool,
+    files: &dyn Files,
+) -> Option<Model> {
+    let parameters = globals::declare(document, settings, scope, files);
+    let appearance = appearance::build(document, scope, files);
+    let mut kinds = Kinds::default();
+    let mut builder = RuleBuilder::new(document, scope, &mut kinds, Clocks::new(document));
+    let mut parts = Parts::default();
+    for (item, span) in &document.items {
+        parts.item(item, *span, &mut builder);
+    }
+    parts.check_strings(&mut builder, unread);
+    let RuleBuilder { occurs, drawn, clocks, .. } = builder;
+    if !parts.singles.seen(INITIAL_STRING) && !unread {
+        scope.diagnostics.push(
+            Diagnostic::error("the model has no initial string")
+                .help("begin with one, such as `initial string: F(1)`"),
+        );
+    }
+    if scope.diagnostics.is_empty() && !unread {
+        unused(document, scope);
+        let is_used = |name: &str| kinds.iter().any(|(_, kind)| kind.name == name);
+        appearance::unused_surfaces(&appearance, is_used, scope);
+    }
+    if parts.faulty || unread {
+        return None;
+    }
+    let places = Places { occurs, drawn };
+    Some(parts.model(document, kinds, &clocks, &places, (parameters, appearance), scope))
+}
+
+/// The first place of each kind of module in strings, and in drawings.
+struct Places {
+    occurs: HashMap<KindId, Span>,
+    drawn: HashMap<KindId, Span>,
+}
+
+/// The declarations and rules that have been lowered.
+#[derive(Default)]
+struct Parts<'d> {
+    singles: Singles,
+    title: Option<String>,
+    angle: Option<f64>,
+    frames: Option<Frames>,
+    period: Option<(f64, Span)>,
+    ignored: Vec<&'d ast::Name>,
+    considered: Vec<&'d ast::Name>,
+    axiom: Successor,
+    axiom_span: Span,
+    rules: Vec<DeclaredRule>,
+    /// The rules as written, those with errors too.
+    written: Vec<&'d ast::Rule>,
+    interpretations: Vec<(KindId, Interpretation)>,
+    /// The heads of the interpretations.
+    heads: Vec<&'d HeadModule>,
+    /// The initial string and all successors; all drawings.
+    strings: Vec<&'d [ast::Module]>,
+    drawings: Vec<&'d [ast::Module]>,
+    /// Something of the strings and rules could not be lowered.
+    faulty: bool,
+}
+
+impl<'d> Parts<'d> {
+    fn item(&mut self, item: &'d Item, span: Span, builder: &mut RuleBuilder) {
+        match item {
+            Item::Title(text) => {
+                self.singles.once("title", span, builder.scope);
+                check_title(text, span, builder.scope);
+                self.title = Some(text.clone());
+            }
+            Item::Angle(value) => {
+                self.singles.once("angle", span, builder.scope);
+                self.angle = builder.constant(*value);
+            }
+            Item::Period(value) => {
+                self.singles.once("period", span, builder.scope);
+                self.period = Some((builder.constant(*value).unwrap_or(1.0), span));
+            }
+            Item::Frames { from, to, step } => self.frames([*from, *to, *step], span, builder),
+            Item::Ignore(names) => self.ignored.extend(names),
+            Item::Consider(names) => self.considered.extend(names),
+            Item::Axiom(modules) => self.axiom(modules, span, builder),
+            Item::Interpret { head, drawn } => {
+                self.heads.push(head);
+                self.drawings.push(&drawn[..]);
+                match builder.interpretation(head, drawn) {
+                    Some(interpretation) => self.interpretations.push(interpretation),
+                    None => self.faulty = true,
+                }
+            }
+            Item::Rule(rule) => self.rule(rule, builder),
+            // Globals, and what `appearance` has built.
+            _ => {}
+        }
+    }
+
+    fn frames(&mut self, written: [Expression; 3], span: Span, builder: &mut RuleBuilder) {
+        self.singles.once("frames", span, builder.scope);
+        if let [Some(from), Some(to), Some(step)] = written.map(|e| builder.constant(e)) {
+            let frames = Frames { from, to, step };
+            check_frames(&frames, span, builder.scope);
+            self.frames = Some(frames);
+        }
+    }
+
+    fn axiom(&mut self, modules: &'d [ast::Module], span: Span, builder: &mut RuleBuilder) {
+        self.singles.once(INITIAL_STRING, span, builder.scope);
+        self.strings.push(modules);
+        let variables =
+            Variables { no_time: Some("the initial string is made at t = 0"), ..Variables::default() };
+        self.axiom_span = span;
+        match builder.successor(modules, &variables, 0) {
+            Some(axiom) => self.axiom = axiom,
+            None => self.faulty = true,
+        }
+    }
+
+    fn rule(&mut self, rule: &'d ast::Rule, builder: &mut RuleBuilder) {
+        for clause in &rule.clauses {
+            if let Action::Produce(successors) = &clause.action {
+                self.strings.extend(successors.iter().map(|s| &s.modules[..]));
+            }
+        }
+        self.written.push(rule);
+        match builder.rule(rule, self.rules.len()) {
+            Some(declared) => self.rules.push(declared),
+            None => self.faulty = true,
+        }
+    }
+
+    /// The heads of drawings that are drawn as they say: in drawings `F(x)` means a line, whatever `F` with other
+    /// parameters is drawn as.
+    fn check_strings(&self, builder: &mut RuleBuilder, unread: bool) {
+        let ruled: Vec<&HeadModule> = self.written.iter().map(|rule| &rule.predecessor).collect();
+        builder.check_arities(&ruled, &self.strings, "in its rule");
+        let is_drawn = |head: &&HeadModule| !DRAWN_WORDS.contains(&&*head.name.text);
+        let drawn: Vec<&HeadModule> = self.heads.iter().copied().filter(is_drawn).collect();
+        builder.check_arities(&drawn, &self.drawings, "where it is drawn");
+        if !unread {
+            builder.check_interpretations(&self.heads);
+        }
+    }
+
+    /// The model, compiled and checked.
+    fn model(
+        self,
+        document: &Document,
+        mut kinds: Kinds,
+        clocks: &Clocks,
+        places: &Places,
+        (parameters, appearance): (Vec<Parameter>, Appearance),
+        scope: &mut Scope,
+    ) -> Model {
+        let has_axiom = self.singles.seen(INITIAL_STRING);
+        for (i, rule) in self.written.iter().enumerate() {
+            for name in names_of(rule) {
+                let kind = kinds.intern(name, rule.predecessor.parameters.len());
+                let kind = kinds.get_mut(kind);
+                if rule.discrete { &mut kind.steps } else { &mut kind.rules }.push(i);
+            }
+        }
+        clocks.assign(&mut kinds);
+        let diagnostics = &mut scope.diagnostics;
+        let interpretations = assign_interpretations(self.interpretations, &mut kinds, diagnostics);
+        contexts::filter(&mut kinds, &self.ignored, &self.considered, diagnostics);
+        let rules = contexts::resolve_all(&kinds, self.rules, diagnostics);
+        let Analysed { rules, drawn_only } = analyse(&mut scope.graph, &kinds, rules);
+        let model = Model {
+            title: self.title,
+            angle: self.angle.unwrap_or(90.0),
+            frames: self.frames,
+            period: self.period.map_or(1.0, |(period, _)| period),
+            parameters,
+            kinds,
+            axiom: self.axiom,
+            axiom_span: self.axiom_span,
+            rules,
+            interpretations,
+            appearance: Arc::new(appearance),
+            drawn_only,
+            curves: scope.graph.curves().to_vec(),
+        };
+        let Places { occurs, drawn } = places;
+        if has_axiom {
+            check::reachability(&model, &self.written, occurs, diagnostics);
+        }
+        check::period(self.period, &model, diagnostics);
+        check::coverage(&model, diagnostics);
+        dead_rules::rules(&model, &self.written, document, diagnostics);
+        check::inert_modules(&model, occurs, diagnostics);
+        check::commands(&model, diagnostics, &drawn.iter().chain(occurs).map(|(k, s)| (*k, *s)).collect());
+        model
+    }
+}
+
+/// Gives each kind its drawing.
+fn assign_interpretations(
+    interpretations: Vec<(KindId, Interpretation)>,
+    kinds: &mut Kinds,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Vec<Interpretation> {
+    let mut all: Vec<Interpretation> = Vec::with_capacity(interpretations.len());
+    for (kind, interpretation) in interpretations {
+        if let Some(before) = kinds.get(kind).interpretation {
+            diagnostics.push(
+                Diagnostic::error("two interpretations of one module")
+                    .at(interpretation.span, "the second one")
+                    .at(all[before].span, "the first one")
+                    .help("keep one of them; what both draw can stand in one string"),
+            );
+        }
+        kinds.get_mut(kind).interpretation = Some(all.len());
+        all.push(interpretation);
+    }
+    all
+}
+
+fn check_title(text: &str, span: Span, scope: &mut Scope) {
+    if text.chars().any(char::is_control) {
+        let error =
+            Diagnostic::error("a title has no control characters").at(span, "it is shown in terminals");
+        scope.diagnostics.push(error.help("write the title in letters; a line break ends it"));
+    }
+}
+
+/// Declarations that a model has once.
+#[derive(Default)]
+struct Singles(Vec<(&'static str, Span)>);
+
+impl Singles {
+    fn seen(&self, what: &str) -> bool {
+        self.0.iter().any(|(name, _)| *name == what)
+    }
+
+    fn once(&mut self, what: &'static str, span: Span, scope: &mut Scope) {
+        if let Some((_, before)) = self.0.iter().find(|(name, _)| *name == what) {
+            scope.diagnostics.push(
+                Diagnostic::error(format!("{what} is given twice"))
+                    .at(first_line(span), "the second time")
+                    .at(first_line(*before), "the first time")
+                    .help(match what {
+                        "the initial string" => "keep one of them, with the modules of both",
+                        _ => "keep one of them, and remove the other",
+                    }),
+            );
+        }
+        self.0.push((what, span));
+    }
+}
+
+/// The beginning of a declaration, short enough to be underlined.
+fn first_line(span: Span) -> Span {
+    Span { end: span.end.min(span.start + 5), ..span }
+}
+
+fn check_frames(&Frames { from, to, step }: &Frames, span: Span, scope: &mut Scope) {
+    let written = |from: f64, to: f64, step: f64| format!("write `frames {from} .. {to} step {step}`");
+    let (fault, help) = if from < 0.0 {
+        ("time begins at 0".to_owned(), written(0.0, to.max(0.0), step))
+    } else if to < from {
+        (format!("{to} is before {from}"), written(to, from, step))
+    } else if step <= 0.0 {
+        let hundredth = if to > from { (to - from) / 100.0 } else { 1.0 };
+        let help = format!("{}, for example", written(from, to, hundredth));
+        ("the step must be greater than 0".to_owned(), help)
+    } else if (to - from) / step >= Frames::LIMIT as f64 {
+        let help = format!("choose a longer step: {}", written(from, to, (to - from) / 100.0));
+        (format!("more than {} frames", Frames::LIMIT), help)
+    } else {
+        return;
+    };
+    scope.diagnostics.push(Diagnostic::error("these frames cannot be").at(span, fault).help(help));
+}
+
+/// Constants and functions that nothing uses.
+fn unused(document: &Document, scope: &mut Scope) {
+    for (item, _) in document.own_items() {
+        let text = |name: &ast::Name| name.text.clone();
+        let (what, name, use_it) = match item {
+            Item::Const { name, .. } => {
+                ("constant", name, "use it in an equation, a condition or a string".into())
+            }
+            Item::Param { name, .. } => {
+                ("param", name, "use it in an equation, a condition or a string".into())
+            }
+            Item::Def { name, parameters, .. } => {
+                let formals: Vec<&str> = parameters.iter().map(|p| &*p.text).collect();
+                ("function", name, format!("call it, as in `{}({})`", text(name), formals.join(", ")))
+            }
+            Item::Array { name, .. } => ("array", name, format!("use an element, as in `{}[0]`", text(name))),
+            Item::Curve { name, .. } => ("curve", name, format!("use it, as in `{}(age)`", text(name))),
+            Item::Table { name, .. } => ("table", name, format!("use it, as in `{}(t)`", text(name))),
+            Item::Color { name, .. } => {
+                ("colour", name, format!("draw with it: `;({})` in a string", text(name)))
+            }
+            Item::Gradient { name, .. } => {
+                ("gradient", name, format!("draw with it: `;({}, v)` in a string, v from 0 to 1", text(name)))
+            }
+            Item::Contour { name, .. } => {
+                ("contour", name, format!("draw with it: `@C({})` in a string", text(name)))
+            }
+            _ => continue,
+        };
+        let text: &Arc<str> = &name.text;
+        if !scope.used.contains(text) {
+            scope.diagnostics.push(
+                Diagnostic::warning(format!("nobody uses the {what} `{text}`"))
+                    .at(name.span, "declared here")
+                    .help(format!("{use_it}, or remove this line")),
+            );
+        }
+    }
+}

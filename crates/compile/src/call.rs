@@ -1,0 +1,186 @@
+//! Calls of functions, those that are built in, those of the library and the model's own, whose bodies are put in.
+
+use std::sync::Arc;
+
+use crate::advice;
+use crate::chance::DRAW;
+use crate::scope::{FORMAL, Function, Lowered, Scope, Variables, plural};
+use dlsys_diagnostic::{Diagnostic, Span};
+use dlsys_expr::{Binary, Integral, Node, NodeId, Part, Unary};
+use dlsys_model::Distribution;
+use dlsys_syntax::ast::{ExprId, Expressions};
+use dlsys_syntax::suggest::did_you_mean;
+use dlsys_syntax::{foreign_syntax, print};
+
+/// Most nodes that the functions of a model may expand to.
+const MAX_WORK: usize = 20_000_000;
+/// Most nodes that one function may have that is called. Functions that call others twice are there at once; what
+/// somebody writes never is.
+const MAX_BODY: usize = 200_000;
+
+impl Scope {
+    pub(super) fn call(
+        &mut self,
+        all: &Expressions,
+        name: &Arc<str>,
+        span: Span,
+        arguments: &[(ExprId, Lowered)],
+        variables: &Variables,
+    ) -> Option<Lowered> {
+        let mut nodes = Vec::with_capacity(arguments.len());
+        for &(id, lowered) in arguments {
+            nodes.push(self.expect_number(all, id, lowered)?);
+        }
+        let count = |me: &mut Scope, wanted: usize| {
+            if nodes.len() == wanted {
+                return Some(());
+            }
+            me.diagnostics.push(
+                Diagnostic::error(format!(
+                    "`{name}` has {}, not {}",
+                    plural(wanted, "parameter"),
+                    nodes.len()
+                ))
+                .at(span, format!("{} given", plural(nodes.len(), "argument")))
+                .help(
+                    match (&**name, advice::decimal_comma(all, arguments.iter().map(|a| a.0), wanted)) {
+                        (_, Some(meant)) => format!("the decimal sign is a point: `{name}({meant})`"),
+                        ("min" | "max", _) if nodes.len() > 2 => {
+                            let texts: Vec<String> =
+                                arguments.iter().map(|(id, _)| print::expression(all, *id)).collect();
+                            let nested = |inner: String, next: &String| format!("{name}({inner}, {next})");
+                            format!("write `{}`", texts[1..].iter().fold(texts[0].clone(), nested))
+                        }
+                        _ => format!("it is called as `{}`", me.call_of(name)),
+                    },
+                ),
+            );
+            None
+        };
+        let number = |node| Some(Lowered { node, is_condition: false });
+        if let Some(function) = self.functions.get(name).cloned() {
+            self.used.insert(name.clone());
+            count(self, function.parameters.len())?;
+            if !function.draws.is_empty() {
+                self.may_draw(name, span)?;
+            }
+            let whole = self.inline(&function, &nodes, span)?;
+            if function.library {
+                self.know_library_integral(name, whole.node, &nodes, span);
+            }
+            return Some(whole);
+        }
+        if let Some(curve) = self.curves.get(name).copied() {
+            self.used.insert(name.clone());
+            count(self, 1)?;
+            return number(self.graph.curve(curve?, Part::Value, nodes[0]));
+        }
+        if let Some((_, op)) = Unary::NAMED.iter().find(|(n, _)| **n == **name) {
+            count(self, 1)?;
+            return number(self.graph.unary(*op, nodes[0]));
+        }
+        if let Some((_, op)) = Binary::NAMED.iter().find(|(n, _)| **n == **name) {
+            count(self, 2)?;
+            return number(self.graph.binary(*op, nodes[0], nodes[1]));
+        }
+        if let Some(distribution) = Distribution::named(name) {
+            return self.draw(distribution, span, nodes);
+        }
+        if self.poisoned.contains(name) || !self.unknown.insert(name.clone()) {
+            return None;
+        }
+        let built_in = Unary::NAMED.iter().map(|(n, _)| *n).chain(Binary::NAMED.iter().map(|(n, _)| *n));
+        let own = self.functions.keys().chain(self.curves.keys()).filter(|_| self.suggests());
+        let built_in = built_in.chain(Distribution::NAMED.iter().map(|(n, ..)| *n));
+        let known = own.map(|n| &**n).chain(built_in).chain(dlsys_syntax::library_names());
+        let mut error =
+            Diagnostic::error(format!("unknown function `{name}`")).at(span, "no function has this name");
+        let texts = || arguments.iter().map(|(id, _)| print::expression(all, *id)).collect::<Vec<_>>();
+        let elsewhere = self.in_a_comment(name).or_else(|| foreign_syntax::function(name, &texts()));
+        error = match elsewhere.or_else(|| did_you_mean(name, known)) {
+            _ if &**name == "log" => error.help("the natural logarithm is `ln`, the decimal one `log10`"),
+            Some(help) => error.help(help),
+            None if self.arrays.contains_key(name) => {
+                error.help(format!("`{name}` is an array, and its elements are written `{name}[i]`"))
+            }
+            None if self.constants.contains_key(name) || variables.names.contains_key(name) => {
+                error.help(format!("to multiply, write `{name}*(…)`"))
+            }
+            None => error.help(format!("declare it: `def {name}(…) = …`")),
+        };
+        self.diagnostics.push(error);
+        None
+    }
+
+    /// Advice for a name that only a comment defines.
+    pub(super) fn in_a_comment(&self, name: &str) -> Option<String> {
+        self.commented.get(name).map(|meaning| foreign_syntax::of_definition(name, meaning))
+    }
+
+    /// How a function is called.
+    pub(super) fn call_of(&self, name: &str) -> String {
+        match self.functions.get(name) {
+            Some(function) => format!("{name}({})", function.parameters.join(", ")),
+            None if Binary::NAMED.iter().any(|(n, _)| *n == name) => format!("{name}(x, y)"),
+            None => format!("{name}(x)"),
+        }
+    }
+
+    /// A function's body with the arguments in place of its formal parameters.
+    pub(super) fn inline(
+        &mut self,
+        function: &Function,
+        arguments: &[NodeId],
+        span: Span,
+    ) -> Option<Lowered> {
+        let (body, draws) = (function.body?, function.draws.clone());
+        let size = self.graph.reachable(&[body.node]).len() + draws.len();
+        self.work += size;
+        if self.work > MAX_WORK || size > MAX_BODY {
+            if self.work < usize::MAX / 2 {
+                self.work = usize::MAX / 2;
+                self.diagnostics.push(
+                    Diagnostic::error("the functions of this model expand without bound")
+                        .at(
+                            span,
+                            format!(
+                                "more than {} operations",
+                                if size > MAX_BODY { MAX_BODY } else { MAX_WORK }
+                            ),
+                        )
+                        .help("a function that calls another twice doubles it; compute a shared part once"),
+                );
+            }
+            return None;
+        }
+        let formal = |v: u32| (FORMAL..DRAW).contains(&v).then(|| arguments[(v - FORMAL) as usize]);
+        let drawn = self.draw_again(draws, &formal)?;
+        let comparisons = &self.function_comparisons;
+        let mut moved = Vec::new();
+        let known = function.integrals.iter().flat_map(|(of, i)| [*of, i.whole, i.argument]);
+        let roots: Vec<NodeId> = std::iter::once(body.node).chain(known).collect();
+        let images = self.graph.rewrite(&roots, |graph, id, node| {
+            let image = match node {
+                Node::Var(v) if v >= DRAW => return drawn.get(&v).copied(),
+                Node::Var(v) => return formal(v),
+                Node::Binary(op @ (Binary::Lt | Binary::Le | Binary::Eq | Binary::Ne), a, b) => {
+                    graph.binary(op, a, b)
+                }
+                _ => return None,
+            };
+            if let Some(at) = comparisons.get(&id) {
+                moved.push((image, at.clone()));
+            }
+            Some(image)
+        });
+        for integral in images[1..].chunks(3) {
+            let [of, whole, argument] = integral[..] else { unreachable!("threes") };
+            self.graph.know_integral(of, Integral { whole, argument });
+        }
+        let node = images[0];
+        for (image, at) in moved {
+            self.comparisons.entry(image).or_insert(at);
+        }
+        Some(Lowered { node, is_condition: body.is_condition })
+    }
+}

@@ -1,0 +1,382 @@
+//! What can be known of a model before it runs.
+
+use std::collections::{HashMap, HashSet};
+
+use crate::advice;
+use crate::appearance::surface_hint;
+use dlsys_diagnostic::{Diagnostic, Span};
+use dlsys_model::{
+    BUILT_IN_SURFACES, COMMAND_SURFACES, Class, Condition, DRAWN_WORDS, KindId, Model, Pattern, Remedy, Rule,
+    Sign, Step, Turn, base_of, class_of,
+};
+use dlsys_syntax::ast;
+use dlsys_syntax::print;
+use dlsys_syntax::suggest::{meant, nearest};
+
+/// Most rules that one strict predecessor can have.
+const MAX_RULES: usize = 1000;
+/// Most messages about modules that do nothing.
+const MAX_INERT: usize = 20;
+
+/// Rules and clauses that can never be reached.
+pub fn reachability(
+    model: &Model,
+    rules: &[&ast::Rule],
+    occurs: &HashMap<KindId, Span>,
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    let mut kinds_of: Vec<Vec<KindId>> = vec![Vec::new(); model.rules.len()];
+    for (id, kind) in model.kinds.iter() {
+        for rule in kind.all_rules() {
+            kinds_of[rule].push(id);
+        }
+    }
+    for (i, rule) in model.rules.iter().enumerate() {
+        let own = &kinds_of[i];
+        if let Some(at) = model.kinds.get(own[0]).rules_like(rule).get(MAX_RULES)
+            && *at == i
+        {
+            diagnostics.push(
+                Diagnostic::error(format!("more than {MAX_RULES} rules for one module"))
+                    .at(rule.span, "this one is too many")
+                    .help("write clauses with conditions under fewer heads"),
+            );
+        }
+        shadowed_rule(model, i, own, diagnostics);
+        clauses(rule, diagnostics);
+        if own.iter().all(|kind| !occurs.contains_key(kind)) {
+            diagnostics.extend(never_made(model, rules[i], occurs));
+        }
+    }
+    // What the initial string can grow into.
+    let mut alive: HashSet<KindId> = model.axiom.kinds.iter().copied().collect();
+    let mut queue: Vec<KindId> = model.axiom.kinds.clone();
+    while let Some(kind) = queue.pop() {
+        for rule in model.kinds.get(kind).all_rules() {
+            let successors = model.rules[rule].produces.iter().flat_map(|p| &p.outcome.successors);
+            for made in successors.flat_map(|s| &s.kinds) {
+                if alive.insert(*made) {
+                    queue.push(*made);
+                }
+            }
+        }
+    }
+    for (i, rule) in model.rules.iter().enumerate() {
+        let own = &kinds_of[i];
+        if own.iter().any(|k| occurs.contains_key(k)) && !own.iter().any(|k| alive.contains(k)) {
+            diagnostics.push(
+                Diagnostic::warning("this rule is not used")
+                    .at(rule.span, "the initial string never grows into this module")
+                    .help(match rules[i].predecessor.parameters.is_empty() {
+                        true => format!("make it in a successor, `produce … {}`, or begin with it in the initial string", rule.label),
+                        false => format!("make it in a successor, `produce … {}(…)`, or begin with it in the initial string", rules[i].predecessor.name.text),
+                    }),
+            );
+        }
+    }
+}
+
+fn shadowed_rule(model: &Model, index: usize, own: &[KindId], diagnostics: &mut Vec<Diagnostic>) {
+    let rule = &model.rules[index];
+    // Of a context that nothing matches something else is said.
+    let wider = |a: &Pattern, b: &Pattern| !b.kinds.is_empty() && b.kinds.iter().all(|k| a.matches(*k));
+    let own_rules = model.kinds.get(own[0]).rules_like(rule);
+    let earlier = own_rules.iter().take(MAX_RULES).take_while(|j| **j < index);
+    // Of discrete rules the first applies whose condition holds, too.
+    let holds = |before: &Rule| !rule.discrete || before.produces.iter().all(|p| p.guard.is_always());
+    let shadow = earlier.map(|j| (*j, &model.rules[*j])).find(|(j, before)| {
+        holds(before)
+            && own.iter().all(|k| model.kinds.get(*k).rules_like(rule).contains(j))
+            && before.left.len() <= rule.left.len()
+            // What stands on branches is found one way or another.
+            && before.right_shape.iter().all(|turn| *turn == Turn::Module)
+            && rule.right_shape.iter().all(|turn| *turn == Turn::Module)
+            && before.right.len() <= rule.right.len()
+            && before.left.iter().rev().zip(rule.left.iter().rev()).all(|(a, b)| wider(a, b))
+            && before.right.iter().zip(&rule.right).all(|(a, b)| wider(a, b))
+    });
+    if let Some((_, before)) = shadow {
+        if before.left.len() == rule.left.len()
+            && before.right.len() == rule.right.len()
+            && before.label == rule.label
+        {
+            if rule.discrete {
+                diagnostics.push(
+                    Diagnostic::warning("this rule can never be reached")
+                        .at(rule.span, "it has the head of the rule before it, and that one always holds")
+                        .at(before.span, "this rule comes first")
+                        .help("give the first one a condition: `A(x) : x > 3 -> …`"),
+                );
+                return;
+            }
+            diagnostics.push(
+                Diagnostic::error("two rules have the same head")
+                    .at(rule.span, "this one never has its turn")
+                    .at(before.span, "this one comes first")
+                    .help("write all clauses under one head"),
+            );
+            return;
+        }
+        diagnostics.push(
+            Diagnostic::warning("this rule can never be reached")
+                .at(rule.span, "whenever its context is there, so is that of the rule before it")
+                .at(before.span, "this rule comes first")
+                .help("of several rules the first whose context is there applies: put the special one first"),
+        );
+    }
+}
+
+fn clauses(rule: &Rule, diagnostics: &mut Vec<Diagnostic>) {
+    let solves: Vec<(&Condition, Span)> = rule.solves.iter().map(|s| (&s.guard, s.span)).collect();
+    let produces = rule.produces.iter().filter(|p| !p.is_fault).map(|p| (&p.guard, p.span)).collect();
+    for (kind, clauses) in [("solve", solves), ("produce", produces)] {
+        for (i, (guard, span)) in clauses.iter().enumerate() {
+            if guard.0 == [Step::Constant(false)] {
+                diagnostics.push(
+                    Diagnostic::error("this clause can never be reached")
+                        .at(*span, "its condition is always false")
+                        .help(always_false(rule)),
+                );
+            }
+            let before = clauses[..i].iter().find(|(other, _)| other.is_always() || other == guard);
+            if let Some((other, first)) = before {
+                let why = if other.is_always() {
+                    "this one always holds, and comes first"
+                } else {
+                    "this one has the same condition, and comes first"
+                };
+                let message = if kind == "solve" {
+                    "two `solve` clauses for the same state"
+                } else {
+                    "this clause can never be reached"
+                };
+                diagnostics.push(
+                    Diagnostic::error(message).at(*span, "this one never has its turn").at(*first, why).help(
+                        if kind == "solve" {
+                            "write the equations in one clause, with commas: `solve dx/dt = …, dy/dt = …`"
+                        } else {
+                            "of several productions that hold at once, the first written wins"
+                        },
+                    ),
+                );
+            }
+        }
+    }
+}
+
+/// What a condition that is never met can be about instead.
+fn always_false(rule: &Rule) -> String {
+    let own: Vec<String> = rule.parameters.iter().map(|name| format!("`{name}`, ")).collect();
+    format!("compare something that changes, such as {}`age` or `t`; or remove the clause", own.concat())
+}
+
+/// A rule for a module that no string has. None if something else will be said about it: words with a wrong
+/// number of parameters, and misspelt ones, are reported where they stand.
+fn never_made(model: &Model, rule: &ast::Rule, occurs: &HashMap<KindId, Span>) -> Option<Diagnostic> {
+    let head = &rule.predecessor;
+    let name = &*head.name.text;
+    let error = Diagnostic::error("this rule can never be reached")
+        .at(head.span, format!("no string has a module `{}`", print::head_module(head)));
+    let names = if name == "±" { vec!["+", "-"] } else { vec![name] };
+    let other = (occurs.iter())
+        .filter(|(id, _)| names.contains(&model.kinds.get(**id).name.as_str()))
+        .min_by_key(|(_, span)| **span);
+    if let Some((id, span)) = other {
+        let kind = model.kinds.get(*id);
+        if kind.class() == Class::Word {
+            return None;
+        }
+        let here = format!("here `{}` has {}", kind.name, crate::scope::plural(kind.arity, "parameter"));
+        let right = advice::head_with(head, kind.arity);
+        return Some(error.at(*span, here).help(format!("write the head with as many: `{right}`")));
+    }
+    let known = occurs.keys().map(|id| model.kinds.get(*id).name.as_str());
+    let near = nearest(name, known);
+    let idle = |near: &str| model.kinds.iter().all(|(_, k)| k.name != near || k.has_no_rules());
+    if class_of(name) == Class::Word && near.is_some_and(idle) {
+        return None;
+    }
+    Some(error.help(match near {
+        Some(near) => meant(name, near),
+        None => format!("put `{name}` into the initial string or a successor, or remove the rule"),
+    }))
+}
+
+/// The period of the discrete rules.
+pub fn period(declared: Option<(f64, Span)>, model: &Model, diagnostics: &mut Vec<Diagnostic>) {
+    let Some((period, span)) = declared else { return };
+    if period <= 0.0 {
+        diagnostics.push(
+            Diagnostic::error("this period cannot be")
+                .at(span, format!("it is {period}; steps need time to pass between them"))
+                .help("discrete rules apply at t = P, 2P, …: `period 1`"),
+        );
+    } else if model.rules.iter().all(|rule| !rule.discrete) {
+        diagnostics.push(
+            Diagnostic::warning("no rule has a period")
+                .at(span, "it is that of discrete rules, and there is none")
+                .help("a discrete rule is written `A(x) : x > 3 -> F(x) A(x/2)`"),
+        );
+    }
+}
+
+/// Domains that can be left without a production.
+pub fn coverage(model: &Model, diagnostics: &mut Vec<Diagnostic>) {
+    for rule in &model.rules {
+        if rule.produces.iter().any(|p| p.guard.is_always()) {
+            continue;
+        }
+        for (i, solve) in rule.solves.iter().enumerate() {
+            let mut said = HashSet::new();
+            for (atom, comparison) in solve.guard.atoms() {
+                let others = rule.solves.iter().enumerate().filter(|(j, s)| *j != i && !s.guard.is_always());
+                let covered = rule.produces.iter().any(|p| p.guard.atoms().any(|(a, _)| a == atom))
+                    || rule.solves.iter().any(|s| s.guard.is_always())
+                    || others.into_iter().any(|(_, s)| s.guard.atoms().any(|(a, _)| a == atom));
+                if !covered && !solve.unreachable[atom] && said.insert(atom) {
+                    diagnostics.push(
+                        Diagnostic::warning("no production covers this boundary of the domain")
+                            .at(
+                                rule.atoms[atom],
+                                "when this stops being true, there is no equation and no production",
+                            )
+                            .help(match Remedy::new(&model.kinds, rule, atom, comparison, Sign::Zero) {
+                                Some(Remedy { produce: Some(clause), .. }) => {
+                                    format!("add a clause for it, such as `{clause}`")
+                                }
+                                Some(Remedy { rest: Some(clause), .. }) => {
+                                    format!("add a clause for it, such as `{clause}`")
+                                }
+                                _ => "add a clause for it, such as `if … = … produce …`".to_owned(),
+                            }),
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// Modules that mean nothing: no rule, no drawing, no context.
+pub fn inert_modules(model: &Model, occurs: &HashMap<KindId, Span>, diagnostics: &mut Vec<Diagnostic>) {
+    let in_context: HashSet<KindId> = model
+        .rules
+        .iter()
+        .flat_map(|r| r.left.iter().chain(&r.right).chain(r.aggregates.iter().map(|a| &a.pattern)))
+        .flat_map(|p| p.kinds.iter().copied())
+        .collect();
+    let with_rules: HashSet<&str> = model
+        .kinds
+        .iter()
+        .filter(|(_, k)| !k.has_no_rules() || k.interpretation.is_some())
+        .map(|(_, k)| k.name.as_str())
+        .collect();
+    let mut all: Vec<(Span, KindId)> = occurs.iter().map(|(kind, span)| (*span, *kind)).collect();
+    all.sort_unstable();
+    let mut said = HashSet::new();
+    for (span, id) in all {
+        let kind = model.kinds.get(id);
+        let name = kind.name.as_str();
+        let known =
+            with_rules.contains(name) || in_context.contains(&id) || DRAWN_WORDS.contains(&kind.base());
+        let first = || Span { end: span.start + name.len() as u32, ..span };
+        if known || !said.insert(name) {
+            continue;
+        }
+        if said.len() > MAX_INERT {
+            break;
+        }
+        match kind.class() {
+            Class::Symbol => {}
+            Class::Surface
+                if BUILT_IN_SURFACES.contains(&kind.base())
+                    || COMMAND_SURFACES.iter().any(|(command, _)| *command == name)
+                    || model.appearance.surfaces.iter().any(|shape| shape.name == name) => {}
+            Class::Surface => diagnostics.push(
+                Diagnostic::warning(format!("there is no surface `{name}`: nothing is drawn for it"))
+                    .at(first(), "built in are @L, a leaf, @K, a flower, @P, a petal, and @B, a bud")
+                    .help_opt(surface_hint(name, &model.appearance)),
+            ),
+            Class::Word => {
+                let names: HashSet<&str> = with_rules.iter().copied().chain(DRAWN_WORDS).collect();
+                if let Some(parts) = split(name, &names) {
+                    diagnostics.push(
+                        Diagnostic::error(format!("unknown module `{name}`"))
+                            .at(first(), "no rule, no drawing")
+                            .help(format!("`{name}` is one name: write `{}`", parts.join(" "))),
+                    );
+                } else if let Some(near) =
+                    nearest(name, with_rules.iter().copied().filter(|n| n.chars().count() > 1))
+                {
+                    diagnostics.push(
+                        Diagnostic::error(format!("unknown module `{name}`"))
+                            .at(first(), "no rule, no drawing")
+                            .help(meant(name, near))
+                            .help(format!(
+                                "a module that only marks a place is declared with `interpret {name}: ε`"
+                            )),
+                    );
+                } else {
+                    diagnostics.push(
+                        Diagnostic::warning(format!("module `{name}` does nothing"))
+                            .at(first(), "no rule, no drawing, no context mentions it")
+                            .help(format!("if it only marks a place, say so: `interpret {name}: ε`")),
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// Modules that tell the turtle something and lack parameters.
+pub fn commands(model: &Model, diagnostics: &mut Vec<Diagnostic>, places: &HashMap<KindId, Span>) {
+    for (id, kind) in model.kinds.iter() {
+        let Some((name, needed)) = COMMAND_SURFACES.into_iter().find(|(name, _)| *name == kind.base()) else {
+            continue;
+        };
+        let Some(span) = places.get(&id).filter(|_| kind.arity < needed && kind.interpretation.is_none())
+        else {
+            continue;
+        };
+        let usage = match name {
+            "@W" => "`@W(w)`, w the width to which the stem tapers",
+            "@T" => "`@T(e)`, e the strength of the tropism",
+            "@C" => "`@C(name)`, name that of a `contour`",
+            "@PC" => "`@PC(n, row, column)`: a control point of patch n, row and column from 0 to 3",
+            "@PS" => "`@PS(n)`: patch n begins",
+            _ => "`@PD(n)`: patch n is drawn",
+        };
+        diagnostics.push(
+            Diagnostic::error(format!(
+                "`{name}` needs {}, not {}",
+                crate::scope::plural(needed, "parameter"),
+                kind.arity
+            ))
+            .at(*span, format!("{} here", crate::scope::plural(kind.arity, "parameter")))
+            .help(format!("write {usage}")),
+        );
+    }
+}
+
+/// A word as a sequence of known names, two or more.
+fn split<'n>(word: &'n str, names: &HashSet<&str>) -> Option<Vec<&'n str>> {
+    if word.len() > 60 || base_of(word) != word {
+        return None;
+    }
+    // best[i]: a way to write the first i bytes.
+    let mut best: Vec<Option<Vec<&str>>> = vec![None; word.len() + 1];
+    best[0] = Some(Vec::new());
+    for end in 1..=word.len() {
+        for start in 0..end {
+            let Some(part) = word.get(start..end) else { continue };
+            if names.contains(part)
+                && let Some(before) = &best[start]
+            {
+                let mut whole = before.clone();
+                whole.push(part);
+                best[end] = Some(whole);
+                break;
+            }
+        }
+    }
+    best.pop().flatten().filter(|parts| parts.len() > 1)
+}

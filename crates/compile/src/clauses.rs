@@ -1,0 +1,235 @@
+//! The clauses of a rule, lowered to the graph: conditions, productions and equations.
+
+use crate::analysis::never_reached;
+use crate::chance::{Hazard, production_keys};
+use crate::conditions::Atoms;
+use crate::declared::{DeclaredRule, DeclaredSolve};
+use crate::equations::Equations;
+use crate::rules::RuleBuilder;
+use crate::scope::Variables;
+use dlsys_diagnostic::Span;
+use dlsys_expr::{Graph, NodeId};
+use dlsys_model::{Clock, Condition, Produce, Switch, Turn};
+use dlsys_syntax::ast::{self, Action, HeadModule};
+use dlsys_syntax::print;
+
+/// The variables of the rule at hand.
+struct Frame<'r> {
+    rule: &'r ast::Rule,
+    variables: Variables,
+    /// Number of the strict predecessor's parameters, hidden ones included.
+    own: usize,
+    /// Number of all variables, switches excluded.
+    count: usize,
+}
+
+/// What a clause is subject to.
+#[derive(Default)]
+struct Guard {
+    condition: Condition,
+    /// The whole condition; None if there is none.
+    node: Option<NodeId>,
+}
+
+/// The productions of a rule.
+#[derive(Default)]
+struct Productions {
+    produces: Vec<Produce>,
+    clocks: Vec<Clock>,
+    hazards: Vec<Hazard>,
+}
+
+/// The equations of a clause, smooth between the changes of its switches.
+struct Smooth {
+    guard: Condition,
+    span: Span,
+    equations: Equations,
+    switches: Vec<Switch>,
+}
+
+impl RuleBuilder<'_> {
+    /// A rule, which gets this place among those of the model. None if there is an error in it, which has been reported.
+    pub fn rule(&mut self, rule: &ast::Rule, index: usize) -> Option<DeclaredRule> {
+        let mut good = self.not_a_bracket(&rule.predecessor, false);
+        for context in rule.left.iter().chain(&rule.right) {
+            good &= self.not_a_bracket(context, true);
+        }
+        for name in names_of(rule) {
+            self.kinds.intern(name, rule.predecessor.parameters.len());
+        }
+        let written = self.aggregates_in(rule);
+        let own = rule.predecessor.parameters.len() + self.hidden(&rule.predecessor);
+        let (mut variables, count) = self.variables(&rule.predecessor, &rule.left, &rule.right, written);
+        self.scope.comparisons.clear();
+        self.scope.gathered.clear();
+        good &= self.locals(rule, &mut variables);
+        let frame = Frame { rule, variables, own, count };
+        let mut atoms = Atoms::default();
+        let guards = self.guards(&frame, &mut atoms, &mut good);
+        let productions = self.productions(&frame, &guards, &mut atoms, &mut good)?;
+        let smooth = self.smooth_clauses(&frame, &guards, &productions, &mut atoms, &mut good)?;
+        if !good {
+            return None;
+        }
+        let aggregates = self.aggregates();
+        let solves = self.declare_solves(&frame, smooth, &atoms);
+        Some(DeclaredRule {
+            index,
+            label: print::head(rule),
+            span: rule.head,
+            discrete: rule.discrete,
+            parameters: self.names(&rule.predecessor),
+            context_names: rule.left.iter().chain(&rule.right).flat_map(|m| self.names(m)).collect(),
+            left: rule.left.iter().map(|m| self.pattern(m.clone())).collect(),
+            right: rule.right.iter().map(|m| self.pattern(m.clone())).collect(),
+            right_shape: rule.right_shape.iter().map(|part| turn(*part)).collect(),
+            aggregates,
+            first_aggregate: count - 2 - written as usize,
+            variables: count,
+            sides: atoms.sides,
+            atoms: atoms.spans,
+            boundaries: atoms.boundaries,
+            solves,
+            produces: productions.produces,
+            hidden: self.hidden(&rule.predecessor),
+            clocks: productions.clocks,
+        })
+    }
+
+    /// The conditions of all clauses. They come first because all clauses share their atoms.
+    fn guards(&mut self, frame: &Frame, atoms: &mut Atoms, good: &mut bool) -> Vec<Guard> {
+        let mut guards = Vec::with_capacity(frame.rule.clauses.len());
+        for clause in &frame.rule.clauses {
+            let Some(guard) = clause.guard else {
+                guards.push(Guard::default());
+                continue;
+            };
+            let node = self.scope.condition(&self.document.expressions, guard, &frame.variables);
+            let condition = match (node, &clause.hazard) {
+                // Under a rate it is the clock that says when.
+                (Some(_), Some(_)) => Some(Condition::default()),
+                (node, _) => node.and_then(|node| self.decompose(node, clause.span, atoms)),
+            };
+            *good &= condition.is_some();
+            guards.push(Guard { condition: condition.unwrap_or_default(), node });
+        }
+        guards
+    }
+
+    /// The productions, those of events at a rate with their clocks; behind them those that stand for negative rates.
+    fn productions(
+        &mut self,
+        frame: &Frame,
+        guards: &[Guard],
+        atoms: &mut Atoms,
+        good: &mut bool,
+    ) -> Option<Productions> {
+        let mut all = Productions::default();
+        let mut faults = Vec::new();
+        let mut keys = production_keys(frame.rule);
+        for (clause, written) in frame.rule.clauses.iter().zip(guards) {
+            let Action::Produce(successors) = &clause.action else { continue };
+            let key = keys.next().map_or(0, |(_, key)| key);
+            let mut guard = written.condition.clone();
+            if clause.hazard.is_some() {
+                let head = (&frame.rule.predecessor, key);
+                match self.hazard(clause, head, written.node, &frame.variables) {
+                    Some(hazard) => {
+                        guard = self.clock_is_down(&hazard, atoms)?;
+                        faults.extend(self.negative_rate(&hazard, clause.span, frame.count, atoms));
+                        all.clocks.push(Clock { parameter: hazard.parameter, produce: all.produces.len() });
+                        all.hazards.push(hazard);
+                    }
+                    None => *good = false,
+                }
+            }
+            match self.outcome(successors, &frame.variables, frame.count) {
+                Some(outcome) => {
+                    all.produces.push(Produce { guard, span: clause.span, key, is_fault: false, outcome })
+                }
+                None => *good = false,
+            }
+        }
+        all.produces.extend(faults);
+        Some(all)
+    }
+
+    /// The equations of all `solve` clauses, with their conditions taken out.
+    fn smooth_clauses(
+        &mut self,
+        frame: &Frame,
+        guards: &[Guard],
+        productions: &Productions,
+        atoms: &mut Atoms,
+        good: &mut bool,
+    ) -> Option<Vec<Smooth>> {
+        let &Frame { rule, own, count, .. } = frame;
+        let hazards = &productions.hazards;
+        let mut all = Vec::new();
+        for (clause, guard) in rule.clauses.iter().zip(guards) {
+            let Action::Solve(equations) = &clause.action else { continue };
+            let equations = self.equations(equations, &rule.predecessor, &frame.variables, clause.span);
+            let Some(mut equations) = equations else {
+                *good = false;
+                continue;
+            };
+            equations.rates.extend(hazards.iter().filter_map(|hazard| self.clock_rate(hazard, guard.node)));
+            let (smooth, switches) = self.smooth(equations.all(), own, count, clause.span, atoms)?;
+            equations.set_all(smooth);
+            all.push(Smooth { guard: guard.condition.clone(), span: clause.span, equations, switches });
+        }
+        if let (true, true, Some(first)) = (*good, all.is_empty(), productions.clocks.first()) {
+            // Clocks run, though nothing else does.
+            let span = productions.produces[first.produce].span;
+            let rates = hazards.iter().filter_map(|hazard| self.clock_rate(hazard, None)).collect();
+            let (rates, switches) = self.smooth(rates, own, count, span, atoms)?;
+            let equations = Equations { rates, algebraic: Vec::new() };
+            all.push(Smooth { guard: Condition::default(), span, equations, switches });
+        }
+        Some(all)
+    }
+
+    /// Adds to each clause which atoms its flow cannot reach.
+    fn declare_solves(&mut self, frame: &Frame, clauses: Vec<Smooth>, atoms: &Atoms) -> Vec<DeclaredSolve> {
+        let context = frame.count - frame.own - 2;
+        let mut solves = Vec::with_capacity(clauses.len());
+        for Smooth { guard, span, equations: Equations { rates, algebraic }, switches } in clauses {
+            let total = frame.count + switches.len();
+            let graph = &mut self.scope.graph;
+            // A value that has no rate is not known to approach anything.
+            let given = |graph: &Graph, (a, b): (NodeId, NodeId)| {
+                let read = graph.variables(&[a, b]);
+                algebraic.iter().any(|entry| read.contains(&(entry.parameter as u32)))
+            };
+            let unreachable = (atoms.sides.iter())
+                .map(|&sides| {
+                    !given(graph, sides) && never_reached(graph, sides, &rates, frame.own, context, total)
+                })
+                .collect();
+            solves.push(DeclaredSolve { guard, span, rates, algebraic, switches, unreachable });
+        }
+        solves
+    }
+
+    /// The names of a module's parameters, hidden ones last.
+    fn names(&self, module: &HeadModule) -> Vec<String> {
+        let clocks = std::iter::repeat_n("clock".to_owned(), self.hidden(module));
+        module.parameters.iter().map(|p| p.text.to_string()).chain(clocks).collect()
+    }
+}
+
+/// The names of the modules that a rule is for: `±` stands for both turns.
+pub fn names_of(rule: &ast::Rule) -> Vec<&str> {
+    match &*rule.predecessor.name.text {
+        "±" => vec!["+", "-"],
+        name => vec![name],
+    }
+}
+
+fn turn(part: ast::Turn) -> Turn {
+    match part {
+        ast::Turn::Module => Turn::Module,
+        ast::Turn::Open => Turn::Open,
+        ast::Turn::Close => Turn::Close,
+    }
+}

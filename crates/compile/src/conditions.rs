@@ -1,0 +1,103 @@
+//! Conditions: taken apart into comparisons of two sides, which all clauses of a rule share.
+
+use std::collections::HashMap;
+
+use crate::advice;
+use crate::rules::RuleBuilder;
+use dlsys_diagnostic::{Diagnostic, Span};
+use dlsys_expr::{Binary, Node, NodeId, Unary};
+use dlsys_model::{Boundary, Comparison, Condition, Step};
+
+/// Longest condition, in comparisons and connectives, after functions are put in.
+const MAX_CONDITION: usize = 10_000;
+
+/// The pairs of expressions that the conditions of a rule compare.
+#[derive(Default)]
+pub struct Atoms {
+    pub sides: Vec<(NodeId, NodeId)>,
+    pub spans: Vec<Span>,
+    pub boundaries: Vec<Boundary>,
+    index: HashMap<(NodeId, NodeId), u32>,
+}
+
+impl RuleBuilder<'_> {
+    /// Takes a condition apart into comparisons of two sides.
+    pub(super) fn decompose(&mut self, root: NodeId, span: Span, atoms: &mut Atoms) -> Option<Condition> {
+        enum Task {
+            Visit(NodeId),
+            Emit(Step),
+        }
+        let mut steps = Vec::new();
+        let mut tasks = vec![Task::Visit(root)];
+        while let Some(task) = tasks.pop() {
+            if steps.len() > MAX_CONDITION {
+                self.error(
+                    Diagnostic::error("this condition is too long")
+                        .at(span, format!("more than {MAX_CONDITION} comparisons and connectives"))
+                        .help("functions that call functions multiply what they compare: compute a shared part once"),
+                );
+                return None;
+            }
+            let id = match task {
+                Task::Emit(step) => {
+                    steps.push(step);
+                    continue;
+                }
+                Task::Visit(id) => id,
+            };
+            match self.scope.graph.node(id) {
+                Node::Const(bits) => steps.push(Step::Constant(f64::from_bits(bits) != 0.0)),
+                Node::Unary(Unary::Not, a) => tasks.extend([Task::Emit(Step::Not), Task::Visit(a)]),
+                Node::Binary(op @ (Binary::And | Binary::Or), a, b) => {
+                    let step = if op == Binary::And { Step::And } else { Step::Or };
+                    tasks.extend([Task::Emit(step), Task::Visit(b), Task::Visit(a)]);
+                }
+                Node::Binary(op, a, b) => {
+                    let comparison = match op {
+                        Binary::Lt => Comparison::Less,
+                        Binary::Le => Comparison::LessOrEqual,
+                        Binary::Eq => Comparison::Equal,
+                        _ => Comparison::NotEqual,
+                    };
+                    let known = self.scope.comparisons.get(&id);
+                    let (at, boundary) = known.map_or((span, None), |(at, sides)| (*at, Some(&**sides)));
+                    let never = [a, b]
+                        .into_iter()
+                        .any(|side| self.scope.graph.as_constant(side).is_some_and(f64::is_nan));
+                    if never {
+                        self.scope.diagnostics.push(
+                            Diagnostic::warning("this comparison never holds")
+                                .at(at, "one of its sides has no value (NaN)")
+                                .help(advice::not_finite(f64::NAN)),
+                        );
+                    }
+                    steps.push(atoms.step(a, b, comparison, at, boundary));
+                }
+                node => unreachable!("{node:?} is no condition"),
+            }
+        }
+        Some(Condition(steps))
+    }
+}
+
+impl Atoms {
+    /// The step that compares two sides; each pair is kept once, whichever way round it is written.
+    fn step(
+        &mut self,
+        a: NodeId,
+        b: NodeId,
+        comparison: Comparison,
+        span: Span,
+        sides: Option<&[String; 2]>,
+    ) -> Step {
+        let (pair, comparison) = if a <= b { ((a, b), comparison) } else { ((b, a), comparison.mirrored()) };
+        let atom = *self.index.entry(pair).or_insert_with(|| {
+            self.sides.push(pair);
+            self.spans.push(span);
+            let known = sides.map(|[left, right]| Boundary::new(left, right, a > b));
+            self.boundaries.push(known.unwrap_or_default());
+            self.sides.len() as u32 - 1
+        });
+        Step::Atom(atom, comparison)
+    }
+}

@@ -1,0 +1,182 @@
+//! Strings, heads and interpretations: the parts of a model that are made of modules, lowered to the graph.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use crate::advice;
+use crate::chance::Clocks;
+use crate::declared::DeclaredPattern;
+use crate::scope::{RESERVED, Scope, Variables};
+use dlsys_diagnostic::{Diagnostic, Span};
+use dlsys_expr::NodeId;
+use dlsys_model::{CUT, Class, DRAWN_WORDS, Interpretation, KindId, Kinds, base_of, class_of};
+use dlsys_syntax::ast::{self, Document, Expression, HeadModule};
+use dlsys_syntax::print;
+
+/// Builds the parts of a model that are made of modules.
+pub struct RuleBuilder<'b> {
+    pub document: &'b Document,
+    pub scope: &'b mut Scope,
+    pub kinds: &'b mut Kinds,
+    pub clocks: Clocks,
+    /// Each kind that stands in a string, with the first place where it does.
+    pub occurs: HashMap<KindId, Span>,
+    /// The same of drawings, where they are not those of the kind itself.
+    pub drawn: HashMap<KindId, Span>,
+}
+
+impl<'b> RuleBuilder<'b> {
+    /// A builder that has seen no strings yet.
+    pub fn new(
+        document: &'b Document,
+        scope: &'b mut Scope,
+        kinds: &'b mut Kinds,
+        clocks: Clocks,
+    ) -> RuleBuilder<'b> {
+        RuleBuilder { document, scope, kinds, clocks, occurs: HashMap::new(), drawn: HashMap::new() }
+    }
+
+    /// Number of hidden parameters of a module.
+    pub(super) fn hidden(&self, module: &HeadModule) -> usize {
+        self.clocks.width(&module.name.text, module.parameters.len())
+    }
+
+    /// A module of a context, whose kinds are found when all are known.
+    pub(super) fn pattern(&self, head: HeadModule) -> DeclaredPattern {
+        DeclaredPattern { width: head.parameters.len() + self.hidden(&head), head }
+    }
+
+    pub(super) fn error(&mut self, error: Diagnostic) {
+        self.scope.diagnostics.push(error);
+    }
+
+    /// The variables of a head, and how many there are with `t` and `age`.
+    pub(super) fn variables(
+        &mut self,
+        own: &HeadModule,
+        left: &[HeadModule],
+        right: &[HeadModule],
+        aggregates: u32,
+    ) -> (Variables, usize) {
+        let mut names: HashMap<Arc<str>, NodeId> = HashMap::new();
+        let mut spans: HashMap<Arc<str>, Span> = HashMap::new();
+        let mut count = 0;
+        let mut parameters = Vec::new();
+        for module in std::iter::once(own).chain(left).chain(right) {
+            parameters.extend(module.parameters.iter().zip(count..));
+            // Behind those that are written, a module has hidden ones.
+            let hidden = self.hidden(module);
+            count += (module.parameters.len() + hidden) as u32;
+        }
+        for (parameter, number) in parameters {
+            let node = self.scope.graph.var(number);
+            if RESERVED.contains(&&*parameter.text) {
+                self.error(
+                    Diagnostic::error(format!("a parameter cannot be called `{}`", parameter.text))
+                        .at(parameter.span, "this name stands for time in every rule")
+                        .help(match &*parameter.text {
+                            "age" => "`age`, the time since the module was made, is known without a parameter; for another time choose another name".to_owned(),
+                            name => format!("`{name}`, the time since the start, is known without a parameter; for another time choose another name"),
+                        }),
+                );
+            }
+            if let Some(before) = spans.insert(parameter.text.clone(), parameter.span) {
+                self.error(
+                    Diagnostic::error(format!("two parameters of this head are called `{}`", parameter.text))
+                        .at(parameter.span, "the second one")
+                        .at(before, "the first one")
+                        .help(advice::other_name(&parameter.text, !left.is_empty(), !right.is_empty())),
+                );
+            }
+            names.insert(parameter.text.clone(), node);
+        }
+        let first_aggregate = count;
+        count += aggregates;
+        for name in RESERVED {
+            let node = self.scope.graph.var(count);
+            names.insert(name.into(), node);
+            count += 1;
+        }
+        let aggregates = Some((first_aggregate, count));
+        (Variables { names, aggregates, ..Variables::default() }, count as usize)
+    }
+
+    pub(super) fn not_a_bracket(&mut self, head: &HeadModule, is_context: bool) -> bool {
+        let bracket = matches!(&*head.name.text, "[" | "]");
+        if bracket {
+            self.error(
+                Diagnostic::error("a bracket has no rules")
+                    .at(head.name.span, "brackets structure the string; they do not develop")
+                    .help(if is_context {
+                        "in a context after `>` brackets stand in pairs around a branch: `A > [ B ] C`"
+                    } else {
+                        "to change a branch, write a rule for a module in it"
+                    }),
+            );
+        }
+        let cut = &*head.name.text == CUT;
+        if cut {
+            self.error(
+                Diagnostic::error("`%` has no rules and no context")
+                    .at(head.name.span, "it cuts off the rest of its branch, and is gone at once")
+                    .help("write the rule for the module that makes it, as in `A(x): if x = 1 produce %`"),
+            );
+        }
+        !bracket && !cut
+    }
+
+    pub fn interpretation(
+        &mut self,
+        head: &HeadModule,
+        drawn: &[ast::Module],
+    ) -> Option<(KindId, Interpretation)> {
+        if !self.not_a_bracket(head, false) {
+            return None;
+        }
+        // Who draws or measures a module sees what is written of it, and no clocks.
+        let clocks = std::mem::take(&mut self.clocks);
+        let (mut variables, count) = self.variables(head, &[], &[], 0);
+        // And one module after another.
+        variables.aggregates = None;
+        if let Some(cut) = drawn.iter().find(|module| &*module.name == CUT) {
+            self.error(
+                Diagnostic::error("a drawing cuts nothing off")
+                    .at(cut.span, "`%` belongs into the successors of rules")
+                    .help("to draw nothing, write `ε`"),
+            );
+        }
+        if let Some(again) = drawn.iter().find(|module| is_head(module, head)) {
+            self.error(draws_nothing(again, head));
+        }
+        // What is only drawn does not develop: it makes no rule reachable.
+        let before = std::mem::take(&mut self.occurs);
+        let drawn = self.string(drawn, &variables, count);
+        self.clocks = clocks;
+        let inside = std::mem::replace(&mut self.occurs, before);
+        let kind = self.kinds.intern(&head.name.text, head.parameters.len());
+        self.drawn.extend(inside.into_iter().filter(|(other, _)| *other != kind));
+        Some((kind, Interpretation { span: head.span, drawn: drawn? }))
+    }
+
+    /// The value of an expression of constants, for declarations such as `angle`.
+    pub fn constant(&mut self, expression: Expression) -> Option<f64> {
+        self.scope.constant_value(&self.document.expressions, expression)
+    }
+}
+
+/// Whether a module of a drawing is of the kind that is drawn, and says nothing to the turtle by its name.
+fn is_head(module: &ast::Module, head: &HeadModule) -> bool {
+    let same = module.name == head.name.text && module.arguments.len() == head.parameters.len();
+    same && class_of(&module.name) == Class::Word && !DRAWN_WORDS.contains(&base_of(&module.name))
+}
+
+fn draws_nothing(module: &ast::Module, head: &HeadModule) -> Diagnostic {
+    let name = &module.name;
+    let arguments = if head.parameters.is_empty() { "" } else { "(…)" };
+    Diagnostic::warning(format!("`{name}` draws nothing in its own drawing"))
+        .at(module.span, format!("inside its own drawing a module is what its name says, and `{name}` says nothing to the turtle"))
+        .help(format!(
+            "drawings do not repeat themselves: let a rule make the parts, `{}: … produce F(1) {name}{arguments}`, or draw a module with another name",
+            print::head_module(head)
+        ))
+}

@@ -1,0 +1,493 @@
+//! Constants, parameters and functions of a model, and the lowering of expressions to the graph.
+
+use std::collections::{HashMap, HashSet};
+use std::ops::Range;
+use std::sync::Arc;
+
+use crate::advice;
+use crate::chance::Draws;
+use dlsys_diagnostic::{Diagnostic, Span};
+use dlsys_expr::{Binary, Graph, Integral, Lookup, NodeId, Unary};
+use dlsys_model::{Comparison, Fold};
+use dlsys_syntax::ast::{Aggregate, Expr, ExprId, Expression, Expressions, HeadModule, Name, Operator};
+use dlsys_syntax::print;
+use dlsys_syntax::suggest::did_you_mean;
+
+/// Variables at and above this number are parameters of functions.
+pub(super) const FORMAL: u32 = 1 << 24;
+
+/// Names that mean something everywhere in a rule.
+pub const RESERVED: [&str; 2] = ["t", "age"];
+const CONSTANTS: [(&str, f64); 2] = [("pi", std::f64::consts::PI), ("e", std::f64::consts::E)];
+
+/// A lowered expression: a number, or a condition.
+#[derive(Clone, Copy, Debug)]
+pub struct Lowered {
+    pub node: NodeId,
+    pub is_condition: bool,
+}
+
+/// A function, as a graph over its formal parameters.
+#[derive(Clone, Debug)]
+pub(super) struct Function {
+    pub parameters: Vec<Arc<str>>,
+    /// None if its own text is at fault, which has been reported.
+    pub body: Option<Lowered>,
+    /// The random numbers that its body draws.
+    pub draws: Range<u32>,
+    /// Of the library.
+    pub library: bool,
+    /// Parts of the body with a known antiderivative.
+    pub integrals: Vec<(NodeId, Integral)>,
+}
+
+/// Names that an expression can use besides the global ones.
+#[derive(Default)]
+pub struct Variables {
+    pub names: HashMap<Arc<str>, NodeId>,
+    /// What to tell somebody who uses `t` or `age` where they mean nothing; None where they are in `names`.
+    pub no_time: Option<&'static str>,
+    /// Names of the rule's `let` lines, those that are not known yet too, and where they are declared.
+    pub lets: HashMap<Arc<str>, Span>,
+    /// In a rule: the number of the variable of its first aggregate, and that of all its variables.
+    pub aggregates: Option<(u32, u32)>,
+}
+
+/// An aggregate of the present rule.
+pub struct Gathered {
+    pub fold: Fold,
+    pub head: HeadModule,
+    /// The parameters of the child are variables from the number of the rule's variables on.
+    pub term: NodeId,
+}
+
+/// The global names of a model, and the graph that its expressions are built in.
+#[derive(Default)]
+pub struct Scope {
+    pub graph: Graph,
+    /// Values; None if the declaration is at fault, which has been reported.
+    pub(super) constants: HashMap<Arc<str>, Option<f64>>,
+    pub(super) functions: HashMap<Arc<str>, Function>,
+    /// None as for constants.
+    pub(super) curves: HashMap<Arc<str>, Option<Lookup>>,
+    pub(super) arrays: HashMap<Arc<str>, Option<Lookup>>,
+    /// Global names that some expression has used.
+    pub used: HashSet<Arc<str>>,
+    pub(super) poisoned: HashSet<Arc<str>>,
+    /// Names that were already complained about.
+    pub(super) unknown: HashSet<Arc<str>>,
+    /// Where the comparisons of the present rule are written, by their node, and their two sides. Rules number their
+    /// variables alike, so one rule's nodes mean nothing in another.
+    pub comparisons: HashMap<NodeId, (Span, Arc<[String; 2]>)>,
+    /// The aggregates of the present rule, in the order of their variables.
+    pub gathered: Vec<Gathered>,
+    /// The same for the bodies of functions.
+    pub(super) function_comparisons: HashMap<NodeId, (Span, Arc<[String; 2]>)>,
+    pub diagnostics: Vec<Diagnostic>,
+    /// What only comments define: names, and their meanings.
+    pub(super) commented: HashMap<Arc<str>, String>,
+    pub draws: Draws,
+    /// What is wrong with the values given from outside, which is not the text's fault.
+    pub refused_settings: Vec<Diagnostic>,
+    pub(super) work: usize,
+}
+
+impl Scope {
+    /// True if a name has a meaning that a model cannot change.
+    pub fn is_built_in(name: &str) -> bool {
+        RESERVED.contains(&name)
+            || CONSTANTS.iter().any(|(n, _)| *n == name)
+            || Unary::NAMED.iter().any(|(n, _)| *n == name)
+            || Binary::NAMED.iter().any(|(n, _)| *n == name)
+    }
+
+    pub fn define_constant(&mut self, name: Arc<str>, value: Option<f64>) {
+        self.constants.insert(name, value);
+    }
+
+    /// Whether a suggestion is worth its time: it looks at every known name, and after so many errors
+    /// nobody reads it.
+    pub(super) fn suggests(&self) -> bool {
+        self.diagnostics.len() < 50
+    }
+
+    /// Makes a name known whose declaration is at fault, which has been reported: no use of it is an error.
+    pub fn poison(&mut self, name: Arc<str>) {
+        self.poisoned.insert(name);
+    }
+
+    /// Lowers the body of a function and makes it known.
+    pub fn define_function(
+        &mut self,
+        name: &Name,
+        parameters: &[Name],
+        all: &Expressions,
+        body: Expression,
+        library: bool,
+    ) {
+        let mut variables = Variables {
+            no_time: Some("a function sees only its parameters: pass it on, as in `G(x, age)`"),
+            ..Variables::default()
+        };
+        for (i, parameter) in parameters.iter().enumerate() {
+            let formal = self.graph.var(FORMAL + i as u32);
+            if variables.names.insert(parameter.text.clone(), formal).is_some() {
+                self.diagnostics.push(
+                    Diagnostic::error(format!(
+                        "`{}` has two parameters called `{}`",
+                        name.text, parameter.text
+                    ))
+                    .at(parameter.span, "the second one")
+                    .help(format!(
+                        "give each a name of its own, such as `{}`",
+                        advice::numbered(&parameter.text)
+                    )),
+                );
+            }
+        }
+        let first = self.draws.all.len() as u32;
+        // Whether it may draw is asked where it is called.
+        self.draws.allowed = true;
+        let body = self.lower(all, body, &variables);
+        self.draws.allowed = false;
+        self.function_comparisons.extend(self.comparisons.drain());
+        let draws = first..self.draws.all.len() as u32;
+        let parameters = parameters.iter().map(|p| p.text.clone()).collect();
+        let integrals = body.map_or_else(Vec::new, |body| {
+            let parts = self.graph.reachable(&[body.node]);
+            self.graph.noted_integrals(&parts)
+        });
+        let function = Function { parameters, body, draws, library, integrals };
+        self.functions.insert(name.text.clone(), function);
+    }
+
+    /// Lowers an expression that must be a number.
+    pub fn number(
+        &mut self,
+        all: &Expressions,
+        expression: Expression,
+        variables: &Variables,
+    ) -> Option<NodeId> {
+        let lowered = self.lower(all, expression, variables)?;
+        self.expect_number(all, expression.root, lowered)
+    }
+
+    /// Lowers an expression that must be a condition.
+    pub fn condition(
+        &mut self,
+        all: &Expressions,
+        expression: Expression,
+        variables: &Variables,
+    ) -> Option<NodeId> {
+        let lowered = self.lower(all, expression, variables)?;
+        self.expect_condition(all, expression.root, lowered)
+    }
+
+    /// The value of an expression that may use constants only.
+    pub fn constant_value(&mut self, all: &Expressions, expression: Expression) -> Option<f64> {
+        let variables = Variables { no_time: Some("only constants can stand here"), ..Variables::default() };
+        let node = self.number(all, expression, &variables)?;
+        let value = self.graph.as_constant(node).expect("without variables everything is folded");
+        if value.is_finite() {
+            return Some(value);
+        }
+        self.diagnostics.push(
+            Diagnostic::error("this has no finite value")
+                .at(all.span(expression.root), format!("it is {value}"))
+                .help(advice::not_finite(value)),
+        );
+        None
+    }
+
+    pub(super) fn expect_number(
+        &mut self,
+        all: &Expressions,
+        id: ExprId,
+        lowered: Lowered,
+    ) -> Option<NodeId> {
+        if !lowered.is_condition {
+            return Some(lowered.node);
+        }
+        self.diagnostics.push(
+            Diagnostic::error("a number is expected here")
+                .at(all.span(id), "this is a condition")
+                .help("a condition becomes a number with `if … then 1 else 0`"),
+        );
+        None
+    }
+
+    fn expect_condition(&mut self, all: &Expressions, id: ExprId, lowered: Lowered) -> Option<NodeId> {
+        if lowered.is_condition {
+            return Some(lowered.node);
+        }
+        self.diagnostics.push(
+            Diagnostic::error("a condition is expected here")
+                .at(all.span(id), "this is a number")
+                .help("compare it with something, as in `x > 0`"),
+        );
+        None
+    }
+
+    /// Lowers an expression. None if it is at fault, which has then been reported.
+    fn lower(&mut self, all: &Expressions, expression: Expression, variables: &Variables) -> Option<Lowered> {
+        let (first, last) = (expression.first.0, expression.root.0);
+        // Operands stand before their users, so this is a loop however deep the expression is.
+        let mut done: Vec<Option<Lowered>> = Vec::with_capacity((last - first + 1) as usize);
+        let named = self.functional_names(all, expression);
+        let inside = terms(all, first, last);
+        for id in first..=last {
+            // The term of an aggregate has names of its own: it is lowered with that.
+            let inside = inside.get((id - first) as usize).is_some_and(|inside| *inside);
+            if inside || named.contains(&ExprId(id)) {
+                done.push(None);
+                continue;
+            }
+            let lowered = self.lower_node(all, ExprId(id), variables, |o| done[(o.0 - first) as usize]);
+            done.push(lowered);
+        }
+        done.pop().flatten()
+    }
+
+    fn lower_node(
+        &mut self,
+        all: &Expressions,
+        id: ExprId,
+        variables: &Variables,
+        done: impl Fn(ExprId) -> Option<Lowered>,
+    ) -> Option<Lowered> {
+        let number = |node| Some(Lowered { node, is_condition: false });
+        let condition = |node| Some(Lowered { node, is_condition: true });
+        let span = all.span(id);
+        match all.get(id) {
+            Expr::Number(x) => number(self.graph.constant(*x)),
+            Expr::Name(name) => number(self.name(name, span, variables)?),
+            Expr::Call(name, arguments) => {
+                let mut nodes = Vec::with_capacity(arguments.len());
+                if self.is_functional(name) {
+                    for &argument in arguments.iter().skip(1) {
+                        nodes.push((argument, done(argument)?));
+                    }
+                    return self.functional(all, name, span, arguments.first().copied(), &nodes);
+                }
+                for &argument in arguments {
+                    nodes.push((argument, done(argument)?));
+                }
+                self.call(all, name, span, &nodes, variables)
+            }
+            Expr::Index(name, index) => {
+                let index = self.expect_number(all, *index, done(*index)?)?;
+                number(self.element(name, index, span)?)
+            }
+            Expr::Match(subject, cases, otherwise) => {
+                number(self.choice(all, (*subject, cases, *otherwise), done)?)
+            }
+            Expr::Parenthesis(a) => done(*a),
+            Expr::Aggregate(aggregate) => number(self.aggregate(all, aggregate, span, variables)?),
+            Expr::Negate(a) => {
+                let a = self.expect_number(all, *a, done(*a)?)?;
+                number(self.graph.unary(Unary::Neg, a))
+            }
+            Expr::Not(a) => {
+                let a = self.expect_condition(all, *a, done(*a)?)?;
+                condition(self.graph.unary(Unary::Not, a))
+            }
+            Expr::Scale(factor, a) => {
+                let a = self.expect_number(all, *a, done(*a)?)?;
+                let factor = self.graph.constant(*factor);
+                number(self.graph.binary(Binary::Mul, factor, a))
+            }
+            Expr::Binary(operator @ (Operator::And | Operator::Or), a, b) => {
+                let (left, right) = (done(*a)?, done(*b)?);
+                let left = self.expect_condition(all, *a, left);
+                let right = self.expect_condition(all, *b, right);
+                let op = if *operator == Operator::And { Binary::And } else { Binary::Or };
+                condition(self.graph.binary(op, left?, right?))
+            }
+            Expr::Binary(operator, a, b) => {
+                let (left, right) = (done(*a)?, done(*b)?);
+                let left = self.expect_number(all, *a, left);
+                let right = self.expect_number(all, *b, right);
+                let op = match operator {
+                    Operator::Add => Binary::Add,
+                    Operator::Sub => Binary::Sub,
+                    Operator::Mul => Binary::Mul,
+                    Operator::Div => Binary::Div,
+                    _ => Binary::Pow,
+                };
+                number(self.graph.binary(op, left?, right?))
+            }
+            Expr::Compare(first, links) => {
+                let mut a = self.expect_number(all, *first, done(*first)?);
+                let mut a_id = *first;
+                let mut whole: Option<NodeId> = None;
+                for (comparison, operand) in links {
+                    let b = self.expect_number(all, *operand, done(*operand)?);
+                    let (Some(left), Some(right)) = (a, b) else { return None };
+                    let link = self.compare(*comparison, left, right);
+                    self.comparisons.entry(link).or_insert_with(|| {
+                        let sides = [a_id, *operand].map(|id| print::expression(all, id));
+                        // A choice binds loosest of all.
+                        let sides = sides.map(|s| if s.starts_with("if ") { format!("({s})") } else { s });
+                        (all.span(a_id).to(all.span(*operand)), sides.into())
+                    });
+                    whole = Some(match whole {
+                        Some(before) => self.graph.binary(Binary::And, before, link),
+                        None => link,
+                    });
+                    (a, a_id) = (b, *operand);
+                }
+                condition(whole?)
+            }
+            Expr::If(c, a, b) => {
+                let (test, then, otherwise) = (done(*c)?, done(*a)?, done(*b)?);
+                let test = self.expect_condition(all, *c, test);
+                let then = self.expect_number(all, *a, then);
+                let otherwise = self.expect_number(all, *b, otherwise);
+                number(self.graph.select(test?, then?, otherwise?))
+            }
+        }
+    }
+
+    /// The variable of an aggregate.
+    fn aggregate(
+        &mut self,
+        all: &Expressions,
+        aggregate: &Aggregate,
+        span: Span,
+        variables: &Variables,
+    ) -> Option<NodeId> {
+        let Some((first, count)) = variables.aggregates else {
+            let name = aggregate.fold.name();
+            self.diagnostics.push(
+                Diagnostic::error(format!("`{name}` has no meaning here"))
+                    .at(span, "what is attached to a module is known in rules only")
+                    .help(format!(
+                        "write `{name}` in an equation, a condition or a successor, and hand its value on"
+                    )),
+            );
+            return None;
+        };
+        let mut names = variables.names.clone();
+        for (i, parameter) in aggregate.head.parameters.iter().enumerate() {
+            let node = self.graph.var(count + i as u32);
+            names.insert(parameter.text.clone(), node);
+        }
+        let inner = Variables { names, ..Variables::default() };
+        // It is looked at again and again, by whoever reads it: numbers that are drawn once have no place in it.
+        let may_draw = std::mem::take(&mut self.draws.allowed);
+        let term = match aggregate.term {
+            Some(term) => self.number(all, term, &inner),
+            None => Some(self.graph.constant(1.0)),
+        };
+        self.draws.allowed = may_draw;
+        let term = term?;
+        let same = |known: &Gathered| {
+            let names = known.head.name.text == aggregate.head.name.text
+                && known.head.parameters.len() == aggregate.head.parameters.len();
+            known.fold == aggregate.fold && known.term == term && names
+        };
+        let place = self.gathered.iter().position(same).unwrap_or_else(|| {
+            let (fold, head) = (aggregate.fold, aggregate.head.clone());
+            self.gathered.push(Gathered { fold, head, term });
+            self.gathered.len() - 1
+        });
+        Some(self.graph.var(first + place as u32))
+    }
+
+    pub(super) fn compare(&mut self, comparison: Comparison, a: NodeId, b: NodeId) -> NodeId {
+        match comparison {
+            Comparison::Less => self.graph.binary(Binary::Lt, a, b),
+            Comparison::LessOrEqual => self.graph.binary(Binary::Le, a, b),
+            Comparison::Equal => self.graph.binary(Binary::Eq, a, b),
+            Comparison::NotEqual => self.graph.binary(Binary::Ne, a, b),
+            Comparison::GreaterOrEqual => self.graph.binary(Binary::Le, b, a),
+            Comparison::Greater => self.graph.binary(Binary::Lt, b, a),
+        }
+    }
+
+    fn name(&mut self, name: &Arc<str>, span: Span, variables: &Variables) -> Option<NodeId> {
+        if let Some(&node) = variables.names.get(name) {
+            return Some(node);
+        }
+        if let Some(value) = self.constants.get(name).copied() {
+            self.used.insert(name.clone());
+            return value.map(|x| self.graph.constant(x));
+        }
+        if let Some((_, value)) = CONSTANTS.iter().find(|(n, _)| **n == **name) {
+            return Some(self.graph.constant(*value));
+        }
+        if self.poisoned.contains(name) || !self.unknown.insert(name.clone()) {
+            return None;
+        }
+        let error = if RESERVED.contains(&&**name) {
+            Diagnostic::error(format!("`{name}` has no meaning here"))
+                .at(span, "time is known in rules only")
+                .help(variables.no_time.unwrap_or("use it in a rule"))
+        } else if self.curves.contains_key(name) {
+            Diagnostic::error(format!("`{name}` is a curve"))
+                .at(span, "a function of one number")
+                .help(format!("give it its argument: `{name}(age)`"))
+        } else if self.arrays.contains_key(name) {
+            Diagnostic::error(format!("`{name}` is an array"))
+                .at(span, "several numbers")
+                .help(format!("give the number of an element, the first one being 0: `{name}[0]`"))
+        } else if self.functions.contains_key(name) || is_function(name) {
+            Diagnostic::error(format!("`{name}` is a function"))
+                .at(span, "expected its arguments")
+                .help(format!("call it: `{}`", self.call_of(name)))
+        } else {
+            let known = variables
+                .names
+                .keys()
+                .filter(|_| self.suggests())
+                .chain(self.constants.keys().filter(|_| self.suggests()))
+                .map(|n| &**n)
+                .chain(RESERVED.into_iter().filter(|_| variables.no_time.is_none()))
+                .chain(["pi"]);
+            let what = match variables.no_time {
+                None => "this is no parameter of the rule and no constant",
+                Some(_) => "this is no constant",
+            };
+            let help = self.in_a_comment(name).or_else(|| did_you_mean(name, known));
+            Diagnostic::error(format!("unknown name `{name}`"))
+                .at(span, what)
+                .help(help.unwrap_or_else(|| format!("declare it: `const {name} = …`")))
+        };
+        let error = match variables.lets.get(name) {
+            Some(later) => Diagnostic::error(format!("`{name}` is not known yet"))
+                .at(span, "used here")
+                .at(*later, "declared here")
+                .help("a `let` is known to what stands after it: change their order"),
+            None => error,
+        };
+        self.diagnostics.push(error);
+        None
+    }
+}
+
+/// For each node of an expression whether it belongs to the term of an aggregate; empty if there is none.
+fn terms(all: &Expressions, first: u32, last: u32) -> Vec<bool> {
+    let mut inside = Vec::new();
+    for id in first..=last {
+        if let Expr::Aggregate(aggregate) = all.get(ExprId(id))
+            && let Some(term) = aggregate.term
+        {
+            inside.resize((last - first + 1) as usize, false);
+            inside[(term.first.0 - first) as usize..=(term.root.0 - first) as usize].fill(true);
+        }
+    }
+    inside
+}
+
+fn is_function(name: &str) -> bool {
+    Unary::NAMED.iter().any(|(n, _)| *n == name) || Binary::NAMED.iter().any(|(n, _)| *n == name)
+}
+
+/// "no parameters", "1 parameter", "2 parameters"
+pub fn plural(n: usize, what: &str) -> String {
+    match n {
+        0 => format!("no {what}s"),
+        1 => format!("1 {what}"),
+        n => format!("{n} {what}s"),
+    }
+}

@@ -1,0 +1,243 @@
+//! Conditions inside equations, taken out of them.
+//!
+//! Between the instants at which a condition changes an equation is smooth, and a method keeps its order; so each
+//! condition becomes a variable, and its change an event (see [`Switch`]).
+
+use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
+
+use crate::analysis::{driven_form, outside_of_drivers};
+use crate::conditions::Atoms;
+use crate::rules::RuleBuilder;
+use dlsys_diagnostic::Span;
+use dlsys_expr::{Binary, Graph, Node, NodeId, Part, Unary};
+use dlsys_model::Switch;
+
+impl RuleBuilder<'_> {
+    /// Makes equations smooth: conditions inside them become variables, numbered from `count` on. The first `own` variables
+    /// are the module's parameters, the last two `t` and `age`.
+    ///
+    /// Curves and growth functions of time with a known integral stay as they are where the whole rate has a formula by
+    /// them. Of other curves the piece is frozen, too, as the conditions are.
+    #[allow(clippy::type_complexity)]
+    pub(super) fn smooth(
+        &mut self,
+        rates: Vec<(usize, NodeId)>,
+        own: usize,
+        count: usize,
+        span: Span,
+        atoms: &mut Atoms,
+    ) -> Option<(Vec<(usize, NodeId)>, Vec<Switch>)> {
+        let mut frozen = Frozen { conditions: Vec::new(), count };
+        let time = count as u32 - 2;
+        let solved: Vec<u32> = rates.iter().map(|(parameter, _)| *parameter as u32).collect();
+        // Truth values stand still, and so do own parameters without an equation here.
+        let still = |v: u32| v >= time + 2 || (v as usize) < own && !solved.contains(&v);
+        let mut smoothed = Vec::new();
+        for &(parameter, rate) in &rates {
+            let graph = &mut self.scope.graph;
+            let outside = outside_of_drivers(graph, rate, &still, time).into_iter().collect();
+            let known = frozen.conditions.len();
+            let gentle =
+                frozen.take_out(graph, rate, &still, Some(&outside), &mut self.scope.comparisons, span);
+            let driven = gentle_is_driven(graph, parameter, gentle, rate, &still, time);
+            smoothed.push((
+                parameter,
+                if driven {
+                    gentle
+                } else {
+                    frozen.conditions.truncate(known);
+                    let strict =
+                        frozen.take_out(graph, rate, &still, None, &mut self.scope.comparisons, span);
+                    where_defined(graph, strict, rate, time + 2)
+                },
+            ));
+        }
+        let mut switches = Vec::new();
+        for condition in frozen.conditions {
+            switches.push(Switch { condition: self.decompose(condition, span, atoms)? });
+        }
+        Some((smoothed, switches))
+    }
+}
+
+/// True if a rate whose curves were left alone has a formula by them. One without curves needs no such question.
+fn gentle_is_driven(
+    graph: &mut Graph,
+    parameter: usize,
+    gentle: NodeId,
+    rate: NodeId,
+    still: &dyn Fn(u32) -> bool,
+    time: u32,
+) -> bool {
+    let curved = |id: &NodeId| graph.integral_is_known(*id);
+    graph.reachable(&[rate]).iter().any(curved)
+        && driven_form(graph, parameter as u32, gentle, still, time).is_some()
+}
+
+/// Smooth equations, where they have a value; elsewhere those as written. A method looks beyond the instant at which a
+/// condition changes, and rounding puts that instant a little too late: `sqrt(max(x, 0))` goes on there as `sqrt(x)`, of
+/// an x that is negative.
+fn where_defined(graph: &mut Graph, smooth: NodeId, written: NodeId, first_flag: u32) -> NodeId {
+    let nodes = graph.reachable(&[smooth]);
+    let is_partial = |id: &NodeId| match graph.node(*id) {
+        Node::Unary(Unary::Sqrt | Unary::Ln | Unary::Log10 | Unary::Asin | Unary::Acos, _) => true,
+        Node::Binary(Binary::Pow, _, power) => graph.as_constant(power).is_none_or(|p| p != p.floor()),
+        _ => false,
+    };
+    let is_flag = |id: &NodeId| matches!(graph.node(*id), Node::Var(v) if v >= first_flag);
+    if !nodes.iter().any(is_partial) || !nodes.iter().any(is_flag) {
+        return smooth;
+    }
+    let (zero, difference) = (graph.constant(0.0), graph.binary(Binary::Sub, smooth, smooth));
+    let finite = graph.binary(Binary::Eq, difference, zero);
+    graph.select(finite, smooth, written)
+}
+
+/// True for what is constant but for jumps, as `floor(t)/2` is.
+fn is_step(graph: &Graph, root: NodeId, still: &dyn Fn(u32) -> bool) -> bool {
+    let mut steps: HashSet<NodeId> = HashSet::new();
+    for id in graph.reachable(&[root]) {
+        let is = match graph.node(id) {
+            Node::Const(_) | Node::Element(..) => true,
+            Node::Unary(Unary::Floor | Unary::Ceil | Unary::Sign, _) => true,
+            Node::Binary(Binary::Lt | Binary::Le | Binary::Eq | Binary::Ne, ..) => true,
+            Node::Var(v) => still(v),
+            Node::Select(_, a, b) => steps.contains(&a) && steps.contains(&b),
+            other => other.operands().into_iter().flatten().all(|operand| steps.contains(&operand)),
+        };
+        if is {
+            steps.insert(id);
+        }
+    }
+    steps.contains(&root)
+}
+
+/// Conditions that variables stand for.
+struct Frozen {
+    conditions: Vec<NodeId>,
+    count: usize,
+}
+
+impl Frozen {
+    fn flag(&mut self, graph: &mut Graph, condition: NodeId) -> NodeId {
+        let known = self.conditions.iter().position(|c| *c == condition);
+        let at = known.unwrap_or_else(|| {
+            self.conditions.push(condition);
+            self.conditions.len() - 1
+        });
+        graph.var((self.count + at) as u32)
+    }
+
+    /// An expression with its conditions taken out. What stands still keeps them; so does all that is not in `outside`.
+    fn take_out(
+        &mut self,
+        graph: &mut Graph,
+        root: NodeId,
+        still: &dyn Fn(u32) -> bool,
+        outside: Option<&HashSet<NodeId>>,
+        comparisons: &mut HashMap<NodeId, (Span, Arc<[String; 2]>)>,
+        span: Span,
+    ) -> NodeId {
+        graph.rewrite(&[root], |graph, id, rebuilt| {
+            if outside.is_some_and(|outside| !outside.contains(&id)) {
+                return Some(id);
+            }
+            // Conditions are asked of the equations as written, so the original operands go into them.
+            let (a, b) = match graph.node(id) {
+                Node::Select(a, ..) | Node::Unary(_, a) | Node::Curve(_, _, a) => (a, a),
+                Node::Binary(_, a, b) => (a, b),
+                _ => return None,
+            };
+            if graph.variables(&[a, b]).into_iter().all(still) {
+                return None;
+            }
+            self.smooth_node(graph, id, rebuilt, still, comparisons, span)
+        })[0]
+    }
+
+    fn smooth_node(
+        &mut self,
+        graph: &mut Graph,
+        id: NodeId,
+        rebuilt: Node,
+        still: &dyn Fn(u32) -> bool,
+        comparisons: &mut HashMap<NodeId, (Span, Arc<[String; 2]>)>,
+        span: Span,
+    ) -> Option<NodeId> {
+        let zero = graph.constant(0.0);
+        match (graph.node(id), rebuilt) {
+            (Node::Select(condition, ..), Node::Select(_, a, b)) => {
+                let chosen = self.flag(graph, condition);
+                Some(graph.select(chosen, a, b))
+            }
+            (Node::Binary(op @ (Binary::Min | Binary::Max), x, y), Node::Binary(_, a, b)) => {
+                let less = graph.binary(Binary::Lt, x, y);
+                let chosen = self.flag(graph, less);
+                let (a, b) = if op == Binary::Min { (a, b) } else { (b, a) };
+                Some(graph.select(chosen, a, b))
+            }
+            (Node::Unary(Unary::Abs, x), Node::Unary(_, a)) => {
+                let negative = graph.binary(Binary::Lt, x, zero);
+                let chosen = self.flag(graph, negative);
+                let minus = graph.unary(Unary::Neg, a);
+                Some(graph.select(chosen, minus, a))
+            }
+            (Node::Unary(Unary::Sign, x), Node::Unary(..)) => {
+                let (below, above) = (graph.binary(Binary::Lt, x, zero), graph.binary(Binary::Lt, zero, x));
+                let (below, above) = (self.flag(graph, below), self.flag(graph, above));
+                let (minus, one) = (graph.constant(-1.0), graph.constant(1.0));
+                let rest = graph.select(above, one, zero);
+                Some(graph.select(below, minus, rest))
+            }
+            // It jumps with its argument, and then only.
+            (Node::Unary(Unary::Floor | Unary::Ceil, x), _) if is_step(graph, x, still) => None,
+            (Node::Unary(op @ (Unary::Floor | Unary::Ceil), x), Node::Unary(_, a)) => {
+                let up = op == Unary::Ceil;
+                let negated = |graph: &mut Graph, x| if up { graph.unary(Unary::Neg, x) } else { x };
+                let (x, a) = (negated(graph, x), negated(graph, a));
+                let (level, _) = self.level(graph, x, a, true);
+                Some(negated(graph, level))
+            }
+            (Node::Curve(curve, part, x), Node::Curve(_, _, a))
+                if !matches!(part, Part::Inverse | Part::Phase | Part::PhaseSlope) =>
+            {
+                let phase = graph.curve(curve, Part::Phase, x);
+                let moved = graph.curve(curve, Part::Phase, a);
+                let (piece, change) = self.level(graph, phase, moved, false);
+                let sides = [graph.curve_of(curve).name.clone(), "its value at a knot".to_owned()];
+                comparisons.entry(change).or_insert((span, Arc::new(sides)));
+                Some(graph.piece(curve, part, piece, a))
+            }
+            _ => None,
+        }
+    }
+
+    /// The whole number below an expression, frozen: a jump at every whole number, where the sine of π x changes sign.
+    /// Between two of them it is the even, or the odd, number next to x - 1/2, however x is rounded at the jump itself.
+    /// If it is `closed`, a whole number where x comes to rest is that number: even where the cosine is positive. Also the
+    /// condition that changes there.
+    fn level(&mut self, graph: &mut Graph, x: NodeId, rebuilt: NodeId, closed: bool) -> (NodeId, NodeId) {
+        let [zero, half, one, two] = [0.0, 0.5, 1.0, 2.0].map(|x| graph.constant(x));
+        let pi = graph.constant(std::f64::consts::PI);
+        let phase = graph.binary(Binary::Mul, pi, x);
+        let sine = graph.unary(Unary::Sin, phase);
+        let change = graph.binary(Binary::Lt, zero, sine);
+        let mut is_even = change;
+        if closed {
+            let cosine = graph.unary(Unary::Cos, phase);
+            let (on, up) = (graph.binary(Binary::Eq, zero, sine), graph.binary(Binary::Lt, zero, cosine));
+            let on_even = graph.binary(Binary::And, on, up);
+            is_even = graph.binary(Binary::Or, change, on_even);
+        }
+        let even = self.flag(graph, is_even);
+        // 2 floor((x + 1/2 - odd) / 2) + odd: x stands in it once, so that bounds of it are as narrow as can be.
+        let odd = graph.select(even, zero, one);
+        let shift = graph.binary(Binary::Sub, half, odd);
+        let shifted = graph.binary(Binary::Add, rebuilt, shift);
+        let pairs = graph.binary(Binary::Div, shifted, two);
+        let pairs = graph.unary(Unary::Floor, pairs);
+        let pairs = graph.binary(Binary::Mul, two, pairs);
+        (graph.binary(Binary::Add, pairs, odd), change)
+    }
+}

@@ -1,0 +1,239 @@
+//! Strings of modules: successors with their weights, initial strings, drawings; and whether their modules have the
+//! parameters that rules and drawings give them.
+
+use std::collections::{HashMap, HashSet};
+
+use crate::advice;
+use crate::chance::Drawn;
+use crate::rules::RuleBuilder;
+use crate::scope::{Variables, plural};
+use dlsys_diagnostic::{Diagnostic, Span};
+use dlsys_expr::Program;
+use dlsys_model::{Class, Outcome, Successor, choose, class_of};
+use dlsys_syntax::ast::{self, Alternative, HeadModule};
+use dlsys_syntax::print;
+use dlsys_syntax::suggest::{looks_like, meant};
+
+impl RuleBuilder<'_> {
+    /// A string of modules that are made, over the given variables.
+    pub fn successor(
+        &mut self,
+        modules: &[ast::Module],
+        variables: &Variables,
+        count: usize,
+    ) -> Option<Successor> {
+        self.scope.draws.allowed = true;
+        let successor = self.string(modules, variables, count);
+        self.scope.draws.allowed = false;
+        successor
+    }
+
+    /// The successors of a clause, with their weights.
+    pub(super) fn outcome(
+        &mut self,
+        all: &[Alternative],
+        variables: &Variables,
+        count: usize,
+    ) -> Option<Outcome> {
+        let mut weights = Vec::new();
+        let mut successors = Vec::new();
+        for Alternative { weight, modules } in all {
+            let successor = self.successor(modules, variables, count);
+            let weight = weight.map(|w| self.scope.number(&self.document.expressions, w, variables));
+            weights.extend(weight.flatten());
+            successors.extend(successor);
+        }
+        if successors.len() < all.len() || weights.len() < all.iter().filter(|a| a.weight.is_some()).count() {
+            return None;
+        }
+        let fixed: Option<Vec<f64>> = weights.iter().map(|w| self.scope.graph.as_constant(*w)).collect();
+        if let Some(why) = fixed.filter(|w| !w.is_empty()).and_then(|w| choose(&w, 0.5).err()) {
+            let of = |a: &Alternative| a.weight.map(|w| self.document.expressions.span(w.root));
+            let mut spans = all.iter().filter_map(of);
+            let first = spans.next().unwrap_or_default();
+            self.error(
+                Diagnostic::error("these weights cannot be")
+                    .at(spans.fold(first, |a, b| a.to(b)), why)
+                    .help("weights are at least 0, and one of them is greater; they need not add up to 1"),
+            );
+            return None;
+        }
+        let program = Program::compile(&self.scope.graph, &weights, count);
+        Some(Outcome { weights: (!weights.is_empty()).then_some(program), successors })
+    }
+
+    pub(super) fn string(
+        &mut self,
+        modules: &[ast::Module],
+        variables: &Variables,
+        count: usize,
+    ) -> Option<Successor> {
+        let mut drawn = Drawn::default();
+        let mut clocks = Vec::new();
+        let (mut place, mut places) = (0, Vec::new());
+        let mut kinds = Vec::with_capacity(modules.len());
+        let mut roots = Vec::new();
+        let mut open: Vec<Span> = Vec::new();
+        let mut good = true;
+        for module in modules {
+            let kind = self.kinds.intern(&module.name, module.arguments.len());
+            match &*module.name {
+                "[" | "]" if !module.arguments.is_empty() => {
+                    self.error(
+                        Diagnostic::error("a bracket has no parameters")
+                            .at(module.span, "a `(` cannot follow a bracket")
+                            .help(
+                                "write it alone; a branch that turns away has a turn in it: `[ +(45) F(1) ]`",
+                            ),
+                    );
+                    good = false;
+                    if &*module.name == "[" {
+                        open.push(module.span);
+                    } else {
+                        open.pop();
+                    }
+                    continue;
+                }
+                "[" => open.push(module.span),
+                "]" if open.pop().is_none() => {
+                    self.error(
+                        Diagnostic::error("this `]` closes no branch")
+                            .at(module.span, "there is no `[` before it in this string")
+                            .help("brackets must match within each string"),
+                    );
+                    good = false;
+                }
+                _ => {}
+            }
+            self.occurs.entry(kind).or_insert(module.span);
+            kinds.push(kind);
+            let first = self.scope.draws.all.len() as u32;
+            for &argument in &module.arguments {
+                let known = self.scope.diagnostics.len();
+                let Some(node) = self.scope.number(&self.document.expressions, argument, variables) else {
+                    good = false;
+                    advice::of_look(module, &self.document.expressions, &mut self.scope.diagnostics[known..]);
+                    if count > 0
+                        && known < self.scope.diagnostics.len()
+                        && let Some(head) = self.looks_like_a_head(module)
+                    {
+                        let error = self.scope.diagnostics.last_mut().expect("one was added");
+                        error.help.push(format!("if `{head}` is the head of a rule, end it with `:`"));
+                    }
+                    continue;
+                };
+                if let Some(value) = self.scope.graph.as_constant(node).filter(|x| !x.is_finite()) {
+                    self.error(
+                        Diagnostic::error("this has no finite value")
+                            .at(self.document.expressions.span(argument.root), format!("it is {value}"))
+                            .help(advice::not_finite(value)),
+                    );
+                    good = false;
+                }
+                roots.push(node);
+            }
+            let draws = first..self.scope.draws.all.len() as u32;
+            if !draws.is_empty() {
+                drawn.modules.push((place, draws));
+            }
+            clocks.extend(self.clocks.for_new(&module.name, module.arguments.len(), place, roots.len()));
+            place += usize::from(!kind.is_bracket());
+            if !kind.is_bracket() && places.len() < Successor::PLACES {
+                places.push((kind, module.span));
+            }
+        }
+        if let Some(bracket) = open.pop() {
+            self.error(
+                Diagnostic::error("this `[` is never closed")
+                    .at(bracket, "expected a `]` for it in this string")
+                    .help("brackets must match within each string"),
+            );
+            good = false;
+        }
+        if !good {
+            return None;
+        }
+        let (arguments, draws) = drawn.compile(self.scope, roots, count);
+        Some(Successor { kinds, arguments, draws, clocks, places })
+    }
+
+    /// A module whose arguments are bare names, as a rule's head has them.
+    fn looks_like_a_head(&self, module: &ast::Module) -> Option<String> {
+        let names: Vec<&str> = (module.arguments.iter())
+            .map(|argument| match self.document.expressions.get(argument.root) {
+                ast::Expr::Name(name) => Some(&**name),
+                _ => None,
+            })
+            .collect::<Option<_>>()?;
+        Some(format!("{}({})", module.name, names.join(", ")))
+    }
+
+    /// Wrong numbers of parameters: of words that have rules (or drawings), wherever they stand in a string (or a
+    /// drawing). `place` says where the right number is.
+    pub fn check_arities(&mut self, heads: &[&HeadModule], strings: &[&[ast::Module]], place: &str) {
+        let mut declared: HashMap<&str, Vec<&HeadModule>> = HashMap::new();
+        for &head in heads {
+            declared.entry(&head.name.text).or_default().push(head);
+        }
+        let mut reported: HashSet<(&str, usize)> = HashSet::new();
+        for module in strings.iter().copied().flatten() {
+            // A symbol or surface may leave its parameters to the turtle's defaults.
+            if class_of(&module.name) != Class::Word {
+                continue;
+            }
+            let Some(heads) = declared.get(&*module.name) else { continue };
+            let given = module.arguments.len();
+            if heads.iter().any(|h| h.parameters.len() == given) || !reported.insert((&module.name, given)) {
+                continue;
+            }
+            let error = Diagnostic::error(format!(
+                "`{}` has {}, not {given}",
+                module.name,
+                plural(heads[0].parameters.len(), "parameter"),
+            ))
+            .at(module.span, format!("{} here", plural(given, "parameter")))
+            .at(heads[0].span, format!("{} {place}", plural(heads[0].parameters.len(), "parameter")))
+            .help_opt(
+                advice::decimal_comma(
+                    &self.document.expressions,
+                    module.arguments.iter().map(|a| a.root),
+                    heads[0].parameters.len(),
+                )
+                .map(|meant| format!("the decimal sign is a point: `{}({meant})`", module.name)),
+            )
+            .help(advice::wrong_arity(module, heads[0], place));
+            self.error(error);
+        }
+    }
+
+    /// Drawings of modules that neither the strings nor other drawings ever have.
+    pub fn check_interpretations(&mut self, heads: &[&HeadModule]) {
+        for head in heads {
+            let name = &*head.name.text;
+            let given = head.parameters.len();
+            let seen = |kind| self.occurs.contains_key(&kind) || self.drawn.contains_key(&kind);
+            if self.kinds.find(name, given).is_some_and(seen) {
+                continue;
+            }
+            let mut error =
+                Diagnostic::warning(format!("nothing is drawn as `{}`", print::head_module(head)))
+                    .at(head.span, "no string and no other drawing has this module");
+            let other = (self.occurs.iter().chain(&self.drawn))
+                .filter(|(kind, _)| self.kinds.get(**kind).name == name)
+                .min_by_key(|(_, span)| **span);
+            if let Some((kind, span)) = other {
+                let arity = self.kinds.get(*kind).arity;
+                error = error
+                    .at(*span, format!("here it has {}", plural(arity, "parameter")))
+                    .help(format!("write the head with as many: `{}`", advice::head_with(head, arity)));
+            } else {
+                let mut others = (self.occurs.keys()).map(|kind| self.kinds.get(*kind).name.as_str());
+                error = error.help(match others.find(|other| looks_like(name, other)) {
+                    Some(other) => meant(name, other),
+                    None => format!("put `{name}` into a string, or remove this line"),
+                });
+            }
+            self.error(error);
+        }
+    }
+}

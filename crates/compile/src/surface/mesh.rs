@@ -1,0 +1,193 @@
+//! Triangle meshes from Wavefront OBJ: `v`, `vn` and `f`, with the colours that `mtllib` and `usemtl` name; other lines
+//! mean nothing here.
+//!
+//! Axes are those of our own OBJ files, so that what was exported reads back as it was drawn: the turtle
+//! stands at the origin and heads along `+Y`, its up is `+Z`, and left is `-X`. Faces with more than three
+//! corners are cut into a fan about their first corner, as is right for convex ones.
+
+use std::collections::HashMap;
+
+use super::materials::Library;
+use super::{Fault, PART_LIMIT, number, shown};
+use dlsys_model::SurfaceShape;
+use dlsys_syntax::Files;
+
+/// A corner of a face: vertex and, perhaps, normal, by number from 0.
+type Corner = (u32, Option<u32>);
+
+/// Reads the mesh of a file, and the material libraries beside it.
+pub(super) fn parse(text: &str, path: &str, files: &dyn Files) -> Result<SurfaceShape, Fault> {
+    let mut library = Library::default();
+    let mut material = None;
+    let (mut points, mut directions): (Vec<[f64; 3]>, Vec<[f64; 3]>) = (Vec::new(), Vec::new());
+    let mut faces: Vec<([Corner; 3], Option<u32>)> = Vec::new();
+    let mut corners: Vec<Corner> = Vec::new();
+    let mut lines = text.lines().enumerate();
+    let mut joined = String::new();
+    while let Some((i, first)) = lines.next() {
+        let at = i + 1;
+        // A line may go on after a backslash.
+        let mut line = first;
+        if first.ends_with('\\') {
+            joined.clear();
+            joined.push_str(first.trim_end_matches('\\'));
+            for (_, more) in lines.by_ref() {
+                joined.push_str(more.trim_end_matches('\\'));
+                if !more.ends_with('\\') {
+                    break;
+                }
+            }
+            line = &joined;
+        }
+        let mut words = line.split_whitespace();
+        match words.next() {
+            Some("v") => points.push(turned(&mut words, at)?),
+            Some("vn") => directions.push(turned(&mut words, at)?),
+            Some("mtllib") => words.try_for_each(|name| library.add(name, path, files))?,
+            Some("usemtl") => material = words.next().and_then(|name| library.find(name)),
+            Some("f") => {
+                corners.clear();
+                for word in words.take_while(|word| !word.starts_with('#')) {
+                    corners.push(corner(word, points.len(), directions.len(), at)?);
+                }
+                if corners.len() < 3 {
+                    return Err(Fault::at(at, "a face has three corners or more"));
+                }
+                for k in 2..corners.len() {
+                    faces.push(([corners[0], corners[k - 1], corners[k]], material));
+                }
+                if faces.len() > PART_LIMIT {
+                    return Err(Fault::at(at, format!("more than {PART_LIMIT} triangles")));
+                }
+            }
+            _ => {}
+        }
+    }
+    if faces.is_empty() {
+        return Err(Fault::whole("the file has no faces").help("faces are lines such as `f 1 2 3`"));
+    }
+    let shape = build(&points, &directions, &faces);
+    Ok(SurfaceShape { materials: library.into_colors(), ..shape })
+}
+
+/// Three numbers, turned into the turtle's axes.
+fn turned<'t>(words: &mut impl Iterator<Item = &'t str>, line: usize) -> Result<[f64; 3], Fault> {
+    let mut next = || match words.next() {
+        Some(word) => number(word, line),
+        None => Err(Fault::at(line, "expected three numbers")),
+    };
+    let (x, y, z) = (next()?, next()?, next()?);
+    Ok([y, -x, z])
+}
+
+/// `v`, `v/vt`, `v//vn` or `v/vt/vn`; numbers count from 1, negative ones backwards from the last.
+fn corner(word: &str, points: usize, directions: usize, line: usize) -> Result<Corner, Fault> {
+    let mut parts = word.split('/');
+    let index = |part: &str, count: usize, what: &str| {
+        let number: Option<i64> = part.parse().ok();
+        let place = match number {
+            Some(n) if n > 0 => Some(n - 1),
+            Some(n) if n < 0 => Some(count as i64 + n),
+            _ => None,
+        };
+        match place {
+            Some(place) if (0..count as i64).contains(&place) => Ok(place as u32),
+            _ => Err(Fault::at(line, format!("there is no {what} `{}` before this face", shown(part)))),
+        }
+    };
+    let vertex = index(parts.next().unwrap_or_default(), points, "vertex")?;
+    let normal = match parts.nth(1) {
+        Some(part) if !part.is_empty() => Some(index(part, directions, "normal")?),
+        _ => None,
+    };
+    Ok((vertex, normal))
+}
+
+/// One vertex for each pair of point and normal that some face has.
+fn build(points: &[[f64; 3]], directions: &[[f64; 3]], faces: &[([Corner; 3], Option<u32>)]) -> SurfaceShape {
+    let smooth = faces.iter().flat_map(|(face, _)| face).any(|(_, normal)| normal.is_none());
+    let mut numbers: HashMap<Corner, u32> = HashMap::new();
+    let mut shape = SurfaceShape::default();
+    for (face, material) in faces {
+        let triangle = face.map(|(vertex, normal)| {
+            // Where some corners have no normal, none counts: all are made from the faces.
+            let normal = normal.filter(|_| !smooth);
+            *numbers.entry((vertex, normal)).or_insert_with(|| {
+                shape.vertices.push(points[vertex as usize]);
+                if let Some(normal) = normal {
+                    shape.normals.push(directions[normal as usize]);
+                }
+                shape.vertices.len() as u32 - 1
+            })
+        });
+        if triangle[0] != triangle[1] && triangle[1] != triangle[2] && triangle[2] != triangle[0] {
+            shape.triangles.push(triangle);
+            shape.painted.push(*material);
+        }
+    }
+    shape
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use dlsys_syntax::NoFiles;
+
+    fn parse(text: &str) -> Result<SurfaceShape, Fault> {
+        super::parse(text, "mesh.obj", &NoFiles)
+    }
+
+    /// A folder with one file in it.
+    struct Beside(&'static str, &'static str);
+
+    impl Files for Beside {
+        fn read(&self, path: &Path, _: u64) -> Result<Vec<u8>, String> {
+            if path == Path::new(self.0) { Ok(self.1.into()) } else { Err("not there".to_owned()) }
+        }
+    }
+
+    #[test]
+    fn faces_have_the_colours_of_the_library_beside_the_mesh() {
+        let text = "mtllib lost.mtl colours.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n\
+                    usemtl red\nf 1 2 3\nusemtl none\nf 1 2 3\nusemtl green\nf 1 2 3\n";
+        let library = "newmtl red\nKa 0 0 0\nKd 1 0 0\nnewmtl green\nKd 0 0.5 0\n";
+        let shape =
+            super::parse(text, "organs/mesh.obj", &Beside("organs/colours.mtl", library)).expect("a mesh");
+        assert_eq!(shape.painted, [None, Some(0), None, Some(1)]);
+        assert_eq!(shape.materials.iter().map(|m| m.rgb).collect::<Vec<_>>(), [0xff0000, 0x008000]);
+        assert_eq!(parse(text).expect("a mesh without colours").materials, []);
+    }
+
+    #[test]
+    fn polygons_become_triangles_and_negative_numbers_count_back() {
+        let text = "# a square\no x\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1 \\\n -1/1\n";
+        let shape = parse(text).expect("a mesh");
+        assert_eq!(shape.triangles, [[0, 1, 2], [0, 2, 3]]);
+        assert_eq!(shape.vertices[1], [0.0, -1.0, 0.0], "right is against the turtle's left");
+        assert!(shape.normals.is_empty());
+    }
+
+    #[test]
+    fn normals_part_vertices() {
+        let text =
+            "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvn 0 0 1\nvn 0 1 0\nf 1//1 2//1 3//1\nf 1//2 4//2 2//2\n";
+        let shape = parse(text).expect("a mesh");
+        assert_eq!((shape.vertices.len(), shape.normals.len()), (6, 6));
+        assert_eq!(shape.normals[0], [0.0, 0.0, 1.0]);
+        assert_eq!(shape.normals[3], [1.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn faults_have_their_line() {
+        let fault = |text: &str| parse(text).expect_err("a fault");
+        assert_eq!(fault("v 0 0 0\nf 1 2 3").line, Some(2));
+        assert_eq!(fault("v 0 0").what, "expected three numbers");
+        assert_eq!(fault("v 0 0 x").what, "expected a number, not `x`");
+        assert_eq!(fault("v 0 0 inf").line, Some(1));
+        assert_eq!(fault("v 0 0 0\nf 1 1").what, "a face has three corners or more");
+        assert_eq!(fault("v 0 0 0\n").what, "the file has no faces");
+        assert_eq!(fault("v 0 0 0\nf 1//1 1 1").what, "there is no normal `1` before this face");
+    }
+}

@@ -1,0 +1,174 @@
+//! Tables from text files: numbers in columns, as spreadsheets write them (CSV).
+//!
+//! Columns are separated by commas, semicolons or tabs, or else by spaces. A first line that is no numbers has the names
+//! of the columns. Empty lines, and lines that begin with `#`, mean nothing.
+
+use std::path::Path;
+
+use dlsys_expr::MAX_POINTS;
+use dlsys_syntax::{Files, is_inside};
+
+/// Greatest size of a file, in bytes.
+const SIZE_LIMIT: u64 = 64 << 20;
+
+/// A row of a table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Row {
+    /// In the file, from 1.
+    pub line: usize,
+    pub point: [f64; 2],
+}
+
+/// What is wrong with a table.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fault {
+    /// From 1, if one line is to blame.
+    pub line: Option<usize>,
+    pub what: String,
+    pub help: Option<String>,
+    /// The name of the column that was asked for is to blame.
+    pub of_column: bool,
+}
+
+impl Fault {
+    fn new(line: Option<usize>, what: impl Into<String>, help: impl Into<String>) -> Fault {
+        Fault { line, what: what.into(), help: Some(help.into()), of_column: false }
+    }
+}
+
+/// Reads the first column of a file, and the second, or the one with a name.
+pub fn read(path: &str, column: Option<&str>, files: &dyn Files) -> Result<Vec<Row>, Fault> {
+    if !is_inside(path) {
+        return Err(Fault::new(
+            None,
+            "the path leaves the model's folder",
+            "tables stand in the folder of the model or below it, as in `\"data/temperature.csv\"`",
+        ));
+    }
+    let bytes = files.read(Path::new(path), SIZE_LIMIT).map_err(|why| {
+        Fault::new(
+            None,
+            why,
+            "paths begin at the folder of the model; other folders are searched with `--include-path DIR`",
+        )
+    })?;
+    parse(&String::from_utf8_lossy(&bytes), column)
+}
+
+fn parse(text: &str, column: Option<&str>) -> Result<Vec<Row>, Fault> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let mut lines = (text.lines().enumerate())
+        .map(|(i, line)| (i + 1, line.trim()))
+        .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
+        .peekable();
+    let Some(&(first, head)) = lines.peek() else {
+        return Err(Fault::new(None, "the file has no rows", "a row is two numbers, as in `0.5, 12.3`"));
+    };
+    let separator = [',', ';', '\t'].into_iter().find(|c| head.contains(*c));
+    let cells = |line: &'_ str| -> Vec<String> {
+        let clean = |cell: &str| cell.trim().trim_matches('"').trim().to_owned();
+        match separator {
+            Some(separator) => line.split(separator).map(clean).collect(),
+            None => line.split_whitespace().map(clean).collect(),
+        }
+    };
+    let names = cells(head);
+    let titled = names.iter().all(|name| name.parse::<f64>().is_err());
+    let which = match column {
+        None => 1,
+        Some(_) if !titled => {
+            let mut fault = Fault::new(
+                Some(first),
+                "its columns have no names",
+                "without `column …` the second column is taken; names stand in the first line",
+            );
+            fault.of_column = true;
+            return Err(fault);
+        }
+        Some(wanted) => names.iter().position(|name| name == wanted).ok_or_else(|| {
+            let mut fault = Fault::new(
+                None,
+                format!("the file has no column \"{}\"", shown(wanted)),
+                dlsys_syntax::suggest::did_you_mean(wanted, names.iter().map(String::as_str)).unwrap_or_else(
+                    || {
+                        let known: Vec<String> =
+                            names.iter().take(12).map(|n| format!("\"{}\"", shown(n))).collect();
+                        format!("it has {}", known.join(", "))
+                    },
+                ),
+            );
+            fault.of_column = true;
+            fault
+        })?,
+    };
+    let mut rows = Vec::new();
+    for (line, text) in lines.skip(usize::from(titled)) {
+        let cells = cells(text);
+        let number = |i: usize| -> Result<f64, Fault> {
+            let Some(cell) = cells.get(i) else {
+                let what = format!("there is no column {}", i + 1);
+                return Err(Fault::new(Some(line), what, "every row has the columns of the first one"));
+            };
+            let value: Option<f64> = cell.parse().ok();
+            value.filter(|x| x.is_finite()).ok_or_else(|| {
+                let help = if separator == Some(';') && cell.contains(',') {
+                    "the decimal sign is a point: `0.5`"
+                } else {
+                    "a cell is a number such as `12.3` or `1e-3`; leave out rows without one"
+                };
+                Fault::new(Some(line), format!("expected a number, not `{}`", shown(cell)), help)
+            })
+        };
+        rows.push(Row { line, point: [number(0)?, number(which)?] });
+        if rows.len() > MAX_POINTS {
+            return Err(Fault::new(
+                Some(line),
+                format!("more than {MAX_POINTS} rows"),
+                "leave out every second row",
+            ));
+        }
+    }
+    if rows.is_empty() {
+        return Err(Fault::new(
+            None,
+            "the file has no rows of numbers",
+            "a row is two numbers, as in `0.5, 12.3`",
+        ));
+    }
+    Ok(rows)
+}
+
+/// The beginning of a cell, for a message.
+fn shown(text: &str) -> String {
+    text.chars().filter(|c| !c.is_control()).take(40).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn points(text: &str, column: Option<&str>) -> Vec<[f64; 2]> {
+        parse(text, column).expect("a good table").iter().map(|row| row.point).collect()
+    }
+
+    #[test]
+    fn spreadsheets_write_many_ways() {
+        let wanted = [[0.0, 1.5], [1.0, 2.0]];
+        assert_eq!(points("0,1.5\n1,2\n", None), wanted);
+        assert_eq!(points("\u{feff}day;mass\r\n0; 1.5\r\n1;2\r\n", None), wanted);
+        assert_eq!(points("# measured\n\"day\"\t\"a\"\t\"b\"\n0\t9\t1.5\n\n1\t9\t2\n", Some("b")), wanted);
+        assert_eq!(points("  0   1.5\n  1   2", None), wanted);
+    }
+
+    #[test]
+    fn faults_say_where() {
+        let fault = |text: &str, column| parse(text, column).expect_err("a bad table");
+        assert_eq!(fault("", None).what, "the file has no rows");
+        assert_eq!(fault("0,1\n1,x\n", None).line, Some(2));
+        assert_eq!(fault("0;1\n1;2,5\n", None).help.as_deref(), Some("the decimal sign is a point: `0.5`"));
+        assert_eq!(fault("0\n", None).what, "there is no column 2");
+        let unknown = fault("day,mass\n0,1\n", Some("mas"));
+        assert_eq!((unknown.of_column, unknown.help.as_deref()), (true, Some("did you mean `mass`?")));
+        assert!(fault("0,1\n", Some("mass")).of_column);
+    }
+}

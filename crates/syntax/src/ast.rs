@@ -1,0 +1,318 @@
+//! The text of a model as a tree, close to how it is written.
+//!
+//! Expressions live in one arena, operands before their users, so that passes over them are loops: a
+//! sum of a million terms is a million nodes, not a million stack frames.
+
+use std::sync::Arc;
+
+use dlsys_diagnostic::Span;
+use dlsys_expr::{Comparison, Fold, Sort};
+
+/// A name and where it stands.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Name {
+    pub text: Arc<str>,
+    pub span: Span,
+}
+
+/// A node of an expression, by its place in [`Expressions`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct ExprId(pub u32);
+
+/// A whole expression: its nodes are those from `first` to `root`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Expression {
+    pub first: ExprId,
+    pub root: ExprId,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Operator {
+    Add,
+    Sub,
+    Mul,
+    Div,
+    Pow,
+    And,
+    Or,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub enum Expr {
+    Number(f64),
+    Name(Arc<str>),
+    Call(Arc<str>, Vec<ExprId>),
+    Negate(ExprId),
+    Not(ExprId),
+    Binary(Operator, ExprId, ExprId),
+    /// `2c`: a number written directly before its factor.
+    Scale(f64, ExprId),
+    /// `a < b <= c`
+    Compare(ExprId, Vec<(Comparison, ExprId)>),
+    /// Condition, then, else.
+    If(ExprId, ExprId, ExprId),
+    /// A number, what it is compared with and the value then, and the value otherwise.
+    Match(ExprId, Vec<(ExprId, ExprId)>, ExprId),
+    /// `a[i]`
+    Index(Arc<str>, ExprId),
+    Parenthesis(ExprId),
+    /// `sum(B(x, c): D*(c - c_0))`
+    Aggregate(Box<Aggregate>),
+}
+
+/// Something of all modules attached to one that match.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Aggregate {
+    pub fold: Fold,
+    pub head: HeadModule,
+    /// What is added up; its nodes stand before that of the aggregate. None for a number of modules.
+    pub term: Option<Expression>,
+}
+
+/// The arena of all expressions of a document.
+#[derive(Clone, Debug, Default)]
+pub struct Expressions {
+    nodes: Vec<Expr>,
+    spans: Vec<Span>,
+}
+
+impl Expressions {
+    pub fn push(&mut self, node: Expr, span: Span) -> ExprId {
+        self.nodes.push(node);
+        self.spans.push(span);
+        ExprId(self.nodes.len() as u32 - 1)
+    }
+
+    /// The id that the next node will get.
+    pub fn next(&self) -> ExprId {
+        ExprId(self.nodes.len() as u32)
+    }
+
+    pub fn get(&self, id: ExprId) -> &Expr {
+        &self.nodes[id.0 as usize]
+    }
+
+    pub fn get_mut(&mut self, id: ExprId) -> &mut Expr {
+        &mut self.nodes[id.0 as usize]
+    }
+
+    pub fn span(&self, id: ExprId) -> Span {
+        self.spans[id.0 as usize]
+    }
+
+    /// All nodes, operands before their users.
+    pub fn iter(&self) -> impl Iterator<Item = &Expr> {
+        self.nodes.iter()
+    }
+
+    /// Nodes from one on, as long as they stand in the text before an end.
+    pub fn iter_within(&self, first: ExprId, last: Option<Span>) -> impl Iterator<Item = &Expr> {
+        let end = last.map_or(u32::MAX, |span| span.end);
+        let from = first.0 as usize;
+        self.nodes[from..]
+            .iter()
+            .zip(&self.spans[from..])
+            .take_while(move |(_, s)| s.start < end)
+            .map(|n| n.0)
+    }
+
+    /// Widens the place of a node in the text, as parentheses do.
+    pub fn widen(&mut self, id: ExprId, span: Span) {
+        self.spans[id.0 as usize] = self.spans[id.0 as usize].to(span);
+    }
+}
+
+/// A module of the initial string or of a successor.
+#[derive(Clone, Debug)]
+pub struct Module {
+    pub name: Arc<str>,
+    pub span: Span,
+    pub arguments: Vec<Expression>,
+}
+
+/// A module of a rule's head: a name and the names of its parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HeadModule {
+    pub name: Name,
+    pub parameters: Vec<Name>,
+    pub span: Span,
+}
+
+/// A part of a right context: `> [ C(z) ] D(w)`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Turn {
+    /// A module; which one, its place among the modules of the context says.
+    Module,
+    /// `[`: a branch begins.
+    Open,
+    /// `]`: a branch ends.
+    Close,
+}
+
+#[derive(Clone, Debug)]
+pub struct Rule {
+    pub left: Vec<HeadModule>,
+    /// The strict predecessor; its name is `±` where one rule stands for both turns.
+    pub predecessor: HeadModule,
+    pub right: Vec<HeadModule>,
+    /// How its modules stand: one after another, or on branches.
+    pub right_shape: Vec<Turn>,
+    /// The whole head.
+    pub head: Span,
+    /// `let` lines.
+    pub locals: Vec<(Name, Expression)>,
+    /// Written with `->`: applied at the multiples of the period. It has one clause, which produces.
+    pub discrete: bool,
+    pub clauses: Vec<Clause>,
+    /// The expressions of the whole rule: from the first to before the second.
+    pub nodes: (ExprId, ExprId),
+}
+
+#[derive(Clone, Debug)]
+pub struct Clause {
+    pub guard: Option<Expression>,
+    /// `at rate …`, of a production.
+    pub hazard: Option<Expression>,
+    pub action: Action,
+    pub span: Span,
+}
+
+#[derive(Clone, Debug)]
+pub enum Action {
+    Solve(Vec<Equation>),
+    /// One successor, or several with weights.
+    Produce(Vec<Alternative>),
+}
+
+/// A successor of a clause.
+#[derive(Clone, Debug)]
+pub struct Alternative {
+    /// `2:` before it.
+    pub weight: Option<Expression>,
+    pub modules: Vec<Module>,
+}
+
+/// An equation of a `solve`.
+#[derive(Clone, Debug)]
+pub enum Equation {
+    /// `dx/dt = …`; the parameter is without the `d`.
+    Rate { parameter: Name, rate: Expression },
+    /// `x = …`
+    Value { parameter: Name, value: Expression },
+    /// `0 = …`, and maybe for which parameter it is to be solved; the place is that of the whole.
+    Zero { residual: Expression, unknown: Option<Name>, span: Span },
+}
+
+impl Equation {
+    /// The one expression of it.
+    pub fn expression(&self) -> Expression {
+        match self {
+            Equation::Rate { rate: it, .. }
+            | Equation::Value { value: it, .. }
+            | Equation::Zero { residual: it, .. } => *it,
+        }
+    }
+}
+
+/// A text in quotes, without them, and where it stands.
+#[derive(Clone, Debug)]
+pub struct Text {
+    pub text: String,
+    /// With the quotes.
+    pub span: Span,
+}
+
+#[derive(Clone, Debug)]
+pub enum Item {
+    Title(String),
+    Array {
+        name: Name,
+        values: Vec<Expression>,
+    },
+    Curve {
+        name: Name,
+        sort: Sort,
+        points: Vec<[Expression; 2]>,
+        periodic: bool,
+    },
+    Table {
+        name: Name,
+        sort: Sort,
+        file: Text,
+        column: Option<Text>,
+        periodic: bool,
+    },
+    Include(Text),
+    Const {
+        name: Name,
+        value: Expression,
+    },
+    Param {
+        name: Name,
+        value: Expression,
+        range: Option<(Expression, Expression)>,
+    },
+    Def {
+        name: Name,
+        parameters: Vec<Name>,
+        body: Expression,
+    },
+    Angle(Expression),
+    /// Of the discrete rules.
+    Period(Expression),
+    Frames {
+        from: Expression,
+        to: Expression,
+        step: Expression,
+    },
+    Color {
+        name: Name,
+        value: Text,
+    },
+    Gradient {
+        name: Name,
+        stops: Vec<Text>,
+    },
+    Surface {
+        name: Name,
+        file: Text,
+    },
+    Contour {
+        name: Name,
+        points: Vec<[Expression; 2]>,
+    },
+    Tropism {
+        direction: [Expression; 3],
+        strength: Option<Expression>,
+    },
+    Ignore(Vec<Name>),
+    Consider(Vec<Name>),
+    Axiom(Vec<Module>),
+    Interpret {
+        head: HeadModule,
+        drawn: Vec<Module>,
+    },
+    Rule(Rule),
+}
+
+/// A parsed model.
+#[derive(Clone, Debug, Default)]
+pub struct Document {
+    /// The declarations and rules in the order written, each with its place.
+    pub items: Vec<(Item, Span)>,
+    pub expressions: Expressions,
+    /// Names of global declarations that could not be read: whoever uses them is not to blame.
+    pub unread: Vec<Arc<str>>,
+    /// What comments such as `#define K 0.5` would define elsewhere: names, and their meanings.
+    pub commented: Vec<(Arc<str>, String)>,
+    /// Items from here on are of the library: names that the model declares itself win over them, and nobody has to
+    /// use them.
+    pub library: Option<usize>,
+}
+
+impl Document {
+    /// The items that somebody wrote for this model.
+    pub fn own_items(&self) -> &[(Item, Span)] {
+        &self.items[..self.library.unwrap_or(self.items.len())]
+    }
+}

@@ -1,0 +1,146 @@
+//! The canonical layout of a model's text (`dlsys fmt`).
+//!
+//! ```text
+//! text ──layout──▶ tokens ──pieces──▶ lines of pieces ──arrange──▶ text
+//! ```
+//!
+//! What is written stays, comments and line breaks included; what changes is white space. It works on the tokens of the
+//! first pass and knows no grammar: an operator has spaces or none by its looks, a word that works as an operator is one
+//! that the first pass takes for one. A construct that is new to the language is laid out like its likes.
+//!
+//! - A declaration or rule begins in the first column, a clause is indented by 2, what follows an `if` on lines of their own
+//!   by 4. What continues stands below its beginning, or indented; brackets that are open indent further.
+//! - `+ - < = & |` have spaces around them, `* / ^` none; commas and colons one behind. In strings of modules the writer
+//!   groups: one space, or none.
+//! - Guards and actions that share lines stand in columns, and so do comments behind neighbouring lines.
+//! - One empty line at most, none at the ends, no spaces at line ends.
+
+mod arrange;
+mod pieces;
+
+use crate::ast::Document;
+use crate::{parse, print};
+use dlsys_diagnostic::{Diagnostic, Source};
+use pieces::lines;
+
+/// The text in its canonical layout, which says the same: the same characters but white space, read as the same
+/// declarations and rules. Both are looked at when the layout is made, and independently of how it is made.
+///
+/// # Errors
+/// What is wrong with a text that cannot be parsed. Nothing is said about what it means.
+pub fn format(source: &Source) -> Result<String, Vec<Diagnostic>> {
+    let (document, errors) = parse::parse(source);
+    if !errors.is_empty() {
+        return Err(errors);
+    }
+    let mut text = arrange::arrange(&lines(&source.text));
+    if source.text.contains("\r\n") {
+        text = text.replace('\n', "\r\n");
+    }
+    // Whatever the language becomes: rather no layout than another model.
+    if !kept(&source.text, &text) || !says_the_same(&document, &text) {
+        let fault = Diagnostic::error("this text cannot be laid out without changing what it says")
+            .help("leave its layout as it is; please report it with the text");
+        return Err(vec![fault]);
+    }
+    Ok(text)
+}
+
+/// Whether a layout has the characters of the text, in their order. It looks at nothing but characters, so that no
+/// mistake about tokens hides from it. White space may differ, but not in quotes, nor within a comment.
+fn kept(text: &str, layout: &str) -> bool {
+    significant(text).eq(significant(layout))
+}
+
+/// What a layout must keep: the characters that are no white space, all of a text in quotes, and comments with their ends.
+fn significant(text: &str) -> impl Iterator<Item = char> + '_ {
+    text.split('\n').flat_map(|line| {
+        let (mut quoted, mut comment) = (false, false);
+        let end = if line.contains('#') { "\n" } else { "" };
+        line.trim_end().chars().chain(end.chars()).filter(move |&c| {
+            quoted ^= c == '"' && !comment;
+            comment |= c == '#' && !quoted;
+            quoted || comment || !c.is_whitespace()
+        })
+    })
+}
+
+/// Whether a layout reads as the same declarations, rules and expressions, in their order.
+fn says_the_same(document: &Document, layout: &str) -> bool {
+    let (again, errors) = parse::parse(&Source::new("", layout));
+    errors.is_empty() && print::document(&again) == print::document(document)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn formatted(text: &str) -> String {
+        let format = |text: &str| format(&Source::new("t", text)).unwrap_or_else(|e| panic!("{text}: {e:?}"));
+        let once = format(text);
+        assert_eq!(format(&once), once, "once is enough");
+        once
+    }
+
+    #[test]
+    fn spaces_go_where_they_help() {
+        for (wild, tame) in [
+            ("const  a=2 * ( 3+4 ) /5 ^ -2", "const a = 2*(3 + 4)/5^-2"),
+            ("const a = -2c+ 1e-3*1.5E+2 - -b", "const a = -2c + 1e-3*1.5E+2 - -b"),
+            ("const a=1e2x+2e3r*1e9floor(t)-2ex", "const a = 1e2x + 2e3r*1e9floor(t) - 2ex"),
+            ("const a=2if b<1 then 1e2e3 else 3.5(b)", "const a = 2if b < 1 then 1e2e3 else 3.5(b)"),
+            ("def f( x,y )=if x<=y&!(x=0)then x else-y", "def f(x, y) = if x <= y & !(x = 0) then x else -y"),
+            ("frames 0..9 step .5", ""),
+            ("frames 0..9 step 0.5", "frames 0 .. 9 step 0.5"),
+            ("frames  200 .. 575   step 1", "frames 200 .. 575 step 1"),
+            ("param α_max=60.0 in 10..90#wide", "param α_max = 60.0 in 10 .. 90  #wide"),
+            ("ignore F_x  @L + -", "ignore F_x @L + -"),
+            ("surface @M  from\t\"m.s\"", "surface @M from \"m.s\""),
+            ("contour c=(1,0)(0,1) (-1, 0)", "contour c = (1, 0) (0, 1) (-1, 0)"),
+            ("tropism 0,-1,0 strength 0.2", "tropism 0, -1, 0 strength 0.2"),
+            ("axiom:  F (x)[+( 30)A]  -  ![ @L(-1) ]  ;(2 , 3)", "axiom: F(x)[+(30)A] - ![ @L(-1) ] ;(2, 3)"),
+            ("A(x)<B( y )>C(z) :solve dy/dt=-x*z", "A(x) < B(y) > C(z): solve dy/dt = -x*z"),
+            ("±( α ):solve dα / dt = 1", "±(α): solve dα/dt = 1"),
+            ("interpret @L(s) :;(2)F( s )@L(s)", "interpret @L(s): ;(2)F(s)@L(s)"),
+        ] {
+            if tame.is_empty() {
+                assert!(format(&Source::new("t", wild)).is_err(), "{wild}");
+            } else {
+                assert_eq!(formatted(wild), format!("{tame}\n"));
+            }
+        }
+    }
+
+    #[test]
+    fn lines_go_where_they_belong() {
+        let wild = "\n\n# About.\ntitle \"Bush\"   \n\n\n\ninitial string:\nF(1)\n[ +(30)\nF(2)\n] F(3)\n\n\
+            # The apex.\nA(x, y):\n   # grows\n      if x < 1 & y>2 solve dx/dt = 1,\n dy/dt = (1 +\n 2)\n\
+            if x = 1 produce F(x)\n   A(0) # new\n  if x > 1\nsolve dx/dt = 0 #still\nif y=0 &\nx = 0\n\n\
+            produce ε\n  # nothing else\n\n#end\ninterpret A(x, y): F(x)\n            F(y)\n interpret B: F\nF\n\n";
+        let tame = "# About.\ntitle \"Bush\"\n\ninitial string:\n  F(1)\n  [ +(30)\n    F(2)\n  ] F(3)\n\n\
+            # The apex.\nA(x, y):\n  # grows\n  if x < 1 & y > 2  solve dx/dt = 1,\n                          \
+            dy/dt = (1 +\n                            2)\n  if x = 1  produce F(x)\n                    \
+            A(0)  # new\n  if x > 1\n    solve dx/dt = 0       #still\n  if y = 0 &\n     x = 0\n\n    produce ε\n  \
+            # nothing else\n\n#end\ninterpret A(x, y): F(x)\n                   F(y)\ninterpret B: F\n  F\n";
+        assert_eq!(formatted(wild), tame);
+    }
+
+    #[test]
+    fn guards_and_comments_stand_in_columns() {
+        let wild = "const a = 1 # one\nconst x = 10*10*10\nconst bcd = 2 # two\n\nconst e = 3 # three\nF(x):\n if x < a solve dx/dt = bcd\n\
+            if x = a & t > e produce ε\naxiom: F(0)";
+        let tame = "const a = 1    # one\nconst x = 10*10*10\nconst bcd = 2  # two\n\nconst e = 3  # three\nF(x):\n  \
+            if x < a          solve dx/dt = bcd\n  if x = a & t > e  produce ε\naxiom: F(0)\n";
+        assert_eq!(formatted(wild), tame);
+    }
+
+    #[test]
+    fn line_ends_of_windows_stay_and_bad_text_is_refused() {
+        assert_eq!(formatted("axiom:  F\r\n\r\n\r\nangle  4"), "axiom: F\r\n\r\nangle 4\r\n");
+        let refused = format(&Source::new("t", "axiom: F(")).expect_err("it never closes");
+        assert!(refused[0].message.contains("never closed"));
+        // No tree is so deep that the layout grows out of hand.
+        let deep = format!("axiom: {}{}", "[\n".repeat(5000), "]\n".repeat(5000));
+        assert!(formatted(&deep).len() < 100 * deep.len());
+    }
+}

@@ -1,0 +1,497 @@
+//! First pass over the text: where declarations begin, and which line breaks mean something.
+//!
+//! The result has the same bytes at the same places, so every position in it is a position in the
+//! file; comments, and line breaks that end nothing, have become spaces. The text is cut into items
+//! (declarations and rules), so that a mistake in one does not hide those in the others, and so that the
+//! parser's memory is bounded by an item, not by the file. Nesting is bounded here, before anything
+//! recursive sees the text.
+//!
+//! A line break ends an expression or a condition, except inside parentheses, after an operator or a
+//! comma, or before `then` and `else` (LANGUAGE, "Text"). Inside a string of modules it means nothing.
+
+mod ahead;
+mod keywords;
+mod recovery;
+
+use crate::lexeme::{Lexeme, Token, in_name, number_length};
+use crate::words::FOLDS;
+use dlsys_diagnostic::{Diagnostic, Span};
+
+/// Deepest nesting of parentheses, signs, powers and `if` that an expression may have.
+pub const MAX_DEPTH: usize = 100;
+
+/// Greatest size of one declaration or rule, in bytes; the initial string is not bounded by it.
+const MAX_ITEM: usize = 1 << 20;
+
+/// What an item declares, told by its first word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ItemKind {
+    Title,
+    Include,
+    Curve,
+    Table,
+    Const,
+    Param,
+    Def,
+    Angle,
+    Period,
+    Frames,
+    Color,
+    Gradient,
+    Surface,
+    Contour,
+    Tropism,
+    Ignore,
+    Consider,
+    Axiom,
+    Interpret,
+    Rule,
+    /// A discrete rule, known by its arrow.
+    Step,
+    /// A line that begins nothing known.
+    Unknown,
+}
+
+/// The words that begin a declaration.
+pub const DECLARATIONS: [(&str, ItemKind); 20] = [
+    ("title", ItemKind::Title),
+    ("include", ItemKind::Include),
+    ("const", ItemKind::Const),
+    ("param", ItemKind::Param),
+    ("def", ItemKind::Def),
+    ("curve", ItemKind::Curve),
+    ("table", ItemKind::Table),
+    ("angle", ItemKind::Angle),
+    ("period", ItemKind::Period),
+    ("frames", ItemKind::Frames),
+    ("color", ItemKind::Color),
+    ("gradient", ItemKind::Gradient),
+    ("surface", ItemKind::Surface),
+    ("contour", ItemKind::Contour),
+    ("tropism", ItemKind::Tropism),
+    ("ignore", ItemKind::Ignore),
+    ("consider", ItemKind::Consider),
+    ("initial", ItemKind::Axiom),
+    ("axiom", ItemKind::Axiom),
+    ("interpret", ItemKind::Interpret),
+];
+
+/// One declaration or rule.
+#[derive(Clone, Copy, Debug)]
+pub struct RawItem {
+    pub kind: ItemKind,
+    pub start: usize,
+    pub end: usize,
+    /// Byte after the first `:` outside parentheses.
+    pub after_colon: Option<usize>,
+    /// It has already been complained about; do not parse it.
+    pub broken: bool,
+}
+
+/// The text cut into items.
+#[derive(Debug)]
+pub struct Layout {
+    pub text: String,
+    pub items: Vec<RawItem>,
+    pub errors: Vec<Diagnostic>,
+}
+
+/// What the last significant token was, as far as line breaks and signs care.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Last {
+    /// Something that can end an expression.
+    Operand,
+    /// Something that cannot.
+    Operator,
+    /// `<` or `>`: cannot end an expression, and may stand at the end of a line in a rule's head.
+    Angle,
+    Colon,
+}
+
+/// A parenthesis that is open, and what recursion is pending inside it.
+#[derive(Clone, Copy, Debug, Default)]
+struct Level {
+    at: usize,
+    /// Signs and powers waiting for their right operand.
+    right: usize,
+    /// `if` without its `else`.
+    ifs: usize,
+    /// A `match` has begun, so that `case` may go on with it.
+    matching: bool,
+    /// Opened by a word over neighbours, `sum(`: a colon belongs to it.
+    is_sum: bool,
+}
+
+struct Scanner<'t> {
+    text: &'t str,
+    out: Vec<u8>,
+    items: Vec<RawItem>,
+    errors: Vec<Diagnostic>,
+    /// In a string of modules, where line breaks mean nothing.
+    in_string: bool,
+    /// In a string of several successors with weights, such as `produce 2: F or 1: G`.
+    weighted: bool,
+    /// The last token asks for a weight: `produce`, or an `or` between successors.
+    weight_next: bool,
+    last: Last,
+    levels: Vec<Level>,
+    /// Sum over `levels`.
+    pending: usize,
+    /// Line break that is significant unless the next line begins with `then` or `else`.
+    held_break: Option<usize>,
+    /// Start of a run of lines that each end with `<` or `>`.
+    run_of_angles: Option<usize>,
+    /// The line before, if it may be the head of a rule that lacks its colon.
+    head_before: Option<(usize, usize)>,
+    /// The token after the present one on its line.
+    next: Option<Token>,
+    /// The expression before the last line break has a `match`.
+    matching: bool,
+    /// All tokens, where somebody wants them.
+    lexemes: Option<Vec<Lexeme>>,
+}
+
+/// Cuts a text into items. Time and memory are linear in the text.
+pub fn layout(text: &str) -> Layout {
+    scan(text, None).0
+}
+
+/// Cuts a text into items, and tells all tokens.
+pub fn lexemes(text: &str) -> (Layout, Vec<Lexeme>) {
+    let (layout, lexemes) = scan(text, Some(Vec::new()));
+    (layout, lexemes.unwrap_or_default())
+}
+
+fn scan(text: &str, lexemes: Option<Vec<Lexeme>>) -> (Layout, Option<Vec<Lexeme>>) {
+    let mut scanner = Scanner {
+        text,
+        out: text.as_bytes().to_vec(),
+        items: Vec::new(),
+        errors: Vec::new(),
+        in_string: false,
+        weighted: false,
+        weight_next: false,
+        last: Last::Operand,
+        levels: vec![Level::default()],
+        pending: 0,
+        held_break: None,
+        run_of_angles: None,
+        head_before: None,
+        next: None,
+        matching: false,
+        lexemes,
+    };
+    let mut tokens = Vec::new();
+    let mut start = 0;
+    while start < text.len() {
+        let end = memchr_newline(text, start);
+        scanner.tokenize(start, end, &mut tokens);
+        scanner.line(start, end, &tokens);
+        start = end + 1;
+    }
+    scanner.close_item(text.len());
+    let Scanner { out, mut items, mut errors, lexemes, .. } = scanner;
+    for item in &mut items {
+        if item.end - item.start > MAX_ITEM && item.kind != ItemKind::Axiom && !item.broken {
+            item.broken = true;
+            let message = format!("this declaration is longer than {} KiB", MAX_ITEM >> 10);
+            errors.push(
+                Diagnostic::error(message)
+                    .at(Span::new(item.start, item.start + first_char(text, item.start)), "it begins here")
+                    .help("cut it into several: constants, functions, or rules with a head each"),
+            );
+        }
+    }
+    // Only ASCII bytes were put in place of whole characters.
+    let text = String::from_utf8(out).expect("whole characters were replaced");
+    (Layout { text, items, errors }, lexemes)
+}
+
+fn memchr_newline(text: &str, from: usize) -> usize {
+    text[from..].find('\n').map_or(text.len(), |i| from + i)
+}
+
+fn first_char(text: &str, at: usize) -> usize {
+    text[at..].chars().next().map_or(0, char::len_utf8)
+}
+
+impl Scanner<'_> {
+    /// Collects a line's tokens and blanks its comment.
+    fn tokenize(&mut self, start: usize, end: usize, tokens: &mut Vec<(Token, usize, usize)>) {
+        tokens.clear();
+        let line = &self.text[start..end];
+        let mut chars = line.char_indices().peekable();
+        while let Some((i, c)) = chars.next() {
+            let mut take_while = |accept: &dyn Fn(char) -> bool| {
+                while chars.next_if(|(_, c)| accept(*c)).is_some() {}
+                chars.peek().map_or(line.len(), |(j, _)| *j)
+            };
+            let (token, to) = match c {
+                c if c.is_whitespace() => continue,
+                '#' => {
+                    self.out[start + i..end].fill(b' ');
+                    break;
+                }
+                '"' => {
+                    let mut to = take_while(&|c| c != '"');
+                    if chars.next().is_some() {
+                        to += 1;
+                    }
+                    (Token::Text, to)
+                }
+                c if c.is_alphabetic() => (Token::Word, take_while(&in_name)),
+                c if c.is_ascii_digit() => {
+                    let to = i + number_length(&line[i..]);
+                    while chars.next_if(|(j, _)| *j < to).is_some() {}
+                    (Token::Number, to)
+                }
+                '(' => (Token::Open, i + 1),
+                ')' => (Token::Close, i + 1),
+                ',' => (Token::Comma, i + 1),
+                ':' => (Token::Colon, i + 1),
+                c => (Token::Symbol, i + c.len_utf8()),
+            };
+            tokens.push((token, start + i, start + to));
+        }
+    }
+
+    fn word(&self, token: (Token, usize, usize)) -> &str {
+        if token.0 == Token::Word { &self.text[token.1..token.2] } else { "" }
+    }
+
+    fn line(&mut self, start: usize, end: usize, tokens: &[(Token, usize, usize)]) {
+        let Some(&first) = tokens.first() else {
+            self.line_break(end);
+            return;
+        };
+        let word = self.word(first).to_owned();
+        let in_sum = self.levels.last().is_some_and(|level| level.is_sum);
+        let colon = !in_sum && self.has_colon(tokens) && !self.goes_on_with_weight(tokens);
+        let arrow = self.arrow_outside_parentheses(tokens);
+        if arrow == Some(first.1) || arrow.is_some() && self.goes_on() {
+            // What looked like the head of a rule is that of a discrete one, broken over lines.
+            self.goes_on_discrete(start, arrow == Some(first.1));
+        }
+        let in_string = self.in_string && self.levels.len() == 1;
+        let starts = self.starts_item(&word, colon, arrow.is_some(), tokens);
+        if let Some(head) = self.head_without_colon(starts, colon, tokens) {
+            let kind = if starts == Some(ItemKind::Step) { ItemKind::Step } else { ItemKind::Rule };
+            self.begin_without_colon(head, kind);
+            (self.in_string, self.weighted, self.weight_next) = (false, false, false);
+            self.last = Last::Colon;
+            self.held_break = None;
+        } else if let Some(kind) = starts {
+            let mut from = first.1;
+            if matches!(kind, ItemKind::Rule | ItemKind::Step)
+                && self.last == Last::Angle
+                && self.levels.len() == 1
+            {
+                // The head was broken over lines; take back the lines before.
+                from = self.run_of_angles.unwrap_or(from);
+            }
+            self.close_item(from);
+            if kind == ItemKind::Unknown
+                && first.0 == Token::Symbol
+                && let Some(cut) = self.items.last_mut()
+            {
+                // It goes on here, wrongly; that is said of this line.
+                cut.broken = true;
+            }
+            self.items.push(RawItem { kind, start: from, end: from, after_colon: None, broken: false });
+            (self.in_string, self.weighted, self.weight_next) = (false, false, false);
+            self.last = Last::Operator;
+            self.held_break = None;
+        } else if let Some(at) = self.held_break.take()
+            && (matches!(word.as_str(), "then" | "else") || word == "case" && self.matching)
+        {
+            // `then`, `else` and `case` take back the break before them, and any empty lines.
+            for byte in &mut self.out[at..start] {
+                if *byte == b'\n' {
+                    *byte = b' ';
+                }
+            }
+        }
+        self.head_before = self.remembered_head(starts, in_string, tokens);
+        for (i, &token) in tokens.iter().enumerate() {
+            self.next = tokens.get(i + 1).map(|next| next.0);
+            self.token(token);
+        }
+        self.run_of_angles = match (self.last, self.run_of_angles) {
+            (Last::Angle, None) => Some(first.1),
+            (Last::Angle, run) => run,
+            _ => None,
+        };
+        self.line_break(end);
+    }
+
+    /// Whether a line begins an item, and which.
+    fn starts_item(
+        &self,
+        word: &str,
+        colon: bool,
+        arrow: bool,
+        tokens: &[(Token, usize, usize)],
+    ) -> Option<ItemKind> {
+        let declared = DECLARATIONS.iter().find(|(name, _)| *name == word).map(|(_, kind)| *kind);
+        let inside = self.levels.len() > 1;
+        // Words that came later may be names of modules in older models: they begin a declaration only where they
+        // cannot be the head of a rule.
+        let newer = matches!(word, "include" | "curve" | "table");
+        let follows = |i: usize| tokens.get(i).map(|t| t.0);
+        let plain = !colon && matches!(follows(1), Some(Token::Word | Token::Text));
+        if let Some(kind) = declared.filter(|_| !newer || plain) {
+            // Inside parentheses that somebody forgot to close, a declaration still begins one; but an
+            // identifier that happens to be called `angle` does not.
+            let next_is_word = matches!(tokens.get(1), Some((Token::Word | Token::Text, ..)));
+            if !inside || next_is_word || colon || arrow {
+                return Some(kind);
+            }
+        }
+        // A clause with a colon too many is still a clause.
+        let is_let = word == "let"
+            && follows(1) == Some(Token::Word)
+            && tokens.get(2).is_some_and(|t| &self.text[t.1..t.2] == "=");
+        let case = word == "case" && (self.matching || self.level_matches());
+        let clause = matches!(word, "if" | "solve" | "produce") && !self.items.is_empty() || is_let || case;
+        let clause = clause || tokens.first().is_some_and(|t| self.is_at_rate(t.1, t.2));
+        // So is one with an arrow; and the head of a discrete rule may have been on the line before.
+        let goes_on = self.items.last().is_some_and(|i| i.kind == ItemKind::Step) && !self.in_string;
+        if arrow && !clause && !goes_on {
+            return Some(ItemKind::Step);
+        }
+        if colon && !clause {
+            return Some(ItemKind::Rule);
+        }
+        let Some(current) = self.items.last() else { return Some(ItemKind::Unknown) };
+        if self.is_no_string(tokens) {
+            return Some(ItemKind::Unknown);
+        }
+        if inside || self.in_string || self.last != Last::Operand {
+            return None;
+        }
+        let continues = match current.kind {
+            // What follows a line that is not understood is not to be complained about again.
+            ItemKind::Rule | ItemKind::Unknown => clause || matches!(word, "then" | "else"),
+            ItemKind::Axiom | ItemKind::Interpret | ItemKind::Step => true,
+            _ => case || matches!(word, "then" | "else"),
+        };
+        (!continues).then_some(ItemKind::Unknown)
+    }
+
+    fn close_item(&mut self, end: usize) {
+        if self.levels.len() > 1 {
+            let at = self.levels.last().expect("two levels").at;
+            self.fault(
+                Diagnostic::error("this `(` is never closed")
+                    .at(Span::new(at, at + 1), "expected `)` for it")
+                    .help("write the `)` where the parameters or the term end"),
+            );
+        }
+        self.levels.truncate(1);
+        self.levels[0] = Level::default();
+        self.pending = 0;
+        if let Some(item) = self.items.last_mut() {
+            item.end = end;
+        }
+    }
+
+    fn fault(&mut self, error: Diagnostic) {
+        if let Some(item) = self.items.last_mut() {
+            if !item.broken {
+                self.errors.push(error);
+            }
+            item.broken = true;
+        }
+    }
+
+    fn token(&mut self, (token, start, end): (Token, usize, usize)) {
+        let in_expression = !self.in_string || self.levels.len() > 1;
+        self.weight_next = false;
+        let (after_operand, depth) = (self.last == Last::Operand, self.levels.len() - 1);
+        let mut last = Last::Operand;
+        match token {
+            Token::Word => {
+                last = self.keyword(start, end);
+            }
+            Token::Number | Token::Text => {}
+            Token::Open => {
+                let word = self.text[..start].trim_end().rsplit(|c| !in_name(c)).next().unwrap_or_default();
+                let is_sum = FOLDS.contains(&word);
+                self.levels.push(Level { at: start, is_sum, ..Level::default() });
+                last = Last::Operator;
+            }
+            Token::Close => {
+                if self.levels.len() > 1 {
+                    let level = self.levels.pop().expect("two levels");
+                    self.pending -= level.right + level.ifs;
+                } else {
+                    self.fault(
+                        Diagnostic::error("this `)` closes nothing")
+                            .at(Span::new(start, end), "there is no `(` before it")
+                            .help("remove it, or write the `(` that it belongs to"),
+                    );
+                }
+            }
+            Token::Comma => {
+                self.forget_pending();
+                last = Last::Operator;
+            }
+            Token::Colon => {
+                last = Last::Colon;
+                self.level().is_sum = false;
+                let weight = self.in_successor();
+                self.weighted |= weight;
+                if self.levels.len() == 1
+                    && !self.level().matching
+                    && !weight
+                    && let Some(item) = self.items.last_mut()
+                    && item.after_colon.is_none()
+                {
+                    item.after_colon = Some(end);
+                    self.in_string = matches!(item.kind, ItemKind::Axiom | ItemKind::Interpret);
+                    self.forget_pending();
+                }
+            }
+            Token::Symbol => {
+                let symbol = &self.text[start..end];
+                let binary = self.last == Last::Operand;
+                last = match symbol {
+                    "<" | ">" => Last::Angle,
+                    // The end of an element, or of an array.
+                    "]" => Last::Operand,
+                    _ => Last::Operator,
+                };
+                if self.is_arrow(start, end)
+                    && self.levels.len() == 1
+                    && self.items.last().is_some_and(|i| i.kind == ItemKind::Step)
+                {
+                    last = Last::Operator;
+                    (self.in_string, self.weighted, self.weight_next) = (true, false, true);
+                    self.forget_pending();
+                } else if in_expression {
+                    let level = self.levels.last_mut().expect("never empty");
+                    if symbol == "^" || !binary {
+                        level.right += 1;
+                        self.pending += 1;
+                    } else {
+                        self.pending -= level.right;
+                        level.right = 0;
+                    }
+                }
+            }
+        }
+        self.last = last;
+        if let Some(lexemes) = &mut self.lexemes {
+            let (in_string, operator) = (!in_expression, last != Last::Operand);
+            lexemes.push(Lexeme { token, start, end, in_string, after_operand, operator, depth });
+        }
+        let depth = self.levels.len() - 1 + self.pending;
+        if depth > MAX_DEPTH {
+            self.fault(
+                Diagnostic::error(format!("this is nested more than {MAX_DEPTH} deep"))
+                    .at(Span::new(start, end), "one level too many")
+                    .help("name a part of it: `const part = …` or `def part(x) = …`"),
+            );
+        }
+    }
+}

@@ -1,0 +1,222 @@
+//! Lines that would be clear if they were complete: the head of a rule without its colon, and in a string of modules, which
+//! may go on over lines, a line that can be none of it, such as a misspelt declaration.
+//!
+//! A colon that lacks is complained about once, and put in: so the rule is read, and its other mistakes are found.
+
+use super::{DECLARATIONS, ItemKind, RawItem, Scanner};
+use crate::foreign_syntax;
+use crate::lexeme::Token;
+use crate::suggest::nearest;
+use dlsys_diagnostic::{Diagnostic, Span};
+
+type Lexed = (Token, usize, usize);
+
+impl Scanner<'_> {
+    /// Where the head of a rule begins and ends whose colon has been forgotten: on this line before its first clause or the
+    /// condition of a discrete rule, or on the line before this clause. `starts` is what the line begins otherwise.
+    pub(super) fn head_without_colon(
+        &self,
+        starts: Option<ItemKind>,
+        colon: bool,
+        tokens: &[Lexed],
+    ) -> Option<(usize, usize)> {
+        let current = self.items.last()?.kind;
+        let whole = |tokens: &[Lexed]| (tokens[0].1, tokens[tokens.len() - 1].2);
+        if starts == Some(ItemKind::Step) && !colon {
+            let head = self.head_length(tokens);
+            let compares = |t: &Lexed| t.0 == Token::Number || matches!(self.text_of(*t), "=" | "&" | "*");
+            let condition = self.before_arrow(&tokens[head..]);
+            let begins = condition.first().is_some_and(|t| matches!(t.0, Token::Word | Token::Open))
+                && self.first_clause(condition) != Some(0);
+            return (head > 0 && begins && condition.iter().any(compares)).then(|| whole(&tokens[..head]));
+        }
+        let in_string = self.in_string && self.levels.len() == 1;
+        match starts {
+            Some(ItemKind::Unknown) => {}
+            None if current == ItemKind::Unknown => {}
+            // In the successor of a clause, another clause may follow.
+            None if in_string
+                && matches!(current, ItemKind::Axiom | ItemKind::Interpret | ItemKind::Step) => {}
+            _ => return None,
+        }
+        let clause = self.first_clause(tokens)?;
+        // In a drawing, `if` may be what somebody takes for a condition of it.
+        let acts = |t: &Lexed| matches!(self.word(*t), "solve" | "produce");
+        if current == ItemKind::Interpret && !tokens.iter().any(acts) {
+            return None;
+        }
+        match clause {
+            0 => self.head_before,
+            _ if self.head_length(&tokens[..clause]) == clause => Some(whole(&tokens[..clause])),
+            _ => None,
+        }
+    }
+
+    /// A rule without clauses whose colon a discrete rule follows: that goes on here, over a broken line, or it was
+    /// no head, but such a line as L-Py's `production:`.
+    pub(super) fn goes_on_discrete(&mut self, line: usize, arrow_first: bool) {
+        let Some(item) = self.items.last_mut().filter(|i| i.kind == ItemKind::Rule) else { return };
+        let head = self.text[item.start..line].trim_end();
+        let foreign = !arrow_first && foreign_syntax::line(head, item.start).is_some();
+        item.kind = if foreign { ItemKind::Unknown } else { ItemKind::Step };
+        self.held_break = None;
+    }
+
+    /// Begins the rule whose head stands there, as if it had its colon.
+    pub(super) fn begin_without_colon(&mut self, (from, to): (usize, usize), kind: ItemKind) {
+        if self.items.last().is_some_and(|item| item.kind == ItemKind::Unknown && item.start == from) {
+            self.items.pop();
+        } else {
+            self.close_item(from);
+        }
+        let written = format!("write `{}:`", self.text[from..to].trim_end());
+        self.errors.push(
+            Diagnostic::error("the head of this rule has no colon")
+                .at(Span::new(from, to), "expected `:` after this head")
+                .help(match kind {
+                    ItemKind::Step => format!("{written}, and the condition behind it"),
+                    _ => format!("{written}, and the clauses behind it or below"),
+                }),
+        );
+        let free = self.text.as_bytes().get(to).is_some_and(u8::is_ascii_whitespace);
+        if free {
+            self.out[to] = b':';
+        }
+        self.items.push(RawItem { kind, start: from, end: from, after_colon: Some(to + 1), broken: !free });
+    }
+
+    /// The line as a head that may lack its colon, for the line after it.
+    pub(super) fn remembered_head(
+        &self,
+        starts: Option<ItemKind>,
+        in_string: bool,
+        tokens: &[Lexed],
+    ) -> Option<(usize, usize)> {
+        let alone = starts == Some(ItemKind::Unknown) || starts.is_none() && in_string;
+        let is_head = alone && self.head_length(tokens) == tokens.len();
+        is_head.then(|| (tokens[0].1, tokens[tokens.len() - 1].2))
+    }
+
+    /// Whether a line within a string of modules can be no part of it, and begins like a declaration.
+    pub(super) fn is_no_string(&self, tokens: &[Lexed]) -> bool {
+        if !self.in_string || self.levels.len() > 1 || self.weighted || self.weight_next {
+            return false;
+        }
+        let Some((&first, rest)) = tokens.split_first() else { return false };
+        let word = self.word(first);
+        if word.is_empty() || word == "or" {
+            return false;
+        }
+        let Some(&next) = rest.first() else { return foreign_syntax::stands_alone(word) };
+        // A number behind a name may be the parameter of a module.
+        let meant = || nearest(word, DECLARATIONS.iter().map(|(name, _)| *name)).is_some();
+        if next.0 == Token::Number && meant() {
+            return true;
+        }
+        let begins =
+            matches!(next.0, Token::Word | Token::Text) || matches!(self.text_of(next), "=" | "@" | "/");
+        // In a clause, signs may compare.
+        let end = self.first_clause(tokens).unwrap_or(tokens.len());
+        let mut depth = 0usize;
+        begins
+            && tokens[..end].iter().any(|t| {
+                match t.0 {
+                    Token::Open => depth += 1,
+                    Token::Close => depth = depth.saturating_sub(1),
+                    _ => {}
+                }
+                depth == 0 && (t.0 == Token::Text || self.is_equals(*t))
+            })
+    }
+
+    fn text_of(&self, token: Lexed) -> &str {
+        &self.text[token.1..token.2]
+    }
+
+    /// An `=` that belongs to no longer sign.
+    fn is_equals(&self, token: Lexed) -> bool {
+        let part = |c: char| "<>=!".contains(c);
+        self.text_of(token) == "="
+            && !self.text[..token.1].ends_with(part)
+            && !self.text[token.2..].starts_with(part)
+    }
+
+    /// The first token outside parentheses that begins a clause.
+    fn first_clause(&self, tokens: &[Lexed]) -> Option<usize> {
+        let mut depth = 0usize;
+        for (i, &token) in tokens.iter().enumerate() {
+            match token.0 {
+                Token::Open => depth += 1,
+                Token::Close => depth = depth.saturating_sub(1),
+                _ => {}
+            }
+            let next = |n: usize| tokens.get(i + n).map_or("", |t| self.text_of(*t));
+            let begins = match self.word(token) {
+                "if" | "solve" | "produce" => true,
+                "at" => next(1) == "rate",
+                "let" => next(2) == "=",
+                _ => false,
+            };
+            if begins && depth == 0 {
+                return Some(i);
+            }
+        }
+        None
+    }
+
+    fn before_arrow<'t>(&self, tokens: &'t [Lexed]) -> &'t [Lexed] {
+        let at = self.arrow_outside_parentheses(tokens);
+        let end = tokens.iter().position(|t| Some(t.1) >= at).unwrap_or(tokens.len());
+        &tokens[..end]
+    }
+
+    /// How many tokens the head of a rule takes at the beginning, with its contexts; 0 if none stands there.
+    fn head_length(&self, tokens: &[Lexed]) -> usize {
+        let left = self.modules(tokens, false);
+        let mut at = match tokens.get(left) {
+            Some(t) if left > 0 && self.text_of(*t) == "<" => left + 1,
+            _ => 0,
+        };
+        match self.module(&tokens[at..]) {
+            0 => return 0,
+            length => at += length,
+        }
+        if tokens.get(at).is_some_and(|t| self.text_of(*t) == ">") {
+            let right = self.modules(&tokens[at + 1..], true);
+            at += if right > 0 { right + 1 } else { 0 };
+        }
+        at
+    }
+
+    /// How many tokens modules with bare names as parameters take.
+    fn modules(&self, tokens: &[Lexed], branches: bool) -> usize {
+        let mut at = 0;
+        loop {
+            let bracket = branches && tokens.get(at).is_some_and(|t| matches!(self.text_of(*t), "[" | "]"));
+            match if bracket { 1 } else { self.module(&tokens[at..]) } {
+                0 => return at,
+                length => at += length,
+            }
+        }
+    }
+
+    /// How many tokens one module with bare names as parameters takes.
+    fn module(&self, tokens: &[Lexed]) -> usize {
+        let Some(&first) = tokens.first() else { return 0 };
+        let name = match self.text_of(first) {
+            "@" if tokens.get(1).is_some_and(|t| t.0 == Token::Word && t.1 == first.2) => 2,
+            "±" | "+" | "-" | "&" | "^" | "\\" | "/" | "|" | "$" | "!" | ";" | "{" | "}" | "." => 1,
+            _ if first.0 == Token::Word && self.first_clause(tokens) != Some(0) => 1,
+            _ => return 0,
+        };
+        if tokens.get(name).is_none_or(|t| t.0 != Token::Open) {
+            return name;
+        }
+        let inside =
+            tokens[name + 1..].iter().take_while(|t| matches!(t.0, Token::Word | Token::Comma)).count();
+        match tokens.get(name + 1 + inside) {
+            Some(t) if t.0 == Token::Close => name + inside + 2,
+            _ => 0,
+        }
+    }
+}

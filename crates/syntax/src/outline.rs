@@ -1,0 +1,93 @@
+//! What a text declares, and where: for those who change texts piece by piece.
+
+use crate::ast::{HeadModule, Item, Rule, Turn};
+use crate::parse;
+use dlsys_diagnostic::{Source, Span};
+
+/// A declaration or rule of a text.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// Two entries of one key cannot stand side by side: one takes the place of the other. None where any number can.
+    pub key: Option<String>,
+    /// What it is called, if it has a name: `r`, `F_a(x, n)`, `frames`.
+    pub name: String,
+    pub is_rule: bool,
+    pub is_axiom: bool,
+    pub span: Span,
+}
+
+/// The declarations and rules of a text that can be read, in the order written.
+pub fn outline(text: &str) -> Vec<Entry> {
+    let source = Source::new("", text);
+    let (document, _) = parse::parse(&source);
+    document.items.iter().map(|(item, span)| entry(item, *span, &source)).collect()
+}
+
+fn entry(item: &Item, span: Span, source: &Source) -> Entry {
+    let single = |word: &str| (Some(word.to_owned()), word.to_owned());
+    let named = |sort: &str, name: &str| (Some(format!("{sort} {name}")), name.to_owned());
+    let (key, name) = match item {
+        Item::Title(_) => single("title"),
+        Item::Angle(_) => single("angle"),
+        Item::Period(_) => single("period"),
+        Item::Frames { .. } => single("frames"),
+        Item::Tropism { .. } => single("tropism"),
+        Item::Axiom(_) => single("initial string"),
+        // Constants, parameters, functions, curves and arrays share their names; so do colours and gradients.
+        Item::Const { name, .. }
+        | Item::Param { name, .. }
+        | Item::Def { name, .. }
+        | Item::Array { name, .. }
+        | Item::Curve { name, .. }
+        | Item::Table { name, .. } => named("value", &name.text),
+        Item::Color { name, .. } | Item::Gradient { name, .. } => named("color", &name.text),
+        Item::Contour { name, .. } => named("contour", &name.text),
+        Item::Surface { name, .. } => named("surface", &name.text),
+        Item::Interpret { head, .. } => (
+            Some(format!("interpret {}", pattern(head))),
+            format!("interpret {}", source.slice(head.span).trim()),
+        ),
+        Item::Rule(rule) => (Some(head(rule)), source.slice(rule.head).trim().to_owned()),
+        Item::Include(file) => (Some(format!("include {}", file.text)), format!("include \"{}\"", file.text)),
+        Item::Ignore(_) => (None, "ignore".to_owned()),
+        Item::Consider(_) => (None, "consider".to_owned()),
+    };
+    let (is_rule, is_axiom) = (matches!(item, Item::Rule(_)), matches!(item, Item::Axiom(_)));
+    Entry { key, name, is_rule, is_axiom, span }
+}
+
+/// A module of a head without the names of its parameters.
+fn pattern(module: &HeadModule) -> String {
+    format!("{}/{}", module.name.text, module.parameters.len())
+}
+
+fn head(rule: &Rule) -> String {
+    let all = |modules: &[HeadModule]| modules.iter().map(pattern).collect::<Vec<_>>().join(" ");
+    let mut following = rule.right.iter().map(pattern);
+    let right: Vec<String> = (rule.right_shape.iter())
+        .filter_map(|turn| match turn {
+            Turn::Module => following.next(),
+            Turn::Open => Some("[".to_owned()),
+            Turn::Close => Some("]".to_owned()),
+        })
+        .collect();
+    format!("{} < {} > {}", all(&rule.left), pattern(&rule.predecessor), right.join(" "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_same_thing_has_the_same_key_however_it_is_spelt() {
+        let text = "const r = 2\nA(a) < F(x): solve dx/dt = r\n  # a remark\n\nfoo bar\nignore F\n";
+        let entries = outline(text);
+        let names: Vec<&str> = entries.iter().map(|e| e.name.as_str()).collect();
+        assert_eq!(names, ["r", "A(a) < F(x)", "ignore"]);
+        assert_eq!(&text[entries[1].span.range()], "A(a) < F(x): solve dx/dt = r");
+        let again = outline("param r = 3 in 0 .. 5\nA(q)<F(y):\n  solve dy/dt = 1");
+        assert_eq!(again[0].key, entries[0].key);
+        assert_eq!(again[1].key, entries[1].key);
+        assert_eq!(entries[2].key, None);
+    }
+}

@@ -1,0 +1,204 @@
+//! What the parser expected, in the language's own words.
+
+use std::collections::BTreeSet;
+
+use pest::error::{Error, ErrorVariant, InputLocation};
+
+use super::Rule;
+use super::advice;
+use super::hints::{hint, is_derivative, keyword_hint};
+use crate::foreign_syntax;
+use crate::layout::{DECLARATIONS, RawItem};
+use dlsys_diagnostic::{Diagnostic, Span};
+
+/// A grammar rule as a person would call it; `None` for what is never named alone.
+fn words(rule: Rule) -> Option<&'static str> {
+    use Rule::*;
+    Some(match rule {
+        expr | number | literal | ident | call | indexed | array | if_expr | match_expr | neg | not
+        | coefficient => "an expression",
+        or | and | le | ge | ne | lt | gt | eq | add | sub | mul | div | pow => "an operator",
+        module | modules | successor | alternative | name => "a module",
+        epsilon => "`ε` for nothing",
+        arguments => "`(` and parameters",
+        formals => "`(` and the names of parameters",
+        head | head_module | plus_minus | context => "a module",
+        step_head | step_context | step_right => "a module",
+        arrow => "`->` and a successor",
+        always => "`*`",
+        left_of => "`<` after the left context",
+        right_of => "`>` and the right context",
+        clause => "`if`, `solve` or `produce`",
+        local | kw_let => "`let`",
+        kw_match => "`match`",
+        kw_case => "`case`",
+        kw_column => "`column` and its name",
+        periodic => "`periodic`",
+        sort => "`linear`, `monotone` or `spline`",
+        kw_or => "`or` and another successor",
+        hazard | kw_at => "`at rate`",
+        kw_rate => "`rate`",
+        solve | kw_solve => "`solve`",
+        produce | kw_produce => "`produce`",
+        right_context => "a module",
+        bracket_open => "`[`",
+        bracket_close => "`]`",
+        aggregate | fold | kw_count => "an expression",
+        kw_for => "`for` and a parameter",
+        kw_if => "`if`",
+        kw_then => "`then`",
+        kw_else => "`else`",
+        kw_dt => "`dt`",
+        kw_step => "`step`",
+        kw_in => "`in` and a range",
+        kw_from => "`from` and a file",
+        kw_strength => "`strength`",
+        surface_name => "the name of a surface such as `@P`",
+        point => "a point such as `(1, 0.5)`",
+        equation | derivative | rate | zero => "an equation such as `dx/dt = …`, `x = …` or `0 = …`",
+        equals => "`=`",
+        colon => "`:`",
+        close => "`)`",
+        range => "`..`",
+        text | text_body => "a text in quotes",
+        EOI => "the end of the line",
+        _ => return None,
+    })
+}
+
+/// Turns pest's error into a message.
+pub fn explain(item: Rule, error: &Error<Rule>, text: &str, offset: usize) -> Diagnostic {
+    let at = match error.location {
+        InputLocation::Pos(at) | InputLocation::Span((at, _)) => at,
+    };
+    let found = token_at(text, at);
+    let mut expected: BTreeSet<&'static str> = BTreeSet::new();
+    if let ErrorVariant::ParsingError { positives, .. } = &error.variant {
+        expected.extend(positives.iter().filter_map(|r| words(*r)));
+    }
+    // Wherever an expression can begin, an `if` can: that goes without saying.
+    if expected.contains("an expression") {
+        expected.remove("`if`");
+        expected.remove("`match`");
+    }
+    // A clause is what a rule lacks, and not one more name.
+    if expected.contains("`if`, `solve` or `produce`") {
+        expected.remove("`let`");
+    }
+    let choice = expected.contains("`case`");
+    // What a name is for depends on where it is asked for.
+    if is_item_with_name(item)
+        && text[..at].split_whitespace().count() <= 1
+        && expected.contains("an expression")
+    {
+        expected = BTreeSet::from(["a name"]);
+    }
+    // Before its `:` a rule has names where other places have expressions.
+    if item == Rule::rule_item && !text[..at].contains(':') && expected.remove("an expression") {
+        expected.insert("the name of a parameter");
+    }
+    // What stands for a declaration elsewhere, and is read as the head of a rule here.
+    let behind = text[..at].split_once(':').map_or("", |(_, behind)| behind);
+    if item == Rule::rule_item
+        && behind.trim().is_empty()
+        && keyword_hint(found, &["if", "solve", "produce"]).is_none()
+        && let Some(said) = foreign_syntax::line(text.lines().next().unwrap_or_default(), offset)
+    {
+        return said;
+    }
+    let shown: Vec<&str> = expected.into_iter().collect();
+    let what = match shown.split_last() {
+        None => "this does not belong here".to_owned(),
+        Some((last, [])) => format!("expected {last}"),
+        Some((last, rest)) => format!("expected {} or {last}", rest.join(", ")),
+    };
+    let message = match found {
+        "" if item == Rule::rule_item => "the rule ends too early".to_owned(),
+        "" | "\n" => "the line ends too early".to_owned(),
+        token => format!("`{token}` is not expected here"),
+    };
+    let end = if found == "\n" { at } else { at + found.len() };
+    // At the end of a line, point at the last thing before it rather than at nothing.
+    let span = if end == at {
+        let before = text[..at].trim_end();
+        let from = before.char_indices().next_back().map_or(0, |(i, _)| i);
+        Span::new(offset + from, offset + before.len())
+    } else {
+        Span::new(offset + at, offset + end)
+    };
+    let what = if end == at { format!("{what} after this") } else { what };
+    let choice = choice.then_some("a choice is written `match n case 0: 1 case 1: 2 else 3`");
+    let advice = hint(item, text, at, found).or_else(|| choice.map(str::to_owned));
+    Diagnostic::error(message).at(span, what).help(advice.unwrap_or_else(|| advice::usage(item).to_owned()))
+}
+
+pub(super) fn is_item_with_name(item: Rule) -> bool {
+    matches!(
+        item,
+        Rule::const_item
+            | Rule::param_item
+            | Rule::def_item
+            | Rule::color_item
+            | Rule::gradient_item
+            | Rule::contour_item
+            | Rule::curve_item
+            | Rule::table_item
+    )
+}
+
+/// The word, number or symbol at a place.
+fn token_at(text: &str, at: usize) -> &str {
+    let rest = &text[at..];
+    let Some(first) = rest.chars().next() else { return "" };
+    let alike = |c: char| c.is_alphanumeric() || c == '_';
+    if alike(first) {
+        let end = rest.find(|c| !alike(c)).unwrap_or(rest.len());
+        // Quote no more than a line's worth.
+        &rest[..rest.char_indices().map(|(i, _)| i).nth(40).unwrap_or(rest.len()).min(end)]
+    } else {
+        &rest[..first.len_utf8()]
+    }
+}
+
+/// A line that begins no declaration and no rule.
+pub fn unknown_line(text: &str, item: &RawItem) -> Diagnostic {
+    let line = text[item.start..item.end].lines().next().unwrap_or_default();
+    let first = token_at(line, 0);
+    let span = Span::new(item.start, item.start + first.len());
+    let is_symbol = !first.starts_with(|c: char| c.is_alphanumeric());
+    if is_symbol && matches!(first, "+" | "-" | "*" | "/" | "^" | "&" | "|" | "<" | ">" | "=") {
+        return Diagnostic::error("the line before ended an expression")
+            .at(span, "this begins a new line")
+            .help("to go on with an expression, put the operator at the end of the line before, or parentheses around it");
+    }
+    if let Some(said) = foreign_syntax::line(line, item.start) {
+        return said;
+    }
+    let whole = &text[item.start..item.end];
+    let mut names: Vec<&'static str> = DECLARATIONS.iter().map(|(name, _)| *name).collect();
+    names.extend(["if", "solve", "produce"]);
+    let diagnostic = Diagnostic::error(format!("`{first}` begins no declaration and no rule"))
+        .at(span, "expected a declaration, or the head of a rule such as `F(x):`");
+    if matches!(first, "if" | "solve" | "produce") {
+        return diagnostic.help("a clause stands under the head of its rule, such as `F(x):`");
+    }
+    if let Some(help) = keyword_hint(first, &names) {
+        return diagnostic.help(help);
+    }
+    if is_derivative(line) {
+        return diagnostic.help("equations stand in a rule, behind `solve`: `solve dx/dt = …`");
+    }
+    if whole.contains("solve") || whole.contains("produce") {
+        return diagnostic.help("a rule's head ends with `:`");
+    }
+    if line.contains("=>") || line.contains("<-") || line.contains("⇒") {
+        return diagnostic.help("a discrete rule is written `A(x) : x > 3 -> F(x)`");
+    }
+    if line.contains('=') {
+        return diagnostic.help("a constant is declared with `const NAME = VALUE`");
+    }
+    let known: Vec<&str> = DECLARATIONS.iter().map(|(name, _)| *name).collect();
+    diagnostic
+        .note(format!("declarations begin with {}", known.join(", ")))
+        .help("a rule has a head with a colon, and clauses: `A(x): solve dx/dt = 1`")
+}

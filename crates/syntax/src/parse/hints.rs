@@ -1,0 +1,350 @@
+//! Advice for slips in the notation, by the text around the place and what was found there.
+
+use super::Rule;
+use super::advice;
+use super::expected::is_item_with_name;
+use crate::layout::DECLARATIONS;
+use crate::suggest::nearest;
+
+/// Advice for mistakes that people make.
+pub(super) fn hint(item: Rule, text: &str, at: usize, found: &str) -> Option<String> {
+    let first = text.split_whitespace().next().unwrap_or_default();
+    let first = first.trim_end_matches(|c: char| !c.is_alphanumeric());
+    if matches!(item, Rule::rule_item)
+        && let Some(word) = nearest(first, DECLARATIONS.iter().map(|(name, _)| *name))
+        && first.len() > 3
+    {
+        return Some(format!("did you mean `{word}`?"));
+    }
+    if let Some(advice) = advice::for_block(item, &text[..at], found) {
+        return Some(advice.to_owned());
+    }
+    if let Some(advice) = hint_of_chance(item, text, at, found) {
+        return Some(advice.to_owned());
+    }
+    hint_by_symbol(item, text, at, found).or_else(|| hint_by_word(item, text, at, found))
+}
+
+/// Advice for successors with weights and for events at a rate.
+fn hint_of_chance(item: Rule, text: &str, at: usize, found: &str) -> Option<&'static str> {
+    const WEIGHTS: &str = "several successors each have a weight before them: `produce 2: F(x) or 1: G(x)`";
+    const STEP: &str = "several successors each have a weight before them: `A -> 2: F A or 1: F`";
+    if !matches!(item, Rule::rule_item | Rule::step_item) {
+        return None;
+    }
+    let before = text[..at].trim_end();
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    let words: Vec<&str> = before.split(|c| !is_word(c)).filter(|w| !w.is_empty()).collect();
+    let last = words.last().copied().unwrap_or_default().trim_start();
+    let last = if before.ends_with(is_word) { last } else { "" };
+    let arrow = before.rfind("->").max(before.rfind('→'));
+    // From the beginning of the successor on.
+    let successor = match item {
+        Rule::step_item => arrow.map(|at| &before[at..])?,
+        _ => before.rfind("produce").map_or("", |at| &before[at..]),
+    };
+    let weights = if item == Rule::step_item { STEP } else { WEIGHTS };
+    let has_or = successor.split(|c| !is_word(c)).any(|word| word == "or");
+    let number = found.starts_with(|c: char| c.is_ascii_digit());
+    let begins = last == "produce" || successor.trim_end_matches(['>', '→', '-']).is_empty();
+    match found {
+        "or" if !successor.is_empty() => Some(weights),
+        _ if last == "or" || has_or && matches!(found, "" | "\n" | "or" | ":") => Some(weights),
+        _ if number && begins && !successor.is_empty() => Some(weights),
+        "produce" | "solve" if last == "rate" => {
+            Some("behind `at rate` stands the rate: `at rate 0.5 produce …`")
+        }
+        "solve" if before.rsplit('\n').next().is_some_and(|line| line.contains("at rate")) => {
+            Some("what happens at a rate is a production: `at rate 0.5 produce …`")
+        }
+        _ if last == "rate" && words.len() > 1 && words[words.len() - 2] != "at" => Some(
+            "a production at a rate is written `at rate 0.5 produce …`, with `if …` before it if it has a condition",
+        ),
+        _ => None,
+    }
+}
+
+/// Advice that the symbols around the place give.
+fn hint_by_symbol(item: Rule, text: &str, at: usize, found: &str) -> Option<String> {
+    let before = text[..at].trim_end();
+    let previous = before.chars().next_back();
+    let touching = before.len() == at;
+    let in_rule = item == Rule::rule_item;
+    let advice = match (previous, found) {
+        (Some('='), "=") if touching => "equality is written with one `=`",
+        (Some('='), "<" | ">") if touching => "“at most” is written `<=`, “at least” `>=`",
+        (Some('<'), ">") if touching => "“not equal” is written `!=`",
+        (Some('&'), "&") if touching => "“and” is written with one `&`",
+        (Some('|'), "|") if touching => "“or” is written with one `|`",
+        (Some('*'), "*") if touching => "a power is written `x^2`",
+        (_, _) if item == Rule::step_item => return hint_for_step(text, at, found),
+        (Some('-'), ">") if touching => ARROW,
+        (_, "→") => ARROW,
+        (_, "/") if text[at..].starts_with("//") => "a comment begins with `#`",
+        (_, "−" | "–") => "this is a typographic dash; a minus is written `-`",
+        (_, "“" | "”" | "‘" | "’" | "„") => "quotation marks are straight: `\"…\"`",
+        (_, "\"") if item == Rule::title_item => "the text ends with a second `\"` on the same line",
+        (_, "²" | "³") => "a power is written `x^2`",
+        (_, ";") if item != Rule::modules => "a declaration ends with its line, without a sign",
+        (_, "[") if item != Rule::modules && previous.is_some_and(|c| "+-*/(=,^".contains(c)) => {
+            "in expressions only round parentheses `( )` group"
+        }
+        (_, "±") => "`±` stands for both turns in the head of a rule only; write `+` or `-`",
+        (_, "~") => "“not” is written `!`",
+        (_, "'") => "a derivative is written `dx/dt`",
+        _ if in_rule && is_primed(&text[at..]) => {
+            "a derivative is written `dx/dt`, and stands behind `solve`: `solve dx/dt = …`"
+        }
+        (Some('m'), _) if item == Rule::surface_item && before.ends_with("from") => {
+            "the name of the file is a text in quotes: `surface @P from \"petal.s\"`"
+        }
+        (Some('e'), _) if item == Rule::surface_item && before.ends_with("surface") => {
+            "the name of a surface begins with `@`: `surface @P from \"petal.s\"`"
+        }
+        (Some('=' | ','), _) if matches!(item, Rule::color_item | Rule::gradient_item) => {
+            "a colour is a text in quotes: `\"#8b6cc9\"`"
+        }
+        _ if item == Rule::tropism_item => {
+            "a tropism is a direction and a strength: `tropism 0, -1, 0 strength 0.2`"
+        }
+        _ if item == Rule::contour_item => {
+            "a contour is three points or more: `contour leaf = (1, 0) (0, 0.3) (-1, 0) (0, -0.3)`"
+        }
+        (_, "-") if is_item_with_name(item) && !before.contains('=') => {
+            "a name is made of letters, digits and `_`"
+        }
+        (_, "-" | "=") if item == Rule::frames_item => "frames are written `frames 0 .. 10 step 0.1`",
+        (_, "=") if item == Rule::angle_item => "the angle is written `angle 45`",
+        (_, ":") if matches!(item, Rule::ignore_item | Rule::consider_item) => {
+            "write the names after it: `ignore F_x @L`"
+        }
+        (_, "<" | ">") if item == Rule::interpret_item => {
+            "a drawing does not depend on the context of a module"
+        }
+        // Numbers that stand apart may be two equations; those that touch are one with a comma.
+        (Some(','), _)
+            if in_rule
+                && has_decimal_comma(&text[..at])
+                && found.starts_with(|c: char| c.is_ascii_digit()) =>
+        {
+            DECIMAL
+        }
+        (Some(c), ",") if c.is_ascii_digit() && touching && item != Rule::modules => DECIMAL,
+        (_, "=") if item == Rule::modules && text[at..].starts_with("=>") => {
+            "a discrete rule is written `A(x) : x > 3 -> F(x)`"
+        }
+        (_, ",") if item == Rule::modules || item == Rule::interpret_item => NO_COMMAS,
+        (Some(c), ",") if in_rule && last_keyword(before) == Some("produce") && is_end_of_module(c) => {
+            NO_COMMAS
+        }
+        (_, "(") if in_string(item, before) => "a branch stands in square brackets: `[ +(45) F(1) ]`",
+        (Some('{'), _) if is_argument(before, found, '{') => ROUND,
+        (Some('['), _) if is_argument(before, found, '[') => ROUND,
+        (Some(']'), ":") if in_rule && !before.contains(':') => ROUND,
+        (c, ".")
+            if text[at + 1..].starts_with(|c: char| c.is_ascii_digit())
+                || c.is_some_and(|c| c.is_ascii_digit()) =>
+        {
+            "a number begins and ends with a digit: `0.5`, `2`"
+        }
+        (Some(')'), ":") if in_rule && !before.contains(':') => {
+            "a rule has one predecessor; modules around it are its context: `A(x) < B(y) > C(z):`"
+        }
+        (_, "=") if in_rule && before.ends_with(|c: char| c.is_alphanumeric()) => {
+            "an equation is written `dx/dt = …`"
+        }
+        (_, ":") if in_rule && last_keyword(before) == Some("if") => {
+            "a condition has no `:` behind it: `if x < 1 solve …`"
+        }
+        (_, ":") if in_rule && before.contains(':') => "a new rule begins on a line of its own",
+        _ => return None,
+    };
+    Some(advice.to_owned())
+}
+
+const DECIMAL: &str = "the decimal sign is a point: `0.5`";
+const NO_COMMAS: &str = "modules stand one after another, with spaces and no commas";
+const ROUND: &str = "parameters stand in round parentheses: `A(x)`";
+const ARROW: &str = "in a clause a production is written `if x = 2 produce …`; a discrete rule has its arrow behind the head: `A(x) : x > 3 -> …`";
+
+/// Advice for discrete rules.
+fn hint_for_step(text: &str, at: usize, found: &str) -> Option<String> {
+    let before = text[..at].trim_end();
+    let rest = text[at..].trim_start();
+    let has_arrow = before.contains("->") || before.contains('→');
+    let advice = match found {
+        "" | "\n" if before.ends_with("->") || before.ends_with('→') => "to produce nothing, write `-> ε`",
+        "if" | "solve" | "produce" if has_arrow => {
+            "a discrete rule has no clauses: it is `A(x) : x > 3 -> F(x)`; equations stand in a rule of their own, `A(x): solve …`"
+        }
+        "if" => "a discrete rule has its condition behind the colon, without `if`: `A(x) : x > 3 -> F(x)`",
+        _ if before.ends_with(':') && rest.starts_with("if ") => {
+            "a discrete rule has its condition behind the colon, without `if`: `A(x) : x > 3 -> F(x)`"
+        }
+        _ if before.contains(": if ") && !has_arrow => {
+            "a discrete rule has its condition behind the colon, without `if`: `A(x) : x > 3 -> F(x)`"
+        }
+        ">" if before.trim_end_matches('-').trim_end().ends_with(':') => {
+            "without a condition there is no colon: `A(x) -> F(x)`; one that always holds is `A(x) : * -> F(x)`"
+        }
+        _ if !has_arrow && found.starts_with(|c: char| c.is_ascii_digit()) => {
+            "a head names its parameters; values belong to the initial string and to successors"
+        }
+        ":" if has_arrow => "the condition stands before the arrow: `A(x) : x > 3 -> F(x)`",
+        ">" | "→" if has_arrow => "a rule has one arrow; a new rule begins on a line of its own",
+        "," if has_arrow => NO_COMMAS,
+        "," if before.len() == at && before.ends_with(|c: char| c.is_ascii_digit()) => DECIMAL,
+        _ if before.ends_with(['{', '['])
+            && is_argument(before, found, '{') | is_argument(before, found, '[') =>
+        {
+            ROUND
+        }
+        ":" if before.ends_with(']') => ROUND,
+        "(" if has_arrow => "a branch stands in square brackets: `[ +(45) F(1) ]`",
+        _ => return None,
+    };
+    Some(advice.to_owned())
+}
+
+/// Advice that the words around the place give.
+fn hint_by_word(item: Rule, text: &str, at: usize, found: &str) -> Option<String> {
+    let before = text[..at].trim_end();
+    let rest = &text[at..];
+    let in_rule = item == Rule::rule_item;
+    let has_head = before.contains(':');
+    let is_word = found.starts_with(|c: char| c.is_alphabetic());
+    let ended = matches!(found, "\n" | "");
+    // The line, up to the place.
+    let line = before.rsplit('\n').next().unwrap_or(before).trim();
+    let last_word = line.rsplit(|c: char| !(c.is_alphanumeric() || c == '_')).next().unwrap_or_default();
+    let advice = match found {
+        "ignore" | "consider" => "brackets cannot be chosen: they are no modules",
+        _ if last_word == "not" => "“not” is written `!`",
+        "if" | "then" | "else" | "solve" | "produce" if is_item_with_name(item) && !before.contains('=') => {
+            "this word is reserved: choose another name"
+        }
+        "then" if in_rule => "a clause has no `then`: `if x < 2 solve …`",
+        "in" if item == Rule::const_item => "only a `param` has a range",
+        "and" => "“and” is written `&`",
+        "or" => "“or” is written `|`",
+        "not" => "“not” is written `!`",
+        "to" if item == Rule::frames_item => "frames are written `frames 0 .. 10 step 0.1`",
+        "solve" | "produce" | "if" if in_rule && !has_head => "a rule's head ends with `:`",
+        "if" if item == Rule::interpret_item => {
+            "a drawing has no conditions; a choice between numbers goes into an argument: `F(if x > 1 then x else 0)`"
+        }
+        "solve" | "produce" if item == Rule::interpret_item => {
+            "a drawing has no clauses; its modules stand behind the colon: `interpret A(x): F(x)`"
+        }
+        "solve" | "produce" | "if" if !in_rule => {
+            "this word begins a clause of a rule; if the line before it is the head of a rule, it ends with `:`"
+        }
+        "else" if in_rule => "every clause has a condition of its own: `if … solve …`, `if … produce …`",
+        "if" if in_rule => "after its condition a clause has `solve` or `produce`",
+        _ if ended && before.ends_with(['+', '-', '*', '/', '^', '=', '<', '>', '&', '|']) => {
+            "an operator has something on both sides: add what is missing, or remove the sign"
+        }
+        _ if has_open_if(line) => "in an expression `if` has three parts: `if x < 1 then 0.5 else 0`",
+        _ if ended && before.ends_with("produce") => "to produce nothing, write `produce ε`",
+        _ if ended && in_rule && before.ends_with(':') => {
+            "under its head a rule has clauses: `solve dx/dt = …`, `if x = 1 produce …`"
+        }
+        _ if in_rule && !has_head && found.starts_with(|c: char| c.is_ascii_digit()) => {
+            "a head names its parameters; values belong to the initial string and to successors"
+        }
+        _ if in_rule && !has_head && before.ends_with(|c: char| c.is_alphanumeric()) && is_word => {
+            "the names of parameters are separated by commas"
+        }
+        _ if in_rule && last_word == "dt" => "a derivative is followed by `=`, as in `dx/dt = 0.1*x`",
+        _ if in_rule && line.ends_with("solve") => "a `solve` gives derivatives: `solve dx/dt = …`",
+        _ if in_rule && is_word && is_derivative(rest) => {
+            if line.contains("solve") {
+                "equations are separated by commas: `solve dx/dt = …, dy/dt = …`"
+            } else {
+                "equations stand behind `solve`: `solve dx/dt = …`"
+            }
+        }
+        _ if is_word || found == "(" => {
+            if let Some(help) = keyword_hint(found, &["if", "then", "else", "solve", "produce"]) {
+                return Some(help);
+            }
+            if last_word.starts_with(|c: char| c.is_alphanumeric()) && line.contains(['=', '<', '>']) {
+                "to multiply, write `*`: `2*x`, `r*x`"
+            } else if in_rule
+                && rest.lines().next().is_some_and(|l| l.contains("solve") || l.contains("produce"))
+            {
+                "a condition begins with `if`"
+            } else {
+                return None;
+            }
+        }
+        _ if is_no_letter(found) => "the names of modules and parameters are made of letters, digits and `_`",
+        _ => return None,
+    };
+    Some(advice.to_owned())
+}
+
+/// Signs such as 🌷, which no name, number or operator has.
+fn is_no_letter(found: &str) -> bool {
+    found.starts_with(|c: char| !c.is_ascii() && !c.is_alphanumeric() && !c.is_whitespace() && c > '\u{2190}')
+}
+
+/// Whether a text ends with a number and a comma that touches it, as `0,5` does before its second digit.
+fn has_decimal_comma(before: &str) -> bool {
+    before.strip_suffix(',').is_some_and(|rest| rest.ends_with(|c: char| c.is_ascii_digit()))
+}
+
+/// Whether a module can end with this.
+fn is_end_of_module(c: char) -> bool {
+    c.is_alphanumeric() || matches!(c, ')' | ']' | '_')
+}
+
+/// Whether a string of modules has begun, and may go on.
+fn in_string(item: Rule, before: &str) -> bool {
+    match item {
+        Rule::modules => true,
+        Rule::interpret_item => before.contains(':'),
+        Rule::rule_item => last_keyword(before) == Some("produce"),
+        _ => false,
+    }
+}
+
+/// Whether what was found is an argument in the wrong parentheses, as in `A{0}`.
+fn is_argument(before: &str, found: &str, parenthesis: char) -> bool {
+    let name =
+        before.strip_suffix(parenthesis).is_some_and(|rest| rest.ends_with(|c: char| c.is_alphanumeric()));
+    name && found.starts_with(|c: char| c.is_ascii_digit())
+}
+
+/// Whether a text begins with something like `x'`.
+fn is_primed(text: &str) -> bool {
+    let end = text.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(text.len());
+    end > 0 && text[end..].starts_with(['\'', '′', '’'])
+}
+
+/// The clause keyword that stands last in a text.
+fn last_keyword(text: &str) -> Option<&str> {
+    let words = text.rsplit(|c: char| !(c.is_alphanumeric() || c == '_'));
+    words.into_iter().find(|word| matches!(*word, "if" | "solve" | "produce"))
+}
+
+/// Whether a line ends inside an `if` that is part of an expression.
+fn has_open_if(line: &str) -> bool {
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    let Some(at) = ["if ", "if("].iter().filter_map(|word| line.rfind(word)).max() else { return false };
+    let before = line[..at].trim_end();
+    let inside = before.ends_with(['=', '+', '-', '*', '/', '^', '(', ',', '<', '>'])
+        || ["then", "else"].iter().any(|word| before.ends_with(word));
+    !line[..at].ends_with(is_word) && inside && !line[at..].split(|c| !is_word(c)).any(|word| word == "else")
+}
+
+/// Whether a text begins with something like `dx/dt`.
+pub(super) fn is_derivative(text: &str) -> bool {
+    let name = text.find(|c: char| !(c.is_alphanumeric() || c == '_')).map_or("", |end| &text[..end]);
+    name.starts_with('d')
+        && text[name.len()..].trim_start().strip_prefix('/').is_some_and(|r| r.trim_start().starts_with("dt"))
+}
+
+pub(super) fn keyword_hint(found: &str, known: &[&'static str]) -> Option<String> {
+    nearest(found, known.iter().copied()).map(|word| format!("did you mean `{word}`?"))
+}

@@ -1,0 +1,264 @@
+//! Text to syntax tree.
+//!
+//! ```text
+//! text ──layout──▶ items ──pest──▶ pairs ──build──▶ Document
+//! ```
+//!
+//! Each item is parsed alone: its mistakes are reported, the others are read all the same.
+
+mod advice;
+mod build;
+mod expected;
+mod expression;
+mod hints;
+
+use std::collections::HashSet;
+
+use pest::Parser;
+
+use crate::ast::{Document, Expression, HeadModule, Item, Module};
+use crate::foreign_syntax;
+use crate::layout::{ItemKind, RawItem, layout};
+use dlsys_diagnostic::{Diagnostic, Source, Span};
+
+/// The pest parser of `grammars/dlsys.pest`.
+#[derive(pest_derive::Parser)]
+#[grammar = "../grammars/dlsys.pest"]
+pub(super) struct Grammar;
+
+type Pair<'i> = pest::iterators::Pair<'i, Rule>;
+
+/// Most errors that are collected from one text; who wants more can mend these first.
+const MAX_ERRORS: usize = 50;
+
+/// Most modules that an initial string can have.
+const MAX_AXIOM: usize = 10_000_000;
+
+/// Reads a model's text. What could be read is returned even if there are errors; of global declarations
+/// that could not be read, the names are in [`Document::unread`].
+///
+/// Texts that it includes are not read: see [`read`](super::read).
+pub fn parse(source: &Source) -> (Document, Vec<Diagnostic>) {
+    let mut reader = Reader::default();
+    reader.document.items = reader.read(&source.text);
+    (reader.document, reader.errors)
+}
+
+/// Reads texts one after another into one document.
+#[derive(Default)]
+pub(super) struct Reader {
+    /// The items are for the caller to put together.
+    pub document: Document,
+    pub errors: Vec<Diagnostic>,
+    interner: build::Interner,
+    /// Functions of the texts so far.
+    defined: HashSet<String>,
+}
+
+impl Reader {
+    /// The items of a text.
+    pub fn read(&mut self, text: &str) -> Vec<(Item, Span)> {
+        let cut = layout(text);
+        self.errors.extend(cut.errors);
+        if text.contains("#define") {
+            let known = foreign_syntax::commented_definitions(text);
+            self.document.commented.extend(known.map(|(name, meaning)| (name.into(), meaning.to_owned())));
+        }
+        let functions = cut.items.iter().filter(|item| item.kind == ItemKind::Def);
+        self.defined.extend(functions.filter_map(|item| declared_word(&cut.text, item).map(str::to_owned)));
+        let mut items = Vec::new();
+        for item in &cut.items {
+            if self.errors.len() >= MAX_ERRORS {
+                break;
+            }
+            if item.broken {
+                self.document.unread.extend(declared_name(&cut.text, item));
+                continue;
+            }
+            let (expressions, interner) = (&mut self.document.expressions, &mut self.interner);
+            let mut builder =
+                build::Builder { expressions, interner, offset: 0, defined: Some(&self.defined) };
+            match read_item(&cut.text, item, &mut builder) {
+                Ok(read) => items.push((read, trimmed(&cut.text, item))),
+                Err(error) => {
+                    self.errors.push(*error);
+                    self.document.unread.extend(declared_name(&cut.text, item));
+                }
+            }
+        }
+        items
+    }
+}
+
+/// The name that an item declares, or seems to: `const k …`, but also `cosnt k …` and `k = …`.
+fn declared_name(text: &str, item: &RawItem) -> Option<std::sync::Arc<str>> {
+    Some(declared_word(text, item)?.into())
+}
+
+fn declared_word<'t>(text: &'t str, item: &RawItem) -> Option<&'t str> {
+    let line = text[item.start..item.end].lines().next()?;
+    let mut words = line.split(|c: char| !(c.is_alphanumeric() || c == '_')).filter(|w| !w.is_empty());
+    let first = words.next()?;
+    let name = match item.kind {
+        ItemKind::Const | ItemKind::Param | ItemKind::Def => words.next()?,
+        ItemKind::Color | ItemKind::Gradient | ItemKind::Contour => words.next()?,
+        ItemKind::Curve | ItemKind::Table => {
+            words.find(|word| !matches!(*word, "linear" | "monotone" | "spline"))?
+        }
+        ItemKind::Unknown if line.strip_prefix(first)?.trim_start().starts_with('=') => first,
+        ItemKind::Unknown => words.next()?,
+        _ => return None,
+    };
+    Some(name)
+}
+
+/// Reads one expression.
+pub fn parse_expression(source: &Source) -> Result<(Document, Expression), Vec<Diagnostic>> {
+    let cut = layout(&format!("const it =\n{}", source.text));
+    if !cut.errors.is_empty() {
+        return Err(cut.errors);
+    }
+    let mut document = Document::default();
+    let mut interner = build::Interner::default();
+    let mut builder = build::Builder {
+        expressions: &mut document.expressions,
+        interner: &mut interner,
+        offset: 0,
+        defined: None,
+    };
+    let pair = pest_parse(Rule::lone_expr, &source.text, 0).map_err(|e| vec![*e])?;
+    let inner = pair.into_inner().next().expect("the grammar has an expression here");
+    let expression = builder.expression(inner).map_err(|e| vec![*e])?;
+    Ok((document, expression))
+}
+
+/// Reads what is to be measured: the head of a module, and the expression that is added up, if it is not just counted.
+pub fn parse_measure(source: &Source) -> Result<(Document, HeadModule, Option<Expression>), Vec<Diagnostic>> {
+    let cut = layout(&format!("const it =\n{}", source.text));
+    if !cut.errors.is_empty() {
+        return Err(vec![Diagnostic::error("this cannot be measured").help(MEASURE)]);
+    }
+    let mut document = Document::default();
+    let mut interner = build::Interner::default();
+    let mut builder = build::Builder {
+        expressions: &mut document.expressions,
+        interner: &mut interner,
+        offset: 0,
+        defined: None,
+    };
+    let pair = pest_parse(Rule::measure, &source.text, 0).map_err(|e| vec![(*e).help(MEASURE)])?;
+    let (head, expression) = builder.measure(pair).map_err(|e| vec![*e])?;
+    Ok((document, head, expression))
+}
+
+/// How a measure is written.
+pub const MEASURE: &str = "a measure is a module, with names for its parameters, and what is added up over all of them: `F(x): x`; without that they are counted: `F(x)`";
+
+fn trimmed(text: &str, item: &RawItem) -> Span {
+    let body = text[item.start..item.end].trim_end();
+    Span::new(item.start, item.start + body.len())
+}
+
+fn pest_parse(rule: Rule, text: &str, offset: usize) -> Result<Pair<'_>, Box<Diagnostic>> {
+    match Grammar::parse(rule, text) {
+        Ok(mut pairs) => Ok(pairs.next().expect("an entry rule gives one pair")),
+        Err(error) => Err(Box::new(expected::explain(rule, &error, text, offset))),
+    }
+}
+
+fn read_item(text: &str, item: &RawItem, builder: &mut build::Builder) -> Result<Item, Box<Diagnostic>> {
+    let rule = match item.kind {
+        ItemKind::Title => Rule::title_item,
+        ItemKind::Include => Rule::include_item,
+        ItemKind::Curve => Rule::curve_item,
+        ItemKind::Table => Rule::table_item,
+        ItemKind::Const => Rule::const_item,
+        ItemKind::Param => Rule::param_item,
+        ItemKind::Def => Rule::def_item,
+        ItemKind::Angle => Rule::angle_item,
+        ItemKind::Period => Rule::period_item,
+        ItemKind::Frames => Rule::frames_item,
+        ItemKind::Color => Rule::color_item,
+        ItemKind::Gradient => Rule::gradient_item,
+        ItemKind::Surface => Rule::surface_item,
+        ItemKind::Contour => Rule::contour_item,
+        ItemKind::Tropism => Rule::tropism_item,
+        ItemKind::Ignore => Rule::ignore_item,
+        ItemKind::Consider => Rule::consider_item,
+        ItemKind::Interpret => Rule::interpret_item,
+        ItemKind::Rule => Rule::rule_item,
+        ItemKind::Step => Rule::step_item,
+        ItemKind::Axiom => return read_axiom(text, item, builder),
+        ItemKind::Unknown => return Err(Box::new(expected::unknown_line(text, item))),
+    };
+    builder.offset = item.start;
+    let pair = pest_parse(rule, &text[item.start..item.end], item.start)?;
+    builder.item(pair)
+}
+
+/// Reads the initial string piece by piece, so that its size costs memory only for its modules.
+fn read_axiom(text: &str, item: &RawItem, builder: &mut build::Builder) -> Result<Item, Box<Diagnostic>> {
+    const PIECE: usize = 1 << 16;
+    let head = text[item.start..item.end].split(':').next().unwrap_or_default().trim_end();
+    let words: Vec<&str> = head.split_whitespace().collect();
+    let Some(mut at) = item.after_colon.filter(|_| matches!(words[..], ["axiom"] | ["initial", "string"]))
+    else {
+        return Err(Box::new(
+            Diagnostic::error("the initial string is written `initial string: …` or `axiom: …`")
+                .at(
+                    Span::new(item.start, item.start + head.lines().next().unwrap_or("").len()),
+                    if words == ["initial"] {
+                        "expected `string:` after this"
+                    } else {
+                        "expected a `:` after this"
+                    },
+                )
+                .help(advice::initial_string(text[item.start..item.end].lines().next().unwrap_or_default())),
+        ));
+    };
+    let mut modules: Vec<Module> = Vec::new();
+    let mut empty = false;
+    while at < item.end {
+        let end = piece_end(&text[..item.end], at, PIECE);
+        let piece = &text[at..end];
+        if matches!(piece.trim(), "ε" | "epsilon") && modules.is_empty() && end == item.end {
+            empty = true;
+            break;
+        }
+        builder.offset = at;
+        let pair = pest_parse(Rule::modules, piece, at)?;
+        for module in pair.into_inner().filter(|p| p.as_rule() == Rule::module) {
+            modules.push(builder.module(module)?);
+        }
+        if modules.len() > MAX_AXIOM {
+            return Err(Box::new(
+                Diagnostic::error(format!("the initial string has more than {MAX_AXIOM} modules"))
+                    .at(modules[MAX_AXIOM].span, "this one is too many")
+                    .help("begin with fewer, and let rules make the others"),
+            ));
+        }
+        at = end;
+    }
+    if modules.is_empty() && !empty {
+        return Err(Box::new(
+            Diagnostic::error("the initial string is empty")
+                .at(trimmed(text, item), "expected modules after the `:`, such as `F(1) [ +(45) A ]`")
+                .help("an initial string that is meant to be empty is written `ε`"),
+        ));
+    }
+    Ok(Item::Axiom(modules))
+}
+
+/// Where to cut a piece of about `size` bytes: at white space outside parentheses.
+fn piece_end(text: &str, from: usize, size: usize) -> usize {
+    let mut depth = 0i64;
+    for (i, b) in text.bytes().enumerate().skip(from) {
+        match b {
+            b'(' => depth += 1,
+            b')' => depth -= 1,
+            b' ' | b'\n' | b']' if depth <= 0 && i - from >= size => return i,
+            _ => {}
+        }
+    }
+    text.len()
+}
