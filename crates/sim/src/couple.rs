@@ -3,7 +3,6 @@
 use std::collections::HashSet;
 
 use super::error::Error;
-use super::integrator::foresee;
 use super::simulation::Simulation;
 use dlsys_tree::ModuleId;
 
@@ -71,7 +70,7 @@ impl Simulation<'_> {
         let now = self.now;
         if let Some(course) = &self.plant.coupled {
             let control = &mut self.coupled.control;
-            foresee(control, control.last_error, now.since(course.start()), now.resolution());
+            control.foresee(control.last_error, now.since(course.start()), now.resolution());
         }
         (self.coupled.mark, self.coupled.since_mark) = (now, 0);
         self.restart_coupled(now)

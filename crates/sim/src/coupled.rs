@@ -130,10 +130,11 @@ impl Simulation<'_> {
             })
             .flatten();
         // After each, all members are searched.
-        self.coupled.integrator.dear = true;
-        self.coupled.integrator.unwatched = self.model.rules.iter().all(|rule| rule.atoms.is_empty())
+        self.coupled.integrator.expect_high_overhead();
+        let is_unwatched = self.model.rules.iter().all(|rule| rule.atoms.is_empty())
             && self.coupled.flashing.is_empty()
             && self.coupled.system.algebra.is_empty();
+        self.coupled.integrator.set_unwatched(is_unwatched);
         self.coupled.integrator.restart(self.settings.method, self.coupled.y.len());
         if self.coupled.members.is_empty() {
             return Ok(());
@@ -168,7 +169,7 @@ impl Simulation<'_> {
             None => {
                 if std::mem::take(pending) {
                     let mut equations = Equations::new(system, &self.model.rules, None);
-                    let stretches = match integrator.unwatched {
+                    let stretches = match integrator.is_unwatched() {
                         true => integrator.refined(&mut equations, y, &self.coupled_settings),
                         false => vec![integrator.dense(&mut equations, y)],
                     };
@@ -201,7 +202,7 @@ impl Simulation<'_> {
                     let found = Course::of(stretches);
                     let h = found.end.since(from);
                     self.plant.coupled = Some(found);
-                    let stiff = control.stiff || settings.method == Method::Radau;
+                    let stiff = control.stiff || settings.method.is_implicit();
                     let nodes = integrator.nodes();
                     let overlooked = flashing.iter().filter_map(|id| {
                         let how = (settings.tolerance, stiff);
@@ -233,7 +234,7 @@ impl Simulation<'_> {
                     tries += 1;
                     stats.rejected += 1;
                     if tries > MAX_TRIES || settings.method.is_fixed_step() {
-                        break Err(StepError::NotFinite(fault.component()));
+                        break Err(StepError::ValueNotFinite(fault.component()));
                     }
                 }
             }
@@ -243,10 +244,7 @@ impl Simulation<'_> {
             Err(error) => {
                 // What cannot be solved for says more than that no step goes on.
                 let fault = equations.make_consistent(0.0, &mut y.clone()).err();
-                let component = match error {
-                    StepError::TooSmall(c) | StepError::Rate(c) | StepError::NotFinite(c) => c,
-                };
-                if fault.is_none() && self.arrest_coupled(component, from) {
+                if fault.is_none() && self.arrest_coupled(error.component(), from) {
                     return Ok(());
                 }
                 return Err(match fault {
@@ -315,7 +313,7 @@ impl Simulation<'_> {
     pub(super) fn pass_coupled_step(&mut self, at: SimTime) -> Result<(), Error> {
         let Coupled { mark, since_mark, .. } = &mut self.coupled;
         if super::local::crawls(mark, since_mark, at) && !self.settings.method.is_fixed_step() {
-            return Err(self.coupled_error(StepError::TooSmall(0), at));
+            return Err(self.coupled_error(StepError::StepTooSmall(0), at));
         }
         let slice_ends = |from| self.settings.slice_end(from).is_some_and(|end| end == at);
         if self.coupled.repaired || slice_ends(self.coupled.system.start) {
@@ -347,7 +345,7 @@ impl Simulation<'_> {
         }
         self.settings.scheduler == Scheduler::Global
             || self.settings.method.is_fixed_step()
-            || self.settings.method == Method::Radau
+            || self.settings.method.is_implicit()
             || self.coupled.control.stiff
             || self.coupled.linear.is_some()
     }
@@ -385,7 +383,7 @@ impl Simulation<'_> {
     fn coupled_error(&self, error: StepError, at: SimTime) -> Error {
         let Coupled { system, y, .. } = &self.coupled;
         let owner = |component: usize| system.owner(component);
-        if matches!(error, StepError::TooSmall(_) | StepError::NotFinite(_))
+        if matches!(error, StepError::StepTooSmall(_) | StepError::ValueNotFinite(_))
             && let Some(fault) = Equations::new(system, &self.model.rules, None).fading(y)
         {
             return self.unsolved(fault, owner(fault.component()), at);

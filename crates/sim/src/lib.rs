@@ -188,11 +188,6 @@ impl Settings {
     pub const MODULES: usize = 10_000_000;
     pub const EVENTS: u64 = 10_000_000_000;
 
-    /// The grid on which steps of fixed size end.
-    fn grid(&self) -> Option<f64> {
-        self.method.is_fixed_step().then_some(self.step_size)
-    }
-
     /// For equations that decide by chance: there is no tolerance in when an event happens that has no time of its own.
     fn for_clocks(&self, has_clocks: bool) -> Settings {
         match has_clocks {

@@ -1,9 +1,8 @@
 //! Modules that are integrated alone, each with steps of its own.
 
-use super::Method;
 use super::error::Error;
 use super::flash::{self, Glance, MAX_UNBOUNDED};
-use super::integrator::{StepError, foresee};
+use super::integrator::StepError;
 use super::motion::Motion;
 use super::plant::Plant;
 use super::simulation::Simulation;
@@ -162,7 +161,7 @@ impl Simulation<'_> {
             }
             let fixed = self.settings.method.is_fixed_step();
             let settings = self.settings.for_clocks(rule.solves[solve].is_delicate);
-            let stiff = control.stiff || self.settings.method == Method::Radau;
+            let stiff = control.stiff || self.settings.method.is_implicit();
             let flashes = rule.solves[solve].flashes && !fixed;
             let mut tries = 0;
             let step = loop {
@@ -223,7 +222,7 @@ impl Simulation<'_> {
             }
         };
         if crawling && !fixed {
-            return Err(self.step_error(StepError::TooSmall(0), from, |_| Some((id, 0))));
+            return Err(self.step_error(StepError::StepTooSmall(0), from, |_| Some((id, 0))));
         }
         Ok(h)
     }
@@ -238,7 +237,7 @@ impl Simulation<'_> {
             // What comes next begins with what was learnt here.
             let mut control = step.control;
             let (lived, error) = (now.since(step.dense.start), control.last_error);
-            foresee(&mut control, error, lived, now.resolution());
+            control.foresee(error, lived, now.resolution());
             self.hints[kind][solve] = Control { last_error: 1.0, ..control };
         }
     }
@@ -250,9 +249,7 @@ impl Simulation<'_> {
         at: SimTime,
         owner: impl Fn(usize) -> Option<(ModuleId, usize)>,
     ) -> Error {
-        let (StepError::TooSmall(component) | StepError::Rate(component) | StepError::NotFinite(component)) =
-            error;
-        let (id, parameter) = owner(component).unwrap_or_else(|| (self.anyone(), 0));
+        let (id, parameter) = owner(error.component()).unwrap_or_else(|| (self.anyone(), 0));
         let index = self.plant.state(id).and_then(|s| s.rule).unwrap_or(0);
         let rule = &self.model.rules[index];
         let solve = self.plant.state(id).and_then(|s| s.solve);
@@ -263,15 +260,15 @@ impl Simulation<'_> {
         site.module = super::describe(self.model, self.plant.tree.kind(id), &values);
         let name = rule.parameters.get(parameter).cloned().unwrap_or_default();
         if let Some(clock) = rule.clocks.iter().find(|clock| clock.parameter == parameter)
-            && !matches!(error, StepError::TooSmall(_))
+            && !matches!(error, StepError::StepTooSmall(_))
         {
             site.span = rule.produces[clock.produce].span;
             return Error::NotFinite { site, what: "the rate of an event".to_owned() };
         }
         match error {
-            StepError::TooSmall(_) => Error::StepTooSmall { site },
-            StepError::Rate(_) => Error::NotFinite { site, what: format!("the rate of {name}") },
-            StepError::NotFinite(_) => Error::NotFinite { site, what: name },
+            StepError::StepTooSmall(_) => Error::StepTooSmall { site },
+            StepError::RateNotFinite(_) => Error::NotFinite { site, what: format!("the rate of {name}") },
+            _ => Error::NotFinite { site, what: name },
         }
     }
 }
