@@ -42,6 +42,8 @@
 //! assert!(pictures[0].starts_with(b"<svg") && mesh.contains("\nusemtl stem\n"));
 //! ```
 
+#![warn(missing_docs)]
+
 mod camera;
 mod extent;
 mod fit;
@@ -93,7 +95,9 @@ pub const GENERATOR: &str = concat!("dlsys ", env!("CARGO_PKG_VERSION"));
 /// The second pass: one frame after another, each as the bytes of its file.
 #[derive(Clone, Debug)]
 pub struct FrameWriter {
+    /// The format of the files.
     pub format: Format,
+    /// The scale and the style that all frames share.
     pub fit: Fit,
     /// What pictures are drawn on (SVG and PNG).
     pub page: Page,

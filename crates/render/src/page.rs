@@ -28,13 +28,16 @@ impl Default for Size {
     Page::MOST_PIXELS / 1_000_000
 )]
 pub struct TooLarge {
+    /// Pixels from left to right.
     pub width: u32,
+    /// Pixels from top to bottom.
     pub height: u32,
 }
 
 /// What a picture is drawn on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Page {
+    /// The area of the scene that it shows.
     pub picture: Picture,
     /// Width and height.
     pub pixels: [u32; 2],
@@ -45,7 +48,9 @@ pub struct Page {
 impl Page {
     /// A warm white.
     pub const BACKGROUND: Color = Color::hex(0xfbfaf5);
+    /// Most pixels on a side.
     pub const MOST_ON_A_SIDE: u32 = 20_000;
+    /// Most pixels in all.
     pub const MOST_PIXELS: u64 = 50_000_000;
 
     /// A page for a picture. Sides that follow from what is drawn are even, as video encoders want them.

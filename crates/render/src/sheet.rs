@@ -18,6 +18,7 @@ const LONGEST: usize = 1 << 30;
 /// What a sheet cannot hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SheetError {
+    /// The format has no pictures.
     #[error("an OBJ file is one mesh in space: it has no layout")]
     Mesh,
     #[error(
@@ -72,6 +73,7 @@ impl SheetWriter {
         format!("{}.{}", self.sheet.layout.name(), self.format.extension())
     }
 
+    /// The page of the whole sheet.
     pub fn page(&self) -> &Page {
         &self.page
     }

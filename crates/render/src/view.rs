@@ -20,8 +20,10 @@ pub struct View {
 /// What is wrong with a view.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ViewError {
+    /// Neither a name nor a pair of angles: the text.
     #[error("unknown view `{0}`; a view is front, side, top, or AZIMUTH,ELEVATION in degrees")]
     Unknown(String),
+    /// Not within -90 to 90 degrees: the text.
     #[error("elevation {0} is not between -90 and 90 degrees")]
     Elevation(String),
 }
