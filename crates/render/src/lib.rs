@@ -45,6 +45,7 @@
 #![warn(missing_docs)]
 
 mod camera;
+mod error;
 mod extent;
 mod fit;
 mod format;
@@ -73,17 +74,18 @@ mod view;
 
 pub use camera::Camera;
 pub use fit::{Fit, Picture, Survey};
-pub use format::{Content, Exporter, Format, FormatError};
-pub use frames::{Error, FrameDirectory, MANIFEST, Staged, Staging, replace};
+pub use error::Error;
+pub use format::{Content, Exporter, Format};
+pub use frames::{FrameDirectory, MANIFEST, Staged, Staging, replace};
 pub use layout::{Layout, Sheet, Spacing};
 pub use lengths::{CrossSection, Length, cross_section, lengths};
 pub use light::Light;
 pub use manifest::{FrameRecord, Manifest};
-pub use page::{Page, Size, TooLarge};
-pub use sheet::{Assembly, Part, SheetError, SheetWriter};
+pub use page::{Page, Size};
+pub use sheet::{Assembly, Part, SheetWriter};
 pub use triangulate::{normal, triangulate};
 pub use tube::Spoke;
-pub use view::{View, ViewError};
+pub use view::View;
 
 use std::io::{self, Write};
 

@@ -1,6 +1,6 @@
 //! The page that a picture is drawn on: its area, its size in pixels, its background.
 
-use super::Picture;
+use super::{Error, Picture};
 use dlsys_geometry::scene::Color;
 
 /// Size of a picture, in pixels.
@@ -18,20 +18,6 @@ impl Default for Size {
     fn default() -> Size {
         Size::Larger(1000)
     }
-}
-
-/// A picture that would not fit into memory.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "a picture of {width} x {height} pixels is too large; at most {} on a side and {} million in all",
-    Page::MOST_ON_A_SIDE,
-    Page::MOST_PIXELS / 1_000_000
-)]
-pub struct TooLarge {
-    /// Pixels from left to right.
-    pub width: u32,
-    /// Pixels from top to bottom.
-    pub height: u32,
 }
 
 /// What a picture is drawn on.
@@ -57,7 +43,7 @@ impl Page {
     ///
     /// # Errors
     /// If a side is 0 or there are too many pixels.
-    pub fn new(picture: Picture, size: Size, background: Option<Color>) -> Result<Page, TooLarge> {
+    pub fn new(picture: Picture, size: Size, background: Option<Color>) -> Result<Page, Error> {
         let [_, _, width, height] = picture.area;
         let (picture, pixels) = match size {
             Size::Larger(n) => (picture, within(picture, n)),
@@ -67,7 +53,7 @@ impl Page {
         let [width, height] = pixels;
         let fits = |side: u32| (1..=Page::MOST_ON_A_SIDE).contains(&side);
         if !fits(width) || !fits(height) || u64::from(width) * u64::from(height) > Page::MOST_PIXELS {
-            return Err(TooLarge { width, height });
+            return Err(Error::PageTooLarge { width, height });
         }
         Ok(Page { picture, pixels, background })
     }
