@@ -216,7 +216,7 @@ pub enum Error {
     Draw(#[from] turtle::Error),
     /// There is no such format.
     #[error(transparent)]
-    Format(#[from] dlsys_render::FormatError),
+    Format(#[from] dlsys_render::Error),
     /// The file cannot be written.
     #[error("cannot write {}: {error}", path.display())]
     Write {

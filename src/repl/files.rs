@@ -107,7 +107,7 @@ impl Stage<'_> {
             },
         };
         let view = match value(&mut words, "--view")? {
-            Some(text) => text.parse().map_err(|error: render::ViewError| Fault::new(error))?,
+            Some(text) => text.parse().map_err(|error: render::Error| Fault::new(error))?,
             None => View::FRONT,
         };
         let perspective =

@@ -29,7 +29,7 @@ impl Stage<'_> {
                 blocks = true;
                 continue;
             }
-            view = word.parse().map_err(|error: crate::render::ViewError| {
+            view = word.parse().map_err(|error: crate::render::Error| {
                 Fault::new(format!("{error}\n  it is used as `draw {}`", usage()))
             })?;
         }

@@ -3,6 +3,8 @@
 //! Every stage has its own errors; all of them end here, in a [`Diagnostic`], and there is one function
 //! that draws them ([`Diagnostic::render`]), for the command line, the tests and whoever embeds the library.
 
+#![warn(missing_docs)]
+
 use std::ops::Range;
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
@@ -10,11 +12,14 @@ use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 /// A stretch of the source text, in bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Span {
+    /// The first byte.
     pub start: u32,
+    /// The byte after the last one.
     pub end: u32,
 }
 
 impl Span {
+    /// The bytes from `start` up to `end`, excluded.
     pub fn new(start: usize, end: usize) -> Span {
         // Sources are bounded far below 4 GiB (`Source::LIMIT`).
         Span { start: start as u32, end: end as u32 }
@@ -25,6 +30,7 @@ impl Span {
         Span { start: self.start.min(other.start), end: self.end.max(other.end) }
     }
 
+    /// The bytes, for slicing [`Source::text`].
     pub fn range(self) -> Range<usize> {
         self.start as usize..self.end as usize
     }
@@ -36,6 +42,7 @@ impl Span {
 pub struct Source {
     /// The file as the user named it.
     pub name: String,
+    /// The text, UTF-8, with everything that it includes behind it.
     pub text: String,
     /// Byte at which each line starts.
     lines: Vec<u32>,
@@ -139,8 +146,10 @@ impl Source {
     }
 }
 
+/// How grave a message is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Severity {
+    /// The model cannot be used, or the run cannot go on.
     Error,
     /// Does not stop a run.
     Warning,
@@ -149,7 +158,9 @@ pub enum Severity {
 /// One message.
 #[derive(Clone, Debug)]
 pub struct Diagnostic {
+    /// How grave it is.
     pub severity: Severity,
+    /// One sentence without a full stop: what is wrong.
     pub message: String,
     /// Places in the text with a remark each; the first is where the fault is.
     pub labels: Vec<(Span, String)>,
@@ -170,10 +181,12 @@ impl Diagnostic {
         }
     }
 
+    /// A message that stops a run, without labels, notes or advice.
     pub fn error(message: impl Into<String>) -> Diagnostic {
         Diagnostic::new(Severity::Error, message)
     }
 
+    /// A message that does not stop a run, without labels, notes or advice.
     pub fn warning(message: impl Into<String>) -> Diagnostic {
         Diagnostic::new(Severity::Warning, message)
     }
@@ -184,11 +197,13 @@ impl Diagnostic {
         self
     }
 
+    /// Adds a further fact: one sentence without a full stop.
     pub fn note(mut self, note: impl Into<String>) -> Diagnostic {
         self.notes.push(note.into());
         self
     }
 
+    /// Adds advice: what to write instead, or where to look.
     pub fn help(mut self, help: impl Into<String>) -> Diagnostic {
         self.help.push(help.into());
         self

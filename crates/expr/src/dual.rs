@@ -5,7 +5,9 @@ use super::{Array, Binary, Curve, Interval, Part, Unary, Value};
 /// A value and its rate of change.
 #[derive(Clone, Copy, Debug)]
 pub struct Dual<T> {
+    /// The value.
     pub value: T,
+    /// Its derivative along the trajectory: per unit of time, or per unit of position in a step.
     pub rate: T,
 }
 

@@ -23,7 +23,9 @@ pub enum Node {
     Const(u64),
     /// A variable, by number; what it stands for is the user's business.
     Var(u32),
+    /// A function or operator of one operand.
     Unary(Unary, NodeId),
+    /// A function or operator of two operands, in their order.
     Binary(Binary, NodeId, NodeId),
     /// `Select(condition, then, else)`.
     Select(NodeId, NodeId, NodeId),
@@ -53,7 +55,9 @@ pub struct Graph {
 /// `derivative of whole by argument = the expression that this is said of`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Integral {
+    /// The antiderivative.
     pub whole: NodeId,
+    /// The expression by which it is one.
     pub argument: NodeId,
 }
 
@@ -63,6 +67,7 @@ impl Graph {
         &self.nodes
     }
 
+    /// The operation that an expression is. Panics for an id of another graph that is larger.
     pub fn node(&self, id: NodeId) -> Node {
         self.nodes[id.index()]
     }
@@ -89,10 +94,12 @@ impl Graph {
         Lookup(self.arrays.len() as u32 - 1)
     }
 
+    /// The curve of a lookup.
     pub fn curve_of(&self, lookup: Lookup) -> &Arc<Curve> {
         &self.curves[lookup.0 as usize]
     }
 
+    /// The array of a lookup.
     pub fn array_of(&self, lookup: Lookup) -> &Arc<Array> {
         &self.arrays[lookup.0 as usize]
     }
@@ -139,6 +146,7 @@ impl Graph {
         among.iter().filter_map(|id| Some((*id, *self.integrals.get(id)?))).collect()
     }
 
+    /// A part of a curve at `x`; folded if `x` is constant.
     pub fn curve(&mut self, curve: Lookup, part: Part, x: NodeId) -> NodeId {
         match self.as_constant(x) {
             Some(x) => self.constant(self.curve_of(curve).eval(part, x)),
@@ -146,6 +154,7 @@ impl Graph {
         }
     }
 
+    /// A part of one piece of a curve, continued beyond its knots, at `x` ([`Curve::continued`]); folded if both operands are constant.
     pub fn piece(&mut self, curve: Lookup, part: Part, index: NodeId, x: NodeId) -> NodeId {
         match (self.as_constant(index), self.as_constant(x)) {
             (Some(index), Some(x)) => self.constant(self.curve_of(curve).continued(part, index, x)),
@@ -153,6 +162,7 @@ impl Graph {
         }
     }
 
+    /// The element of an array with a number ([`Array::element`]); folded if the number is constant.
     pub fn element(&mut self, array: Lookup, index: NodeId) -> NodeId {
         match self.as_constant(index) {
             Some(index) => self.constant(self.array_of(array).element(index)),
@@ -160,10 +170,12 @@ impl Graph {
         }
     }
 
+    /// A constant, by its bits: 0 and -0 differ, NaN equals itself.
     pub fn constant(&mut self, x: f64) -> NodeId {
         self.intern(Node::Const(x.to_bits()))
     }
 
+    /// The variable with a number; its meaning is up to the caller.
     pub fn var(&mut self, index: u32) -> NodeId {
         self.intern(Node::Var(index))
     }
@@ -176,6 +188,7 @@ impl Graph {
         }
     }
 
+    /// A function or operator of one operand; folded if the operand is constant.
     pub fn unary(&mut self, op: Unary, a: NodeId) -> NodeId {
         match self.as_constant(a) {
             Some(x) => self.constant(f64::unary(op, x)),
@@ -196,6 +209,7 @@ impl Graph {
         self.intern(Node::Binary(op, a, b))
     }
 
+    /// `a` where `condition` is true, else `b`; folded if the condition is constant.
     pub fn select(&mut self, condition: NodeId, a: NodeId, b: NodeId) -> NodeId {
         match self.as_constant(condition) {
             Some(c) if c != 0.0 => a,

@@ -19,6 +19,7 @@ pub struct Interval {
 }
 
 impl Interval {
+    /// No value: the expression is undefined on the whole set.
     pub const EMPTY: Interval = Interval { lo: f64::NAN, hi: f64::NAN, partial: true };
     /// Anything at all.
     pub const ENTIRE: Interval = Interval { lo: f64::NEG_INFINITY, hi: f64::INFINITY, partial: true };
@@ -28,10 +29,12 @@ impl Interval {
         Interval { lo: a.min(b), hi: a.max(b), partial: false }
     }
 
+    /// True if the expression is undefined on the whole set.
     pub fn is_empty(self) -> bool {
         self.lo.is_nan()
     }
 
+    /// True if a number lies between the bounds, ends included; never of an empty interval.
     pub fn contains(self, x: f64) -> bool {
         self.lo <= x && x <= self.hi
     }

@@ -20,6 +20,8 @@
 //! assert_eq!(program.eval_one(&[3.0]), 1.5);
 //! ```
 
+#![warn(missing_docs)]
+
 mod comparison;
 mod curve;
 mod derivative;

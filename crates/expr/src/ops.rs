@@ -7,47 +7,78 @@ use super::{Array, Curve, Part};
 /// Functions and operators of one operand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Unary {
+    /// -a
     Neg,
     /// What a product of something with itself is compiled to: bounds of it are narrower than those of a product.
     Square,
     /// Logical negation of a truth value.
     Not,
+    /// Square root; NaN below 0.
     Sqrt,
+    /// e to the power a.
     Exp,
+    /// Natural logarithm; -∞ at 0, NaN below.
     Ln,
+    /// Logarithm to base 10; -∞ at 0, NaN below.
     Log10,
+    /// Absolute value.
     Abs,
     /// -1, 0 or 1; NaN stays NaN.
     Sign,
+    /// Greatest whole number that is not above a.
     Floor,
+    /// Least whole number that is not below a.
     Ceil,
+    /// Sine of an angle in radians.
     Sin,
+    /// Cosine of an angle in radians.
     Cos,
+    /// Tangent of an angle in radians.
     Tan,
+    /// Arcus sine in radians, from -π/2 to π/2; NaN beyond ±1.
     Asin,
+    /// Arcus cosine in radians, from 0 to π; NaN beyond ±1.
     Acos,
+    /// Arcus tangent in radians, from -π/2 to π/2.
     Atan,
+    /// Hyperbolic sine.
     Sinh,
+    /// Hyperbolic cosine.
     Cosh,
+    /// Hyperbolic tangent.
     Tanh,
 }
 
 /// Functions and operators of two operands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Binary {
+    /// a + b.
     Add,
+    /// a - b.
     Sub,
+    /// a times b.
     Mul,
+    /// a divided by b, as IEEE 754 has it: ±∞ or NaN for b = 0.
     Div,
+    /// a to the power b; NaN for a negative a and a b that is not whole.
     Pow,
+    /// The lesser; NaN if one is NaN.
     Min,
+    /// The greater; NaN if one is NaN.
     Max,
+    /// The angle of the point (b, a) in radians, from -π to π.
     Atan2,
+    /// a < b.
     Lt,
+    /// a ≤ b.
     Le,
+    /// a = b.
     Eq,
+    /// a ≠ b; true with NaN.
     Ne,
+    /// Both are true.
     And,
+    /// One is true, or both.
     Or,
 }
 
@@ -82,8 +113,11 @@ impl Binary {
 
 /// A number-like type that a [`Program`](super::Program) can be evaluated in.
 pub trait Value: Copy {
+    /// The type's view of a number.
     fn constant(x: f64) -> Self;
+    /// A function or operator of one operand.
     fn unary(op: Unary, a: Self) -> Self;
+    /// A function or operator of two operands.
     fn binary(op: Binary, a: Self, b: Self) -> Self;
     /// `a` where `condition` is true, else `b`.
     fn select(condition: Self, a: Self, b: Self) -> Self;

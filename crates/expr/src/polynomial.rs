@@ -15,6 +15,7 @@ pub type Monomial = Vec<(u32, u32)>;
 /// are left out.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Polynomial {
+    /// The coefficient of each monomial; the empty monomial is the constant term.
     pub terms: BTreeMap<Monomial, NodeId>,
 }
 

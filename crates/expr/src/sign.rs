@@ -3,8 +3,11 @@
 /// The sign of `a - b`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Sign {
+    /// `a < b`.
     Minus,
+    /// `a = b`, within the tolerance of whoever tells the sign.
     Zero,
+    /// `a > b`.
     Plus,
     /// Not yet known: it is zero now, and where it goes depends on equations that are being chosen.
     Any,
@@ -14,6 +17,7 @@ pub enum Sign {
 }
 
 impl Sign {
+    /// The exact sign of a number; undefined for NaN.
     pub fn of(x: f64) -> Sign {
         if x < 0.0 {
             Sign::Minus

@@ -11,8 +11,10 @@ pub struct SimTime {
 }
 
 impl SimTime {
+    /// The start of a run.
     pub const ZERO: SimTime = SimTime { high: 0.0, low: 0.0 };
 
+    /// The time `t`, in units of simulated time.
     pub fn new(t: f64) -> SimTime {
         SimTime { high: t, low: 0.0 }
     }

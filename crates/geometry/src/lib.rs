@@ -3,5 +3,7 @@
 //! - [`scene`]: elements, materials, meshes, patches, bounds.
 //! - [`turtle`]: strings of modules as a scene.
 
+#![warn(missing_docs)]
+
 pub mod scene;
 pub mod turtle;

@@ -1,4 +1,4 @@
-//! The solution within one step, as polynomials in Bernstein form.
+//! Dense output: the solution within one step, as polynomials in Bernstein form.
 //!
 //! Every method's dense output is a polynomial; in Bernstein form its coefficients bound it (the convex
 //! hull property), so that a step can be searched for events without sampling it (Farouki 2012, sections
@@ -9,8 +9,9 @@ use dlsys_expr::{Dual, Interval, Value};
 
 /// Highest degree of a dense output.
 pub const MAX_DEGREE: usize = 7;
-/// Where the error of interpolation is measured, and Bernstein polynomials of degree 7 and their slopes there.
-pub const PLACE: f64 = 0.7;
+/// The position at which the error of interpolation is measured.
+pub(crate) const PLACE: f64 = 0.7;
+/// Bernstein polynomials of degree 7 and their slopes at [`PLACE`].
 const AT_PLACE: [[f64; 8]; 2] = bernstein(PLACE);
 
 const fn bernstein(at: f64) -> [[f64; 8]; 2] {
@@ -28,16 +29,19 @@ const fn bernstein(at: f64) -> [[f64; 8]; 2] {
     all
 }
 
+/// Bernstein coefficients of one component; those above the degree of the dense output are 0 or mean nothing.
 pub type Coefficients = [f64; MAX_DEGREE + 1];
 
 /// All components of the solution from `start` to `start + h`.
 #[derive(Clone, Debug)]
 pub struct Dense {
+    /// Time at position 0.
     pub start: SimTime,
+    /// Time at position 1.
     pub end: SimTime,
-    /// Length of the step.
+    /// Length of the step, in units of simulated time.
     pub h: f64,
-    /// What its components may be wrong by, as a part of their size.
+    /// Bound of the error of the components, relative to their size; 0 where the output is exact.
     pub error: f64,
     degree: usize,
     /// `degree + 1` coefficients for each component.
@@ -45,7 +49,8 @@ pub struct Dense {
 }
 
 impl Dense {
-    /// A step to `end`, if that is known better than as `start` and `h`.
+    /// A step to `end`, if that is known more precisely than as `start + h`. `coefficients` holds `degree + 1` for each component;
+    /// `degree` is at most [`MAX_DEGREE`].
     pub fn new(start: SimTime, end: Option<SimTime>, h: f64, degree: usize, coefficients: Vec<f64>) -> Dense {
         debug_assert!(degree <= MAX_DEGREE);
         Dense { start, end: end.unwrap_or_else(|| start.after(h)), h, error: 0.0, degree, coefficients }
@@ -68,7 +73,7 @@ impl Dense {
     /// One component at a position, by de Casteljau's algorithm.
     pub fn value(&self, component: usize, position: f64) -> f64 {
         let c = self.of(component);
-        // Of the degrees that methods have most often, code without loops.
+        // The most common degrees have code without loops.
         if let Ok(c) = c.try_into() {
             return casteljau::<5>(c, position);
         }
@@ -117,7 +122,7 @@ impl Dense {
         Dense { start, end, h, error: self.error, degree: MAX_DEGREE, coefficients: all }
     }
 
-    /// One component at a position, and its rate there per unit of position.
+    /// One component at a position, and its rate there, per unit of position.
     pub fn departure(&self, component: usize, position: f64) -> Dual<f64> {
         let mut c: Coefficients = [0.0; MAX_DEGREE + 1];
         c[..=self.degree].copy_from_slice(self.of(component));
@@ -132,8 +137,8 @@ impl Dense {
         Dual { value: mix(c[0], c[1], position), rate: self.degree as f64 * (c[1] - c[0]) }
     }
 
-    /// The value of one component and its rate, per unit of position, at [`PLACE`]; quick for polynomials of degree 7.
-    pub fn at_place(&self, component: usize) -> (f64, f64) {
+    /// The value of one component and its rate, per unit of position, at [`PLACE`]; fast for polynomials of degree 7.
+    pub(crate) fn at_place(&self, component: usize) -> (f64, f64) {
         let Ok(c): Result<&[f64; 8], _> = self.of(component).try_into() else {
             let Dual { value, rate } = self.departure(component, PLACE);
             return (value, rate);
@@ -141,7 +146,7 @@ impl Dense {
         AT_PLACE.map(|weights| weights.iter().zip(c).map(|(w, c)| w * c).sum()).into()
     }
 
-    /// Bounds of one component over the whole step.
+    /// Bounds of one component over the whole step: the hull of its coefficients.
     pub fn bounds(&self, component: usize) -> Interval {
         hull(self.of(component))
     }
@@ -175,7 +180,7 @@ impl Dense {
     }
 }
 
-/// Cuts off what is after `hi`, then what is before `lo`.
+/// Restricts a polynomial to the positions from `lo` to `hi` (de Casteljau's subdivision, at `hi` and then at `lo`).
 fn cut(c: &mut [f64], lo: f64, hi: f64) {
     let degree = c.len() - 1;
     if hi < 1.0 {
@@ -195,7 +200,7 @@ fn cut(c: &mut [f64], lo: f64, hi: f64) {
     }
 }
 
-/// The value of a polynomial with so many coefficients.
+/// The value of a polynomial with `N` coefficients.
 #[inline(always)]
 fn casteljau<const N: usize>(coefficients: &[f64; N], position: f64) -> f64 {
     let mut c = *coefficients;

@@ -1,26 +1,39 @@
-//! Ordinary differential equations: one step of a method, the solution inside it, and the search of that for roots.
+//! Initial value problems for ordinary differential equations: steps of controlled error, the solution inside each step, and the search
+//! of that for roots.
 //!
-//! - [`Method`]: the methods by name. To add an explicit one: its coefficients in `tableau.rs`, its name in `method.rs`, and its dense
-//!   output in `runge_kutta.rs`.
-//! - [`Workspace`]: explicit Runge-Kutta steps; what becomes of one is a [`Trial`]. Equations are [`Rates`].
-//! - [`Implicit`]: Radau IIA steps, by [`sparse`] elimination.
+//! ```text
+//! Rates ──OneStep──▶ Trial ──Stepper──▶ step accepted ──▶ Dense ──first_root──▶ Root
+//! ```
+//!
+//! - [`Rates`]: the system of equations `y' = f(t, y)`.
+//! - [`Method`]: the methods by name; [`OneStep`] is what each implements (`methods/`, whose `mod.rs` says how to add one).
+//! - [`Stepper`]: makes steps with a method and controls their length; its page has an example. [`Control`] is what it remembers.
 //! - [`Dense`]: all components over a step, as polynomials in Bernstein form.
-//! - [`roots`]: the first change of sign of a function that is known by bounds.
+//! - [`first_root`]: the first change of sign of a function of which bounds are known.
+//! - [`Pattern`]: sparse elimination, for the implicit method and for others who solve linear systems on trees.
 //!
-//! Nothing here knows of modules or productions.
+//! The equations, and events in them, belong to the caller: this crate knows of numbers only.
 
-pub mod dense;
-pub mod implicit;
-mod method;
-mod radau;
-pub mod roots;
-pub mod runge_kutta;
-pub mod sparse;
-mod tableau;
+#![warn(missing_docs)]
 
+mod control;
+mod dense;
+mod error;
+mod methods;
+mod one_step;
+mod rates;
+mod roots;
+mod sparse;
+mod stepper;
+mod workspace;
+
+pub use control::{CERTAINTY, Control, StepSettings, next_grid_time};
 pub use dense::{Coefficients, Dense, MAX_DEGREE};
-pub use implicit::Implicit;
-pub use method::Method;
+pub use error::Error;
+pub use methods::Method;
+pub use one_step::{InteriorError, Nodes, OneStep, Step, Trial};
+pub use rates::Rates;
 pub use roots::{Function, Root, first_root};
-pub use runge_kutta::{Inside, Nodes, Rates, Trial, Workspace};
-pub use sparse::{Pattern, Wide};
+pub use sparse::{Complex, Field, Pattern, Wide};
+pub use stepper::Stepper;
+pub use workspace::Workspace;

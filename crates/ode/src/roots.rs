@@ -9,7 +9,7 @@
 //! # Contract
 //!
 //! - The sign just after the start of the search is given by the caller (`Sign::Any` if not known). A zero
-//!   at the start itself is not a root: it has been judged before.
+//!   at the start itself is not a root: it belongs to the search before.
 //! - The first root is returned: an instant at which the sign becomes another, or zero is touched.
 //! - Zero means within `tolerance`, which should stand for the rounding of the function's values.
 //! - Work is bounded: after `MAX_PIECES` stretches the rest is judged by the signs at their ends only.
@@ -27,12 +27,14 @@ const MAX_PIECES: usize = 1024;
 pub trait Function {
     /// Bounds of the value and of its rate from `lo` to `hi`.
     fn bounds(&mut self, lo: f64, hi: f64) -> Dual<Interval>;
+    /// The value at a position; NaN where it is undefined.
     fn value(&mut self, at: f64) -> f64;
 }
 
 /// A root found by [`first_root`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Root {
+    /// Where in the step, from 0 to 1.
     pub position: f64,
     /// The sign at the root: zero, unless the function jumps over it.
     pub at: Sign,
@@ -42,33 +44,76 @@ pub struct Root {
 
 /// Finds the first root in `(from, to]`; see the contract above.
 pub fn first_root(f: &mut impl Function, from: f64, to: f64, start: Sign, tolerance: f64) -> Option<Root> {
-    let classify = |g: f64| if g.abs() <= tolerance { Sign::Zero } else { Sign::of(g) };
-    let mut sign = start;
-    let first = classify(f.value(from));
-    if first != Sign::Zero && sign == Sign::Any {
-        sign = first;
+    let mut search = Search { f, to, tolerance, sign: start, armed: false };
+    let first = search.sign_at(from);
+    if first != Sign::Zero && search.sign == Sign::Any {
+        search.sign = first;
     }
     // Where it is undefined from here on it may be defined here.
-    if first != Sign::Zero && first != sign && sign != Sign::Undefined {
+    if first != Sign::Zero && first != search.sign && search.sign != Sign::Undefined {
         return Some(Root { position: from, at: Sign::Zero, after: first });
     }
     // Off zero: a root from here on is one that was not there before.
-    let mut armed = first != Sign::Zero;
+    search.armed = first != Sign::Zero;
     let mut stack = vec![(from, to)];
     let mut pieces = 0;
     while let Some((lo, hi)) = stack.pop() {
         pieces += 1;
-        let Dual { value: mut g, rate } = f.bounds(lo, hi);
-        if g.is_empty() {
-            if sign != Sign::Undefined {
-                return Some(Root { position: lo, at: Sign::Undefined, after: Sign::Undefined });
+        match search.examine(lo, hi, pieces > MAX_PIECES) {
+            Finding::Nothing => {}
+            Finding::Root(root) => return Some(root),
+            Finding::Halve => {
+                let middle = 0.5 * (lo + hi);
+                stack.extend([(middle, hi), (lo, middle)]);
             }
-            continue;
         }
-        let middle = 0.5 * (lo + hi);
+    }
+    None
+}
+
+/// The state of a search, which goes from stretch to stretch in the order of position.
+struct Search<'f, F> {
+    f: &'f mut F,
+    to: f64,
+    tolerance: f64,
+    /// The sign up to here.
+    sign: Sign,
+    /// The function was off zero somewhere up to here.
+    armed: bool,
+}
+
+/// The result of a look at a stretch.
+enum Finding {
+    /// It holds no root.
+    Nothing,
+    Root(Root),
+    /// Bounds are too wide to tell: its halves are to be searched.
+    Halve,
+}
+
+impl<F: Function> Search<'_, F> {
+    fn classify(&self, g: f64) -> Sign {
+        if g.abs() <= self.tolerance { Sign::Zero } else { Sign::of(g) }
+    }
+
+    fn sign_at(&mut self, at: f64) -> Sign {
+        let g = self.f.value(at);
+        self.classify(g)
+    }
+
+    /// Searches a stretch; if it is the `last`, it is judged by its ends.
+    fn examine(&mut self, lo: f64, hi: f64, last: bool) -> Finding {
+        let (sign, tolerance) = (self.sign, self.tolerance);
+        let Dual { value: mut g, rate } = self.f.bounds(lo, hi);
+        if g.is_empty() {
+            return match sign {
+                Sign::Undefined => Finding::Nothing,
+                _ => Finding::Root(Root { position: lo, at: Sign::Undefined, after: Sign::Undefined }),
+            };
+        }
         if !rate.partial && !g.partial {
             // The mean value theorem often bounds more tightly than the expression itself.
-            let (centre, reach) = (f.value(middle), 0.5 * (hi - lo) * rate.magnitude());
+            let (centre, reach) = (self.f.value(0.5 * (lo + hi)), 0.5 * (hi - lo) * rate.magnitude());
             if centre.is_finite() && reach.is_finite() {
                 g.lo = g.lo.max(centre - reach);
                 g.hi = g.hi.min(centre + reach);
@@ -81,100 +126,111 @@ pub fn first_root(f: &mut impl Function, from: f64, to: f64, start: Sign, tolera
             Sign::Undefined => false,
         };
         if settled && !g.partial {
-            armed |= matches!(sign, Sign::Plus | Sign::Minus);
-            continue;
+            self.armed |= matches!(sign, Sign::Plus | Sign::Minus);
+            return Finding::Nothing;
         }
         let monotone = !rate.partial && !g.partial && (rate.lo > 0.0 || rate.hi < 0.0);
-        let narrow = hi - lo <= NARROW * hi || hi <= SMALL || pieces > MAX_PIECES;
+        let narrow = hi - lo <= NARROW * hi || hi <= SMALL || last;
         if !monotone && !narrow {
-            stack.extend([(middle, hi), (lo, middle)]);
-            continue;
+            return Finding::Halve;
         }
-        let end = classify(f.value(hi));
-        if armed {
-            // Exactly: a value that merely comes within the tolerance may be about to cross.
-            let exact = Sign::of(f.value(hi));
-            // At the very end of the stretch, if it is about to cross within the rounding of the position.
-            if monotone && hi >= to && exact == sign && end == Sign::Zero {
-                let rate = f.bounds(lo.max(hi - 1e-9 * hi), hi).rate;
-                let steep = rate.lo.abs().min(rate.hi.abs()) * 16.0 * f64::EPSILON * hi;
-                if f.value(hi).abs() <= steep && (rate.hi < 0.0) == (sign == Sign::Plus) {
-                    return Some(Root { position: hi, at: Sign::Zero, after: opposite(sign) });
-                }
+        let end = self.sign_at(hi);
+        let found = if !self.armed {
+            self.leave_zero(lo, hi, end)
+        } else {
+            let crossing = self.crossing(lo, hi, end, monotone);
+            if crossing.is_some() || monotone { crossing } else { self.touch(lo, hi, end) }
+        };
+        found.map_or(Finding::Nothing, Finding::Root)
+    }
+
+    /// A change of sign in a stretch that is monotone or narrow and has the sign `end` at its end.
+    fn crossing(&mut self, lo: f64, hi: f64, end: Sign, monotone: bool) -> Option<Root> {
+        let sign = self.sign;
+        // Exactly: a value that merely comes within the tolerance may be about to cross.
+        let exact = Sign::of(self.f.value(hi));
+        // At the very end of the stretch, if it is about to cross within the rounding of the position.
+        if monotone && hi >= self.to && exact == sign && end == Sign::Zero {
+            let rate = self.f.bounds(lo.max(hi - 1e-9 * hi), hi).rate;
+            let steep = rate.lo.abs().min(rate.hi.abs()) * 16.0 * f64::EPSILON * hi;
+            if self.f.value(hi).abs() <= steep && (rate.hi < 0.0) == (sign == Sign::Plus) {
+                return Some(Root { position: hi, at: Sign::Zero, after: opposite(sign) });
             }
-            let crossed = if monotone { exact != sign } else { end != sign && end != Sign::Zero };
-            if crossed {
-                let position = bracket(f, lo, hi, sign);
-                if monotone {
-                    let after = if exact == Sign::Zero { opposite(sign) } else { exact };
-                    return Some(Root { position, at: Sign::Zero, after });
-                }
-                // Too narrow to see how it gets from one side to the other: it jumps, or as good as.
-                let near = [f.value(lo), f.value(position)].into_iter().any(|g| classify(g) == Sign::Zero);
-                let at = if near { Sign::Zero } else { exact };
-                return Some(Root { position, at, after: exact });
+        }
+        let crossed = if monotone { exact != sign } else { end != sign && end != Sign::Zero };
+        if !crossed {
+            return None;
+        }
+        let position = bracket(self.f, lo, hi, sign);
+        if monotone {
+            let after = if exact == Sign::Zero { opposite(sign) } else { exact };
+            return Some(Root { position, at: Sign::Zero, after });
+        }
+        // Too narrow to see how it gets from one side to the other: it jumps, or as good as.
+        let near = [self.f.value(lo), self.f.value(position)];
+        let is_near = near.into_iter().any(|g| self.classify(g) == Sign::Zero);
+        Some(Root { position, at: if is_near { Sign::Zero } else { exact }, after: exact })
+    }
+
+    /// An extremum on zero, or within the tolerance, in a narrow stretch that has the sign `end` at its end.
+    fn touch(&mut self, lo: f64, hi: f64, end: Sign) -> Option<Root> {
+        let (sign, middle) = (self.sign, 0.5 * (lo + hi));
+        let seen = [(middle, self.sign_at(middle)), (hi, end)];
+        let (at, _) = seen.into_iter().find(|(_, seen)| *seen == Sign::Zero)?;
+        // A kink in a crossing looks like one, as far as its value is zero.
+        let (beyond, after) = self.way_out(at);
+        let position = if after == opposite(sign) {
+            if Sign::of(self.f.value(lo)) == sign { bracket(self.f, lo, beyond, sign) } else { lo }
+        } else if after == Sign::Zero {
+            // It stays there: from where it is as small as it gets.
+            let least = 2.0 * self.f.value(beyond).abs();
+            first_where(lo, beyond, |x| self.f.value(x).abs() <= least)
+        } else {
+            first_where(lo, at, |x| self.sign_at(x) == Sign::Zero)
+        };
+        Some(Root { position, at: Sign::Zero, after })
+    }
+
+    /// The end of a zero that has lasted since the start of the search, in a stretch that has the sign `end` at its end.
+    fn leave_zero(&mut self, lo: f64, hi: f64, end: Sign) -> Option<Root> {
+        if end == Sign::Zero {
+            return None;
+        }
+        if self.sign == Sign::Any {
+            self.sign = end;
+        }
+        if end == self.sign {
+            self.armed = true;
+            return None;
+        }
+        // It leaves zero continuously, or it jumps.
+        let position = first_where(lo, hi, |x| self.sign_at(x) != Sign::Zero);
+        let (there, later) = (self.f.value(position).abs(), self.f.value(hi).abs());
+        let jumps = there > 4.0 * self.tolerance && there > 0.5 * later && later.is_finite();
+        Some(match self.sign == Sign::Undefined || jumps {
+            true => Root { position, at: end, after: end },
+            false => Root { position: lo, at: Sign::Zero, after: end },
+        })
+    }
+
+    /// The nearest position found after a zero at `at` where the function is no longer zero, and its sign there; the sign is zero if
+    /// there is none nearby.
+    fn way_out(&mut self, at: f64) -> (f64, Sign) {
+        /// A function that is zero up to here, relative to the position, stays zero.
+        const NEARBY: f64 = 1e-6;
+        let (size, mut reach) = (at.max(SMALL), NARROW * at.max(SMALL));
+        loop {
+            let position = (at + reach).min(self.to);
+            let sign = self.sign_at(position);
+            if sign != Sign::Zero || position >= self.to || reach > NEARBY * size {
+                return (position, sign);
             }
-            if !monotone {
-                // An extremum on zero, or near enough.
-                for (at, seen) in [(middle, classify(f.value(middle))), (hi, end)] {
-                    if seen == Sign::Zero {
-                        // A kink in a crossing looks like one, as far as its value is zero.
-                        let (beyond, after) = way_out(f, at, to, classify);
-                        if after == opposite(sign) {
-                            let position =
-                                if Sign::of(f.value(lo)) == sign { bracket(f, lo, beyond, sign) } else { lo };
-                            return Some(Root { position, at: Sign::Zero, after });
-                        }
-                        let position = if after == Sign::Zero {
-                            // It stays there: from where it is as small as it gets.
-                            let least = 2.0 * f.value(beyond).abs();
-                            first_where(lo, beyond, |x| f.value(x).abs() <= least)
-                        } else {
-                            first_where(lo, at, |x| classify(f.value(x)) == Sign::Zero)
-                        };
-                        return Some(Root { position, at: Sign::Zero, after });
-                    }
-                }
-            }
-        } else if end != Sign::Zero {
-            if sign == Sign::Any {
-                sign = end;
-            }
-            if end != sign {
-                // From zero on it goes, or it jumps.
-                let position = first_where(lo, hi, |x| classify(f.value(x)) != Sign::Zero);
-                let (there, later) = (f.value(position).abs(), f.value(hi).abs());
-                if sign == Sign::Undefined {
-                    return Some(Root { position, at: end, after: end });
-                }
-                return Some(if there > 4.0 * tolerance && there > 0.5 * later && later.is_finite() {
-                    Root { position, at: end, after: end }
-                } else {
-                    Root { position: lo, at: Sign::Zero, after: end }
-                });
-            }
-            armed = true;
+            reach *= 2.0;
         }
     }
-    None
 }
 
-/// A position where a function is no longer zero that is at `at`, and its sign there; zero if that is not nearby.
-fn way_out(f: &mut impl Function, at: f64, to: f64, classify: impl Fn(f64) -> Sign) -> (f64, Sign) {
-    /// Further away, zero is where it stays.
-    const NEARBY: f64 = 1e-6;
-    let (size, mut reach) = (at.max(SMALL), NARROW * at.max(SMALL));
-    loop {
-        let position = (at + reach).min(to);
-        let sign = classify(f.value(position));
-        if sign != Sign::Zero || position >= to || reach > NEARBY * size {
-            return (position, sign);
-        }
-        reach *= 2.0;
-    }
-}
-
-/// The first position at which something holds, which it does at `hi` and need not at `lo`; by bisection.
+/// The first position at which a condition holds that holds at `hi` and need not hold at `lo`, by bisection.
 fn first_where(mut lo: f64, mut hi: f64, mut holds: impl FnMut(f64) -> bool) -> f64 {
     while hi - lo > f64::EPSILON * hi {
         let middle = 0.5 * (lo + hi);

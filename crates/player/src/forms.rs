@@ -40,8 +40,11 @@ pub struct Forms {
 /// A corner of a mesh that may have several colours.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeshVertex {
+    /// Its place, in units of the form.
     pub place: Point,
+    /// The unit normal of the surface there.
     pub normal: Vector,
+    /// Its colour in full light.
     pub color: Color,
     /// The colour of the thing, if it has one, replaces this one.
     pub takes_tint: bool,
@@ -50,7 +53,9 @@ pub struct MeshVertex {
 /// A mesh as it is drawn.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshForm {
+    /// The corners.
     pub vertices: Vec<MeshVertex>,
+    /// Triangles by the numbers of their corners, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
 }
 

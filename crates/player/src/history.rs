@@ -9,9 +9,11 @@ use dlsys_sim::Event;
 /// Productions that took place at one instant by one clause.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Happening {
+    /// Time of the run.
     pub t: f64,
     /// Name of the modules that were replaced.
     pub module: String,
+    /// How many modules the clause replaced.
     pub times: u64,
     /// Where the clause stands in the model.
     pub line: usize,
@@ -24,6 +26,7 @@ pub struct Happening {
 /// What has happened in a run, up to a number of lines.
 #[derive(Clone, Debug, Default)]
 pub struct History {
+    /// The lines, in the order of time.
     pub happenings: Vec<Happening>,
     /// Productions, including those that are not listed.
     pub productions: u64,

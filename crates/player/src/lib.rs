@@ -13,6 +13,8 @@
 //! The player makes triangles of what is to be seen at a time (`page/geometry.js`). The shaders (`shaders/`) have no version
 //! line: whoever compiles them puts it first.
 
+#![warn(missing_docs)]
+
 mod encode;
 mod forms;
 mod history;

@@ -13,24 +13,31 @@ use dlsys_render::{Fit, Spoke, cross_section};
 /// A recorded run.
 #[derive(Clone, Debug)]
 pub struct Recording {
+    /// Title of the model, or the name of its file.
     pub title: String,
     /// The model file.
     pub source: String,
+    /// Parameters of the model with the values of the run.
     pub parameters: Vec<Parameter>,
     /// Of the frames, in the model's unit of time.
     pub times: Vec<f64>,
     /// Modules in each frame, brackets not counted.
     pub modules: Vec<u64>,
+    /// Productions, for the list beside the plant.
     pub history: History,
+    /// The materials that looks name.
     pub palette: Palette,
+    /// The forms that things are placed copies of.
     pub forms: Forms,
     /// In the order in which things first appear.
     pub tracks: Vec<Track>,
     /// Opposite corners of the box around everything, and their middle.
     pub bounds: [Point; 2],
+    /// The middle of the bounds, in scene units.
     pub centre: Point,
     /// Largest side of the box around all points, and how far what is shown may be from what is recorded; in scene units.
     pub extent: f64,
+    /// Largest distance between what is shown and what was recorded, in scene units.
     pub accuracy: f64,
     /// Scene units in one step of the tracks' samples.
     pub unit: f64,
@@ -42,6 +49,7 @@ pub struct Recording {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("there is too much to record: more than {limit} numbers by t = {time}", limit = Recorder::MOST_NUMBERS)]
 pub struct TooMuch {
+    /// Time of the first frame that does not fit, in units of the model.
     pub time: f64,
 }
 
@@ -87,6 +95,7 @@ impl Recorder {
         Recorder { recording, open: HashMap::new(), numbers: 0 }
     }
 
+    /// The list of productions, to be added to between frames.
     pub fn history(&mut self) -> &mut History {
         &mut self.recording.history
     }

@@ -20,6 +20,7 @@ pub enum Form {
     Stem(Option<u32>),
     /// A mesh, by its number among the [`Forms`].
     Mesh(u32),
+    /// A bicubic Bézier patch: its 16 control points.
     Patch,
     /// A polygon of so many corners.
     Polygon(u32),
@@ -42,7 +43,9 @@ impl Form {
 pub struct Key {
     /// See [`Lineage::id`](dlsys_tree::Lineage::id).
     pub lineage: u64,
+    /// The form that it is a copy of.
     pub form: Form,
+    /// How many things of this form the module has drawn before it in the frame.
     pub count: u32,
 }
 
@@ -59,7 +62,9 @@ pub struct Look {
 /// A thing in its place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Item {
+    /// Follows the item from frame to frame.
     pub key: Key,
+    /// Its colours.
     pub look: Look,
     /// Index of the first of its numbers.
     pub first: usize,

@@ -8,9 +8,11 @@ use super::stage::{Form, Look};
 /// One thing from the first frame in which it is there to the last.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Track {
+    /// The form of the thing.
     pub form: Form,
     /// Frames, by index.
     pub first: u32,
+    /// The last frame in which it is there, by index.
     pub last: u32,
     /// Changes of look: the frame from which it holds. The first is `first`.
     pub looks: Vec<(u32, Look)>,

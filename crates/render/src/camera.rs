@@ -73,6 +73,7 @@ impl Camera {
         Camera { view, eye: Some(Eye { x, y, focus, distance }) }
     }
 
+    /// The direction that it looks from.
     pub fn view(&self) -> View {
         self.view
     }

@@ -69,6 +69,7 @@ impl Survey {
 /// What all frames of an animation share.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fit {
+    /// The camera that sees all frames.
     pub camera: Camera,
     /// Width of a line of default width, in scene units.
     pub default_width: f64,

@@ -9,7 +9,7 @@ use std::io::{self, Write};
 
 use dlsys_geometry::scene::Scene;
 
-use crate::{FrameWriter, obj, png, svg};
+use crate::{Error, FrameWriter, obj, png, svg};
 
 /// All formats, in the order in which help lists them.
 static EXPORTERS: [&dyn Exporter; 3] = [&svg::Svg, &png::Png, &obj::Obj];
@@ -86,6 +86,15 @@ impl Format {
         self.0.content()
     }
 
+    /// Their names, for people: `svg, png and obj`.
+    pub(crate) fn names() -> String {
+        let names: Vec<&str> = Format::all().map(Format::extension).collect();
+        match &names[..] {
+            [first @ .., last] if !first.is_empty() => format!("{} and {last}", first.join(", ")),
+            all => all.join(""),
+        }
+    }
+
     pub(crate) fn exporter(self) -> &'static dyn Exporter {
         self.0
     }
@@ -111,25 +120,13 @@ impl fmt::Debug for Format {
     }
 }
 
-/// A name that is no [`Format`].
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown format `{0}`; known are {known}", known = names())]
-pub struct FormatError(pub String);
-
-/// `svg, png and obj`.
-fn names() -> String {
-    let names: Vec<&str> = Format::all().map(Format::extension).collect();
-    match &names[..] {
-        [first @ .., last] if !first.is_empty() => format!("{} and {last}", first.join(", ")),
-        all => all.join(""),
-    }
-}
-
 impl std::str::FromStr for Format {
-    type Err = FormatError;
+    type Err = Error;
 
-    fn from_str(name: &str) -> Result<Format, FormatError> {
-        Format::all().find(|format| format.extension() == name).ok_or_else(|| FormatError(name.to_owned()))
+    fn from_str(name: &str) -> Result<Format, Error> {
+        Format::all()
+            .find(|format| format.extension() == name)
+            .ok_or_else(|| Error::UnknownFormat(name.to_owned()))
     }
 }
 
@@ -139,8 +136,8 @@ mod tests {
 
     #[test]
     fn formats_are_known_by_name() {
-        assert_eq!("svg".parse(), Ok(Format::SVG));
-        assert_eq!("obj".parse::<Format>().map(Format::extension), Ok("obj"));
+        assert_eq!("svg".parse::<Format>().ok(), Some(Format::SVG));
+        assert_eq!("obj".parse().map(Format::extension).ok(), Some("obj"));
         assert_eq!(
             "pdf".parse::<Format>().unwrap_err().to_string(),
             "unknown format `pdf`; known are svg, png and obj"

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::{GENERATOR, Manifest};
+use super::{Error, GENERATOR, Manifest};
 
 /// Name of the manifest.
 pub const MANIFEST: &str = "manifest.json";
@@ -20,28 +20,6 @@ pub const MANIFEST: &str = "manifest.json";
 const TEMPORARY: &str = ".dlsys-tmp-";
 /// Names of the files of a render under way, one a line.
 const JOURNAL: &str = ".dlsys-journal";
-
-/// What can go wrong with a directory of frames.
-#[derive(Debug, thiserror::Error)]
-pub enum Error {
-    #[error("cannot {action} {}: {source}", .path.display())]
-    Io { action: &'static str, path: PathBuf, source: io::Error },
-    #[error(
-        "{} holds files that are not of an earlier render, such as `{file}`; \
-         choose another directory, or --force to write beside them", .directory.display()
-    )]
-    Foreign { directory: PathBuf, file: String },
-    #[error("{} is not of an earlier render and is not overwritten; choose another directory", .0.display())]
-    Taken(PathBuf),
-    #[error("another render is writing to {}; wait for its end, or choose another directory", .0.display())]
-    Busy(PathBuf),
-    #[error("the files of this render are larger than {limit} bytes")]
-    TooLarge { limit: u64 },
-    #[error("{} is not a directory; choose another name", .0.display())]
-    NotADirectory(PathBuf),
-    #[error("`{0}` cannot be the name of a file of a render")]
-    Name(String),
-}
 
 fn io_error<'a>(action: &'static str, path: &'a Path) -> impl FnOnce(io::Error) -> Error + 'a {
     move |source| Error::Io { action, path: path.to_owned(), source }

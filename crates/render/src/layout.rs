@@ -27,6 +27,7 @@ impl Layout {
         ("grid", Layout::Grid),
     ];
 
+    /// The name on the command line, and of the files.
     pub fn name(self) -> &'static str {
         Layout::NAMED.iter().find(|(_, layout)| *layout == self).map_or("", |(name, _)| name)
     }
@@ -63,6 +64,7 @@ pub(super) struct Caption {
 /// Frames in their places.
 #[derive(Clone, Debug)]
 pub struct Sheet {
+    /// How frames are arranged.
     pub layout: Layout,
     /// The area of the whole sheet.
     pub picture: Picture,

@@ -10,8 +10,11 @@ use dlsys_geometry::scene::{Point, Scene, Vector};
 /// `centre + x u + y v`. Vectors are in scene units, counter-clockwise seen from further along; both are 0 at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CrossSection {
+    /// The middle.
     pub centre: Point,
+    /// From the middle to the outline's (1, 0).
     pub u: Vector,
+    /// From the middle to the outline's (0, 1).
     pub v: Vector,
 }
 

@@ -42,7 +42,10 @@
 //! assert!(pictures[0].starts_with(b"<svg") && mesh.contains("\nusemtl stem\n"));
 //! ```
 
+#![warn(missing_docs)]
+
 mod camera;
+mod error;
 mod extent;
 mod fit;
 mod format;
@@ -70,18 +73,19 @@ mod tube;
 mod view;
 
 pub use camera::Camera;
+pub use error::Error;
 pub use fit::{Fit, Picture, Survey};
-pub use format::{Content, Exporter, Format, FormatError};
-pub use frames::{Error, FrameDirectory, MANIFEST, Staged, Staging, replace};
+pub use format::{Content, Exporter, Format};
+pub use frames::{FrameDirectory, MANIFEST, Staged, Staging, replace};
 pub use layout::{Layout, Sheet, Spacing};
 pub use lengths::{CrossSection, Length, cross_section, lengths};
 pub use light::Light;
 pub use manifest::{FrameRecord, Manifest};
-pub use page::{Page, Size, TooLarge};
-pub use sheet::{Assembly, Part, SheetError, SheetWriter};
+pub use page::{Page, Size};
+pub use sheet::{Assembly, Part, SheetWriter};
 pub use triangulate::{normal, triangulate};
 pub use tube::Spoke;
-pub use view::{View, ViewError};
+pub use view::View;
 
 use std::io::{self, Write};
 
@@ -93,7 +97,9 @@ pub const GENERATOR: &str = concat!("dlsys ", env!("CARGO_PKG_VERSION"));
 /// The second pass: one frame after another, each as the bytes of its file.
 #[derive(Clone, Debug)]
 pub struct FrameWriter {
+    /// The format of the files.
     pub format: Format,
+    /// The scale and the style that all frames share.
     pub fit: Fit,
     /// What pictures are drawn on (SVG and PNG).
     pub page: Page,

@@ -1,6 +1,6 @@
 //! The page that a picture is drawn on: its area, its size in pixels, its background.
 
-use super::Picture;
+use super::{Error, Picture};
 use dlsys_geometry::scene::Color;
 
 /// Size of a picture, in pixels.
@@ -20,21 +20,10 @@ impl Default for Size {
     }
 }
 
-/// A picture that would not fit into memory.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "a picture of {width} x {height} pixels is too large; at most {} on a side and {} million in all",
-    Page::MOST_ON_A_SIDE,
-    Page::MOST_PIXELS / 1_000_000
-)]
-pub struct TooLarge {
-    pub width: u32,
-    pub height: u32,
-}
-
 /// What a picture is drawn on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Page {
+    /// The area of the scene that it shows.
     pub picture: Picture,
     /// Width and height.
     pub pixels: [u32; 2],
@@ -45,14 +34,16 @@ pub struct Page {
 impl Page {
     /// A warm white.
     pub const BACKGROUND: Color = Color::hex(0xfbfaf5);
+    /// Most pixels on a side.
     pub const MOST_ON_A_SIDE: u32 = 20_000;
+    /// Most pixels in all.
     pub const MOST_PIXELS: u64 = 50_000_000;
 
     /// A page for a picture. Sides that follow from what is drawn are even, as video encoders want them.
     ///
     /// # Errors
     /// If a side is 0 or there are too many pixels.
-    pub fn new(picture: Picture, size: Size, background: Option<Color>) -> Result<Page, TooLarge> {
+    pub fn new(picture: Picture, size: Size, background: Option<Color>) -> Result<Page, Error> {
         let [_, _, width, height] = picture.area;
         let (picture, pixels) = match size {
             Size::Larger(n) => (picture, within(picture, n)),
@@ -62,7 +53,7 @@ impl Page {
         let [width, height] = pixels;
         let fits = |side: u32| (1..=Page::MOST_ON_A_SIDE).contains(&side);
         if !fits(width) || !fits(height) || u64::from(width) * u64::from(height) > Page::MOST_PIXELS {
-            return Err(TooLarge { width, height });
+            return Err(Error::PageTooLarge { width, height });
         }
         Ok(Page { picture, pixels, background })
     }

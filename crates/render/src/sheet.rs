@@ -7,24 +7,13 @@ use super::layout::{Caption, Cell};
 use super::painter::{self, text};
 use super::png::{self, Canvas, Meeting};
 use super::raster::Image;
-use super::{Fit, Format, Layout, Page, Sheet, Smoothness, glyphs, svg};
+use super::{Error, Fit, Format, Layout, Page, Sheet, Smoothness, glyphs, svg};
 use dlsys_geometry::scene::{Color, Scene};
 
 /// Colour of captions.
 const INK: Color = Color::hex(0x555555);
 /// Longest document, in bytes.
 const LONGEST: usize = 1 << 30;
-
-/// What a sheet cannot hold.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum SheetError {
-    #[error("an OBJ file is one mesh in space: it has no layout")]
-    Mesh,
-    #[error(
-        "the picture would be longer than 1 GiB from frame {frame} on; choose fewer frames, or PNG, which does not grow"
-    )]
-    TooLong { frame: usize },
-}
 
 /// Writes the frames of a sheet.
 #[derive(Clone, Debug)]
@@ -60,9 +49,9 @@ impl SheetWriter {
     ///
     /// # Errors
     /// If the format has no pictures.
-    pub fn new(format: Format, fit: Fit, sheet: Sheet, page: Page) -> Result<SheetWriter, SheetError> {
+    pub fn new(format: Format, fit: Fit, sheet: Sheet, page: Page) -> Result<SheetWriter, Error> {
         match format.content() {
-            Content::Mesh => Err(SheetError::Mesh),
+            Content::Mesh => Err(Error::NoLayout),
             _ => Ok(SheetWriter { format, fit, sheet, page }),
         }
     }
@@ -72,6 +61,7 @@ impl SheetWriter {
         format!("{}.{}", self.sheet.layout.name(), self.format.extension())
     }
 
+    /// The page of the whole sheet.
     pub fn page(&self) -> &Page {
         &self.page
     }
@@ -126,7 +116,7 @@ impl Assembly<'_> {
     ///
     /// # Errors
     /// If the document becomes too long.
-    pub fn add(&mut self, part: Part) -> Result<(), SheetError> {
+    pub fn add(&mut self, part: Part) -> Result<(), Error> {
         let index = self.added;
         self.added += 1;
         let Some(cell) = self.writer.sheet.cells.get(index) else { return Ok(()) };
@@ -140,7 +130,7 @@ impl Assembly<'_> {
             Drawn::Elements(elements) => {
                 self.add_group(index, cell, &elements);
                 if self.elements.len() > LONGEST {
-                    return Err(SheetError::TooLong { frame: index });
+                    return Err(Error::SheetTooLong { frame: index });
                 }
             }
         }

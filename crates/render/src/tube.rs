@@ -289,7 +289,9 @@ impl<'s> Tubes<'s> {
 /// A corner of a cross-section, in parts of the radius: its place, and the unit normal of the outline there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spoke {
+    /// Its place, the outline's radius being 1.
     pub place: [f64; 2],
+    /// The unit normal of the outline, pointing out.
     pub normal: [f64; 2],
 }
 

@@ -1,5 +1,6 @@
 //! From where the scene is looked at.
 
+use crate::Error;
 use std::fmt;
 use std::str::FromStr;
 
@@ -17,15 +18,6 @@ pub struct View {
     towards: Vector,
 }
 
-/// What is wrong with a view.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum ViewError {
-    #[error("unknown view `{0}`; a view is front, side, top, or AZIMUTH,ELEVATION in degrees")]
-    Unknown(String),
-    #[error("elevation {0} is not between -90 and 90 degrees")]
-    Elevation(String),
-}
-
 impl View {
     /// From `+Z`: x to the right, y up.
     pub const FRONT: View = View {
@@ -41,12 +33,12 @@ impl View {
     ///
     /// # Errors
     /// If the azimuth is not finite or the elevation not between -90 and 90.
-    pub fn new(azimuth: f64, elevation: f64) -> Result<View, ViewError> {
+    pub fn new(azimuth: f64, elevation: f64) -> Result<View, Error> {
         if !azimuth.is_finite() {
-            return Err(ViewError::Unknown(format!("{azimuth},{elevation}")));
+            return Err(Error::UnknownView(format!("{azimuth},{elevation}")));
         }
         if !(-90.0..=90.0).contains(&elevation) {
-            return Err(ViewError::Elevation(elevation.to_string()));
+            return Err(Error::Elevation(elevation.to_string()));
         }
         let (sin_a, cos_a) = sin_cos_degrees(azimuth);
         let (sin_e, cos_e) = sin_cos_degrees(elevation);
@@ -62,15 +54,15 @@ impl View {
 }
 
 impl FromStr for View {
-    type Err = ViewError;
+    type Err = Error;
 
-    fn from_str(text: &str) -> Result<View, ViewError> {
+    fn from_str(text: &str) -> Result<View, Error> {
         match text.trim() {
             "front" => Ok(View::FRONT),
             "side" => View::new(90.0, 0.0),
             "top" => View::new(0.0, 90.0),
             other => {
-                let unknown = || ViewError::Unknown(other.to_owned());
+                let unknown = || Error::UnknownView(other.to_owned());
                 let (azimuth, elevation) = other.split_once(',').ok_or_else(unknown)?;
                 let number = |text: &str| text.trim().parse::<f64>().map_err(|_| unknown());
                 View::new(number(azimuth)?, number(elevation)?)

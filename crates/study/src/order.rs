@@ -1,5 +1,7 @@
 //! Orders of methods: what the books say, and what a study shows.
 
+use dlsys_sim::Method;
+
 /// The order of a method: on a smooth solution the error of a step of length h is O(h^(order + 1)). None for
 /// `auto`, which is whatever it chooses. The scheduler `local`, whose neighbours stand still for a slice of time, is a
 /// method of order 1 in the length of the slice.
@@ -8,9 +10,10 @@
 /// Solving Ordinary Differential Equations I, 2nd ed. 1993, II.1 and II.5), DOP853 (II.10), Radau IIA with
 /// five stages (Hairer and Wanner, Solving ODEs II, IV.5: 2s - 1).
 pub fn nominal_order(method: &str) -> Option<u32> {
-    const ORDERS: [(&str, u32); 6] =
-        [("local", 1), ("euler", 1), ("rk4", 4), ("dopri5", 5), ("dop853", 8), ("radau", 9)];
-    ORDERS.iter().find(|(name, _)| *name == method).map(|(_, order)| *order)
+    if method == "local" {
+        return Some(1);
+    }
+    Method::NAMED.iter().find(|(name, _)| *name == method).and_then(|(_, method)| method.order())
 }
 
 /// Errors above this say nothing about the order yet.
@@ -51,7 +54,6 @@ pub fn observed_order(points: &[(f64, f64)], nominal: Option<u32>, floor: f64) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dlsys_sim::Method;
 
     #[test]
     fn a_power_law_is_read_back() {

@@ -77,7 +77,7 @@ impl std::fmt::Display for Setup {
 
 /// The name that a method has on the command line.
 pub fn method_name(method: Method) -> &'static str {
-    Method::NAMED.iter().find(|(_, known)| *known == method).map_or("?", |(name, _)| name)
+    method.name()
 }
 
 /// Why a run ended before its last time.

@@ -26,6 +26,7 @@ pub enum Purpose {
 }
 
 impl Seed {
+    /// The seed of a run. Numbers drawn from consecutive seeds are unrelated.
     pub fn new(seed: u64) -> Seed {
         // Seeds that follow one another must have nothing in common.
         Seed(mix(0x6469_6365, seed))

@@ -7,6 +7,8 @@
 //! - [`Seed`]: random numbers, each of which belongs to a module.
 //! - [`SimTime`]: when it was born, to more digits than a float has.
 
+#![warn(missing_docs)]
+
 mod brood;
 mod chance;
 mod lineage;

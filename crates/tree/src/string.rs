@@ -48,7 +48,9 @@ struct Entry {
 /// One module, or one bracket, of a [`ModuleString`].
 #[derive(Clone, Copy, Debug)]
 pub struct Module<'a> {
+    /// Kind of the module; [`KindId::OPEN`] or [`KindId::CLOSE`] for a bracket.
     pub kind: KindId,
+    /// Parameters shown to observers, in their order in the model.
     pub parameters: &'a [f64],
     /// Time since the module was created.
     pub age: f64,
@@ -119,6 +121,7 @@ impl ModuleString {
         self.version
     }
 
+    /// Sets the version; changes of the string unset it.
     pub fn set_version(&mut self, version: Version) {
         self.version = Some(version);
     }
@@ -133,10 +136,12 @@ impl ModuleString {
         self.entries.len()
     }
 
+    /// True if there are no modules and no brackets.
     pub fn is_empty(&self) -> bool {
         self.entries.is_empty()
     }
 
+    /// The module or bracket at a place in string order, from 0. Panics beyond [`len`](ModuleString::len).
     pub fn get(&self, index: usize) -> Module<'_> {
         let Entry { kind, first, brood, place } = self.entries[index];
         let end = self.entries.get(index + 1).map_or(self.parameters.len(), |next| next.first as usize);
@@ -150,6 +155,7 @@ impl ModuleString {
         Module { kind, parameters, age: self.now.since(birth).max(0.0), lineage }
     }
 
+    /// All modules and brackets in string order.
     pub fn iter(&self) -> impl Iterator<Item = Module<'_>> {
         (0..self.len()).map(|i| self.get(i))
     }

@@ -76,10 +76,15 @@ pub(super) struct Node {
 /// A module in a [`Tree`], looked at once.
 #[derive(Clone, Copy, Debug)]
 pub struct Look<'t> {
+    /// Its id.
     pub id: ModuleId,
+    /// Its kind.
     pub kind: KindId,
+    /// Its label ([`Tree::label`]).
     pub label: u16,
+    /// Time at which a production made it.
     pub birth: SimTime,
+    /// All its parameters, hidden ones last, with the values that the tree has of them.
     pub values: &'t [f64],
     /// Brood, and place in it.
     member: (u32, u16),
@@ -131,6 +136,7 @@ impl Tree {
         self.modules
     }
 
+    /// True if no module is alive.
     pub fn is_empty(&self) -> bool {
         self.modules == 0
     }
@@ -154,6 +160,7 @@ impl Tree {
         self.nodes.len()
     }
 
+    /// True if the module has not been replaced.
     pub fn is_alive(&self, id: ModuleId) -> bool {
         self.nodes[id.slot()].generation == id.generation
     }
@@ -183,14 +190,17 @@ impl Tree {
         self.broods.lineage(look.member.0, look.member.1)
     }
 
+    /// The kind of a living module.
     pub fn kind(&self, id: ModuleId) -> KindId {
         self.node(id).kind
     }
 
+    /// The time at which a production made a living module.
     pub fn birth(&self, id: ModuleId) -> SimTime {
         self.broods.birth(self.node(id).brood)
     }
 
+    /// The lineage of a living module.
     pub fn lineage(&self, id: ModuleId) -> Lineage {
         let node = self.node(id);
         self.broods.lineage(node.brood, node.place)
@@ -201,6 +211,7 @@ impl Tree {
         self.node(id).label
     }
 
+    /// Gives a living module a label.
     pub fn set_label(&mut self, id: ModuleId, label: u16) {
         self.nodes[id.slot()].label = label;
     }
@@ -216,6 +227,7 @@ impl Tree {
         self.node(id).places(&self.arities)
     }
 
+    /// All parameters of a living module, hidden ones last.
     pub fn parameters(&self, id: ModuleId) -> &[f64] {
         &self.values[self.places(id)]
     }
@@ -230,6 +242,7 @@ impl Tree {
         &self.values
     }
 
+    /// Sets the parameter at a place of [`Tree::values`].
     pub fn set_value(&mut self, place: usize, value: f64) {
         self.values[place] = value;
     }

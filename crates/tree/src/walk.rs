@@ -7,8 +7,11 @@ use dlsys_model::KindId;
 /// What a walk in string order meets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Visit {
+    /// A module.
     Module(ModuleId),
+    /// The start of a branch: `[`.
     Open,
+    /// The end of a branch: `]`.
     Close,
 }
 

@@ -237,7 +237,7 @@ impl Render<'_> {
         };
         let sheet = Sheet::new(layout, &fit, &self.frames, &captions, flags::spacing(self.args));
         let page = flags::page(self.args, sheet.picture)?;
-        let refuse = |error: render::SheetError| Failure::Usage(format!("error: {error}\n"));
+        let refuse = |error: render::Error| Failure::Usage(format!("error: {error}\n"));
         let writer = SheetWriter::new(self.args.format, fit.clone(), sheet, page).map_err(refuse)?;
         let mut directory = FrameDirectory::create(self.out, self.args.force)
             .map_err(out_of_directory)?

@@ -11,12 +11,15 @@ pub const MAX_POINTS: usize = 1_000_000;
 pub enum CurveFault {
     /// So many are needed.
     TooFew(usize),
+    /// More than [`MAX_POINTS`].
     TooMany,
     /// The x of this point is not greater than that of the one before.
     NotAscending(usize),
     /// A periodic curve whose last value is not its first.
     NotClosed {
+        /// Value of the first point.
         first: f64,
+        /// Value of the last point.
         last: f64,
     },
     /// Slopes or areas leave the range of numbers.

@@ -25,10 +25,13 @@ pub enum Sort {
 /// What is computed of a curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Part {
+    /// The value.
     Value,
     /// First derivative.
     Slope,
+    /// Second derivative.
     Second,
+    /// Third derivative.
     Third,
     /// Integral from the first knot.
     Integral,
@@ -36,6 +39,7 @@ pub enum Part {
     Inverse,
     /// The number of the piece, and how far in it, increasing without bound or jump.
     Phase,
+    /// Derivative of the phase by the argument.
     PhaseSlope,
 }
 
@@ -56,8 +60,11 @@ impl Part {
 /// A function of one variable by points.
 #[derive(Clone, Debug)]
 pub struct Curve {
+    /// Name in the model, for messages.
     pub name: String,
+    /// How it follows its points.
     pub sort: Sort,
+    /// Whether it repeats beyond its ends; otherwise it keeps the values that it has there.
     pub periodic: bool,
     /// Number of points that it was made from.
     pub points: usize,
@@ -254,7 +261,9 @@ impl Curve {
 /// A list of numbers that expressions look up by number.
 #[derive(Clone, Debug)]
 pub struct Array {
+    /// Name in the model, for messages.
     pub name: String,
+    /// The elements, from number 0.
     pub values: Vec<f64>,
 }
 

@@ -38,7 +38,9 @@ impl Width {
 /// A straight piece of a stem.
 #[derive(Clone, Debug)]
 pub struct Segment {
+    /// Middle of its first end.
     pub start: Point,
+    /// Middle of its second end.
     pub end: Point,
     /// Unit vector from `start` to `end`; kept, because the difference of two near points has few digits.
     pub direction: Vector,
@@ -48,7 +50,9 @@ pub struct Segment {
     pub widths: [Width; 2],
     /// Index of the cross-section among the model's contours; `None` is a circle.
     pub contour: Option<u32>,
+    /// Material of the whole segment.
     pub material: MaterialId,
+    /// The module that drew it.
     pub owner: OwnerId,
     /// Index of the segment that this one continues: it precedes this one on the same axis and ends exactly
     /// where this one starts. No two segments continue the same one.
@@ -58,27 +62,34 @@ pub struct Segment {
 /// A filled outline, of at least three distinct vertices. It need not be flat or convex.
 #[derive(Clone, Debug)]
 pub struct Polygon {
+    /// Corners in order, the first not repeated.
     pub vertices: Vec<Point>,
+    /// Material of the whole polygon.
     pub material: MaterialId,
+    /// The module that opened it.
     pub owner: OwnerId,
 }
 
 /// A mesh in its place.
 #[derive(Clone, Debug)]
 pub struct Surface {
+    /// The mesh, shared by all surfaces of one shape.
     pub mesh: Arc<Mesh>,
     /// What `mesh` is a preview of, if the surface is curved: the mesh of the right accuracy is made when a
     /// frame is written (see [`Scene::tessellated`](super::Scene::tessellated)).
     pub patches: Option<Arc<PatchSet>>,
+    /// Where it is placed.
     pub placement: Placement,
     /// Stands in for the materials of those faces that take a colour.
     pub tint: Option<MaterialId>,
+    /// The module that drew it.
     pub owner: OwnerId,
 }
 
 /// Position, orientation and size of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
+    /// Where the origin of the mesh comes to lie, in scene units.
     pub origin: Point,
     /// Unit vectors that the mesh's first, second and third axis turn to.
     pub axes: [Vector; 3],

@@ -11,8 +11,11 @@ use std::fmt;
 /// A colour of the sRGB space, 8 bits a channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Color {
+    /// Red, from 0 to 255.
     pub red: u8,
+    /// Green, from 0 to 255.
     pub green: u8,
+    /// Blue, from 0 to 255.
     pub blue: u8,
 }
 
@@ -68,6 +71,7 @@ impl MaterialId {
     /// Materials before the numbered ones.
     const NAMED: usize = 5;
 
+    /// Position in [`Palette::materials`].
     pub fn index(self) -> usize {
         self.0 as usize
     }
@@ -78,6 +82,7 @@ impl MaterialId {
 pub struct Material {
     /// ASCII letters, digits, `_` and `-`; no two materials of a palette share one.
     pub name: Cow<'static, str>,
+    /// Its colour in full light.
     pub color: Color,
 }
 
@@ -180,6 +185,7 @@ impl Palette {
         &self.materials
     }
 
+    /// The material with a number of this palette.
     pub fn get(&self, id: MaterialId) -> &Material {
         &self.materials[id.index()]
     }

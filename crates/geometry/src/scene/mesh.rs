@@ -5,16 +5,20 @@ use super::{MaterialId, Point, Vector};
 /// A triangle mesh with smooth normals. Its axes are the turtle's: heading, left, up.
 #[derive(Clone, Debug)]
 pub struct Mesh {
+    /// Places of the vertices.
     pub vertices: Vec<Point>,
     /// One unit normal for each vertex.
     pub normals: Vec<Vector>,
+    /// The triangles.
     pub faces: Vec<Face>,
 }
 
 /// A triangle, counter-clockwise seen from the side to which its normals point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Face {
+    /// Vertices by number.
     pub corners: [u32; 3],
+    /// Its material, unless a colour replaces it.
     pub material: MaterialId,
     /// Whether a colour that the model chooses replaces the material.
     pub takes_tint: bool,

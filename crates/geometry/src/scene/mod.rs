@@ -54,6 +54,7 @@ pub struct Owner {
 pub struct OwnerId(u32);
 
 impl OwnerId {
+    /// Position in [`Scene::owners`].
     pub fn index(self) -> usize {
         self.0 as usize
     }
@@ -62,6 +63,7 @@ impl OwnerId {
 /// A surface as it is before it is placed.
 #[derive(Clone, Debug)]
 pub struct Shape {
+    /// The mesh; of curved surfaces, a preview.
     pub mesh: Arc<Mesh>,
     /// See [`Surface::patches`].
     pub patches: Option<Arc<PatchSet>>,
@@ -85,18 +87,24 @@ impl Shape {
 /// Everything that is to be seen at one instant.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
+    /// The materials; elements name them by number.
     pub palette: Palette,
     /// The model's own surfaces, and what they and the palette were made from, so that they are made once
     /// and not for every frame.
     pub shapes: Vec<Shape>,
+    /// The part of the model from which `shapes` and `palette` were made.
     pub prepared_for: Option<Arc<Appearance>>,
     /// How far curves may be from what is drawn for them, in scene units, if that is known when the turtle
     /// draws; 0 if not. Bent segments are drawn in pieces; see [`Fit::accuracy`](dlsys_render::Fit::accuracy).
     pub accuracy: f64,
     owners: Vec<Owner>,
+    /// Pieces of stems, in string order.
     pub segments: Vec<Segment>,
+    /// Filled outlines, in the order in which they were closed.
     pub polygons: Vec<Polygon>,
+    /// Placed meshes, in string order.
     pub surfaces: Vec<Surface>,
+    /// Bézier patches drawn by `@PD`, in string order.
     pub patches: Vec<Patch>,
     /// What is drawn, but hardly as it was meant.
     pub warnings: Vec<Diagnostic>,
@@ -159,6 +167,7 @@ impl Scene {
         OwnerId((self.owners.len() - 1) as u32)
     }
 
+    /// The module with a number of this scene.
     pub fn owner(&self, id: OwnerId) -> &Owner {
         &self.owners[id.index()]
     }

@@ -21,8 +21,11 @@ const FINEST: usize = 64;
 /// A patch in space.
 #[derive(Clone, Debug)]
 pub struct Patch {
+    /// Control points in scene units.
     pub net: Net,
+    /// Material of the whole patch.
     pub material: MaterialId,
+    /// The module that drew it.
     pub owner: OwnerId,
 }
 
@@ -57,7 +60,9 @@ impl Patch {
 /// A patch of a [`PatchSet`].
 #[derive(Clone, Debug)]
 pub struct PatchFace {
+    /// Control points in units of the surface.
     pub net: Net,
+    /// Its material, unless a colour replaces it.
     pub material: MaterialId,
     /// Whether a colour that the model chooses replaces the material.
     pub takes_tint: bool,
@@ -72,6 +77,7 @@ pub struct PatchSet {
 }
 
 impl PatchSet {
+    /// The surface made of these patches.
     pub fn new(faces: Vec<PatchFace>) -> PatchSet {
         PatchSet { faces, meshes: Mutex::default() }
     }

@@ -61,6 +61,7 @@ impl Fault {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("cannot draw `{name}` (module {lineage}): {fault}")]
 pub struct Error {
+    /// What is wrong.
     pub fault: Fault,
     /// The module of the string, or the part of its interpretation.
     pub name: String,

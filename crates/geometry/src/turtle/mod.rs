@@ -76,6 +76,7 @@ pub const SMALLEST_LENGTH: f64 = 1e-80;
 /// Where a turtle stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
+    /// Where it is, in scene units.
     pub position: Point,
     /// Heading, left and up: unit vectors.
     pub axes: [Vector; 3],

@@ -5,7 +5,7 @@
 //! Computing 15 (1984) 69. Patterns that are not a tree are eliminated in the same order, with the fill-in
 //! found once by symbolic elimination (T. Davis, Direct Methods for Sparse Linear Systems, SIAM 2006, ch. 4).
 //!
-//! There is no pivoting: the matrices meant here, `shift I - scale A` of a stable coupled system, are close
+//! There is no pivoting: the matrices for which it is made, `shift I - scale A` of a stable coupled system, are close
 //! to diagonally dominant. Every pivot is checked. The place of a value depends on the pattern alone, so one
 //! array of real matrix values serves any number of real or complex shifts.
 
@@ -109,8 +109,7 @@ impl Pattern {
         self.unknowns() + 2 * self.neighbour.len()
     }
 
-    /// Place of an entry in an array of values, `None` if it is not stored. Places nobody asks for must hold
-    /// 0.
+    /// Place of an entry in an array of values, `None` if it is not stored. Places of fill-in must hold 0.
     pub fn entry(&self, row: usize, column: usize) -> Option<usize> {
         let (k, j) = (row.max(column), row.min(column));
         if k >= self.unknowns() {
@@ -129,8 +128,8 @@ impl Pattern {
         &self.neighbour[self.first[k + 1] as usize..self.first[k] as usize]
     }
 
-    /// Of each unknown its parent, and the place of its entry in the parent's column, after which comes that of the parent's
-    /// in its own; None of a root. None if the pattern is no forest.
+    /// For each unknown its parent, and the place of its entry in the parent's column, which is followed by that of the parent's
+    /// entry in the unknown's column; None for a root. None if the pattern is no forest.
     pub fn forest(&self) -> Option<impl Iterator<Item = Option<(usize, usize)>>> {
         let n = self.unknowns();
         let above = move |(k, parent): (usize, &u32)| {

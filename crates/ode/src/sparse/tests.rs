@@ -66,7 +66,7 @@ fn gauss<F: Field>(a: &mut [F], b: &mut [F], measure: fn(F) -> f64) {
 }
 
 #[test]
-fn agrees_with_dense_elimination() {
+fn sparse_elimination_agrees_with_dense_elimination() {
     let mut random = Random(7);
     for n in [1, 2, 9, 40] {
         for couplings in patterns(n, &mut random) {
@@ -138,7 +138,7 @@ fn trees_take_linear_space_and_fill_is_bounded() {
 }
 
 #[test]
-fn bad_pivots_are_refused() {
+fn zero_and_infinite_pivots_are_reported() {
     for couplings in [&[(0, 1), (1, 2)][..], &[(0, 1), (1, 2), (0, 2)]] {
         let pattern = Pattern::new(3, couplings).unwrap();
         let mut values = vec![0.0; pattern.entries()];

@@ -1,10 +1,9 @@
 //! Modules that are integrated alone, each with steps of its own.
 
-use crate::Method;
 use crate::detect::flash::{self, Glance, MAX_UNBOUNDED};
 use crate::error::Error;
 use crate::flow::FlowStage;
-use crate::flow::integrator::{StepError, foresee};
+use crate::flow::integrator::StepError;
 use crate::motion::Motion;
 use crate::world::state::{Control, State, Step};
 use crate::world::{World, describe};
@@ -162,7 +161,7 @@ impl FlowStage<'_, '_> {
             }
             let fixed = self.setup.settings.method.is_fixed_step();
             let settings = self.setup.settings.for_clocks(rule.solves[solve].has_hazard_clock);
-            let stiff = control.stiff || self.setup.settings.method == Method::Radau;
+            let stiff = control.stiff || self.setup.settings.method.is_implicit();
             let flashes = rule.solves[solve].has_pulses && !fixed;
             let mut tries = 0;
             let step = loop {
@@ -223,7 +222,7 @@ impl FlowStage<'_, '_> {
             }
         };
         if crawling && !fixed {
-            return Err(self.step_error(StepError::TooSmall(0), from, |_| Some((id, 0))));
+            return Err(self.step_error(StepError::StepTooSmall(0), from, |_| Some((id, 0))));
         }
         Ok(h)
     }
@@ -238,7 +237,7 @@ impl FlowStage<'_, '_> {
             // What comes next begins with what was learnt here.
             let mut control = step.control;
             let (lived, error) = (now.since(step.dense.start), control.last_error);
-            foresee(&mut control, error, lived, now.resolution());
+            control.foresee(error, lived, now.resolution());
             self.flows.hints[kind][solve] = Control { last_error: 1.0, ..control };
         }
     }
@@ -250,9 +249,7 @@ impl FlowStage<'_, '_> {
         at: SimTime,
         owner: impl Fn(usize) -> Option<(ModuleId, usize)>,
     ) -> Error {
-        let (StepError::TooSmall(component) | StepError::Rate(component) | StepError::NotFinite(component)) =
-            error;
-        let (id, parameter) = owner(component).unwrap_or_else(|| (self.flows.anyone(self.world), 0));
+        let (id, parameter) = owner(error.component()).unwrap_or_else(|| (self.flows.anyone(self.world), 0));
         let index = self.world.state(id).and_then(|s| s.rule).unwrap_or(0);
         let rule = &self.setup.model.rules[index];
         let solve = self.world.state(id).and_then(|s| s.solve);
@@ -263,15 +260,15 @@ impl FlowStage<'_, '_> {
         site.module = describe(self.setup.model, self.world.tree.kind(id), &values);
         let name = rule.parameters.get(parameter).cloned().unwrap_or_default();
         if let Some(clock) = rule.clocks.iter().find(|clock| clock.parameter == parameter)
-            && !matches!(error, StepError::TooSmall(_))
+            && !matches!(error, StepError::StepTooSmall(_))
         {
             site.span = rule.produces[clock.produce].span;
             return Error::NotFinite { site, what: "the rate of an event".to_owned() };
         }
         match error {
-            StepError::TooSmall(_) => Error::StepTooSmall { site },
-            StepError::Rate(_) => Error::NotFinite { site, what: format!("the rate of {name}") },
-            StepError::NotFinite(_) => Error::NotFinite { site, what: name },
+            StepError::StepTooSmall(_) => Error::StepTooSmall { site },
+            StepError::RateNotFinite(_) => Error::NotFinite { site, what: format!("the rate of {name}") },
+            _ => Error::NotFinite { site, what: name },
         }
     }
 }

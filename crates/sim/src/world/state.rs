@@ -5,6 +5,7 @@ use smallvec::SmallVec;
 use crate::motion::Motion;
 use crate::world::context::Around;
 use dlsys_model::Sign;
+pub use dlsys_ode::Control;
 use dlsys_ode::Dense;
 use dlsys_tree::{ModuleId, SimTime};
 
@@ -58,25 +59,6 @@ pub struct Step {
     /// Time in the past, and the number of steps since then.
     pub mark: SimTime,
     pub since_mark: usize,
-}
-
-/// What step control remembers.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Control {
-    /// Length of the next step to be tried; 0 if nothing is known.
-    pub size: f64,
-    pub last_error: f64,
-    /// Signs of stiffness in a row.
-    pub suspicion: u32,
-    pub stiff: bool,
-    /// The sum of what the steps so far are estimated to be wrong by, relative; no more than the tolerance.
-    pub error: f64,
-}
-
-impl Default for Control {
-    fn default() -> Control {
-        Control { size: 0.0, last_error: 1.0, suspicion: 0, stiff: false, error: 0.0 }
-    }
 }
 
 /// What is known to come.

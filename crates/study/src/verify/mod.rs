@@ -154,7 +154,7 @@ fn other_ways(checked: &Settings) -> Vec<Settings> {
         Method::Auto => [Method::Radau, Method::Dop853],
         Method::Dop853 => [Method::Radau, Method::Dopri5],
         Method::Radau => [Method::Dop853, Method::Dopri5],
-        Method::Dopri5 | Method::Rk4 | Method::Euler => [Method::Dop853, Method::Radau],
+        _ => [Method::Dop853, Method::Radau],
     };
     // 1e-7, not 1.0000000000000001e-7.
     let tighter = checked.tolerance / TIGHTER;

@@ -221,7 +221,7 @@ fn help(checked: &Settings) -> &'static str {
         (Scheduler::Local { .. }, _) => {
             "the scheduler `local` has an error of the order of its slice: a shorter `--slice`, or `--scheduler auto`"
         }
-        (_, Method::Euler | Method::Rk4) => {
+        (_, method) if method.is_fixed_step() => {
             "a fixed step knows of no tolerance: a smaller `--step-size`, a `--tolerance` that suits it, or `--method auto`"
         }
         _ => {

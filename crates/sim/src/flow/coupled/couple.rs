@@ -4,7 +4,6 @@ use crate::flow::FlowStage;
 use std::collections::HashSet;
 
 use crate::error::Error;
-use crate::flow::integrator::foresee;
 use dlsys_tree::ModuleId;
 
 /// What an instant means for the coupled modules.
@@ -71,7 +70,7 @@ impl FlowStage<'_, '_> {
         let now = self.instant.at;
         if let Some(course) = &self.world.coupled {
             let control = &mut self.flows.coupled.control;
-            foresee(control, control.last_error, now.since(course.start()), now.resolution());
+            control.foresee(control.last_error, now.since(course.start()), now.resolution());
         }
         (self.flows.coupled.mark, self.flows.coupled.since_mark) = (now, 0);
         self.restart_coupled(now)

@@ -154,11 +154,11 @@ impl FlowStage<'_, '_> {
             })
             .flatten();
         // After each, all members are searched.
-        self.flows.coupled.integrator.dear = true;
-        self.flows.coupled.integrator.unwatched =
-            self.setup.model.rules.iter().all(|rule| rule.atoms.is_empty())
-                && self.flows.coupled.flashing.is_empty()
-                && self.flows.coupled.system.algebra.is_empty();
+        self.flows.coupled.integrator.expect_high_overhead();
+        let is_unwatched = self.setup.model.rules.iter().all(|rule| rule.atoms.is_empty())
+            && self.flows.coupled.flashing.is_empty()
+            && self.flows.coupled.system.algebra.is_empty();
+        self.flows.coupled.integrator.set_unwatched(is_unwatched);
         self.flows.coupled.integrator.restart(self.setup.settings.method, self.flows.coupled.y.len());
         if self.flows.coupled.members.is_empty() {
             return Ok(());
@@ -193,7 +193,7 @@ impl FlowStage<'_, '_> {
             None => {
                 if std::mem::take(pending) {
                     let mut equations = Equations::new(system, &self.setup.model.rules, None);
-                    let stretches = match integrator.unwatched {
+                    let stretches = match integrator.is_unwatched() {
                         true => integrator.refined(&mut equations, y, &self.setup.coupled_settings),
                         false => vec![integrator.dense(&mut equations, y)],
                     };
@@ -226,7 +226,7 @@ impl FlowStage<'_, '_> {
                     let found = Course::of(stretches);
                     let h = found.end.since(from);
                     self.world.coupled = Some(found);
-                    let stiff = control.stiff || settings.method == Method::Radau;
+                    let stiff = control.stiff || settings.method.is_implicit();
                     let nodes = integrator.nodes();
                     let overlooked = flashing.iter().filter_map(|id| {
                         let how = (settings.tolerance, stiff);
@@ -258,7 +258,7 @@ impl FlowStage<'_, '_> {
                     tries += 1;
                     stats.rejected += 1;
                     if tries > MAX_TRIES || settings.method.is_fixed_step() {
-                        break Err(StepError::NotFinite(fault.component()));
+                        break Err(StepError::ValueNotFinite(fault.component()));
                     }
                 }
             }
@@ -268,9 +268,7 @@ impl FlowStage<'_, '_> {
             Err(error) => {
                 // What cannot be solved for says more than that no step goes on.
                 let fault = equations.make_consistent(0.0, &mut y.clone()).err();
-                let component = match error {
-                    StepError::TooSmall(c) | StepError::Rate(c) | StepError::NotFinite(c) => c,
-                };
+                let component = error.component();
                 if fault.is_none() && self.arrest_coupled(component, from) {
                     return Ok(());
                 }
@@ -342,7 +340,7 @@ impl FlowStage<'_, '_> {
     pub fn pass_coupled_step(&mut self, at: SimTime) -> Result<(), Error> {
         let Coupled { mark, since_mark, .. } = &mut self.flows.coupled;
         if super::independent::crawls(mark, since_mark, at) && !self.setup.settings.method.is_fixed_step() {
-            return Err(self.coupled_error(StepError::TooSmall(0), at));
+            return Err(self.coupled_error(StepError::StepTooSmall(0), at));
         }
         let slice_ends = |from| self.setup.settings.slice_end(from).is_some_and(|end| end == at);
         if self.flows.coupled.repaired || slice_ends(self.flows.coupled.system.start) {
@@ -374,7 +372,7 @@ impl FlowStage<'_, '_> {
         }
         self.setup.settings.scheduler == Scheduler::Global
             || self.setup.settings.method.is_fixed_step()
-            || self.setup.settings.method == Method::Radau
+            || self.setup.settings.method.is_implicit()
             || self.flows.coupled.control.stiff
             || self.flows.coupled.linear.is_some()
     }
@@ -413,7 +411,7 @@ impl FlowStage<'_, '_> {
     fn coupled_error(&self, error: StepError, at: SimTime) -> Error {
         let Coupled { system, y, .. } = &self.flows.coupled;
         let owner = |component: usize| system.owner(component);
-        if matches!(error, StepError::TooSmall(_) | StepError::NotFinite(_))
+        if matches!(error, StepError::StepTooSmall(_) | StepError::ValueNotFinite(_))
             && let Some(fault) = Equations::new(system, &self.setup.model.rules, None).fading(y)
         {
             return self.unsolved(fault, owner(fault.component()), at);

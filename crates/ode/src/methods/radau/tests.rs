@@ -1,6 +1,7 @@
 //! Tests of the Radau IIA steps: orders, stiff references, cost.
 
-use super::*;
+use super::stages::{Attempt, Stages, Start, Stiff};
+use crate::sparse::Pattern;
 
 /// A system of rates and a Jacobian in absolute time, with the time of the step's beginning.
 struct Case<R, J> {
@@ -37,7 +38,7 @@ fn integrate<R: Fn(f64, &[f64], &mut [f64]), J: Fn(f64, &[f64], &mut [f64])>(
     until: f64,
     (relative, absolute, first): (f64, f64, f64),
 ) -> Cost {
-    let mut radau = Radau::new(stages).unwrap();
+    let mut radau = Stages::of(stages);
     let (mut h, mut steps, mut failed, mut after_failure) = (first, 0, 0, false);
     let (mut rate, mut scale) = (vec![0.0; y.len()], vec![0.0; y.len()]);
     case.rates(0.0, y, &mut rate);
@@ -47,7 +48,9 @@ fn integrate<R: Fn(f64, &[f64], &mut [f64]), J: Fn(f64, &[f64], &mut [f64])>(
         scale.iter_mut().zip(&*y).for_each(|(s, y)| *s = relative * y.abs() + absolute);
         let mut factor = 0.5;
         let mut good = false;
-        if let Attempt::Done { error, newton } = radau.attempt(case, pattern, y, &rate, step, &scale) {
+        if let Attempt::Done { error, newton } =
+            radau.attempt(case, &Start { pattern, y, rate: &rate, scale: &scale }, step)
+        {
             let most = 2.0 * stages as f64 + 1.0;
             let safety = 0.9 * (2.0 * most + 1.0) / (2.0 * most + f64::from(newton));
             factor = (safety * error.max(1e-10).powf(-1.0 / (stages as f64 + 1.0))).clamp(0.125, 8.0);
@@ -98,12 +101,16 @@ fn orders_are_five_and_nine() {
     for (stages, counts) in [(3, [96, 144, 192]), (5, [24, 36, 48])] {
         let mut errors = Vec::new();
         for count in counts {
-            let (mut radau, h) = (Radau::new(stages).unwrap(), 12.0 / f64::from(count));
+            let (mut radau, h) = (Stages::of(stages), 12.0 / f64::from(count));
             let (mut y, mut rate) = (vec![1.0, 0.0], [0.0; 2]);
             let mut case = rotation();
             for _ in 0..count {
                 case.rates(0.0, &y, &mut rate);
-                let outcome = radau.attempt(&mut case, &pattern, &y, &rate, h, &[1e-13; 2]);
+                let outcome = radau.attempt(
+                    &mut case,
+                    &Start { pattern: &pattern, y: &y, rate: &rate, scale: &[1e-13; 2] },
+                    h,
+                );
                 assert!(matches!(outcome, Attempt::Done { .. }), "{outcome:?}");
                 radau.accept();
                 y.copy_from_slice(radau.end());
@@ -123,7 +130,7 @@ fn orders_are_five_and_nine() {
 
 /// A. Prothero, A. Robinson, Math. Comp. 28 (1974) 145: stiffness must not spoil accuracy or step size.
 #[test]
-fn prothero_robinson() {
+fn stiffness_costs_neither_accuracy_nor_steps() {
     let pattern = Pattern::new(1, &[]).unwrap();
     for (stages, tolerance, most) in [(3, 1e-6, 40), (3, 1e-10, 400), (5, 1e-6, 20), (5, 1e-10, 100)] {
         let rates = |t: f64, y: &[f64], out: &mut [f64]| out[0] = -1e6 * (y[0] - t.cos()) - t.sin();
@@ -140,7 +147,7 @@ fn prothero_robinson() {
 /// H. Robertson's kinetics (Hairer, Wanner IV.1); reference of 16 digits at t = 40.
 #[test]
 #[allow(clippy::excessive_precision)]
-fn robertson() {
+fn robertson_kinetics_agree_with_the_reference_of_sixteen_digits() {
     let pattern = Pattern::new(3, &[(0, 1), (0, 2), (1, 0), (1, 2), (2, 1)]).unwrap();
     let at = |r, c| pattern.entry(r, c).unwrap();
     let reference = [0.7158270687194051, 9.185534764557764e-6, 0.2841637457458304];
@@ -167,7 +174,7 @@ fn robertson() {
 /// Diffusion and decay along 1,000 cells from 0, ends held at 255, against the exact solution: steady state
 /// `cosh(mu (i - m)) / cosh(mu m)`, m the middle, less its expansion in decaying sines.
 #[test]
-fn stiff_diffusion_chain() {
+fn a_stiff_diffusion_chain_is_exact_within_tolerance_in_few_steps() {
     let n = 1_000usize;
     let (diffusion, decay) = (1e4, 0.03);
     let couplings: Vec<(u32, u32)> = (1..n as u32).flat_map(|k| [(k - 1, k), (k, k - 1)]).collect();
@@ -218,8 +225,12 @@ fn dense_output_follows_the_solution() {
     let (y, mut rate, mut out) = ([1.0, 0.0], [0.0; 2], Vec::new());
     case.rates(0.0, &y, &mut rate);
     for (stages, error) in [(3, 1e-5), (5, 1e-8)] {
-        let mut radau = Radau::new(stages).unwrap();
-        let done = radau.attempt(&mut case, &pattern, &y, &rate, 0.3, &[1e-9; 2]);
+        let mut radau = Stages::of(stages);
+        let done = radau.attempt(
+            &mut case,
+            &Start { pattern: &pattern, y: &y, rate: &rate, scale: &[1e-9; 2] },
+            0.3,
+        );
         assert!(matches!(done, Attempt::Done { .. }));
         radau.dense(&y, &mut out);
         for (i, b) in out.chunks(stages + 1).enumerate() {
@@ -235,30 +246,40 @@ fn dense_output_follows_the_solution() {
 }
 
 #[test]
-fn bad_input_is_reported_and_factors_are_reused() {
+fn invalid_input_is_reported_and_factors_are_reused() {
     let pattern = Pattern::new(1, &[]).unwrap();
-    let mut radau = Radau::new(5).unwrap();
+    let mut radau = Stages::of(5);
     let decay = |_: f64, y: &[f64], out: &mut [f64]| out[0] = if y[0] < 2.0 { -y[0] } else { f64::NAN };
     let mut case =
         Case { time: 0.0, rates: decay, jacobian: |_: f64, _: &[f64], out: &mut [f64]| out[0] = -1.0 };
-    let mut tried = |y: &[f64], rate: f64, h: f64| radau.attempt(&mut case, &pattern, y, &[rate], h, &[1e-9]);
+    let mut tried = |y: &[f64], rate: f64, h: f64| {
+        radau.attempt(&mut case, &Start { pattern: &pattern, y, rate: &[rate], scale: &[1e-9] }, h)
+    };
     assert_eq!(tried(&[1.0], f64::NAN, 0.1), Attempt::NotFinite(Some(0)));
     assert_eq!(tried(&[1.0], -1.0, 0.0), Attempt::NotFinite(None));
     assert_eq!(tried(&[1.0, 1.0], -1.0, 0.1), Attempt::NotFinite(None));
     assert_eq!(tried(&[3.0], -3.0, 0.1), Attempt::NotFinite(Some(0)));
     let mut y = [1.0];
     for _ in 0..10 {
-        let outcome = radau.attempt(&mut case, &pattern, &y, &[-y[0]], 0.1, &[1e-9]);
+        let outcome = radau.attempt(
+            &mut case,
+            &Start { pattern: &pattern, y: &y, rate: &[-y[0]], scale: &[1e-9] },
+            0.1,
+        );
         assert!(matches!(outcome, Attempt::Done { error, .. } if error < 1.0), "{outcome:?}");
         radau.accept();
         y[0] = radau.end()[0];
     }
     assert!((y[0] - (-1f64).exp()).abs() < 1e-14 && radau.factorisations() == 1);
-    assert!(Radau::new(4).is_none());
+    assert_eq!([3, 4, 5].map(|count| Stages::of(count).count()), [3, 5, 5]);
     // Growth without bound inside the step: blow-up of y' = y^2 at tau = 1.
     let square = |_: f64, y: &[f64], out: &mut [f64]| out[0] = y[0] * y[0];
     let mut case =
         Case { time: 0.0, rates: square, jacobian: |_: f64, y: &[f64], out: &mut [f64]| out[0] = 2.0 * y[0] };
-    let outcome = Radau::new(3).unwrap().attempt(&mut case, &pattern, &[1.0], &[1.0], 3.0, &[1e-9]);
+    let outcome = Stages::of(3).attempt(
+        &mut case,
+        &Start { pattern: &pattern, y: &[1.0], rate: &[1.0], scale: &[1e-9] },
+        3.0,
+    );
     assert!(!matches!(outcome, Attempt::Done { error, .. } if error < 1.0), "{outcome:?}");
 }

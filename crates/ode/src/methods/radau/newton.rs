@@ -1,11 +1,11 @@
-//! One Radau IIA method of a fixed number of stages: Newton's iteration, error estimate, dense output.
+//! A Radau IIA step of a fixed number of stages: Newton's iteration, error estimate, dense output.
 //!
 //! Section numbers are those of E. Hairer, G. Wanner, Solving Ordinary Differential Equations II (2nd ed.
 //! 1996).
 
 use super::collocation::Collocation;
-use super::{Attempt, Stiff};
-use crate::sparse::{Field, Pattern, Wide};
+use super::stages::{Attempt, Start, Stiff};
+use crate::sparse::{Field, Wide};
 
 /// Longest extrapolation of the collocation polynomial, in lengths of the step before.
 const EXTRAPOLATE: f64 = 10.0;
@@ -25,11 +25,11 @@ enum Jacobian {
 }
 
 /// Why Newton's iteration stopped; `Ok` holds the number of iterations.
-type Newton = Result<u32, Attempt>;
+type Iterations = Result<u32, Attempt>;
 
 /// A method with fixed number of stages; `L = (S + 1) / 2` lanes: one real and the complex systems.
 #[derive(Clone)]
-pub(super) struct Method<const S: usize, const L: usize> {
+pub struct Newton<const S: usize, const L: usize> {
     table: Collocation<S, L>,
     lambda: Wide<L>,
     jacobian: Vec<f64>,
@@ -46,7 +46,7 @@ pub(super) struct Method<const S: usize, const L: usize> {
     rates: Vec<f64>,
     point: Vec<f64>,
     weight: Vec<f64>,
-    pub(super) end: Vec<f64>,
+    pub end: Vec<f64>,
     h: f64,
     /// Length of the step `before`, if there is one that ended here.
     h_before: Option<f64>,
@@ -58,19 +58,19 @@ pub(super) struct Method<const S: usize, const L: usize> {
     accepted: bool,
     tried: bool,
     first: bool,
-    pub(super) rates_used: u64,
-    pub(super) factorisations: u64,
+    pub rates_used: u64,
+    pub factorisations: u64,
 }
 
-impl<const S: usize, const L: usize> Method<S, L> {
+impl<const S: usize, const L: usize> Newton<S, L> {
     pub fn nodes(&self) -> &[f64] {
         &self.table.nodes
     }
 
-    pub(super) fn new() -> Self {
+    pub fn new() -> Self {
         let table = Collocation::compute();
         let lambda = Wide { re: table.lambda.map(|l| l.re), im: table.lambda.map(|l| l.im) };
-        Method {
+        Newton {
             table,
             lambda,
             jacobian: Vec::new(),
@@ -99,7 +99,7 @@ impl<const S: usize, const L: usize> Method<S, L> {
         }
     }
 
-    pub(super) fn forget(&mut self) {
+    pub fn forget(&mut self) {
         self.known = Jacobian::Unknown;
         self.factored = f64::NAN;
         self.h_before = None;
@@ -107,19 +107,12 @@ impl<const S: usize, const L: usize> Method<S, L> {
         (self.done, self.accepted, self.tried, self.first) = (false, false, false, true);
     }
 
-    pub(super) fn accept(&mut self) {
+    pub fn accept(&mut self) {
         self.accepted |= self.done;
     }
 
-    pub(super) fn attempt(
-        &mut self,
-        problem: &mut impl Stiff,
-        pattern: &Pattern,
-        y: &[f64],
-        rate: &[f64],
-        h: f64,
-        scale: &[f64],
-    ) -> Attempt {
+    pub fn attempt(&mut self, problem: &mut impl Stiff, start: &Start<'_>, h: f64) -> Attempt {
+        let Start { pattern, y, rate, scale } = *start;
         let n = pattern.unknowns();
         if y.len() != n || rate.len() != n || scale.len() != n || !h.is_finite() || h == 0.0 {
             return Attempt::NotFinite(None);
@@ -144,12 +137,12 @@ impl<const S: usize, const L: usize> Method<S, L> {
             Jacobian::Earlier => self.slow || again,
             Jacobian::Here => false,
         };
-        let mut outcome = self.try_newton(problem, pattern, y, renew, true, rounding);
+        let mut outcome = self.try_newton(problem, start, renew, true, rounding);
         if let Err(failure) = outcome {
             // An old Jacobian or a wild extrapolation must not be the reason.
             let finite = failure == Attempt::Diverged;
             if self.known == Jacobian::Earlier || (!finite && self.h_before.is_some()) {
-                outcome = self.try_newton(problem, pattern, y, self.known != Jacobian::Here, false, rounding);
+                outcome = self.try_newton(problem, start, self.known != Jacobian::Here, false, rounding);
             }
         }
         match outcome {
@@ -158,7 +151,7 @@ impl<const S: usize, const L: usize> Method<S, L> {
                 failure
             }
             Ok(newton) => {
-                let error = self.estimate(problem, pattern, y, rate, self.first || again);
+                let error = self.estimate(problem, start, self.first || again);
                 for (e, (y, z)) in self.end.iter_mut().zip(y.iter().zip(&self.z[(S - 1) * n..])) {
                     *e = y + z;
                 }
@@ -205,15 +198,14 @@ impl<const S: usize, const L: usize> Method<S, L> {
     fn try_newton(
         &mut self,
         problem: &mut impl Stiff,
-        pattern: &Pattern,
-        y: &[f64],
+        start: &Start<'_>,
         renew: bool,
         extrapolate: bool,
         rounding: f64,
-    ) -> Newton {
+    ) -> Iterations {
         if renew {
             self.candidate.fill(0.0);
-            problem.jacobian(0.0, y, &mut self.candidate);
+            problem.jacobian(0.0, start.y, &mut self.candidate);
             if self.candidate.iter().any(|v| !v.is_finite()) {
                 self.known = Jacobian::Unknown;
                 return Err(Attempt::NotFinite(None));
@@ -228,7 +220,7 @@ impl<const S: usize, const L: usize> Method<S, L> {
         if self.factored != self.h {
             self.factorisations += 1;
             self.factored = self.h;
-            if !pattern.factor(&self.jacobian, self.lambda, self.h, &mut self.factors) {
+            if !start.pattern.factor(&self.jacobian, self.lambda, self.h, &mut self.factors) {
                 self.factored = f64::NAN;
                 return Err(Attempt::Diverged);
             }
@@ -243,7 +235,7 @@ impl<const S: usize, const L: usize> Method<S, L> {
                 self.eta = 1.0;
             }
         }
-        self.newton(problem, pattern, y, rounding)
+        self.iterate(problem, start, rounding)
     }
 
     /// Starting values from the collocation polynomial of the step before; `ratio` of the step lengths.
@@ -263,7 +255,8 @@ impl<const S: usize, const L: usize> Method<S, L> {
     }
 
     /// Simplified Newton iteration on the transformed increments (IV.8).
-    fn newton(&mut self, problem: &mut impl Stiff, pattern: &Pattern, y: &[f64], rounding: f64) -> Newton {
+    fn iterate(&mut self, problem: &mut impl Stiff, start: &Start<'_>, rounding: f64) -> Iterations {
+        let Start { pattern, y, .. } = *start;
         let (n, h, most) = (self.w.len(), self.h, 2 * S as u32 + 1);
         let kappa = KAPPA.max(rounding);
         let (mut last, mut last_ratio) = (0.0, 0.0);
@@ -328,16 +321,9 @@ impl<const S: usize, const L: usize> Method<S, L> {
 
     /// Error of the embedded formula of order s, filtered by `(lambda_0 / h - J)^-1`, and filtered once more
     /// where the first value may be far too large (IV.8).
-    fn estimate(
-        &mut self,
-        problem: &mut impl Stiff,
-        pattern: &Pattern,
-        y: &[f64],
-        rate: &[f64],
-        twice: bool,
-    ) -> f64 {
-        let n = y.len();
-        let mut error = self.filter(pattern, rate);
+    fn estimate(&mut self, problem: &mut impl Stiff, start: &Start<'_>, twice: bool) -> f64 {
+        let (y, n) = (start.y, start.y.len());
+        let mut error = self.filter(start, start.rate);
         if error >= 1.0 && twice {
             for (p, (y, e)) in self.point.iter_mut().zip(y.iter().zip(&self.rhs)) {
                 *p = y + e.re[0];
@@ -346,7 +332,7 @@ impl<const S: usize, const L: usize> Method<S, L> {
             problem.rates(0.0, &self.point, &mut rates[..n]);
             self.rates_used += 1;
             if rates[..n].iter().all(|f| f.is_finite()) {
-                error = self.filter(pattern, &rates[..n]);
+                error = self.filter(start, &rates[..n]);
             }
             self.rates = rates;
         }
@@ -354,19 +340,19 @@ impl<const S: usize, const L: usize> Method<S, L> {
     }
 
     /// Filtered error in the real lane of `rhs` for a given rate at the beginning; its norm.
-    fn filter(&mut self, pattern: &Pattern, rate: &[f64]) -> f64 {
+    fn filter(&mut self, start: &Start<'_>, rate: &[f64]) -> f64 {
         let n = rate.len();
         for (i, rate) in rate.iter().enumerate() {
             let mut v = self.h * rate;
             (0..S).for_each(|j| v += self.table.error[j] * self.z[j * n + i]);
             self.rhs[i] = Wide::from_f64(v);
         }
-        pattern.solve(&self.factors, &mut self.rhs);
+        start.pattern.solve(&self.factors, &mut self.rhs);
         let shares = self.rhs.iter().zip(&self.weight).map(|(e, w)| (e.re[0] * w).abs());
         shares.fold(0.0, |m, v| if v > m || v.is_nan() { v } else { m })
     }
 
-    pub(super) fn dense(&self, y: &[f64], out: &mut Vec<f64>) {
+    pub fn dense(&self, y: &[f64], out: &mut Vec<f64>) {
         let n = self.end.len();
         out.clear();
         out.reserve((S + 1) * n);

@@ -226,7 +226,7 @@ mod tests {
     /// Published: section IV.5 (nodes, A) and the constants of RADAU5 (IV.8: eigenvalues, error
     /// coefficients).
     #[test]
-    fn three_stages_as_published() {
+    fn coefficients_of_three_stages_are_the_published_ones() {
         let c = Collocation::<3, 2>::compute();
         let r = 6f64.sqrt();
         [(4.0 - r) / 10.0, (4.0 + r) / 10.0, 1.0].iter().zip(c.nodes).for_each(|(p, c)| close(c, *p, 1e-15));
@@ -284,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn definitions_hold() {
+    fn coefficients_satisfy_their_definitions() {
         check::<3, 2>();
         check::<5, 3>();
         // Order conditions of the quadrature, degree 2s - 2, through the last row of A = inverse of the

@@ -1,0 +1,151 @@
+//! Radau IIA collocation for stiff systems: s = 3 or 5 stages, order 2s - 1, L-stable.
+//!
+//! E. Hairer, G. Wanner, Solving Ordinary Differential Equations II (2nd ed. 1996), section IV.8, and the
+//! same authors' "Stiff differential equations solved by Radau methods", J. Comput. Appl. Math. 111 (1999)
+//! 93. The stages' linear systems are decoupled by the eigenvectors of the inverse Runge-Kutta matrix; the
+//! real and the complex ones are eliminated side by side, as lanes of one wide number.
+//!
+//! Here the method meets the other ones ([`OneStep`]): number of stages, scale of errors, the places of partial derivatives in the
+//! sparse Jacobian. `stages.rs` holds what a step needs of its system, `newton.rs` makes the step.
+
+mod collocation;
+mod newton;
+mod stages;
+
+use crate::Rates;
+use crate::dense::Dense;
+use crate::one_step::{Nodes, OneStep, Step, Trial};
+use crate::sparse::Pattern;
+use crate::workspace::{FLOOR, Workspace};
+use dlsys_expr::SimTime;
+use stages::{Attempt, Stages, Start, Stiff};
+
+/// Tighter than this, five stages need fewer evaluations than three.
+const FIVE_STAGES_BELOW: f64 = 1e-5;
+
+/// The method, with what it knows of one system.
+#[derive(Clone, Default)]
+pub struct Radau {
+    /// None before the first step.
+    stages: Option<Stages>,
+    /// The structure of the Jacobian, and the place of each partial derivative in it.
+    pattern: Option<(Pattern, Vec<usize>)>,
+    scale: Vec<f64>,
+    coefficients: Vec<f64>,
+}
+
+/// A system whose partial derivatives are put into their places.
+struct Placed<'a, R> {
+    system: &'a mut R,
+    places: &'a [usize],
+    values: Vec<f64>,
+    evaluations: u64,
+}
+
+impl<R: Rates> Stiff for Placed<'_, R> {
+    fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]) {
+        self.evaluations += 1;
+        self.system.rates(tau, y, out);
+    }
+
+    fn jacobian(&mut self, tau: f64, y: &[f64], out: &mut [f64]) {
+        self.system.partials(tau, y, &mut self.values);
+        for (&place, value) in self.places.iter().zip(&self.values) {
+            out[place] += value;
+        }
+    }
+}
+
+impl OneStep for Radau {
+    /// Between the ends of its long steps the solution is known less well than there.
+    const TOLERANCE_SHARE: f64 = 0.01;
+
+    fn prepare(&mut self, tolerance: f64) {
+        let count = if tolerance < FIVE_STAGES_BELOW { 5 } else { 3 };
+        if self.stages.as_ref().is_none_or(|stages| stages.count() != count) {
+            *self = Radau { stages: Some(Stages::of(count)), ..Radau::default() };
+        }
+    }
+
+    fn forget(&mut self) {
+        self.pattern = None;
+        if let Some(stages) = &mut self.stages {
+            stages.forget();
+        }
+    }
+
+    fn error_order(&self) -> u32 {
+        self.stages.as_ref().map_or(0, Stages::count) as u32
+    }
+
+    /// Whatever the number of stages: the first step has nothing to do with stiffness yet.
+    fn starting_order(&self) -> u32 {
+        4
+    }
+
+    fn nodes(&self) -> Nodes {
+        self.stages
+            .as_ref()
+            .map_or_else(|| Nodes::from_slice(&[0.0, 0.5, 1.0]), |stages| Nodes::from_slice(stages.nodes()))
+    }
+
+    fn attempt(
+        &mut self,
+        work: &mut Workspace,
+        system: &mut impl Rates,
+        step: Step<'_>,
+        tolerance: f64,
+    ) -> Trial {
+        let Step { y, h, .. } = step;
+        let rate = work.rates_at_start();
+        let largest = y.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+        self.scale.clear();
+        // As for explicit methods; but the rate at the start of a fast transient says nothing about its size.
+        let largest = if largest > 0.0 { largest } else { f64::INFINITY };
+        let scale = |(y, f): (&f64, &f64)| tolerance * (y.abs().max((h * f).abs().min(largest)) + FLOOR);
+        self.scale.extend(y.iter().zip(rate).map(scale));
+        let Some(stages) = &mut self.stages else { return Trial::Diverged };
+        let (pattern, places) = match &mut self.pattern {
+            Some(known) => known,
+            unknown => {
+                let couplings = system.couplings();
+                let Some(pattern) = Pattern::new(y.len(), &couplings) else { return Trial::Diverged };
+                let place = |&(row, column): &(u32, u32)| pattern.entry(row as usize, column as usize);
+                let places = couplings.iter().filter_map(place).collect();
+                unknown.insert((pattern, places))
+            }
+        };
+        let modules = system.modules();
+        let mut placed = Placed { system, places, values: Vec::new(), evaluations: 0 };
+        let start = Start { pattern, y, rate, scale: &self.scale };
+        let attempt = stages.attempt(&mut placed, &start, h);
+        work.evaluations += placed.evaluations * modules;
+        match attempt {
+            Attempt::Done { error, .. } => {
+                work.end.copy_from_slice(stages.end());
+                Trial::Done { error, rounding: 0.0 }
+            }
+            Attempt::Diverged => Trial::Diverged,
+            Attempt::NotFinite(component) => Trial::NotFinite(component.unwrap_or(0)),
+        }
+    }
+
+    /// The end of the step is `start + h`, whatever else is known of it.
+    fn dense(&mut self, _: &mut Workspace, _: &mut impl Rates, step: Step<'_>, _: Option<SimTime>) -> Dense {
+        let count = self.stages.as_ref().map_or(0, |stages| {
+            stages.dense(step.y, &mut self.coefficients);
+            stages.count()
+        });
+        Dense::new(step.start, None, step.h, count, self.coefficients.clone())
+    }
+
+    fn accept(&mut self, _: &mut Workspace) -> bool {
+        if let Some(stages) = &mut self.stages {
+            stages.accept();
+        }
+        false
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,64 @@
+//! The right-hand side of a system of differential equations, as integrators see it.
+
+/// A system of equations `y' = f(tau, y)`.
+///
+/// `tau` is the time since the start of the step, in units of simulated time, so that equations keep their digits when the clock
+/// shows large numbers. All slices of components have the same length and order throughout a run of steps.
+pub trait Rates {
+    /// Writes `f(tau, y)` to `out`, which is as long as `y`. A rate that is undefined is NaN or infinite.
+    fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]);
+
+    /// The structure of the Jacobian: pairs (row, column) such that the rate of component `row` depends on component `column`.
+    fn couplings(&self) -> Vec<(u32, u32)>;
+
+    /// Writes the partial derivatives at `(tau, y)` to `out`: one for each of [`couplings`](Rates::couplings), in the same order.
+    fn partials(&mut self, tau: f64, y: &[f64], out: &mut Vec<f64>);
+
+    /// The number that one evaluation of the rates adds to [`Stepper::evaluations`](crate::Stepper::evaluations): how many modules
+    /// share the system.
+    fn modules(&self) -> u64;
+
+    /// The error at `tau` of the unknowns that are solved for along with the components, in units of the tolerated error, given the
+    /// components there and their estimated errors. Zero by default.
+    fn algebraic_error(&mut self, _tau: f64, _end: &[f64], _errors: &[f64], _tolerance: f64) -> f64 {
+        0.0
+    }
+
+    /// True if the rates depend on absolute time, which has the resolution of a float. False by default.
+    fn is_timed(&self) -> bool {
+        false
+    }
+
+    /// True if unknowns are solved for along with the components. False by default.
+    fn is_algebraic(&self) -> bool {
+        false
+    }
+}
+
+/// A system whose time begins `by` later: `tau = 0` here is `tau = by` there.
+pub(crate) struct Shifted<'s, R> {
+    pub system: &'s mut R,
+    pub by: f64,
+}
+
+impl<R: Rates> Rates for Shifted<'_, R> {
+    fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]) {
+        self.system.rates(self.by + tau, y, out);
+    }
+
+    fn couplings(&self) -> Vec<(u32, u32)> {
+        self.system.couplings()
+    }
+
+    fn partials(&mut self, tau: f64, y: &[f64], out: &mut Vec<f64>) {
+        self.system.partials(self.by + tau, y, out);
+    }
+
+    fn modules(&self) -> u64 {
+        self.system.modules()
+    }
+
+    fn is_timed(&self) -> bool {
+        self.system.is_timed()
+    }
+}

@@ -1,0 +1,158 @@
+//! The working memory that all methods share, and the measurements on a step that need no knowledge of the method.
+
+use crate::Rates;
+use crate::one_step::Trial;
+
+/// Errors below the tolerated part of this are ignored, whatever the size of the component.
+pub(crate) const FLOOR: f64 = 1e-18;
+
+/// A step of so many resolutions of time, in which nothing changes by more than [`NOTHING`] times the tolerance, is an instant.
+const INSTANT: f64 = 1e4;
+const NOTHING: f64 = 1e-3;
+
+/// Components that fit into the processor's registers together. States and rates are padded to whole multiples of this; the values
+/// in the padding mean nothing.
+pub(crate) const PART: usize = 8;
+
+/// The most stages of a method: those of DOP853 with its dense output.
+pub(crate) const MAX_STAGES: usize = 16;
+
+/// [`PART`] components of some rates, from `first` on.
+pub(crate) fn part(k: &[f64], first: usize) -> &[f64; PART] {
+    k[first..first + PART].try_into().expect("states and rates are padded to whole parts")
+}
+
+/// Working memory of a step: states and rates of all components.
+#[derive(Clone, Debug, Default)]
+pub struct Workspace {
+    /// The state at the start of the step.
+    pub(crate) from: Vec<f64>,
+    /// Rates at the stages; the first is that of the start of the step.
+    pub(crate) k: Vec<Vec<f64>>,
+    /// The state at which the rates of a stage are evaluated.
+    pub(crate) stage: Vec<f64>,
+    /// The state of the stage before the last, where that is also at the end of the step.
+    pub(crate) other_end: Vec<f64>,
+    /// The state at the end of the step.
+    pub(crate) end: Vec<f64>,
+    /// The error of each rate by rounding of the state; empty unless noise was measured.
+    pub(crate) noise: Vec<f64>,
+    /// The resolution of time at the start of the step if rates depend on time, otherwise 0.
+    pub(crate) resolution: f64,
+    /// Evaluations of the equations of single modules so far.
+    pub(crate) evaluations: u64,
+}
+
+impl Workspace {
+    /// Fits the memory to systems of `n` components.
+    pub fn resize(&mut self, n: usize) {
+        if self.end.len() == n && !self.k.is_empty() {
+            return;
+        }
+        let places = n.next_multiple_of(PART);
+        if self.k.first().is_none_or(|k| k.len() != places) {
+            self.k.resize(MAX_STAGES, Vec::new());
+            for k in &mut self.k {
+                k.resize(places, 0.0);
+            }
+        }
+        self.from.resize(places, 0.0);
+        self.stage.resize(places, 0.0);
+        self.other_end.resize(n, 0.0);
+        self.end.resize(n, 0.0);
+    }
+
+    /// Evaluates the rates at the state `self.stage`, for a stage.
+    pub(crate) fn evaluate(&mut self, system: &mut impl Rates, tau: f64, stage: usize) {
+        self.evaluations += system.modules();
+        let n = self.end.len();
+        system.rates(tau, &self.stage[..n], &mut self.k[stage][..n]);
+    }
+
+    /// Computes the rates at the start of a step.
+    ///
+    /// # Errors
+    ///
+    /// The first component whose rate is not finite.
+    pub fn start(&mut self, system: &mut impl Rates, y: &[f64]) -> Result<(), usize> {
+        self.stage[..y.len()].copy_from_slice(y);
+        self.evaluate(system, 0.0, 0);
+        self.rates_at_start().iter().position(|x| !x.is_finite()).map_or(Ok(()), Err)
+    }
+
+    /// The state at the end of the step just tried.
+    pub fn end(&self) -> &[f64] {
+        &self.end
+    }
+
+    /// The rates at the start of the step.
+    pub fn rates_at_start(&self) -> &[f64] {
+        &self.k[0][..self.end.len()]
+    }
+
+    /// The outcome of a step with these errors whose end and whose rates there, those of stage `last`, are known.
+    pub(crate) fn outcome(&self, error: f64, rounding: f64, last: usize) -> Trial {
+        let bad = self.end.iter().position(|x| !x.is_finite());
+        let rates = &self.k[last][..self.end.len()];
+        match bad.or_else(|| rates.iter().position(|x| !x.is_finite())) {
+            None if error.is_finite() => Trial::Done { error, rounding },
+            at => Trial::NotFinite(at.unwrap_or(0)),
+        }
+    }
+
+    /// The length of a first step over which the solution changes little, for a method of order `order`: in units of simulated time,
+    /// more than 0. One evaluation of the rates (Hairer, Nørsett and Wanner 1993, section II.4).
+    pub(crate) fn first_size(
+        &mut self,
+        order: u32,
+        system: &mut impl Rates,
+        y: &[f64],
+        tolerance: f64,
+    ) -> f64 {
+        let f = &self.k[0][..y.len()];
+        let norm = |v: &[f64]| {
+            v.iter().zip(y).fold(0.0f64, |m, (v, y)| m.max((v / (tolerance * (1.0 + y.abs()))).abs()))
+        };
+        let (d0, d1) = (norm(y), norm(f));
+        if y.is_empty() || d1 == 0.0 {
+            return 1e-3;
+        }
+        let guess = if d0 < 1e-5 || d1 < 1e-5 { 1e-6 } else { 0.01 * d0 / d1 };
+        for (s, (y, f)) in self.stage.iter_mut().zip(y.iter().zip(f)) {
+            *s = y + guess * f;
+        }
+        self.evaluate(system, guess, 1);
+        let bend: Vec<f64> = self.k[1].iter().zip(&self.k[0]).map(|(a, b)| a - b).collect();
+        let most = d1.max(norm(&bend) / guess);
+        let order = f64::from(order + 1);
+        let next = if most <= 1e-15 { (guess * 1e-3).max(1e-6) } else { (0.01 / most).powf(1.0 / order) };
+        let size = next.min(100.0 * guess);
+        if size.is_finite() && size > 0.0 { size } else { 1e-6 }
+    }
+
+    /// Estimates the error of each rate by rounding of the state, from the partial derivatives.
+    pub(crate) fn measure_noise(&mut self, system: &mut impl Rates, y: &[f64]) {
+        let (couplings, mut partials) = (system.couplings(), Vec::new());
+        system.partials(0.0, y, &mut partials);
+        self.noise.clear();
+        self.noise.resize(y.len(), 0.0);
+        for (&(row, column), slope) in couplings.iter().zip(&partials) {
+            let part = f64::EPSILON * (slope * y[column as usize]).abs();
+            self.noise[row as usize] += if part.is_finite() { part } else { 0.0 };
+        }
+    }
+
+    /// True for a step so short that no more than a small part of the tolerance can change in it, however rates may jump. Shorter
+    /// steps do not help where a rate leaves zero like a root, or jumps where no condition says so.
+    pub(crate) fn is_instant(&self, y: &[f64], h: f64, resolution: f64, tolerance: f64) -> bool {
+        let change =
+            |most: f64| y.iter().zip(&self.end).all(|(y, end)| (end - y).abs() <= most * y.abs().max(1.0));
+        h <= INSTANT * resolution && change(NOTHING * tolerance) || h <= 4.0 * resolution && change(1e-9)
+    }
+
+    /// The component whose rate at the start is largest for its size.
+    pub(crate) fn worst(&self, y: &[f64]) -> usize {
+        let size = |i: usize| (self.k[0][i] / (1.0 + y[i].abs())).abs();
+        (0..y.len()).max_by(|a, b| size(*a).total_cmp(&size(*b))).unwrap_or(0)
+    }
+}
