@@ -32,7 +32,6 @@ use std::io::IsTerminal;
 use crate::cli::args::ReplArgs;
 use crate::cli::common::Failure;
 use crate::interrupt;
-use crate::sim::{self, Settings};
 use desk::{Desk, Fault, Screen};
 use grammar::{Line, Statement};
 use input::{Input, Next};
@@ -45,15 +44,7 @@ use stage::{Flow, Stage};
 pub fn repl(args: &ReplArgs) -> Result<(), Failure> {
     let interactive = std::io::stdin().is_terminal() && std::io::stdout().is_terminal();
     let screen = Screen::of_process();
-    let defaults = Settings::default();
-    let settings = Settings {
-        method: args.method,
-        scheduler: sim::Scheduler::Auto,
-        tolerance: args.tolerance,
-        step_size: args.step_size.unwrap_or(defaults.step_size),
-        seed: args.seed,
-        ..args.budget.settings()
-    };
+    let settings = args.solver.apply(args.budget.settings())?;
     let mut desk = Desk::new(settings, args.include.folders.clone(), screen);
     let mut log = Log { echo: args.echo, interactive, ..Log::default() };
     let mut input = match interactive {

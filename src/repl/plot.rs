@@ -13,6 +13,7 @@ use crate::lang::did_you_mean;
 use crate::model::{KindId, Model};
 use crate::replay::Stop;
 use crate::sim::brief;
+use crate::study::LinearAxis;
 use crate::tree::{Lineage, ModuleString};
 
 /// What is plotted.
@@ -64,11 +65,32 @@ impl Stage<'_> {
             return Err(Fault::new(format!("{} .. {} is no stretch of time", brief(from, 9), brief(to, 9))));
         }
         let (subject, title) = self.subject(words, desk)?;
-        // An odd number, so that one row is the middle.
+        // An odd number of rows has a row in the middle.
         let sheet_rows = (desk.screen.rows - 6).clamp(6, 16) | 1;
         let mut sheet = Sheet::new(desk.screen.columns - MARGIN - 2, sheet_rows);
-        let [width, height] = sheet.size();
-        // What is to be seen, by column.
+        let Some(columns) = self.sample(&subject, [from, to], sheet.size()[0], desk)? else {
+            return desk.say("stopped\n");
+        };
+        let Some(axis) = value_axis(&columns, sheet.size()[1]) else {
+            return desk.say("there is no such module from first to last\n");
+        };
+        let joined = !matches!(subject, Subject::Each(_));
+        dots(&mut sheet, &columns, &axis, joined);
+        let range = [axis.high, axis.low];
+        let width = sheet.size()[0] / 2;
+        desk.say(&framed(&sheet.rows(desk.screen.coloured), &title, [from, to], range, width))
+    }
+
+    /// The values of a subject at equidistant times, one column of dots each; `None` if the user has stopped it. The
+    /// replay is back at the present afterwards.
+    fn sample(
+        &mut self,
+        subject: &Subject,
+        [from, to]: [f64; 2],
+        width: usize,
+        desk: &Desk,
+    ) -> Result<Option<Vec<Vec<f64>>>, Fault> {
+        let present = self.replay()?.time();
         let mut columns: Vec<Vec<f64>> = Vec::new();
         let (mut interrupted, mut failed) = (false, None);
         for i in 0..width {
@@ -82,47 +104,14 @@ impl Stage<'_> {
             }
             columns.push(subject.values(self.string(desk)?));
         }
-        // To where we were; that way is short, and must be gone.
+        // The way back is short and cannot be left out.
         interrupt::clear();
         let gone = self.replay()?.seek(present);
         self.arrive(gone, desk)?;
-        if let Some(error) = failed {
-            return Err(self.drawn(&error, desk));
+        match failed {
+            Some(error) => Err(self.drawn(&error, desk)),
+            None => Ok((!interrupted).then_some(columns)),
         }
-        if interrupted {
-            return desk.say("stopped\n");
-        }
-        let finite = || columns.iter().flatten().copied().filter(|x| x.is_finite());
-        let (mut low, mut high) =
-            finite().fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), x| (lo.min(x), hi.max(x)));
-        if low > high {
-            return desk.say("there is no such module from first to last\n");
-        }
-        // Zero is shown where it is near; a line that is flat lies in the middle.
-        if low > 0.0 && low < 0.3 * high {
-            low = 0.0;
-        }
-        if high < 0.0 && high > 0.3 * low {
-            high = 0.0;
-        }
-        if high - low <= 1e-12 * high.abs().max(low.abs()) {
-            let room = if high == 0.0 { 1.0 } else { 0.1 * high.abs() };
-            (low, high) = (low - room, high + room);
-        }
-        let place = |x: f64| (high - x) / (high - low) * (height - 1) as f64;
-        let joined = !matches!(subject, Subject::Each(_));
-        for (i, values) in columns.iter().enumerate() {
-            let values = values.iter().filter(|x| x.is_finite());
-            for &x in values {
-                let before =
-                    i.checked_sub(1).and_then(|i| columns[i].first()).filter(|x| joined && x.is_finite());
-                match before {
-                    Some(&y) => sheet.line([i as f64 - 1.0, place(y)], [i as f64, place(x)], Some(INK)),
-                    None => sheet.dot(i, place(x).round() as usize, Some(INK)),
-                }
-            }
-        }
-        desk.say(&framed(&sheet.rows(desk.screen.coloured), &title, [from, to], [low, high], width / 2))
     }
 
     fn subject(&mut self, words: &[String], desk: &Desk) -> Result<(Subject, String), Fault> {
@@ -227,6 +216,38 @@ impl Subject {
                     Summary::Max => vec![all.iter().copied().fold(f64::NEG_INFINITY, f64::max)],
                     Summary::Min => vec![all.iter().copied().fold(f64::INFINITY, f64::min)],
                 }
+            }
+        }
+    }
+}
+
+/// The vertical axis, from the top row of dots to the bottom one; `None` without values. Zero is included where it is
+/// near the values.
+fn value_axis(columns: &[Vec<f64>], height: usize) -> Option<LinearAxis> {
+    let values = || columns.iter().flatten().copied().filter(|x| x.is_finite());
+    values().next()?;
+    let mut axis = LinearAxis::around(values(), 0.0, (height - 1) as f64);
+    if axis.low > 0.0 && axis.low < 0.3 * axis.high {
+        axis.low = 0.0;
+    }
+    if axis.high < 0.0 && axis.high > 0.3 * axis.low {
+        axis.high = 0.0;
+    }
+    // Rows are counted from the top.
+    Some(LinearAxis { low: axis.high, high: axis.low, ..axis })
+}
+
+/// Draws values as dots, or joins the first ones of adjacent columns by lines.
+fn dots(sheet: &mut Sheet, columns: &[Vec<f64>], axis: &LinearAxis, joined: bool) {
+    for (i, values) in columns.iter().enumerate() {
+        for &x in values.iter().filter(|x| x.is_finite()) {
+            let before =
+                i.checked_sub(1).and_then(|i| columns[i].first()).filter(|x| joined && x.is_finite());
+            match before {
+                Some(&y) => {
+                    sheet.line([i as f64 - 1.0, axis.place(y)], [i as f64, axis.place(x)], Some(INK));
+                }
+                None => sheet.dot(i, axis.place(x).round() as usize, Some(INK)),
             }
         }
     }

@@ -10,7 +10,8 @@ use dlsys::sim::Settings;
 use dlsys::tree::ModuleString;
 
 use crate::common::{plain, repository};
-use crate::wild::{Dice, changed, texts};
+use crate::dice::Dice;
+use crate::wild::{changed, texts};
 
 /// The characters that are no white space.
 fn characters(text: &str) -> String {

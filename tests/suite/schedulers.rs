@@ -4,32 +4,11 @@ use dlsys::sim::{Method, Scheduler, Settings};
 use proptest::prelude::*;
 
 use crate::common::{Plain, run, show};
-
-/// Random numbers of a test case.
-struct Dice(u64);
-
-impl Dice {
-    fn roll(&mut self) -> f64 {
-        // Knuth's MMIX generator; the high bits are good.
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.roll()
-    }
-
-    fn pick<'a>(&mut self, from: &[&'a str]) -> &'a str {
-        from[(self.roll() * from.len() as f64) as usize]
-    }
-}
+use crate::dice::Dice;
 
 /// A filament, maybe with branches, of cells that grow, divide, exchange and decay.
 fn tissue(seed: u64) -> String {
-    let mut dice = Dice(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
-    for _ in 0..8 {
-        dice.roll();
-    }
+    let mut dice = Dice(seed);
     let growth = dice.pick(&["0.2*x", "0.3", "0.1*x*(2 - x) + 0.05", "0.2*x + 0.001*c", "0.2*sqrt(x)"]);
     let exchange = dice.pick(&[
         "D*(l + r - 2c) - 0.1*c",
@@ -196,10 +175,7 @@ impl Rewriting {
 /// Rules over A, B, C, D and +, with contexts, branches and modules that are skipped; the last two applied to
 /// everything.
 fn rewriting(seed: u64) -> Rewriting {
-    let mut dice = Dice(seed.wrapping_mul(0xd134_2543_de82_ef95) | 1);
-    for _ in 0..8 {
-        dice.roll();
-    }
+    let mut dice = Dice(seed);
     let parts = ["A", "B", "C", "D", "+", "A", "B", "[A]", "[+B]", "[C[D]A]", ""];
     let kinds = ["A", "B", "C", "D", "+"];
     let one = |s: &str| s.chars().next();
@@ -207,9 +183,9 @@ fn rewriting(seed: u64) -> Rewriting {
     for _ in 0..9 {
         let strict = one(dice.pick(&kinds)).expect("a kind");
         let context =
-            |dice: &mut Dice| (dice.roll() < 0.6).then(|| one(dice.pick(&["A", "B", "D"]))).flatten();
+            |dice: &mut Dice| (dice.unit() < 0.6).then(|| one(dice.pick(&["A", "B", "D"]))).flatten();
         let (left, right) = (context(&mut dice), context(&mut dice));
-        let length = (dice.roll() * 3.5) as usize;
+        let length = (dice.unit() * 3.5) as usize;
         let successor: String = (0..length).map(|_| dice.pick(&parts)).collect();
         rules.push((left, strict, right, successor));
     }

@@ -23,6 +23,7 @@ mod band;
 mod case;
 mod cases;
 mod compare;
+mod diagram;
 mod files;
 mod hard;
 mod order;
@@ -34,6 +35,7 @@ mod study;
 mod table;
 mod verify;
 
+pub use axis::LinearAxis;
 pub use band::band_svg;
 pub use case::{Case, CaseError, Expectation, Piece, Within};
 pub use cases::CASES;
