@@ -120,7 +120,7 @@ pub struct Clock {
 }
 
 /// A model that was read, and what is to be done with it.
-pub struct Run {
+pub struct ModelRun {
     pub session: Session,
     /// What has been said of its drawings, and what is still to be said.
     remarks: Mutex<Remarks>,
@@ -222,19 +222,19 @@ fn scheduler(args: &SharedArgs) -> Result<sim::Scheduler, Failure> {
     }
 }
 
-impl Run {
+impl ModelRun {
     /// Reads the model.
-    pub fn start(args: &SharedArgs) -> Result<Run, Failure> {
+    pub fn start(args: &SharedArgs) -> Result<ModelRun, Failure> {
         let before = Instant::now();
         ready(args)?;
         let session = open(&args.model, &args.settings, &args.include)?;
-        let mut run = Run::of(session, args)?;
+        let mut run = ModelRun::of(session, args)?;
         run.clock.parse = before.elapsed();
         Ok(run)
     }
 
     /// Of a model that was read.
-    pub fn of(session: Session, args: &SharedArgs) -> Result<Run, Failure> {
+    pub fn of(session: Session, args: &SharedArgs) -> Result<ModelRun, Failure> {
         let settings = settings(args)?;
         let times = times(args, &session)?;
         if let (sim::Scheduler::Local { slice }, Some(end)) = (settings.scheduler, times.last())
@@ -256,7 +256,7 @@ impl Run {
                 )));
             }
         }
-        Ok(Run { session, remarks: Mutex::default(), times, settings, clock: Clock::default() })
+        Ok(ModelRun { session, remarks: Mutex::default(), times, settings, clock: Clock::default() })
     }
 
     /// Starts a simulation.
@@ -278,7 +278,7 @@ impl Run {
             .map_err(|error| Failure::Model(error.diagnostic().render(&self.session.source, coloured())))
     }
 
-    /// Takes the warnings of a frame; those that no frame before had are kept for [`Run::warn`].
+    /// Takes the warnings of a frame; those that no frame before had are kept for [`ModelRun::warn`].
     pub fn note(&self, warnings: Vec<Diagnostic>) {
         if warnings.is_empty() {
             return;

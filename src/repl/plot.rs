@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use super::braille::Sheet;
 use super::commands;
-use super::desk::{Desk, Fault};
+use super::loaded::{LoadedModel, misused};
+use super::navigation::time_of;
 use super::show::{is_called, known_name};
-use super::stage::{Stage, misused};
-use super::travel::time_of;
+use super::state::{CommandError, SessionState};
 use crate::interrupt;
 use crate::lang::did_you_mean;
 use crate::model::{KindId, Model};
@@ -41,9 +41,9 @@ const SUMMARIES: [(&str, Summary); 4] =
 const MARGIN: usize = 11;
 const INK: [u8; 3] = [90, 170, 90];
 
-impl Stage<'_> {
+impl LoadedModel<'_> {
     /// `plot SPEC [A..B]`
-    pub fn plot(&mut self, rest: &[String], desk: &Desk) -> Result<(), Fault> {
+    pub fn plot(&mut self, rest: &[String], state: &SessionState) -> Result<(), CommandError> {
         let (range, words) = match rest.split_last() {
             Some((last, words)) if last.contains("..") && !words.is_empty() => (Some(last), words),
             _ => (None, rest),
@@ -55,30 +55,34 @@ impl Stage<'_> {
                 _ if present > 0.0 => (0.0, present),
                 Some(frames) if frames.to > 0.0 => (0.0, frames.to),
                 _ => {
-                    return Err(Fault::new(
+                    return Err(CommandError::new(
                         "at t = 0 there is nothing to plot; `run` first, or say from when to when, as in `plot F.x 0..10`",
                     ));
                 }
             },
         };
         if to <= from {
-            return Err(Fault::new(format!("{} .. {} is no stretch of time", brief(from, 9), brief(to, 9))));
+            return Err(CommandError::new(format!(
+                "{} .. {} is no stretch of time",
+                brief(from, 9),
+                brief(to, 9)
+            )));
         }
-        let (subject, title) = self.subject(words, desk)?;
+        let (subject, title) = self.subject(words, state)?;
         // An odd number of rows has a row in the middle.
-        let sheet_rows = (desk.screen.rows - 6).clamp(6, 16) | 1;
-        let mut sheet = Sheet::new(desk.screen.columns - MARGIN - 2, sheet_rows);
-        let Some(columns) = self.sample(&subject, [from, to], sheet.size()[0], desk)? else {
-            return desk.say("stopped\n");
+        let sheet_rows = (state.screen.rows - 6).clamp(6, 16) | 1;
+        let mut sheet = Sheet::new(state.screen.columns - MARGIN - 2, sheet_rows);
+        let Some(columns) = self.sample(&subject, [from, to], sheet.size()[0], state)? else {
+            return state.say("stopped\n");
         };
         let Some(axis) = value_axis(&columns, sheet.size()[1]) else {
-            return desk.say("there is no such module from first to last\n");
+            return state.say("there is no such module from first to last\n");
         };
         let joined = !matches!(subject, Subject::Each(_));
         dots(&mut sheet, &columns, &axis, joined);
         let range = [axis.high, axis.low];
         let width = sheet.size()[0] / 2;
-        desk.say(&framed(&sheet.rows(desk.screen.coloured), &title, [from, to], range, width))
+        state.say(&framed(&sheet.rows(state.screen.coloured), &title, [from, to], range, width))
     }
 
     /// The values of a subject at equidistant times, one column of dots each; `None` if the user has stopped it. The
@@ -88,8 +92,8 @@ impl Stage<'_> {
         subject: &Subject,
         [from, to]: [f64; 2],
         width: usize,
-        desk: &Desk,
-    ) -> Result<Option<Vec<Vec<f64>>>, Fault> {
+        state: &SessionState,
+    ) -> Result<Option<Vec<Vec<f64>>>, CommandError> {
         let present = self.replay()?.time();
         let mut columns: Vec<Vec<f64>> = Vec::new();
         let (mut interrupted, mut failed) = (false, None);
@@ -102,19 +106,19 @@ impl Stage<'_> {
             if interrupted || failed.is_some() {
                 break;
             }
-            columns.push(subject.values(self.string(desk)?));
+            columns.push(subject.values(self.string(state)?));
         }
         // The way back is short and cannot be left out.
         interrupt::clear();
         let gone = self.replay()?.seek(present);
-        self.arrive(gone, desk)?;
+        self.arrive(gone, state)?;
         match failed {
-            Some(error) => Err(self.drawn(&error, desk)),
+            Some(error) => Err(self.drawn(&error, state)),
             None => Ok((!interrupted).then_some(columns)),
         }
     }
 
-    fn subject(&mut self, words: &[String], desk: &Desk) -> Result<(Subject, String), Fault> {
+    fn subject(&mut self, words: &[String], state: &SessionState) -> Result<(Subject, String), CommandError> {
         let words: Vec<&str> = words.iter().map(String::as_str).collect();
         match words[..] {
             ["count", name] => {
@@ -127,9 +131,9 @@ impl Stage<'_> {
                 let Some((number, parameter)) = spec[1..].split_once('.') else {
                     return Err(misused(commands::find("plot").expect("it is one")));
                 };
-                let (number, lineage) = self.find(&[number.to_owned()], desk)?;
+                let (number, lineage) = self.find(&[number.to_owned()], state)?;
                 let model = &self.session.model;
-                let module = super::show::modules(self.string(desk)?).find(|m| m.number == number);
+                let module = super::show::modules(self.string(state)?).find(|m| m.number == number);
                 let kind = module.map(|m| m.module.kind).unwrap_or(KindId::OPEN);
                 let place = parameter_place(model, kind, parameter)?;
                 let name = &model.kinds.get(kind).name;
@@ -144,20 +148,20 @@ impl Stage<'_> {
                     let kinds = self.kinds_with(spec)?;
                     Ok((Subject::Whole(*summary, kinds), format!("{how} of {spec}")))
                 }
-                None => Err(Fault::new(format!("`{how}` is none of sum, mean, max, min, count"))),
+                None => Err(CommandError::new(format!("`{how}` is none of sum, mean, max, min, count"))),
             },
             _ => Err(misused(commands::find("plot").expect("it is one"))),
         }
     }
 
     /// The kinds that `NAME.PARAM` means.
-    fn kinds_with(&self, spec: &str) -> Result<BTreeMap<KindId, usize>, Fault> {
+    fn kinds_with(&self, spec: &str) -> Result<BTreeMap<KindId, usize>, CommandError> {
         let model = &self.session.model;
         let Some((name, parameter)) = spec.rsplit_once('.').filter(|(name, _)| !name.is_empty()) else {
             let all = model.kinds.iter().find(|(id, _)| is_called(model, *id, spec));
             let own = all.map(|(id, _)| model.parameter_names(id)).unwrap_or_default();
             let example = own.first().map_or("F.x".to_owned(), |parameter| format!("{spec}.{parameter}"));
-            return Err(Fault::new(format!("say which parameter, as in `plot {example}`")));
+            return Err(CommandError::new(format!("say which parameter, as in `plot {example}`")));
         };
         let name = known_name(model, name)?;
         let mut kinds = BTreeMap::new();
@@ -165,18 +169,18 @@ impl Stage<'_> {
         for (id, _) in model.kinds.iter().filter(|(id, _)| is_called(model, *id, name)) {
             match parameter_place(model, id, parameter) {
                 Ok(place) => drop(kinds.insert(id, place)),
-                Err(fault) => missing = Some(fault),
+                Err(error) => missing = Some(error),
             }
         }
         match missing {
-            Some(fault) if kinds.is_empty() => Err(fault),
+            Some(error) if kinds.is_empty() => Err(error),
             _ => Ok(kinds),
         }
     }
 }
 
 /// The place of a parameter, by name or by number from 1.
-fn parameter_place(model: &Model, kind: KindId, parameter: &str) -> Result<usize, Fault> {
+fn parameter_place(model: &Model, kind: KindId, parameter: &str) -> Result<usize, CommandError> {
     let names = model.parameter_names(kind);
     let kind = model.kinds.get(kind);
     let number = parameter.parse::<usize>().ok().filter(|n| (1..=kind.arity).contains(n));
@@ -184,11 +188,11 @@ fn parameter_place(model: &Model, kind: KindId, parameter: &str) -> Result<usize
         return Ok(place);
     }
     if names.is_empty() {
-        return Err(Fault::new(format!("`{}` has no parameters", kind.name)));
+        return Err(CommandError::new(format!("`{}` has no parameters", kind.name)));
     }
     let hint = did_you_mean(parameter, names.iter().map(String::as_str));
     let hint = hint.unwrap_or_else(|| format!("it has {}", names.join(", ")));
-    Err(Fault::new(format!("`{}` has no parameter `{parameter}`; {hint}", kind.name)))
+    Err(CommandError::new(format!("`{}` has no parameter `{parameter}`; {hint}", kind.name)))
 }
 
 impl Subject {

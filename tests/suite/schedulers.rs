@@ -1,6 +1,6 @@
 //! Who is solved again after an event, and who looks again at whom: cheap ways against plain ones.
 
-use dlsys::sim::{Method, Scheduler, Settings};
+use dlsys::sim::{Error, Method, Scheduler, Settings};
 use proptest::prelude::*;
 
 use crate::common::{Plain, run, show};
@@ -62,21 +62,29 @@ const TIMES: [f64; 4] = [0.5, 1.5, 3.0, 5.0];
 
 #[test]
 fn repairs_err_no_more_than_the_tolerance() {
-    for seed in 0..12 {
+    let mut compared = 0;
+    for seed in 0..16 {
         let text = tissue(seed);
         let with = |scheduler, method, tolerance| {
             let settings = Settings { scheduler, method, tolerance, ..Settings::default() };
-            run(&text, settings, &TIMES).unwrap_or_else(|e| panic!("{e}\n{text}"))
+            run(&text, settings, &TIMES)
         };
-        let exact = with(Scheduler::Global, Method::Auto, 1e-10);
+        let exact = match with(Scheduler::Global, Method::Auto, 1e-10) {
+            Ok(exact) => exact,
+            // The exchange that jumps at c = 1 may lead back there from both sides.
+            Err(Error::Chattering { .. }) => continue,
+            Err(error) => panic!("{error}\n{text}"),
+        };
+        compared += 1;
         for (method, tolerance) in
             [(Method::Auto, 1e-4), (Method::Auto, 1e-6), (Method::Auto, 1e-8), (Method::Dopri5, 1e-6)]
         {
-            let ours = with(Scheduler::Auto, method, tolerance);
+            let ours = with(Scheduler::Auto, method, tolerance).unwrap_or_else(|e| panic!("{e}\n{text}"));
             let error = distance(&ours, &exact, &text);
             assert!(error <= 20.0 * tolerance, "{method:?} at {tolerance:e} errs by {error:e}\n{text}");
         }
     }
+    assert!(compared >= 12, "{compared} tissues");
 }
 
 #[test]

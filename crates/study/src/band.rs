@@ -11,7 +11,7 @@ use super::axis::LinearAxis;
 use super::diagram::{
     COLOURS, LEFT, MIDDLE, PALE, RIGHT, SMALL, TOP, frame, label, page, plain, polyline, stroke, two,
 };
-use super::spread::{Course, Spread};
+use super::spread::{Spread, SpreadSeries};
 use dlsys_sim::brief;
 
 const PANEL: f64 = 150.0;
@@ -20,7 +20,7 @@ const GAP: f64 = 28.0;
 const UNDER: f64 = 64.0;
 
 /// The picture of some measures.
-pub fn band_svg(title: &str, courses: &[Course]) -> String {
+pub fn band_svg(title: &str, courses: &[SpreadSeries]) -> String {
     let panels = courses.len() as f64;
     let bottom = TOP + panels * PANEL + (panels - 1.0).max(0.0) * GAP + 14.0;
     let height = bottom + UNDER;
@@ -41,7 +41,7 @@ pub fn band_svg(title: &str, courses: &[Course]) -> String {
         + "\n"
 }
 
-fn panel(course: &Course, x: &LinearAxis, top: f64, colour: &str) -> Group {
+fn panel(course: &SpreadSeries, x: &LinearAxis, top: f64, colour: &str) -> Group {
     let bottom = top + PANEL;
     let all = course.spreads.iter().flat_map(|s| s.quantiles.into_iter().chain([s.mean]));
     let mut y = LinearAxis::around(all, bottom, top);
@@ -101,7 +101,7 @@ mod tests {
     #[test]
     fn a_panel_for_each_measure() {
         let spreads = (0..3).map(|t| Spread::new(t as f64, vec![1.0, 2.0 * t as f64])).collect();
-        let course = Course { name: "F(x): x < 2".into(), spreads };
+        let course = SpreadSeries { name: "F(x): x < 2".into(), spreads };
         let picture = band_svg("two", &[course.clone(), course]);
         assert_eq!(picture.matches("fill-opacity=\"0.35\"").count(), 2);
         assert!(picture.contains("x &lt; 2"), "names are escaped");

@@ -37,16 +37,16 @@ mod verify;
 
 pub use axis::LinearAxis;
 pub use band::band_svg;
-pub use case::{Case, CaseError, Expectation, Piece, Within};
+pub use case::{Case, CaseError, Expectation, PlainModule, Within};
 pub use cases::CASES;
 pub use compare::{Agreement, Comparison, Difference, compare};
 pub use files::{csv, hard_csv, hard_json, json};
-pub use hard::{HardPlan, Mismatch, Row, run_case};
+pub use hard::{CaseResult, HardPlan, Mismatch, run_case};
 pub use order::{nominal_order, observed_order};
 pub use plot::svg;
-pub use record::{Accuracy, Record, Setup, Stop, Task, method_name};
+pub use record::{Accuracy, EarlyEnd, Record, Setup, Task, method_name};
 pub use reference::{Reference, References};
-pub use spread::{Course, QUANTILES, Spread, spread_csv, spread_table};
+pub use spread::{QUANTILES, Spread, SpreadSeries, spread_csv, spread_table};
 pub use study::{Outcome, Plan, Point, Series, Study, Wall, default_times, study};
 pub use table::{hard_table, mismatches, series_table, study_head, study_table};
 pub use verify::{
