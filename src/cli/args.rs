@@ -6,9 +6,12 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::fmt::FmtArgs;
 use super::new::NewArgs;
-use super::shared::*;
+use super::shared::{BudgetArgs, SharedArgs, SolverArgs, TextFormat};
 use super::shell::{self, CompletionsArgs, ManArgs};
-use super::values::*;
+use super::values::{
+    Background, Seeds, background, bytes, columns, field_of_view, figure, frame_format, layout, method,
+    pixels, positive, runs, seeds, setting, size, threads, time, tolerance,
+};
 use super::verify::VerifyArgs;
 use crate::compile::Setting;
 use crate::render::{Format, Layout};
@@ -407,18 +410,8 @@ pub struct ReplArgs {
     pub settings: Vec<Setting>,
     #[command(flatten)]
     pub include: IncludeArgs,
-    /// Error aimed at in every parameter, relative to max(1, |value|)
-    #[arg(long, value_name = "TOL", allow_negative_numbers = true, default_value = "1e-6", value_parser = tolerance)]
-    pub tolerance: f64,
-    /// How equations are integrated: auto, dopri5, dop853, radau, rk4, euler
-    #[arg(long, default_value = "auto", value_parser = method)]
-    pub method: Method,
-    /// Step of the methods with a fixed one (rk4, euler)
-    #[arg(long, value_name = "H", allow_negative_numbers = true, value_parser = positive, required_if_eq_any([("method", "rk4"), ("method", "euler")]))]
-    pub step_size: Option<f64>,
-    /// Seed of random numbers, for models that draw them: the same seed gives the same plant
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub seed: u64,
+    #[command(flatten)]
+    pub solver: SolverArgs,
     #[command(flatten)]
     pub budget: BudgetArgs,
     /// Print each line before what it does, as on a terminal; for transcripts

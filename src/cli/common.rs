@@ -17,7 +17,6 @@ use crate::model::Frames;
 use crate::scene::Scene;
 use crate::session::Session;
 use crate::sim::{self, Settings, Simulation, Stats};
-use crate::study::method_name;
 use crate::tree::ModuleString;
 use crate::turtle;
 
@@ -121,7 +120,7 @@ pub struct Clock {
 }
 
 /// A model that was read, and what is to be done with it.
-pub struct Run {
+pub struct ModelRun {
     pub session: Session,
     /// What has been said of its drawings, and what is still to be said.
     remarks: Mutex<Remarks>,
@@ -174,18 +173,7 @@ fn spare_files(args: &SharedArgs) -> Result<(), Failure> {
 
 /// Refuses what is wrong with the flags, whatever the model says.
 fn ready(args: &SharedArgs) -> Result<(), Failure> {
-    if args.method.is_fixed_step() && args.step_size.is_none() {
-        return Err(Failure::Usage(
-            "error: this method has a fixed step\n\n  = help: give its length, in the model's unit of time: `--step-size H`\n".to_owned(),
-        ));
-    }
-    if let Some(h) = args.step_size.filter(|_| !args.method.is_fixed_step()) {
-        return Err(Failure::Usage(format!(
-            "error: `--step-size {h}` is for methods with a fixed step, and `{}` chooses its own\n\n  \
-             = help: say how accurate it has to be with `--tolerance TOL`, or choose `--method rk4` or `--method euler`\n",
-            method_name(args.method)
-        )));
-    }
+    args.solver.apply(Settings::default())?;
     for (flag, path) in [("--stats", &args.stats), ("--events", &args.events)] {
         if let Some(path) = path.as_ref().filter(|path| path.is_dir()) {
             return Err(Failure::Usage(format!(
@@ -213,23 +201,15 @@ fn ready(args: &SharedArgs) -> Result<(), Failure> {
 /// What is wrong with them, whatever the model says.
 pub fn settings(args: &SharedArgs) -> Result<Settings, Failure> {
     ready(args)?;
-    let defaults = Settings::default();
-    Ok(Settings {
-        method: args.method,
-        scheduler: scheduler(args)?,
-        tolerance: args.tolerance,
-        step_size: args.step_size.unwrap_or(defaults.step_size),
-        seed: args.seed,
-        log: args.events.is_some(),
-        ..args.budget.settings()
-    })
+    let settings = args.solver.apply(args.budget.settings())?;
+    Ok(Settings { scheduler: scheduler(args)?, log: args.events.is_some(), ..settings })
 }
 
 /// The scheduler that the flags say.
 fn scheduler(args: &SharedArgs) -> Result<sim::Scheduler, Failure> {
     let usage = |message: &str| Err(Failure::Usage(format!("error: {message}\n")));
     match (args.scheduler, args.slice) {
-        (Scheduler::Local, Some(_)) if args.method.is_fixed_step() => {
+        (Scheduler::Local, Some(_)) if args.solver.method.is_fixed_step() => {
             usage("the scheduler `local` has slices of its own: choose a method with step control")
         }
         (Scheduler::Local, Some(slice)) => Ok(sim::Scheduler::Local { slice }),
@@ -242,19 +222,19 @@ fn scheduler(args: &SharedArgs) -> Result<sim::Scheduler, Failure> {
     }
 }
 
-impl Run {
+impl ModelRun {
     /// Reads the model.
-    pub fn start(args: &SharedArgs) -> Result<Run, Failure> {
+    pub fn start(args: &SharedArgs) -> Result<ModelRun, Failure> {
         let before = Instant::now();
         ready(args)?;
         let session = open(&args.model, &args.settings, &args.include)?;
-        let mut run = Run::of(session, args)?;
+        let mut run = ModelRun::of(session, args)?;
         run.clock.parse = before.elapsed();
         Ok(run)
     }
 
     /// Of a model that was read.
-    pub fn of(session: Session, args: &SharedArgs) -> Result<Run, Failure> {
+    pub fn of(session: Session, args: &SharedArgs) -> Result<ModelRun, Failure> {
         let settings = settings(args)?;
         let times = times(args, &session)?;
         if let (sim::Scheduler::Local { slice }, Some(end)) = (settings.scheduler, times.last())
@@ -276,7 +256,7 @@ impl Run {
                 )));
             }
         }
-        Ok(Run { session, remarks: Mutex::default(), times, settings, clock: Clock::default() })
+        Ok(ModelRun { session, remarks: Mutex::default(), times, settings, clock: Clock::default() })
     }
 
     /// Starts a simulation.
@@ -298,7 +278,7 @@ impl Run {
             .map_err(|error| Failure::Model(error.diagnostic().render(&self.session.source, coloured())))
     }
 
-    /// Takes the warnings of a frame; those that no frame before had are kept for [`Run::warn`].
+    /// Takes the warnings of a frame; those that no frame before had are kept for [`ModelRun::warn`].
     pub fn note(&self, warnings: Vec<Diagnostic>) {
         if warnings.is_empty() {
             return;

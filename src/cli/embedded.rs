@@ -4,7 +4,7 @@
 use clap::Parser;
 
 use super::args::{Action, Command};
-use super::common::{Failure, Run};
+use super::common::{Failure, ModelRun};
 use super::{explain, render, report};
 use crate::session::Session;
 
@@ -32,7 +32,9 @@ pub fn run(session: &Session, words: &[String]) -> Result<(), Failure> {
         }
     };
     match &command.action {
-        Action::Render(args) => render::render_run(args, Run::of(session.clone(), &args.shared)?, &|| false),
+        Action::Render(args) => {
+            render::render_run(args, ModelRun::of(session.clone(), &args.shared)?, &|| false)
+        }
         Action::Explain(args) => explain::show(args, session),
         Action::Report(args) => {
             let stem = std::path::Path::new(&session.source.name).file_stem();

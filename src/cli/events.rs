@@ -20,7 +20,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use super::common::{Failure, Run};
+use super::common::{Failure, ModelRun};
 use super::output::Output;
 use super::run::number;
 use crate::sim::Event;
@@ -43,7 +43,7 @@ fn json(text: &str) -> String {
 
 impl EventLog {
     /// Makes the file that was asked for.
-    pub fn create(path: Option<&Path>, run: &Run) -> Result<Option<EventLog>, Failure> {
+    pub fn create(path: Option<&Path>, run: &ModelRun) -> Result<Option<EventLog>, Failure> {
         let Some(path) = path else { return Ok(None) };
         let (model, source) = (&run.session.model, &run.session.source);
         let lines = |rule: &crate::model::Rule| {

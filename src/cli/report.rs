@@ -13,7 +13,7 @@ use crate::model::Frames;
 use crate::render;
 use crate::session::Session;
 use crate::sim::Method;
-use crate::study::{self, CASES, Case, HardPlan, Plan, Row};
+use crate::study::{self, CASES, Case, CaseResult, HardPlan, Plan};
 
 /// Studies models, or runs the hard cases.
 pub fn report(args: &ReportArgs) -> Result<(), Failure> {
@@ -136,7 +136,7 @@ fn hard(args: &ReportArgs, folder: Option<&Path>) -> Result<(), Failure> {
         time_limit: args.time_limit,
     };
     let mut progress = Progress::new("hard cases", cases.len());
-    let mut rows: Vec<Row> = Vec::new();
+    let mut rows: Vec<CaseResult> = Vec::new();
     for case in &cases {
         let run = study::run_case(case, &plan, &mut |what| progress.say(what));
         rows.extend(run.map_err(fault)?);

@@ -4,7 +4,7 @@ use std::io::Write;
 use std::time::Instant;
 
 use super::args::{CheckArgs, RunArgs};
-use super::common::{Failure, Run, count_of, out_error};
+use super::common::{Failure, ModelRun, count_of, out_error};
 use super::events::EventLog;
 use super::progress::Progress;
 use super::shared::TextFormat;
@@ -37,7 +37,7 @@ const STRIDE: usize = 1000;
 
 /// Runs a model and prints its strings.
 pub fn run(args: &RunArgs) -> Result<(), Failure> {
-    let run = Run::start(&args.shared)?;
+    let run = ModelRun::start(&args.shared)?;
     if let Some(seeds) = args.seeds {
         return super::specimens::summarise(args, &run, seeds);
     }

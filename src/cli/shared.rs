@@ -5,9 +5,11 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::args::IncludeArgs;
-use super::values::*;
+use super::common::Failure;
+use super::values::{bytes, events, method, positive, setting, time, tolerance};
 use crate::compile::Setting;
 use crate::sim::{Method, Settings};
+use crate::study::method_name;
 
 /// What a run may take, so that what runs away ends with a message.
 #[derive(Clone, Copy, Debug, Args)]
@@ -42,6 +44,51 @@ impl BudgetArgs {
     }
 }
 
+/// Flags that say how the equations of a model are solved, and with which random numbers.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct SolverArgs {
+    /// Error aimed at in every parameter, relative to max(1, |value|)
+    #[arg(long, value_name = "TOL", allow_negative_numbers = true, default_value = "1e-6", value_parser = tolerance)]
+    pub tolerance: f64,
+    /// How equations are integrated: auto, dopri5, dop853, radau, rk4, euler; all but auto integrate what has formulas, too
+    #[arg(long, default_value = "auto", value_parser = method)]
+    pub method: Method,
+    /// Step of the methods with a fixed one (rk4, euler)
+    #[arg(long, value_name = "H", allow_negative_numbers = true, value_parser = positive)]
+    pub step_size: Option<f64>,
+    /// Seed of random numbers, for models that draw them: the same seed gives the same plant
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+}
+
+impl SolverArgs {
+    /// Adds these flags to settings.
+    ///
+    /// # Errors
+    /// A fixed step without its length, or a length of step for a method that chooses its own.
+    pub fn apply(&self, settings: Settings) -> Result<Settings, Failure> {
+        if self.method.is_fixed_step() && self.step_size.is_none() {
+            return Err(Failure::Usage(
+                "error: this method has a fixed step\n\n  = help: give its length, in the model's unit of time: `--step-size H`\n".to_owned(),
+            ));
+        }
+        if let Some(h) = self.step_size.filter(|_| !self.method.is_fixed_step()) {
+            return Err(Failure::Usage(format!(
+                "error: `--step-size {h}` is for methods with a fixed step, and `{}` chooses its own\n\n  \
+                 = help: say how accurate it has to be with `--tolerance TOL`, or choose `--method rk4` or `--method euler`\n",
+                method_name(self.method)
+            )));
+        }
+        Ok(Settings {
+            method: self.method,
+            tolerance: self.tolerance,
+            step_size: self.step_size.unwrap_or(settings.step_size),
+            seed: self.seed,
+            ..settings
+        })
+    }
+}
+
 /// Flags of everything that runs a model.
 #[derive(Debug, Args)]
 pub struct SharedArgs {
@@ -64,24 +111,14 @@ pub struct SharedArgs {
     pub settings: Vec<Setting>,
     #[command(flatten)]
     pub include: IncludeArgs,
-    /// Error aimed at in every parameter, relative to max(1, |value|)
-    #[arg(long, value_name = "TOL", allow_negative_numbers = true, default_value = "1e-6", value_parser = tolerance)]
-    pub tolerance: f64,
-    /// How equations are integrated: auto, dopri5, dop853, radau, rk4, euler; all but auto integrate what has formulas, too
-    #[arg(long, default_value = "auto", value_parser = method)]
-    pub method: Method,
-    /// Step of the methods with a fixed one (rk4, euler)
-    #[arg(long, value_name = "H", allow_negative_numbers = true, value_parser = positive)]
-    pub step_size: Option<f64>,
+    #[command(flatten)]
+    pub solver: SolverArgs,
     /// How time is advanced for modules that read their neighbours
     #[arg(long, value_enum, default_value_t = Scheduler::Auto)]
     pub scheduler: Scheduler,
     /// Length of the slices of time of the scheduler `local`; its error is of that order
     #[arg(long, value_name = "DT", allow_negative_numbers = true, value_parser = positive)]
     pub slice: Option<f64>,
-    /// Seed of random numbers, for models that draw them: the same seed gives the same plant
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub seed: u64,
     #[command(flatten)]
     pub budget: BudgetArgs,
     /// Write times and counts of work as JSON; - is standard output

@@ -9,7 +9,7 @@ use std::path::Path;
 use serde_json::json;
 
 use super::args::RunArgs;
-use super::common::{Failure, Run, coloured, out_error};
+use super::common::{Failure, ModelRun, coloured, out_error};
 use super::output;
 use super::parallel;
 use super::progress::Progress;
@@ -17,7 +17,7 @@ use super::shared::TextFormat;
 use super::values::Seeds;
 use crate::model::Measure;
 use crate::sim::Settings;
-use crate::study::{Course, Spread, band_svg, spread_csv, spread_table};
+use crate::study::{Spread, SpreadSeries, band_svg, spread_csv, spread_table};
 use crate::tree::ModuleString;
 
 /// Most numbers that are kept, one for each specimen, measure and time.
@@ -27,7 +27,7 @@ const MOST: usize = 100_000_000;
 const ALL: &str = "modules";
 
 /// Runs all specimens and tells how they differ.
-pub fn summarise(args: &RunArgs, run: &Run, seeds: Seeds) -> Result<(), Failure> {
+pub fn summarise(args: &RunArgs, run: &ModelRun, seeds: Seeds) -> Result<(), Failure> {
     let measures: Vec<Measure> =
         args.measures.iter().map(|text| measure(run, text)).collect::<Result<_, _>>()?;
     spare(args)?;
@@ -76,10 +76,10 @@ pub fn summarise(args: &RunArgs, run: &Run, seeds: Seeds) -> Result<(), Failure>
     out.flush().map_err(out_error)?;
     done?;
     let mut values = values.into_iter();
-    let courses: Vec<Course> = (names.iter())
+    let courses: Vec<SpreadSeries> = (names.iter())
         .map(|name| {
             let spreads = run.times.iter().zip(&mut values).map(|(t, values)| Spread::new(*t, values));
-            Course { name: (*name).to_owned(), spreads: spreads.collect() }
+            SpreadSeries { name: (*name).to_owned(), spreads: spreads.collect() }
         })
         .collect();
     if args.format == TextFormat::Text {
@@ -92,7 +92,7 @@ pub fn summarise(args: &RunArgs, run: &Run, seeds: Seeds) -> Result<(), Failure>
 }
 
 /// Reads a measure.
-fn measure(run: &Run, text: &str) -> Result<Measure, Failure> {
+fn measure(run: &ModelRun, text: &str) -> Result<Measure, Failure> {
     run.session.measure(text).map_err(|(source, said)| {
         Failure::Usage(said.iter().map(|d| d.render(&source, coloured())).collect())
     })
@@ -120,7 +120,7 @@ fn spare(args: &RunArgs) -> Result<(), Failure> {
 }
 
 /// Everything that is measured of one specimen: of each measure, its values at all times.
-fn specimen(run: &Run, seed: u64, measures: &[Measure]) -> Result<Vec<f64>, Failure> {
+fn specimen(run: &ModelRun, seed: u64, measures: &[Measure]) -> Result<Vec<f64>, Failure> {
     let times = run.times.len();
     let settings = Settings { seed, log: false, ..run.settings };
     let mut simulation = run.session.simulate(settings).map_err(|error| run.fault(&error))?;

@@ -5,7 +5,7 @@
 use clap::Args;
 
 use super::args::ReportArgs;
-use super::common::{Failure, Run, coloured, count_of, tell};
+use super::common::{Failure, ModelRun, coloured, count_of, tell};
 use super::progress::Progress;
 use super::values::positive;
 use crate::session::Session;
@@ -38,7 +38,7 @@ fn failure(session: &Session, why: Unverified) -> Failure {
 }
 
 /// Verifies a run that is done.
-pub fn verify(args: &VerifyArgs, run: &Run) -> Result<(), Failure> {
+pub fn verify(args: &VerifyArgs, run: &ModelRun) -> Result<(), Failure> {
     let mut progress = Progress::new("verifying", 0);
     let session = &run.session;
     let found = compare(session, run.settings, &run.times, args.time_limit, &mut |what| progress.say(what));

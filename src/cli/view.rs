@@ -4,9 +4,9 @@ use std::io::Write;
 use std::path::Path;
 
 use super::args::ViewArgs;
-use super::common::{Failure, Run, count_of, out_error};
+use super::common::{Failure, ModelRun, count_of, out_error};
+use super::frame_source::{Frame, Pass, play};
 use super::progress::Progress;
-use super::reel::{Pass, Shot, play};
 use crate::player::{Recorder, Recording, Stage, page};
 use crate::render::{self, Survey, View};
 use crate::scene::Scene;
@@ -71,7 +71,7 @@ fn open(args: &ViewArgs) -> Result<(), Failure> {
 /// Writes the page of a model.
 fn write(args: &ViewArgs, out: &Path) -> Result<(), Failure> {
     spare(args, out)?;
-    let run = Run::start(&args.shared)?;
+    let run = ModelRun::start(&args.shared)?;
     let count = run.times.len();
     if count > MOST_FRAMES {
         return Err(Failure::Usage(format!(
@@ -110,14 +110,14 @@ fn spare(args: &ViewArgs, out: &Path) -> Result<(), Failure> {
 
 /// Runs the model twice: what is recorded is in parts of its extent. Frames are drawn on all cores; the recording does not
 /// depend on how many there are.
-fn record(run: &Run, accuracy: Option<f64>) -> Result<Recording, Failure> {
+fn record(run: &ModelRun, accuracy: Option<f64>) -> Result<Recording, Failure> {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let mut clock = run.clock;
     let nothing = Survey::new(View::FRONT);
     let mut survey = nothing.clone();
     let pass = Pass { settings: Settings { log: false, ..run.settings }, accuracy: 0.0 };
     let mut progress = Progress::new("measuring", run.times.len());
-    let of_frame = |_: &Shot, scene: &Scene| {
+    let of_frame = |_: &Frame, scene: &Scene| {
         let mut survey = nothing.clone();
         survey.add(scene);
         survey
@@ -140,10 +140,10 @@ fn record(run: &Run, accuracy: Option<f64>) -> Result<Recording, Failure> {
     let mut recorder = Recorder::new(model, &name, &fit);
     let pass = Pass { settings: Settings { log: true, ..run.settings }, accuracy: fit.accuracy };
     let mut progress = Progress::new("recording", run.times.len());
-    let staged = |shot: &Shot, scene: &Scene| {
+    let staged = |frame: &Frame, scene: &Scene| {
         let mut stage = Stage::default();
         stage.set(scene, fit.default_width);
-        (shot.time, shot.modules() as u64, shot.events().to_vec(), stage)
+        (frame.time, frame.modules() as u64, frame.events().to_vec(), stage)
     };
     play(run, pass, threads, &mut clock, None, staged, |(time, modules, events, stage)| {
         recorder.history().add(&events, model, source);

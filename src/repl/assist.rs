@@ -11,7 +11,7 @@ use rustyline::validate::{ValidationContext, ValidationResult, Validator};
 use rustyline::{Context, Helper};
 
 use super::commands::{self, Argument};
-use super::grammar::{self, Line};
+use super::grammar::{self, StatementKind};
 use crate::model::Model;
 use crate::syntax::words;
 
@@ -81,7 +81,7 @@ impl Assistant {
             }
             return Some((word_start("@"), all));
         }
-        if grammar::classify(line) == Line::Command
+        if grammar::classify(line) == StatementKind::Command
             && let Some(command) = commands::find(word)
         {
             let all = match command.argument {
@@ -196,7 +196,7 @@ mod ink {
 /// A text of a model, or a command, in colours.
 pub fn coloured(text: &str, names: &Names) -> String {
     let mut out = String::new();
-    let command = grammar::classify(text.lines().next().unwrap_or("")) == Line::Command;
+    let command = grammar::classify(text.lines().next().unwrap_or("")) == StatementKind::Command;
     let mut first = true;
     let mut rest = text;
     while let Some(c) = rest.chars().next() {

@@ -25,17 +25,17 @@ pub struct Draft {
 
 /// A text that may take the place of the present one.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Change {
+pub struct TextChange {
     pub text: String,
     /// What was done, for people: `F(x) replaced`.
     pub done: Vec<String>,
     last_rule: Option<String>,
 }
 
-impl Change {
+impl TextChange {
     /// Another text altogether.
-    pub fn whole(text: String) -> Change {
-        Change { text, done: Vec::new(), last_rule: None }
+    pub fn whole(text: String) -> TextChange {
+        TextChange { text, done: Vec::new(), last_rule: None }
     }
 }
 
@@ -74,12 +74,12 @@ impl Draft {
     }
 
     /// The text with declarations and rules typed in.
-    pub fn with(&self, typed: &str) -> Change {
+    pub fn with(&self, typed: &str) -> TextChange {
         let known = outline(&self.text);
         let new = outline(typed);
         if new.is_empty() {
             // It cannot be read; whoever tries will say why.
-            return Change { text: joined(&self.text, typed), done: Vec::new(), last_rule: None };
+            return TextChange { text: joined(&self.text, typed), done: Vec::new(), last_rule: None };
         }
         let mut text = self.text.clone();
         let mut added = String::new();
@@ -110,21 +110,25 @@ impl Draft {
             text = joined(&text, &added);
         }
         let last_rule = new.iter().rev().find(|entry| entry.is_rule).and_then(|entry| entry.key.clone());
-        Change { text, done, last_rule }
+        TextChange { text, done, last_rule }
     }
 
     /// The text with a clause added to the rule typed last; None if no rule was typed.
-    pub fn with_clause(&self, clause: &str) -> Option<Change> {
+    pub fn with_clause(&self, clause: &str) -> Option<TextChange> {
         let key = self.last_rule.as_ref()?;
         let known = outline(&self.text);
         let rule = known.iter().rev().find(|entry| entry.key.as_ref() == Some(key))?;
         let mut text = self.text.clone();
         text.insert_str(rule.span.range().end, &format!("\n  {}", clause.trim()));
-        Some(Change { text, done: vec![format!("{} continued", rule.name)], last_rule: Some(key.clone()) })
+        Some(TextChange {
+            text,
+            done: vec![format!("{} continued", rule.name)],
+            last_rule: Some(key.clone()),
+        })
     }
 
     /// Makes a change.
-    pub fn accept(&mut self, change: Change) {
+    pub fn accept(&mut self, change: TextChange) {
         let before = std::mem::replace(&mut self.text, change.text);
         self.before.push(before);
         if self.before.len() > MOST_UNDONE {

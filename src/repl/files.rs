@@ -3,17 +3,17 @@
 use std::path::{Path, PathBuf};
 
 use super::commands;
-use super::desk::{Desk, Fault};
-use super::stage::{Stage, misused};
+use super::loaded::{LoadedModel, misused};
+use super::state::{CommandError, SessionState};
 use crate::cli::run::Printer;
 use crate::render::{self, Format, FrameWriter, Page, Size, Survey, View};
 use crate::sim::brief;
 
 /// Says whether a file may be written.
-fn spare(path: &Path, force: bool, desk: &Desk) -> Result<(), Fault> {
-    if path.exists() && !force && !desk.written.contains(&real(path)) {
+fn spare(path: &Path, force: bool, state: &SessionState) -> Result<(), CommandError> {
+    if path.exists() && !force && !state.written.contains(&real(path)) {
         let path = path.display();
-        return Err(Fault::new(format!(
+        return Err(CommandError::new(format!(
             "{path} is there already; another name, or `--force` after it to replace it"
         )));
     }
@@ -26,13 +26,13 @@ fn real(path: &Path) -> PathBuf {
 }
 
 /// Writes a file, whole or not at all.
-fn write(path: &Path, bytes: &[u8], desk: &mut Desk) -> Result<(), Fault> {
+fn write(path: &Path, bytes: &[u8], state: &mut SessionState) -> Result<(), CommandError> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let Some(name) = path.file_name().and_then(|name| name.to_str()) else {
-        return Err(Fault::new(format!("{} is no name for a file", path.display())));
+        return Err(CommandError::new(format!("{} is no name for a file", path.display())));
     };
-    render::replace(folder, name, bytes).map_err(Fault::new)?;
-    desk.written.insert(real(path));
+    render::replace(folder, name, bytes).map_err(CommandError::new)?;
+    state.written.insert(real(path));
     Ok(())
 }
 
@@ -44,62 +44,66 @@ fn flag(words: &mut Vec<String>, name: &str) -> bool {
 }
 
 /// Takes a flag with its value out of the words.
-fn value(words: &mut Vec<String>, name: &str) -> Result<Option<String>, Fault> {
+fn value(words: &mut Vec<String>, name: &str) -> Result<Option<String>, CommandError> {
     let Some(at) = words.iter().position(|word| word == name) else { return Ok(None) };
     words.remove(at);
     if at >= words.len() {
-        return Err(Fault::new(format!("{name} needs a value after it")));
+        return Err(CommandError::new(format!("{name} needs a value after it")));
     }
     Ok(Some(words.remove(at)))
 }
 
-impl Stage<'_> {
+impl LoadedModel<'_> {
     /// `save [FILE] [--force]`
-    pub fn save(&mut self, rest: &[String], desk: &mut Desk) -> Result<(), Fault> {
+    pub fn save(&mut self, rest: &[String], state: &mut SessionState) -> Result<(), CommandError> {
         let mut words = rest.to_vec();
         let force = flag(&mut words, "--force");
         let path = match &words[..] {
-            [] => match desk.draft.path.clone() {
+            [] => match state.draft.path.clone() {
                 Some(path) => path,
-                None => return Err(Fault::new("this model has no file yet: `save NAME.dls` gives it one")),
+                None => {
+                    return Err(CommandError::new(
+                        "this model has no file yet: `save NAME.dls` gives it one",
+                    ));
+                }
             },
             [name] => PathBuf::from(name),
             _ => return Err(misused(commands::find("save").expect("it is one"))),
         };
-        if desk.draft.text.trim().is_empty() {
-            return Err(Fault::new("there is nothing to save yet"));
+        if state.draft.text.trim().is_empty() {
+            return Err(CommandError::new("there is nothing to save yet"));
         }
-        let own = desk.draft.path.as_ref().is_some_and(|known| real(known) == real(&path));
+        let own = state.draft.path.as_ref().is_some_and(|known| real(known) == real(&path));
         if !own {
-            spare(&path, force, desk)?;
-        } else if !force && desk.draft.was_changed_elsewhere(&path) {
-            return Err(Fault::new(format!(
+            spare(&path, force, state)?;
+        } else if !force && state.draft.was_changed_elsewhere(&path) {
+            return Err(CommandError::new(format!(
                 "{} was changed by somebody else since it was read: `reload` takes what is there, `save NAME.dls` another name, `save --force` writes over it",
                 path.display()
             )));
         }
-        let text = desk.draft.text.clone();
-        write(&path, text.as_bytes(), desk)?;
-        desk.draft.set_saved(&path);
+        let text = state.draft.text.clone();
+        write(&path, text.as_bytes(), state)?;
+        state.draft.set_saved(&path);
         let lines = text.lines().count();
         let noun = if lines == 1 { "line" } else { "lines" };
-        desk.say(&format!("{}: {lines} {noun}\n", path.display()))?;
-        if !desk.set.is_empty() {
-            let set: Vec<String> = desk.set.iter().map(|s| format!("{} = {}", s.name, s.value)).collect();
-            desk.say(&format!("  not in the file: what was set, {}\n", set.join(", ")))?;
+        state.say(&format!("{}: {lines} {noun}\n", path.display()))?;
+        if !state.set.is_empty() {
+            let set: Vec<String> = state.set.iter().map(|s| format!("{} = {}", s.name, s.value)).collect();
+            state.say(&format!("  not in the file: what was set, {}\n", set.join(", ")))?;
         }
         Ok(())
     }
 
     /// `export FILE [--view V] [--perspective D] [--width N] [--force]`
-    pub fn export(&mut self, rest: &[String], desk: &mut Desk) -> Result<(), Fault> {
+    pub fn export(&mut self, rest: &[String], state: &mut SessionState) -> Result<(), CommandError> {
         let mut words = rest.to_vec();
         let force = flag(&mut words, "--force");
         let number = |text: Option<String>, what: &str, range: std::ops::RangeInclusive<f64>| match text {
             None => Ok(None),
             Some(text) => match text.parse::<f64>().ok().filter(|x| range.contains(x)) {
                 Some(x) => Ok(Some(x)),
-                None => Err(Fault::new(format!(
+                None => Err(CommandError::new(format!(
                     "{what} is a number from {} to {}, not `{text}`",
                     range.start(),
                     range.end()
@@ -107,7 +111,7 @@ impl Stage<'_> {
             },
         };
         let view = match value(&mut words, "--view")? {
-            Some(text) => text.parse().map_err(|error: render::Error| Fault::new(error))?,
+            Some(text) => text.parse().map_err(|error: render::Error| CommandError::new(error))?,
             None => View::FRONT,
         };
         let perspective =
@@ -121,7 +125,7 @@ impl Stage<'_> {
         let (bytes, companion) = match extension.as_str() {
             "json" | "txt" => {
                 let printer = Printer::new(&self.session.model);
-                let string = self.string(desk)?;
+                let string = self.string(state)?;
                 let mut text = String::new();
                 match extension.as_str() {
                     "json" => printer.json(string, &mut text),
@@ -131,13 +135,13 @@ impl Stage<'_> {
             }
             other => {
                 let format: Format = other.parse().map_err(|_| {
-                    Fault::new(format!(
+                    CommandError::new(format!(
                         "the name tells the format: .svg, .png, .obj, .json or .txt, but `{}` has {}; `render -o DIR` writes all frames",
                         path.display(),
                         if extension.is_empty() { "none".to_owned() } else { format!("`.{extension}`") }
                     ))
                 })?;
-                let scene = self.scene(desk)?;
+                let scene = self.scene(state)?;
                 let mut survey = Survey::new(view);
                 if let Some(field) = perspective {
                     survey = survey.with_perspective(field);
@@ -146,8 +150,8 @@ impl Stage<'_> {
                 let mut writer = FrameWriter::new(format, survey.fit());
                 if let Some(width) = width {
                     let size = Size::Width(width as u32);
-                    writer.page =
-                        Page::new(writer.page.picture, size, Some(Page::BACKGROUND)).map_err(Fault::new)?;
+                    writer.page = Page::new(writer.page.picture, size, Some(Page::BACKGROUND))
+                        .map_err(CommandError::new)?;
                 }
                 let model = &self.session.model;
                 let name = model.title.as_deref().unwrap_or(&self.session.source.name);
@@ -156,13 +160,13 @@ impl Stage<'_> {
             }
         };
         let beside = |name: &str| path.with_file_name(name);
-        spare(&path, force, desk)?;
+        spare(&path, force, state)?;
         if let Some((name, bytes)) = &companion {
-            spare(&beside(name), force, desk)?;
-            write(&beside(name), bytes, desk)?;
+            spare(&beside(name), force, state)?;
+            write(&beside(name), bytes, state)?;
         }
-        write(&path, &bytes, desk)?;
+        write(&path, &bytes, state)?;
         let with = companion.map_or(String::new(), |(name, _)| format!(", with {name}"));
-        desk.say(&format!("{}: {} bytes{with}\n", path.display(), bytes.len()))
+        state.say(&format!("{}: {} bytes{with}\n", path.display(), bytes.len()))
     }
 }

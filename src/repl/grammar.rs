@@ -15,7 +15,7 @@ use crate::syntax::words;
 
 /// What a line begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Line {
+pub enum StatementKind {
     /// Nothing, or a remark.
     Blank,
     Command,
@@ -29,7 +29,7 @@ pub enum Line {
 /// A command, or a piece of a model, with the number of its first line (from 1).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Statement {
-    pub kind: Line,
+    pub kind: StatementKind,
     pub text: String,
     pub line: usize,
 }
@@ -55,28 +55,28 @@ pub fn first_word(line: &str) -> (&str, &str) {
 }
 
 /// Tells what a line begins.
-pub fn classify(line: &str) -> Line {
+pub fn classify(line: &str) -> StatementKind {
     if line.trim_start().starts_with('?') || line.trim_start().starts_with(':') {
-        return Line::Command;
+        return StatementKind::Command;
     }
     let body = code(line).trim();
     if body.is_empty() {
-        return Line::Blank;
+        return StatementKind::Blank;
     }
     let (word, rest) = first_word(body);
     if words::CLAUSES.contains(&word) {
-        return Line::Clause;
+        return StatementKind::Clause;
     }
     if words::declarations().any(|known| known == word) {
-        return Line::Model;
+        return StatementKind::Model;
     }
     let colon = has_colon(body);
     let apart = body.len() == word.len() || body[word.len()..].starts_with(char::is_whitespace);
     let head = rest.starts_with([':', '<', '>']) || rest.starts_with('(') && colon;
     if commands::find(word).is_some() && apart && !head {
-        return Line::Command;
+        return StatementKind::Command;
     }
-    if colon || body.ends_with(['<', '>']) { Line::Model } else { Line::Unknown }
+    if colon || body.ends_with(['<', '>']) { StatementKind::Model } else { StatementKind::Unknown }
 }
 
 /// True if a `:` stands outside parentheses.
@@ -111,20 +111,20 @@ pub fn is_open(text: &str) -> bool {
 fn goes_on(text: &str, line: &str) -> bool {
     let indented = line.starts_with(char::is_whitespace);
     match classify(line) {
-        Line::Blank => indented && !line.trim().is_empty(),
-        Line::Clause => true,
+        StatementKind::Blank => indented && !line.trim().is_empty(),
+        StatementKind::Clause => true,
         _ if indented => true,
-        Line::Unknown => is_open(text),
-        Line::Command | Line::Model => false,
+        StatementKind::Unknown => is_open(text),
+        StatementKind::Command | StatementKind::Model => false,
     }
 }
 
 /// True if what was typed on a terminal can be taken as it is; otherwise Enter begins another line of it.
 pub fn is_complete(input: &str) -> bool {
-    let first = input.lines().find(|line| classify(line) != Line::Blank);
+    let first = input.lines().find(|line| classify(line) != StatementKind::Blank);
     match first.map(classify) {
-        Some(Line::Model) => {}
-        Some(Line::Clause) => return input.ends_with('\n') || !is_open(&format!("x: {input}")),
+        Some(StatementKind::Model) => {}
+        Some(StatementKind::Clause) => return input.ends_with('\n') || !is_open(&format!("x: {input}")),
         _ => return true,
     }
     let last = input.rsplit('\n').next().unwrap_or("");
@@ -159,9 +159,9 @@ impl Splitter {
         }
         let statement = |kind| Statement { kind, text: line.trim_end().to_owned(), line: number };
         match classify(line) {
-            Line::Blank => {}
-            kind @ (Line::Command | Line::Unknown) => done.push(statement(kind)),
-            kind @ (Line::Model | Line::Clause) => self.open = Some(statement(kind)),
+            StatementKind::Blank => {}
+            kind @ (StatementKind::Command | StatementKind::Unknown) => done.push(statement(kind)),
+            kind @ (StatementKind::Model | StatementKind::Clause) => self.open = Some(statement(kind)),
         }
         done
     }
@@ -179,26 +179,26 @@ mod tests {
     #[test]
     fn lines_are_told_apart() {
         for (line, kind) in [
-            ("run 5", Line::Command),
-            ("  run", Line::Command),
-            (":F(x)", Line::Command),
-            ("? run", Line::Command),
-            ("load C:\\plants\\a.dls", Line::Command),
-            ("run(x): solve dx/dt = 1", Line::Model),
-            ("run (x): solve dx/dt = 1", Line::Model),
-            ("run < B: produce A", Line::Model),
-            ("run: produce A", Line::Model),
-            ("F(x): solve dx/dt = 1", Line::Model),
-            ("±(α): solve dα/dt = 1", Line::Model),
-            ("+(a): solve da/dt = 1", Line::Model),
-            ("A(x) <", Line::Model),
-            ("param r = 2", Line::Model),
-            ("parm r = 2", Line::Unknown),
-            ("title \"a: b\"", Line::Model),
-            ("if x = 1 produce F", Line::Clause),
-            ("# a remark", Line::Blank),
-            ("", Line::Blank),
-            ("x + 1", Line::Unknown),
+            ("run 5", StatementKind::Command),
+            ("  run", StatementKind::Command),
+            (":F(x)", StatementKind::Command),
+            ("? run", StatementKind::Command),
+            ("load C:\\plants\\a.dls", StatementKind::Command),
+            ("run(x): solve dx/dt = 1", StatementKind::Model),
+            ("run (x): solve dx/dt = 1", StatementKind::Model),
+            ("run < B: produce A", StatementKind::Model),
+            ("run: produce A", StatementKind::Model),
+            ("F(x): solve dx/dt = 1", StatementKind::Model),
+            ("±(α): solve dα/dt = 1", StatementKind::Model),
+            ("+(a): solve da/dt = 1", StatementKind::Model),
+            ("A(x) <", StatementKind::Model),
+            ("param r = 2", StatementKind::Model),
+            ("parm r = 2", StatementKind::Unknown),
+            ("title \"a: b\"", StatementKind::Model),
+            ("if x = 1 produce F", StatementKind::Clause),
+            ("# a remark", StatementKind::Blank),
+            ("", StatementKind::Blank),
+            ("x + 1", StatementKind::Unknown),
         ] {
             assert_eq!(classify(line), kind, "{line}");
         }
@@ -252,17 +252,17 @@ mod tests {
             all.extend(splitter.line(line, i + 1));
         }
         all.extend(splitter.finish());
-        let shape: Vec<(Line, usize, usize)> =
+        let shape: Vec<(StatementKind, usize, usize)> =
             all.iter().map(|s| (s.kind, s.line, s.text.lines().count())).collect();
         assert_eq!(
             shape,
             [
-                (Line::Model, 2, 2),
-                (Line::Model, 4, 6),
-                (Line::Command, 10, 1),
-                (Line::Model, 11, 1),
-                (Line::Clause, 13, 1),
-                (Line::Command, 14, 1),
+                (StatementKind::Model, 2, 2),
+                (StatementKind::Model, 4, 6),
+                (StatementKind::Command, 10, 1),
+                (StatementKind::Model, 11, 1),
+                (StatementKind::Clause, 13, 1),
+                (StatementKind::Command, 14, 1),
             ]
         );
     }

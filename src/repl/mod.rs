@@ -2,13 +2,13 @@
 //!
 //! ```text
 //! terminal or script ──input──▶ statements ──┬─ text of the model ──draft──▶ Session, read anew
-//!                       grammar, assist      └─ commands ──▶ Stage (a Session and its Replay) ──▶ answers
+//!                       grammar, assist      └─ commands ──▶ LoadedModel (a Session and its Replay) ──▶ answers
 //! ```
 //!
 //! - `input`, `grammar`, `assist`: lines, what they are, and what helps to type them; `commands`: the list of commands.
 //! - `draft`: the model's text, changed piece by piece. A change that cannot be read is rolled back whole.
-//! - `desk`: all that outlives a model. `stage`: a model in time, and what commands do with it.
-//! - `travel`, `show`, `plot`, `picture`, `files`: the commands, by what they are about. `braille`: pictures made of dots.
+//! - `state`: all that outlives a model. `loaded`: a model in time, and what commands do with it.
+//! - `navigation`, `show`, `plot`, `picture`, `files`: the commands, by what they are about. `braille`: pictures made of dots.
 //!
 //! Answers go to standard output, complaints to standard error. Without a terminal the statements of standard input are done
 //! one after another, and the exit status is 1 if one of them has failed.
@@ -16,27 +16,26 @@
 mod assist;
 mod braille;
 mod commands;
-mod desk;
 mod draft;
 mod files;
 mod grammar;
 mod input;
+mod loaded;
+mod navigation;
 mod picture;
 mod plot;
 mod show;
-mod stage;
-mod travel;
+mod state;
 
 use std::io::IsTerminal;
 
 use crate::cli::args::ReplArgs;
 use crate::cli::common::Failure;
 use crate::interrupt;
-use crate::sim::{self, Settings};
-use desk::{Desk, Fault, Screen};
-use grammar::{Line, Statement};
+use grammar::{Statement, StatementKind};
 use input::{Input, Next};
-use stage::{Flow, Stage};
+use loaded::{LoadedModel, NextStep};
+use state::{CommandError, Screen, SessionState};
 
 /// Runs a session to its end.
 ///
@@ -45,19 +44,11 @@ use stage::{Flow, Stage};
 pub fn repl(args: &ReplArgs) -> Result<(), Failure> {
     let interactive = std::io::stdin().is_terminal() && std::io::stdout().is_terminal();
     let screen = Screen::of_process();
-    let defaults = Settings::default();
-    let settings = Settings {
-        method: args.method,
-        scheduler: sim::Scheduler::Auto,
-        tolerance: args.tolerance,
-        step_size: args.step_size.unwrap_or(defaults.step_size),
-        seed: args.seed,
-        ..args.budget.settings()
-    };
-    let mut desk = Desk::new(settings, args.include.folders.clone(), screen);
+    let settings = args.solver.apply(args.budget.settings())?;
+    let mut state = SessionState::new(settings, args.include.folders.clone(), screen);
     let mut log = Log { echo: args.echo, interactive, ..Log::default() };
     let mut input = match interactive {
-        true => Input::terminal(desk.names.clone(), screen.coloured)
+        true => Input::terminal(state.names.clone(), screen.coloured)
             .map_err(|why| Failure::Model(format!("error: the terminal cannot be used: {why}\n")))?,
         false => Input::script(),
     };
@@ -65,51 +56,58 @@ pub fn repl(args: &ReplArgs) -> Result<(), Failure> {
         // Only who goes on after it needs to hear it.
         interrupt::listen();
         let version = env!("CARGO_PKG_VERSION");
-        desk.say(&format!(
+        state.say(&format!(
             "dlsys {version}. Type declarations and rules, or commands; `help` lists them.\n"
         ))?;
     }
     let mut start = match &args.model {
-        Some(path) => match desk.load(path, &args.settings) {
+        Some(path) => match state.load(path, &args.settings) {
             Ok(flow) => flow,
-            Err(fault @ (Fault::Closed | Fault::Unwritable(_))) => return Err(fault.into()),
-            // On a terminal somebody may mend the file and try again.
-            Err(Fault::Said(message)) if interactive => {
-                desk.complain(&message);
-                desk.begin_empty()
+            Err(error @ (CommandError::OutputClosed | CommandError::OutputFailed(_))) => {
+                return Err(error.into());
             }
-            Err(Fault::Said(message)) => return Err(Failure::Model(message)),
+            // On a terminal somebody may mend the file and try again.
+            Err(CommandError::Message(message)) if interactive => {
+                state.complain(&message);
+                state.begin_empty()
+            }
+            Err(CommandError::Message(message)) => return Err(Failure::Model(message)),
         },
-        None => desk.begin_empty(),
+        None => state.begin_empty(),
     };
     // Each round is one model; whatever changes it begins another.
-    while let Flow::Model { session, time } = start {
-        let mut stage = Stage::new(&session, &desk);
-        let set = stage.set(time, &desk);
-        log.take(set, &mut desk, None)?;
-        start = play(&mut stage, &mut desk, &mut input, &mut log)?;
+    while let NextStep::Model { session, time } = start {
+        let mut loaded = LoadedModel::new(&session, &state);
+        let set = loaded.set(time, &state);
+        log.take(set, &mut state, None)?;
+        start = play(&mut loaded, &mut state, &mut input, &mut log)?;
     }
     crate::rescue::remember(None);
-    if interactive && !desk.draft.is_saved() {
-        desk.say("The model was not saved; the history has what was typed.\n")?;
+    if interactive && !state.draft.is_saved() {
+        state.say("The model was not saved; the history has what was typed.\n")?;
     }
     log.verdict()
 }
 
 /// Does one statement after another, until there is another model or no more to do.
-fn play(stage: &mut Stage, desk: &mut Desk, input: &mut Input, log: &mut Log) -> Result<Flow, Failure> {
+fn play(
+    loaded: &mut LoadedModel,
+    state: &mut SessionState,
+    input: &mut Input,
+    log: &mut Log,
+) -> Result<NextStep, Failure> {
     let mut cancelled = false;
     loop {
-        let statement = match input.next(&desk.prompt(stage)) {
+        let statement = match input.next(&state.prompt(loaded)) {
             Next::Statement(statement) => statement,
             Next::Cancelled => {
                 if std::mem::replace(&mut cancelled, true) {
-                    desk.say("Ctrl-D or `quit` ends the session.\n")?;
+                    state.say("Ctrl-D or `quit` ends the session.\n")?;
                     cancelled = false;
                 }
                 continue;
             }
-            Next::End => return Ok(Flow::Quit),
+            Next::End => return Ok(NextStep::Quit),
             Next::Broken(why) => {
                 return Err(Failure::Model(format!("error: the input cannot be read: {why}\n")));
             }
@@ -117,12 +115,12 @@ fn play(stage: &mut Stage, desk: &mut Desk, input: &mut Input, log: &mut Log) ->
         cancelled = false;
         interrupt::clear();
         if log.echo && !log.interactive {
-            desk.say(&echo(&statement))?;
+            state.say(&echo(&statement))?;
         }
-        crate::rescue::remember((!desk.draft.is_saved()).then_some(&desk.draft.text));
-        let done = stage.obey(&statement, desk);
-        if let Some(flow) = log.take(done, desk, Some(&statement))?
-            && !matches!(flow, Flow::On)
+        crate::rescue::remember((!state.draft.is_saved()).then_some(&state.draft.text));
+        let done = loaded.obey(&statement, state);
+        if let Some(flow) = log.take(done, state, Some(&statement))?
+            && !matches!(flow, NextStep::Continue)
         {
             return Ok(flow);
         }
@@ -151,22 +149,22 @@ impl Log {
     /// Takes what came of a statement; says what is wrong with it.
     fn take<T>(
         &mut self,
-        done: Result<T, Fault>,
-        desk: &mut Desk,
+        done: Result<T, CommandError>,
+        state: &mut SessionState,
         statement: Option<&Statement>,
     ) -> Result<Option<T>, Failure> {
         self.statements += usize::from(statement.is_some());
         match done {
             Ok(value) => Ok(Some(value)),
-            Err(fault @ (Fault::Closed | Fault::Unwritable(_))) => Err(fault.into()),
-            Err(Fault::Said(message)) => {
-                desk.complain(&message);
+            Err(error @ (CommandError::OutputClosed | CommandError::OutputFailed(_))) => Err(error.into()),
+            Err(CommandError::Message(message)) => {
+                state.complain(&message);
                 if !self.interactive {
                     let line = statement.map_or(0, |statement| statement.line);
                     self.failed.push(line);
                     let what = statement.map_or("", |s| s.text.lines().next().unwrap_or("")).trim();
                     if statement.is_some() {
-                        desk.complain(&format!("(line {line} of the input: {what})\n"));
+                        state.complain(&format!("(line {line} of the input: {what})\n"));
                     }
                 }
                 Ok(None)
@@ -194,7 +192,7 @@ impl Log {
 impl Statement {
     /// A command's name and what follows it; quotes hold spaces together.
     fn words(&self) -> Vec<String> {
-        debug_assert!(self.kind == Line::Command);
+        debug_assert!(self.kind == StatementKind::Command);
         let text = self.text.trim();
         let text = text.strip_prefix(':').unwrap_or(text).trim();
         let text = text.strip_prefix('?').map_or(text.to_owned(), |rest| format!("help {rest}"));
@@ -229,7 +227,8 @@ mod tests {
 
     #[test]
     fn words_of_a_command() {
-        let words = |text: &str| Statement { kind: Line::Command, text: text.to_owned(), line: 1 }.words();
+        let words =
+            |text: &str| Statement { kind: StatementKind::Command, text: text.to_owned(), line: 1 }.words();
         assert_eq!(words("plot #3.x 0..9 # a remark"), ["plot", "#3.x", "0..9"]);
         assert_eq!(words("load \"my plants/a b.dls\""), ["load", "my plants/a b.dls"]);
         assert_eq!(words(":run"), ["run"]);

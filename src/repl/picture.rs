@@ -2,8 +2,8 @@
 
 use super::braille::Sheet;
 use super::commands;
-use super::desk::{Desk, Fault};
-use super::stage::{Stage, misused};
+use super::loaded::{LoadedModel, misused};
+use super::state::{CommandError, SessionState};
 use crate::render::{Fit, Page, Size, Survey, View, pixels};
 use crate::scene::Scene;
 use crate::turtle;
@@ -11,18 +11,18 @@ use crate::turtle;
 /// A dot is set where so much of it (of 255) is covered; stems may be thinner than a dot.
 const COVERED: u8 = 48;
 
-impl Stage<'_> {
+impl LoadedModel<'_> {
     /// What is to be seen at present.
-    pub fn scene(&mut self, desk: &Desk) -> Result<Scene, Fault> {
+    pub fn scene(&mut self, state: &SessionState) -> Result<Scene, CommandError> {
         let model = &self.session.model;
         let mut scene = turtle::blank(model);
-        turtle::draw(model, self.string(desk)?, &mut scene)
-            .map_err(|error| Fault::Said(error.diagnostic().render(&self.session.source, false)))?;
+        turtle::draw(model, self.string(state)?, &mut scene)
+            .map_err(|error| CommandError::Message(error.diagnostic().render(&self.session.source, false)))?;
         Ok(scene)
     }
 
     /// `draw [VIEW] [blocks]`
-    pub fn draw(&mut self, rest: &[String], desk: &Desk) -> Result<(), Fault> {
+    pub fn draw(&mut self, rest: &[String], state: &SessionState) -> Result<(), CommandError> {
         let (mut view, mut blocks) = (View::FRONT, false);
         for word in rest {
             if word == "blocks" {
@@ -30,25 +30,25 @@ impl Stage<'_> {
                 continue;
             }
             view = word.parse().map_err(|error: crate::render::Error| {
-                Fault::new(format!("{error}\n  it is used as `draw {}`", usage()))
+                CommandError::new(format!("{error}\n  it is used as `draw {}`", usage()))
             })?;
         }
         if rest.len() > 2 {
             return Err(misused(commands::find("draw").expect("it is one")));
         }
-        let scene = self.scene(desk)?;
+        let scene = self.scene(state)?;
         for warning in &scene.warnings {
-            desk.complain(&warning.render(&self.session.source, false));
+            state.complain(&warning.render(&self.session.source, false));
         }
         let mut survey = Survey::new(view);
         survey.add(&scene);
         let mut fit = survey.fit();
         if scene.is_empty() || fit.bounds.is_none() {
-            return desk.say(
+            return state.say(
                 "there is nothing to be seen: the turtle draws F, surfaces such as @L, and what `interpret` says\n",
             );
         }
-        let [columns, rows] = [desk.screen.columns - 2, desk.screen.rows - 3];
+        let [columns, rows] = [state.screen.columns - 2, state.screen.rows - 3];
         let picture = fit.picture;
         let [_, _, width, height] = picture.area;
         // Pixels are square: a character holds two by four dots, or one by two blocks.
@@ -57,12 +57,12 @@ impl Stage<'_> {
         let scale = (most[0] / width).min(most[1] / height);
         let side = |length: f64, most: f64| (length * scale).round().clamp(2.0, most) as u32;
         let size = Size::Exact(side(width, most[0]), side(height, most[1]));
-        let page = Page::new(picture, size, None).map_err(Fault::new)?;
+        let page = Page::new(picture, size, None).map_err(CommandError::new)?;
         // Lines of default width are a dot wide: thinner, they would be seen here and there only.
         fit.default_width = 1.4 / scale;
         let lines = match blocks {
-            true => half_blocks(&scene, &fit, &page, desk.screen.coloured),
-            false => dots(&scene, &fit, &page, desk.screen.coloured),
+            true => half_blocks(&scene, &fit, &page, state.screen.coloured),
+            false => dots(&scene, &fit, &page, state.screen.coloured),
         };
         let empty = |line: &&String| line.trim().is_empty();
         let first = lines.iter().take_while(empty).count();
@@ -75,7 +75,7 @@ impl Stage<'_> {
         if out.is_empty() {
             out += "too small to be seen\n";
         }
-        desk.say(&out)
+        state.say(&out)
     }
 }
 

@@ -4,14 +4,15 @@ use std::collections::BTreeMap;
 
 use super::braille::Sheet;
 use super::commands;
-use super::desk::{Desk, Fault};
+use super::loaded::{LoadedModel, misused};
+use super::navigation::time_of;
 use super::show::{is_called, known_name};
-use super::stage::{Stage, misused};
-use super::travel::time_of;
+use super::state::{CommandError, SessionState};
 use crate::interrupt;
 use crate::model::{KindId, Model};
 use crate::replay::Stop;
 use crate::sim::brief;
+use crate::study::LinearAxis;
 use crate::syntax::suggest::did_you_mean;
 use crate::tree::{Lineage, ModuleString};
 
@@ -40,9 +41,9 @@ const SUMMARIES: [(&str, Summary); 4] =
 const MARGIN: usize = 11;
 const INK: [u8; 3] = [90, 170, 90];
 
-impl Stage<'_> {
+impl LoadedModel<'_> {
     /// `plot SPEC [A..B]`
-    pub fn plot(&mut self, rest: &[String], desk: &Desk) -> Result<(), Fault> {
+    pub fn plot(&mut self, rest: &[String], state: &SessionState) -> Result<(), CommandError> {
         let (range, words) = match rest.split_last() {
             Some((last, words)) if last.contains("..") && !words.is_empty() => (Some(last), words),
             _ => (None, rest),
@@ -54,21 +55,46 @@ impl Stage<'_> {
                 _ if present > 0.0 => (0.0, present),
                 Some(frames) if frames.to > 0.0 => (0.0, frames.to),
                 _ => {
-                    return Err(Fault::new(
+                    return Err(CommandError::new(
                         "at t = 0 there is nothing to plot; `run` first, or say from when to when, as in `plot F.x 0..10`",
                     ));
                 }
             },
         };
         if to <= from {
-            return Err(Fault::new(format!("{} .. {} is no stretch of time", brief(from, 9), brief(to, 9))));
+            return Err(CommandError::new(format!(
+                "{} .. {} is no stretch of time",
+                brief(from, 9),
+                brief(to, 9)
+            )));
         }
-        let (subject, title) = self.subject(words, desk)?;
-        // An odd number, so that one row is the middle.
-        let sheet_rows = (desk.screen.rows - 6).clamp(6, 16) | 1;
-        let mut sheet = Sheet::new(desk.screen.columns - MARGIN - 2, sheet_rows);
-        let [width, height] = sheet.size();
-        // What is to be seen, by column.
+        let (subject, title) = self.subject(words, state)?;
+        // An odd number of rows has a row in the middle.
+        let sheet_rows = (state.screen.rows - 6).clamp(6, 16) | 1;
+        let mut sheet = Sheet::new(state.screen.columns - MARGIN - 2, sheet_rows);
+        let Some(columns) = self.sample(&subject, [from, to], sheet.size()[0], state)? else {
+            return state.say("stopped\n");
+        };
+        let Some(axis) = value_axis(&columns, sheet.size()[1]) else {
+            return state.say("there is no such module from first to last\n");
+        };
+        let joined = !matches!(subject, Subject::Each(_));
+        dots(&mut sheet, &columns, &axis, joined);
+        let range = [axis.high, axis.low];
+        let width = sheet.size()[0] / 2;
+        state.say(&framed(&sheet.rows(state.screen.coloured), &title, [from, to], range, width))
+    }
+
+    /// The values of a subject at equidistant times, one column of dots each; `None` if the user has stopped it. The
+    /// replay is back at the present afterwards.
+    fn sample(
+        &mut self,
+        subject: &Subject,
+        [from, to]: [f64; 2],
+        width: usize,
+        state: &SessionState,
+    ) -> Result<Option<Vec<Vec<f64>>>, CommandError> {
+        let present = self.replay()?.time();
         let mut columns: Vec<Vec<f64>> = Vec::new();
         let (mut interrupted, mut failed) = (false, None);
         for i in 0..width {
@@ -80,52 +106,19 @@ impl Stage<'_> {
             if interrupted || failed.is_some() {
                 break;
             }
-            columns.push(subject.values(self.string(desk)?));
+            columns.push(subject.values(self.string(state)?));
         }
-        // To where we were; that way is short, and must be gone.
+        // The way back is short and cannot be left out.
         interrupt::clear();
         let gone = self.replay()?.seek(present);
-        self.arrive(gone, desk)?;
-        if let Some(error) = failed {
-            return Err(self.drawn(&error, desk));
+        self.arrive(gone, state)?;
+        match failed {
+            Some(error) => Err(self.drawn(&error, state)),
+            None => Ok((!interrupted).then_some(columns)),
         }
-        if interrupted {
-            return desk.say("stopped\n");
-        }
-        let finite = || columns.iter().flatten().copied().filter(|x| x.is_finite());
-        let (mut low, mut high) =
-            finite().fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), x| (lo.min(x), hi.max(x)));
-        if low > high {
-            return desk.say("there is no such module from first to last\n");
-        }
-        // Zero is shown where it is near; a line that is flat lies in the middle.
-        if low > 0.0 && low < 0.3 * high {
-            low = 0.0;
-        }
-        if high < 0.0 && high > 0.3 * low {
-            high = 0.0;
-        }
-        if high - low <= 1e-12 * high.abs().max(low.abs()) {
-            let room = if high == 0.0 { 1.0 } else { 0.1 * high.abs() };
-            (low, high) = (low - room, high + room);
-        }
-        let place = |x: f64| (high - x) / (high - low) * (height - 1) as f64;
-        let joined = !matches!(subject, Subject::Each(_));
-        for (i, values) in columns.iter().enumerate() {
-            let values = values.iter().filter(|x| x.is_finite());
-            for &x in values {
-                let before =
-                    i.checked_sub(1).and_then(|i| columns[i].first()).filter(|x| joined && x.is_finite());
-                match before {
-                    Some(&y) => sheet.line([i as f64 - 1.0, place(y)], [i as f64, place(x)], Some(INK)),
-                    None => sheet.dot(i, place(x).round() as usize, Some(INK)),
-                }
-            }
-        }
-        desk.say(&framed(&sheet.rows(desk.screen.coloured), &title, [from, to], [low, high], width / 2))
     }
 
-    fn subject(&mut self, words: &[String], desk: &Desk) -> Result<(Subject, String), Fault> {
+    fn subject(&mut self, words: &[String], state: &SessionState) -> Result<(Subject, String), CommandError> {
         let words: Vec<&str> = words.iter().map(String::as_str).collect();
         match words[..] {
             ["count", name] => {
@@ -138,9 +131,9 @@ impl Stage<'_> {
                 let Some((number, parameter)) = spec[1..].split_once('.') else {
                     return Err(misused(commands::find("plot").expect("it is one")));
                 };
-                let (number, lineage) = self.find(&[number.to_owned()], desk)?;
+                let (number, lineage) = self.find(&[number.to_owned()], state)?;
                 let model = &self.session.model;
-                let module = super::show::modules(self.string(desk)?).find(|m| m.number == number);
+                let module = super::show::modules(self.string(state)?).find(|m| m.number == number);
                 let kind = module.map(|m| m.module.kind).unwrap_or(KindId::OPEN);
                 let place = parameter_place(model, kind, parameter)?;
                 let name = &model.kinds.get(kind).name;
@@ -155,20 +148,20 @@ impl Stage<'_> {
                     let kinds = self.kinds_with(spec)?;
                     Ok((Subject::Whole(*summary, kinds), format!("{how} of {spec}")))
                 }
-                None => Err(Fault::new(format!("`{how}` is none of sum, mean, max, min, count"))),
+                None => Err(CommandError::new(format!("`{how}` is none of sum, mean, max, min, count"))),
             },
             _ => Err(misused(commands::find("plot").expect("it is one"))),
         }
     }
 
     /// The kinds that `NAME.PARAM` means.
-    fn kinds_with(&self, spec: &str) -> Result<BTreeMap<KindId, usize>, Fault> {
+    fn kinds_with(&self, spec: &str) -> Result<BTreeMap<KindId, usize>, CommandError> {
         let model = &self.session.model;
         let Some((name, parameter)) = spec.rsplit_once('.').filter(|(name, _)| !name.is_empty()) else {
             let all = model.kinds.iter().find(|(id, _)| is_called(model, *id, spec));
             let own = all.map(|(id, _)| model.parameter_names(id)).unwrap_or_default();
             let example = own.first().map_or("F.x".to_owned(), |parameter| format!("{spec}.{parameter}"));
-            return Err(Fault::new(format!("say which parameter, as in `plot {example}`")));
+            return Err(CommandError::new(format!("say which parameter, as in `plot {example}`")));
         };
         let name = known_name(model, name)?;
         let mut kinds = BTreeMap::new();
@@ -176,18 +169,18 @@ impl Stage<'_> {
         for (id, _) in model.kinds.iter().filter(|(id, _)| is_called(model, *id, name)) {
             match parameter_place(model, id, parameter) {
                 Ok(place) => drop(kinds.insert(id, place)),
-                Err(fault) => missing = Some(fault),
+                Err(error) => missing = Some(error),
             }
         }
         match missing {
-            Some(fault) if kinds.is_empty() => Err(fault),
+            Some(error) if kinds.is_empty() => Err(error),
             _ => Ok(kinds),
         }
     }
 }
 
 /// The place of a parameter, by name or by number from 1.
-fn parameter_place(model: &Model, kind: KindId, parameter: &str) -> Result<usize, Fault> {
+fn parameter_place(model: &Model, kind: KindId, parameter: &str) -> Result<usize, CommandError> {
     let names = model.parameter_names(kind);
     let kind = model.kinds.get(kind);
     let number = parameter.parse::<usize>().ok().filter(|n| (1..=kind.arity).contains(n));
@@ -195,11 +188,11 @@ fn parameter_place(model: &Model, kind: KindId, parameter: &str) -> Result<usize
         return Ok(place);
     }
     if names.is_empty() {
-        return Err(Fault::new(format!("`{}` has no parameters", kind.name)));
+        return Err(CommandError::new(format!("`{}` has no parameters", kind.name)));
     }
     let hint = did_you_mean(parameter, names.iter().map(String::as_str));
     let hint = hint.unwrap_or_else(|| format!("it has {}", names.join(", ")));
-    Err(Fault::new(format!("`{}` has no parameter `{parameter}`; {hint}", kind.name)))
+    Err(CommandError::new(format!("`{}` has no parameter `{parameter}`; {hint}", kind.name)))
 }
 
 impl Subject {
@@ -227,6 +220,38 @@ impl Subject {
                     Summary::Max => vec![all.iter().copied().fold(f64::NEG_INFINITY, f64::max)],
                     Summary::Min => vec![all.iter().copied().fold(f64::INFINITY, f64::min)],
                 }
+            }
+        }
+    }
+}
+
+/// The vertical axis, from the top row of dots to the bottom one; `None` without values. Zero is included where it is
+/// near the values.
+fn value_axis(columns: &[Vec<f64>], height: usize) -> Option<LinearAxis> {
+    let values = || columns.iter().flatten().copied().filter(|x| x.is_finite());
+    values().next()?;
+    let mut axis = LinearAxis::around(values(), 0.0, (height - 1) as f64);
+    if axis.low > 0.0 && axis.low < 0.3 * axis.high {
+        axis.low = 0.0;
+    }
+    if axis.high < 0.0 && axis.high > 0.3 * axis.low {
+        axis.high = 0.0;
+    }
+    // Rows are counted from the top.
+    Some(LinearAxis { low: axis.high, high: axis.low, ..axis })
+}
+
+/// Draws values as dots, or joins the first ones of adjacent columns by lines.
+fn dots(sheet: &mut Sheet, columns: &[Vec<f64>], axis: &LinearAxis, joined: bool) {
+    for (i, values) in columns.iter().enumerate() {
+        for &x in values.iter().filter(|x| x.is_finite()) {
+            let before =
+                i.checked_sub(1).and_then(|i| columns[i].first()).filter(|x| joined && x.is_finite());
+            match before {
+                Some(&y) => {
+                    sheet.line([i as f64 - 1.0, axis.place(y)], [i as f64, axis.place(x)], Some(INK));
+                }
+                None => sheet.dot(i, axis.place(x).round() as usize, Some(INK)),
             }
         }
     }

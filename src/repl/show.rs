@@ -2,8 +2,8 @@
 
 use super::assist::coloured;
 use super::commands;
-use super::desk::{Desk, Fault};
-use super::stage::{Stage, misused};
+use super::loaded::{LoadedModel, misused};
+use super::state::{CommandError, SessionState};
 use crate::model::{KindId, Model};
 use crate::sim::{Seen, brief, describe};
 use crate::syntax::suggest::did_you_mean;
@@ -33,21 +33,21 @@ pub fn is_called(model: &Model, kind: KindId, name: &str) -> bool {
 }
 
 /// The name of modules, if the model has some.
-pub fn known_name<'n>(model: &Model, name: &'n str) -> Result<&'n str, Fault> {
+pub fn known_name<'n>(model: &Model, name: &'n str) -> Result<&'n str, CommandError> {
     let kinds = || model.kinds.iter().filter(|(id, _)| !id.is_bracket());
     if kinds().any(|(id, _)| is_called(model, id, name)) {
         return Ok(name);
     }
     let hint = did_you_mean(name, kinds().map(|(_, kind)| kind.name.as_str()));
     let hint = hint.map_or(String::new(), |hint| format!("; {hint}"));
-    Err(Fault::new(format!("the model has no module `{name}`{hint}")))
+    Err(CommandError::new(format!("the model has no module `{name}`{hint}")))
 }
 
-impl Stage<'_> {
+impl LoadedModel<'_> {
     /// `list [NAME]`
-    pub fn list(&mut self, rest: &[String], desk: &Desk) -> Result<(), Fault> {
-        let text = &desk.draft.text;
-        let names = desk.names.borrow();
+    pub fn list(&mut self, rest: &[String], state: &SessionState) -> Result<(), CommandError> {
+        let text = &state.draft.text;
+        let names = state.names.borrow();
         let wanted: Vec<bool> = match rest {
             [] => text.lines().map(|_| true).collect(),
             [name] => {
@@ -63,63 +63,63 @@ impl Stage<'_> {
                     }
                 }
                 if !wanted.contains(&true) {
-                    return Err(Fault::new(format!("nothing in the text mentions `{name}`")));
+                    return Err(CommandError::new(format!("nothing in the text mentions `{name}`")));
                 }
                 wanted
             }
             _ => return Err(misused(commands::find("list").expect("it is one"))),
         };
         if text.trim().is_empty() {
-            return desk.say("nothing was typed yet, and no file is loaded\n");
+            return state.say("nothing was typed yet, and no file is loaded\n");
         }
         let mut out = String::new();
         for ((line, number), _) in text.lines().zip(1..).zip(wanted).filter(|(_, wanted)| *wanted) {
-            let shown = if desk.screen.coloured { coloured(line, &names) } else { line.to_owned() };
+            let shown = if state.screen.coloured { coloured(line, &names) } else { line.to_owned() };
             out += format!("{number:>4}  {shown}").trim_end();
             out.push('\n');
         }
-        desk.say(&out)
+        state.say(&out)
     }
 
     /// `show [all | A..B | NAME]`
-    pub fn show(&mut self, rest: &[String], desk: &Desk) -> Result<(), Fault> {
+    pub fn show(&mut self, rest: &[String], state: &SessionState) -> Result<(), CommandError> {
         let model = &self.session.model;
-        self.string(desk)?;
+        self.string(state)?;
         let status = self.status()?;
-        let present = self.string(desk)?;
+        let present = self.string(state)?;
         match rest {
-            [] => desk.say(&(status + &string(model, present, desk.screen.columns, MOST_LINES))),
+            [] => state.say(&(status + &string(model, present, state.screen.columns, MOST_LINES))),
             [all] if all == "all" => {
-                desk.say(&(status + &string(model, present, desk.screen.columns, usize::MAX)))
+                state.say(&(status + &string(model, present, state.screen.columns, usize::MAX)))
             }
             [range] if range.starts_with(|c: char| c.is_ascii_digit()) => {
                 let (from, to) = range.split_once("..").unwrap_or((range, range));
                 let number = |text: &str| text.parse::<usize>().ok().filter(|n| *n >= 1);
                 let (Some(from), Some(to)) = (number(from), number(to)) else {
-                    return Err(Fault::new(format!(
+                    return Err(CommandError::new(format!(
                         "`{range}` is no part of the string: `show 10..20` is from the 10th to the 20th module"
                     )));
                 };
                 let rows = modules(present).filter(|m| (from..=to).contains(&m.number));
-                desk.say(&table(model, rows, usize::MAX)?)
+                state.say(&table(model, rows, usize::MAX)?)
             }
             [name, more @ ..] if more.is_empty() || more == ["all"] => {
                 let name = known_name(model, name)?;
                 let rows = modules(present).filter(|m| is_called(model, m.module.kind, name));
                 let most = if more.is_empty() { MOST_LINES } else { usize::MAX };
-                desk.say(&table(model, rows, most)?)
+                state.say(&table(model, rows, most)?)
             }
             _ => Err(misused(commands::find("show").expect("it is one"))),
         }
     }
 
     /// The module that words name.
-    pub fn find(&mut self, rest: &[String], desk: &Desk) -> Result<(usize, Lineage), Fault> {
+    pub fn find(&mut self, rest: &[String], state: &SessionState) -> Result<(usize, Lineage), CommandError> {
         let model = &self.session.model;
-        let present = self.string(desk)?;
+        let present = self.string(state)?;
         let found = |m: Option<Numbered>, what: String| match m {
             Some(m) => Ok((m.number, m.module.lineage)),
-            None => Err(Fault::new(format!("{what} at present; `show` lists the modules"))),
+            None => Err(CommandError::new(format!("{what} at present; `show` lists the modules"))),
         };
         let count = modules(present).count();
         let words: Vec<&str> = rest.iter().map(|word| word.trim_start_matches('#')).collect();
@@ -147,7 +147,7 @@ impl Stage<'_> {
                     None => 1,
                     Some(text) => match number(text).filter(|n| *n >= 1) {
                         Some(n) => n,
-                        None => return Err(Fault::new(format!("`{text}` is not a number from 1"))),
+                        None => return Err(CommandError::new(format!("`{text}` is not a number from 1"))),
                     },
                 };
                 let mut all = modules(present).filter(|m| is_called(model, m.module.kind, name));
@@ -163,8 +163,8 @@ impl Stage<'_> {
     }
 
     /// `inspect N | NAME [N] | LINEAGE`
-    pub fn inspect(&mut self, rest: &[String], desk: &Desk) -> Result<(), Fault> {
-        let (number, lineage) = self.find(rest, desk)?;
+    pub fn inspect(&mut self, rest: &[String], state: &SessionState) -> Result<(), CommandError> {
+        let (number, lineage) = self.find(rest, state)?;
         let limit = self.horizon(self.time().unwrap_or(0.0));
         let session = self.session;
         let model = &session.model;
@@ -172,10 +172,10 @@ impl Stage<'_> {
         let t = replay.time();
         let end = replay.end_of(lineage, limit);
         let Some(all) = replay.simulation().ok().and_then(|now| now.inspect(t, number - 1)) else {
-            return Err(Fault::new("this module cannot be looked at now"));
+            return Err(CommandError::new("this module cannot be looked at now"));
         };
         let line = |span: crate::diagnostic::Span| session.source.position(span.start).0;
-        let present = self.string(desk)?;
+        let present = self.string(state)?;
         let count = modules(present).count();
         let name = |seen: &Seen| describe(model, seen.kind, &seen.parameters);
         let mut out = format!("{}\n", name(&all.module));
@@ -246,18 +246,18 @@ impl Stage<'_> {
             }
             None => out += &format!("  next      no production up to t = {}\n", brief(limit, 9)),
         }
-        desk.say(&out)
+        state.say(&out)
     }
 
     /// `events [N | all] [NAME]`
-    pub fn events(&mut self, rest: &[String], desk: &Desk) -> Result<(), Fault> {
+    pub fn events(&mut self, rest: &[String], state: &SessionState) -> Result<(), CommandError> {
         let session = self.session;
         let model = &session.model;
         let (most, rest) = match rest {
             [first, rest @ ..] if first == "all" => (usize::MAX, rest),
             [first, rest @ ..] if first.starts_with(|c: char| c.is_ascii_digit()) => match first.parse() {
                 Ok(n) => (n, rest),
-                Err(_) => return Err(Fault::new(format!("`{first}` is not a number"))),
+                Err(_) => return Err(CommandError::new(format!("`{first}` is not a number"))),
             },
             rest => (MOST_EVENTS, rest),
         };
@@ -271,7 +271,7 @@ impl Stage<'_> {
         let count = replay.events().filter(|event| wanted(event.kind)).count();
         let forgotten = replay.forgotten_events();
         if count == 0 {
-            return desk.say("no productions so far\n");
+            return state.say("no productions so far\n");
         }
         let mut out = String::new();
         if forgotten > 0 {
@@ -293,7 +293,7 @@ impl Stage<'_> {
             },
         );
         out += &columns(["t", "module", "replaced by", "lineage"], rows.collect());
-        desk.say(&out)
+        state.say(&out)
     }
 }
 
@@ -328,7 +328,11 @@ fn string(model: &Model, all: &ModuleString, width: usize, most: usize) -> Strin
 }
 
 /// Modules with numbers, ages and lineages.
-fn table<'a>(model: &Model, rows: impl Iterator<Item = Numbered<'a>>, most: usize) -> Result<String, Fault> {
+fn table<'a>(
+    model: &Model,
+    rows: impl Iterator<Item = Numbered<'a>>,
+    most: usize,
+) -> Result<String, CommandError> {
     let mut all = rows.peekable();
     if all.peek().is_none() {
         return Ok("there are none at present\n".to_owned());

@@ -275,11 +275,10 @@ fn an_error_of_drawing_names_the_line() {
 }
 
 #[test]
-fn progress_is_written_where_it_is_asked_for() {
+fn work_of_less_than_a_second_shows_no_progress() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("out");
     let out = out.to_str().expect("UTF-8");
-    // Quick work shows none, whoever asks.
     assert_eq!(good(&["run", "tests/paper-models/leaf.dls", "--at", "1", "--progress"]).lines().count(), 2);
     good(&["render", "tests/paper-models/leaf.dls", "--at", "1", "--progress", "-q", "-o", out]);
 }

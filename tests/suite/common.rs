@@ -48,6 +48,25 @@ pub fn repository(path: &str) -> std::path::PathBuf {
     std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
 }
 
+/// All models of the repository, and the mistakes.
+pub fn models() -> Vec<std::path::PathBuf> {
+    let mut folders: Vec<std::path::PathBuf> =
+        ["models", "tests/paper-models", "tests/errors"].map(repository).to_vec();
+    let mut found = Vec::new();
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).expect("a folder") {
+            let path = entry.expect("readable").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| e == "dls") {
+                found.push(path);
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
 /// A module of a string: its name and parameters.
 pub type Plain = (String, Vec<f64>);
 

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -11,25 +11,7 @@ use dlsys::syntax::{format::format, parse, print};
 use proptest::prelude::*;
 
 use crate::cli::{bad, dlsys, good};
-use crate::common::repository;
-
-/// All models of the repository, and the mistakes.
-pub fn models() -> Vec<PathBuf> {
-    let mut folders: Vec<PathBuf> = ["models", "tests/paper-models", "tests/errors"].map(repository).to_vec();
-    let mut found = Vec::new();
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(folder).expect("a folder") {
-            let path = entry.expect("readable").path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|e| e == "dls") {
-                found.push(path);
-            }
-        }
-    }
-    found.sort();
-    found
-}
+use crate::common::{models, repository};
 
 /// What a text says, whatever its layout; `None` if it does not parse.
 fn meaning(text: &str) -> Option<String> {

@@ -6,6 +6,8 @@ use dlsys::sim::Settings;
 use dlsys::tree::ModuleString;
 use proptest::prelude::*;
 
+use crate::common::{models, repository};
+
 const LAWS: [&str; 8] = ["1", "0.5", "2", "2*(1 - x/3)*x", "x", "0.25 + age", "3 - x", "1 + 0.5*age^2 - x*0"];
 /// What follows, with `n` generations to go.
 const SUCCESSORS: [&str; 8] = [
@@ -109,7 +111,7 @@ proptest! {
 #[test]
 fn both_paths_grow_every_model_alike() {
     let mut compared = 0;
-    for path in crate::editing::models() {
+    for path in models() {
         let Ok(session) = Session::open(&path, &[]) else { continue };
         let outcome = |slow| {
             let settings =
@@ -151,4 +153,39 @@ fn both_paths_grow_every_model_alike() {
         }
     }
     assert!(compared > 150, "{compared} models ran");
+}
+
+/// The models that are meant to be run, without a budget and for longer than above.
+#[test]
+#[ignore = "slow: whole models on the reference path"]
+fn both_paths_grow_whole_models_alike() {
+    let folders = ["models", "models/hard", "tests/paper-models"];
+    let files = folders.iter().flat_map(|f| std::fs::read_dir(repository(f)).expect("a folder"));
+    let mut compared = 0;
+    for file in
+        files.map(|f| f.expect("readable").path()).filter(|p| p.extension().is_some_and(|e| e == "dls"))
+    {
+        let big = ["h01-", "h03-"];
+        if big.iter().any(|b| file.file_name().is_some_and(|n| n.to_string_lossy().starts_with(b))) {
+            continue;
+        }
+        let bits = |slow| -> Vec<Vec<(String, Vec<u64>)>> {
+            let settings = Settings { slow, ..Settings::default() };
+            let session = dlsys::session::Session::open(&file, &[]).expect("a good model");
+            let Ok(mut simulation) = session.simulate(settings) else { return Vec::new() };
+            let mut string = Default::default();
+            let mut all = Vec::new();
+            for t in [0.0, 0.3, 1.0, 2.5, 9.0] {
+                if simulation.at(t, &mut string).is_err() {
+                    break;
+                }
+                let state = crate::common::plain(&session.model, &string).into_iter();
+                all.push(state.map(|(n, p)| (n, p.into_iter().map(f64::to_bits).collect())).collect());
+            }
+            all
+        };
+        assert!(bits(false) == bits(true), "{}", file.display());
+        compared += 1;
+    }
+    assert!(compared > 80, "{compared} models");
 }

@@ -10,6 +10,7 @@ use dlsys::sim::{Error, Method, Settings};
 use dlsys::tree::ModuleString;
 
 use crate::common::{repository, run, session};
+use crate::dice::Dice;
 
 fn dlsys(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_dlsys")).args(arguments).output().expect("it starts")
@@ -68,19 +69,10 @@ const EXTREMES: [f64; 16] = [
     1e308,
 ];
 
-/// A generator of one's own: the same numbers everywhere.
-struct Dice(u64);
-
-impl Dice {
-    fn roll(&mut self, n: usize) -> usize {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) as usize % n
-    }
-
-    fn number(&mut self) -> String {
-        let x = EXTREMES[self.roll(EXTREMES.len())] * [1.0, 1.0, -1.0, 0.7][self.roll(4)];
-        format!("{x:e}")
-    }
+/// One of the extreme numbers, or nearly one, as a literal.
+fn extreme(dice: &mut Dice) -> String {
+    let x = dice.pick(&EXTREMES) * dice.pick(&[1.0, 1.0, -1.0, 0.7]);
+    format!("{x:e}")
 }
 
 /// A file that takes ten million bytes and no more.
@@ -103,9 +95,9 @@ impl std::io::Write for Bounded {
 /// A string of drawing commands with extreme numbers.
 fn drawing(dice: &mut Dice) -> String {
     let mut text = String::from("initial string: F(1e-310)");
-    for _ in 0..1 + dice.roll(8) {
-        let (a, b) = (dice.number(), dice.number());
-        text += &match dice.roll(12) {
+    for _ in 0..1 + dice.below(8) {
+        let (a, b) = (extreme(dice), extreme(dice));
+        text += &match dice.below(12) {
             0..=2 => format!(" F({a})"),
             3 => format!(" !({a})"),
             4 => format!(" +({a}) &({b})"),
@@ -122,15 +114,24 @@ fn drawing(dice: &mut Dice) -> String {
 }
 
 #[test]
-fn no_format_ever_has_a_number_that_is_none() {
-    // Meshes in a build for tests take their time; DLSYS_DRAWINGS=400 draws more.
-    let cases = std::env::var("DLSYS_DRAWINGS").ok().and_then(|n| n.parse().ok()).unwrap_or(60);
+fn all_numbers_in_files_are_finite() {
+    write_extreme_drawings(16);
+}
+
+#[test]
+#[ignore = "slow: large meshes"]
+fn all_numbers_in_many_files_are_finite() {
+    write_extreme_drawings(60);
+}
+
+/// Writes drawings with extreme numbers in every format; no file may have a number that is not finite.
+fn write_extreme_drawings(cases: usize) {
     let mut dice = Dice(7);
     let (mut drawn, mut refused) = (0, 0);
     for _ in 0..cases {
         let text = drawing(&mut dice);
-        let accuracy = [None, Some(1e-300), Some(1e-12), Some(1e300)][dice.roll(4)];
-        let perspective = [None, Some(40.0)][dice.roll(2)];
+        let accuracy = dice.pick(&[None, Some(1e-300), Some(1e-12), Some(1e300)]);
+        let perspective = dice.pick(&[None, Some(40.0)]);
         let Ok(session) = dlsys::session::Session::from_text("test.dls", &text, &[]) else {
             panic!("{text}");
         };
@@ -223,7 +224,7 @@ fn a_killed_render_leaves_whole_frames_and_the_next_one_takes_over() {
     let mut cut = 0;
     for _ in 0..kills {
         let mut child = start();
-        std::thread::sleep(Duration::from_micros(dice.roll(whole) as u64));
+        std::thread::sleep(Duration::from_micros(dice.below(whole) as u64));
         cut += usize::from(child.try_wait().expect("known").is_none());
         let _ = child.kill();
         child.wait().expect("it ends");

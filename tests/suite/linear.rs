@@ -1,7 +1,7 @@
 //! Neighbours with linear equations, as `auto` solves them, against closed forms: transport one way, what is left of a large
 //! start, stiff chains, growth, signs. Each at several tolerances, and to the same bits whatever else is looked at.
 
-use dlsys::sim::Settings;
+use dlsys::sim::{Method, Settings};
 
 use crate::common::{Plain, run};
 
@@ -151,4 +151,40 @@ fn couplings_that_are_no_tree() {
         [[0.0; 2]].into_iter().chain((1..=5).map(cell)).chain([[0.0; 2]]).flatten().collect()
     };
     reaches(&text, &[0.01, 0.5, 3.0, 100.0], exact);
+}
+
+#[test]
+fn linear_neighbours_are_followed_without_steps() {
+    // Two cells between walls at 1: with s = a + b and d = a - b, s' = 2D - (D + m) s and d' = -(3D + m) d. Decay, and
+    // growth, where the largest eigenvalue is positive; stiff and not. By the method that makes no steps, and by others.
+    let text = "param D = 1\nparam m = 0.5\ninitial string: W(1) C(3) C(0.25) W(1)\nC(l) < C(c) > W(r): solve dc/dt = D*(l + r - 2c) - m*c\nW(l) < C(c) > C(r): solve dc/dt = D*(l + r - 2c) - m*c";
+    for (d, m) in [(1.0, 0.5), (1e4, 0.5), (0.25, -0.5), (1e-3, 0.0)] {
+        let text = text.replace("D = 1\n", &format!("D = {d}\n")).replace("m = 0.5", &format!("m = {m}"));
+        let exact = |t: f64| {
+            let (decay, rest) = (d + m, 2.0 * d / (d + m));
+            let sum = rest + (3.25 - rest) * (-decay * t).exp();
+            let difference = 2.75 * (-(3.0 * d + m) * t).exp();
+            [0.5 * (sum + difference), 0.5 * (sum - difference)]
+        };
+        for (method, bound) in [(Method::Auto, 1e-12), (Method::Radau, 1e-8)] {
+            let settings = Settings { method, tolerance: 1e-10, ..Settings::default() };
+            let session = crate::common::session(&text);
+            let mut simulation = session.simulate(settings).expect("starts");
+            let mut string = Default::default();
+            for t in [0.0, 1e-5, 0.3, 2.0, 20.0] {
+                simulation.at(t, &mut string).expect("runs");
+                let cells = crate::common::plain(&session.model, &string);
+                for (cell, exact) in cells[1..3].iter().zip(exact(t)) {
+                    let error = (cell.1[0] - exact).abs() / exact.abs().max(1.0);
+                    assert!(error < bound, "D = {d}, m = {m}, {method:?}, t = {t}: error {error:e}");
+                }
+            }
+            assert_eq!(simulation.stats().steps == 0, method == Method::Auto);
+        }
+    }
+    // Two that turn about each other have no real eigenvalues, and take steps.
+    let turning = "initial string: A(1) B(0)\nA(x) > B(y): solve dx/dt = -y\nA(x) < B(y): solve dy/dt = x";
+    let settings = Settings { tolerance: 1e-10, ..Settings::default() };
+    let string = run(turning, settings, &[10.0]).expect("runs").remove(0);
+    assert!((string[0].1[0] - 10f64.cos()).abs() < 1e-10 && (string[1].1[0] - 10f64.sin()).abs() < 1e-10);
 }

@@ -1,33 +1,8 @@
-//! The test suite, in one binary, because linking takes longer than running.
+//! The test suite of the whole program, in one binary, because linking takes longer than running. The header of each file
+//! says what it tests; tests of a single stage stand in its crate.
 //!
-//! - [`book`]: the book in `docs/`, followed literally; [`pages`] reads its Markdown.
-//! - [`light`]: modules with formulas only, the quick way against the general one.
-//! - [`limits`]: what runs away, extreme numbers, killed processes, full disks, little memory.
-//! - [`linear`]: neighbours with linear equations against closed forms: transport one way, large starts, stiff chains.
-//! - [`layout`]: what `fmt` may not do to any text.
-//! - [`listings`]: the paper's models against results of an independent program.
-//! - [`algebraic`], [`signals`]: values and equations instead of rates; sums over what is attached; contexts with branches.
-//! - [`semantics`]: what happens when (events, contexts, errors of a run), model by small model.
-//! - [`language`]: text to model and back; hostile input.
-//! - [`gallery`]: every mistake in `tests/errors` and the message it gets.
-//! - [`chance`]: times, draws and choices against their distributions; what they depend on.
-//! - [`discrete`]: derivation steps, against the models of a book; cuts.
-//! - [`blocks`]: curves, growth functions, arrays, `match` and `let` against exact values; [`files`]: includes and tables.
-//! - [`cli`]: the program as it is typed.
-//! - [`editing`]: layout, `new`, `render --watch`, completions.
-//! - [`inspect`]: what `explain`, `--events` and `check --continuity` say.
-//! - [`evidence`]: events of integrated values: found, not there, or in doubt; pulses; ties.
-//! - [`export`]: SVG and OBJ, read back by other people's code.
-//! - [`schedulers`]: local repair against one clock, remembered neighbours against the whole string.
-//! - [`pictures`]: pixels, perspective, and sheets of several frames.
-//! - [`plants`]: the paper's plants: order of flowering, continuity, the gallery.
-//! - [`random`]: random coupled models by four ways of solving.
-//! - [`repl`]: the interactive session, without a terminal and with one.
-//! - [`replay`]: any time after any other, to the bits of a run.
-//! - [`report`]: studies of methods, and hard cases with exact answers.
-//! - [`wild`]: texts that nobody would write.
-//! - [`verify`]: runs that are computed again by an independent way.
-//! - [`view`]: pages that play a recording, read back.
+//! Tests that take long, or that need a program that not every machine has, are ignored by `cargo test`; `.ci/run` runs
+//! them too (`cargo test -- --include-ignored`).
 
 mod algebraic;
 mod blocks;
@@ -36,6 +11,7 @@ mod chance;
 mod cli;
 mod common;
 mod corners;
+mod dice;
 mod discrete;
 mod editing;
 mod evidence;
@@ -53,6 +29,7 @@ mod organs;
 mod pages;
 mod pictures;
 mod plants;
+mod precision;
 mod random;
 mod repl;
 mod replay;

@@ -6,44 +6,21 @@
 //! of them, and others.
 
 use dlsys::sim::{Method, Scheduler, Settings};
-
 use dlsys::tree::ModuleString;
 
 use crate::common::{Plain, plain, session};
+use crate::dice::Dice;
 
-/// Random numbers (SplitMix64; Steele, Lea, Flood 2014).
-struct Dice(u64);
-
-impl Dice {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        (self.next() % n as u64) as usize
-    }
-
-    /// A number with two digits.
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        let unit = (self.next() >> 11) as f64 / (1u64 << 53) as f64;
-        ((low + (high - low) * unit) * 100.0).round() / 100.0
-    }
-
-    /// A number of any of several decades.
-    fn size(&mut self, decades: f64) -> f64 {
-        let power = self.between(-decades, decades);
-        (10f64.powf(power) * 100.0).round() / 100.0 + 0.01
-    }
+/// A number of any of several decades, on either side of 1.
+fn size(dice: &mut Dice, decades: f64) -> f64 {
+    let power = dice.rounded(-decades, decades);
+    (10f64.powf(power) * 100.0).round() / 100.0 + 0.01
 }
 
 /// What a cell's value does by itself.
 fn reaction(dice: &mut Dice) -> String {
-    let k = dice.size(0.7);
-    let (p, q) = (dice.between(0.1, 2.0), dice.between(0.2, 1.5));
+    let k = size(dice, 0.7);
+    let (p, q) = (dice.rounded(0.1, 2.0), dice.rounded(0.2, 1.5));
     match dice.below(9) {
         0 => String::new(),
         1 => format!(" - {k}*x"),
@@ -59,8 +36,8 @@ fn reaction(dice: &mut Dice) -> String {
 
 /// What flows to a cell from its left neighbour `l` and its right neighbour `r`.
 fn exchange(dice: &mut Dice) -> (String, String, String) {
-    let (d, e) = (dice.size(0.7), dice.size(0.7));
-    let kink = dice.between(0.2, 1.5);
+    let (d, e) = (size(dice, 0.7), size(dice, 0.7));
+    let kink = dice.rounded(0.2, 1.5);
     match dice.below(9) {
         // Inside, at the left end, at the right end.
         0 => (format!("{d}*(l + r - 2x)"), format!("{d}*(r - x)"), format!("{d}*(l - x)")),
@@ -88,15 +65,15 @@ fn exchange(dice: &mut Dice) -> (String, String, String) {
 /// A row of cells, maybe with events.
 fn filament(dice: &mut Dice) -> String {
     let count = 3 + dice.below(12);
-    let cells: String = (0..count).map(|_| format!(" C({}, 0)", dice.between(0.05, 1.6))).collect();
+    let cells: String = (0..count).map(|_| format!(" C({}, 0)", dice.rounded(0.05, 1.6))).collect();
     let (inside, left, right) = exchange(dice);
     let react = reaction(dice);
-    let level = dice.between(0.3, 1.8);
+    let level = dice.rounded(0.3, 1.8);
     let event = match dice.below(6) {
         0 => format!("\n  if x = {level} & n = 0 produce C(x/2, 1) C(x/2, 1)"),
         1 => format!("\n  if x = {level} & n < 2 produce C(x, n + 1)"),
-        2 => format!("\n  if n = 0 & age = {} produce C(0.9*x, 1) [ C(0.1*x, 1) ]", dice.between(0.1, 1.5)),
-        3 if dice.below(2) == 0 => format!("\n  if n = 0 at rate {} produce C(x, 1)", dice.between(0.1, 1.5)),
+        2 => format!("\n  if n = 0 & age = {} produce C(0.9*x, 1) [ C(0.1*x, 1) ]", dice.rounded(0.1, 1.5)),
+        3 if dice.below(2) == 0 => format!("\n  if n = 0 at rate {} produce C(x, 1)", dice.rounded(0.1, 1.5)),
         _ => String::new(),
     };
     let inner_event =
@@ -114,18 +91,18 @@ fn filament(dice: &mut Dice) -> String {
 fn tree(dice: &mut Dice) -> String {
     let mut string = String::from(" S(0.5)");
     for _ in 0..2 + dice.below(4) {
-        let twig = format!(" B({}) B({})", dice.between(0.1, 1.2), dice.between(0.1, 1.2));
+        let twig = format!(" B({}) B({})", dice.rounded(0.1, 1.2), dice.rounded(0.1, 1.2));
         string +=
             &if dice.below(2) == 0 { format!(" [{twig} ] S(0.3)") } else { format!(" S(0.4) [{twig} ]") };
     }
-    let kink = dice.between(0.3, 1.2);
+    let kink = dice.rounded(0.3, 1.2);
     let term = match dice.below(4) {
         0 => "x",
         1 => "x^2/(1 + x)",
         2 => "max(x, 0.6)",
         _ => "if x > 0.8 then x - 0.8 else 0",
     };
-    let (p, q) = (dice.between(0.2, 1.5), dice.between(0.2, 1.5));
+    let (p, q) = (dice.rounded(0.2, 1.5), dice.rounded(0.2, 1.5));
     let value = match dice.below(3) {
         0 => format!("solve du/dt = {p}*sum(B(x): {term}) - {q}*u"),
         1 => format!("solve du/dt = {p}*sum(B(x): {term}) - {q}*u + sum(S(w): {p}*(w - u))"),
@@ -142,13 +119,13 @@ fn tree(dice: &mut Dice) -> String {
 /// Values between cells: `v` follows from its cell and the next ones, which read it.
 fn values(dice: &mut Dice) -> String {
     let count = 3 + dice.below(6);
-    let cells: String = (0..count).map(|_| format!(" C({}, 0)", dice.between(0.1, 1.5))).collect();
-    let (p, q) = (dice.between(0.1, 0.9), dice.between(0.1, 0.9));
+    let cells: String = (0..count).map(|_| format!(" C({}, 0)", dice.rounded(0.1, 1.5))).collect();
+    let (p, q) = (dice.rounded(0.1, 0.9), dice.rounded(0.1, 0.9));
     let given = match dice.below(4) {
         0 => format!("v = {p}*x + {q}*l"),
         1 => format!("v = max({p}*x, {q}*l)"),
         2 => format!("0 = v + {p}*v^3 - x - {q}*l"),
-        _ => format!("v = exp(-((t - {})/{})^2)*x", dice.between(0.5, 2.0), dice.between(0.01, 0.5)),
+        _ => format!("v = exp(-((t - {})/{})^2)*x", dice.rounded(0.5, 2.0), dice.rounded(0.01, 0.5)),
     };
     let react = reaction(dice);
     format!(
@@ -160,14 +137,14 @@ fn values(dice: &mut Dice) -> String {
 
 /// Pulses of light that one module gives another.
 fn pulses(dice: &mut Dice) -> String {
-    let (at, width) = (dice.between(0.5, 2.5), 10f64.powf(dice.between(-4.0, -0.5)));
+    let (at, width) = (dice.rounded(0.5, 2.5), 10f64.powf(dice.rounded(-4.0, -0.5)));
     let height = 1.0 / width;
     let pulse = match dice.below(3) {
         0 => format!("{height}*exp(-((t - {at})/{width})^2)"),
         1 => format!("{height}/(1 + ((t - {at})/{width})^4)"),
         _ => format!("(if abs(t - {at}) < {width} then {height} else 0)"),
     };
-    let (p, q) = (dice.between(0.2, 1.5), dice.between(0.2, 1.5));
+    let (p, q) = (dice.rounded(0.2, 1.5), dice.rounded(0.2, 1.5));
     let first = if dice.below(2) == 0 {
         format!("solve y = {pulse}")
     } else {

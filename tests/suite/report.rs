@@ -189,10 +189,10 @@ fn runs_that_fail_or_take_too_long_do_not_stop_a_report() {
     let common = [model, "--methods", "rk4", "--at", "50,100", "--runs", "1"];
     let table = good(&[&common[..], &["--step-sizes", "0.5,0.01"]].concat());
     assert!(table.contains("FAILED: ") && table.contains("not finite") && table.contains("right"), "{table}");
-    let table = good(&[&common[..], &["--step-sizes", "0.01,1e-7", "--time-limit", "2"]].concat());
+    let table = good(&[&common[..], &["--step-sizes", "0.01,1e-7", "--time-limit", "1"]].concat());
     assert!(table.contains("left out: would take about"), "{table}");
-    let table = good(&[&common[..], &["--step-sizes", "1e-7", "--time-limit", "2"]].concat());
-    assert!(table.contains("FAILED: stopped after 2 s, at t = "), "{table}");
+    let table = good(&[&common[..], &["--step-sizes", "1e-7", "--time-limit", "1"]].concat());
+    assert!(table.contains("FAILED: stopped after 1 s, at t = "), "{table}");
 }
 
 /// Runs the hard cases of a folder with one file.

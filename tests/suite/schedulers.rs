@@ -1,35 +1,14 @@
 //! Who is solved again after an event, and who looks again at whom: cheap ways against plain ones.
 
-use dlsys::sim::{Method, Scheduler, Settings};
+use dlsys::sim::{Error, Method, Scheduler, Settings};
 use proptest::prelude::*;
 
 use crate::common::{Plain, run, show};
-
-/// Random numbers of a test case.
-struct Dice(u64);
-
-impl Dice {
-    fn roll(&mut self) -> f64 {
-        // Knuth's MMIX generator; the high bits are good.
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.roll()
-    }
-
-    fn pick<'a>(&mut self, from: &[&'a str]) -> &'a str {
-        from[(self.roll() * from.len() as f64) as usize]
-    }
-}
+use crate::dice::Dice;
 
 /// A filament, maybe with branches, of cells that grow, divide, exchange and decay.
 fn tissue(seed: u64) -> String {
-    let mut dice = Dice(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
-    for _ in 0..8 {
-        dice.roll();
-    }
+    let mut dice = Dice(seed);
     let growth = dice.pick(&["0.2*x", "0.3", "0.1*x*(2 - x) + 0.05", "0.2*x + 0.001*c", "0.2*sqrt(x)"]);
     let exchange = dice.pick(&[
         "D*(l + r - 2c) - 0.1*c",
@@ -83,21 +62,29 @@ const TIMES: [f64; 4] = [0.5, 1.5, 3.0, 5.0];
 
 #[test]
 fn repairs_err_no_more_than_the_tolerance() {
-    for seed in 0..12 {
+    let mut compared = 0;
+    for seed in 0..16 {
         let text = tissue(seed);
         let with = |scheduler, method, tolerance| {
             let settings = Settings { scheduler, method, tolerance, ..Settings::default() };
-            run(&text, settings, &TIMES).unwrap_or_else(|e| panic!("{e}\n{text}"))
+            run(&text, settings, &TIMES)
         };
-        let exact = with(Scheduler::Global, Method::Auto, 1e-10);
+        let exact = match with(Scheduler::Global, Method::Auto, 1e-10) {
+            Ok(exact) => exact,
+            // The exchange that jumps at c = 1 may lead back there from both sides.
+            Err(Error::Chattering { .. }) => continue,
+            Err(error) => panic!("{error}\n{text}"),
+        };
+        compared += 1;
         for (method, tolerance) in
             [(Method::Auto, 1e-4), (Method::Auto, 1e-6), (Method::Auto, 1e-8), (Method::Dopri5, 1e-6)]
         {
-            let ours = with(Scheduler::Auto, method, tolerance);
+            let ours = with(Scheduler::Auto, method, tolerance).unwrap_or_else(|e| panic!("{e}\n{text}"));
             let error = distance(&ours, &exact, &text);
             assert!(error <= 20.0 * tolerance, "{method:?} at {tolerance:e} errs by {error:e}\n{text}");
         }
     }
+    assert!(compared >= 12, "{compared} tissues");
 }
 
 #[test]
@@ -196,10 +183,7 @@ impl Rewriting {
 /// Rules over A, B, C, D and +, with contexts, branches and modules that are skipped; the last two applied to
 /// everything.
 fn rewriting(seed: u64) -> Rewriting {
-    let mut dice = Dice(seed.wrapping_mul(0xd134_2543_de82_ef95) | 1);
-    for _ in 0..8 {
-        dice.roll();
-    }
+    let mut dice = Dice(seed);
     let parts = ["A", "B", "C", "D", "+", "A", "B", "[A]", "[+B]", "[C[D]A]", ""];
     let kinds = ["A", "B", "C", "D", "+"];
     let one = |s: &str| s.chars().next();
@@ -207,9 +191,9 @@ fn rewriting(seed: u64) -> Rewriting {
     for _ in 0..9 {
         let strict = one(dice.pick(&kinds)).expect("a kind");
         let context =
-            |dice: &mut Dice| (dice.roll() < 0.6).then(|| one(dice.pick(&["A", "B", "D"]))).flatten();
+            |dice: &mut Dice| (dice.unit() < 0.6).then(|| one(dice.pick(&["A", "B", "D"]))).flatten();
         let (left, right) = (context(&mut dice), context(&mut dice));
-        let length = (dice.roll() * 3.5) as usize;
+        let length = (dice.unit() * 3.5) as usize;
         let successor: String = (0..length).map(|_| dice.pick(&parts)).collect();
         rules.push((left, strict, right, successor));
     }

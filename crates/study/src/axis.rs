@@ -1,4 +1,54 @@
-//! Logarithmic axes: their range, their ticks, and where a value lies.
+//! Axes of plots, logarithmic and linear: range, ticks, and the position of a value.
+
+/// The least and the greatest of the finite values; `None` if there are none.
+fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    let finite = values.filter(|x| x.is_finite());
+    let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+    (low <= high).then_some((low, high))
+}
+
+/// A linear axis: a range of values mapped onto a stretch of the picture.
+#[derive(Clone, Copy, Debug)]
+pub struct LinearAxis {
+    /// The value at `from`.
+    pub low: f64,
+    /// The value at `to`.
+    pub high: f64,
+    /// Coordinate of one end in the picture.
+    pub from: f64,
+    /// Coordinate of the other end.
+    pub to: f64,
+}
+
+impl LinearAxis {
+    /// An axis over all finite values, or over 0 to 1 if there are none. If they are all the same, the range extends a
+    /// tenth of the value to either side.
+    pub fn around(values: impl Iterator<Item = f64>, from: f64, to: f64) -> LinearAxis {
+        let (low, high) = range(values).unwrap_or((0.0, 1.0));
+        if high - low > 1e-12 * high.abs().max(low.abs()) {
+            return LinearAxis { low, high, from, to };
+        }
+        let space = if high == 0.0 { 1.0 } else { 0.1 * high.abs() };
+        LinearAxis { low: low - space, high: high + space, from, to }
+    }
+
+    /// The coordinate of a value. A value outside the range lies at most a tenth of the length beyond the end.
+    pub fn place(&self, value: f64) -> f64 {
+        let part = (value - self.low) / (self.high - self.low);
+        self.from + part.clamp(-0.1, 1.1) * (self.to - self.from)
+    }
+
+    /// The multiples within the range of a round number (1, 2 or 5 times a power of ten), about as many as asked for.
+    pub(super) fn ticks(&self, about: f64) -> Vec<f64> {
+        let rough = (self.high - self.low) / about;
+        let power = 10f64.powf(rough.log10().floor());
+        let step =
+            [1.0, 2.0, 5.0, 10.0].map(|n| n * power).into_iter().find(|s| *s >= rough).unwrap_or(rough);
+        let (first, last) =
+            ((self.low / step - 1e-9).ceil() as i64, (self.high / step + 1e-9).floor() as i64);
+        (first..=last).map(|n| n as f64 * step).collect()
+    }
+}
 
 /// A logarithmic axis in a picture.
 #[derive(Clone, Copy, Debug)]
@@ -29,12 +79,8 @@ impl LogAxis {
     /// An axis that shows all values greater than 0, with some space around them, and at least a decade. The
     /// lowest lies towards `from`.
     pub fn around(values: impl Iterator<Item = f64>, from: f64, to: f64) -> LogAxis {
-        let logs = values.filter(|x| *x > 0.0 && x.is_finite()).map(f64::log10);
-        let (mut low, mut high) =
-            logs.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
-        if low > high {
-            (low, high) = (0.0, 0.0);
-        }
+        let positive = values.filter(|x| *x > 0.0 && x.is_finite());
+        let (low, high) = range(positive.map(f64::log10)).unwrap_or((0.0, 0.0));
         let space = (0.04 * (high - low)).max((1.0 - (high - low)) / 2.0);
         LogAxis { low: low - space, high: high + space, from, to }
     }
@@ -85,6 +131,15 @@ mod tests {
         let labelled: Vec<i32> = ticks.iter().filter(|t| t.is_labelled).map(|t| t.exponent).collect();
         assert_eq!(labelled, [-3, 0, 3]);
         assert!(ticks.iter().any(|t| t.mantissa == 5), "space for ticks between decades");
+    }
+
+    #[test]
+    fn linear_ticks_are_round_and_within_the_axis() {
+        let axis = LinearAxis { low: 0.0, high: 7.3, from: 0.0, to: 1.0 };
+        assert_eq!(axis.ticks(7.0), [0.0, 2.0, 4.0, 6.0]);
+        let flat = LinearAxis::around([3.0, 3.0].into_iter(), 0.0, 1.0);
+        assert!(flat.low < 3.0 && flat.high > 3.0);
+        assert!(!flat.ticks(5.0).is_empty());
     }
 
     #[test]

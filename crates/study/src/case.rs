@@ -55,7 +55,7 @@ pub struct Case {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Expectation {
     /// The whole string at a time.
-    At { t: f64, string: Vec<Piece>, within: Within },
+    At { t: f64, string: Vec<PlainModule>, within: Within },
     /// How many modules have this name, or, without a name, how many there are.
     Count { name: Option<String>, t: f64, count: u64 },
     /// The sum of a parameter (from 0) over all modules of this name.
@@ -84,7 +84,7 @@ impl Expectation {
 
 /// A module of an expected string.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Piece {
+pub struct PlainModule {
     pub name: String,
     pub parameters: Vec<f64>,
 }
@@ -318,7 +318,7 @@ fn within_of(text: &str) -> Result<(&str, Within), String> {
 }
 
 /// A string as `dlsys run` prints it; `ε` is the empty one.
-fn string_of(text: &str) -> Result<Vec<Piece>, String> {
+fn string_of(text: &str) -> Result<Vec<PlainModule>, String> {
     let mut pieces = Vec::new();
     let mut rest = text.trim_start();
     if rest.is_empty() {
@@ -346,7 +346,7 @@ fn string_of(text: &str) -> Result<Vec<Piece>, String> {
             }
             None => (Vec::new(), after),
         };
-        pieces.push(Piece { name: name.to_owned(), parameters });
+        pieces.push(PlainModule { name: name.to_owned(), parameters });
         rest = after.trim_start();
     }
     Ok(pieces)
@@ -384,8 +384,10 @@ mod tests {
 
     #[test]
     fn strings_and_tolerances_are_read() {
-        let piece =
-            |name: &str, parameters: &[f64]| Piece { name: name.to_owned(), parameters: parameters.to_vec() };
+        let piece = |name: &str, parameters: &[f64]| PlainModule {
+            name: name.to_owned(),
+            parameters: parameters.to_vec(),
+        };
         let Expectation::At { t, string, within } =
             only("#= at 0.5: F_i(0.75, 1)[+(30)@L(2)] - B relative within 10 tol")
         else {

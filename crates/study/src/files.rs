@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::compare::{Agreement, Difference};
-use super::hard::Row;
+use super::hard::CaseResult;
 use super::study::{Point, Series, Study};
 use dlsys_render::GENERATOR;
 
@@ -157,7 +157,7 @@ fn pretty(value: &Value) -> String {
 }
 
 /// Hard cases as comma-separated values, a line for each run.
-pub fn hard_csv(rows: &[Row]) -> String {
+pub fn hard_csv(rows: &[CaseResult]) -> String {
     let columns = [
         "case",
         "group",
@@ -194,7 +194,7 @@ pub fn hard_csv(rows: &[Row]) -> String {
 }
 
 /// Hard cases as JSON, an object for each run.
-pub fn hard_json(rows: &[Row]) -> String {
+pub fn hard_json(rows: &[CaseResult]) -> String {
     let rows: Vec<Value> = rows
         .iter()
         .map(|row| {

@@ -1,7 +1,7 @@
 //! Runs hard cases and checks everything that they expect.
 
-use super::case::{Case, CaseError, Expectation, Piece, Within};
-use super::record::{Driver, Stop, method_name};
+use super::case::{Case, CaseError, Expectation, PlainModule, Within};
+use super::record::{Driver, EarlyEnd, method_name};
 use dlsys_model::{KindId, Model};
 use dlsys_session::Session;
 use dlsys_sim::{self as sim, Event, Method, Settings, Simulation, Stats, brief};
@@ -19,7 +19,7 @@ pub struct HardPlan {
 
 /// A run of a case: what came of it.
 #[derive(Clone, Debug)]
-pub struct Row {
+pub struct CaseResult {
     pub case: String,
     pub group: String,
     pub file: String,
@@ -46,7 +46,7 @@ pub struct Mismatch {
     pub found: String,
 }
 
-impl Row {
+impl CaseResult {
     pub fn passes(&self) -> bool {
         self.mismatches.is_empty()
     }
@@ -66,7 +66,11 @@ impl Row {
 ///
 /// # Errors
 /// If the model cannot be read.
-pub fn run_case(case: &Case, plan: &HardPlan, watch: &mut dyn FnMut(&str)) -> Result<Vec<Row>, CaseError> {
+pub fn run_case(
+    case: &Case,
+    plan: &HardPlan,
+    watch: &mut dyn FnMut(&str),
+) -> Result<Vec<CaseResult>, CaseError> {
     let session = Session::from_text(&case.file, &case.text, &case.settings).map_err(|refused| {
         let all = refused.diagnostics.iter().chain(&refused.settings);
         let message: String = all.map(|d| d.render(&refused.source, false)).collect();
@@ -113,12 +117,12 @@ impl<'a> Judge<'a> {
         }
     }
 
-    fn run(mut self, session: &Session, method: Method, limit: f64) -> Row {
+    fn run(mut self, session: &Session, method: Method, limit: f64) -> CaseResult {
         let mut driver = Driver::new(limit, self.times().last().copied().unwrap_or(0.0));
         let (stats, stop) = self.go(session, method, &mut driver);
         let seconds = driver.seconds();
         self.check_end(stop);
-        Row {
+        CaseResult {
             case: self.case.id.clone(),
             group: self.case.group.clone(),
             file: self.case.file.clone(),
@@ -133,12 +137,12 @@ impl<'a> Judge<'a> {
     }
 
     /// Runs to the last time and checks what is expected on the way. Tells why it stopped before, if so.
-    fn go(&mut self, session: &Session, method: Method, driver: &mut Driver) -> (Stats, Option<Stop>) {
+    fn go(&mut self, session: &Session, method: Method, driver: &mut Driver) -> (Stats, Option<EarlyEnd>) {
         let settings =
             Settings { method, tolerance: self.tolerance, log: self.counts_events(), ..Settings::default() };
         let mut simulation = match session.simulate(settings) {
             Ok(simulation) => simulation,
-            Err(fault) => return (Stats::default(), Some(Stop::Fault(fault))),
+            Err(fault) => return (Stats::default(), Some(EarlyEnd::Error(fault))),
         };
         let mut string = ModuleString::default();
         for t in self.times() {
@@ -250,14 +254,16 @@ impl<'a> Judge<'a> {
         line: usize,
         t: f64,
         string: &ModuleString,
-        expected: &[Piece],
+        expected: &[PlainModule],
         within: Within,
     ) {
-        let found: Vec<Piece> = string
+        let found: Vec<PlainModule> = string
             .iter()
-            .map(|m| Piece { name: self.name(m.kind).to_owned(), parameters: m.parameters.to_vec() })
+            .map(|m| PlainModule { name: self.name(m.kind).to_owned(), parameters: m.parameters.to_vec() })
             .collect();
-        let same = |(a, b): (&Piece, &Piece)| a.name == b.name && a.parameters.len() == b.parameters.len();
+        let same = |(a, b): (&PlainModule, &PlainModule)| {
+            a.name == b.name && a.parameters.len() == b.parameters.len()
+        };
         let agree = found.iter().zip(expected).take_while(|pair| same(*pair)).count();
         if agree < found.len().max(expected.len()) {
             let what = format!("other modules at t = {t}, from module {} on", agree + 1);
@@ -286,7 +292,7 @@ impl<'a> Judge<'a> {
     }
 
     /// Checks how the run ended.
-    fn check_end(&mut self, stop: Option<Stop>) {
+    fn check_end(&mut self, stop: Option<EarlyEnd>) {
         let case = self.case;
         let wanted = case.expectations.iter().find_map(|(line, e)| match e {
             Expectation::Fails { faults, t, within } => Some((*line, faults, *t, *within)),
@@ -294,12 +300,12 @@ impl<'a> Judge<'a> {
         });
         let found = match &stop {
             None => "no error".to_owned(),
-            Some(Stop::Fault(fault)) => format!("{}: {fault} ({})", fault_name(fault), fault.site().time),
+            Some(EarlyEnd::Error(fault)) => format!("{}: {fault} ({})", fault_name(fault), fault.site().time),
             Some(stop) => stop.to_string(),
         };
         match (&stop, wanted) {
             (None, None) => {}
-            (Some(Stop::Fault(fault)), Some((line, faults, t, within)))
+            (Some(EarlyEnd::Error(fault)), Some((line, faults, t, within)))
                 if faults.contains(&fault_name(fault)) =>
             {
                 if let Some(off) = self.check_number(fault.site().time, t, within) {
@@ -332,10 +338,10 @@ impl<'a> Judge<'a> {
 }
 
 /// A word for why a run ended, and the time to which it came.
-fn end_of(stop: &Stop) -> (&'static str, f64) {
+fn end_of(stop: &EarlyEnd) -> (&'static str, f64) {
     match stop {
-        Stop::Fault(fault) => (fault_name(fault), fault.site().time),
-        Stop::Overtime { t, .. } => ("it takes too long", *t),
+        EarlyEnd::Error(fault) => (fault_name(fault), fault.site().time),
+        EarlyEnd::Overtime { t, .. } => ("it takes too long", *t),
     }
 }
 
@@ -361,7 +367,7 @@ fn fault_name(fault: &sim::Error) -> &'static str {
 }
 
 /// A string with every digit; of a long one, what is around a module.
-fn show(pieces: &[Piece], around: usize) -> String {
+fn show(pieces: &[PlainModule], around: usize) -> String {
     const SHOWN: usize = 6;
     let start = around.saturating_sub(SHOWN / 2).min(pieces.len().saturating_sub(SHOWN));
     let end = (start + SHOWN).min(pieces.len());
@@ -375,7 +381,7 @@ fn show(pieces: &[Piece], around: usize) -> String {
     if words.is_empty() { "ε".to_owned() } else { words.join(" ") }
 }
 
-fn show_piece(piece: &Piece) -> String {
+fn show_piece(piece: &PlainModule) -> String {
     if piece.parameters.is_empty() {
         return piece.name.clone();
     }

@@ -7,38 +7,29 @@
 
 use std::fmt::Write;
 
-use svg::Document;
-use svg::node::element::{Circle, Group, Line, Path, Rectangle, TSpan, Text, Title};
+use svg::node::element::{Circle, Group, Line, Path, Rectangle, TSpan, Text};
 
 use super::axis::{LogAxis, Tick};
+use super::diagram::{
+    COLOURS, GREY, LEFT, MIDDLE, PALE, RIGHT, SMALL, TOP, WIDTH, frame, label, page, plain, polyline, stroke,
+    two,
+};
 use super::study::{Outcome, Series, Study};
 use super::table::order_text;
 use dlsys_sim::brief;
 
-/// Width of the picture, and of the space left of the panels and right of them.
-pub(super) const WIDTH: f64 = 400.0;
-const LEFT: f64 = 58.0;
-const RIGHT: f64 = 12.0;
-const TOP: f64 = 34.0;
 const PANEL: f64 = 185.0;
 const GAP: f64 = 14.0;
 /// From the lower panel to the legend.
 const UNDER: f64 = 52.0;
 const LEGEND_LINE: f64 = 18.0;
 const CAPTION_LINE: f64 = 13.0;
-pub(super) const FONT: f64 = 12.0;
-pub(super) const SMALL: f64 = 10.0;
 /// Characters of a line of the caption.
 const CAPTION_WIDTH: usize = 80;
-pub(super) const FAMILY: &str = "Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif";
 
 /// Smaller errors are drawn as this one: they are rounding.
 const LEAST_ERROR: f64 = 1e-16;
 
-/// Okabe and Ito (2008), Color universal design; told apart by people who do not see all colours, and of
-/// different lightness. Yellow is left out: it is too light for lines on paper.
-pub(super) const COLOURS: [&str; 7] =
-    ["#000000", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
 const DASHES: [&str; 4] = ["none", "6 2.5", "2 2", "7 2 2 2"];
 
 /// The value of a point on a vertical axis, the least and the largest of it.
@@ -51,18 +42,8 @@ pub fn svg(study: &Study) -> String {
     let legend_top = TOP + 2.0 * PANEL + GAP + UNDER;
     let caption_top = legend_top + legend_lines as f64 * LEGEND_LINE + 4.0;
     let height = caption_top + caption.len() as f64 * CAPTION_LINE + 6.0;
-    let title = plain(&study.title);
-
-    let x = LogAxis::around(shown(study).map(|(_, _, error)| error), WIDTH - RIGHT, LEFT);
-    let mut document = Document::new()
-        .set("viewBox", (0.0, 0.0, WIDTH, height))
-        .set("width", 2.0 * WIDTH)
-        .set("height", 2.0 * height)
-        .set("font-family", FAMILY)
-        .set("font-size", FONT)
-        .add(Title::new(format!("Work and precision: {title}")))
-        .add(Rectangle::new().set("width", WIDTH).set("height", height).set("fill", "white"))
-        .add(label(&title, (LEFT + WIDTH - RIGHT) / 2.0, 20.0, "middle").set("font-weight", "bold"));
+    let x = LogAxis::around(shown(study).map(|(_, _, error)| error), RIGHT, LEFT);
+    let mut document = page(height, "Work and precision", &study.title);
 
     let time = |o: &Outcome| [o.wall.median, o.wall.min, o.wall.max].map(|s| s * 1e3);
     let work = |o: &Outcome| [o.stats.rhs_evaluations as f64; 3];
@@ -76,13 +57,12 @@ pub fn svg(study: &Study) -> String {
     for tick in ticks.iter().filter(|t| t.is_labelled) {
         document = document.add(power(tick, is_plain(&ticks), tick.position, bottom + 16.0, "middle"));
     }
-    let middle = (LEFT + WIDTH - RIGHT) / 2.0;
     document = document
-        .add(label("largest error, relative to max(1, |value|)", middle, bottom + 34.0, "middle"))
+        .add(label("largest error, relative to max(1, |value|)", MIDDLE, bottom + 34.0, "middle"))
         .add(legend(study, legend_top));
     for (i, line) in caption.iter().enumerate() {
         let y = caption_top + (i + 1) as f64 * CAPTION_LINE - 2.0;
-        document = document.add(label(line, 8.0, y, "start").set("font-size", SMALL).set("fill", "#333333"));
+        document = document.add(label(line, 8.0, y, "start").set("font-size", SMALL).set("fill", GREY));
     }
     document.to_string() + "\n"
 }
@@ -112,69 +92,73 @@ fn has_wrong_points(study: &Study) -> bool {
 
 /// One panel: its frame, grid, labels of the vertical axis, lines, bars and markers.
 fn panel(study: &Study, x: &LogAxis, name: &str, measure: Measure<'_>, top: f64) -> Group {
-    let bottom = top + PANEL;
-    let y = LogAxis::around(shown(study).flat_map(|(_, o, _)| measure(o)), bottom, top);
+    let y = LogAxis::around(shown(study).flat_map(|(_, o, _)| measure(o)), top + PANEL, top);
     let mut group = Group::new();
+    let ticks = y.ticks(8);
+    for tick in ticks.iter().filter(|tick| tick.is_labelled) {
+        group = group.add(power(tick, is_plain(&ticks), LEFT - 6.0, tick.position + 4.0, "end"));
+    }
+    // To the right of here the error of the reference is as large as those of the methods.
+    let from = x.place(reference_error(study));
+    let doubtful = Rectangle::new().set("x", two(from)).set("y", top).set("fill", "#f0f0f0");
+    let doubtful = doubtful.set("width", two(RIGHT - from)).set("height", PANEL);
+    let (decades, marks) = grid(&x.ticks(7), &ticks, top);
+    group = group.add(doubtful).add(stroke(decades, PALE, 0.7)).add(stroke(marks, GREY, 0.8));
+    let turned = label(name, 0.0, 0.0, "middle")
+        .set("transform", format!("translate(14 {:.1}) rotate(-90)", top + PANEL / 2.0));
+    group = group.add(frame(top, PANEL)).add(turned);
+    for (index, series) in study.series.iter().enumerate() {
+        group = group.add(curve(index, series, [x, &y], measure));
+    }
+    group
+}
+
+/// The lines across a panel at decades, and the tick marks on its four sides.
+fn grid(horizontal: &[Tick], vertical: &[Tick], top: f64) -> (String, String) {
+    let bottom = top + PANEL;
     let (mut decades, mut marks) = (String::new(), String::new());
-    for tick in x.ticks(7) {
-        let (at, length) = (tick.position, if tick.is_decade { 5.0 } else { 3.0 });
+    let length = |tick: &Tick| if tick.is_decade { 5.0 } else { 3.0 };
+    for tick in horizontal {
+        let (at, length) = (tick.position, length(tick));
         if tick.is_decade {
             let _ = write!(decades, "M{at:.2} {top:.2}V{bottom:.2}");
         }
         let _ = write!(marks, "M{at:.2} {bottom:.2}v-{length}M{at:.2} {top:.2}v{length}");
     }
-    let ticks = y.ticks(8);
-    for tick in &ticks {
-        let (at, length) = (tick.position, if tick.is_decade { 5.0 } else { 3.0 });
+    for tick in vertical {
+        let (at, length) = (tick.position, length(tick));
         if tick.is_decade {
-            let _ = write!(decades, "M{LEFT:.2} {at:.2}H{:.2}", WIDTH - RIGHT);
+            let _ = write!(decades, "M{LEFT:.2} {at:.2}H{RIGHT:.2}");
         }
-        let _ = write!(marks, "M{LEFT:.2} {at:.2}h{length}M{:.2} {at:.2}h-{length}", WIDTH - RIGHT);
-        if tick.is_labelled {
-            group = group.add(power(tick, is_plain(&ticks), LEFT - 6.0, at + 4.0, "end"));
-        }
+        let _ = write!(marks, "M{LEFT:.2} {at:.2}h{length}M{RIGHT:.2} {at:.2}h-{length}");
     }
-    let stroke = |d: String, colour: &str, width: f64| {
-        Path::new().set("d", d).set("fill", "none").set("stroke", colour).set("stroke-width", width)
-    };
-    // Where the errors of the references are seen as much as those of the methods.
-    let from = x.place(reference_error(study));
-    let doubtful = Rectangle::new().set("x", two(from)).set("y", top).set("fill", "#f0f0f0");
-    let doubtful = doubtful.set("width", two(WIDTH - RIGHT - from)).set("height", PANEL);
-    group = group.add(doubtful).add(stroke(decades, "#d8d8d8", 0.7)).add(stroke(marks, "#333333", 0.8));
-    let frame = Rectangle::new().set("x", LEFT).set("y", top).set("width", WIDTH - LEFT - RIGHT);
-    let frame = frame.set("height", PANEL).set("fill", "none").set("stroke", "#333333");
-    let turned = label(name, 0.0, 0.0, "middle")
-        .set("transform", format!("translate(14 {:.1}) rotate(-90)", top + PANEL / 2.0));
-    group = group.add(frame).add(turned);
+    (decades, marks)
+}
 
-    for (index, series) in study.series.iter().enumerate() {
-        let (mut line, mut bars) = (String::new(), String::new());
-        let mut markers = Group::new();
-        for (outcome, error) in of_series(series) {
-            let [value, least, most] = measure(outcome);
-            let (px, py) = (x.place(error), y.place(value));
-            let is_right = outcome.agreement.is_right();
-            if is_right {
-                let _ = write!(line, "{}{px:.2} {py:.2}", if line.is_empty() { 'M' } else { 'L' });
-            }
-            if most > least {
-                let _ = write!(bars, "M{px:.2} {:.2}V{:.2}", y.place(least), y.place(most));
-            }
-            markers = markers.add(marker(index, px, py, is_right));
+/// A method in a panel: a line through its correct points, a bar from the least to the largest value, and a marker.
+fn curve(index: usize, series: &Series, [x, y]: [&LogAxis; 2], measure: Measure<'_>) -> Group {
+    let mut bars = String::new();
+    let mut markers = Group::new();
+    for (outcome, error) in of_series(series) {
+        let [value, least, most] = measure(outcome);
+        let (px, py) = (x.place(error), y.place(value));
+        if most > least {
+            let _ = write!(bars, "M{px:.2} {:.2}V{:.2}", y.place(least), y.place(most));
         }
-        let colour = COLOURS[index % COLOURS.len()];
-        let mut of_method = Group::new().set("class", series.name);
-        if line.contains('L') {
-            let path = stroke(line, colour, 1.4).set("stroke-dasharray", DASHES[index % DASHES.len()]);
-            of_method = of_method.add(path.set("stroke-linejoin", "round"));
-        }
-        if !bars.is_empty() {
-            of_method = of_method.add(stroke(bars, colour, 1.0));
-        }
-        group = group.add(of_method.add(markers));
+        markers = markers.add(marker(index, px, py, outcome.agreement.is_right()));
     }
-    group
+    let right = of_series(series).filter(|(outcome, _)| outcome.agreement.is_right());
+    let line = polyline(right.map(|(outcome, error)| (x.place(error), y.place(measure(outcome)[0]))));
+    let colour = COLOURS[index % COLOURS.len()];
+    let mut group = Group::new().set("class", series.name);
+    if line.contains('L') {
+        let path = stroke(line, colour, 1.4).set("stroke-dasharray", DASHES[index % DASHES.len()]);
+        group = group.add(path.set("stroke-linejoin", "round"));
+    }
+    if !bars.is_empty() {
+        group = group.add(stroke(bars, colour, 1.0));
+    }
+    group.add(markers)
 }
 
 /// A marker of a method: filled, or hollow where modules or the order of events are wrong.
@@ -210,7 +194,7 @@ fn legend(study: &Study, top: f64) -> Group {
         let sample = sample.set("stroke-dasharray", DASHES[index % DASHES.len()]);
         let text = Text::new("").set("x", x + 34.0).set("y", y + 4.0);
         let name = TSpan::new(series.name).set("font-weight", "bold");
-        let order = TSpan::new(order_text(series)).set("dx", 6).set("fill", "#333333");
+        let order = TSpan::new(order_text(series)).set("dx", 6).set("fill", GREY);
         group = group.add(sample).add(marker(index, x + 14.0, y, true)).add(text.add(name).add(order));
     }
     if has_wrong_points(study) {
@@ -274,13 +258,9 @@ fn wrap(text: &str, width: usize) -> Vec<String> {
     lines
 }
 
-pub(super) fn label(text: &str, x: f64, y: f64, anchor: &str) -> Text {
-    Text::new(text).set("x", two(x)).set("y", two(y)).set("text-anchor", anchor)
-}
-
 /// `10` with an exponent above it; plain numbers if all of an axis can be written so.
 fn power(tick: &Tick, plain: bool, x: f64, y: f64, anchor: &str) -> Text {
-    let text = Text::new("").set("x", two(x)).set("y", two(y)).set("text-anchor", anchor);
+    let text = label("", x, y, anchor);
     if plain {
         return text.add(TSpan::new(brief(f64::from(tick.mantissa) * 10f64.powi(tick.exponent), 3)));
     }
@@ -292,16 +272,6 @@ fn power(tick: &Tick, plain: bool, x: f64, y: f64, anchor: &str) -> Text {
 /// True if no label of an axis is very small or large.
 fn is_plain(ticks: &[Tick]) -> bool {
     ticks.iter().filter(|t| t.is_labelled).all(|t| (-2..=3).contains(&t.exponent))
-}
-
-/// Without characters that XML cannot hold.
-pub(super) fn plain(text: &str) -> String {
-    text.chars().filter(|c| !c.is_control()).collect()
-}
-
-/// To two decimals: a coordinate needs no more.
-pub(super) fn two(x: f64) -> f64 {
-    (x * 100.0).round() / 100.0
 }
 
 #[cfg(test)]

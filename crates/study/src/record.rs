@@ -82,18 +82,18 @@ pub fn method_name(method: Method) -> &'static str {
 
 /// Why a run ended before its last time.
 #[derive(Clone, Debug)]
-pub enum Stop {
+pub enum EarlyEnd {
     /// The run met an error.
-    Fault(sim::Error),
+    Error(sim::Error),
     /// It took too long: the time that it had come to, and the seconds that it was allowed.
     Overtime { t: f64, limit: f64 },
 }
 
-impl std::fmt::Display for Stop {
+impl std::fmt::Display for EarlyEnd {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Stop::Fault(error) => write!(f, "{error}"),
-            Stop::Overtime { t, limit } => {
+            EarlyEnd::Error(error) => write!(f, "{error}"),
+            EarlyEnd::Overtime { t, limit } => {
                 write!(f, "stopped after {} s, at t = {}", brief(*limit, 3), brief(*t, 6))
             }
         }
@@ -110,7 +110,7 @@ pub struct Record {
     pub stats: Stats,
     /// Wall time from the initial string to the last state, in seconds.
     pub seconds: f64,
-    pub stop: Option<Stop>,
+    pub stop: Option<EarlyEnd>,
 }
 
 impl Record {
@@ -172,17 +172,17 @@ impl Driver {
         simulation: &mut Simulation<'_>,
         t: f64,
         string: &mut ModuleString,
-    ) -> Result<(), Stop> {
+    ) -> Result<(), EarlyEnd> {
         let looks = ((t - self.t) / self.end * LOOKS).ceil().max(1.0) as usize;
         for i in 1..=looks {
             if i < looks && self.looked > MOST_LOOKED {
                 continue;
             }
             let then = if i == looks { t } else { self.t + (t - self.t) * (i as f64 / looks as f64) };
-            simulation.at(then, string).map_err(Stop::Fault)?;
+            simulation.at(then, string).map_err(EarlyEnd::Error)?;
             self.looked += if i < looks { string.len() } else { 0 };
             if self.seconds() > self.limit && then < self.end {
-                return Err(Stop::Overtime { t: then, limit: self.limit });
+                return Err(EarlyEnd::Overtime { t: then, limit: self.limit });
             }
         }
         self.t = t;
@@ -225,12 +225,12 @@ impl<'a> Task<'a> {
         setup: Setup,
         log: bool,
         mut see: impl FnMut(&ModuleString),
-    ) -> (f64, Option<Simulation<'a>>, Option<Stop>) {
+    ) -> (f64, Option<Simulation<'a>>, Option<EarlyEnd>) {
         let mut driver = Driver::new(self.limit, self.end());
         let settings = Settings { log, ..setup.settings(self.base) };
         let mut simulation = match self.session.simulate(settings) {
             Ok(simulation) => simulation,
-            Err(error) => return (driver.seconds(), None, Some(Stop::Fault(error))),
+            Err(error) => return (driver.seconds(), None, Some(EarlyEnd::Error(error))),
         };
         let mut string = ModuleString::default();
         for &t in self.times {

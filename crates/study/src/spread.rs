@@ -42,14 +42,14 @@ impl Spread {
 
 /// A measure over time.
 #[derive(Clone, Debug)]
-pub struct Course {
+pub struct SpreadSeries {
     /// As the measure is written.
     pub name: String,
     pub spreads: Vec<Spread>,
 }
 
 /// All measures for people, to six digits.
-pub fn spread_table(courses: &[Course]) -> String {
+pub fn spread_table(courses: &[SpreadSeries]) -> String {
     let mut out = String::new();
     for (i, course) in courses.iter().enumerate() {
         let specimens = course.spreads.first().map_or(0, |spread| spread.count);
@@ -71,7 +71,7 @@ pub fn spread_table(courses: &[Course]) -> String {
 }
 
 /// All measures for programs: a line for each measure and time, numbers to all digits.
-pub fn spread_csv(courses: &[Course]) -> String {
+pub fn spread_csv(courses: &[SpreadSeries]) -> String {
     let mut out = "measure,t,specimens,mean,deviation,least,q05,q25,median,q75,q95,most\n".to_owned();
     for course in courses {
         let name = match course.name.contains([',', '"', '\n']) {
@@ -107,7 +107,8 @@ mod tests {
 
     #[test]
     fn a_measure_with_commas_is_quoted() {
-        let course = Course { name: "F(x, y): x".into(), spreads: vec![Spread::new(0.5, vec![1.0, 2.0])] };
+        let course =
+            SpreadSeries { name: "F(x, y): x".into(), spreads: vec![Spread::new(0.5, vec![1.0, 2.0])] };
         let text = spread_csv(&[course]);
         assert!(
             text.ends_with("\"F(x, y): x\",0.5,2,1.5,0.7071067811865476,1,1.05,1.25,1.5,1.75,1.95,2\n"),

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::hard::Row;
+use super::hard::CaseResult;
 use super::record::Accuracy;
 use super::study::{Outcome, Series, Study};
 use dlsys_sim::brief;
@@ -150,7 +150,7 @@ fn thousands(n: u64) -> String {
 }
 
 /// Hard cases: one line for each run.
-pub fn hard_table(rows: &[Row]) -> String {
+pub fn hard_table(rows: &[CaseResult]) -> String {
     let mut table = Table::default();
     let heads =
         ["case", "group", "method", "tolerance", "error", "of allowed", "steps", "events", "time", ""];
@@ -183,11 +183,11 @@ fn ratio_text(ratio: f64) -> String {
 }
 
 /// What was not as it should be in these rows: expected, found, where.
-pub fn mismatches(rows: &[Row]) -> String {
+pub fn mismatches(rows: &[CaseResult]) -> String {
     let mut out = String::new();
     for row in rows {
         for mismatch in &row.mismatches {
-            let Row { case, method, tolerance, file, .. } = row;
+            let CaseResult { case, method, tolerance, file, .. } = row;
             let _ = writeln!(out, "\n{case}, {method} at tolerance {tolerance:e}: {}", mismatch.what);
             let _ = writeln!(out, "  --> {file}:{}", mismatch.line);
             let _ = writeln!(out, "  expected: {}", mismatch.expected);

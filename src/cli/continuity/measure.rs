@@ -13,7 +13,7 @@ const NOISE: f64 = 1e-9;
 
 /// One side of a quantity, or both sides' difference.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Change {
+pub struct Sides {
     pub before: f64,
     pub after: f64,
     /// Size of the difference; of vectors, of the vector of difference.
@@ -27,13 +27,13 @@ pub struct Jump {
     /// The largest length on either side, against which positions and lengths are judged.
     pub size: f64,
     /// Of the turtle that leaves.
-    pub position: Change,
+    pub position: Sides,
     /// Of its heading; 0 where nothing follows.
-    pub heading: Change,
+    pub heading: Sides,
     /// About its heading; 0 where nothing follows.
-    pub roll: Change,
+    pub roll: Sides,
     /// Of all lines and outlines, and the sizes of surfaces.
-    pub length: Change,
+    pub length: Sides,
     /// None if the rates before are not known.
     pub speeds: Option<Speeds>,
     /// Further productions of the same instant that are in this.
@@ -42,15 +42,15 @@ pub struct Jump {
 
 #[derive(Clone, Copy, Debug)]
 pub struct Speeds {
-    pub position: Change,
+    pub position: Sides,
     /// Turning and rolling, in degrees per unit of time.
-    pub direction: Change,
-    pub length: Change,
+    pub direction: Sides,
+    pub length: Sides,
 }
 
 /// A drawing, as far as it matters.
 #[derive(Clone, Copy)]
-struct Look {
+struct Measurement {
     position: Point,
     axes: [Vector; 3],
     length: f64,
@@ -65,23 +65,23 @@ struct Motion {
 }
 
 /// Draws modules on trial.
-pub struct Draughtsman<'m> {
+pub struct DrawingProbe<'m> {
     model: &'m Model,
     string: ModuleString,
     scene: Scene,
 }
 
-impl<'m> Draughtsman<'m> {
-    pub fn new(model: &'m Model) -> Draughtsman<'m> {
-        Draughtsman { model, string: ModuleString::default(), scene: Scene::default() }
+impl<'m> DrawingProbe<'m> {
+    pub fn new(model: &'m Model) -> DrawingProbe<'m> {
+        DrawingProbe { model, string: ModuleString::default(), scene: Scene::default() }
     }
 
     /// Measures a transition at a time.
     pub fn jump(&mut self, time: f64, transition: &Transition) -> Result<Jump, Error> {
         let Transition { before, after, moved, followed, cascade } = transition;
         let before = std::slice::from_ref(before);
-        let from = self.look(before, time, 0.0)?;
-        let to = self.look(after, time, 0.0)?;
+        let from = self.measure(before, time, 0.0)?;
+        let to = self.measure(after, time, 0.0)?;
         let size = from.length.max(to.length).max(from.position.coords.norm()).max(to.position.coords.norm());
         let of = |way: f64| if *followed { way } else { 0.0 };
         let (heading, roll) = angles(&from.axes, &to.axes);
@@ -89,13 +89,13 @@ impl<'m> Draughtsman<'m> {
         Ok(Jump {
             time,
             size,
-            position: Change {
+            position: Sides {
                 before: from.position.coords.norm(),
                 after: to.position.coords.norm(),
                 jump: (to.position - from.position).norm(),
             },
-            heading: Change { before: 0.0, after: of(heading), jump: of(heading) },
-            roll: Change { before: 0.0, after: of(roll), jump: of(roll) },
+            heading: Sides { before: 0.0, after: of(heading), jump: of(heading) },
+            roll: Sides { before: 0.0, after: of(roll), jump: of(roll) },
             length: scalar(from.length, to.length, 0.0),
             speeds,
             cascade: *cascade,
@@ -110,10 +110,10 @@ impl<'m> Draughtsman<'m> {
         let from = self.motion(before, time, -h)?;
         let to = self.motion(&transition.after, time, h)?;
         let (slow, still) = (NOISE * size / scale, NOISE / scale);
-        let mut direction = Change::default();
+        let mut direction = Sides::default();
         if transition.followed {
             let parts = vector(from.turning, to.turning, still);
-            direction = Change {
+            direction = Sides {
                 before: parts.before.to_degrees(),
                 after: parts.after.to_degrees(),
                 jump: parts.jump.to_degrees(),
@@ -126,23 +126,26 @@ impl<'m> Draughtsman<'m> {
         })
     }
 
-    /// Rates at an instant by a one-sided difference quotient of second order; negative `h` looks back.
+    /// Rates at an instant by a one-sided difference quotient of second order; negative `h` measured back.
     fn motion(&mut self, stands: &[Stand], time: f64, h: f64) -> Result<Motion, Error> {
-        let looks =
-            [self.look(stands, time, 0.0)?, self.look(stands, time, h)?, self.look(stands, time, 2.0 * h)?];
+        let measured = [
+            self.measure(stands, time, 0.0)?,
+            self.measure(stands, time, h)?,
+            self.measure(stands, time, 2.0 * h)?,
+        ];
         let slope = |x: [Vector; 3]| (4.0 * (x[1] - x[0]) - (x[2] - x[0])) / (2.0 * h);
         let turning: Vector =
-            (0..3).map(|axis| looks[0].axes[axis].cross(&slope(looks.map(|look| look.axes[axis])))).sum();
-        let [a, b, c] = looks.map(|look| look.length);
+            (0..3).map(|axis| measured[0].axes[axis].cross(&slope(measured.map(|m| m.axes[axis])))).sum();
+        let [a, b, c] = measured.map(|m| m.length);
         Ok(Motion {
-            position: slope(looks.map(|look| look.position.coords)),
+            position: slope(measured.map(|m| m.position.coords)),
             turning: turning / 2.0,
             length: (4.0 * (b - a) - (c - a)) / (2.0 * h),
         })
     }
 
-    /// Draws modules as they are `tau` from now, from a turtle that looks up.
-    fn look(&mut self, stands: &[Stand], time: f64, tau: f64) -> Result<Look, Error> {
+    /// Draws modules as they are `tau` from now, from a turtle that measured up.
+    fn measure(&mut self, stands: &[Stand], time: f64, tau: f64) -> Result<Measurement, Error> {
         self.string.reset(time + tau);
         for stand in stands {
             let values = stand.values.iter().zip(&stand.rates).map(|(x, rate)| x + tau * rate);
@@ -160,7 +163,7 @@ impl<'m> Draughtsman<'m> {
         let patches = self.scene.patches.iter().map(Patch::length);
         let length =
             lines.sum::<f64>() + outlines.sum::<f64>() + surfaces.sum::<f64>() + patches.sum::<f64>();
-        Ok(Look { position: pose.position, axes: pose.axes, length })
+        Ok(Measurement { position: pose.position, axes: pose.axes, length })
     }
 }
 
@@ -172,14 +175,14 @@ fn time_scale<'s>(stands: impl Iterator<Item = &'s Stand>) -> f64 {
         .fold(1.0, f64::min)
 }
 
-fn scalar(before: f64, after: f64, least: f64) -> Change {
+fn scalar(before: f64, after: f64, least: f64) -> Sides {
     let clear = |x: f64| if x.abs() > least { x } else { 0.0 };
-    Change { before: clear(before), after: clear(after), jump: clear(after - before).abs() }
+    Sides { before: clear(before), after: clear(after), jump: clear(after - before).abs() }
 }
 
-fn vector(before: Vector, after: Vector, least: f64) -> Change {
+fn vector(before: Vector, after: Vector, least: f64) -> Sides {
     let clear = |v: Vector| if v.norm() > least { v.norm() } else { 0.0 };
-    Change { before: clear(before), after: clear(after), jump: clear(after - before) }
+    Sides { before: clear(before), after: clear(after), jump: clear(after - before) }
 }
 
 /// The angles between two headings, and about the heading, in degrees.

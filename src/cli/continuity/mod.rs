@@ -18,7 +18,7 @@ use super::common::{Failure, coloured, out_error};
 use crate::session::Session;
 use crate::sim::{Settings, Simulation};
 use crate::tree::ModuleString;
-use measure::Draughtsman;
+use measure::DrawingProbe;
 use report::{Report, Verdict};
 
 /// Pieces of the time range after which the log of events is emptied.
@@ -73,12 +73,12 @@ fn observe(
     end: f64,
     report: &mut Report,
 ) -> Result<(), Trouble> {
-    let mut draughtsman = Draughtsman::new(&session.model);
+    let mut probe = DrawingProbe::new(&session.model);
     let mut string = ModuleString::default();
     for piece in 0..=PIECES {
         let done = simulation.at(end * piece as f64 / PIECES as f64, &mut string);
         for event in simulation.take_events() {
-            let jump = event.transition.as_ref().map(|transition| draughtsman.jump(event.time, transition));
+            let jump = event.transition.as_ref().map(|transition| probe.jump(event.time, transition));
             let jump = jump
                 .transpose()
                 .map_err(|error| Trouble::Drawing(format!("error: at t = {}: {error}\n", event.time)))?;

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::measure::{Change, Jump};
+use super::measure::{Jump, Sides};
 use crate::session::Session;
 use crate::sim::{Event, brief};
 
@@ -51,7 +51,7 @@ const FIRST_SPEED: usize = 4;
 const UNITS: [&str; 7] = ["", "°", "°", "", "", "°", ""];
 
 /// The same, of one jump.
-fn quantities(jump: &Jump) -> [Option<Change>; 7] {
+fn quantities(jump: &Jump) -> [Option<Sides>; 7] {
     let Jump { position, heading, roll, length, speeds, .. } = *jump;
     let [p, d, l] = match speeds {
         Some(s) => [s.position, s.direction, s.length].map(Some),
@@ -61,18 +61,18 @@ fn quantities(jump: &Jump) -> [Option<Change>; 7] {
 }
 
 /// What a quantity's jump is relative to, unless that is too small: lengths on both sides, or speeds.
-fn size(jump: &Jump, quantity: usize, change: Change) -> f64 {
+fn size(jump: &Jump, quantity: usize, sides: Sides) -> f64 {
     match quantity {
         0 | 3 => jump.size,
         1 | 2 => 0.0,
-        _ => change.before.abs().max(change.after.abs()),
+        _ => sides.before.abs().max(sides.after.abs()),
     }
 }
 
 /// The worst jump of a quantity.
 #[derive(Clone, Copy)]
 struct Worst {
-    change: Change,
+    sides: Sides,
     relative: f64,
     time: f64,
 }
@@ -99,11 +99,11 @@ impl<'s> Report<'s> {
         production.without_speed += usize::from(jump.speeds.is_none());
         production.cascade = production.cascade.max(jump.cascade);
         let mut seen = false;
-        for (i, change) in quantities(&jump).into_iter().enumerate() {
-            let Some(change) = change else { continue };
-            let size = size(&jump, i, change);
+        for (i, sides) in quantities(&jump).into_iter().enumerate() {
+            let Some(sides) = sides else { continue };
+            let size = size(&jump, i, sides);
             self.floors[i] = self.floors[i].max(FLOOR * size);
-            seen |= change.jump > self.tolerance * size.max(f64::MIN_POSITIVE);
+            seen |= sides.jump > self.tolerance * size.max(f64::MIN_POSITIVE);
         }
         // What is none against its own size is none against a larger one.
         if seen {
@@ -114,13 +114,13 @@ impl<'s> Report<'s> {
     fn worst(&self, production: &Production) -> [Option<Worst>; 7] {
         let mut worst = [None; 7];
         for jump in &production.jumps {
-            for (i, change) in quantities(jump).into_iter().enumerate() {
-                let Some(change) = change else { continue };
-                let relative = change.jump / size(jump, i, change).max(self.floors[i]);
+            for (i, sides) in quantities(jump).into_iter().enumerate() {
+                let Some(sides) = sides else { continue };
+                let relative = sides.jump / size(jump, i, sides).max(self.floors[i]);
                 // Of jumps that are the same but for rounding, the first is named.
                 let more = worst[i].is_none_or(|w: Worst| relative > w.relative * (1.0 + 1e-6));
                 if more {
-                    worst[i] = Some(Worst { change, relative, time: jump.time });
+                    worst[i] = Some(Worst { sides, relative, time: jump.time });
                 }
             }
         }
@@ -180,7 +180,7 @@ impl<'s> Report<'s> {
         let _ = writeln!(out, "{name}: fired {} {times}; {says}", production.fired);
         for i in 0..7 {
             let Some(w) = worst[i].filter(|w| w.relative > self.tolerance) else { continue };
-            let Change { before, after, jump } = w.change;
+            let Sides { before, after, jump } = w.sides;
             let unit = UNITS[i];
             // A place has no size that would say anything.
             let sides = match i {

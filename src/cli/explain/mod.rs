@@ -2,7 +2,7 @@
 //! the plan of a query.
 //!
 //! ```text
-//! Model (classes found by model::analyse) ──plan──▶ Plan ──▶ text, for people
+//! Model (classes found by model::analyse) ──plan──▶ Explanation ──▶ text, for people
 //!                                            words             JSON, for programs
 //! ```
 //!
@@ -46,7 +46,7 @@ pub fn explain(args: &ExplainArgs) -> Result<(), Failure> {
 
 /// The same of a model that was read.
 pub fn show(args: &ExplainArgs, session: &Session) -> Result<(), Failure> {
-    let plan = plan::Plan::new(session);
+    let plan = plan::Explanation::new(session);
     let shown = match args.format {
         TextFormat::Text => text::show(&plan),
         TextFormat::Json => serde_json::to_string(&plan).expect("text becomes JSON") + "\n",

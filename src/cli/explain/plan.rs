@@ -10,7 +10,7 @@ use crate::session::Session;
 
 /// Everything that is said about a model. Field names are those of the JSON.
 #[derive(Serialize)]
-pub struct Plan {
+pub struct Explanation {
     pub model: String,
     pub title: Option<String>,
     pub kinds: Vec<KindPlan>,
@@ -128,8 +128,8 @@ pub struct Facts<'m> {
     work: Vec<Work>,
 }
 
-impl Plan {
-    pub fn new(session: &Session) -> Plan {
+impl Explanation {
+    pub fn new(session: &Session) -> Explanation {
         let model = &session.model;
         let facts = Facts { model, source: &session.source, work: works(model) };
         let mut summary = Summary { closed_form: model.is_closed_form(), ..Summary::default() };
@@ -160,7 +160,7 @@ impl Plan {
                 drawn_only: if kind.rules.is_empty() { Vec::new() } else { drawn_only.collect() },
             });
         }
-        Plan {
+        Explanation {
             model: session.source.name.clone(),
             title: model.title.clone(),
             kinds,

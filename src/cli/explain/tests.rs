@@ -1,17 +1,17 @@
 //! Small models of which every class is known.
 
-use super::plan::Plan;
+use super::plan::Explanation;
 use super::words;
 use crate::session::Session;
 
 /// Parameters of the first clause of a rule, as class, law and reason.
-fn parameters(plan: &Plan, rule: usize) -> Vec<[&str; 3]> {
+fn parameters(plan: &Explanation, rule: usize) -> Vec<[&str; 3]> {
     let all = &plan.rules[rule].solves[0].parameters;
     all.iter().map(|p| [p.class, p.law.as_deref().unwrap_or(""), &p.why]).collect()
 }
 
-fn plan(text: &str) -> Plan {
-    Plan::new(&Session::from_text("test.dls", text, &[]).expect("a good model"))
+fn plan(text: &str) -> Explanation {
+    Explanation::new(&Session::from_text("test.dls", text, &[]).expect("a good model"))
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::curves::CurvePlan;
-use super::plan::{ClausePlan, ConditionPlan, KindPlan, Plan, RulePlan, Work};
+use super::plan::{ClausePlan, ConditionPlan, Explanation, KindPlan, RulePlan, Work};
 use super::words::SUM;
 
 const COLUMNS: usize = 100;
@@ -62,7 +62,7 @@ fn clause(action: &str, clause: &ClausePlan, out: &mut String) {
     line(&format!("    {action}, line {}, {condition}{choice}", clause.line), out);
 }
 
-fn kind_line(plan: &Plan, group: &[&KindPlan]) -> String {
+fn kind_line(plan: &Explanation, group: &[&KindPlan]) -> String {
     let shown: Vec<String> = (group.iter())
         .map(|kind| match plan.kinds.iter().filter(|other| other.name == kind.name).count() {
             1 => kind.name.clone(),
@@ -122,7 +122,7 @@ fn condition(condition: &ConditionPlan) -> Vec<[String; 3]> {
 }
 
 /// The whole plan, for people.
-pub fn show(plan: &Plan) -> String {
+pub fn show(plan: &Explanation) -> String {
     let mut out = String::new();
     let title = plan.title.as_ref().map_or(String::new(), |title| format!(": {title}"));
     let _ = writeln!(out, "{}{title}\n", plan.model);

@@ -16,10 +16,10 @@ use std::time::Instant;
 use serde_json::json;
 
 use super::args::RenderArgs;
-use super::common::{Clock, Failure, Run, count_of, out_error, size_of};
+use super::common::{Clock, Failure, ModelRun, count_of, out_error, size_of};
 use super::events::EventLog;
+use super::frame_source::{Frame, Pass, play};
 use super::progress::Progress;
-use super::reel::{Pass, Shot, play};
 use super::values::Seeds;
 use crate::render::{
     self, Content, Fit, FrameDirectory, FrameRecord, FrameWriter, Layout, Manifest, Page, Sheet, SheetWriter,
@@ -37,7 +37,7 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
 fn once(args: &RenderArgs, stale: &(dyn Fn() -> bool + Sync)) -> Result<(), Failure> {
     flags::survey(args)?;
     flags::agree(args)?;
-    let run = Run::start(&args.shared)?;
+    let run = ModelRun::start(&args.shared)?;
     match args.seeds {
         Some(seeds) => specimens(args, run, seeds),
         None => render_run(args, run, stale),
@@ -45,7 +45,7 @@ fn once(args: &RenderArgs, stale: &(dyn Fn() -> bool + Sync)) -> Result<(), Fail
 }
 
 /// Renders specimens with several seeds, to one scale. All are measured before anything is written.
-fn specimens(args: &RenderArgs, mut run: Run, seeds: Seeds) -> Result<(), Failure> {
+fn specimens(args: &RenderArgs, mut run: ModelRun, seeds: Seeds) -> Result<(), Failure> {
     let begun = Instant::now();
     let never = || false;
     let threads = flags::threads(args);
@@ -85,7 +85,11 @@ fn specimens(args: &RenderArgs, mut run: Run, seeds: Seeds) -> Result<(), Failur
 }
 
 /// The same of a model that was read.
-pub fn render_run(args: &RenderArgs, run: Run, stale: &(dyn Fn() -> bool + Sync)) -> Result<(), Failure> {
+pub fn render_run(
+    args: &RenderArgs,
+    run: ModelRun,
+    stale: &(dyn Fn() -> bool + Sync),
+) -> Result<(), Failure> {
     let begun = Instant::now();
     let survey = flags::survey(args)?;
     flags::agree(args)?;
@@ -128,7 +132,7 @@ struct Written {
 /// What is being rendered.
 struct Render<'r> {
     args: &'r RenderArgs,
-    run: &'r Run,
+    run: &'r ModelRun,
     /// Where to write.
     out: &'r Path,
     threads: usize,
@@ -152,7 +156,7 @@ impl Render<'_> {
         let mut progress = self.bar("measuring", self.run.times.len());
         let mut events = EventLog::create(self.args.shared.events.as_deref(), self.run)?;
         let nothing = survey.clone();
-        let of_frame = |_: &Shot, scene: &Scene| {
+        let of_frame = |_: &Frame, scene: &Scene| {
             let mut survey = nothing.clone();
             survey.add(scene);
             survey
@@ -188,14 +192,14 @@ impl Render<'_> {
         // Frames side by side; threads that have none help with those of others.
         writer.threads = (self.threads / count.max(1)).max(1);
         let staging = directory.staging();
-        let work = |shot: &Shot, scene: &Scene| {
-            let file = FrameDirectory::frame_name(shot.index, count, writer.format.extension());
-            let companion = writer.companion(scene).filter(|_| shot.index == 0);
-            let title = format!("{}, t = {}", self.title(), shot.time);
+        let work = |frame: &Frame, scene: &Scene| {
+            let file = FrameDirectory::frame_name(frame.index, count, writer.format.extension());
+            let companion = writer.companion(scene).filter(|_| frame.index == 0);
+            let title = format!("{}, t = {}", self.title(), frame.time);
             let staged = staging
                 .write(|file| writer.write_to(scene, &title, file))
-                .map_err(|error| explain(error, shot, scene));
-            (record(&writer.fit, shot, scene, file), companion, staged)
+                .map_err(|error| explain(error, frame, scene));
+            (record(&writer.fit, frame, scene, file), companion, staged)
         };
         let mut progress = self.bar("writing", count);
         let stats = play(
@@ -243,8 +247,8 @@ impl Render<'_> {
             .map_err(out_of_directory)?
             .limited(self.args.max_output);
         let mut manifest = self.manifest(&fit, writer.page());
-        let work = |shot: &Shot, scene: &Scene| {
-            (record(&fit, shot, scene, writer.file()), writer.part(shot.index, scene))
+        let work = |frame: &Frame, scene: &Scene| {
+            (record(&fit, frame, scene, writer.file()), writer.part(frame.index, scene))
         };
         let mut assembly = writer.begin();
         let mut progress = self.bar("drawing", times.len());
@@ -337,18 +341,18 @@ impl Render<'_> {
 }
 
 /// What the manifest says of a frame.
-fn record(fit: &Fit, shot: &Shot, scene: &Scene, file: String) -> FrameRecord {
+fn record(fit: &Fit, frame: &Frame, scene: &Scene, file: String) -> FrameRecord {
     FrameRecord {
-        index: shot.index,
-        time: shot.time,
+        index: frame.index,
+        time: frame.time,
         file,
-        modules: shot.modules(),
+        modules: frame.modules(),
         bounds: fit.bounds_of(scene).map(|c| c.map(|p| [p.x, p.y, p.z])),
     }
 }
 
 /// An error of a frame; of one that is too large, with what makes it so.
-fn explain(error: render::Error, shot: &Shot, scene: &Scene) -> Failure {
+fn explain(error: render::Error, frame: &Frame, scene: &Scene) -> Failure {
     let render::Error::TooLarge { limit } = error else { return out_of_directory(error) };
     let mut counts: HashMap<&str, usize> = HashMap::new();
     let owners = scene.segments.iter().map(|s| s.owner).chain(scene.polygons.iter().map(|p| p.owner));
@@ -361,7 +365,7 @@ fn explain(error: render::Error, shot: &Shot, scene: &Scene) -> Failure {
     let most = most.map_or(String::new(), |(name, count)| {
         format!(
             "  = note: frame {} at t = {} draws {count} pieces for `{name}`, more than for anything else\n",
-            shot.index, shot.time
+            frame.index, frame.time
         )
     });
     Failure::Model(format!(

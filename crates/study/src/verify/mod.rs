@@ -24,7 +24,7 @@ use parameters::Parameters;
 use productions::Matching;
 use table::way;
 
-use super::record::Stop;
+use super::record::EarlyEnd;
 use super::reference::TIGHTEST;
 use dlsys_session::Session;
 use dlsys_sim::{self as sim, Method, Passed, Scheduler, Settings, Simulation};
@@ -48,7 +48,7 @@ pub struct Verification {
     /// How the one was made that it is compared with.
     pub other: Settings,
     /// Ways that were tried before that, and why each ended.
-    pub refused: Vec<(Settings, Stop)>,
+    pub refused: Vec<(Settings, EarlyEnd)>,
     /// Both have used Radau's method: `auto` has gone over to it where equations are stiff.
     pub has_same_method: bool,
     /// Last time that was observed, and how many there were.
@@ -91,7 +91,7 @@ pub enum Unverified {
     /// The run in question meets an error itself.
     Fault(sim::Error),
     /// No other way comes to the last time: why each of them ended.
-    NoOtherWay(Vec<(Settings, Stop)>),
+    NoOtherWay(Vec<(Settings, EarlyEnd)>),
 }
 
 /// Runs a model by other ways until one comes to the last of the times, which increase, and compares. `limit`: seconds that
@@ -123,13 +123,13 @@ pub fn verify(
     limit: f64,
     watch: &mut dyn FnMut(&str),
 ) -> Result<Verification, Unverified> {
-    let mut refused: Vec<(Settings, Stop)> = Vec::new();
-    let mut ways: Vec<(Settings, Option<Stop>)> =
+    let mut refused: Vec<(Settings, EarlyEnd)> = Vec::new();
+    let mut ways: Vec<(Settings, Option<EarlyEnd>)> =
         other_ways(&checked).into_iter().map(|way| (way, None)).collect();
     for part in [FIRST_GO, 1.0] {
         for (other, stop) in &mut ways {
             // What took too long may come to its end in a longer time; a refusal stays one.
-            if matches!(stop, Some(Stop::Fault(_))) {
+            if matches!(stop, Some(EarlyEnd::Error(_))) {
                 continue;
             }
             watch(&format!("verifying by {}", way(other)));
@@ -178,7 +178,7 @@ fn side_by_side(
     other: Settings,
     times: &[f64],
     limit: f64,
-) -> Result<Result<Verification, Stop>, Unverified> {
+) -> Result<Result<Verification, EarlyEnd>, Unverified> {
     let checked = Settings { log: true, transitions: false, ..checked };
     let mut ours = session.simulate(checked).map_err(Unverified::Fault)?;
     let mut theirs = match Limited::start(session, other, limit) {
@@ -235,20 +235,20 @@ struct Limited<'m> {
 const STRIDE: usize = 64;
 
 impl<'m> Limited<'m> {
-    fn start(session: &'m Session, settings: Settings, limit: f64) -> Result<Limited<'m>, Stop> {
+    fn start(session: &'m Session, settings: Settings, limit: f64) -> Result<Limited<'m>, EarlyEnd> {
         let start = Instant::now();
-        let simulation = session.simulate(settings).map_err(Stop::Fault)?;
+        let simulation = session.simulate(settings).map_err(EarlyEnd::Error)?;
         Ok(Limited { simulation, string: ModuleString::default(), start, limit })
     }
 
     /// Goes to a time and writes the structure there.
-    fn go(&mut self, t: f64) -> Result<(), Stop> {
+    fn go(&mut self, t: f64) -> Result<(), EarlyEnd> {
         loop {
             if self.start.elapsed().as_secs_f64() > self.limit {
-                return Err(Stop::Overtime { t: self.simulation.reached(), limit: self.limit });
+                return Err(EarlyEnd::Overtime { t: self.simulation.reached(), limit: self.limit });
             }
-            if self.simulation.pass_some(t, STRIDE, false).map_err(Stop::Fault)? == Passed::All {
-                return self.simulation.at(t, &mut self.string).map_err(Stop::Fault);
+            if self.simulation.pass_some(t, STRIDE, false).map_err(EarlyEnd::Error)? == Passed::All {
+                return self.simulation.at(t, &mut self.string).map_err(EarlyEnd::Error);
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::super::record::{Accuracy, Setup, Stop};
+use super::super::record::{Accuracy, EarlyEnd, Setup};
 use super::super::table::Table;
 use super::{Gap, PROMISED, Pair, Split, Unverified, Verification};
 use dlsys_model::Model;
@@ -230,20 +230,20 @@ fn help(checked: &Settings) -> &'static str {
     }
 }
 
-fn stop_text(stop: &Stop) -> String {
+fn stop_text(stop: &EarlyEnd) -> String {
     match stop {
-        Stop::Fault(error) => format!("it ends with an error: {error}"),
+        EarlyEnd::Error(error) => format!("it ends with an error: {error}"),
         stop => stop.to_string(),
     }
 }
 
 /// The message if no other way came to the end.
-pub fn unverified(refused: &[(Settings, Stop)]) -> String {
+pub fn unverified(refused: &[(Settings, EarlyEnd)]) -> String {
     let mut out = String::from("error: not verified: no other way comes to the last time\n");
     for (other, stop) in refused {
         let _ = write!(out, "\n  = note: {}: {}", way(other), stop_text(stop));
     }
-    let late = refused.iter().any(|(_, stop)| matches!(stop, Stop::Overtime { .. }));
+    let late = refused.iter().any(|(_, stop)| matches!(stop, EarlyEnd::Overtime { .. }));
     out.push_str(match late {
         true => "\n  = help: give them more time: `--time-limit S`; or look at earlier times, `--at` or `--to`\n\n",
         false => "\n  = help: where the other ways meet errors, look at the model there; up to an earlier time it can be verified\n\n",

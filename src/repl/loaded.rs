@@ -1,8 +1,8 @@
 //! A model in time, and who does what with it.
 
 use super::commands;
-use super::desk::{Desk, Fault};
-use super::grammar::{Line, Statement, first_word};
+use super::grammar::{Statement, StatementKind, first_word};
+use super::state::{CommandError, SessionState};
 use crate::cli::embedded;
 use crate::interrupt;
 use crate::replay::{Replay, Stop};
@@ -13,8 +13,8 @@ use crate::tree::ModuleString;
 
 /// What comes after a statement.
 #[derive(Debug)]
-pub enum Flow {
-    On,
+pub enum NextStep {
+    Continue,
     Quit,
     /// Another model, to be shown at a time.
     Model {
@@ -24,39 +24,39 @@ pub enum Flow {
 }
 
 /// A model and its time.
-pub struct Stage<'m> {
+pub struct LoadedModel<'m> {
     pub session: &'m Session,
     /// None if the model cannot start, or if there is nothing to start.
     replay: Option<Replay<'m>>,
     /// Why it cannot.
-    fault: Option<sim::Error>,
+    error: Option<sim::Error>,
 }
 
-impl<'m> Stage<'m> {
+impl<'m> LoadedModel<'m> {
     /// Starts the model.
-    pub fn new(session: &'m Session, desk: &Desk) -> Stage<'m> {
+    pub fn new(session: &'m Session, state: &SessionState) -> LoadedModel<'m> {
         let empty = session.model.axiom.kinds.is_empty();
-        let (replay, fault) = match Replay::new(&session.model, desk.settings) {
+        let (replay, error) = match Replay::new(&session.model, state.settings) {
             _ if empty => (None, None),
             Ok(mut replay) => {
                 replay.stop_when(interrupt::flag());
                 (Some(replay), None)
             }
-            Err(fault) => (None, Some(fault)),
+            Err(error) => (None, Some(error)),
         };
-        Stage { session, replay, fault }
+        LoadedModel { session, replay, error }
     }
 
     /// Goes to the time at which the model is to be shown.
-    pub fn set(&mut self, time: f64, desk: &Desk) -> Result<(), Fault> {
-        if let Some(fault) = &self.fault {
-            return Err(self.drawn(fault, desk));
+    pub fn set(&mut self, time: f64, state: &SessionState) -> Result<(), CommandError> {
+        if let Some(error) = &self.error {
+            return Err(self.drawn(error, state));
         }
         if time > 0.0
             && let Ok(replay) = self.replay()
         {
             let gone = replay.seek(time);
-            self.arrive(gone, desk)?;
+            self.arrive(gone, state)?;
         }
         Ok(())
     }
@@ -70,129 +70,139 @@ impl<'m> Stage<'m> {
     ///
     /// # Errors
     /// If there is none.
-    pub fn replay(&mut self) -> Result<&mut Replay<'m>, Fault> {
-        let why = match &self.fault {
-            Some(fault) => format!("the model does not start: {fault}"),
+    pub fn replay(&mut self) -> Result<&mut Replay<'m>, CommandError> {
+        let why = match &self.error {
+            Some(error) => format!("the model does not start: {error}"),
             None if self.session.model.rules.is_empty() => {
                 "there is no model yet: `load FILE`, or type an initial string, such as `initial string: A(0)`".to_owned()
             }
             None => "there is no initial string yet: type one, such as `initial string: A(0)`".to_owned(),
         };
-        self.replay.as_mut().ok_or_else(|| Fault::new(why))
+        self.replay.as_mut().ok_or_else(|| CommandError::new(why))
     }
 
     /// An error of the run, drawn.
-    pub fn drawn(&self, error: &sim::Error, desk: &Desk) -> Fault {
-        Fault::Said(error.diagnostic().render(&self.session.source, desk.screen.coloured))
+    pub fn drawn(&self, error: &sim::Error, state: &SessionState) -> CommandError {
+        CommandError::Message(error.diagnostic().render(&self.session.source, state.screen.coloured))
     }
 
     /// What came of a way to another time.
-    pub fn arrive(&mut self, gone: Result<Stop, sim::Error>, desk: &Desk) -> Result<Stop, Fault> {
+    pub fn arrive(
+        &mut self,
+        gone: Result<Stop, sim::Error>,
+        state: &SessionState,
+    ) -> Result<Stop, CommandError> {
         let present = self.time().unwrap_or(0.0);
         match gone {
             Ok(Stop::Interrupted) => {
-                desk.say(&format!("stopped at t = {}; `run T` goes on from there\n", brief(present, 12)))?;
+                state.say(&format!("stopped at t = {}; `run T` goes on from there\n", brief(present, 12)))?;
                 Ok(Stop::Interrupted)
             }
             Ok(stop) => Ok(stop),
             Err(error) => {
-                let Fault::Said(mut text) = self.drawn(&error, desk) else { return Err(Fault::Closed) };
+                let CommandError::Message(mut text) = self.drawn(&error, state) else {
+                    return Err(CommandError::OutputClosed);
+                };
                 text = format!("{}\n(the session stays at t = {})\n", text.trim_end(), brief(present, 12));
-                Err(Fault::Said(text))
+                Err(CommandError::Message(text))
             }
         }
     }
 
     /// Goes the way to the present, if nobody wanted to see it before.
-    pub fn settle(&mut self, desk: &Desk) -> Result<(), Fault> {
+    pub fn settle(&mut self, state: &SessionState) -> Result<(), CommandError> {
         let gone = self.replay()?.settle();
-        self.arrive(gone, desk).map(|_| ())
+        self.arrive(gone, state).map(|_| ())
     }
 
     /// The structure at present.
-    pub fn string(&mut self, desk: &Desk) -> Result<&ModuleString, Fault> {
-        self.settle(desk)?;
+    pub fn string(&mut self, state: &SessionState) -> Result<&ModuleString, CommandError> {
+        self.settle(state)?;
         if let Err(error) = self.replay()?.string() {
-            return Err(self.drawn(&error, desk));
+            return Err(self.drawn(&error, state));
         }
         let formed = self.replay()?.string();
         Ok(formed.expect("it was formed"))
     }
 
     /// Does what a statement says.
-    pub fn obey(&mut self, statement: &Statement, desk: &mut Desk) -> Result<Flow, Fault> {
+    pub fn obey(
+        &mut self,
+        statement: &Statement,
+        state: &mut SessionState,
+    ) -> Result<NextStep, CommandError> {
         let time = self.time().unwrap_or(0.0);
         match statement.kind {
-            Line::Command => self.command(&statement.words(), desk),
-            Line::Model => {
-                let change = desk.draft.with(&statement.text);
-                desk.change(change, time)
+            StatementKind::Command => self.command(&statement.words(), state),
+            StatementKind::Model => {
+                let change = state.draft.with(&statement.text);
+                state.change(change, time)
             }
-            Line::Clause => match desk.draft.with_clause(&statement.text) {
-                Some(change) => desk.change(change, time),
-                None => Err(Fault::new(
+            StatementKind::Clause => match state.draft.with_clause(&statement.text) {
+                Some(change) => state.change(change, time),
+                None => Err(CommandError::new(
                     "a clause belongs to a rule, and none was typed yet; a rule begins with its head: `A(x): if x < 1 solve dx/dt = 1`",
                 )),
             },
-            Line::Unknown | Line::Blank => Err(unknown(&statement.text)),
+            StatementKind::Unknown | StatementKind::Blank => Err(unknown(&statement.text)),
         }
     }
 
-    fn command(&mut self, words: &[String], desk: &mut Desk) -> Result<Flow, Fault> {
+    fn command(&mut self, words: &[String], state: &mut SessionState) -> Result<NextStep, CommandError> {
         let Some((name, rest)) = words.split_first() else {
-            return Err(Fault::new("there is no command after the `:`; `help` lists them"));
+            return Err(CommandError::new("there is no command after the `:`; `help` lists them"));
         };
         let Some(command) = commands::find(name) else { return Err(unknown(name)) };
         let time = self.time().unwrap_or(0.0);
-        let nothing = |flow: Flow| match rest.first() {
+        let nothing = |flow: NextStep| match rest.first() {
             None => Ok(flow),
             Some(word) => {
-                Err(Fault::new(format!("`{}` takes nothing more, but `{word}` follows", command.name)))
+                Err(CommandError::new(format!("`{}` takes nothing more, but `{word}` follows", command.name)))
             }
         };
         if ["run", "step", "plot", "render", "save"].contains(&command.name) && self.replay.is_some() {
-            desk.warn();
+            state.warn();
         }
         match command.name {
-            "quit" => return nothing(Flow::Quit),
-            "help" => desk.say(&commands::help(&rest.join(" ")).map_err(Fault::new)?)?,
+            "quit" => return nothing(NextStep::Quit),
+            "help" => state.say(&commands::help(&rest.join(" ")).map_err(CommandError::new)?)?,
             "load" => {
                 let [file] = rest else { return Err(misused(command)) };
-                return desk.load(std::path::Path::new(file), &[]);
+                return state.load(std::path::Path::new(file), &[]);
             }
             "reload" => {
-                nothing(Flow::On)?;
-                return desk.reload(time);
+                nothing(NextStep::Continue)?;
+                return state.reload(time);
             }
             "new" => {
-                nothing(Flow::On)?;
-                return Ok(desk.begin_empty());
+                nothing(NextStep::Continue)?;
+                return Ok(state.begin_empty());
             }
             "undo" => {
-                nothing(Flow::On)?;
-                return desk.undo(time);
+                nothing(NextStep::Continue)?;
+                return state.undo(time);
             }
-            "save" => self.save(rest, desk)?,
-            "list" => self.list(rest, desk)?,
-            "set" => return self.set_parameter(rest, desk),
-            "run" => self.run(rest, desk)?,
-            "step" => self.step(rest, desk)?,
-            "back" => self.back(rest, desk)?,
-            "time" => return self.clock(rest, desk),
-            "show" => self.show(rest, desk)?,
-            "inspect" => self.inspect(rest, desk)?,
-            "events" => self.events(rest, desk)?,
-            "plot" => self.plot(rest, desk)?,
-            "draw" => self.draw(rest, desk)?,
-            "export" => self.export(rest, desk)?,
+            "save" => self.save(rest, state)?,
+            "list" => self.list(rest, state)?,
+            "set" => return self.set_parameter(rest, state),
+            "run" => self.run(rest, state)?,
+            "step" => self.step(rest, state)?,
+            "back" => self.back(rest, state)?,
+            "time" => return self.clock(rest, state),
+            "show" => self.show(rest, state)?,
+            "inspect" => self.inspect(rest, state)?,
+            "events" => self.events(rest, state)?,
+            "plot" => self.plot(rest, state)?,
+            "draw" => self.draw(rest, state)?,
+            "export" => self.export(rest, state)?,
             "explain" | "report" | "render" => self.embedded(command.name, rest)?,
-            other => return Err(Fault::new(format!("`{other}` cannot be done"))),
+            other => return Err(CommandError::new(format!("`{other}` cannot be done"))),
         }
-        Ok(Flow::On)
+        Ok(NextStep::Continue)
     }
 
     /// Commands that the command line has, too.
-    fn embedded(&mut self, name: &str, rest: &[String]) -> Result<(), Fault> {
+    fn embedded(&mut self, name: &str, rest: &[String]) -> Result<(), CommandError> {
         if name != "explain" {
             self.replay()?;
         }
@@ -209,7 +219,7 @@ impl<'m> Stage<'m> {
         Ok(embedded::run(self.session, &words)?)
     }
 
-    fn set_parameter(&mut self, rest: &[String], desk: &mut Desk) -> Result<Flow, Fault> {
+    fn set_parameter(&mut self, rest: &[String], state: &mut SessionState) -> Result<NextStep, CommandError> {
         let text = rest.join(" ").replace('=', " ");
         let words: Vec<&str> = text.split_whitespace().collect();
         let all = &self.session.model.parameters;
@@ -219,47 +229,47 @@ impl<'m> Stage<'m> {
         };
         match words[..] {
             [] if all.is_empty() => {
-                desk.say("this model has no params; `param r = 0.1 in 0 .. 1` declares one\n")?;
+                state.say("this model has no params; `param r = 0.1 in 0 .. 1` declares one\n")?;
             }
-            [] => desk.say(&all.iter().map(shown).collect::<String>())?,
+            [] => state.say(&all.iter().map(shown).collect::<String>())?,
             [name] => match all.iter().find(|p| p.name == name) {
-                Some(parameter) => desk.say(&shown(parameter))?,
+                Some(parameter) => state.say(&shown(parameter))?,
                 None => {
                     let hint = did_you_mean(name, all.iter().map(|p| p.name.as_str()));
                     let hint = hint.map_or(String::new(), |hint| format!("; {hint}"));
-                    return Err(Fault::new(format!("there is no param `{name}`{hint}")));
+                    return Err(CommandError::new(format!("there is no param `{name}`{hint}")));
                 }
             },
             [name, value] => {
                 let value: f64 = match value.parse() {
                     Ok(x) if f64::is_finite(x) => x,
-                    _ => return Err(Fault::new(format!("`{value}` is not a number"))),
+                    _ => return Err(CommandError::new(format!("`{value}` is not a number"))),
                 };
-                return desk.set(name, value, self.time().unwrap_or(0.0));
+                return state.set(name, value, self.time().unwrap_or(0.0));
             }
             _ => return Err(misused(commands::find("set").expect("it is one"))),
         }
-        Ok(Flow::On)
+        Ok(NextStep::Continue)
     }
 }
 
 /// A command with too much or too little after it.
-pub fn misused(command: &commands::Command) -> Fault {
+pub fn misused(command: &commands::Command) -> CommandError {
     let example = command
         .examples
         .first()
         .map_or(String::new(), |(line, does)| format!("\n  for example: {line}   ({does})"));
-    Fault::new(format!("it is used as `{} {}`{example}", command.name, command.usage))
+    CommandError::new(format!("it is used as `{} {}`{example}", command.name, command.usage))
 }
 
 /// A line that is nothing.
-fn unknown(text: &str) -> Fault {
+fn unknown(text: &str) -> CommandError {
     let line = text.lines().next().unwrap_or("").trim();
     let (word, _) = first_word(line);
     let shown: String = if word.is_empty() { line.chars().take(20).collect() } else { word.to_owned() };
     let hint = did_you_mean(word, commands::names().chain(words::declarations()));
     let hint = hint.map_or(String::new(), |hint| format!("\n  {hint}"));
-    Fault::new(format!(
+    CommandError::new(format!(
         "`{shown}` begins no command, declaration or rule{hint}\n  `help` lists the commands; the head of a rule ends with `:`, as in `A(x): solve dx/dt = 1`"
     ))
 }

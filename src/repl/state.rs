@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use super::assist::Names;
-use super::draft::{Change, Draft};
-use super::stage::{Flow, Stage};
+use super::draft::{Draft, TextChange};
+use super::loaded::{LoadedModel, NextStep};
 use crate::cli::common::Failure;
 use crate::compile::Setting;
 use crate::diagnostic::{Diagnostic, Severity};
@@ -20,37 +20,37 @@ const MOST_SHOWN: usize = 20;
 
 /// Why a statement has failed.
 #[derive(Debug)]
-pub enum Fault {
+pub enum CommandError {
     /// The message, drawn.
-    Said(String),
+    Message(String),
     /// Nobody reads the answers any more.
-    Closed,
+    OutputClosed,
     /// Answers cannot be written, to a full disk for instance: the message.
-    Unwritable(String),
+    OutputFailed(String),
 }
 
-impl Fault {
+impl CommandError {
     /// A message in one line, without the line break.
-    pub fn new(message: impl std::fmt::Display) -> Fault {
-        Fault::Said(format!("error: {message}\n"))
+    pub fn new(message: impl std::fmt::Display) -> CommandError {
+        CommandError::Message(format!("error: {message}\n"))
     }
 }
 
-impl From<Failure> for Fault {
-    fn from(failure: Failure) -> Fault {
+impl From<Failure> for CommandError {
+    fn from(failure: Failure) -> CommandError {
         match failure {
-            Failure::Model(message) | Failure::Usage(message) => Fault::Said(message),
-            Failure::ClosedPipe | Failure::Stale => Fault::Closed,
+            Failure::Model(message) | Failure::Usage(message) => CommandError::Message(message),
+            Failure::ClosedPipe | Failure::Stale => CommandError::OutputClosed,
         }
     }
 }
 
-impl From<Fault> for Failure {
-    fn from(fault: Fault) -> Failure {
-        match fault {
-            Fault::Said(message) => Failure::Model(message),
-            Fault::Closed => Failure::ClosedPipe,
-            Fault::Unwritable(message) => Failure::Model(message),
+impl From<CommandError> for Failure {
+    fn from(error: CommandError) -> Failure {
+        match error {
+            CommandError::Message(message) => Failure::Model(message),
+            CommandError::OutputClosed => Failure::ClosedPipe,
+            CommandError::OutputFailed(message) => Failure::Model(message),
         }
     }
 }
@@ -79,7 +79,7 @@ impl Screen {
 }
 
 /// See the module.
-pub struct Desk {
+pub struct SessionState {
     pub draft: Draft,
     /// Values of params.
     pub set: Vec<Setting>,
@@ -97,22 +97,22 @@ pub struct Desk {
     waiting: Vec<(String, String)>,
 }
 
-impl Desk {
-    pub fn new(settings: Settings, include: Vec<PathBuf>, screen: Screen) -> Desk {
+impl SessionState {
+    pub fn new(settings: Settings, include: Vec<PathBuf>, screen: Screen) -> SessionState {
         let (draft, set, names, written, warned) = Default::default();
-        Desk { draft, set, include, settings, screen, names, written, warned, waiting: Vec::new() }
+        SessionState { draft, set, include, settings, screen, names, written, warned, waiting: Vec::new() }
     }
 
     /// Prints an answer.
     ///
     /// # Errors
     /// If nobody reads it.
-    pub fn say(&self, text: &str) -> Result<(), Fault> {
+    pub fn say(&self, text: &str) -> Result<(), CommandError> {
         let mut out = std::io::stdout().lock();
         out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(|error| {
             match crate::cli::common::out_error(error) {
-                Failure::Model(message) => Fault::Unwritable(message),
-                _ => Fault::Closed,
+                Failure::Model(message) => CommandError::OutputFailed(message),
+                _ => CommandError::OutputClosed,
             }
         })
     }
@@ -124,25 +124,25 @@ impl Desk {
     }
 
     /// What a terminal shows before a line.
-    pub fn prompt(&self, stage: &Stage) -> String {
-        match stage.time() {
+    pub fn prompt(&self, loaded: &LoadedModel) -> String {
+        match loaded.time() {
             Some(t) => format!("t={}> ", brief(t, 6)),
             None => "> ".to_owned(),
         }
     }
 
     /// Begins with no model at all.
-    pub fn begin_empty(&mut self) -> Flow {
+    pub fn begin_empty(&mut self) -> NextStep {
         (self.draft, self.set) = Default::default();
         self.warned.clear();
         self.waiting.clear();
         let session = Session::from_text("typed", "initial string: ε", &[]).expect("an empty model is one");
         *self.names.borrow_mut() = Names::of(&session.model, "");
-        Flow::Model { session: Box::new(session), time: 0.0 }
+        NextStep::Model { session: Box::new(session), time: 0.0 }
     }
 
     /// Reads a model file.
-    pub fn load(&mut self, path: &Path, set: &[Setting]) -> Result<Flow, Fault> {
+    pub fn load(&mut self, path: &Path, set: &[Setting]) -> Result<NextStep, CommandError> {
         let session =
             Session::open_with(path, set, &self.include).map_err(|refused| self.refusal(&refused))?;
         self.draft = Draft::of_file(path, session.source.own_text().to_owned());
@@ -153,9 +153,9 @@ impl Desk {
     }
 
     /// Reads the file again; what was typed since is gone.
-    pub fn reload(&mut self, time: f64) -> Result<Flow, Fault> {
+    pub fn reload(&mut self, time: f64) -> Result<NextStep, CommandError> {
         let Some(path) = self.draft.path.clone() else {
-            return Err(Fault::new(
+            return Err(CommandError::new(
                 "this model has no file yet; `save FILE` gives it one, `load FILE` reads one",
             ));
         };
@@ -163,7 +163,7 @@ impl Desk {
             Session::open_with(&path, &self.set, &self.include).map_err(|refused| self.refusal(&refused))?;
         let text = session.source.own_text().to_owned();
         if text != self.draft.text {
-            let change = Change::whole(text);
+            let change = TextChange::whole(text);
             self.draft.accept(change);
         }
         self.draft.set_saved(&path);
@@ -172,7 +172,7 @@ impl Desk {
     }
 
     /// Reads a changed text, and keeps it if it is good.
-    pub fn change(&mut self, change: Change, time: f64) -> Result<Flow, Fault> {
+    pub fn change(&mut self, change: TextChange, time: f64) -> Result<NextStep, CommandError> {
         let session = self.read(&change.text, &self.set)?;
         self.note_warnings(&session);
         let done = change.done.join(", ");
@@ -184,10 +184,10 @@ impl Desk {
     }
 
     /// Takes the last change back.
-    pub fn undo(&mut self, time: f64) -> Result<Flow, Fault> {
+    pub fn undo(&mut self, time: f64) -> Result<NextStep, CommandError> {
         let Some(text) = self.draft.previous().map(str::to_owned) else {
             let set = if self.set.is_empty() { "" } else { "; params go back with `set`" };
-            return Err(Fault::new(format!("the text was not changed yet{set}")));
+            return Err(CommandError::new(format!("the text was not changed yet{set}")));
         };
         let session = self.read(&text, &self.set)?;
         self.draft.undo();
@@ -196,7 +196,7 @@ impl Desk {
     }
 
     /// Gives a param another value.
-    pub fn set(&mut self, name: &str, value: f64, time: f64) -> Result<Flow, Fault> {
+    pub fn set(&mut self, name: &str, value: f64, time: f64) -> Result<NextStep, CommandError> {
         let mut set = self.set.clone();
         set.retain(|setting| setting.name != name);
         set.push(Setting { name: name.to_owned(), value });
@@ -206,7 +206,7 @@ impl Desk {
         Ok(self.begin(session, time))
     }
 
-    fn read(&self, text: &str, set: &[Setting]) -> Result<Session, Fault> {
+    fn read(&self, text: &str, set: &[Setting]) -> Result<Session, CommandError> {
         // As long as there is no initial string, the empty one stands for it.
         let whole = match Draft::has_axiom(text) {
             true => text.to_owned(),
@@ -225,12 +225,12 @@ impl Desk {
         read.map_err(|refused| self.refusal(&refused))
     }
 
-    fn begin(&mut self, session: Session, time: f64) -> Flow {
+    fn begin(&mut self, session: Session, time: f64) -> NextStep {
         *self.names.borrow_mut() = Names::of(&session.model, &self.draft.text);
-        Flow::Model { session: Box::new(session), time }
+        NextStep::Model { session: Box::new(session), time }
     }
 
-    fn welcome(&mut self, session: &Session) -> Result<(), Fault> {
+    fn welcome(&mut self, session: &Session) -> Result<(), CommandError> {
         self.note_warnings(session);
         self.warn();
         let model = &session.model;
@@ -267,7 +267,7 @@ impl Desk {
     }
 
     /// All that is wrong with a text.
-    pub fn refusal(&self, refused: &LoadError) -> Fault {
+    pub fn refusal(&self, refused: &LoadError) -> CommandError {
         let wrong = |d: &&Diagnostic| d.severity == Severity::Error;
         let all: Vec<&Diagnostic> =
             refused.diagnostics.iter().filter(wrong).chain(&refused.settings).collect();
@@ -276,6 +276,6 @@ impl Desk {
         if all.len() > MOST_SHOWN {
             text += &format!("… and {} more\n", all.len() - MOST_SHOWN);
         }
-        Fault::Said(text)
+        CommandError::Message(text)
     }
 }

@@ -1,9 +1,9 @@
 //! Commands about time: `run`, `step`, `back`, `time`.
 
 use super::commands;
-use super::desk::{Desk, Fault};
 use super::grammar::{Statement, classify};
-use super::stage::{Flow, Stage, misused};
+use super::loaded::{LoadedModel, NextStep, misused};
+use super::state::{CommandError, SessionState};
 use crate::replay::Stop;
 use crate::sim::{Event, brief};
 
@@ -15,31 +15,33 @@ const MOST_EVENTS: usize = 1_000_000;
 const FAR: f64 = 100.0;
 
 /// A time as it is typed; it begins at 0.
-pub fn time_of(text: &str) -> Result<f64, Fault> {
+pub fn time_of(text: &str) -> Result<f64, CommandError> {
     match text.parse::<f64>() {
         Ok(t) if t.is_finite() && t >= 0.0 => Ok(t + 0.0),
-        Ok(t) if t < 0.0 => Err(Fault::new(format!("time begins at 0, and {text} is before that"))),
-        _ => Err(Fault::new(format!("`{text}` is not a time: a number such as 2.5 is"))),
+        Ok(t) if t < 0.0 => Err(CommandError::new(format!("time begins at 0, and {text} is before that"))),
+        _ => Err(CommandError::new(format!("`{text}` is not a time: a number such as 2.5 is"))),
     }
 }
 
-fn count_of(text: &str) -> Result<usize, Fault> {
+fn count_of(text: &str) -> Result<usize, CommandError> {
     match text.parse::<usize>() {
         Ok(n) if (1..=MOST_EVENTS).contains(&n) => Ok(n),
-        _ => Err(Fault::new(format!("`{text}` is not a number from 1 to {MOST_EVENTS}"))),
+        _ => Err(CommandError::new(format!("`{text}` is not a number from 1 to {MOST_EVENTS}"))),
     }
 }
 
-impl Stage<'_> {
+impl LoadedModel<'_> {
     /// `run [T | +DT]`
-    pub fn run(&mut self, rest: &[String], desk: &Desk) -> Result<(), Fault> {
+    pub fn run(&mut self, rest: &[String], state: &SessionState) -> Result<(), CommandError> {
         let frames = self.session.model.frames;
         let present = self.replay()?.time();
         let t = match rest {
             [] => match frames {
                 Some(frames) => frames.to,
                 None => {
-                    return Err(Fault::new("the model has no `frames`: say to which time, as in `run 10`"));
+                    return Err(CommandError::new(
+                        "the model has no `frames`: say to which time, as in `run 10`",
+                    ));
                 }
             },
             [text] => match text.strip_prefix('+') {
@@ -48,23 +50,23 @@ impl Stage<'_> {
             },
             _ => return Err(misused(commands::find("run").expect("it is one"))),
         };
-        self.go(t, desk)
+        self.go(t, state)
     }
 
-    fn go(&mut self, t: f64, desk: &Desk) -> Result<(), Fault> {
+    fn go(&mut self, t: f64, state: &SessionState) -> Result<(), CommandError> {
         let gone = self.replay()?.seek(t);
-        self.arrive(gone, desk)?;
-        desk.say(&self.status()?)
+        self.arrive(gone, state)?;
+        state.say(&self.status()?)
     }
 
     /// `step [N | frame [N]]`
-    pub fn step(&mut self, rest: &[String], desk: &Desk) -> Result<(), Fault> {
+    pub fn step(&mut self, rest: &[String], state: &SessionState) -> Result<(), CommandError> {
         self.replay()?;
         let words: Vec<&str> = rest.iter().map(String::as_str).collect();
         let count = match words[..] {
             [] | ["event"] => 1,
-            ["frame"] => return self.step_frames(1, desk),
-            ["frame", n] => return self.step_frames(count_of(n)? as i64, desk),
+            ["frame"] => return self.step_frames(1, state),
+            ["frame", n] => return self.step_frames(count_of(n)? as i64, state),
             [n] | ["event", n] => count_of(n)?,
             _ => return Err(misused(commands::find("step").expect("it is one"))),
         };
@@ -73,15 +75,15 @@ impl Stage<'_> {
         for _ in 0..count {
             let before = self.replay()?.time();
             let gone = self.replay()?.seek_event(limit.max(before));
-            match self.arrive(gone, desk)? {
+            match self.arrive(gone, state)? {
                 Stop::There => {}
                 Stop::Interrupted => break,
                 Stop::Nothing => {
                     // Where nothing happens nobody wants to be.
                     let gone = self.replay()?.seek(before);
-                    self.arrive(gone, desk)?;
+                    self.arrive(gone, state)?;
                     let what = if count == 1 { "no event" } else { "no more events" };
-                    desk.say(&format!(
+                    state.say(&format!(
                         "{what} up to t = {}; `run T` goes there, or beyond\n",
                         brief(limit, 12)
                     ))?;
@@ -89,49 +91,51 @@ impl Stage<'_> {
                 }
             }
         }
-        desk.say(&(self.status()? + &self.happened_since(start)?))
+        state.say(&(self.status()? + &self.happened_since(start)?))
     }
 
     /// `back [N | frame [N] | to T]`
-    pub fn back(&mut self, rest: &[String], desk: &Desk) -> Result<(), Fault> {
+    pub fn back(&mut self, rest: &[String], state: &SessionState) -> Result<(), CommandError> {
         let present = self.replay()?.time();
         let words: Vec<&str> = rest.iter().map(String::as_str).collect();
         let count = match words[..] {
             [] | ["event"] => 1,
-            ["frame"] => return self.step_frames(-1, desk),
-            ["frame", n] => return self.step_frames(-(count_of(n)? as i64), desk),
+            ["frame"] => return self.step_frames(-1, state),
+            ["frame", n] => return self.step_frames(-(count_of(n)? as i64), state),
             ["to", t] => {
                 let t = time_of(t)?;
                 if t > present {
                     let (t, present) = (brief(t, 12), brief(present, 12));
-                    return Err(Fault::new(format!("t = {t} is after t = {present}; `run {t}` goes there")));
+                    return Err(CommandError::new(format!(
+                        "t = {t} is after t = {present}; `run {t}` goes there"
+                    )));
                 }
-                return self.go(t, desk);
+                return self.go(t, state);
             }
             [n] | ["event", n] => count_of(n)?,
             _ => return Err(misused(commands::find("back").expect("it is one"))),
         };
         if present == 0.0 {
-            return desk.say("this is the start, t = 0\n");
+            return state.say("this is the start, t = 0\n");
         }
         for _ in 0..count {
             let gone = self.replay()?.seek_event_before();
-            match self.arrive(gone, desk)? {
+            match self.arrive(gone, state)? {
                 Stop::There => {}
                 Stop::Interrupted => break,
                 Stop::Nothing => {
-                    desk.say("no event before that: the start\n")?;
+                    state.say("no event before that: the start\n")?;
                     break;
                 }
             }
         }
-        desk.say(&self.status()?)
+        state.say(&self.status()?)
     }
 
     /// Over so many of the model's frames, backwards if it is negative.
-    fn step_frames(&mut self, count: i64, desk: &Desk) -> Result<(), Fault> {
+    fn step_frames(&mut self, count: i64, state: &SessionState) -> Result<(), CommandError> {
         let Some(frames) = self.session.model.frames else {
-            return Err(Fault::new(
+            return Err(CommandError::new(
                 "the model has no `frames`; type them, as in `frames 0 .. 10 step 0.1`, or go by `run +0.1`",
             ));
         };
@@ -151,11 +155,11 @@ impl Stage<'_> {
         let wanted = (here as i64).saturating_add(count);
         let index = wanted.clamp(0, last);
         if wanted != index {
-            desk.say(if count > 0 { "this is the last frame\n" } else { "this is the first frame\n" })?;
+            state.say(if count > 0 { "this is the last frame\n" } else { "this is the first frame\n" })?;
         }
         let target = frames.time(index as usize);
         let beyond = if count > 0 { target < t } else { target > t };
-        self.go(if beyond { t } else { target }, desk)
+        self.go(if beyond { t } else { target }, state)
     }
 
     /// How far ahead events are searched for.
@@ -168,7 +172,7 @@ impl Stage<'_> {
     }
 
     /// Where we are, in a line.
-    pub fn status(&mut self) -> Result<String, Fault> {
+    pub fn status(&mut self) -> Result<String, CommandError> {
         let replay = self.replay()?;
         let plural = |n: usize, word: &str| format!("{n} {word}{}", if n == 1 { "" } else { "s" });
         Ok(format!(
@@ -180,7 +184,7 @@ impl Stage<'_> {
     }
 
     /// The productions after a time, those of one clause and instant together.
-    fn happened_since(&mut self, start: f64) -> Result<String, Fault> {
+    fn happened_since(&mut self, start: f64) -> Result<String, CommandError> {
         let session = self.session;
         let replay = self.replay()?;
         let mut groups: Vec<(&Event, usize)> = Vec::new();
@@ -209,17 +213,17 @@ impl Stage<'_> {
     }
 
     /// `time [COMMAND …]`
-    pub fn clock(&mut self, rest: &[String], desk: &mut Desk) -> Result<Flow, Fault> {
+    pub fn clock(&mut self, rest: &[String], state: &mut SessionState) -> Result<NextStep, CommandError> {
         if !rest.is_empty() {
             let text = rest.join(" ");
             let statement = Statement { kind: classify(&text), text, line: 0 };
             let before = std::time::Instant::now();
-            let flow = self.obey(&statement, desk)?;
-            desk.say(&format!("{:.3} s\n", before.elapsed().as_secs_f64()))?;
+            let flow = self.obey(&statement, state)?;
+            state.say(&format!("{:.3} s\n", before.elapsed().as_secs_f64()))?;
             return Ok(flow);
         }
         let frames = self.session.model.frames;
-        self.settle(desk)?;
+        self.settle(state)?;
         let mut text = self.status()?;
         let replay = self.replay()?;
         if let Some(frames) = frames {
@@ -233,7 +237,7 @@ impl Stage<'_> {
         let (marks, bytes) = replay.marks();
         let stats = match replay.simulation() {
             Ok(simulation) => simulation.stats(),
-            Err(error) => return Err(self.drawn(&error, desk)),
+            Err(error) => return Err(self.drawn(&error, state)),
         };
         text += &format!(
             "  up to here: {} productions, {} steps, {} evaluations of rates, at most {} modules\n  for going back: {marks} marks, {:.1} MB\n",
@@ -243,7 +247,7 @@ impl Stage<'_> {
             stats.peak_modules,
             bytes as f64 / 1e6
         );
-        desk.say(&text)?;
-        Ok(Flow::On)
+        state.say(&text)?;
+        Ok(NextStep::Continue)
     }
 }

@@ -3,7 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::common::{Clock, Failure, Run};
+use super::common::{Clock, Failure, ModelRun};
 use super::events::EventLog;
 use super::parallel;
 use crate::diagnostic::Diagnostic;
@@ -14,7 +14,7 @@ use crate::tree::ModuleString;
 use crate::turtle;
 
 /// The structure at one observation time.
-pub struct Shot {
+pub struct Frame {
     pub index: usize,
     pub time: f64,
     /// What has happened since the one before.
@@ -22,47 +22,47 @@ pub struct Shot {
     string: Result<ModuleString, Failure>,
 }
 
-impl Shot {
+impl Frame {
     /// Number of modules, brackets not counted.
     pub fn modules(&self) -> usize {
         let string = self.string.as_ref().ok();
         string.map_or(0, |string| string.iter().filter(|m| !m.kind.is_bracket()).count())
     }
 
-    /// What has happened since the shot before, if the settings ask for a log.
+    /// What has happened since the frame before, if the settings ask for a log.
     pub fn events(&self) -> &[Event] {
         &self.events
     }
 }
 
 /// A simulation and the times at which it is looked at.
-struct Reel<'r> {
-    run: &'r Run,
+struct FrameSource<'r> {
+    run: &'r ModelRun,
     simulation: Simulation<'r>,
     next: usize,
     failed: bool,
 }
 
-impl<'r> Reel<'r> {
-    fn start(run: &'r Run, settings: Settings) -> Result<Reel<'r>, Failure> {
+impl<'r> FrameSource<'r> {
+    fn start(run: &'r ModelRun, settings: Settings) -> Result<FrameSource<'r>, Failure> {
         let simulation = run.session.simulate(settings).map_err(|error| run.fault(&error))?;
-        Ok(Reel { run, simulation, next: 0, failed: false })
+        Ok(FrameSource { run, simulation, next: 0, failed: false })
     }
 
     /// Goes on to the next time; `None` after the last, or after an error.
-    fn shot(&mut self) -> Option<Shot> {
+    fn next_frame(&mut self) -> Option<Frame> {
         let index = self.next;
         let &time = self.run.times.get(index).filter(|_| !self.failed)?;
         self.next += 1;
         if interrupt::asked() {
             self.failed = true;
             let string = Err(Failure::Model(format!("stopped before t = {time}\n")));
-            return Some(Shot { index, time, events: Vec::new(), string });
+            return Some(Frame { index, time, events: Vec::new(), string });
         }
         let mut string = ModuleString::default();
         let wound = self.simulation.at(time, &mut string).map_err(|error| self.run.fault(&error));
         self.failed = wound.is_err();
-        Some(Shot { index, time, events: self.simulation.take_events(), string: wound.map(|()| string) })
+        Some(Frame { index, time, events: self.simulation.take_events(), string: wound.map(|()| string) })
     }
 }
 
@@ -80,15 +80,15 @@ pub struct Pass {
 /// # Errors
 /// The first in the order of time: of the run, of drawing, of `take`.
 pub fn play<Done: Send>(
-    run: &Run,
+    run: &ModelRun,
     pass: Pass,
     threads: usize,
     clock: &mut Clock,
     mut log: Option<&mut EventLog>,
-    work: impl Fn(&Shot, &Scene) -> Done + Sync,
+    work: impl Fn(&Frame, &Scene) -> Done + Sync,
     mut take: impl FnMut(Done) -> Result<(), Failure>,
 ) -> Result<Stats, Failure> {
-    let mut reel = Reel::start(run, pass.settings)?;
+    let mut source = FrameSource::start(run, pass.settings)?;
     let mut blank = turtle::blank(&run.session.model);
     blank.accuracy = pass.accuracy;
     // One for each thread, in the end: scenes keep their memory.
@@ -97,18 +97,18 @@ pub fn play<Done: Send>(
     let Clock { mut simulate, mut output, .. } = *clock;
     let make = || {
         let before = Instant::now();
-        let shot = reel.shot();
+        let frame = source.next_frame();
         simulate += before.elapsed();
-        shot
+        frame
     };
-    let draw = |mut shot: Shot| -> (Vec<Event>, Vec<Diagnostic>, Result<Done, Failure>, Duration) {
+    let draw = |mut frame: Frame| -> (Vec<Event>, Vec<Diagnostic>, Result<Done, Failure>, Duration) {
         let before = Instant::now();
         let pooled = pool().pop();
         let mut scene = pooled.unwrap_or_else(|| blank.clone());
-        let done = draw_shot(run, &mut shot, &mut scene).map(|()| work(&shot, &scene));
+        let done = draw_frame(run, &mut frame, &mut scene).map(|()| work(&frame, &scene));
         let warnings = std::mem::take(&mut scene.warnings);
         pool().push(scene);
-        (shot.events, warnings, done, before.elapsed())
+        (frame.events, warnings, done, before.elapsed())
     };
     let taken = parallel::in_order(threads, make, draw, |(events, warnings, done, spent)| {
         if let Some(log) = &mut log {
@@ -121,14 +121,14 @@ pub fn play<Done: Send>(
         Ok(())
     });
     (clock.simulate, clock.output) = (simulate, output);
-    run.note(reel.simulation.remarks());
-    taken.map(|()| reel.simulation.stats())
+    run.note(source.simulation.remarks());
+    taken.map(|()| source.simulation.stats())
 }
 
-/// Draws what is to be seen of a shot.
-fn draw_shot(run: &Run, shot: &mut Shot, scene: &mut Scene) -> Result<(), Failure> {
+/// Draws what is to be seen of a frame.
+fn draw_frame(run: &ModelRun, frame: &mut Frame, scene: &mut Scene) -> Result<(), Failure> {
     scene.clear();
-    match &mut shot.string {
+    match &mut frame.string {
         Ok(string) => run.draw(string, scene),
         failed => std::mem::replace(failed, Ok(ModuleString::default())).map(|_| ()),
     }
