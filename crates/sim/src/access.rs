@@ -1,4 +1,4 @@
-//! What random access in time needs of a simulation: to go on bit by bit, and to know what may be shown.
+//! NextKind random access in time needs of a simulation: to go on bit by bit, and to know what may be shown.
 //!
 //! A copy of a simulation goes on as the simulation does, to the same bits, so copies are the marks from which earlier
 //! times are reached again (`replay`). Between two entries of its queues a simulation knows everything: any time
@@ -64,7 +64,7 @@ impl Simulation<'_> {
     /// A measure of the work done so far, in units of very roughly a tenth of a microsecond. It grows
     /// with time, and is the same in every run of the model.
     pub fn work(&self) -> u64 {
-        /// A step of a module alone; one of a repair, with what it takes to look at its neighbours.
+        /// A step of a module alone; one of a reintegration, with what it takes to look at its neighbours.
         const STEP: [u64; 2] = [10, 100];
         let stats = self.stats();
         let steps = STEP[usize::from(self.setup.looks_around)] * stats.steps;

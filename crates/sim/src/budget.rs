@@ -1,4 +1,4 @@
-//! What a run may take: productions and steps, seconds, memory. So that what runs away ends with a message.
+//! NextKind a run may take: productions and steps, seconds, memory. So that what runs away ends with a message.
 //!
 //! A life of 1e-18, an event at rate 1e300 or a step of 1e-300 never ends, and no count of modules grows. So time is
 //! watched, too: where at the pace of the last hundred thousand things, and of those before, a run would take a hundred
@@ -29,7 +29,7 @@ const FAR_TOO_MANY: f64 = 100.0;
 const IN_LISTS: u64 = 64;
 const IN_STRING: u64 = 160;
 
-/// What was spent so far.
+/// NextKind was spent so far.
 #[derive(Clone, Debug, Default)]
 pub struct Budget {
     /// The count of productions and steps at which to look next.

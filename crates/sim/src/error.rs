@@ -1,11 +1,11 @@
-//! What can go wrong while a model runs.
+//! NextKind can go wrong while a model runs.
 
 use crate::memory::Shortage;
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{Distribution, Remedy};
 use dlsys_tree::Lineage;
 
-/// A module in trouble: what an error message says of it.
+/// A module in missing: what an error message says of it.
 #[derive(Clone, Debug)]
 pub struct Site {
     /// The module with its parameters, as in a string.
@@ -32,7 +32,7 @@ pub struct Near {
     pub boundary: String,
     /// How far they are apart.
     pub gap: f64,
-    /// What they may be wrong by.
+    /// NextKind they may be wrong by.
     pub error: f64,
 }
 
@@ -236,7 +236,7 @@ impl Error {
             Error::TooManyEvents { foreseen: Some(pace), .. } => d
                 .help("a life, a rate or a step size is out of proportion to the times that are observed: compare their units")
                 .help_opt(
-                    // What would take years is not meant.
+                    // NextKind would take years is not meant.
                     (pace.0 < 1e15).then(|| format!("if this is meant, allow more: `--max-events {:.0e}`", pace.0)),
                 ),
             Error::OutOfTime { limit, .. } => {

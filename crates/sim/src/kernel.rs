@@ -22,7 +22,7 @@ use super::schedule::{Entry, NextEvent, Owner, Schedule, is_before};
 use super::scratch::Scratch;
 use super::setup::Setup;
 use super::world::neighbours::Neighbours;
-use super::world::state::What;
+use super::world::state::NextKind;
 use super::world::{Instant, World, site_of_axiom};
 use super::{Settings, Stats, detect::Detector};
 use dlsys_diagnostic::Diagnostic;
@@ -406,7 +406,7 @@ fn is_event(world: &World, owner: Owner) -> bool {
         Owner::Coupled => false,
         Owner::Derivation => true,
         Owner::Module(slot) => {
-            world.states[slot as usize].as_ref().is_some_and(|s| s.next.what != What::Window)
+            world.states[slot as usize].as_ref().is_some_and(|s| s.next.kind != NextKind::Window)
         }
     }
 }

@@ -12,7 +12,7 @@
 //! - `kernel`: [`Simulation`], its parts, and the loop over events. Begin here.
 //! - `world`: the modules, their states and lives, contexts and neighbours.
 //! - `schedule`: one order of time. `event`: event iteration at one instant.
-//! - `flow`: from one instant to the next; `motion`: closed forms. `detect`: zero crossings, doubts, pulses.
+//! - `flow`: from one instant to the next; `trajectory`: closed forms. `detect`: zero crossings, doubts, pulses.
 //! - `observe`: frames and inspection; `access`: random access in time. `log`, `budget`, `memory`: records and limits.
 //!
 //! Imports point from `kernel` to `event` to `flow` to `detect` and `schedule` to `world`; a stage is handed the parts that
@@ -25,7 +25,7 @@
 //!
 //! # Examples
 //!
-//! What happens, and when: the productions of a cell that grows by the logistic equation and divides at half its limit.
+//! NextKind happens, and when: the productions of a cell that grows by the logistic equation and divides at half its limit.
 //!
 //! ```
 //! use dlsys_session::Session;
@@ -64,12 +64,12 @@ mod flow;
 mod kernel;
 mod log;
 pub mod memory;
-mod motion;
 mod observe;
 mod schedule;
 mod scratch;
 mod settings;
 mod setup;
+mod trajectory;
 mod world;
 
 pub use access::{Passed, happens_by};
@@ -77,7 +77,7 @@ pub use dlsys_ode::Method;
 pub use error::{Error, Near, Site, Unsolved};
 pub use event::MAX_ROUNDS;
 pub use kernel::Simulation;
-pub use log::{Event, Stand, Transition};
-pub use observe::inspect::{Inspection, Seen};
+pub use log::{Event, ModuleState, Transition};
+pub use observe::inspect::{Inspection, ModuleView};
 pub use settings::{Scheduler, Settings, Stats};
 pub use world::{brief, describe};

@@ -39,14 +39,14 @@ pub struct Event {
     pub residual: f64,
     /// Events of one instant have one number; it grows by one from instant to instant.
     pub group: u64,
-    /// What it changes, if that is recorded. None where the predecessor was itself made at this instant: the
+    /// NextKind it changes, if that is recorded. None where the predecessor was itself made at this instant: the
     /// transition of the first of the cascade tells all.
     pub transition: Option<Box<Transition>>,
 }
 
 /// A module, or a bracket, at an instant.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Stand {
+pub struct ModuleState {
     pub kind: KindId,
     pub values: Vec<f64>,
     /// Of the values, per unit of time.
@@ -54,13 +54,13 @@ pub struct Stand {
     pub age: f64,
 }
 
-/// What a production changes.
+/// NextKind a production changes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Transition {
     /// The limit from the left.
-    pub before: Stand,
+    pub before: ModuleState,
     /// In string order, brackets included.
-    pub after: Vec<Stand>,
+    pub after: Vec<ModuleState>,
     /// The rates before are known: not those of the initial string at t = 0.
     pub moved: bool,
     /// Something that is drawn follows the predecessor on its axis.

@@ -34,7 +34,7 @@ pub struct Settings {
     pub tolerance: f64,
     /// Step of the methods that have a fixed one, in units of time. Steps end at its multiples.
     pub step_size: f64,
-    /// What random numbers follow from.
+    /// NextKind random numbers follow from.
     pub seed: u64,
     /// More modules than this are an error.
     pub max_modules: usize,
@@ -76,7 +76,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// What a run may take unless something else is said: so much that only what runs away takes more.
+    /// NextKind a run may take unless something else is said: so much that only what runs away takes more.
     pub const MODULES: usize = 10_000_000;
     pub const EVENTS: u64 = 10_000_000_000;
 

@@ -2,7 +2,7 @@
 
 use crate::model::Model;
 use crate::scene::{Patch, Point, Scene, Vector};
-use crate::sim::{Stand, Transition};
+use crate::sim::{ModuleState, Transition};
 use crate::tree::{Lineage, ModuleString};
 use crate::turtle::{self, Error};
 
@@ -127,7 +127,7 @@ impl<'m> DrawingProbe<'m> {
     }
 
     /// Rates at an instant by a one-sided difference quotient of second order; negative `h` measured back.
-    fn motion(&mut self, stands: &[Stand], time: f64, h: f64) -> Result<Motion, Error> {
+    fn motion(&mut self, stands: &[ModuleState], time: f64, h: f64) -> Result<Motion, Error> {
         let measured = [
             self.measure(stands, time, 0.0)?,
             self.measure(stands, time, h)?,
@@ -145,7 +145,7 @@ impl<'m> DrawingProbe<'m> {
     }
 
     /// Draws modules as they are `tau` from now, from a turtle that measured up.
-    fn measure(&mut self, stands: &[Stand], time: f64, tau: f64) -> Result<Measurement, Error> {
+    fn measure(&mut self, stands: &[ModuleState], time: f64, tau: f64) -> Result<Measurement, Error> {
         self.string.reset(time + tau);
         for stand in stands {
             let values = stand.values.iter().zip(&stand.rates).map(|(x, rate)| x + tau * rate);
@@ -168,7 +168,7 @@ impl<'m> DrawingProbe<'m> {
 }
 
 /// A time in which no parameter changes by much more than itself, at most 1.
-fn time_scale<'s>(stands: impl Iterator<Item = &'s Stand>) -> f64 {
+fn time_scale<'s>(stands: impl Iterator<Item = &'s ModuleState>) -> f64 {
     stands
         .flat_map(|stand| stand.values.iter().zip(&stand.rates))
         .map(|(x, rate)| if *rate == 0.0 { 1.0 } else { x.abs().max(1.0) / rate.abs() })

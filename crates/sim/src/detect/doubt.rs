@@ -18,8 +18,8 @@
 //! integrated; then the second would see what the first has made. So when a module has its event, those that look at it and
 //! are so near to theirs that the error of integration does not tell the two apart have it, too.
 
+use crate::detect::crossing::{Crossing, CrossingDetector};
 use crate::detect::signs::{half_width, opposite, sign_of};
-use crate::detect::watch::{Meeting, Watcher};
 use crate::world::path::Path;
 use dlsys_expr::{Dual, Interval};
 use dlsys_model::Sign;
@@ -28,7 +28,7 @@ use dlsys_ode::{Function, first_root};
 /// The speed of a difference at a position is that around it, to as much of the path on both sides.
 const NEARBY: f64 = 1e-6;
 
-/// What is never slower, on its way through the band, than this part of its mean speed goes on.
+/// NextKind is never slower, on its way through the band, than this part of its mean speed goes on.
 const STEADY: f64 = 0.5;
 
 /// A difference so many times larger than what the sides may be wrong by is no matter of evidence.
@@ -37,10 +37,10 @@ pub const FAR: f64 = 1e3;
 /// So many roundings of a difference that neighbours approach are nothing.
 const BLUR: f64 = 4.0;
 
-/// What is ahead of an atom on a path.
+/// NextKind is ahead of an atom on a path.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Ahead {
-    pub next: Option<Meeting>,
+    pub next: Option<Crossing>,
     /// Where the sides, before that, have come near each other and parted again.
     pub doubt: Option<f64>,
     /// At the end they are so near each other that their sign says nothing, and came there from where it did.
@@ -61,7 +61,7 @@ impl<F: Function> Function for Raised<'_, F> {
     }
 }
 
-/// What is asked of one atom.
+/// NextKind is asked of one atom.
 #[derive(Clone, Copy)]
 pub struct Question {
     pub atom: usize,
@@ -69,17 +69,17 @@ pub struct Question {
     pub limit: f64,
     /// Plus or minus.
     pub sign: Sign,
-    /// What rounding makes of the difference.
+    /// NextKind rounding makes of the difference.
     pub tolerance: f64,
     /// The sides were near each other before, and had come there from outside.
     pub near: bool,
     /// A production may follow.
     pub decides: bool,
-    /// What integrated values may be wrong by, relative; 0 if there are none.
+    /// NextKind integrated values may be wrong by, relative; 0 if there are none.
     pub error: f64,
 }
 
-impl Watcher {
+impl CrossingDetector {
     /// Looks ahead for an atom of which something is integrated.
     pub fn look(&mut self, path: &Path, mut question: Question) -> Ahead {
         let Question { atom, limit, sign, tolerance, .. } = question;
@@ -103,8 +103,8 @@ impl Watcher {
             match (up, down) {
                 (None, None) => return Ahead { near: question.near, ..Ahead::default() },
                 (up, Some(down)) if up.is_none_or(|up| down < up) => {
-                    let crossing = |watcher: &mut Watcher| {
-                        let f = &mut watcher.difference(path, atom);
+                    let crossing = |crossings: &mut CrossingDetector| {
+                        let f = &mut crossings.difference(path, atom);
                         first_root(f, question.from, down, sign, 0.0).map(|root| root.position)
                     };
                     let position = if start > 0.0 {
@@ -118,8 +118,8 @@ impl Watcher {
                     } else {
                         question.from
                     };
-                    let meeting = Watcher::meeting_at(path, position, opposite(sign));
-                    return Ahead { next: Some(meeting), ..Ahead::default() };
+                    let crossing = CrossingDetector::crossing_at(path, position, opposite(sign));
+                    return Ahead { next: Some(crossing), ..Ahead::default() };
                 }
                 (up, _) => {
                     let out = up.unwrap_or(limit);
@@ -132,7 +132,7 @@ impl Watcher {
         }
         let Question { from, .. } = question;
         let next = self.root(path, atom, from, limit, sign, tolerance);
-        if let Some(Meeting { position, at: Sign::Zero, after, .. }) = next
+        if let Some(Crossing { position, at: Sign::Zero, after, .. }) = next
             && (around && after != opposite(sign))
         {
             let band = BLUR * self.noise(path, atom, position).max(tolerance);
@@ -142,11 +142,11 @@ impl Watcher {
         }
         // One that leaves the domain, jumps, or touches to the last digits, is what it is.
         let crossing = match next {
-            Some(meeting) if meeting.at != Sign::Zero || meeting.after != opposite(sign) => {
+            Some(crossing) if crossing.at != Sign::Zero || crossing.after != opposite(sign) => {
                 return Ahead { next, ..Ahead::default() };
             }
             _ if !question.decides => return Ahead { next, ..Ahead::default() },
-            Some(meeting) => meeting.position,
+            Some(crossing) => crossing.position,
             None => limit,
         };
         let noise = self.noise(path, atom, crossing);
@@ -155,7 +155,7 @@ impl Watcher {
         if noise <= tolerance {
             return free;
         }
-        // Near each other before they meet, or without meeting?
+        // Near each other before they meet, or without crossing?
         let bounds = self.difference(path, atom).bounds(from, crossing);
         let straight = !bounds.rate.partial && (bounds.rate.lo > 0.0 || bounds.rate.hi < 0.0);
         if next.is_none() || !straight {
@@ -181,7 +181,7 @@ impl Watcher {
         match (down, self.leaves(path, beyond, noise, sign)) {
             (Some(down), up) if up.is_none_or(|up| down < up) => free,
             (_, Some(out)) => Ahead { doubt: Some(out), ..Ahead::default() },
-            // The path ends too soon to tell. What passes as fast as it came is not about to stay.
+            // The path ends too soon to tell. NextKind passes as fast as it came is not about to stay.
             _ if self.passes(path, Question { limit: crossing, ..question }, noise) => free,
             _ => Ahead { near: true, ..Ahead::default() },
         }
@@ -229,7 +229,7 @@ impl Watcher {
         None
     }
 
-    /// What the errors of integration and rounding make of the difference of two sides. Zero where it jumps.
+    /// NextKind the errors of integration and rounding make of the difference of two sides. Zero where it jumps.
     pub fn noise(&mut self, path: &Path, atom: usize, at: f64) -> f64 {
         path.uncertain(at, &mut self.around);
         let sides = &path.rule.sides;
@@ -248,10 +248,10 @@ impl Watcher {
         sign_of(sign) * rate.lo < 0.0 && sign_of(sign) * rate.hi < 0.0
     }
 
-    /// A meeting at a position.
-    fn meeting_at(path: &Path, position: f64, after: Sign) -> Meeting {
+    /// A crossing at a position.
+    fn crossing_at(path: &Path, position: f64, after: Sign) -> Crossing {
         let time = path.start.after(position * path.h);
-        Meeting { position, time, at: Sign::Zero, after, level: None }
+        Crossing { position, time, at: Sign::Zero, after, level: None }
     }
 
     /// How much earlier or later a crossing may be, in units of position, given the errors of integration.

@@ -1,29 +1,29 @@
 //! Detection: the search of a stretch of time for zero crossings, for doubts about them, and for pulses between stages.
 //!
-//! - [`watch`]: the next event of a module on a stretch
+//! - [`crossing`]: the next event of a module on a stretch
 //! - [`doubt`]: crossings that the error of integration may hide or feign
-//! - [`flash`]: rates that are large between the stages of a step
+//! - [`pulse`]: rates that are large between the stages of a step
 //! - [`signs`]: signs of the differences that conditions compare
 
+pub mod crossing;
 pub mod doubt;
-pub mod flash;
+pub mod pulse;
 pub mod signs;
-pub mod watch;
 
 use std::collections::BTreeMap;
 
 use crate::world::brief;
+use crossing::CrossingDetector;
 use dlsys_diagnostic::Diagnostic;
 use dlsys_model::Model;
 use dlsys_tree::SimTime;
-use flash::Lookout;
-use watch::Watcher;
+use pulse::PulseDetector;
 
 /// The detectors, and the remarks that they have collected.
 #[derive(Clone, Debug, Default)]
 pub struct Detector {
-    pub watcher: Watcher,
-    pub lookout: Lookout,
+    pub crossings: CrossingDetector,
+    pub pulses: PulseDetector,
     /// Rules whose rates could not be bounded, and when first.
     pub unbounded: BTreeMap<usize, f64>,
     /// Atoms of rules, with the number of the rule, whose sides have come nearer each other than the error of integration;
@@ -47,7 +47,7 @@ impl Detector {
         }
     }
 
-    /// What there is to say of the run so far: rules whose rates could not be bounded somewhere, so that a rate that is large
+    /// NextKind there is to say of the run so far: rules whose rates could not be bounded somewhere, so that a rate that is large
     /// there for a very short time may have been overlooked; and sides of conditions that have come nearer each other than the error
     /// of integration, so that a production may have been due.
     pub fn remarks(&self, model: &Model) -> Vec<Diagnostic> {

@@ -2,7 +2,7 @@
 
 use smallvec::SmallVec;
 
-use crate::motion::Motion;
+use crate::trajectory::Trajectory;
 use crate::world::state::State;
 use dlsys_expr::{Interval, Scratch, Sign};
 use dlsys_model::{Condition, Rule, Solve, Truth};
@@ -87,7 +87,7 @@ pub fn sign_at_birth(a: f64, b: f64) -> Sign {
     if equal { Sign::Zero } else { Sign::of(difference) }
 }
 
-/// What the errors of values, relative, make of the difference of an atom's sides.
+/// NextKind the errors of values, relative, make of the difference of an atom's sides.
 pub fn noise(rule: &Rule, atom: usize, values: &[f64], error: f64) -> f64 {
     let around = |x: &f64| Interval { lo: x - error * x.abs(), hi: x + error * x.abs(), partial: false };
     let variables: Vec<Interval> = values.iter().map(around).collect();
@@ -112,7 +112,7 @@ pub fn reach(
     variable: usize,
     time: usize,
     level: f64,
-    motion: Option<&Motion>,
+    trajectory: Option<&Trajectory>,
     start: f64,
     exact: impl FnOnce() -> f64,
 ) -> Option<Reach> {
@@ -123,7 +123,7 @@ pub fn reach(
     } else if variable == time + 1 {
         Some(Reach::Age(level))
     } else {
-        Some(Reach::After(motion?.reach(level - start, exact)?))
+        Some(Reach::After(trajectory?.reach(level - start, exact)?))
     }
 }
 

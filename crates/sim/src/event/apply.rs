@@ -12,13 +12,13 @@ use crate::log::Event;
 use crate::memory::Shortage;
 use crate::scratch::Scratch;
 use crate::world::World;
-use crate::world::context::Around;
+use crate::world::context::Context;
 use crate::world::life::{End, LifeClass};
 use dlsys_model::{Comparison, KindId, Model, Rule, Sign, Successor};
 use dlsys_tree::{Lineage, ModuleId};
 
 /// The context of a rule without one.
-static NO_CONTEXT: LazyLock<Around> = LazyLock::new(Around::default);
+static NO_CONTEXT: LazyLock<Context> = LazyLock::new(Context::default);
 
 /// The reason why a production cannot be applied.
 #[derive(Clone, Debug)]
@@ -237,10 +237,10 @@ impl EventStage<'_, '_> {
 fn context_of<'c>(
     model: &Model,
     world: &'c World,
-    steps: &'c [Around],
+    steps: &'c [Context],
     fire: &Firing,
     passed: &mut usize,
-) -> &'c Around {
+) -> &'c Context {
     if !model.rules[fire.rule].discrete {
         return world.state(fire.id).map_or(&NO_CONTEXT, |state| &state.context);
     }

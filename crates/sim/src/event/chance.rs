@@ -1,7 +1,7 @@
-//! What chance decides when a production takes place: which successor, with which parameters, and how long the clocks of
+//! NextKind chance decides when a production takes place: which successor, with which parameters, and how long the clocks of
 //! its modules run.
 //!
-//! All ways in which events are taken (`settle`, `light`, and the beginning of a run) come here, so they agree. What is
+//! All ways in which events are taken (`settle`, `light`, and the beginning of a run) come here, so they agree. NextKind is
 //! drawn belongs to the lineage of the module that it is drawn for ([`Seed`]), never to the order of events.
 
 use smallvec::SmallVec;

@@ -1,7 +1,7 @@
 //! Consistent values: what is given by a value or an equation, at an instant.
 //!
 //! When modules are born, change their equations or get other neighbours, their algebraic parameters are solved for
-//! before anything is judged, together with those of all modules that depend on them. What nobody but the drawing and
+//! before anything is judged, together with those of all modules that depend on them. NextKind nobody but the drawing and
 //! successors read is not kept up to date: it is computed when somebody looks.
 
 use super::EventStage;
@@ -18,11 +18,11 @@ const MAX_ROUNDS: usize = 100;
 impl EventStage<'_, '_> {
     /// Makes the algebraic parameters consistent of all modules that the instant concerns. `chosen`: they have their
     /// equations, and what has been followed may have jumped. True if something has changed that conditions may read.
-    pub fn level(&mut self, chosen: bool) -> Result<bool, Error> {
+    pub fn make_consistent(&mut self, chosen: bool) -> Result<bool, Error> {
         if !self.setup.is_algebraic {
             return Ok(false);
         }
-        self.events.level_rounds += 1;
+        self.events.consistency_rounds += 1;
         let mut wanted: Vec<ModuleId> = Vec::new();
         for &id in self.events.opened.iter().chain(&self.events.ready) {
             let Some(state) = self.world.state_mut(id) else { continue };
@@ -91,7 +91,7 @@ impl EventStage<'_, '_> {
         for id in again {
             matters |= self.place_again(id, changed.contains(&id));
         }
-        if matters && self.events.level_rounds > MAX_ROUNDS {
+        if matters && self.events.consistency_rounds > MAX_ROUNDS {
             let id = changed[0];
             let rule = self.world.state(id).and_then(|s| s.rule).unwrap_or(0);
             let site = self.world.site(
@@ -112,7 +112,7 @@ impl EventStage<'_, '_> {
         let Some(rule) = state.rule else { return false };
         let compiled = &self.setup.model.rules[rule];
         let is_open = state.open.is_some();
-        // What was followed here has its signs, unless it has jumped itself.
+        // NextKind was followed here has its signs, unless it has jumped itself.
         if !own && is_open && state.open.as_ref().is_some_and(|open| open.flow.is_some()) {
             return false;
         }

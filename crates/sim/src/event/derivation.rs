@@ -17,11 +17,11 @@ use crate::error::Error;
 use crate::event::Firing;
 use crate::event::exact::exact_atoms;
 use crate::schedule::Owner;
-use crate::world::context::Around;
+use crate::world::context::Context;
 use dlsys_model::{Model, Rule, Sign, Truth};
 use dlsys_tree::{ModuleId, SimTime};
 
-/// What is known of the steps.
+/// NextKind is known of the steps.
 #[derive(Clone, Debug, Default)]
 pub struct Steps {
     /// Number of the last step, the period being what separates two.
@@ -34,7 +34,7 @@ pub struct Steps {
     /// Productions of the present step.
     pub firing: Vec<Firing>,
     /// Their contexts, one after another.
-    pub contexts: Vec<Around>,
+    pub contexts: Vec<Context>,
     /// By kind: there are discrete rules for it.
     pub has_rules: Vec<bool>,
     /// By kind: if no rule applies to a module at its first step, none ever does.
@@ -79,7 +79,7 @@ impl EventStage<'_, '_> {
         }
         let (now, period) = (self.instant.at, self.setup.model.period);
         let mut next = (now.to_f64() / period).floor().max(self.events.steps.passed) + 1.0;
-        // What is made within the resolution of time of a step is made at that step.
+        // NextKind is made within the resolution of time of a step is made at that step.
         while SimTime::multiple(next - 1.0, period).since(now) > now.resolution() {
             next -= 1.0;
         }
@@ -148,9 +148,9 @@ impl EventStage<'_, '_> {
     }
 
     /// The first discrete rule whose context is there and whose condition holds, with that context.
-    fn applying(&mut self, id: ModuleId) -> Option<(usize, Around)> {
+    fn applying(&mut self, id: ModuleId) -> Option<(usize, Context)> {
         let model = self.setup.model;
-        let mut context = Around::default();
+        let mut context = Context::default();
         for &index in &model.kinds.get(self.world.tree.kind(id)).steps {
             let rule = &model.rules[index];
             if !self.context(id, rule, false, &mut context) {
@@ -164,7 +164,7 @@ impl EventStage<'_, '_> {
     }
 
     /// Judges the condition of a discrete rule by the values of now.
-    fn holds_now(&mut self, id: ModuleId, rule: &Rule, context: &Around) -> bool {
+    fn holds_now(&mut self, id: ModuleId, rule: &Rule, context: &Context) -> bool {
         let guard = &rule.produces[0].guard;
         if guard.is_always() {
             return true;

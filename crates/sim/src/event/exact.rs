@@ -34,7 +34,7 @@ fn inexact(model: &Model) -> Vec<Vec<bool>> {
             moves
         })
         .collect();
-    // What is made of what moves, until nothing is added.
+    // NextKind is made of what moves, until nothing is added.
     loop {
         let mut news: Vec<(KindId, usize)> = Vec::new();
         for rule in &model.rules {

@@ -14,7 +14,7 @@ impl EventStage<'_, '_> {
         self.instant.number += 1;
         self.note_arrivals();
         self.open_resting();
-        self.events.level_rounds = 0;
+        self.events.consistency_rounds = 0;
         self.iterate_from(0)
     }
 
@@ -27,7 +27,7 @@ impl EventStage<'_, '_> {
         self.instant.number += 1;
         let lazy = std::mem::take(&mut self.events.firing_lazy);
         self.replace_all_lazy(lazy, 1)?;
-        // What is made may have to be looked at, or end at once.
+        // NextKind is made may have to be looked at, or end at once.
         if self.events.fresh.is_empty() && self.events.firing_lazy.is_empty() {
             Ok(())
         } else {
@@ -35,13 +35,13 @@ impl EventStage<'_, '_> {
         }
     }
 
-    /// What happens at the instant after so many rounds of productions.
+    /// NextKind happens at the instant after so many rounds of productions.
     fn iterate_from(&mut self, mut rounds: usize) -> Result<(), Error> {
         let mut hurried = false;
         loop {
             if !self.events.fresh.is_empty() || std::mem::take(&mut self.events.changed) {
                 self.look_up();
-                self.level(false)?;
+                self.make_consistent(false)?;
             }
             if self.events.steps.due {
                 self.afford_round(self.events.steps.len(), self.events.steps.first())?;
@@ -59,7 +59,7 @@ impl EventStage<'_, '_> {
                 self.select_modes(&mut hurried, &mut firing)?;
             }
             if firing.is_empty() && lazy.is_empty() {
-                if self.level(true)? {
+                if self.make_consistent(true)? {
                     (self.events.firing, self.events.firing_lazy) = (firing, lazy);
                     continue;
                 }
@@ -131,7 +131,7 @@ impl EventStage<'_, '_> {
         }
     }
 
-    /// Starts the motions of the modules that were open, and of those that depend on them.
+    /// Starts the trajectories of the modules that were open, and of those that depend on them.
     pub fn start_flows(&mut self) -> Result<(), Error> {
         let mut opened = std::mem::take(&mut self.events.opened);
         opened.append(&mut self.events.ready);
@@ -141,14 +141,14 @@ impl EventStage<'_, '_> {
                 state.waits = true;
             }
         }
-        // A module that got several rules within the instant is there several times; its motion begins once.
+        // A module that got several rules within the instant is there several times; its trajectory begins once.
         opened.retain(|id| self.world.state_mut(*id).is_some_and(|state| std::mem::take(&mut state.waits)));
         for &id in &opened {
             let Some(state) = self.world.state_mut(id) else { continue };
             if state.rule.is_some() {
                 state.restarted = self.instant.number;
                 let numeric_only = self.setup.numeric_only;
-                self.flow().start_motions(id, numeric_only);
+                self.flow().start_trajectories(id, numeric_only);
             }
         }
         if self.setup.looks_around || self.setup.is_algebraic {

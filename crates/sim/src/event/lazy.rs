@@ -4,8 +4,8 @@ use super::apply::{Refusal, residual};
 use super::{EventStage, Firing, LONG, chance, clear, lives};
 use crate::error::Error;
 use crate::flow::prediction::values_at_event;
-use crate::world::context::Around;
-use crate::world::life::{Child, End, Life, REFUSED};
+use crate::world::context::Context;
+use crate::world::life::{End, Life, Newborn, REFUSED};
 use dlsys_model::{KindId, Outcome, Sign};
 use dlsys_tree::{ModuleId, NO_LABEL};
 
@@ -40,7 +40,7 @@ impl EventStage<'_, '_> {
         let mut label = self.world.tree.label(id);
         if label == NO_LABEL {
             let (compiled, now) = (&self.setup.model.rules[rule], self.instant.at);
-            self.world.variables(compiled, id, &Around::default(), now, &mut self.scratch.variables);
+            self.world.variables(compiled, id, &Context::default(), now, &mut self.scratch.variables);
             let child = lives::classify(self.setup, self.world, now, rule, self.scratch);
             label = child.label;
             self.world.tree.set_label(id, label);
@@ -161,7 +161,7 @@ impl EventStage<'_, '_> {
     }
 
     /// The life of a newborn module of a kind.
-    fn child(&mut self, kind: KindId, parameters: &[f64]) -> Child {
+    fn child(&mut self, kind: KindId, parameters: &[f64]) -> Newborn {
         let now = self.instant.at;
         match self.world.lives.rule(kind) {
             Some(rule) => {
@@ -172,7 +172,7 @@ impl EventStage<'_, '_> {
             }
             None => {
                 let open = Some(kind) == self.setup.cuts || !self.setup.model.kinds.get(kind).has_no_rules();
-                Child { label: NO_LABEL, time: None, open, lasting: true, tau: None }
+                Newborn { label: NO_LABEL, time: None, open, lasting: true, tau: None }
             }
         }
     }

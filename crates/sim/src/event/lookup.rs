@@ -7,7 +7,7 @@ use super::EventStage;
 use std::collections::HashSet;
 
 use crate::event::{LONG, clear};
-use crate::world::context::Around;
+use crate::world::context::Context;
 use crate::world::state::{Signs, State};
 use dlsys_model::{KindId, Successor};
 use dlsys_tree::ModuleId;
@@ -36,7 +36,7 @@ impl EventStage<'_, '_> {
             } else if let Some(&rule) = model.kinds.get(kind).rules.first()
                 && !self.begin_predicted(id, rule)
             {
-                self.take_up(id, rule, &Around::default());
+                self.take_up(id, rule, &Context::default());
             }
         }
         clear(&mut fresh);
@@ -54,7 +54,7 @@ impl EventStage<'_, '_> {
     fn look_around(&mut self) {
         let model = self.setup.model;
         let mut to_look = std::mem::take(&mut self.events.to_look);
-        let mut context = Around::default();
+        let mut context = Context::default();
         if self.setup.gathers {
             // A module with many children has been put in by each of them that is new.
             let mut seen = HashSet::new();
@@ -89,7 +89,7 @@ impl EventStage<'_, '_> {
     }
 
     /// Gives a module its rule and opens it.
-    pub fn take_up(&mut self, id: ModuleId, rule: usize, context: &Around) {
+    pub fn take_up(&mut self, id: ModuleId, rule: usize, context: &Context) {
         let compiled = &self.setup.model.rules[rule];
         let error = self.flows.error_of(self.world, id);
         self.world.rebase(id, self.instant.at);
@@ -157,7 +157,7 @@ impl EventStage<'_, '_> {
         self.events.to_look.extend_from_slice(self.neighbours.lookers(id));
         self.neighbours.bury(id);
         self.neighbours.hand_on(Some(id), &successor.kinds, made, skipped);
-        // What was skipped may turn into something that stands between others.
+        // NextKind was skipped may turn into something that stands between others.
         let counts = |kind: &KindId| !kind.is_bracket() && !skipped(*kind);
         self.events.lost |= skipped(kind) && successor.kinds.iter().any(counts);
     }

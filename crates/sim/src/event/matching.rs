@@ -3,9 +3,9 @@
 use smallvec::SmallVec;
 
 use super::EventStage;
+use crate::detect::crossing::TOUCH;
 use crate::detect::signs::{EQUAL, NEAR, noise, opposite};
-use crate::detect::watch::TOUCH;
-use crate::world::context::Around;
+use crate::world::context::Context;
 use crate::world::state::Signs;
 use dlsys_model::{Pattern, Rule, Sign, Turn};
 use dlsys_tree::ModuleId;
@@ -27,7 +27,7 @@ fn closing(shape: &[Turn]) -> usize {
 impl EventStage<'_, '_> {
     /// Collects the context that a rule asks for, in the order of the rule's variables; false if it is
     /// not there. `lasting` says that the module goes on looking at what it has found.
-    pub fn context(&mut self, id: ModuleId, rule: &Rule, lasting: bool, out: &mut Around) -> bool {
+    pub fn context(&mut self, id: ModuleId, rule: &Rule, lasting: bool, out: &mut Context) -> bool {
         out.clear();
         let skipped = |kind| self.setup.model.kinds.get(kind).skipped;
         let (tree, neighbours) = (&self.world.tree, &mut self.neighbours);
@@ -89,7 +89,7 @@ impl EventStage<'_, '_> {
         from: ModuleId,
         shape: &[Turn],
         patterns: &mut std::slice::Iter<Pattern>,
-        out: &mut Around,
+        out: &mut Context,
     ) -> Option<()> {
         let mut on_axis = self.attached_to(looker, from);
         let mut around = self.events.attached.clone();
@@ -139,7 +139,7 @@ impl EventStage<'_, '_> {
         &mut self,
         id: ModuleId,
         rule: &Rule,
-        context: &Around,
+        context: &Context,
         followed: Option<(Signs, f64)>,
     ) -> (Signs, bool) {
         if rule.atoms.is_empty() {

@@ -58,7 +58,7 @@ pub struct Firing {
     pub produce: usize,
 }
 
-/// What an instant concerns, and what is left to do at it.
+/// NextKind an instant concerns, and what is left to do at it.
 #[derive(Clone, Debug, Default)]
 pub struct Events {
     /// Modules that the instant concerns.
@@ -82,7 +82,7 @@ pub struct Events {
     /// Slots of lazy modules whose event it is.
     pub firing_lazy: Vec<u32>,
     /// Times that algebraic values have changed at the present instant.
-    level_rounds: usize,
+    consistency_rounds: usize,
     recorder: Option<Recorder>,
     // Memory that is used again and again.
     pub batch: Vec<NextEvent>,

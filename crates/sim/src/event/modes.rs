@@ -25,7 +25,7 @@ const NOISE: f64 = 16.0 * f64::EPSILON;
 const SMOOTH: f64 = 1e-9;
 
 /// Why a module has no equations.
-struct Trouble {
+struct NoMode {
     id: ModuleId,
     chattering: bool,
     signs: Signs,
@@ -52,7 +52,7 @@ impl EventStage<'_, '_> {
         let mut outcome = Ok(());
         for choice in 0.. {
             let mut changed = false;
-            let mut trouble: Option<Trouble> = None;
+            let mut missing: Option<NoMode> = None;
             let mut settled: SmallVec<[(ModuleId, Signs); 4]> = SmallVec::new();
             for &id in &opened {
                 if self.world.state(id).is_none_or(|s| s.rule.is_none()) {
@@ -90,7 +90,7 @@ impl EventStage<'_, '_> {
                         }
                         None => {
                             let chattering = entry.tried.len() > 1;
-                            trouble.get_or_insert(Trouble { id, chattering, signs: signs.clone() });
+                            missing.get_or_insert(NoMode { id, chattering, signs: signs.clone() });
                         }
                     }
                     continue;
@@ -118,7 +118,7 @@ impl EventStage<'_, '_> {
                         continue;
                     }
                     if undecided {
-                        trouble.get_or_insert(Trouble { id, chattering: true, signs: signs.clone() });
+                        missing.get_or_insert(NoMode { id, chattering: true, signs: signs.clone() });
                     }
                     changed = true;
                 }
@@ -127,12 +127,12 @@ impl EventStage<'_, '_> {
             if !firing.is_empty() {
                 break;
             }
-            if trouble.is_none() && changed && choice > MAX_CHOICES {
+            if missing.is_none() && changed && choice > MAX_CHOICES {
                 let (id, signs) = settled.pop().unwrap_or((opened[0], Signs::new()));
-                trouble = Some(Trouble { id, chattering: true, signs });
+                missing = Some(NoMode { id, chattering: true, signs });
             }
-            if let Some(trouble) = trouble {
-                outcome = Err(self.no_equations(&trouble));
+            if let Some(missing) = missing {
+                outcome = Err(self.no_equations(&missing));
                 break;
             }
             if !changed {
@@ -158,7 +158,7 @@ impl EventStage<'_, '_> {
         let own = swap(self, other.clone());
         self.flow().rates_now(id, &mut there);
         swap(self, own);
-        // What an integrated value is off by, a kink in it is off by, too.
+        // NextKind an integrated value is off by, a kink in it is off by, too.
         let smooth = if self.flows.error_of(self.world, id) > 0.0 {
             SMOOTH.max(self.setup.settings.tolerance)
         } else {
@@ -238,8 +238,8 @@ impl EventStage<'_, '_> {
         self.world.tree.parameters(id).iter().fold(1.0, |m: f64, x| m.max(x.abs()))
     }
 
-    fn no_equations(&self, trouble: &Trouble) -> Error {
-        let id = trouble.id;
+    fn no_equations(&self, missing: &NoMode) -> Error {
+        let id = missing.id;
         let index = self.world.state(id).and_then(|s| s.rule).expect("open modules have a rule");
         let rule = &self.setup.model.rules[index];
         let site = self.world.site(self.setup.model, id, index, rule.span, self.instant.at);
@@ -250,7 +250,7 @@ impl EventStage<'_, '_> {
         if age > 0.0 && age <= SHORT_LIFE * self.instant.at.resolution() && generation > 4 {
             return Error::Zeno { site };
         }
-        if trouble.chattering {
+        if missing.chattering {
             return Error::Chattering { site };
         }
         let (mut variables, mut scratch) = (Vec::new(), Vec::new());
@@ -267,10 +267,10 @@ impl EventStage<'_, '_> {
         for solve in &rule.solves {
             for (atom, comparison) in solve.guard.atoms() {
                 let alone = Condition(vec![Step::Atom(atom as u32, comparison)]);
-                if alone.judge(|i| trouble.signs[i]) == Truth::No
+                if alone.judge(|i| missing.signs[i]) == Truth::No
                     && !failing.iter().any(|(s, _)| *s == rule.atoms[atom])
                 {
-                    let sign = if meet(atom) { Sign::Zero } else { trouble.signs[atom] };
+                    let sign = if meet(atom) { Sign::Zero } else { missing.signs[atom] };
                     let remedy = Remedy::new(&self.setup.model.kinds, rule, atom, comparison, sign);
                     failing.push((rule.atoms[atom], remedy));
                 }
@@ -287,7 +287,7 @@ fn next_clause(rule: &Rule, signs: &[Sign], tried: &[usize]) -> Option<usize> {
         .map(|(i, _)| i)
 }
 
-/// The conditions inside a clause's equations. What may hold is first taken to hold.
+/// The conditions inside a clause's equations. NextKind may hold is first taken to hold.
 fn switches(rule: &Rule, solve: Option<usize>, signs: &[Sign]) -> Switches {
     let all = solve.map_or(&[][..], |s| &rule.solves[s].switches);
     all.iter().map(|s| s.condition.judge(|a| signs[a]) != Truth::No).collect()

@@ -5,11 +5,11 @@ use smallvec::SmallVec;
 use super::{EventStage, Firing};
 use crate::error::Error;
 use crate::flow::prediction::{PredictedEnd, Prediction, predict};
-use crate::motion::Motion;
 use crate::schedule::{NextEvent, Owner};
+use crate::trajectory::Trajectory;
 use crate::world::brief;
-use crate::world::context::Around;
-use crate::world::state::{Change, Open, State, What};
+use crate::world::context::Context;
+use crate::world::state::{Change, NextKind, Open, State};
 use dlsys_model::{Sign, Truth, ZeroCrossing};
 use dlsys_tree::ModuleId;
 
@@ -46,7 +46,7 @@ impl EventStage<'_, '_> {
                         self.events.firing.push(firing);
                         Some(id)
                     }
-                    None => Some(self.touch_alone(slot as usize)?),
+                    None => Some(self.touch_scheduled(slot as usize)?),
                 },
             };
             oldest = oldest.or(first);
@@ -94,7 +94,7 @@ impl EventStage<'_, '_> {
         for &id in modules {
             let state = self.world.state(id);
             let rests = |s: &State| {
-                // What stands still until an event of its own is not moved by others.
+                // NextKind stands still until an event of its own is not moved by others.
                 let watch = s.rule.map_or(&[][..], |rule| self.setup.model.rules[rule].watch(s.solve));
                 let mut atoms = s.signs.iter().zip(watch);
                 atoms.any(|(sign, watch)| *sign == Sign::Zero && !matches!(watch, ZeroCrossing::Constant))
@@ -106,15 +106,15 @@ impl EventStage<'_, '_> {
     }
 
     /// Opens a module whose event it is.
-    pub fn touch_alone(&mut self, slot: usize) -> Result<ModuleId, Error> {
+    pub fn touch_scheduled(&mut self, slot: usize) -> Result<ModuleId, Error> {
         let state = self.world.states[slot].as_mut().expect("scheduled");
         let id = state.id;
-        if state.next.what == What::Doubt {
+        if state.next.kind == NextKind::Doubt {
             let atom = state.next.touched[0].atom;
             return Err(self.flow().in_doubt(id, atom));
         }
-        if state.next.what == What::Fault {
-            let ends: Vec<Option<f64>> = state.motions.iter().map(Motion::end).collect();
+        if state.next.kind == NextKind::Fault {
+            let ends: Vec<Option<f64>> = state.trajectories.iter().map(Trajectory::end).collect();
             let first = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1);
             let parameter = ends.iter().enumerate().filter_map(|(i, e)| Some((i, (*e)?))).min_by(first);
             let since = state.since;
@@ -143,9 +143,9 @@ impl EventStage<'_, '_> {
             return self.begin_lazily(id, index);
         }
         let now = self.instant.at;
-        self.world.variables(rule, id, &Around::default(), now, &mut self.scratch.variables);
+        self.world.variables(rule, id, &Context::default(), now, &mut self.scratch.variables);
         let Some(prediction) = predict(rule, now, self.scratch) else { return false };
-        let Prediction { solve, signs, motions, end, .. } = prediction;
+        let Prediction { solve, signs, trajectories, end, .. } = prediction;
         let owner = Owner::Module(id.slot() as u32);
         let change = match end {
             Some(PredictedEnd::AtBirth { .. }) => return false,
@@ -161,8 +161,8 @@ impl EventStage<'_, '_> {
         let state = self.world.make_state(id);
         state.renew(id);
         (state.rule, state.solve, state.signs) = (Some(index), solve, signs);
-        (state.since, state.motions) = (now, motions);
-        state.next.what = if change.is_none() { What::Nothing } else { What::Event };
+        (state.since, state.trajectories) = (now, trajectories);
+        state.next.kind = if change.is_none() { NextKind::Nothing } else { NextKind::Event };
         state.next.touched = change.into_iter().collect();
         state.restarted = self.instant.number;
         true
@@ -171,7 +171,8 @@ impl EventStage<'_, '_> {
     /// The production that a module's event is, if that is all there is to it; its values are then those of the event.
     pub fn fire_predicted(&mut self, slot: usize) -> Option<Firing> {
         let state = self.world.states.get(slot)?.as_ref()?;
-        if !self.setup.fast_path || state.next.what != What::Event || state.is_numeric() || state.coupled {
+        if !self.setup.fast_path || state.next.kind != NextKind::Event || state.is_numeric() || state.coupled
+        {
             return None;
         }
         let (id, rule) = (state.id, state.rule?);
@@ -190,7 +191,7 @@ impl EventStage<'_, '_> {
     }
 }
 
-/// What is open about a module, which must be.
+/// NextKind is open about a module, which must be.
 pub fn open(state: &mut State) -> &mut Open {
     state.open.get_or_insert_with(Box::default)
 }

@@ -4,7 +4,7 @@ use super::EventStage;
 use crate::detect::doubt::FAR;
 use crate::detect::signs::{opposite, produces};
 use crate::world::path::Path;
-use crate::world::state::{Change, Signs, What};
+use crate::world::state::{Change, NextKind, Signs};
 use dlsys_model::Sign;
 use dlsys_tree::ModuleId;
 
@@ -42,10 +42,10 @@ impl EventStage<'_, '_> {
         if rule.produces.is_empty() || rule.atoms.is_empty() {
             return None;
         }
-        // What is known to come, or how far that is known, is mostly far away.
-        let known = match (&state.next.what, &self.world.coupled, &state.step) {
-            (What::Event, ..) => state.next.touched[0].time,
-            (_, Some(course), _) if state.coupled => course.end,
+        // NextKind is known to come, or how far that is known, is mostly far away.
+        let known = match (&state.next.kind, &self.world.coupled, &state.step) {
+            (NextKind::Event, ..) => state.next.touched[0].time,
+            (_, Some(solution), _) if state.coupled => solution.end,
             (_, _, Some(step)) => step.dense.end,
             _ => self.instant.at,
         };
@@ -64,7 +64,7 @@ impl EventStage<'_, '_> {
             error > 0.0
                 && matches!(signs[atom], Sign::Plus | Sign::Minus)
                 && produces(rule, &signs, atom)
-                && self.detector.watcher.is_about_to_meet(&path, atom, signs[atom], factor)
+                && self.detector.crossings.is_about_to_meet(&path, atom, signs[atom], factor)
         })?;
         Some(Change {
             atom,

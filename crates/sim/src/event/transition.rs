@@ -1,4 +1,4 @@
-//! What a production changes, for those who ask ([`Settings::transitions`](super::Settings::transitions)): the
+//! NextKind a production changes, for those who ask ([`Settings::transitions`](super::Settings::transitions)): the
 //! predecessor just before the instant and the successor just after it, both with their rates.
 //!
 //! A successor that is itself replaced at the same instant is not seen by anybody, so a transition goes across the
@@ -6,7 +6,7 @@
 //! the rates of the equations that were chosen for them.
 
 use super::EventStage;
-use crate::log::{Stand, Transition};
+use crate::log::{ModuleState, Transition};
 use std::collections::BTreeMap;
 
 use crate::event::Firing;
@@ -25,7 +25,7 @@ pub(super) struct Recorder {
 struct Fired {
     /// Index into the log.
     event: usize,
-    before: Stand,
+    before: ModuleState,
     moved: bool,
     followed: bool,
     /// It was made at this instant.
@@ -70,7 +70,7 @@ impl EventStage<'_, '_> {
             let made = |f: &Fired| f.parts.iter().any(|(_, id)| *id == Some(fire.id));
             let fired = Fired {
                 event,
-                before: Stand { kind, values, rates, age },
+                before: ModuleState { kind, values, rates, age },
                 moved: arrival.is_some(),
                 followed: tree.is_followed(fire.id, draws),
                 made_now: arrival.is_none() && recorder.fired.values().any(made),
@@ -99,14 +99,14 @@ impl EventStage<'_, '_> {
             let mut parts: Vec<(KindId, Option<ModuleId>)> = fired.parts.iter().rev().copied().collect();
             while let Some((kind, id)) = parts.pop() {
                 match id {
-                    None => after.push(Stand { kind, values: Vec::new(), rates: Vec::new(), age: 0.0 }),
+                    None => after.push(ModuleState { kind, values: Vec::new(), rates: Vec::new(), age: 0.0 }),
                     Some(id) if self.world.tree.is_alive(id) => {
                         let (mut values, mut rates) = (Vec::new(), Vec::new());
                         self.world.values(id, self.instant.at, &mut values);
                         self.flow().rates_ahead(id, 0.0, &mut rates);
                         values.truncate(self.world.tree.shown(id));
                         rates.truncate(values.len());
-                        after.push(Stand { kind, values, rates, age: 0.0 });
+                        after.push(ModuleState { kind, values, rates, age: 0.0 });
                     }
                     Some(id) => {
                         cascade += 1;

@@ -8,7 +8,7 @@ use super::coupled::equations::Equations;
 use super::coupled::system::{Source, Sum, System};
 use crate::detect::signs::NEAR;
 use crate::error::{Error, Unsolved};
-use crate::world::context::Around;
+use crate::world::context::Context;
 use crate::world::{World, describe};
 use dlsys_expr::{Dual, eliminate};
 use dlsys_model::Model;
@@ -172,7 +172,7 @@ impl FlowStage<'_, '_> {
         let (Some(rule), Some(solve)) = (state.rule, state.solve) else { return };
         let (compiled, switches) = (&model.rules[rule], state.switches.clone());
         let algebraic = &compiled.solves[solve].algebraic;
-        let around: Around = state.context.clone();
+        let around: Context = state.context.clone();
         if algebraic.is_empty() || depth == 0 {
             return;
         }

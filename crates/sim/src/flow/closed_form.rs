@@ -1,10 +1,10 @@
 //! Closed forms: the trajectories of a clause's parameters from their values at one instant on.
 //!
 //! Everything here is a function of the rule and of the variables in [`Scratch`]; the prediction of whole lives
-//! (`prediction`) and the general way (`start_motions`) both use it.
+//! (`prediction`) and the general way (`start_trajectories`) both use it.
 
-use crate::motion::{Driven, Flow, Function, Motion, Pace, Riccati, Terms};
 use crate::scratch::Scratch;
+use crate::trajectory::{Driven, Flow, Function, Pace, Riccati, Terms, Trajectory};
 use crate::world::state::State;
 use dlsys_expr::Value;
 use dlsys_model::{Law, Solve};
@@ -13,42 +13,48 @@ use dlsys_tree::Tree;
 /// The first stretch that is searched on closed forms, in units of time, if their time scale is unknown.
 const FIRST_WINDOW: f64 = 1.0;
 
-/// The motions of a clause from `scratch.variables`; false if a formula refuses these numbers.
-pub fn formulas(solve: &Solve, time: usize, scratch: &mut Scratch, motions: &mut [Motion]) -> bool {
+/// The trajectories of a clause from `scratch.variables`; false if a formula refuses these numbers.
+pub fn formulas(solve: &Solve, time: usize, scratch: &mut Scratch, trajectories: &mut [Trajectory]) -> bool {
     let mut out = [0.0; 4];
-    // For the algebra: the coefficients f and d of exponential motions.
+    // For the algebra: the coefficients f and d of exponential trajectories.
     let mut sums_follow = false;
     for (law, &parameter) in solve.laws.iter().zip(&solve.of) {
         match law {
             Law::Polynomial(program) => {
                 let out = &mut out[..program.outputs()];
                 program.eval(&scratch.variables, &mut scratch.registers, out);
-                motions[parameter] = Motion::Polynomial(integrated(out, scratch.variables[time + 1]));
+                trajectories[parameter] =
+                    Trajectory::Polynomial(integrated(out, scratch.variables[time + 1]));
             }
             Law::Quadratic(program) => {
                 program.eval(&scratch.variables, &mut scratch.registers, &mut out[..3]);
                 let riccati = Riccati::new(scratch.variables[parameter], out[0], out[1], out[2]);
-                motions[parameter] = Motion::Riccati(riccati);
+                trajectories[parameter] = Trajectory::Riccati(riccati);
             }
             Law::Sum { .. } => sums_follow = true,
             Law::Driven(driven) => match self::driven(driven, parameter, time, scratch) {
-                Some(motion) => motions[parameter] = motion,
+                Some(trajectory) => trajectories[parameter] = trajectory,
                 None => return false,
             },
             Law::Numeric(_) => {}
         }
     }
-    if sums_follow && !sums(solve, time, scratch, motions) {
+    if sums_follow && !sums(solve, time, scratch, trajectories) {
         return false;
     }
     for (component, &position) in solve.numeric.iter().enumerate() {
-        motions[solve.of[position]] = Motion::Step(component as u32);
+        trajectories[solve.of[position]] = Trajectory::Step(component as u32);
     }
-    motions.iter().zip(&scratch.variables).all(|(m, _)| !m.is_formula() || m.rate(0.0).is_finite())
+    trajectories.iter().zip(&scratch.variables).all(|(m, _)| !m.is_formula() || m.rate(0.0).is_finite())
 }
 
-/// The motion of a parameter at a pace; None if its formula does not hold for these numbers.
-fn driven(law: &dlsys_model::Driven, parameter: usize, time: usize, scratch: &mut Scratch) -> Option<Motion> {
+/// The trajectory of a parameter at a pace; None if its formula does not hold for these numbers.
+fn driven(
+    law: &dlsys_model::Driven,
+    parameter: usize,
+    time: usize,
+    scratch: &mut Scratch,
+) -> Option<Trajectory> {
     let mut c = [0.0; 3];
     let coefficients = &mut c[..law.coefficients.outputs()];
     law.coefficients.eval(&scratch.variables, &mut scratch.registers, coefficients);
@@ -61,38 +67,39 @@ fn driven(law: &dlsys_model::Driven, parameter: usize, time: usize, scratch: &mu
         Some(program) => Some(Pace::new(program.clone(), &scratch.variables, time)?),
         None => None,
     };
-    Some(Motion::Driven(Box::new(Driven::new(flow, pace))))
+    Some(Trajectory::Driven(Box::new(Driven::new(flow, pace))))
 }
 
-/// The motions of explicit parameters that are formulas, and components for those that are solved for.
-pub fn functions(solve: &Solve, time: usize, scratch: &Scratch, motions: &mut [Motion]) -> bool {
+/// The trajectories of explicit parameters that are formulas, and components for those that are solved for.
+pub fn functions(solve: &Solve, time: usize, scratch: &Scratch, trajectories: &mut [Trajectory]) -> bool {
     let algebraic = &solve.algebraic;
     for (place, &parameter) in algebraic.of.iter().enumerate() {
         if !algebraic.closed[place] {
             continue;
         }
         let program = &algebraic.formulas[place];
-        let moves = |v: &usize| *v < motions.len() && !matches!(motions[*v], Motion::Rest);
-        let moving = program.reads().iter().copied().filter(moves).map(|v| (v, motions[v].clone())).collect();
+        let moves = |v: &usize| *v < trajectories.len() && !matches!(trajectories[*v], Trajectory::Rest);
+        let moving =
+            program.reads().iter().copied().filter(moves).map(|v| (v, trajectories[v].clone())).collect();
         let Some(function) = Function::new(program, &scratch.variables, moving, time) else { return false };
-        motions[parameter] = Motion::Function(Box::new(function));
+        trajectories[parameter] = Trajectory::Function(Box::new(function));
     }
-    solved(solve, false, motions);
+    solved(solve, false, trajectories);
     true
 }
 
 /// Components for the algebraic parameters that are solved for, after those that are integrated.
-pub fn solved(solve: &Solve, forced: bool, motions: &mut [Motion]) {
+pub fn solved(solve: &Solve, numeric_only: bool, trajectories: &mut [Trajectory]) {
     let algebraic = &solve.algebraic;
-    let first = if forced { solve.of.len() } else { solve.numeric.len() };
-    let places = (0..algebraic.of.len()).filter(|place| algebraic.is_solved(*place, forced));
+    let first = if numeric_only { solve.of.len() } else { solve.numeric.len() };
+    let places = (0..algebraic.of.len()).filter(|place| algebraic.is_solved(*place, numeric_only));
     for (component, place) in (first..).zip(places) {
-        motions[algebraic.of[place]] = Motion::Step(component as u32);
+        trajectories[algebraic.of[place]] = Trajectory::Step(component as u32);
     }
 }
 
-/// The motions that are sums, those that others depend on first.
-fn sums(solve: &Solve, time: usize, scratch: &mut Scratch, motions: &mut [Motion]) -> bool {
+/// The trajectories that are sums, those that others depend on first.
+fn sums(solve: &Solve, time: usize, scratch: &mut Scratch, trajectories: &mut [Trajectory]) -> bool {
     let mut variables: Vec<Terms> = scratch.variables.iter().map(|&x| Terms::constant(x)).collect();
     for v in [time, time + 1] {
         variables[v] = Terms::affine(scratch.variables[v], 1.0);
@@ -100,7 +107,7 @@ fn sums(solve: &Solve, time: usize, scratch: &mut Scratch, motions: &mut [Motion
     let mut known: Vec<bool> = solve.laws.iter().map(|law| !matches!(law, Law::Sum { .. })).collect();
     for (i, &parameter) in solve.of.iter().enumerate() {
         if known[i]
-            && let Some(terms) = motions[parameter].terms(scratch.variables[parameter])
+            && let Some(terms) = trajectories[parameter].terms(scratch.variables[parameter])
         {
             variables[parameter] = terms;
         }
@@ -118,7 +125,7 @@ fn sums(solve: &Solve, time: usize, scratch: &mut Scratch, motions: &mut [Motion
         inflow.eval(&variables, &mut Vec::new(), &mut g);
         let Some(sum) = g[0].solve(scratch.variables[parameter], b[0]) else { return false };
         variables[parameter] = sum.terms(scratch.variables[parameter]);
-        motions[parameter] = Motion::Sum(Box::new(sum));
+        trajectories[parameter] = Trajectory::Sum(Box::new(sum));
         known[i] = true;
     }
     known.into_iter().all(|k| k)
@@ -142,8 +149,8 @@ fn integrated(c: &[f64], age: f64) -> [f64; 4] {
 /// A time in which the formulas of a module change noticeably.
 pub fn time_scale(state: &State, tree: &Tree) -> f64 {
     let values = tree.parameters(state.id);
-    let times = state.motions.iter().zip(values).filter_map(|(motion, x)| {
-        let rate = motion.rate(0.0).abs();
+    let times = state.trajectories.iter().zip(values).filter_map(|(trajectory, x)| {
+        let rate = trajectory.rate(0.0).abs();
         (rate > 0.0 && *x != 0.0).then(|| (x.abs() / rate).clamp(1e-9, 1e9))
     });
     times.reduce(f64::min).unwrap_or(FIRST_WINDOW)

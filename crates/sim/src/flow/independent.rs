@@ -1,10 +1,10 @@
 //! Modules that are integrated alone, each with steps of its own.
 
-use crate::detect::flash::{self, Glance, MAX_UNBOUNDED};
+use crate::detect::pulse::{self, MAX_UNBOUNDED, PulseFinding};
 use crate::error::Error;
 use crate::flow::FlowStage;
 use crate::flow::integrator::StepError;
-use crate::motion::Motion;
+use crate::trajectory::Trajectory;
 use crate::world::state::{Control, State, Step};
 use crate::world::{World, describe};
 use dlsys_expr::{Program, Scratch};
@@ -29,7 +29,7 @@ pub fn crawls(mark: &mut SimTime, since_mark: &mut usize, at: SimTime) -> bool {
 }
 
 /// The equations of one module whose neighbours rest or follow formulas that it does not read.
-struct Alone<'a> {
+struct Independent<'a> {
     program: &'a Program,
     jacobian: &'a Jacobian,
     /// Row, column and entry in the clause's Jacobian.
@@ -38,7 +38,7 @@ struct Alone<'a> {
     variables: Vec<f64>,
     /// Where each component stands among the variables.
     numeric: SmallVec<[usize; 4]>,
-    formulas: SmallVec<[(usize, &'a Motion, f64); 4]>,
+    formulas: SmallVec<[(usize, &'a Trajectory, f64); 4]>,
     /// Time since the formulas began, and `t` and `age`, at the start of the step.
     offset: f64,
     time: usize,
@@ -47,7 +47,7 @@ struct Alone<'a> {
     scratch: Scratch<f64>,
 }
 
-impl<'a> Alone<'a> {
+impl<'a> Independent<'a> {
     fn new(
         world: &'a World,
         state: &'a State,
@@ -56,22 +56,22 @@ impl<'a> Alone<'a> {
         mut variables: Vec<f64>,
         scratch: Scratch<f64>,
         y: &mut Vec<f64>,
-    ) -> Alone<'a> {
+    ) -> Independent<'a> {
         y.clear();
         let own = world.tree.parameters(state.id);
         world.variables(rule, state.id, &state.context, from, &mut variables);
         variables[..own.len()].copy_from_slice(own);
         let (t, age) = (from.to_f64(), from.since(world.tree.birth(state.id)));
         variables.extend(state.switches.iter().map(|&on| f64::from(u8::from(on))));
-        let solve = &rule.solves[state.solve.expect("numeric motions have equations")];
-        let program = if state.forced { &solve.rates } else { &solve.numeric_rates };
+        let solve = &rule.solves[state.solve.expect("numeric trajectories have equations")];
+        let program = if state.numeric_only { &solve.rates } else { &solve.numeric_rates };
         let mut numeric: SmallVec<[usize; 4]> = smallvec::smallvec![0; program.outputs()];
         let mut formulas = SmallVec::new();
         y.resize(program.outputs(), 0.0);
-        for (i, motion) in state.motions.iter().enumerate() {
-            match motion {
-                Motion::Rest => {}
-                Motion::Step(c) | Motion::Coupled(c) => {
+        for (i, trajectory) in state.trajectories.iter().enumerate() {
+            match trajectory {
+                Trajectory::Rest => {}
+                Trajectory::Step(c) | Trajectory::Coupled(c) => {
                     numeric[*c as usize] = i;
                     y[*c as usize] = own[i];
                 }
@@ -86,18 +86,30 @@ impl<'a> Alone<'a> {
             })
             .collect();
         let jacobian = &solve.jacobian;
-        Alone { program, jacobian, partials, variables, numeric, formulas, offset, time, t, age, scratch }
+        Independent {
+            program,
+            jacobian,
+            partials,
+            variables,
+            numeric,
+            formulas,
+            offset,
+            time,
+            t,
+            age,
+            scratch,
+        }
     }
 }
 
-impl Alone<'_> {
+impl Independent<'_> {
     /// Fills in the variables that move.
     fn move_to(&mut self, tau: f64, y: &[f64]) {
         for (&variable, &value) in self.numeric.iter().zip(y) {
             self.variables[variable] = value;
         }
-        for &(variable, motion, x) in &self.formulas {
-            self.variables[variable] = x + motion.value(self.offset + tau);
+        for &(variable, trajectory, x) in &self.formulas {
+            self.variables[variable] = x + trajectory.value(self.offset + tau);
         }
         self.variables[self.time] = self.t + tau;
         self.variables[self.time + 1] = self.age + tau;
@@ -107,7 +119,7 @@ impl Alone<'_> {
 /// Most times that a step is cut because of what it may have overlooked.
 const MAX_TRIES: usize = 100;
 
-impl Rates for Alone<'_> {
+impl Rates for Independent<'_> {
     fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]) {
         self.move_to(tau, y);
         self.program.eval(&self.variables, &mut self.scratch, out);
@@ -136,7 +148,7 @@ impl Rates for Alone<'_> {
 
 impl FlowStage<'_, '_> {
     /// Makes a step of a module from its values in the tree; returns its length.
-    pub fn step_alone(&mut self, id: ModuleId, from: SimTime) -> Result<f64, Error> {
+    pub fn step_independent(&mut self, id: ModuleId, from: SimTime) -> Result<f64, Error> {
         let model = self.setup.model;
         let state = self.world.state(id).expect("a module with a rule");
         let (index, solve) = (state.rule.expect("has a rule"), state.solve.expect("has equations"));
@@ -146,45 +158,46 @@ impl FlowStage<'_, '_> {
         let hint = self.flows.hints[self.world.tree.kind(id).index()][solve];
         let going_on = state.step.as_ref().filter(|s| s.live);
         let mut control = going_on.map_or(hint, |s| s.control);
-        // What was learnt elsewhere says nothing of how well this module is known.
+        // NextKind was learnt elsewhere says nothing of how well this module is known.
         control.error = state.step.as_ref().map_or(0.0, |s| s.control.error);
         let step = {
             let scratch = std::mem::take(&mut self.scratch.registers);
-            let mut system = Alone::new(self.world, state, rule, from, variables, scratch, &mut y);
+            let mut system = Independent::new(self.world, state, rule, from, variables, scratch, &mut y);
             // One that goes on from its own last step need not evaluate its rates again.
-            if going_on.is_some_and(|s| self.flows.alone_last == Some((id, s.dense.end)))
-                && y.len() == self.flows.alone.size()
+            if going_on.is_some_and(|s| self.flows.independent_last == Some((id, s.dense.end)))
+                && y.len() == self.flows.independent.size()
             {
-                self.flows.alone.advance(&mut y);
+                self.flows.independent.advance(&mut y);
             } else {
-                self.flows.alone.restart(self.setup.settings.method, y.len());
+                self.flows.independent.restart(self.setup.settings.method, y.len());
             }
             let fixed = self.setup.settings.method.is_fixed_step();
             let settings = self.setup.settings.for_clocks(rule.solves[solve].has_hazard_clock);
             let stiff = control.stiff || self.setup.settings.method.is_implicit();
-            let flashes = rule.solves[solve].has_pulses && !fixed;
+            let pulses = rule.solves[solve].has_pulses && !fixed;
             let mut tries = 0;
             let step = loop {
                 let stats = &mut self.log.stats;
-                let step = self.flows.alone.step(&settings, &mut control, &mut system, &y, from, None, stats);
-                let step = step.map(|_| self.flows.alone.dense(&mut system, &y));
+                let step =
+                    self.flows.independent.step(&settings, &mut control, &mut system, &y, from, None, stats);
+                let step = step.map(|_| self.flows.independent.dense(&mut system, &y));
                 let Ok(dense) = &step else { break step };
                 tries += 1;
                 let least = 64.0 * from.resolution();
-                if !flashes || tries > MAX_TRIES {
+                if !pulses || tries > MAX_TRIES {
                     break step;
                 }
                 let (world, solve) = (&self.world, &rule.solves[solve]);
-                let (nodes, tolerance) = (&*self.flows.alone.nodes(), self.setup.settings.tolerance);
+                let (nodes, tolerance) = (&*self.flows.independent.nodes(), self.setup.settings.tolerance);
                 let (start, end, own) = (from, dense.end, Some(dense));
                 let step_made =
-                    flash::Step { world, state, rule, solve, start, end, nodes, own, tolerance, stiff };
-                match self.detector.lookout.look(&step_made) {
-                    Glance::Unbounded(at) if tries > MAX_UNBOUNDED => {
+                    pulse::Step { world, state, rule, solve, start, end, nodes, own, tolerance, stiff };
+                match self.detector.pulses.look(&step_made) {
+                    PulseFinding::Unbounded(at) if tries > MAX_UNBOUNDED => {
                         self.detector.unbounded.entry(index).or_insert(from.to_f64() + at * dense.h);
                         break step;
                     }
-                    Glance::Overlooked(at) | Glance::Unbounded(at) if dense.h > least => {
+                    PulseFinding::Overlooked(at) | PulseFinding::Unbounded(at) if dense.h > least => {
                         stats.rejected += 1;
                         let part = if at > 0.0 { at } else { 0.25 };
                         control.size = (part * dense.h).max(least);
@@ -199,13 +212,13 @@ impl FlowStage<'_, '_> {
         let dense = step.map_err(|error| {
             let own = |component: usize| {
                 let state = self.world.state(id)?;
-                let is_it = |m: &Motion| matches!(m, Motion::Step(c) if *c as usize == component);
-                Some((id, state.motions.iter().position(is_it)?))
+                let is_it = |m: &Trajectory| matches!(m, Trajectory::Step(c) if *c as usize == component);
+                Some((id, state.trajectories.iter().position(is_it)?))
             };
             self.step_error(error, from, own)
         })?;
         let h = dense.h;
-        self.flows.alone_last = Some((id, dense.end));
+        self.flows.independent_last = Some((id, dense.end));
         let fixed = self.setup.settings.method.is_fixed_step();
         let state = self.world.state_mut(id).expect("seen above");
         let crawling = match &mut state.step {
@@ -234,7 +247,7 @@ impl FlowStage<'_, '_> {
         let (Some(solve), Some(step)) = (state.solve, &state.step) else { return };
         let kind = self.world.tree.kind(id).index();
         if step.live {
-            // What comes next begins with what was learnt here.
+            // NextKind comes next begins with what was learnt here.
             let mut control = step.control;
             let (lived, error) = (now.since(step.dense.start), control.last_error);
             control.foresee(error, lived, now.resolution());

@@ -10,7 +10,7 @@ use smallvec::SmallVec;
 
 use dlsys_tree::ModuleId;
 
-/// What is known of an instant.
+/// NextKind is known of an instant.
 #[derive(Clone, Debug, Default)]
 pub struct KnownRates {
     /// Of each module, by the time ahead of the instant.

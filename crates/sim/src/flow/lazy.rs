@@ -6,29 +6,35 @@
 use super::prediction::{PredictedEnd, Prediction, predict, retrace, values_at_event};
 use crate::scratch::Scratch;
 use crate::setup::Setup;
-use crate::world::life::{Child, End, Forecast, Life, LifeClass, REFUSED, same_bits};
-use crate::world::state::{Change, What};
+use crate::world::life::{CachedPrediction, End, Life, LifeClass, Newborn, REFUSED, same_bits};
+use crate::world::state::{Change, NextKind};
 use crate::world::{Instant, World};
 use dlsys_model::{Rule, Sign};
 use dlsys_tree::{Look, ModuleId, NO_LABEL, SimTime};
 use smallvec::SmallVec;
 
 /// The class of a module that is born now with the parameters in `scratch`, and its event.
-pub fn classify(setup: &Setup, world: &mut World, now: SimTime, rule: usize, scratch: &mut Scratch) -> Child {
+pub fn classify(
+    setup: &Setup,
+    world: &mut World,
+    now: SimTime,
+    rule: usize,
+    scratch: &mut Scratch,
+) -> Newborn {
     let timeless = world.lives.is_timeless(rule);
     let compiled = &setup.model.rules[rule];
     let arity = compiled.parameters.len();
     if timeless
-        && let Some(known) = &world.lives.forecasts[rule]
+        && let Some(known) = &world.lives.cached[rule]
         && same_bits(&known.values, &scratch.variables[..arity])
     {
         let time = known.tau.map(|tau| now.ahead(tau));
         if time != Some(None) {
             let (label, time, tau) = (known.label, time.flatten(), known.tau);
-            return Child { label, time, open: false, lasting: true, tau };
+            return Newborn { label, time, open: false, lasting: true, tau };
         }
     }
-    let refused = Child { label: REFUSED, time: None, open: true, lasting: false, tau: None };
+    let refused = Newborn { label: REFUSED, time: None, open: true, lasting: false, tau: None };
     let values = SmallVec::from_slice(&scratch.variables[..arity]);
     let Some(prediction) = predict(compiled, now, scratch) else { return refused };
     let Prediction { solve, signs, end, lasting, .. } = prediction;
@@ -36,7 +42,7 @@ pub fn classify(setup: &Setup, world: &mut World, now: SimTime, rule: usize, scr
         Some(PredictedEnd::AtBirth { produce }) => {
             let class = LifeClass { rule, solve: None, signs, end: Some(End::AtBirth { produce }) };
             let label = world.lives.intern(class);
-            return label.map_or(refused, |label| Child { label, ..refused });
+            return label.map_or(refused, |label| Newborn { label, ..refused });
         }
         Some(PredictedEnd::Event { change: Change { atom, after, time, .. }, produce }) => {
             (Some(End::Crossing { produce, atom, after }), Some(time.to_f64()))
@@ -52,9 +58,9 @@ pub fn classify(setup: &Setup, world: &mut World, now: SimTime, rule: usize, scr
     };
     let lasting = lasting.filter(|_| timeless);
     if let Some(tau) = lasting {
-        world.lives.forecasts[rule] = Some(Forecast { values, label, tau });
+        world.lives.cached[rule] = Some(CachedPrediction { values, label, tau });
     }
-    Child { label, time, open: false, lasting: lasting.is_some(), tau: lasting.flatten() }
+    Newborn { label, time, open: false, lasting: lasting.is_some(), tau: lasting.flatten() }
 }
 
 /// The life of the lazy module in a slot, taken out of its class; to be given back with
@@ -119,13 +125,13 @@ pub fn materialise(
     state.renew(id);
     (state.rule, state.solve, state.signs) = (Some(class.rule), class.solve, class.signs);
     (state.since, state.restarted) = (life.birth, instant.number);
-    state.motions = life.motions.clone();
-    state.next.what = What::Nothing;
+    state.trajectories = life.trajectories.clone();
+    state.next.kind = NextKind::Nothing;
     state.next.touched.clear();
     match class.end {
         Some(End::AtBirth { .. }) => state.place(false),
         Some(End::Crossing { atom, after, .. }) => {
-            state.next.what = What::Event;
+            state.next.kind = NextKind::Event;
             let change = Change { atom, time: life.at, at: Sign::Zero, after, level: life.level };
             state.next.touched.push(change);
         }

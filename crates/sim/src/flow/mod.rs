@@ -1,7 +1,7 @@
 //! Flows: how parameters move from one instant to the next, and the next event of each module.
 //!
 //! ```text
-//! start_motions ─▶ closed_form            a formula, evaluated and never stepped
+//! start_trajectories ─▶ closed_form            a formula, evaluated and never stepped
 //!               ─▶ independent            steps of the module alone
 //!               ─▶ coupled                one step for all modules that read one another
 //! look_ahead    ─▶ detect (zero crossings) ─▶ schedule
@@ -19,16 +19,16 @@ pub mod prediction;
 mod rates;
 
 use crate::detect::Detector;
-use crate::detect::watch::needs_search;
+use crate::detect::crossing::needs_search;
 use crate::error::{Error, Near};
 use crate::log::Log;
-use crate::motion::Motion;
 use crate::schedule::{Owner, Schedule};
 use crate::scratch::Scratch;
 use crate::setup::Setup;
+use crate::trajectory::Trajectory;
 use crate::world::neighbours::Neighbours;
 use crate::world::path::Path;
-use crate::world::state::{Change, Control, Next, What};
+use crate::world::state::{Change, Control, Next, NextKind};
 use crate::world::{Instant, World};
 use coupled::Coupled;
 use dlsys_model::{Model, Sign};
@@ -45,20 +45,20 @@ const ARRIVED: f64 = 0.01;
 /// Growth of the stretches that are searched on closed forms.
 const WIDENING: f64 = 4.0;
 
-/// What flows keep from step to step.
+/// NextKind flows keep from step to step.
 #[derive(Clone)]
 pub struct Flows {
     pub coupled: Coupled,
     /// Some algebraic parameters are computed only where they are observed.
     pub lazy_algebra: bool,
     /// Steps of modules that are integrated alone, and the module and end of the last one.
-    alone: Integrator,
-    alone_last: Option<(ModuleId, SimTime)>,
+    independent: Integrator,
+    independent_last: Option<(ModuleId, SimTime)>,
     /// The experience of step control, by kind and number of the clause: modules of one kind under different rules take
     /// the same steps.
     hints: Vec<Vec<Control>>,
     pub known_rates: KnownRates,
-    motions: Vec<Motion>,
+    trajectories: Vec<Trajectory>,
     y: Vec<f64>,
 }
 
@@ -72,11 +72,11 @@ impl Flows {
         Flows {
             coupled: Coupled::default(),
             lazy_algebra: algebraic.any(|a| (0..a.of.len()).any(|place| a.is_lazy(place))),
-            alone: Integrator::default(),
-            alone_last: None,
+            independent: Integrator::default(),
+            independent_last: None,
             hints: hints.collect(),
             known_rates: KnownRates::default(),
-            motions: Vec::new(),
+            trajectories: Vec::new(),
             y: Vec::new(),
         }
     }
@@ -108,12 +108,12 @@ impl Flows {
     }
     /// Evaluations of the equations of one module so far.
     pub fn evaluations(&self) -> u64 {
-        self.alone.evaluations() + self.coupled.evaluations()
+        self.independent.evaluations() + self.coupled.evaluations()
     }
 
     /// True if equations were stiff, so that the implicit method was taken.
     pub fn has_been_stiff(&self) -> bool {
-        self.alone.is_implicit() || self.coupled.integrator.is_implicit()
+        self.independent.is_implicit() || self.coupled.integrator.is_implicit()
     }
 }
 
@@ -131,52 +131,52 @@ pub struct FlowStage<'s, 'm> {
 }
 
 impl FlowStage<'_, '_> {
-    /// Gives each parameter of a module its motion from the present on. Numeric motions get their component; the
+    /// Gives each parameter of a module its trajectory from the present on. Numeric trajectories get their component; the
     /// steps are made later.
-    pub fn start_motions(&mut self, id: ModuleId, forced: bool) {
+    pub fn start_trajectories(&mut self, id: ModuleId, numeric_only: bool) {
         let model = self.setup.model;
         let state = self.world.state(id).expect("a module with a rule");
         let rule = &model.rules[state.rule.expect("a module with a rule")];
         let Some(solve) = state.solve.map(|s| &rule.solves[s]) else {
-            self.set_motions(id, false, &[]);
+            self.set_trajectories(id, false, &[]);
             return;
         };
         if solve.of.is_empty() && solve.algebraic.is_empty() {
-            self.set_motions(id, false, &[]);
+            self.set_trajectories(id, false, &[]);
             return;
         }
-        let mut motions = std::mem::take(&mut self.flows.motions);
-        motions.clear();
-        motions.resize(rule.parameters.len(), Motion::Rest);
+        let mut trajectories = std::mem::take(&mut self.flows.trajectories);
+        trajectories.clear();
+        trajectories.resize(rule.parameters.len(), Trajectory::Rest);
         let mut refused = false;
-        if forced {
+        if numeric_only {
             for (component, &parameter) in solve.of.iter().enumerate() {
-                motions[parameter] = Motion::Step(component as u32);
+                trajectories[parameter] = Trajectory::Step(component as u32);
             }
-            closed_form::solved(solve, true, &mut motions);
+            closed_form::solved(solve, true, &mut trajectories);
         } else {
             let read = (rule, solve.stepping.laws_read());
             self.world.variables_read(read, id, &state.context, self.instant.at, &mut self.scratch.variables);
             self.scratch.variables.extend(state.switches.iter().map(|&on| f64::from(u8::from(on))));
-            refused = !closed_form::formulas(solve, rule.time_variable(), self.scratch, &mut motions)
-                || !closed_form::functions(solve, rule.time_variable(), self.scratch, &mut motions);
+            refused = !closed_form::formulas(solve, rule.time_variable(), self.scratch, &mut trajectories)
+                || !closed_form::functions(solve, rule.time_variable(), self.scratch, &mut trajectories);
         }
         if refused {
-            self.flows.motions = motions;
-            self.start_motions(id, true);
+            self.flows.trajectories = trajectories;
+            self.start_trajectories(id, true);
             return;
         }
-        self.set_motions(id, forced, &motions);
-        self.flows.motions = motions;
+        self.set_trajectories(id, numeric_only, &trajectories);
+        self.flows.trajectories = trajectories;
     }
 
-    fn set_motions(&mut self, id: ModuleId, forced: bool, motions: &[Motion]) {
+    fn set_trajectories(&mut self, id: ModuleId, numeric_only: bool, trajectories: &[Trajectory]) {
         let now = self.instant.at;
         let state = self.world.state_mut(id).expect("a module with a rule");
         state.since = now;
-        state.forced = forced;
-        state.motions.clear();
-        state.motions.extend(motions.iter().cloned());
+        state.numeric_only = numeric_only;
+        state.trajectories.clear();
+        state.trajectories.extend(trajectories.iter().cloned());
         state.window = 0.0;
         if let Some(step) = &mut state.step {
             step.live = false;
@@ -194,7 +194,7 @@ impl FlowStage<'_, '_> {
         let numeric = state.is_numeric() && !state.coupled;
         state.next = state.next.again();
         let (h, limit) = if numeric {
-            match self.step_alone(id, from) {
+            match self.step_independent(id, from) {
                 Ok(h) => (h, 1.0),
                 Err(error) => return self.arrest(id, from).ok_or(error),
             }
@@ -213,25 +213,25 @@ impl FlowStage<'_, '_> {
         };
         let state = self.world.state(id).expect("seen above");
         let path = Path::new(self.world, state, rule, from, h);
-        let found = self.detector.watcher.search(&path, limit);
-        let end = (state.motions.iter()).filter_map(Motion::end).reduce(f64::min);
+        let found = self.detector.crossings.search(&path, limit);
+        let end = (state.trajectories.iter()).filter_map(Trajectory::end).reduce(f64::min);
         let end = end.map(|tau| state.since.after(tau));
-        let (what, at) = match found.event {
-            Some(_) if found.in_doubt => (What::Doubt, found.touched[0].time),
-            Some(_) => (What::Event, found.touched[0].time),
-            None if numeric => (What::Window, state.step.as_ref().map_or(from, |s| s.dense.end)),
-            None if limit.is_finite() => (What::Window, from.after(h)),
-            None => (What::Nothing, from),
+        let (kind, at) = match found.event {
+            Some(_) if found.in_doubt => (NextKind::Doubt, found.touched[0].time),
+            Some(_) => (NextKind::Event, found.touched[0].time),
+            None if numeric => (NextKind::Window, state.step.as_ref().map_or(from, |s| s.dense.end)),
+            None if limit.is_finite() => (NextKind::Window, from.after(h)),
+            None => (NextKind::Nothing, from),
         };
-        let (what, at) = match end {
-            Some(end) if what == What::Nothing || end.since(at) < 0.0 => (What::Fault, end),
-            _ => (what, at),
+        let (kind, at) = match end {
+            Some(end) if kind == NextKind::Nothing || end.since(at) < 0.0 => (NextKind::Fault, end),
+            _ => (kind, at),
         };
         let state = self.world.state_mut(id).expect("seen above");
         let lasting = limit.is_infinite();
         let (near, before, index) = (found.near, state.next.near, state.rule);
-        state.next = Next { what, touched: found.touched, changes: found.changes, lasting, near };
-        if what == What::Nothing {
+        state.next = Next { kind, touched: found.touched, changes: found.changes, lasting, near };
+        if kind == NextKind::Nothing {
             self.schedule.cancel(who);
         } else {
             self.schedule.schedule(who, at);
@@ -262,7 +262,7 @@ impl FlowStage<'_, '_> {
             return None;
         }
         let state = self.world.state_mut(id)?;
-        state.next = Next { what: What::Event, touched, ..Next::default() };
+        state.next = Next { kind: NextKind::Event, touched, ..Next::default() };
         self.schedule.schedule(Owner::Module(id.slot() as u32), at);
         Some(())
     }
@@ -282,9 +282,9 @@ impl FlowStage<'_, '_> {
     fn rebase(&mut self, id: ModuleId, at: SimTime) {
         let state = self.world.state(id).expect("scheduled");
         let first = self.world.tree.places(id).start;
-        let ends: Vec<(usize, f64)> = (state.motions.iter().enumerate())
-            .filter_map(|(parameter, motion)| match motion {
-                Motion::Step(c) => {
+        let ends: Vec<(usize, f64)> = (state.trajectories.iter().enumerate())
+            .filter_map(|(parameter, trajectory)| match trajectory {
+                Trajectory::Step(c) => {
                     let dense: &Dense = &state.step.as_ref()?.dense;
                     Some((first + parameter, dense.value(*c as usize, dense.position(at))))
                 }
@@ -298,11 +298,11 @@ impl FlowStage<'_, '_> {
 
     /// Forgets all about a module that has been replaced, or has lost its rule.
     pub fn forget(&mut self, id: ModuleId) {
-        // What was kept of it stays as memory for the next that lives there.
+        // NextKind was kept of it stays as memory for the next that lives there.
         if let Some(state) = self.world.state_mut(id) {
             state.is_alive = false;
             if state.coupled {
-                self.flows.coupled.repaired = true;
+                self.flows.coupled.reintegrated = true;
                 self.flows.coupled.loosened.extend_from_slice(&state.context);
             }
             self.schedule.cancel(Owner::Module(id.slot() as u32));

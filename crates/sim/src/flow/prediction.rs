@@ -11,8 +11,8 @@ use smallvec::SmallVec;
 
 use super::closed_form;
 use crate::detect::signs::{NEAR, Reach, opposite, rate_at, reach, sign_at_birth};
-use crate::motion::Motion;
 use crate::scratch::Scratch;
+use crate::trajectory::Trajectory;
 use crate::world::life::{End, Life, LifeClass};
 use crate::world::state::{Change, Signs};
 use dlsys_model::{Condition, Law, Rule, Sign, Solve, Truth, ZeroCrossing};
@@ -23,7 +23,7 @@ pub struct Prediction {
     pub solve: Option<usize>,
     /// The signs of the rule's atoms from birth to the event.
     pub signs: Signs,
-    pub motions: SmallVec<[Motion; 2]>,
+    pub trajectories: SmallVec<[Trajectory; 2]>,
     /// None if the module lives for ever.
     pub end: Option<PredictedEnd>,
     /// The time from birth to the event (or none ever), if nothing else was in question: then it does not depend on when
@@ -41,7 +41,7 @@ pub enum PredictedEnd {
 }
 
 /// The instant at which the two sides of an atom meet.
-struct Crossing {
+struct PredictedCrossing {
     time: SimTime,
     /// The time from birth, if it was found as that.
     tau: Option<f64>,
@@ -56,7 +56,7 @@ pub fn predict(rule: &Rule, birth: SimTime, scratch: &mut Scratch) -> Option<Pre
     let holds = |guard: &Condition| guard.judge(|i| signs[i]) == Truth::Yes;
     if let Some(produce) = rule.produces.iter().position(|p| holds(&p.guard)) {
         let end = Some(PredictedEnd::AtBirth { produce });
-        return Some(Prediction { solve: None, signs, motions: SmallVec::new(), end, lasting: None });
+        return Some(Prediction { solve: None, signs, trajectories: SmallVec::new(), end, lasting: None });
     }
     if !clear {
         return None;
@@ -67,10 +67,10 @@ pub fn predict(rule: &Rule, birth: SimTime, scratch: &mut Scratch) -> Option<Pre
         None => None,
         Some(s) => Some(&rule.solves[s]),
     };
-    let motions = trajectories(rule, active, scratch)?;
-    let mut life = Prediction { solve, signs, motions, end: None, lasting: Some(None) };
+    let trajectories = trajectories(rule, active, scratch)?;
+    let mut life = Prediction { solve, signs, trajectories, end: None, lasting: Some(None) };
     life.find_first_event(rule, birth, scratch)?;
-    for end in life.motions.iter().filter_map(Motion::end) {
+    for end in life.trajectories.iter().filter_map(Trajectory::end) {
         match life.end {
             Some(PredictedEnd::Event { change, .. }) if change.time.since(birth) < end => {}
             _ => return None,
@@ -88,10 +88,10 @@ impl Prediction {
             if matches!(watch, ZeroCrossing::Search(_)) {
                 return None;
             }
-            let Some(crossing) = crossing(rule, self.solve, atom, &self.motions, birth, scratch) else {
+            let Some(crossing) = crossing(rule, self.solve, atom, &self.trajectories, birth, scratch) else {
                 continue;
             };
-            let Crossing { time, tau, level } = crossing;
+            let PredictedCrossing { time, tau, level } = crossing;
             if time.since(birth) <= 0.0 {
                 self.lasting = None;
                 continue;
@@ -129,10 +129,10 @@ pub fn retrace(rule: &Rule, class: &LifeClass, timeless: bool, life: &mut Life, 
     scratch.variables.extend_from_slice(&life.values);
     scratch.variables.extend([birth.to_f64(), birth.since(birth)]);
     let clause = class.solve.map(|s| &rule.solves[s]);
-    life.motions = trajectories(rule, clause, scratch).unwrap_or_default();
+    life.trajectories = trajectories(rule, clause, scratch).unwrap_or_default();
     (life.at, life.tau, life.level) = (birth, None, None);
     if let Some(End::Crossing { atom, .. }) = class.end
-        && let Some(crossing) = crossing(rule, class.solve, atom, &life.motions, birth, scratch)
+        && let Some(crossing) = crossing(rule, class.solve, atom, &life.trajectories, birth, scratch)
     {
         (life.at, life.level) = (crossing.time, crossing.level);
         life.tau = crossing.tau.filter(|_| timeless);
@@ -144,9 +144,9 @@ pub fn retrace(rule: &Rule, class: &LifeClass, timeless: bool, life: &mut Life, 
 pub fn values_at_event(life: &Life, at: SimTime, out: &mut Vec<f64>) {
     let tau = at.since(life.birth).max(0.0);
     for (i, &x) in life.values.iter().enumerate() {
-        out.push(match (life.motions.get(i), life.level) {
+        out.push(match (life.trajectories.get(i), life.level) {
             (_, Some((parameter, level))) if parameter == i => level,
-            (None | Some(Motion::Rest), _) => x,
+            (None | Some(Trajectory::Rest), _) => x,
             (Some(formula), _) => x + formula.value(tau),
         });
     }
@@ -154,15 +154,19 @@ pub fn values_at_event(life: &Life, at: SimTime, out: &mut Vec<f64>) {
 
 /// The trajectories under a clause from the variables in `scratch`; None if some have no simple closed form. An empty list
 /// means that no parameter moves.
-fn trajectories(rule: &Rule, clause: Option<&Solve>, scratch: &mut Scratch) -> Option<SmallVec<[Motion; 2]>> {
-    let mut motions = SmallVec::new();
-    let Some(clause) = clause.filter(|s| !s.of.is_empty()) else { return Some(motions) };
+fn trajectories(
+    rule: &Rule,
+    clause: Option<&Solve>,
+    scratch: &mut Scratch,
+) -> Option<SmallVec<[Trajectory; 2]>> {
+    let mut trajectories = SmallVec::new();
+    let Some(clause) = clause.filter(|s| !s.of.is_empty()) else { return Some(trajectories) };
     let simple = |law: &Law| matches!(law, Law::Polynomial(_) | Law::Quadratic(_) | Law::Driven(_));
     if !clause.switches.is_empty() || !clause.laws.iter().all(simple) {
         return None;
     }
-    motions.resize(rule.parameters.len(), Motion::Rest);
-    closed_form::formulas(clause, rule.time_variable(), scratch, &mut motions).then_some(motions)
+    trajectories.resize(rule.parameters.len(), Trajectory::Rest);
+    closed_form::formulas(clause, rule.time_variable(), scratch, &mut trajectories).then_some(trajectories)
 }
 
 /// The signs of a newborn module's atoms, and whether all are clearly different from zero.
@@ -191,10 +195,10 @@ fn crossing(
     rule: &Rule,
     solve: Option<usize>,
     atom: usize,
-    motions: &[Motion],
+    trajectories: &[Trajectory],
     birth: SimTime,
     scratch: &mut Scratch,
-) -> Option<Crossing> {
+) -> Option<PredictedCrossing> {
     let ZeroCrossing::Formula { variable, level } = &rule.watch(solve)[atom] else { return None };
     let (variable, time) = (*variable, rule.time_variable());
     let clause = solve.map(|s| &rule.solves[s]);
@@ -207,11 +211,11 @@ fn crossing(
     let [level] = out;
     let start = variables[variable];
     let exact = || rate_at(clause, variables, variable, level, registers, rates);
-    let tau = match reach(variable, time, level, motions.get(variable), start, exact)? {
-        Reach::At(time) => return Some(Crossing { time, tau: None, level: None }),
+    let tau = match reach(variable, time, level, trajectories.get(variable), start, exact)? {
+        Reach::At(time) => return Some(PredictedCrossing { time, tau: None, level: None }),
         Reach::Age(age) => age - start,
         Reach::After(tau) => tau,
     };
     let level = (variable < time).then_some((variable, level));
-    Some(Crossing { time: birth.after(tau), tau: Some(tau), level })
+    Some(PredictedCrossing { time: birth.after(tau), tau: Some(tau), level })
 }

@@ -1,7 +1,7 @@
 //! Rates of parameters at an instant, by the equations that are active there, and values a little ahead.
 
 use super::FlowStage;
-use crate::world::context::{Around, gather};
+use crate::world::context::{Context, gather};
 use dlsys_expr::Dual;
 use dlsys_model::Rule;
 use dlsys_tree::ModuleId;
@@ -27,7 +27,7 @@ impl FlowStage<'_, '_> {
         &mut self,
         rule: &Rule,
         id: ModuleId,
-        around: &Around,
+        around: &Context,
         tau: f64,
         depth: usize,
         own: &[f64],
@@ -45,7 +45,7 @@ impl FlowStage<'_, '_> {
         &mut self,
         rule: &Rule,
         id: ModuleId,
-        around: &Around,
+        around: &Context,
         tau: f64,
         reads_context: bool,
         depth: usize,

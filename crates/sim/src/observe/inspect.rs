@@ -7,7 +7,7 @@ use dlsys_tree::{Lineage, ModuleId, SimTime, Visit};
 
 /// A module as it is seen from another.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Seen {
+pub struct ModuleView {
     pub kind: KindId,
     pub lineage: Lineage,
     /// At the time of the inspection.
@@ -17,7 +17,7 @@ pub struct Seen {
 /// A module with its rates and its neighbours.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inspection {
-    pub module: Seen,
+    pub module: ModuleView,
     /// Derivatives of the parameters by time, in the model's unit.
     pub rates: Vec<f64>,
     /// Time of birth.
@@ -27,10 +27,10 @@ pub struct Inspection {
     pub rule: Option<usize>,
     pub solve: Option<usize>,
     /// The modules that the rule's context has found, left to right as written.
-    pub context: Vec<Seen>,
+    pub context: Vec<ModuleView>,
     /// The nearest modules that count as context, to the left and to the right (LANGUAGE, "Context").
-    pub left: Option<Seen>,
-    pub right: Option<Seen>,
+    pub left: Option<ModuleView>,
+    pub right: Option<ModuleView>,
 }
 
 impl Simulation<'_> {
@@ -82,12 +82,12 @@ impl Simulation<'_> {
         lazy::materialise(&mut self.world, rules, id, &self.instant, &mut self.scratch);
     }
 
-    fn seen(&mut self, id: ModuleId) -> Seen {
+    fn seen(&mut self, id: ModuleId) -> ModuleView {
         self.materialise(id);
         let mut parameters = Vec::new();
         self.world.values(id, self.instant.at, &mut parameters);
         let tree = &self.world.tree;
         parameters.truncate(tree.shown(id));
-        Seen { kind: tree.kind(id), lineage: tree.lineage(id), parameters }
+        ModuleView { kind: tree.kind(id), lineage: tree.lineage(id), parameters }
     }
 }

@@ -1,9 +1,9 @@
 //! Observation: the structure written out at an instant, in two passes.
 //!
-//! The first goes through the structure in string order and writes who is there, with the values of which motions are
+//! The first goes through the structure in string order and writes who is there, with the values of which trajectories are
 //! displacements; it also notes who moves. It is made anew only when the structure has changed: from frame to frame a
 //! string stays, but for the second pass, which goes through those that move, by class: the coefficients of their
-//! motions are evaluated for many modules at once (`Program::eval_lanes`, to the same bits as one by one), and once
+//! trajectories are evaluated for many modules at once (`Program::eval_lanes`, to the same bits as one by one), and once
 //! for twins.
 
 pub mod cache;
@@ -12,7 +12,7 @@ pub mod inspect;
 use crate::budget::afford_string;
 use crate::error::Error;
 use crate::kernel::Simulation;
-use crate::motion::{Flow, Riccati};
+use crate::trajectory::{Flow, Riccati};
 use crate::world::life::LifeClass;
 use crate::world::site_of_axiom;
 use cache::{Column, FrameCache};
@@ -82,7 +82,7 @@ impl Simulation<'_> {
         columns.resize(self.world.lives.len(), Column::default());
         others.clear();
         let world = &self.world;
-        // What rests need not be looked at again.
+        // NextKind rests need not be looked at again.
         let moves: Vec<bool> = (0..world.lives.len())
             .map(|label| {
                 let class = world.lives.get(label as u16).expect("as many as there are columns");
@@ -133,7 +133,7 @@ impl Simulation<'_> {
                     continue;
                 }
                 let moved: Lanes = match law {
-                    // What is at rest is what it was in the frame before.
+                    // NextKind is at rest is what it was in the frame before.
                     Law::Polynomial(program) if again && is_zero(program) => continue,
                     Law::Polynomial(program) => polynomial(program, registers, parameter, &tau),
                     Law::Quadratic(program) => {
@@ -225,7 +225,7 @@ fn driven(
     moved
 }
 
-/// A parameter with a polynomial rate at the time `tau` after birth, for each lane: as `Motion::value` has it.
+/// A parameter with a polynomial rate at the time `tau` after birth, for each lane: as `Trajectory::value` has it.
 fn polynomial(program: &Program, registers: &mut Vec<Lanes>, parameter: usize, tau: &Lanes) -> Lanes {
     let mut c = [[0.0; LANES]; 4];
     for (power, register) in program.eval_lanes(registers).enumerate() {
@@ -233,7 +233,7 @@ fn polynomial(program: &Program, registers: &mut Vec<Lanes>, parameter: usize, t
     }
     let starts = &registers[parameter];
     if program.outputs() == 1 {
-        // What is added to the first coefficient is zero.
+        // NextKind is added to the first coefficient is zero.
         return std::array::from_fn(|i| starts[i] + tau[i] * (c[0][i] + tau[i] * 0.0));
     }
     std::array::from_fn(|i| {

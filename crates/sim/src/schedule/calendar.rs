@@ -20,17 +20,17 @@ const NOWHERE: u32 = u32::MAX;
 
 /// The time in halves, so that four bytes less are needed.
 #[derive(Clone, Copy, Debug)]
-struct Entry {
+struct CalendarEntry {
     high: u32,
     low: u32,
     slot: u32,
 }
 
-impl Entry {
+impl CalendarEntry {
     #[inline]
-    fn new(time: f64, slot: u32) -> Entry {
+    fn new(time: f64, slot: u32) -> CalendarEntry {
         let bits = time.to_bits();
-        Entry { high: (bits >> 32) as u32, low: bits as u32, slot }
+        CalendarEntry { high: (bits >> 32) as u32, low: bits as u32, slot }
     }
 
     #[inline]
@@ -42,15 +42,15 @@ impl Entry {
 /// Events in order, in which many of one time are one entry: a thousand cells that divide together cost one place in
 /// the order, and one push each.
 ///
-/// What is put in is mostly later than all before it of its kind: newborns that live as long as each other. Such events
+/// NextKind is put in is mostly later than all before it of its kind: newborns that live as long as each other. Such events
 /// wait in a few lines, first in, first out; the heap is for what comes out of turn. A line is read and written in the
 /// order of memory, a heap of a million events at ten places for each.
 #[derive(Clone, Debug)]
 pub struct CalendarQueue {
-    lines: [VecDeque<Entry>; LINES],
+    lines: [VecDeque<CalendarEntry>; LINES],
     /// The last time of each line.
     ends: [f64; LINES],
-    heap: Vec<Entry>,
+    heap: Vec<CalendarEntry>,
     /// The first place of the heap is empty: most events are followed by a later one, which is put there.
     hole: bool,
     runs: Vec<Vec<u32>>,
@@ -58,7 +58,7 @@ pub struct CalendarQueue {
     /// Times lately put in, by a hash, with their runs.
     recent: [(u64, u32); RECENT],
     /// The earliest entry and the line where it stands (none for the heap), once somebody has asked.
-    first: Option<(Entry, Option<usize>)>,
+    first: Option<(CalendarEntry, Option<usize>)>,
 }
 
 impl Default for CalendarQueue {
@@ -112,14 +112,14 @@ impl CalendarQueue {
     }
 
     #[inline]
-    fn first(&mut self) -> Option<(Entry, Option<usize>)> {
+    fn first(&mut self) -> Option<(CalendarEntry, Option<usize>)> {
         if self.first.is_none() {
             self.first = self.find_first();
         }
         self.first
     }
 
-    fn find_first(&self) -> Option<(Entry, Option<usize>)> {
+    fn find_first(&self) -> Option<(CalendarEntry, Option<usize>)> {
         let mut first = self.first_of_heap().map(|entry| (entry, None));
         for (line, entries) in self.lines.iter().enumerate() {
             if let Some(&entry) = entries.front()
@@ -131,7 +131,7 @@ impl CalendarQueue {
         first
     }
 
-    fn first_of_heap(&self) -> Option<Entry> {
+    fn first_of_heap(&self) -> Option<CalendarEntry> {
         if !self.hole {
             return self.heap.first().copied();
         }
@@ -143,7 +143,7 @@ impl CalendarQueue {
     pub fn pop(&mut self, out: &mut Vec<u32>) {
         let Some(time) = self.earliest() else { return };
         while let Some((_, line)) = self.first().filter(|(entry, _)| entry.time() == time) {
-            let Some(Entry { slot, .. }) = (match line {
+            let Some(CalendarEntry { slot, .. }) = (match line {
                 Some(line) => self.pop_line(line),
                 None => self.pop_heap(),
             }) else {
@@ -169,7 +169,7 @@ impl CalendarQueue {
     }
 
     fn push_entry(&mut self, time: f64, slot: u32) {
-        let entry = Entry::new(time, slot);
+        let entry = CalendarEntry::new(time, slot);
         // The line that it fits best: the others stay free for what comes earlier.
         let mut line = None;
         for (i, end) in self.ends.iter().enumerate() {
@@ -201,7 +201,7 @@ impl CalendarQueue {
         self.heap[at] = entry;
     }
 
-    fn pop_line(&mut self, line: usize) -> Option<Entry> {
+    fn pop_line(&mut self, line: usize) -> Option<CalendarEntry> {
         let entry = self.lines[line].pop_front();
         if self.lines[line].is_empty() {
             self.ends[line] = f64::NEG_INFINITY;
@@ -209,7 +209,7 @@ impl CalendarQueue {
         entry
     }
 
-    fn pop_heap(&mut self) -> Option<Entry> {
+    fn pop_heap(&mut self) -> Option<CalendarEntry> {
         self.fill_hole();
         self.hole = !self.heap.is_empty();
         self.heap.first().copied()
@@ -222,14 +222,14 @@ impl CalendarQueue {
         {
             self.sift_down(last);
         }
-        // What goes from the heap into lines is not to be paid for twice.
+        // NextKind goes from the heap into lines is not to be paid for twice.
         if self.heap.capacity() > LARGE && self.heap.len() < self.heap.capacity() / 2 {
             self.heap.shrink_to(self.heap.len() + self.heap.len() / 4);
         }
     }
 
     /// Puts an entry into the first place, and sets the heap in order.
-    fn sift_down(&mut self, entry: Entry) {
+    fn sift_down(&mut self, entry: CalendarEntry) {
         let heap = &mut self.heap[..];
         let wanted = entry.time();
         let mut at = 0;

@@ -1,4 +1,4 @@
-//! What a module reads of others: its context, and the modules attached to it.
+//! NextKind a module reads of others: its context, and the modules attached to it.
 
 use std::ops::Deref;
 
@@ -11,14 +11,14 @@ use dlsys_tree::ModuleId;
 /// The modules that a rule looks at: those of its context in the order of its variables, then, for each of its
 /// aggregates, those attached to it that match.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Around {
+pub struct Context {
     modules: SmallVec<[ModuleId; 2]>,
     /// Where the children of each aggregate end.
     ends: SmallVec<[u32; 1]>,
     context: u32,
 }
 
-impl Deref for Around {
+impl Deref for Context {
     type Target = [ModuleId];
 
     fn deref(&self) -> &[ModuleId] {
@@ -26,7 +26,7 @@ impl Deref for Around {
     }
 }
 
-impl<'a> IntoIterator for &'a Around {
+impl<'a> IntoIterator for &'a Context {
     type Item = &'a ModuleId;
     type IntoIter = std::slice::Iter<'a, ModuleId>;
 
@@ -35,7 +35,7 @@ impl<'a> IntoIterator for &'a Around {
     }
 }
 
-impl Around {
+impl Context {
     pub fn clear(&mut self) {
         self.modules.clear();
         self.ends.clear();
@@ -82,7 +82,7 @@ impl Around {
 /// the parameters of a child.
 pub fn gather<T: Value>(
     rule: &Rule,
-    around: &Around,
+    around: &Context,
     time: [T; 2],
     variables: &mut Vec<T>,
     scratch: &mut Scratch<T>,

@@ -1,14 +1,14 @@
-//! What is known of a light module besides its numbers.
+//! NextKind is known of a light module besides its numbers.
 //!
 //! A module is *light* if it reads nobody, is read by nobody, follows formulas only, and if its next event is a formula
 //! and a production (`quick` finds that out when it is born). Then its birth and the values it was born with determine
-//! all its life: motions, instant of the event, successor. They are computed from them by the same code, hence to the
+//! all its life: trajectories, instant of the event, successor. They are computed from them by the same code, hence to the
 //! same bits, whenever somebody asks, and nothing is kept of the module but a number: that of its [`LifeClass`]. A model
 //! has a few classes; a module has one from its birth to its end.
 
 use smallvec::SmallVec;
 
-use crate::motion::Motion;
+use crate::trajectory::Trajectory;
 use crate::world::state::Signs;
 use dlsys_expr::Program;
 use dlsys_model::{Law, Model, Rule, Sign, Solve, ZeroCrossing};
@@ -19,14 +19,14 @@ pub const REFUSED: u16 = NO_LABEL - 1;
 /// Most classes of one rule; a model with more of them has conditions without number.
 const MAX_CAREERS: usize = 64;
 
-/// What all modules that live through the same have in common.
+/// NextKind all modules that live through the same have in common.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LifeClass {
     pub rule: usize,
     pub solve: Option<usize>,
     /// Of the rule's atoms, from birth to the event.
     pub signs: Signs,
-    /// What comes; None if nothing does.
+    /// NextKind comes; None if nothing does.
     pub end: Option<End>,
 }
 
@@ -59,10 +59,10 @@ pub struct Life {
     pub birth: SimTime,
     /// Those it was born with.
     pub values: SmallVec<[f64; 4]>,
-    pub motions: SmallVec<[Motion; 2]>,
+    pub trajectories: SmallVec<[Trajectory; 2]>,
     /// The event, if there is one.
     pub at: SimTime,
-    /// The time from birth to the event, if that and the motions are the same whenever a module is born.
+    /// The time from birth to the event, if that and the trajectories are the same whenever a module is born.
     pub tau: Option<f64>,
     /// The parameter that meets a level at the event, with the level.
     pub level: Option<(usize, f64)>,
@@ -72,25 +72,25 @@ pub struct Life {
     pub arguments: Vec<f64>,
     /// Which of the successors that the production has.
     pub successor: usize,
-    pub children: Vec<Child>,
+    pub children: Vec<Newborn>,
     pub residual: f64,
     /// All that is said of the end here is the same whenever a module with these values is born; but for the times of the
     /// children's events, which come as long after as they say.
     pub lasting: bool,
 }
 
-/// What modules of a rule are going to do that are born with these values, whenever that is.
+/// NextKind modules of a rule are going to do that are born with these values, whenever that is.
 #[derive(Clone, Debug)]
-pub struct Forecast {
+pub struct CachedPrediction {
     pub values: SmallVec<[f64; 4]>,
     pub label: u16,
     /// The time to the event, if there is one.
     pub tau: Option<f64>,
 }
 
-/// What a module of a successor is going to do.
+/// NextKind a module of a successor is going to do.
 #[derive(Clone, Copy, Debug)]
-pub struct Child {
+pub struct Newborn {
     /// Of its class; or [`REFUSED`]; or [`NO_LABEL`]: there is nothing to know, or it has a context.
     pub label: u16,
     /// Of its event.
@@ -152,7 +152,7 @@ pub struct Lives {
     /// By rule and production: what comes of it depends on the values at birth only.
     lasting: Vec<Vec<bool>>,
     /// By rule: the last one, if it is timeless.
-    pub forecasts: Vec<Option<Forecast>>,
+    pub cached: Vec<Option<CachedPrediction>>,
 }
 
 impl Lives {
@@ -169,15 +169,15 @@ impl Lives {
         let rules = (model.kinds.iter())
             .map(|(id, kind)| {
                 let alone = !kinds_with_context[id.index()] && !seen[id.index()] && kind.steps.is_empty();
-                // What has a value or an equation must be made consistent first.
+                // NextKind has a value or an equation must be made consistent first.
                 kind.rules.first().copied().filter(|rule| alone && !model.rules[*rule].is_algebraic())
             })
             .collect();
         let of_rule = vec![Vec::new(); model.rules.len()];
         let timeless = model.rules.iter().map(is_timeless).collect();
         let lasting = model.rules.iter().map(lasting_productions).collect();
-        let forecasts = vec![None; model.rules.len()];
-        Lives { all: Vec::new(), lives: Vec::new(), of_rule, rules, timeless, lasting, forecasts }
+        let cached = vec![None; model.rules.len()];
+        Lives { all: Vec::new(), lives: Vec::new(), of_rule, rules, timeless, lasting, cached }
     }
 
     /// True if nothing in a rule depends on the time of birth.

@@ -7,16 +7,16 @@
 //! - [`life`]: lazy modules
 
 pub mod context;
-pub mod course;
+pub mod coupled_solution;
 pub mod life;
 pub mod neighbours;
 pub mod path;
 pub mod state;
 
 use crate::error::{Error, Site};
-use crate::motion::Motion;
-use context::{Around, gather};
-use course::Course;
+use crate::trajectory::Trajectory;
+use context::{Context, gather};
+use coupled_solution::CoupledSolution;
 use dlsys_diagnostic::Span;
 use dlsys_model::{KindId, Model, Rule};
 use dlsys_tree::{Lineage, ModuleId, SimTime, Tree, Visit};
@@ -32,17 +32,17 @@ pub struct Instant {
     pub number: u64,
 }
 
-/// The growing structure with the motions of its parameters.
+/// The growing structure with the trajectories of its parameters.
 #[derive(Clone, Debug)]
 pub struct World {
-    /// Its values are those at the start of each motion.
+    /// Its values are those at the start of each trajectory.
     pub tree: Tree,
     /// By slot of the tree, as far as there are any; None for modules without rules, and for light ones.
     pub states: Vec<Option<Box<State>>>,
-    /// What is known of light modules, whose labels in the tree are numbers of life classes.
+    /// NextKind is known of light modules, whose labels in the tree are numbers of life classes.
     pub lives: Lives,
     /// How the coupled modules move.
-    pub coupled: Option<Course>,
+    pub coupled: Option<CoupledSolution>,
     /// Number of changes of the structure.
     pub structure: u64,
 }
@@ -101,31 +101,31 @@ impl World {
 
     /// A parameter, moving since `state.since` from the value `x`, at an instant.
     #[inline]
-    fn moved(&self, state: &State, motion: &Motion, x: f64, at: SimTime) -> f64 {
-        match motion {
-            Motion::Rest => x,
-            Motion::Step(component) => match state.step.as_ref().filter(|s| s.live) {
+    fn moved(&self, state: &State, trajectory: &Trajectory, x: f64, at: SimTime) -> f64 {
+        match trajectory {
+            Trajectory::Rest => x,
+            Trajectory::Step(component) => match state.step.as_ref().filter(|s| s.live) {
                 Some(step) => step.dense.value(*component as usize, step.dense.position(at)),
                 None => x,
             },
-            Motion::Coupled(component) => match &self.coupled {
-                Some(course) => course.value(*component as usize, at).unwrap_or(x),
+            Trajectory::Coupled(component) => match &self.coupled {
+                Some(solution) => solution.value(*component as usize, at).unwrap_or(x),
                 None => x,
             },
             formula => x + formula.value(at.since(state.since).max(0.0)),
         }
     }
 
-    /// The parameters of a module at an instant, appended to `out`; not of a light one, whose motions are not here.
+    /// The parameters of a module at an instant, appended to `out`; not of a light one, whose trajectories are not here.
     pub fn values(&self, id: ModuleId, at: SimTime, out: &mut Vec<f64>) {
         debug_assert!(self.lives.get(self.tree.label(id)).is_none_or(|class| class.is_over_at_birth()));
         let values = self.tree.parameters(id);
-        match self.state(id).filter(|s| !s.motions.is_empty()) {
+        match self.state(id).filter(|s| !s.trajectories.is_empty()) {
             None => out.extend_from_slice(values),
             Some(state) => {
-                for (&x, motion) in values.iter().zip(&state.motions[..]) {
-                    let rests = matches!(motion, Motion::Rest);
-                    out.push(if rests { x } else { self.moved(state, motion, x, at) });
+                for (&x, trajectory) in values.iter().zip(&state.trajectories[..]) {
+                    let rests = matches!(trajectory, Trajectory::Rest);
+                    out.push(if rests { x } else { self.moved(state, trajectory, x, at) });
                 }
             }
         }
@@ -134,11 +134,11 @@ impl World {
     /// One parameter of a module at an instant.
     pub fn value(&self, id: ModuleId, parameter: usize, at: SimTime) -> f64 {
         let x = self.tree.parameters(id)[parameter];
-        let moving = self.state(id).and_then(|s| Some((s, s.motions.get(parameter)?)));
-        moving.map_or(x, |(state, motion)| self.moved(state, motion, x, at))
+        let moving = self.state(id).and_then(|s| Some((s, s.trajectories.get(parameter)?)));
+        moving.map_or(x, |(state, trajectory)| self.moved(state, trajectory, x, at))
     }
 
-    /// Makes the values at an instant those of the tree, and the motions begin there, all at rest.
+    /// Makes the values at an instant those of the tree, and the trajectories begin there, all at rest.
     pub fn rebase(&mut self, id: ModuleId, at: SimTime) {
         self.rebase_except(id, at, &[]);
     }
@@ -148,11 +148,11 @@ impl World {
         let places = self.tree.places(id);
         let mut moved: SmallVec<[(usize, f64); 4]> = SmallVec::new();
         let Some(state) = self.state(id) else { return };
-        for ((i, place), motion) in places.enumerate().zip(&state.motions[..]) {
+        for ((i, place), trajectory) in places.enumerate().zip(&state.trajectories[..]) {
             if let Some(&(_, value)) = given.iter().find(|(parameter, _)| *parameter == i) {
                 moved.push((place, value));
-            } else if !matches!(motion, Motion::Rest) {
-                moved.push((place, self.moved(state, motion, self.tree.values()[place], at)));
+            } else if !matches!(trajectory, Trajectory::Rest) {
+                moved.push((place, self.moved(state, trajectory, self.tree.values()[place], at)));
             }
         }
         for (place, value) in moved {
@@ -160,21 +160,21 @@ impl World {
         }
         let Some(state) = self.state_mut(id) else { return };
         state.since = at;
-        for motion in &mut state.motions {
-            *motion = Motion::Rest;
+        for trajectory in &mut state.trajectories {
+            *trajectory = Trajectory::Rest;
         }
     }
 
     /// The end of the stretch, from an instant on, in which all coupled components that a module reads follow one polynomial.
-    pub fn knot(&self, state: &State, course: &Course, from: SimTime) -> SimTime {
-        let mut knot = course.end;
-        if course.is_whole() {
+    pub fn knot(&self, state: &State, solution: &CoupledSolution, from: SimTime) -> SimTime {
+        let mut knot = solution.end;
+        if solution.is_whole() {
             return knot;
         }
         for &id in std::iter::once(&state.id).chain(&state.context) {
-            for motion in self.state(id).map_or(&[][..], |s| &s.motions) {
-                if let Motion::Coupled(component) = motion {
-                    let end = course.knot(*component as usize, from);
+            for trajectory in self.state(id).map_or(&[][..], |s| &s.trajectories) {
+                if let Trajectory::Coupled(component) = trajectory {
+                    let end = solution.knot(*component as usize, from);
                     if end.since(knot) < 0.0 {
                         knot = end;
                     }
@@ -185,7 +185,7 @@ impl World {
     }
 
     /// The variables of a rule at an instant: parameters, those of the context, aggregates, `t` and `age`.
-    pub fn variables(&self, rule: &Rule, id: ModuleId, around: &Around, at: SimTime, out: &mut Vec<f64>) {
+    pub fn variables(&self, rule: &Rule, id: ModuleId, around: &Context, at: SimTime, out: &mut Vec<f64>) {
         out.clear();
         self.values(id, at, out);
         for module in around.context() {
@@ -206,7 +206,7 @@ impl World {
         &self,
         (rule, reads): (&Rule, &[bool]),
         id: ModuleId,
-        around: &Around,
+        around: &Context,
         at: SimTime,
         out: &mut Vec<f64>,
     ) {

@@ -2,7 +2,7 @@
 //!
 //! The nearest module that is not skipped, on either side, is remembered once it has been found, and handed on from a
 //! module to its successor. So finding a context costs the same however many finished branches stand between: they are
-//! not passed again. What is remembered stays right until the neighbour dies, because nothing else can come between;
+//! not passed again. NextKind is remembered stays right until the neighbour dies, because nothing else can come between;
 //! only where a skipped module turns into one that counts is everything forgotten.
 //!
 //! Whoever was looked at, matching or not, knows who looked: when it dies, those look again, and nobody else.
@@ -43,11 +43,11 @@ struct Near {
     right: Link,
 }
 
-/// What is remembered, by slot of the tree.
+/// NextKind is remembered, by slot of the tree.
 #[derive(Clone, Debug, Default)]
 pub struct Neighbours {
     near: Vec<Near>,
-    /// What stands left of what stood right of a module that has died at this instant.
+    /// NextKind stands left of what stood right of a module that has died at this instant.
     forwards: Forwards,
     lookers: Vec<SmallVec<[ModuleId; 4]>>,
 }
@@ -222,7 +222,7 @@ impl Neighbours {
             None => (Link::End, Link::End),
         };
         let mut made = made.iter().copied();
-        // What stands left of the next module, and the last on the same axis.
+        // NextKind stands left of the next module, and the last on the same axis.
         let (mut before, mut last): (Link, Option<ModuleId>) = (left, None);
         let mut outer = Vec::new();
         let mut first = None;

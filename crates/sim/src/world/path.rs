@@ -2,8 +2,8 @@
 
 use super::World;
 use super::context::gather;
-use crate::motion::Motion;
-use crate::world::course::Piece;
+use crate::trajectory::Trajectory;
+use crate::world::coupled_solution::DenseComponent;
 use crate::world::state::State;
 use dlsys_expr::{Dual, Interval, Value};
 use dlsys_model::{Rule, Sum};
@@ -44,23 +44,23 @@ impl<'p> Path<'p> {
         Path { wanted: &[], step, ..Path::new(world, state, rule, start, h) }
     }
 
-    /// What numeric motions follow along this stretch.
-    fn piece<'s>(&'s self, state: &'s State, motion: &Motion) -> Option<Piece<'s>> {
-        match motion {
-            Motion::Step(c) => {
+    /// NextKind numeric trajectories follow along this stretch.
+    fn piece<'s>(&'s self, state: &'s State, trajectory: &Trajectory) -> Option<DenseComponent<'s>> {
+        match trajectory {
+            Trajectory::Step(c) => {
                 let own = self.step.filter(|_| state.id == self.state.id);
                 let dense = own.or(state.step.as_ref().map(|step| &step.dense))?;
-                Some(Piece::new(dense, *c as usize, self.start, self.h))
+                Some(DenseComponent::new(dense, *c as usize, self.start, self.h))
             }
-            Motion::Coupled(c) => self.world.coupled.as_ref()?.piece(*c as usize, self.start, self.h),
+            Trajectory::Coupled(c) => self.world.coupled.as_ref()?.piece(*c as usize, self.start, self.h),
             _ => None,
         }
     }
 
     /// Bounds of an own parameter over the whole stretch, if it follows dense output.
     pub fn dense_bounds(&self, parameter: usize) -> Option<Interval> {
-        let motion = self.state.motions.get(parameter)?;
-        Some(self.piece(self.state, motion)?.bounds())
+        let trajectory = self.state.trajectories.get(parameter)?;
+        Some(self.piece(self.state, trajectory)?.bounds())
     }
 
     /// Gives each variable that is wanted to one of three functions: values that rest, pieces of dense output, and formulas
@@ -69,8 +69,8 @@ impl<'p> Path<'p> {
         &self,
         out: &mut Vec<T>,
         rest: impl Fn(f64) -> T,
-        piece: impl Fn(&Piece) -> T,
-        formula: impl Fn(&Motion, f64, f64) -> T,
+        piece: impl Fn(&DenseComponent) -> T,
+        formula: impl Fn(&Trajectory, f64, f64) -> T,
         time: impl Fn(f64) -> T,
     ) {
         out.clear();
@@ -81,20 +81,20 @@ impl<'p> Path<'p> {
                 // Any value will do.
                 return out.extend(values.iter().map(|x| rest(*x)));
             }
-            let Some(state) = self.world.state(id).filter(|s| !s.motions.is_empty()) else {
+            let Some(state) = self.world.state(id).filter(|s| !s.trajectories.is_empty()) else {
                 return out.extend(values.iter().map(|x| rest(*x)));
             };
             let offset = self.start.since(state.since);
-            for (&x, motion) in values.iter().zip(&state.motions) {
+            for (&x, trajectory) in values.iter().zip(&state.trajectories) {
                 let reads = reads(out.len());
-                out.push(match motion {
+                out.push(match trajectory {
                     _ if !reads => rest(x),
-                    Motion::Rest => rest(x),
-                    Motion::Step(_) | Motion::Coupled(_) => match self.piece(state, motion) {
+                    Trajectory::Rest => rest(x),
+                    Trajectory::Step(_) | Trajectory::Coupled(_) => match self.piece(state, trajectory) {
                         Some(along) => piece(&along),
                         None => rest(x),
                     },
-                    motion => formula(motion, x, offset),
+                    trajectory => formula(trajectory, x, offset),
                 });
             }
         };
@@ -122,7 +122,7 @@ impl<'p> Path<'p> {
             out,
             |x| x,
             |piece| piece.value(position),
-            |motion, x, offset| x + motion.value(offset + tau),
+            |trajectory, x, offset| x + trajectory.value(offset + tau),
             |t| t + tau,
         );
     }
@@ -134,7 +134,10 @@ impl<'p> Path<'p> {
             out,
             Dual::constant,
             |piece| piece.departure(),
-            |motion, x, offset| Dual { value: x + motion.value(offset), rate: h * motion.rate(offset) },
+            |trajectory, x, offset| Dual {
+                value: x + trajectory.value(offset),
+                rate: h * trajectory.rate(offset),
+            },
             |t| Dual { value: t, rate: h },
         );
     }
@@ -155,8 +158,8 @@ impl<'p> Path<'p> {
                 true => Interval::constant(piece.value(0.5 * (lo + hi))),
                 false => piece.over(lo, hi).value,
             },
-            |motion, x, offset| {
-                let value = motion.over(offset + lo * h, offset + hi * h).value;
+            |trajectory, x, offset| {
+                let value = trajectory.over(offset + lo * h, offset + hi * h).value;
                 Interval { lo: x + value.lo, hi: x + value.hi, ..value }
             },
             |t| Interval::spanned(t + lo * h, t + hi * h),
@@ -171,8 +174,8 @@ impl<'p> Path<'p> {
             out,
             Dual::constant,
             |piece| piece.over(lo, hi),
-            |motion, x, offset| {
-                let Dual { value, rate } = motion.over(offset + lo * h, offset + hi * h);
+            |trajectory, x, offset| {
+                let Dual { value, rate } = trajectory.over(offset + lo * h, offset + hi * h);
                 let shifted = Interval { lo: x + value.lo, hi: x + value.hi, ..value };
                 Dual { value: shifted, rate: Interval { lo: h * rate.lo, hi: h * rate.hi, ..rate } }
             },
@@ -193,9 +196,9 @@ impl<'p> Path<'p> {
                 is_here
             })?;
             let state = self.world.state(id);
-            match state.and_then(|state| Some((state, state.motions.get(parameter)?))) {
-                Some((state, motion)) if !matches!(motion, Motion::Rest) => {
-                    if !self.piece(state, motion)?.add_to(factor, &mut moving) {
+            match state.and_then(|state| Some((state, state.trajectories.get(parameter)?))) {
+                Some((state, trajectory)) if !matches!(trajectory, Trajectory::Rest) => {
+                    if !self.piece(state, trajectory)?.add_to(factor, &mut moving) {
                         return None;
                     }
                 }
@@ -207,7 +210,7 @@ impl<'p> Path<'p> {
         Some(Dual { value: Interval { lo: value.lo + constant, hi: value.hi + constant, ..value }, rate })
     }
 
-    /// What the values may be at a position, given the errors of integration and of rounding.
+    /// NextKind the values may be at a position, given the errors of integration and of rounding.
     pub fn uncertain(&self, position: f64, out: &mut Vec<Interval>) {
         let tau = position * self.h;
         let around = |x: f64, more: f64| {
@@ -221,24 +224,24 @@ impl<'p> Path<'p> {
             |piece| {
                 around(piece.value(position), piece.error() * piece.over(0.0, position).value.magnitude())
             },
-            |motion, x, offset| around(x + motion.value(offset + tau), ROUNDING * x.abs()),
+            |trajectory, x, offset| around(x + trajectory.value(offset + tau), ROUNDING * x.abs()),
             |t| around(t + tau, 0.0),
         );
     }
 
-    /// What integrated values along the path may be wrong by, as a part of their size; 0 if there are none.
+    /// NextKind integrated values along the path may be wrong by, as a part of their size; 0 if there are none.
     pub fn error(&self) -> f64 {
-        let course = self.world.coupled.as_ref().map_or(0.0, |course| course.error);
-        if self.state.coupled && course > 0.0 {
-            return course;
+        let solution = self.world.coupled.as_ref().map_or(0.0, |solution| solution.error);
+        if self.state.coupled && solution > 0.0 {
+            return solution;
         }
         let error = |state: &State| {
-            let of = |motion: &Motion| match motion {
-                Motion::Coupled(_) => course,
-                Motion::Step(_) => state.step.as_ref().map_or(0.0, |step| step.dense.error),
+            let of = |trajectory: &Trajectory| match trajectory {
+                Trajectory::Coupled(_) => solution,
+                Trajectory::Step(_) => state.step.as_ref().map_or(0.0, |step| step.dense.error),
                 _ => 0.0,
             };
-            state.motions.iter().map(of).fold(0.0, f64::max)
+            state.trajectories.iter().map(of).fold(0.0, f64::max)
         };
         let others = self.state.context.iter().filter_map(|id| self.world.state(*id));
         others.map(error).fold(error(self.state), f64::max)
@@ -255,8 +258,8 @@ impl<'p> Path<'p> {
                 let width = piece.error() * bounds.magnitude();
                 Interval { lo: bounds.lo - width, hi: bounds.hi + width, ..bounds }
             },
-            |motion, x, offset| {
-                let value = motion.over(offset, offset + h).value;
+            |trajectory, x, offset| {
+                let value = trajectory.over(offset, offset + h).value;
                 Interval { lo: x + value.lo, hi: x + value.hi, ..value }
             },
             |t| Interval::spanned(t, t + h),

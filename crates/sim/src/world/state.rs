@@ -1,9 +1,9 @@
-//! What the simulation keeps of a module that has rules.
+//! NextKind the simulation keeps of a module that has rules.
 
 use smallvec::SmallVec;
 
-use crate::motion::Motion;
-use crate::world::context::Around;
+use crate::trajectory::Trajectory;
+use crate::world::context::Context;
 use dlsys_model::Sign;
 pub use dlsys_ode::Control;
 use dlsys_ode::Dense;
@@ -20,22 +20,22 @@ pub struct State {
     pub is_alive: bool,
     /// The rule that applies; None where no rule's context is there.
     pub rule: Option<usize>,
-    pub context: Around,
+    pub context: Context,
     pub solve: Option<usize>,
     /// Conditions inside the active equations.
     pub switches: Switches,
     /// The sign of each atom of the rule, just after the last instant at which it was examined.
     pub signs: Signs,
-    /// When the motions began; the values in the tree are those of then.
+    /// When the trajectories began; the values in the tree are those of then.
     pub since: SimTime,
     /// How each parameter moves; empty means that none does.
-    pub motions: SmallVec<[Motion; 2]>,
+    pub trajectories: SmallVec<[Trajectory; 2]>,
     /// The module's own step, if it is integrated alone.
     pub step: Option<Box<Step>>,
     /// Length of the last stretch of formulas that was searched; 0 if none was.
     pub window: f64,
     /// All equations are integrated numerically, formulas or not.
-    pub forced: bool,
+    pub numeric_only: bool,
     /// It is integrated together with others.
     pub coupled: bool,
     /// Number of the last walk through neighbours that came by.
@@ -43,9 +43,9 @@ pub struct State {
     pub next: Next,
     /// Set while an instant is examined that concerns the module.
     pub open: Option<Box<Open>>,
-    /// Its motions are about to begin.
+    /// Its trajectories are about to begin.
     pub waits: bool,
-    /// Number of the instant at which its motions last began.
+    /// Number of the instant at which its trajectories last began.
     pub restarted: u64,
 }
 
@@ -54,17 +54,17 @@ pub struct State {
 pub struct Step {
     pub dense: Dense,
     pub control: Control,
-    /// The step is of the present motion.
+    /// The step is of the present trajectory.
     pub live: bool,
     /// Time in the past, and the number of steps since then.
     pub mark: SimTime,
     pub since_mark: usize,
 }
 
-/// What is known to come.
+/// NextKind is known to come.
 #[derive(Clone, Debug, Default)]
 pub struct Next {
-    pub what: What,
+    pub kind: NextKind,
     /// Signs that are zero then.
     pub touched: SmallVec<[Change; 1]>,
     /// Signs that change before then, without consequence.
@@ -76,7 +76,7 @@ pub struct Next {
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum What {
+pub enum NextKind {
     /// Nothing, ever.
     #[default]
     Nothing,
@@ -108,7 +108,7 @@ pub struct Change {
     pub level: Option<(usize, f64)>,
 }
 
-/// What is still open about a module at the instant under examination.
+/// NextKind is still open about a module at the instant under examination.
 #[derive(Clone, Debug, Default)]
 pub struct Open {
     /// The signs at the instant.
@@ -132,15 +132,15 @@ impl State {
             id,
             is_alive: true,
             rule: None,
-            context: Around::default(),
+            context: Context::default(),
             solve: None,
             switches: SmallVec::new(),
             signs: SmallVec::new(),
             since: SimTime::ZERO,
-            motions: SmallVec::new(),
+            trajectories: SmallVec::new(),
             step: None,
             window: 0.0,
-            forced: false,
+            numeric_only: false,
             coupled: false,
             visited: 0,
             next: Next::default(),
@@ -158,12 +158,12 @@ impl State {
         (self.step, self.open) = (None, None);
         self.next.changes.clear();
         (self.next.lasting, self.next.near) = (false, 0);
-        (self.window, self.forced, self.coupled) = (0.0, false, false);
+        (self.window, self.numeric_only, self.coupled) = (0.0, false, false);
     }
 
     /// True if some parameter is integrated by the module's own steps.
     pub fn is_numeric(&self) -> bool {
-        self.motions.iter().any(|m| !m.is_formula())
+        self.trajectories.iter().any(|m| !m.is_formula())
     }
 
     /// Opens the module as one that was followed along its trajectory.

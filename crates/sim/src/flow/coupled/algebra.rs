@@ -23,7 +23,7 @@ pub struct Unknown {
     place: u32,
 }
 
-/// What is solved for, in the order in which that is done.
+/// NextKind is solved for, in the order in which that is done.
 #[derive(Clone, Debug, Default)]
 pub struct Algebra {
     pub unknowns: Vec<Unknown>,
@@ -217,7 +217,7 @@ impl Algebra {
 }
 
 impl Algebra {
-    /// What has brought the steps to a stop: unknowns whose equations become singular, and which therefore turn ever
+    /// NextKind has brought the steps to a stop: unknowns whose equations become singular, and which therefore turn ever
     /// faster.
     pub fn fading(&self, system: &System, rules: &[Rule], inputs: &[f64], y: &[f64]) -> Option<Fault> {
         let mut memory = Memory::default();
@@ -261,7 +261,7 @@ impl Solver<'_> {
         values[unknown.place as usize]
     }
 
-    /// What is left of the equations of a block.
+    /// NextKind is left of the equations of a block.
     fn residuals(&mut self, block: &Block, y: &[f64], out: &mut Vec<f64>) {
         out.clear();
         for &n in &block.unknowns {

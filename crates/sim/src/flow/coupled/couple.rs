@@ -6,7 +6,7 @@ use std::collections::HashSet;
 use crate::error::Error;
 use dlsys_tree::ModuleId;
 
-/// What an instant means for the coupled modules.
+/// NextKind an instant means for the coupled modules.
 #[derive(Clone, Default)]
 pub struct Affected {
     /// Coupled modules whose equations or inputs have changed.
@@ -20,7 +20,7 @@ pub struct Affected {
 }
 
 impl FlowStage<'_, '_> {
-    /// Finds out who is coupled now, given the modules that have begun new motions, and lets the coupled ones go on.
+    /// Finds out who is coupled now, given the modules that have begun new trajectories, and lets the coupled ones go on.
     pub fn couple(&mut self, begun: &[ModuleId]) -> Result<(), Error> {
         let mut affected = std::mem::take(&mut self.flows.coupled.affected);
         self.find_affected(begun, &mut affected);
@@ -44,11 +44,11 @@ impl FlowStage<'_, '_> {
             state.pass_changes(now);
             if state.restarted != self.instant.number {
                 self.world.rebase(id, now);
-                self.start_motions(id, self.setup.numeric_only);
+                self.start_trajectories(id, self.setup.numeric_only);
                 self.look_ahead(id, now)?;
             }
         }
-        self.flows.coupled.repaired |= !freed.is_empty();
+        self.flows.coupled.reintegrated |= !freed.is_empty();
         for &id in joined {
             self.world.state_mut(id).expect("seen above").coupled = true;
         }
@@ -61,22 +61,22 @@ impl FlowStage<'_, '_> {
                 state.next = state.next.again();
             }
         }
-        if seeds.is_empty() || self.repair(seeds, joined) {
+        if seeds.is_empty() || self.reintegrate(seeds, joined) {
             return Ok(());
         }
         if self.flows.coupled.linear.is_some() {
             self.flows.coupled.cuts += 1;
         }
         let now = self.instant.at;
-        if let Some(course) = &self.world.coupled {
+        if let Some(solution) = &self.world.coupled {
             let control = &mut self.flows.coupled.control;
-            control.foresee(control.last_error, now.since(course.start()), now.resolution());
+            control.foresee(control.last_error, now.since(solution.start()), now.resolution());
         }
         (self.flows.coupled.mark, self.flows.coupled.since_mark) = (now, 0);
         self.restart_coupled(now)
     }
 
-    /// Looks at the modules that have begun new motions, and at their neighbours.
+    /// Looks at the modules that have begun new trajectories, and at their neighbours.
     fn find_affected(&mut self, begun: &[ModuleId], affected: &mut Affected) {
         affected.seeds.clear();
         affected.joined.clear();
@@ -97,7 +97,7 @@ impl FlowStage<'_, '_> {
                 near.extend_from_slice(&state.context);
             }
         }
-        let visit = self.flows.coupled.repairer.begin_visit();
+        let visit = self.flows.coupled.reintegration.begin_visit();
         near.retain(|id| {
             let state = self.world.state_mut(*id);
             state.is_some_and(|state| std::mem::replace(&mut state.visited, visit) != visit)
@@ -137,10 +137,10 @@ impl FlowStage<'_, '_> {
         {
             return true;
         }
-        // What is solved for is solved for here.
+        // NextKind is solved for is solved for here.
         let solved = |s: usize| {
             let algebraic = &self.setup.model.rules[rule].solves[s].algebraic;
-            (0..algebraic.of.len()).any(|place| algebraic.is_solved(place, state.forced))
+            (0..algebraic.of.len()).any(|place| algebraic.is_solved(place, state.numeric_only))
         };
         if state.solve.is_some_and(solved) {
             return true;

@@ -1,9 +1,9 @@
 //! The right-hand side of the equations of coupled modules, as the integrators ask for it.
 
 use crate::flow::coupled::algebra::Fault;
-use crate::flow::coupled::columns::Readings;
+use crate::flow::coupled::lanes::Readings;
 use crate::flow::coupled::system::{Row, System};
-use crate::world::course::Course;
+use crate::world::coupled_solution::CoupledSolution;
 use dlsys_expr::{Lanes, Program, Scratch};
 use dlsys_model::Rule;
 use dlsys_ode::Rates;
@@ -11,7 +11,7 @@ use dlsys_ode::Rates;
 /// The code of a row's rates.
 pub fn program<'s>(rules: &'s [Rule], row: &Row) -> &'s Program {
     let solve = &rules[row.rule].solves[row.solve];
-    if row.forced { &solve.rates } else { &solve.numeric_rates }
+    if row.numeric_only { &solve.rates } else { &solve.numeric_rates }
 }
 
 /// The right-hand side of a [`System`].
@@ -19,7 +19,7 @@ pub struct Equations<'s> {
     pub system: &'s System,
     pub rules: &'s [Rule],
     /// How the components move that are inputs.
-    course: Option<&'s Course>,
+    solution: Option<&'s CoupledSolution>,
     pub memory: Memory,
 }
 
@@ -41,8 +41,12 @@ pub struct Memory {
 }
 
 impl<'s> Equations<'s> {
-    pub fn new(system: &'s System, rules: &'s [Rule], course: Option<&'s Course>) -> Equations<'s> {
-        Equations::within(Memory::default(), system, rules, course)
+    pub fn new(
+        system: &'s System,
+        rules: &'s [Rule],
+        solution: Option<&'s CoupledSolution>,
+    ) -> Equations<'s> {
+        Equations::within(Memory::default(), system, rules, solution)
     }
 
     /// The same, in the memory of other evaluations.
@@ -50,16 +54,16 @@ impl<'s> Equations<'s> {
         memory: Memory,
         system: &'s System,
         rules: &'s [Rule],
-        course: Option<&'s Course>,
+        solution: Option<&'s CoupledSolution>,
     ) -> Equations<'s> {
-        Equations { system, rules, course, memory: Memory { read_at: None, ..memory } }
+        Equations { system, rules, solution, memory: Memory { read_at: None, ..memory } }
     }
 
     /// Reads the inputs.
     pub fn read_inputs(&mut self, tau: f64) {
         // The last stages of a step are of one time.
         if self.memory.read_at != Some(tau) {
-            self.system.read(self.course, tau, &mut self.memory.inputs);
+            self.system.read(self.solution, tau, &mut self.memory.inputs);
             self.memory.read_at = Some(tau);
         }
     }

@@ -1,37 +1,37 @@
 //! Modules whose equations read one another: who they are, and their common step.
 //!
 //! Only those are coupled that read something of a neighbour which is integrated itself; a neighbour that follows a
-//! formula is an input. All of them are integrated together over a common step. What happens to some of them within
-//! it is repaired there (`repair`), or ends it for all.
+//! formula is an input. All of them are integrated together over a common step. NextKind happens to some of them within
+//! it is reintegrated there (`reintegration`), or ends it for all.
 
 pub mod aggregates;
 pub mod algebra;
 pub mod blend;
-pub mod columns;
 pub mod couple;
 pub mod equations;
-pub mod fetch;
+pub mod lanes;
 pub mod linear;
-pub mod repair;
+pub mod prefetch;
+pub mod reintegration;
 pub mod system;
 
 use super::FlowStage;
-use crate::detect::flash::{self, Glance, MAX_UNBOUNDED};
-use crate::detect::watch::needs_search;
+use crate::detect::crossing::needs_search;
+use crate::detect::pulse::{self, MAX_UNBOUNDED, PulseFinding};
 use crate::error::Error;
 use crate::flow::coupled::couple::Affected;
 use crate::flow::coupled::equations::Equations;
-use crate::flow::coupled::fetch::fetch_ahead;
 use crate::flow::coupled::linear::Linear;
-use crate::flow::coupled::repair::Repairer;
+use crate::flow::coupled::prefetch::prefetch;
+use crate::flow::coupled::reintegration::Reintegration;
 use crate::flow::coupled::system::System;
 use crate::flow::integrator::{Integrator, StepError};
-use crate::motion::Motion;
 use crate::schedule::Owner;
+use crate::trajectory::Trajectory;
 use crate::world::World;
-use crate::world::course::Course;
+use crate::world::coupled_solution::CoupledSolution;
 use crate::world::path::Path;
-use crate::world::state::{Control, State, What};
+use crate::world::state::{Control, NextKind, State};
 use crate::{Method, Scheduler};
 use dlsys_model::{Model, Rule};
 use dlsys_tree::{ModuleId, SimTime, Visit};
@@ -49,26 +49,26 @@ pub struct Coupled {
     pub linear: Option<Linear>,
     /// A step has been made whose dense output nobody has asked for yet.
     pending: bool,
-    /// Repairs have changed the members or their motion since the common step was made.
-    pub repaired: bool,
+    /// Repairs have changed the members or their trajectory since the common step was made.
+    pub reintegrated: bool,
     /// Modules that have lost a neighbour who reads them.
     pub loosened: Vec<ModuleId>,
-    pub repairer: Repairer,
+    pub reintegration: Reintegration,
     pub affected: Affected,
     /// A solution without steps was looked for.
     tried: bool,
-    /// Times that an event cut a motion without steps.
+    /// Times that an event cut a trajectory without steps.
     pub cuts: u32,
     pub mark: SimTime,
     pub since_mark: usize,
-    /// Members whose rates may have flashes.
-    flashing: Vec<ModuleId>,
+    /// Members whose rates may have pulses.
+    pulsing: Vec<ModuleId>,
 }
 
 impl Coupled {
     /// Evaluations of the equations of one module so far.
     pub fn evaluations(&self) -> u64 {
-        self.integrator.evaluations() + self.repairer.evaluations()
+        self.integrator.evaluations() + self.reintegration.evaluations()
     }
 }
 
@@ -79,7 +79,7 @@ const MAX_TRIES: usize = 100;
 const MAX_CUTS: u32 = 2;
 
 impl FlowStage<'_, '_> {
-    /// Begins the common motion of the coupled modules at an instant.
+    /// Begins the common trajectory of the coupled modules at an instant.
     pub fn restart_coupled(&mut self, at: SimTime) -> Result<(), Error> {
         let mut members = std::mem::take(&mut self.flows.coupled.members);
         members.clear();
@@ -87,11 +87,11 @@ impl FlowStage<'_, '_> {
             Visit::Module(id) if matches!(self.world.states.get(id.slot()), Some(Some(_))) => Some(id),
             _ => None,
         }));
-        let course = self.world.coupled.take();
+        let solution = self.world.coupled.take();
         self.flows.coupled.y.clear();
         let mut count = 0;
         for n in 0..members.len() {
-            fetch_ahead(self.world, &members, n);
+            prefetch(self.world, &members, n);
             let id = members[n];
             if self.world.state(id).is_none_or(|s| !s.coupled) {
                 continue;
@@ -102,12 +102,12 @@ impl FlowStage<'_, '_> {
             let state = states[id.slot()].as_mut().expect("a member");
             let first = tree.places(id).start;
             for &parameter in integrated(self.setup.model, state) {
-                let motion = &mut state.motions[parameter];
-                let value = match *motion {
-                    Motion::Coupled(component) => {
-                        course.as_ref().and_then(|c| c.value(component as usize, at))
+                let trajectory = &mut state.trajectories[parameter];
+                let value = match *trajectory {
+                    Trajectory::Coupled(component) => {
+                        solution.as_ref().and_then(|c| c.value(component as usize, at))
                     }
-                    Motion::Step(component) => state
+                    Trajectory::Step(component) => state
                         .step
                         .as_ref()
                         .filter(|step| step.live)
@@ -117,7 +117,7 @@ impl FlowStage<'_, '_> {
                 let place = first + parameter;
                 let value = value.unwrap_or(tree.values()[place]);
                 tree.set_value(place, value);
-                *motion = Motion::Coupled(self.flows.coupled.y.len() as u32);
+                *trajectory = Trajectory::Coupled(self.flows.coupled.y.len() as u32);
                 self.flows.coupled.y.push(value);
             }
             state.pass_changes(at);
@@ -130,13 +130,13 @@ impl FlowStage<'_, '_> {
         self.schedule.cancel(Owner::Coupled);
         let frozen = self.setup.settings.is_sliced();
         self.flows.coupled.system.rebuild(&self.setup.model.rules, self.world, &members, at, Some, frozen);
-        self.flows.coupled.flashing.clear();
+        self.flows.coupled.pulsing.clear();
         if self.setup.has_pulses && !self.setup.settings.method.is_fixed_step() {
-            let flashing: Vec<ModuleId> = members.iter().copied().filter(|id| self.may_flash(*id)).collect();
-            self.flows.coupled.flashing = flashing;
+            let pulsing: Vec<ModuleId> = members.iter().copied().filter(|id| self.may_pulse(*id)).collect();
+            self.flows.coupled.pulsing = pulsing;
         }
         self.flows.coupled.members = members;
-        (self.flows.coupled.repaired, self.flows.coupled.pending) = (false, false);
+        (self.flows.coupled.reintegrated, self.flows.coupled.pending) = (false, false);
         let without_steps = self.setup.settings.method == Method::Auto
             && (self.flows.coupled.control.stiff || self.flows.coupled.cuts < MAX_CUTS)
             && !self.setup.settings.is_sliced()
@@ -156,7 +156,7 @@ impl FlowStage<'_, '_> {
         // After each, all members are searched.
         self.flows.coupled.integrator.expect_high_overhead();
         let is_unwatched = self.setup.model.rules.iter().all(|rule| rule.atoms.is_empty())
-            && self.flows.coupled.flashing.is_empty()
+            && self.flows.coupled.pulsing.is_empty()
             && self.flows.coupled.system.algebra.is_empty();
         self.flows.coupled.integrator.set_unwatched(is_unwatched);
         self.flows.coupled.integrator.restart(self.setup.settings.method, self.flows.coupled.y.len());
@@ -170,7 +170,7 @@ impl FlowStage<'_, '_> {
         self.step_coupled(at)
     }
 
-    /// True if some condition of the coupled modules can only be found by searching their common motion.
+    /// True if some condition of the coupled modules can only be found by searching their common trajectory.
     fn watches_coupled(&self) -> bool {
         self.flows.coupled.members.iter().any(|id| self.is_watched(*id))
     }
@@ -180,14 +180,14 @@ impl FlowStage<'_, '_> {
         rule.is_some_and(|r| !self.setup.model.rules[r].atoms.is_empty())
     }
 
-    /// Sees to it that the coupled modules' motion is known at an instant.
+    /// Sees to it that the coupled modules' trajectory is known at an instant.
     pub fn show_coupled(&mut self, at: SimTime) {
         let Coupled { system, y, integrator, control, linear, pending, .. } = &mut self.flows.coupled;
         match linear {
             Some(linear) => {
-                if self.world.coupled.as_ref().is_none_or(|course| course.start() != at) {
+                if self.world.coupled.as_ref().is_none_or(|solution| solution.start() != at) {
                     let dense = linear.at(at, &self.setup.coupled_settings, control, &mut self.log.stats);
-                    self.world.coupled = Some(Course::new(dense));
+                    self.world.coupled = Some(CoupledSolution::new(dense));
                 }
             }
             None => {
@@ -197,7 +197,7 @@ impl FlowStage<'_, '_> {
                         true => integrator.refined(&mut equations, y, &self.setup.coupled_settings),
                         false => vec![integrator.dense(&mut equations, y)],
                     };
-                    self.world.coupled = Some(Course::of(stretches));
+                    self.world.coupled = Some(CoupledSolution::of(stretches));
                 }
             }
         }
@@ -206,15 +206,15 @@ impl FlowStage<'_, '_> {
     /// Makes a step of the coupled modules and searches it.
     fn step_coupled(&mut self, from: SimTime) -> Result<(), Error> {
         let rules = &self.setup.model.rules;
-        let Coupled { system, y, integrator, control, flashing, .. } = &mut self.flows.coupled;
+        let Coupled { system, y, integrator, control, pulsing, .. } = &mut self.flows.coupled;
         let mut equations = Equations::new(system, rules, None);
         let limit = self.setup.settings.slice_end(from);
-        let (mut course, mut tries) = (None, 0);
+        let (mut solution, mut tries) = (None, 0);
         let settings = &self.setup.coupled_settings;
         let step = loop {
             let stats = &mut self.log.stats;
             let step = integrator.step(settings, control, &mut equations, y, from, limit, stats);
-            if step.is_err() || system.algebra.is_empty() && flashing.is_empty() {
+            if step.is_err() || system.algebra.is_empty() && pulsing.is_empty() {
                 break step;
             }
             let stretches = match system.algebra.is_empty() {
@@ -223,19 +223,19 @@ impl FlowStage<'_, '_> {
             };
             match stretches {
                 Ok(stretches) => {
-                    let found = Course::of(stretches);
+                    let found = CoupledSolution::of(stretches);
                     let h = found.end.since(from);
                     self.world.coupled = Some(found);
                     let stiff = control.stiff || settings.method.is_implicit();
                     let nodes = integrator.nodes();
-                    let overlooked = flashing.iter().filter_map(|id| {
+                    let overlooked = pulsing.iter().filter_map(|id| {
                         let how = (settings.tolerance, stiff);
                         let step = step_of(self.world, rules, *id, from, &nodes, how)?;
-                        match self.detector.lookout.look(&step) {
-                            Glance::Clear => None,
-                            Glance::Overlooked(at) => Some(at),
-                            Glance::Unbounded(at) if tries <= MAX_UNBOUNDED => Some(at),
-                            Glance::Unbounded(at) => {
+                        match self.detector.pulses.look(&step) {
+                            PulseFinding::Clear => None,
+                            PulseFinding::Overlooked(at) => Some(at),
+                            PulseFinding::Unbounded(at) if tries <= MAX_UNBOUNDED => Some(at),
+                            PulseFinding::Unbounded(at) => {
                                 let rule = self.world.state(*id).and_then(|s| s.rule).unwrap_or(0);
                                 self.detector.unbounded.entry(rule).or_insert(from.to_f64() + at * h);
                                 None
@@ -243,7 +243,7 @@ impl FlowStage<'_, '_> {
                         }
                     });
                     let overlooked = overlooked.reduce(f64::min);
-                    course = self.world.coupled.take();
+                    solution = self.world.coupled.take();
                     let least = 64.0 * from.resolution();
                     match overlooked {
                         Some(at) if h > least && tries < MAX_TRIES => {
@@ -266,7 +266,7 @@ impl FlowStage<'_, '_> {
         let end = match step {
             Ok(end) => end,
             Err(error) => {
-                // What cannot be solved for says more than that no step goes on.
+                // NextKind cannot be solved for says more than that no step goes on.
                 let fault = equations.make_consistent(0.0, &mut y.clone()).err();
                 let component = error.component();
                 if fault.is_none() && self.arrest_coupled(component, from) {
@@ -280,11 +280,11 @@ impl FlowStage<'_, '_> {
                 });
             }
         };
-        self.flows.coupled.pending = course.is_none();
-        self.world.coupled = course;
+        self.flows.coupled.pending = solution.is_none();
+        self.world.coupled = solution;
         let members = std::mem::take(&mut self.flows.coupled.members);
         for (at, &id) in members.iter().enumerate() {
-            fetch_ahead(self.world, &members, at);
+            prefetch(self.world, &members, at);
             self.search_member(id, from);
         }
         self.flows.coupled.members = members;
@@ -307,17 +307,17 @@ impl FlowStage<'_, '_> {
         let who = Owner::Module(id.slot() as u32);
         let mut start = from;
         loop {
-            let (Some(course), Some(state)) = (&self.world.coupled, self.world.state(id)) else { return };
+            let (Some(solution), Some(state)) = (&self.world.coupled, self.world.state(id)) else { return };
             let Some(rule) = state.rule.map(|r| &self.setup.model.rules[r]) else { return };
             // Everything that the module reads follows one polynomial up to there.
-            let knot = self.world.knot(state, course, start);
+            let knot = self.world.knot(state, solution, start);
             let h = knot.since(start);
             if h <= 0.0 {
                 return self.schedule.cancel(who);
             }
             let path = Path::new(self.world, state, rule, start, h);
-            let found = self.detector.watcher.search(&path, 1.0);
-            let last = knot.since(course.end) >= 0.0;
+            let found = self.detector.crossings.search(&path, 1.0);
+            let last = knot.since(solution.end) >= 0.0;
             let state = self.world.state_mut(id).expect("seen above");
             state.next.changes.extend(found.changes);
             let (before, index) = (std::mem::replace(&mut state.next.near, found.near), state.rule);
@@ -325,8 +325,8 @@ impl FlowStage<'_, '_> {
             let state = self.world.state_mut(id).expect("seen above");
             if found.event.is_some() {
                 let time = found.touched[0].time;
-                let what = if found.in_doubt { What::Doubt } else { What::Event };
-                (state.next.what, state.next.touched) = (what, found.touched);
+                let what = if found.in_doubt { NextKind::Doubt } else { NextKind::Event };
+                (state.next.kind, state.next.touched) = (what, found.touched);
                 return self.schedule.schedule(who, time);
             }
             if last {
@@ -343,14 +343,14 @@ impl FlowStage<'_, '_> {
             return Err(self.coupled_error(StepError::StepTooSmall(0), at));
         }
         let slice_ends = |from| self.setup.settings.slice_end(from).is_some_and(|end| end == at);
-        if self.flows.coupled.repaired || slice_ends(self.flows.coupled.system.start) {
-            // What the step has brought is read from its motion, which nobody may have asked for yet.
+        if self.flows.coupled.reintegrated || slice_ends(self.flows.coupled.system.start) {
+            // NextKind the step has brought is read from its trajectory, which nobody may have asked for yet.
             self.show_coupled(at);
             return self.restart_coupled(at);
         }
         let Coupled { members, system, y, integrator, control, .. } = &mut self.flows.coupled;
         for (n, id) in members.iter().enumerate() {
-            fetch_ahead(self.world, members, n);
+            prefetch(self.world, members, n);
             self.world.state_mut(*id).expect("a member").pass_changes(at);
         }
         integrator.advance(y);
@@ -387,24 +387,24 @@ impl FlowStage<'_, '_> {
         !arrested.is_empty()
     }
 
-    fn may_flash(&self, id: ModuleId) -> bool {
+    fn may_pulse(&self, id: ModuleId) -> bool {
         let clause =
             self.world.state(id).and_then(|s| Some(&self.setup.model.rules[s.rule?].solves[s.solve?]));
         clause.is_some_and(|solve| solve.has_pulses)
     }
 
-    /// True if something may have been overlooked of the present motion of some coupled modules, from now on.
+    /// True if something may have been overlooked of the present trajectory of some coupled modules, from now on.
     pub fn is_overlooked(&mut self, members: &[ModuleId]) -> bool {
         if !self.setup.has_pulses || self.setup.settings.method.is_fixed_step() {
             return false;
         }
-        let flashing: Vec<ModuleId> = members.iter().copied().filter(|id| self.may_flash(*id)).collect();
+        let pulsing: Vec<ModuleId> = members.iter().copied().filter(|id| self.may_pulse(*id)).collect();
         let how = (self.setup.coupled_settings.tolerance, false);
-        let (world, rules, lookout) = (&self.world, &self.setup.model.rules, &mut self.detector.lookout);
-        let nodes = &*self.flows.coupled.repairer.nodes();
-        flashing.into_iter().any(|id| {
+        let (world, rules, pulses) = (&self.world, &self.setup.model.rules, &mut self.detector.pulses);
+        let nodes = &*self.flows.coupled.reintegration.nodes();
+        pulsing.into_iter().any(|id| {
             let step = step_of(world, rules, id, self.instant.at, nodes, how);
-            step.is_some_and(|step| lookout.look(&step) != Glance::Clear)
+            step.is_some_and(|step| pulses.look(&step) != PulseFinding::Clear)
         })
     }
 
@@ -428,16 +428,16 @@ fn step_of<'p>(
     start: SimTime,
     nodes: &'p [f64],
     (tolerance, stiff): (f64, bool),
-) -> Option<flash::Step<'p>> {
+) -> Option<pulse::Step<'p>> {
     let state = world.state(id)?;
     let rule = &rules[state.rule?];
     let (solve, end) = (&rule.solves[state.solve?], world.coupled.as_ref()?.end);
-    Some(flash::Step { world, state, rule, solve, start, end, nodes, own: None, tolerance, stiff })
+    Some(pulse::Step { world, state, rule, solve, start, end, nodes, own: None, tolerance, stiff })
 }
 
 /// The parameters of a coupled module that are integrated, then those that are solved for, in the order of their
 /// components.
 pub fn integrated<'m>(model: &'m Model, state: &State) -> &'m [usize] {
     let Some((rule, solve)) = state.rule.zip(state.solve) else { return &[] };
-    model.rules[rule].solves[solve].stepping.components(state.forced)
+    model.rules[rule].solves[solve].stepping.components(state.numeric_only)
 }

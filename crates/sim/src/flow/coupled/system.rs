@@ -2,11 +2,11 @@
 
 use crate::flow::coupled::aggregates::Partial;
 use crate::flow::coupled::algebra::Algebra;
-use crate::flow::coupled::columns::Columns;
-use crate::flow::coupled::fetch::fetch_ahead;
-use crate::motion::Motion;
+use crate::flow::coupled::lanes::LaneBatches;
+use crate::flow::coupled::prefetch::prefetch;
+use crate::trajectory::Trajectory;
 use crate::world::World;
-use crate::world::course::Course;
+use crate::world::coupled_solution::CoupledSolution;
 use crate::world::state::State;
 use dlsys_model::{Rule, Solve};
 use dlsys_tree::{ModuleId, SimTime};
@@ -46,7 +46,7 @@ pub struct System {
     given: Vec<u32>,
     /// Components of the coupled modules that are read.
     inputs: Vec<u32>,
-    pub columns: Columns,
+    pub columns: LaneBatches,
     pub switches: Vec<f64>,
     /// Place in the tree's values, and owner with its parameter, of each component.
     pub places: Vec<(usize, ModuleId, usize)>,
@@ -58,7 +58,7 @@ pub struct System {
 /// A parameter that follows a formula, as an input.
 #[derive(Clone, Debug)]
 pub struct Formula {
-    pub motion: Motion,
+    pub trajectory: Trajectory,
     pub x: f64,
     since: SimTime,
     /// Time since then, at the start of the step.
@@ -70,7 +70,7 @@ pub struct Formula {
 pub struct Row {
     pub rule: usize,
     pub solve: usize,
-    pub forced: bool,
+    pub numeric_only: bool,
     pub first_source: usize,
     pub sources: usize,
     first_switch: usize,
@@ -126,7 +126,7 @@ impl System {
         for (at, &id) in members.iter().enumerate() {
             // A region has just been visited.
             if members.len() > REGION {
-                fetch_ahead(world, members, at);
+                prefetch(world, members, at);
             }
             let state = world.state(id).expect("members have states");
             let first = world.tree.places(id).start;
@@ -134,8 +134,8 @@ impl System {
             let (compiled, clause) = (&rules[rule], &rules[rule].solves[solve]);
             system.timed |= clause.stepping.is_timed();
             let first_rate = system.places.len();
-            for &parameter in clause.stepping.components(state.forced) {
-                if let Some(Motion::Coupled(_)) = state.motions.get(parameter) {
+            for &parameter in clause.stepping.components(state.numeric_only) {
+                if let Some(Trajectory::Coupled(_)) = state.trajectories.get(parameter) {
                     system.places.push((first + parameter, id, parameter));
                 }
             }
@@ -150,7 +150,7 @@ impl System {
                     system.sources.extend(sources);
                 }
             } else {
-                // What is not read may be any number.
+                // NextKind is not read may be any number.
                 system.sources.resize(first_source + compiled.variables - 2, Source::Fixed(0.0));
                 for read in clause.stepping.reads() {
                     let (module, moves) = match read.neighbour.map(|n| state.context.context()[n]) {
@@ -174,14 +174,14 @@ impl System {
                 system.sources.push(Source::Sum(system.sums.len() as u32 - 1));
             }
             system.sources.resize(first_source + compiled.variables - 2, Source::Fixed(0.0));
-            let integrated = rates(clause, state.forced);
+            let integrated = rates(clause, state.numeric_only);
             let first_switch = system.switches.len();
             system.switches.extend(state.switches.iter().map(|&on| f64::from(u8::from(on))));
             let birth = world.tree.birth(id);
             system.rows.push(Row {
                 rule,
                 solve,
-                forced: state.forced,
+                numeric_only: state.numeric_only,
                 first_source,
                 sources: system.sources.len() - first_source,
                 first_switch,
@@ -193,7 +193,7 @@ impl System {
                 birth,
                 age: start.since(birth),
             });
-            let solved = |place: &usize| clause.algebraic.is_solved(*place, state.forced);
+            let solved = |place: &usize| clause.algebraic.is_solved(*place, state.numeric_only);
             let given = (0..clause.algebraic.of.len()).filter(solved);
             system.given.extend(given.map(|place| place as u32));
         }
@@ -209,21 +209,21 @@ impl System {
         x: impl Fn() -> f64,
         unknown: impl Fn(u32) -> Option<u32>,
     ) -> Source {
-        let Some((state, motion)) = state.and_then(|s| Some((s, s.motions.get(parameter)?))) else {
+        let Some((state, trajectory)) = state.and_then(|s| Some((s, s.trajectories.get(parameter)?))) else {
             return Source::Fixed(x());
         };
-        match motion {
-            Motion::Rest | Motion::Step(_) => Source::Fixed(x()),
-            Motion::Coupled(component) => match unknown(*component) {
+        match trajectory {
+            Trajectory::Rest | Trajectory::Step(_) => Source::Fixed(x()),
+            Trajectory::Coupled(component) => match unknown(*component) {
                 Some(number) => Source::State(number),
                 None => {
                     self.inputs.push(*component);
                     Source::Input(self.inputs.len() as u32 - 1)
                 }
             },
-            motion => {
+            trajectory => {
                 let (since, offset) = (state.since, self.start.since(state.since));
-                self.formulas.push(Formula { motion: motion.clone(), x: x(), since, offset });
+                self.formulas.push(Formula { trajectory: trajectory.clone(), x: x(), since, offset });
                 Source::Formula(self.formulas.len() as u32 - 1)
             }
         }
@@ -275,7 +275,7 @@ impl System {
         self.rows.push(Row {
             rule,
             solve,
-            forced: false,
+            numeric_only: false,
             first_source,
             sources,
             first_switch,
@@ -300,19 +300,19 @@ impl System {
         &self.switches[row.first_switch..row.first_switch + row.switches]
     }
 
-    /// What the components that are read are at a time after the start; NaN where that is not known.
-    pub fn read(&self, course: Option<&Course>, tau: f64, out: &mut Vec<f64>) {
+    /// NextKind the components that are read are at a time after the start; NaN where that is not known.
+    pub fn read(&self, solution: Option<&CoupledSolution>, tau: f64, out: &mut Vec<f64>) {
         out.clear();
         if self.inputs.is_empty() {
             return;
         }
         let at = self.start.after(tau);
         for &component in &self.inputs {
-            out.push(course.and_then(|c| c.value(component as usize, at)).unwrap_or(f64::NAN));
+            out.push(solution.and_then(|c| c.value(component as usize, at)).unwrap_or(f64::NAN));
         }
     }
 
-    /// What a source is; an aggregate is none.
+    /// NextKind a source is; an aggregate is none.
     pub fn value(&self, source: Source, tau: f64, y: &[f64], inputs: &[f64]) -> f64 {
         match source {
             Source::Sum(_) => 0.0,
@@ -320,8 +320,8 @@ impl System {
             Source::Fixed(x) => x,
             Source::State(component) => y[component as usize],
             Source::Formula(i) => {
-                let Formula { motion, x, offset, .. } = &self.formulas[i as usize];
-                x + motion.value(offset + tau)
+                let Formula { trajectory, x, offset, .. } = &self.formulas[i as usize];
+                x + trajectory.value(offset + tau)
             }
         }
     }
@@ -365,8 +365,11 @@ impl System {
         let solve = &rules[row.rule].solves[row.solve];
         self.visit_partials(rules, row, &solve.jacobian, |partial| {
             let position = solve.jacobian.entries[partial.entry].0;
-            let rate =
-                if row.forced { Some(position) } else { solve.numeric.iter().position(|p| *p == position) };
+            let rate = if row.numeric_only {
+                Some(position)
+            } else {
+                solve.numeric.iter().position(|p| *p == position)
+            };
             if let Some(rate) = rate
                 && !self.algebra.is_solved(partial.component)
             {
@@ -382,6 +385,6 @@ impl System {
 }
 
 /// The number of components of a clause that are integrated.
-fn rates(solve: &Solve, forced: bool) -> usize {
-    if forced { solve.of.len() } else { solve.numeric.len() }
+fn rates(solve: &Solve, numeric_only: bool) -> usize {
+    if numeric_only { solve.of.len() } else { solve.numeric.len() }
 }

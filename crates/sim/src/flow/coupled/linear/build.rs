@@ -2,7 +2,7 @@
 
 use super::{Linear, Problem};
 use crate::flow::coupled::system::{Formula, Source, System};
-use crate::motion::Motion;
+use crate::trajectory::Trajectory;
 use dlsys_expr::Scratch;
 use dlsys_model::Rule;
 
@@ -24,10 +24,10 @@ impl Unknowns {
             return Some(());
         }
         let formula = &formulas[i as usize];
-        let x = formula.x + formula.motion.value(formula.offset);
-        let (rate, decay) = match &formula.motion {
-            Motion::Polynomial([c, 0.0, 0.0, 0.0]) => (*c, 0.0),
-            Motion::Riccati(law) => (formula.motion.rate(formula.offset), law.exponential()?.1),
+        let x = formula.x + formula.trajectory.value(formula.offset);
+        let (rate, decay) = match &formula.trajectory {
+            Trajectory::Polynomial([c, 0.0, 0.0, 0.0]) => (*c, 0.0),
+            Trajectory::Riccati(law) => (formula.trajectory.rate(formula.offset), law.exponential()?.1),
             _ => return None,
         };
         let n = self.problem.y.len() as u32;
@@ -54,7 +54,7 @@ impl Linear {
         for row in &system.rows {
             let rule = &rules[row.rule];
             let solve = &rule.solves[row.solve];
-            if row.forced {
+            if row.numeric_only {
                 return None;
             }
             let linear = solve.linear.as_ref()?;

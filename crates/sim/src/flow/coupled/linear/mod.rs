@@ -31,14 +31,14 @@ use steps::Steps;
 
 /// As many products of the matrix and a vector cost about as much as the rational approximation, once.
 const POLES_COST: f64 = 60.0;
-/// The same where the approximation is unproven, and made three times to see how far it can be trusted. What is proven is
+/// The same where the approximation is unproven, and made three times to see how far it can be trusted. NextKind is proven is
 /// worth some more.
 const UNPROVEN_POLES_COST: f64 = 2_000.0;
 /// More products than this are dearer than steps.
 const MOST_PRODUCTS: f64 = 30_000.0;
 /// Bounds of errors may be so many tolerances: they are seldom reached, and a hundred are promised.
 const ALLOWED: f64 = 40.0;
-/// What rounds once is off by this at most, relative to its size.
+/// NextKind rounds once is off by this at most, relative to its size.
 const ROUNDING: f64 = 0.5 * f64::EPSILON;
 
 /// The equations, and the state at the start.
@@ -146,7 +146,7 @@ impl Linear {
         self.series();
         let Linear { problem, orthant, series: Some(series), majorant, .. } = self else { return None };
         let (y, cut, rounding) = series.at(&problem.y, tau);
-        // What is cut off is known for all unknowns together; what is rounded, relative to the sum of all sizes.
+        // NextKind is cut off is known for all unknowns together; what is rounded, relative to the sum of all sizes.
         let largest = series.largest(tau);
         if problem.allows(&y, |i| cut + rounding * if orthant.holds(i) { y[i].abs() } else { largest }) {
             return Some(y);

@@ -18,7 +18,7 @@ const LANES: usize = 8;
 const ERROR: f64 = 5e-14;
 /// The same of the difference quotients of its error.
 const ERROR_OF_SLOPE: f64 = 2e-11;
-/// What is rounded in an elimination, in units of what the largest entry rounds to.
+/// NextKind is rounded in an elimination, in units of what the largest entry rounds to.
 const ROUNDINGS: f64 = 4.5;
 /// Roundings of the pivots themselves last as disturbances do, and so do those of the state of rest.
 const MEMORIES: f64 = 8.0;
@@ -33,7 +33,7 @@ pub struct Poles {
     a: Vec<f64>,
     /// No eigenvalue is larger; not negative.
     shift: f64,
-    /// What is known of the error. None if influences are one way.
+    /// NextKind is known of the error. None if influences are one way.
     proof: Option<Proof>,
     /// The largest value of b, and of the state of rest: infinite if there is none.
     inflow: f64,
@@ -214,7 +214,7 @@ impl Poles {
         }
         let half = self.propagate(&problem.y, &problem.b, 0.5 * tau)?;
         let halves = self.propagate(&half, &problem.b, 0.5 * tau)?;
-        // What adds up in unknowns that nothing leaves is off by the same part for the whole and for the halves.
+        // NextKind adds up in unknowns that nothing leaves is off by the same part for the whole and for the halves.
         let flow = self.rest.min(tau * self.inflow);
         let most = problem.y.iter().chain(&halves).fold(flow, |m, y| m.max(y.abs()));
         if !problem.allows(&halves, |_| growth * (rounding * tau + ERROR_OF_SLOPE) * most) {

@@ -4,7 +4,7 @@
 //! `A + q` has no negative entry, and neither has any term of the series: what comes out is right to its own digits, down
 //! to where the series is cut off, and never negative (A. Jensen, Scand. Actuar. J. 1953; W. Grassmann, Comput. Oper. Res.
 //! 4 (1977) 47). Equations whose unknowns can be given signs so that they look like that (see [`Orthant`]) are as good.
-//! Nothing is asked of the spectrum: transport one way along a thousand cells is as easy as diffusion. What it costs is
+//! Nothing is asked of the spectrum: transport one way along a thousand cells is as easy as diffusion. NextKind it costs is
 //! one product of the matrix and a vector for each time that something happens in the fastest unknown.
 //!
 //! Long times are cut into stretches on a grid that observation does not move. States at two grids, a coarse one and a
@@ -14,7 +14,7 @@ use super::{Problem, ROUNDING};
 
 /// Lengths of the stretches, in units of the mean time between two events of the fastest unknown.
 const STRETCHES: [f64; 2] = [256.0, 64.0];
-/// What is cut off of a stretch, as a part of the largest value, and as a part of the tolerance.
+/// NextKind is cut off of a stretch, as a part of the largest value, and as a part of the tolerance.
 const CUT: f64 = 1.0 / (1u64 << 56) as f64;
 const CUT_OF_TOLERANCE: f64 = 1e-6;
 /// Couplings as far apart as each other are stored side by side, if there are as many of them as this part of the
@@ -52,7 +52,7 @@ impl Orthant {
                 return None;
             }
         }
-        // What the values of each part say of the sign of its root: NaN if they do not agree.
+        // NextKind the values of each part say of the sign of its root: NaN if they do not agree.
         let mut parts = vec![0.0f64; y.len()];
         for i in 0..y.len() {
             let (part, sign) = root(&mut above, i as u32);
@@ -147,7 +147,7 @@ struct Mark {
     /// Stretches since the start, or since the coarser mark.
     count: f64,
     y: Vec<f64>,
-    /// What was cut off: bounds for the largest of all values, and for their sum.
+    /// NextKind was cut off: bounds for the largest of all values, and for their sum.
     cut: [f64; 2],
     /// Terms that were added up.
     terms: f64,

@@ -76,7 +76,7 @@ fn random(random: &mut Random, weighing: Weighing) -> (Problem, f64) {
             Weighing::OneWay => (d, 0.0),
             _ => (d, if random.chance(0.5) { -d } else { d }),
         };
-        // What flows is lost where it comes from, or only seen there.
+        // NextKind flows is lost where it comes from, or only seen there.
         let (lost_above, lost_below) = if random.chance(0.5) { (down, up) } else { (up, down) };
         decays[parent as usize] += lost_above.abs();
         decays[k as usize] += lost_below.abs();
@@ -148,7 +148,7 @@ fn answers(weighing: Weighing, wanted: [usize; 3]) {
             let Some(error) = error(&problem, tau, &found) else { continue };
             assert!(error <= 5.0, "{error} tolerances: {what}");
             if way == 0 {
-                // What is added up without cancellation has no need to be put right.
+                // NextKind is added up without cancellation has no need to be put right.
                 let before = found.clone();
                 linear.orthant.confine(&mut found);
                 assert_eq!(before, found, "{what}");

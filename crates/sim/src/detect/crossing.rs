@@ -1,6 +1,6 @@
 //! The search of a stretch of time for a module's next event.
 //!
-//! The signs of the rule's atoms are known at the start. What is looked for is the first instant at which a change of
+//! The signs of the rule's atoms are known at the start. NextKind is looked for is the first instant at which a change of
 //! signs matters: a production's condition becomes true, the active equations' condition ends, or a condition inside
 //! them changes. Where a formula gives the instant it is taken; elsewhere the stretch is searched.
 
@@ -18,13 +18,13 @@ use dlsys_tree::SimTime;
 /// Zero, for a difference of two sides, in units of their rounding.
 pub const TOUCH: f64 = 256.0 * f64::EPSILON;
 
-/// A difference of two sides of no more than this part of them, or of 1, may be what numerical motions leave of zero.
+/// A difference of two sides of no more than this part of them, or of 1, may be what numerical trajectories leave of zero.
 const NOISE: f64 = 1e-10;
 
 /// Most changes of a module's signs that are followed within one stretch.
 const MAX_ROUNDS: usize = 50;
 
-/// What a search found.
+/// NextKind a search found.
 #[derive(Clone, Debug, Default)]
 pub struct Found {
     /// Position of the event, if there is one.
@@ -41,7 +41,7 @@ pub struct Found {
 
 /// Working memory of searches.
 #[derive(Clone, Debug, Default)]
-pub struct Watcher {
+pub struct CrossingDetector {
     pub values: Vec<f64>,
     departure: Vec<Dual<f64>>,
     whole: Vec<Interval>,
@@ -62,14 +62,14 @@ pub struct Watcher {
 /// An atom under watch.
 struct Watched {
     atom: usize,
-    /// What counts as zero; NaN for those whose instant is a formula.
+    /// NextKind counts as zero; NaN for those whose instant is a formula.
     tolerance: f64,
     ahead: Ahead,
 }
 
 /// An instant at which the sides of an atom meet.
 #[derive(Clone, Copy, Debug)]
-pub struct Meeting {
+pub struct Crossing {
     pub position: f64,
     pub time: SimTime,
     pub at: Sign,
@@ -82,7 +82,7 @@ pub struct Difference<'w, 'p> {
     path: &'w Path<'p>,
     sides: &'w Program,
     atom: usize,
-    memory: &'w mut Watcher,
+    memory: &'w mut CrossingDetector,
 }
 
 impl Function for Difference<'_, '_> {
@@ -131,15 +131,15 @@ enum How<'w> {
 fn how<'w>(watch: &'w ZeroCrossing, state: &State) -> How<'w> {
     match watch {
         ZeroCrossing::Constant => How::Not,
-        ZeroCrossing::Formula { variable, level } => match state.motions.get(*variable) {
-            Some(motion) if !motion.is_formula() => How::Search,
+        ZeroCrossing::Formula { variable, level } => match state.trajectories.get(*variable) {
+            Some(trajectory) if !trajectory.is_formula() => How::Search,
             _ => How::Formula(*variable, level),
         },
         ZeroCrossing::Search(_) => How::Search,
     }
 }
 
-impl Watcher {
+impl CrossingDetector {
     /// Searches the path up to the position `limit`.
     pub fn search(&mut self, path: &Path, limit: f64) -> Found {
         let (rule, state) = (path.rule, path.state);
@@ -240,13 +240,13 @@ impl Watcher {
                 // A touch is known only to about the root of the rounding; one that is zero here is here.
                 let mut zero = || self.difference(path, w.atom).value(first.position).abs() <= w.tolerance;
                 let here = match &w.ahead.next {
-                    Some(meeting) if meeting.position <= together => Some(*meeting),
+                    Some(crossing) if crossing.position <= together => Some(*crossing),
                     _ if w.tolerance.is_nan() => None,
-                    Some(meeting) if meeting.after == now[w.atom] && zero() => {
-                        Some(Meeting { at: Sign::Zero, time: first.time, ..*meeting })
+                    Some(crossing) if crossing.after == now[w.atom] && zero() => {
+                        Some(Crossing { at: Sign::Zero, time: first.time, ..*crossing })
                     }
                     None if now[w.atom] != Sign::Zero && zero() => {
-                        Some(Meeting { at: Sign::Zero, after: now[w.atom], level: None, ..first })
+                        Some(Crossing { at: Sign::Zero, after: now[w.atom], level: None, ..first })
                     }
                     _ => None,
                 };
@@ -340,7 +340,7 @@ impl Watcher {
         limit: f64,
         sign: Sign,
         tolerance: f64,
-    ) -> Option<Meeting> {
+    ) -> Option<Crossing> {
         // The sign that a boundary was left with is believed against values that are rounding, and against a jump that
         // comes within the rounding of time.
         let (mut from, mut tolerance) = (from, tolerance);
@@ -360,10 +360,10 @@ impl Watcher {
         let Root { position, at, after } =
             first_root(&mut self.difference(path, atom), from, limit, sign, tolerance)?;
         let time = path.start.after(position * path.h);
-        Some(Meeting { position, time, at, after, level: None })
+        Some(Crossing { position, time, at, after, level: None })
     }
 
-    /// What rounding of the variables makes of the difference of two sides.
+    /// NextKind rounding of the variables makes of the difference of two sides.
     fn rounding(&mut self, path: &Path, atom: usize, at: f64) -> f64 {
         path.over(at, at, &mut self.bounds);
         for variable in &mut self.bounds {
@@ -389,14 +389,14 @@ impl Watcher {
         variable: usize,
         level: &Program,
         sign: Sign,
-    ) -> Option<Meeting> {
+    ) -> Option<Crossing> {
         if !matches!(sign, Sign::Plus | Sign::Minus) {
             return None;
         }
         let level = self.level(path, level);
         let t = path.rule.time_variable();
-        let motion = path.state.motions.get(variable);
-        let start = motion.map_or(0.0, |_| path.world.tree.parameters(path.state.id)[variable]);
+        let trajectory = path.state.trajectories.get(variable);
+        let start = trajectory.map_or(0.0, |_| path.world.tree.parameters(path.state.id)[variable]);
         let clause = path.state.solve.map(|s| &path.rule.solves[s]);
         let (values, scratch, rates) = (&mut self.values, &mut self.scratch, &mut self.rates);
         let exact = || {
@@ -404,7 +404,7 @@ impl Watcher {
             values.extend(path.state.switches.iter().map(|&on| f64::from(u8::from(on))));
             rate_at(clause, values, variable, level, scratch, rates)
         };
-        let time = match reach(variable, t, level, motion, start, exact)? {
+        let time = match reach(variable, t, level, trajectory, start, exact)? {
             Reach::At(time) => time,
             Reach::Age(age) => path.world.tree.birth(path.state.id).after(age),
             Reach::After(tau) => path.state.since.after(tau),
@@ -412,9 +412,9 @@ impl Watcher {
         let position = time.since(path.start) / path.h;
         let level = (variable < t).then_some((variable, level));
         let after = opposite(sign);
-        let meeting = Meeting { position, time, at: Sign::Zero, after, level };
+        let crossing = Crossing { position, time, at: Sign::Zero, after, level };
         if position > path.start.resolution() / path.h {
-            return Some(meeting);
+            return Some(crossing);
         }
         // Here, but for rounding, or already behind: an instant that has been passed, or one that fell on the very end
         // of the stretch before this one and was not seen? The difference goes towards zero, or away from it.
@@ -422,11 +422,11 @@ impl Watcher {
         self.departure_out.resize(path.rule.sides.outputs(), Dual::constant(0.0));
         path.rule.sides.eval(&self.departure, &mut self.departure_scratch, &mut self.departure_out);
         let slope = self.departure_out[2 * atom].rate - self.departure_out[2 * atom + 1].rate;
-        if Sign::of(slope) != meeting.after {
+        if Sign::of(slope) != crossing.after {
             return None;
         }
         let time = if position > 0.0 { time } else { path.start };
-        Some(Meeting { position: position.max(0.0), time, ..meeting })
+        Some(Crossing { position: position.max(0.0), time, ..crossing })
     }
 
     /// Values at the start and bounds over the whole path: most atoms keep their sign on most paths.

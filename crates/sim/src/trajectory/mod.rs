@@ -1,6 +1,6 @@
 //! How one parameter of one module moves from an instant on: by a formula, along dense output, or not at all.
 //!
-//! Time is counted from the start of the motion, values as displacements from the value there, so that a module born
+//! Time is counted from the start of the trajectory, values as displacements from the value there, so that a module born
 //! at t = 1e9 moves as precisely as one born at 0.
 
 mod driven;
@@ -17,9 +17,9 @@ pub use sum::{Sum, Terms};
 
 use dlsys_expr::{Dual, Interval, Value};
 
-/// The motion of a parameter.
+/// The trajectory of a parameter.
 #[derive(Clone, Debug, Default)]
-pub enum Motion {
+pub enum Trajectory {
     /// It stays.
     #[default]
     Rest,
@@ -35,60 +35,62 @@ pub enum Motion {
     Coupled(u32),
 }
 
-impl Motion {
+impl Trajectory {
     pub fn is_formula(&self) -> bool {
-        !matches!(self, Motion::Step(_) | Motion::Coupled(_))
+        !matches!(self, Trajectory::Step(_) | Trajectory::Coupled(_))
     }
 
-    /// The displacement at a time, of a motion that is a formula.
+    /// The displacement at a time, of a trajectory that is a formula.
     #[inline]
     pub fn value(&self, tau: f64) -> f64 {
         match self {
-            Motion::Rest => 0.0,
-            Motion::Polynomial(c) => tau * (c[0] + tau * (c[1] + tau * (c[2] + tau * c[3]))),
-            Motion::Riccati(law) => law.value(tau),
-            Motion::Sum(sum) => sum.value(tau),
-            Motion::Driven(driven) => driven.value(tau),
-            Motion::Function(function) => function.value(tau),
-            Motion::Step(_) | Motion::Coupled(_) => f64::NAN,
+            Trajectory::Rest => 0.0,
+            Trajectory::Polynomial(c) => tau * (c[0] + tau * (c[1] + tau * (c[2] + tau * c[3]))),
+            Trajectory::Riccati(law) => law.value(tau),
+            Trajectory::Sum(sum) => sum.value(tau),
+            Trajectory::Driven(driven) => driven.value(tau),
+            Trajectory::Function(function) => function.value(tau),
+            Trajectory::Step(_) | Trajectory::Coupled(_) => f64::NAN,
         }
     }
 
     pub fn rate(&self, tau: f64) -> f64 {
         match self {
-            Motion::Rest => 0.0,
-            Motion::Polynomial(c) => c[0] + tau * (2.0 * c[1] + tau * (3.0 * c[2] + tau * 4.0 * c[3])),
-            Motion::Riccati(law) => law.rate(law.value(tau)),
-            Motion::Sum(sum) => sum.rate(tau),
-            Motion::Driven(driven) => driven.rate(tau),
-            Motion::Function(function) => function.rate(tau),
-            Motion::Step(_) | Motion::Coupled(_) => f64::NAN,
+            Trajectory::Rest => 0.0,
+            Trajectory::Polynomial(c) => c[0] + tau * (2.0 * c[1] + tau * (3.0 * c[2] + tau * 4.0 * c[3])),
+            Trajectory::Riccati(law) => law.rate(law.value(tau)),
+            Trajectory::Sum(sum) => sum.rate(tau),
+            Trajectory::Driven(driven) => driven.rate(tau),
+            Trajectory::Function(function) => function.rate(tau),
+            Trajectory::Step(_) | Trajectory::Coupled(_) => f64::NAN,
         }
     }
 
     /// Bounds of displacement and rate from one time to another.
     pub fn over(&self, from: f64, to: f64) -> Dual<Interval> {
         match self {
-            Motion::Rest => Dual { value: Interval::constant(0.0), rate: Interval::constant(0.0) },
-            Motion::Polynomial(c) => bound_polynomial(c, from, to),
-            Motion::Riccati(law) => law.over(from, to),
-            Motion::Sum(sum) => sum.over(from, to),
-            Motion::Driven(driven) => driven.over(from, to),
-            Motion::Function(function) => function.over(from, to),
-            Motion::Step(_) | Motion::Coupled(_) => Dual { value: Interval::ENTIRE, rate: Interval::ENTIRE },
+            Trajectory::Rest => Dual { value: Interval::constant(0.0), rate: Interval::constant(0.0) },
+            Trajectory::Polynomial(c) => bound_polynomial(c, from, to),
+            Trajectory::Riccati(law) => law.over(from, to),
+            Trajectory::Sum(sum) => sum.over(from, to),
+            Trajectory::Driven(driven) => driven.over(from, to),
+            Trajectory::Function(function) => function.over(from, to),
+            Trajectory::Step(_) | Trajectory::Coupled(_) => {
+                Dual { value: Interval::ENTIRE, rate: Interval::ENTIRE }
+            }
         }
     }
 
-    /// The first time after 0 at which the displacement is `u`, of a motion that goes one way only; `rate` gives the
+    /// The first time after 0 at which the displacement is `u`, of a trajectory that goes one way only; `rate` gives the
     /// rate there.
     pub fn reach(&self, u: f64, rate: impl FnOnce() -> f64) -> Option<f64> {
         match self {
-            Motion::Polynomial([c, 0.0, 0.0, 0.0]) => {
+            Trajectory::Polynomial([c, 0.0, 0.0, 0.0]) => {
                 let tau = u / c;
                 (tau > 0.0 && tau.is_finite()).then_some(tau)
             }
-            Motion::Riccati(law) => law.reach(u, rate),
-            Motion::Driven(driven) => driven.reach(u, rate),
+            Trajectory::Riccati(law) => law.reach(u, rate),
+            Trajectory::Driven(driven) => driven.reach(u, rate),
             _ => None,
         }
     }
@@ -96,23 +98,26 @@ impl Motion {
     /// The time from which on there is no value.
     pub fn end(&self) -> Option<f64> {
         match self {
-            Motion::Riccati(law) => law.pole(),
-            Motion::Driven(driven) => driven.end(),
+            Trajectory::Riccati(law) => law.pole(),
+            Trajectory::Driven(driven) => driven.end(),
             _ => None,
         }
     }
 
-    /// The motion as an algebraic sum, from the value `x`; None if it is none.
+    /// The trajectory as an algebraic sum, from the value `x`; None if it is none.
     pub fn terms(&self, x: f64) -> Option<Terms> {
         match self {
-            Motion::Rest => Some(Terms::constant(x)),
-            Motion::Polynomial(c) => Some(Terms::polynomial(x, c)),
+            Trajectory::Rest => Some(Terms::constant(x)),
+            Trajectory::Polynomial(c) => Some(Terms::polynomial(x, c)),
             // x + f (exp(d τ) - 1) / d
-            Motion::Riccati(law) => law.exponential().map(|(f, d)| {
+            Trajectory::Riccati(law) => law.exponential().map(|(f, d)| {
                 if d == 0.0 { Terms::affine(x, f) } else { Terms::exponential(x - f / d, f / d, d) }
             }),
-            Motion::Sum(sum) => Some(sum.terms(x)),
-            Motion::Driven(_) | Motion::Function(_) | Motion::Step(_) | Motion::Coupled(_) => None,
+            Trajectory::Sum(sum) => Some(sum.terms(x)),
+            Trajectory::Driven(_)
+            | Trajectory::Function(_)
+            | Trajectory::Step(_)
+            | Trajectory::Coupled(_) => None,
         }
     }
 }

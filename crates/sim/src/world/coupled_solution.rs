@@ -4,15 +4,15 @@ use dlsys_expr::{Dual, Interval};
 use dlsys_ode::{Coefficients, Dense};
 use dlsys_tree::SimTime;
 
-/// The motion of all components from the last common step to its end.
+/// The trajectory of all components from the last common step to its end.
 #[derive(Clone, Debug)]
-pub struct Course {
-    /// The common step, then the stretches of repairs.
+pub struct CoupledSolution {
+    /// The common step, then the stretches of reintegrations.
     stretches: Vec<Dense>,
     /// By component: where it is found. Empty as long as there is the common step only.
     tracks: Vec<Track>,
     pub end: SimTime,
-    /// What the components may be wrong by, relative, in the worst of the stretches.
+    /// NextKind the components may be wrong by, relative, in the worst of the stretches.
     pub error: f64,
 }
 
@@ -27,7 +27,7 @@ struct Track {
 
 /// A component along a stretch of time that lies within one dense output.
 #[derive(Clone, Copy)]
-pub struct Piece<'c> {
+pub struct DenseComponent<'c> {
     dense: &'c Dense,
     component: usize,
     /// Position in the dense output at the start, and change of it from start to end.
@@ -35,22 +35,22 @@ pub struct Piece<'c> {
     scale: f64,
 }
 
-impl Course {
+impl CoupledSolution {
     /// The components of a common step.
-    pub fn new(step: Dense) -> Course {
+    pub fn new(step: Dense) -> CoupledSolution {
         let (end, error) = (step.end, step.error);
-        Course { stretches: vec![step], tracks: Vec::new(), end, error }
+        CoupledSolution { stretches: vec![step], tracks: Vec::new(), end, error }
     }
 
     /// The components of a common step that is several stretches.
-    pub fn of(stretches: Vec<Dense>) -> Course {
+    pub fn of(stretches: Vec<Dense>) -> CoupledSolution {
         let end = stretches.last().expect("one at least").end;
         let count = stretches.len() as u32;
         let track = |component: u32| Track { first: 0, count, component };
         let tracks =
             if count == 1 { Vec::new() } else { (0..stretches[0].components() as u32).map(track).collect() };
         let error = stretches.iter().map(|dense| dense.error).fold(0.0, f64::max);
-        Course { stretches, tracks, end, error }
+        CoupledSolution { stretches, tracks, end, error }
     }
 
     /// The start of the common step.
@@ -91,9 +91,9 @@ impl Course {
     }
 
     /// A component along a stretch of time.
-    pub fn piece(&self, component: usize, start: SimTime, h: f64) -> Option<Piece<'_>> {
+    pub fn piece(&self, component: usize, start: SimTime, h: f64) -> Option<DenseComponent<'_>> {
         let (dense, component) = self.stretch(component, start)?;
-        Some(Piece::new(dense, component, start, h))
+        Some(DenseComponent::new(dense, component, start, h))
     }
 
     /// Adds a component that is not integrated yet.
@@ -119,13 +119,13 @@ impl Course {
     }
 }
 
-impl<'c> Piece<'c> {
-    pub fn new(dense: &'c Dense, component: usize, start: SimTime, h: f64) -> Piece<'c> {
+impl<'c> DenseComponent<'c> {
+    pub fn new(dense: &'c Dense, component: usize, start: SimTime, h: f64) -> DenseComponent<'c> {
         if dense.start == start && dense.h == h {
-            return Piece { dense, component, from: 0.0, scale: 1.0 };
+            return DenseComponent { dense, component, from: 0.0, scale: 1.0 };
         }
         let scale = if dense.h == 0.0 { 0.0 } else { h / dense.h };
-        Piece { dense, component, from: dense.position(start), scale }
+        DenseComponent { dense, component, from: dense.position(start), scale }
     }
 
     fn position(&self, position: f64) -> f64 {
@@ -143,7 +143,7 @@ impl<'c> Piece<'c> {
     }
 
     /// Adds the polynomial, times a factor, to a sum of others of the same dense output and stretch; false if it is not of them.
-    pub fn add_to(&self, factor: f64, sum: &mut Option<(Piece<'c>, Coefficients)>) -> bool {
+    pub fn add_to(&self, factor: f64, sum: &mut Option<(DenseComponent<'c>, Coefficients)>) -> bool {
         let (first, coefficients) = sum.get_or_insert((*self, Coefficients::default()));
         self.dense.add_to(self.component, factor, coefficients);
         std::ptr::eq(first.dense, self.dense)
@@ -154,7 +154,7 @@ impl<'c> Piece<'c> {
         self.scaled(self.dense.stretch(&mut sum, self.position(lo), self.position(hi)))
     }
 
-    /// What it may be wrong by, as a part of its size.
+    /// NextKind it may be wrong by, as a part of its size.
     pub fn error(&self) -> f64 {
         self.dense.error
     }

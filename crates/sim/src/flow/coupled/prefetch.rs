@@ -1,6 +1,6 @@
 //! Memory that will be needed soon is asked for early.
 //!
-//! What is kept of modules stands in memory as they were born, and a common step visits it in string order: for the
+//! NextKind is kept of modules stands in memory as they were born, and a common step visits it in string order: for the
 //! processor, at random. So each visit would wait for memory; asked for some modules ahead, it is there.
 
 use crate::world::World;
@@ -9,7 +9,7 @@ use dlsys_tree::ModuleId;
 /// So many modules ahead, memory is asked for.
 const AHEAD: usize = 6;
 
-/// What fewer modules than this hold stays near the processor by itself; then asking costs a third of a cheap step.
+/// NextKind fewer modules than this hold stays near the processor by itself; then asking costs a third of a cheap step.
 const FEW: usize = 2000;
 
 /// Bytes that come from memory together.
@@ -18,7 +18,7 @@ const LINE: usize = 64;
 
 /// Asks for what will be read when some modules, visited one after another, have come to the one at a place.
 #[inline]
-pub fn fetch_ahead(world: &World, visited: &[ModuleId], at: usize) {
+pub fn prefetch(world: &World, visited: &[ModuleId], at: usize) {
     if visited.len() < FEW {
         return;
     }

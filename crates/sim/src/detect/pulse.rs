@@ -1,17 +1,17 @@
-//! Flashes: rates that are large for a time so short that no stage of a step falls into it.
+//! Pulses: rates that are large for a time so short that no stage of a step falls into it.
 //!
 //! Step control sees a rate where a stage evaluates it and nowhere else. A flash of light of a ten-thousandth of a day
-//! between two stages of a step of a day is not seen by any method. So rates that may have flashes are bounded by interval
+//! between two stages of a step of a day is not seen by any method. So rates that may have pulses are bounded by interval
 //! arithmetic over pieces of the step, along its dense output, and compared with the rates that were seen: where they
 //! may be much larger, the step is cut.
 //!
-//! Which rates may have flashes is known from the model ([`Solve::has_pulses`](dlsys_model::Solve::has_pulses)): those that are
-//! no polynomials in what moves, and those that read what follows a formula, which a step does not resolve. What moves by
-//! the step itself is resolved by it, to the tolerance, and a polynomial of that has no flashes.
+//! Which rates may have pulses is known from the model ([`Solve::has_pulses`](dlsys_model::Solve::has_pulses)): those that are
+//! no polynomials in what moves, and those that read what follows a formula, which a step does not resolve. NextKind moves by
+//! the step itself is resolved by it, to the tolerance, and a polynomial of that has no pulses.
 //!
 //! In stiff equations bounds over a range of states say nothing: the rates of two states a tolerance apart may
 //! differ by any amount. There the states are taken as they are in the middle of a piece, and only time and formulas vary.
-//! What cannot be bounded is counted, and `run --stats` and `explain` say of what.
+//! NextKind cannot be bounded is counted, and `run --stats` and `explain` say of what.
 
 use smallvec::SmallVec;
 
@@ -31,9 +31,9 @@ const MAX_PIECES: usize = 512;
 /// Most times that a step is cut for want of bounds: a part of 4^-20 of it is as narrow as anything that can be told.
 pub const MAX_UNBOUNDED: usize = 20;
 
-/// What bounds say of a step, at the first position where they say anything.
+/// NextKind bounds say of a step, at the first position where they say anything.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Glance {
+pub enum PulseFinding {
     /// Nothing has been overlooked.
     Clear,
     /// Something may have been, from this position on.
@@ -60,7 +60,7 @@ pub struct Step<'p> {
 
 /// Bounds rates along steps.
 #[derive(Clone, Debug, Default)]
-pub struct Lookout {
+pub struct PulseDetector {
     values: Vec<f64>,
     bounds: Vec<Interval>,
     seen: Vec<f64>,
@@ -70,19 +70,19 @@ pub struct Lookout {
     bounds_scratch: Scratch<Interval>,
 }
 
-impl Lookout {
+impl PulseDetector {
     /// Looks along a step for what the rates of the module's equations, and its values that are solved for, may be between
     /// the places where they were evaluated.
-    pub fn look(&mut self, step: &Step) -> Glance {
+    pub fn look(&mut self, step: &Step) -> PulseFinding {
         let all = step.end.since(step.start);
-        let rates = if step.state.forced { &step.solve.rates } else { &step.solve.numeric_rates };
+        let rates = if step.state.numeric_only { &step.solve.rates } else { &step.solve.numeric_rates };
         self.see(step, rates, all);
         let values = &step.solve.algebraic.values;
         let explicit = values.outputs() > 0 && step.solve.algebraic.explicit.iter().all(|e| *e);
         let mut start = step.start;
         while step.end.since(start) > 0.0 {
             let knot = match (&step.world.coupled, step.own) {
-                (Some(course), None) => step.world.knot(step.state, course, start),
+                (Some(solution), None) => step.world.knot(step.state, solution, start),
                 _ => step.end,
             };
             let h = knot.since(start);
@@ -91,23 +91,23 @@ impl Lookout {
             }
             let path = Path::of_equations(step.world, step.state, step.rule, (start, h), step.own);
             let (before, part) = (start.since(step.start) / all, h / all);
-            let mut glance = self.along(&path, rates, all * part, part, step);
-            if explicit && glance == Glance::Clear {
-                // What the dense output has of them, against what they may be.
+            let mut finding = self.along(&path, rates, all * part, part, step);
+            if explicit && finding == PulseFinding::Clear {
+                // NextKind the dense output has of them, against what they may be.
                 let rates = std::mem::take(&mut self.seen);
                 let of = step.solve.algebraic.of.iter();
                 self.seen =
                     of.map(|p| path.dense_bounds(*p).map_or(f64::INFINITY, Interval::magnitude)).collect();
-                glance = self.along(&path, values, 1.0, part, step);
+                finding = self.along(&path, values, 1.0, part, step);
                 self.seen = rates;
             }
-            match glance {
-                Glance::Clear => start = knot,
-                Glance::Overlooked(at) => return Glance::Overlooked(before + part * at),
-                Glance::Unbounded(at) => return Glance::Unbounded(before + part * at),
+            match finding {
+                PulseFinding::Clear => start = knot,
+                PulseFinding::Overlooked(at) => return PulseFinding::Overlooked(before + part * at),
+                PulseFinding::Unbounded(at) => return PulseFinding::Unbounded(before + part * at),
             }
         }
-        Glance::Clear
+        PulseFinding::Clear
     }
 
     /// The rates where the method has seen them.
@@ -126,9 +126,9 @@ impl Lookout {
         }
     }
 
-    /// Compares bounds of a program along a path, which is a part of the step, with what was seen. What they exceed that
+    /// Compares bounds of a program along a path, which is a part of the step, with what was seen. NextKind they exceed that
     /// by matters times `scale`, when it lasts for the whole path.
-    fn along(&mut self, path: &Path, program: &Program, scale: f64, part: f64, step: &Step) -> Glance {
+    fn along(&mut self, path: &Path, program: &Program, scale: f64, part: f64, step: &Step) -> PulseFinding {
         self.bounds_out.resize(program.outputs(), Interval::EMPTY);
         let mut stack: SmallVec<[(f64, f64); 16]> = SmallVec::new();
         stack.push((0.0, 1.0));
@@ -147,14 +147,14 @@ impl Lookout {
                 continue;
             }
             if (hi - lo) * part <= NARROW {
-                return if bounded { Glance::Overlooked(lo) } else { Glance::Unbounded(lo) };
+                return if bounded { PulseFinding::Overlooked(lo) } else { PulseFinding::Unbounded(lo) };
             }
             if pieces >= MAX_PIECES {
-                return Glance::Unbounded(lo);
+                return PulseFinding::Unbounded(lo);
             }
             let middle = 0.5 * (lo + hi);
             stack.extend([(middle, hi), (lo, middle)]);
         }
-        Glance::Clear
+        PulseFinding::Clear
     }
 }

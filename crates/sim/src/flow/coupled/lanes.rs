@@ -8,10 +8,10 @@ use dlsys_model::Rule;
 use smallvec::SmallVec;
 use std::ops::Range;
 
-/// All rows with rates, in chunks. What chunks and columns consist of stands in a few long lists, so that the equations
+/// All rows with rates, in chunks. NextKind chunks and columns consist of stands in a few long lists, so that the equations
 /// of another region are written into the memory of the last.
 #[derive(Clone, Debug, Default)]
-pub struct Columns {
+pub struct LaneBatches {
     chunks: Vec<Chunk>,
     rows: Vec<u32>,
     columns: Vec<(u32, Column)>,
@@ -27,7 +27,7 @@ struct Chunk {
     rows: usize,
     /// Registers of the rule's variables.
     registers: usize,
-    /// What the program reads, and from where.
+    /// NextKind the program reads, and from where.
     first_column: usize,
     columns: usize,
     /// Places of the first rate of each row.
@@ -55,7 +55,7 @@ enum Places {
     Any(usize),
 }
 
-/// What the rows of a system read at one time.
+/// NextKind the rows of a system read at one time.
 pub struct Readings<'r> {
     pub tau: f64,
     pub y: &'r [f64],
@@ -65,7 +65,7 @@ pub struct Readings<'r> {
     pub sums: &'r [f64],
 }
 
-impl Columns {
+impl LaneBatches {
     /// Puts rows with the same program together, a chunk of them for each evaluation.
     pub fn fill(&mut self, system: &System, rules: &[Rule]) {
         self.chunks.clear();
@@ -74,7 +74,7 @@ impl Columns {
         self.numbers.clear();
         self.places.clear();
         self.sources.clear();
-        let key = |row: &Row| (row.rule, row.solve, row.forced);
+        let key = |row: &Row| (row.rule, row.solve, row.numeric_only);
         let mut keys: SmallVec<[_; 4]> = SmallVec::new();
         for row in system.rows.iter().filter(|row| row.rates > 0) {
             if keys.last() != Some(&key(row)) && !keys.contains(&key(row)) {
@@ -157,7 +157,7 @@ impl Columns {
 
     /// A variable that is no component in some rows.
     fn other_column(&mut self, system: &System, range: Range<usize>, variable: usize) -> Column {
-        let Columns { rows, numbers, places, sources, .. } = self;
+        let LaneBatches { rows, numbers, places, sources, .. } = self;
         let all = rows[range].iter().map(|row| &system.rows[*row as usize]);
         let all = all.map(|row| system.sources[row.first_source + variable]);
         let (number, place, mixed) = (numbers.len(), places.len(), sources.len());

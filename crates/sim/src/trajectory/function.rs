@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use dlsys_expr::{Dual, Interval, Program, Value};
 
-use super::Motion;
+use super::Trajectory;
 
 /// A formula over variables of which some move: time, and parameters that follow formulas themselves.
 #[derive(Clone, Debug)]
@@ -13,7 +13,7 @@ pub struct Function {
     /// The variables at the start.
     variables: Vec<f64>,
     /// Which of them move, and how.
-    moving: Vec<(usize, Motion)>,
+    moving: Vec<(usize, Trajectory)>,
     /// `t`; `age` is the next.
     time: usize,
     /// The value at the start.
@@ -25,7 +25,7 @@ impl Function {
     pub fn new(
         program: &Arc<Program>,
         variables: &[f64],
-        moving: Vec<(usize, Motion)>,
+        moving: Vec<(usize, Trajectory)>,
         time: usize,
     ) -> Option<Function> {
         let (program, variables) = (program.clone(), variables.to_vec());
@@ -37,11 +37,11 @@ impl Function {
     fn evaluate<T: Value>(
         &self,
         mut variables: Vec<T>,
-        motion: impl Fn(&Motion, f64) -> T,
+        trajectory: impl Fn(&Trajectory, f64) -> T,
         time: [T; 2],
     ) -> T {
         for (variable, how) in &self.moving {
-            variables[*variable] = motion(how, self.variables[*variable]);
+            variables[*variable] = trajectory(how, self.variables[*variable]);
         }
         [variables[self.time], variables[self.time + 1]] = time;
         let mut out = [T::constant(0.0)];
@@ -51,7 +51,7 @@ impl Function {
 
     fn at(&self, tau: f64) -> f64 {
         let time = [self.variables[self.time] + tau, self.variables[self.time + 1] + tau];
-        self.evaluate(self.variables.clone(), |motion, x| x + motion.value(tau), time)
+        self.evaluate(self.variables.clone(), |trajectory, x| x + trajectory.value(tau), time)
     }
 
     /// The displacement.
@@ -62,8 +62,11 @@ impl Function {
     pub fn rate(&self, tau: f64) -> f64 {
         let still = |value: f64| Dual { value, rate: 0.0 };
         let time = [self.time, self.time + 1].map(|v| Dual { value: self.variables[v] + tau, rate: 1.0 });
-        let motion = |motion: &Motion, x: f64| Dual { value: x + motion.value(tau), rate: motion.rate(tau) };
-        self.evaluate(self.variables.iter().map(|x| still(*x)).collect(), motion, time).rate
+        let trajectory = |trajectory: &Trajectory, x: f64| Dual {
+            value: x + trajectory.value(tau),
+            rate: trajectory.rate(tau),
+        };
+        self.evaluate(self.variables.iter().map(|x| still(*x)).collect(), trajectory, time).rate
     }
 
     /// Bounds of displacement and rate from one time to another.
@@ -72,12 +75,12 @@ impl Function {
             let value = Interval::spanned(self.variables[v] + from, self.variables[v] + to);
             Dual { value, rate: Interval::constant(1.0) }
         });
-        let motion = |motion: &Motion, x: f64| {
-            let Dual { value, rate } = motion.over(from, to);
+        let trajectory = |trajectory: &Trajectory, x: f64| {
+            let Dual { value, rate } = trajectory.over(from, to);
             Dual { value: Interval { lo: x + value.lo, hi: x + value.hi, ..value }, rate }
         };
         let still = self.variables.iter().map(|x| Dual::constant(*x)).collect();
-        let Dual { value, rate } = self.evaluate(still, motion, time);
+        let Dual { value, rate } = self.evaluate(still, trajectory, time);
         Dual { value: Interval { lo: value.lo - self.start, hi: value.hi - self.start, ..value }, rate }
     }
 }

@@ -11,14 +11,14 @@ use super::{Growth, Riccati};
 use dlsys_expr::{Dual, Interval, Program, Scratch, Value};
 use dlsys_model as model;
 
-/// A motion of one parameter, from one start.
+/// A trajectory of one parameter, from one start.
 #[derive(Clone, Debug)]
 pub struct Driven {
     flow: Flow,
     pace: Option<Pace>,
 }
 
-/// The motion in s.
+/// The trajectory in s.
 #[derive(Clone, Debug)]
 pub enum Flow {
     /// Forward, and backward with the signs of the coefficients turned.

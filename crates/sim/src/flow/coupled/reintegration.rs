@@ -1,19 +1,19 @@
-//! What an event does to the coupled modules around it, without ending the common step of the others.
+//! NextKind an event does to the coupled modules around it, without ending the common step of the others.
 //!
 //! After an event at t' within the common step, the modules whose equations or inputs have changed (the *seeds*) and some
-//! rings of neighbours around them are integrated again from t' to the end of the step, with the motion of everybody
-//! else as an input. What a ring is: who reads a module is one ring further out, since influence goes to those who read.
+//! rings of neighbours around them are integrated again from t' to the end of the step, with the trajectory of everybody
+//! else as an input. NextKind a ring is: who reads a module is one ring further out, since influence goes to those who read.
 //!
 //! # Why the error stays under the tolerance
 //!
-//! Let ε be the error that a step may have ([`INNER_TOLERANCE`] times the tolerance). The repair is integrated with the
-//! step control of any other step. What it leaves out is the change of the modules outside. They read the region only
-//! through its outermost ring, and the change of that ring, old motion against new, is measured along the whole
-//! rest of the step: if it is more than ε anywhere, the repair is done again with twice as many rings. So what is
+//! Let ε be the error that a step may have ([`INNER_TOLERANCE`] times the tolerance). The reintegration is integrated with the
+//! step control of any other step. NextKind it leaves out is the change of the modules outside. They read the region only
+//! through its outermost ring, and the change of that ring, old trajectory against new, is measured along the whole
+//! rest of the step: if it is more than ε anywhere, the reintegration is done again with twice as many rings. So what is
 //! left out enters the rates outside as a disturbance of at most ε times the Lipschitz constant L of the coupling, and
 //! over the rest of a step of length h changes their values by at most ε (exp(L h) - 1). Explicit methods keep L h
 //! to a few units (beyond that their stability ends, the equations count as stiff, and every event ends the step), and
-//! steps are repaired where events happen: the neglected change is one more local error, and adds up as those do. Where
+//! steps are reintegrated where events happen: the neglected change is one more local error, and adds up as those do. Where
 //! neighbours' influence is weak (diffusion between cells), it falls by a factor of about L h / k from ring k - 1 to
 //! ring k, and a handful of rings is enough.
 
@@ -22,9 +22,9 @@ use crate::flow::coupled::equations::{Equations, Memory};
 use crate::flow::coupled::integrated;
 use crate::flow::coupled::system::System;
 use crate::flow::integrator::{CERTAINTY, INNER_TOLERANCE, Integrator};
-use crate::motion::Motion;
 use crate::schedule::Owner;
-use crate::world::course::Course;
+use crate::trajectory::Trajectory;
+use crate::world::coupled_solution::CoupledSolution;
 use crate::world::neighbours::reads;
 use crate::world::state::{Control, State};
 use dlsys_ode::Dense;
@@ -32,9 +32,9 @@ use dlsys_ode::Nodes;
 use dlsys_tree::{ModuleId, SimTime};
 use smallvec::SmallVec;
 
-/// What repairs have learnt, and their memory: nothing is allocated for one but its motion.
+/// NextKind reintegrations have learnt, and their memory: nothing is allocated for one but its trajectory.
 #[derive(Clone)]
-pub struct Repairer {
+pub struct Reintegration {
     integrator: Integrator,
     control: Control,
     /// Rings to begin with.
@@ -51,15 +51,15 @@ pub struct Repairer {
     visit: u64,
 }
 
-impl Default for Repairer {
-    fn default() -> Repairer {
+impl Default for Reintegration {
+    fn default() -> Reintegration {
         let (integrator, control, numbers, system, memory) = Default::default();
         let (region, trial, y) = Default::default();
-        Repairer { integrator, control, rings: 3, numbers, system, memory, region, trial, y, visit: 0 }
+        Reintegration { integrator, control, rings: 3, numbers, system, memory, region, trial, y, visit: 0 }
     }
 }
 
-impl Repairer {
+impl Reintegration {
     /// Where its steps evaluate rates.
     pub fn nodes(&self) -> Nodes {
         self.integrator.nodes()
@@ -79,12 +79,12 @@ impl Repairer {
 
 /// Most rings that are tried.
 const MAX_RINGS: usize = 64;
-/// Most steps of a repair.
+/// Most steps of a reintegration.
 const MAX_STEPS: usize = 64;
 /// A region of more than this part of all modules is no region.
 const MOST: f64 = 0.5;
 
-/// What flows along branches is to be conserved whatever the tolerance: what the edge of a region sends to the outside,
+/// NextKind flows along branches is to be conserved whatever the tolerance: what the edge of a region sends to the outside,
 /// the outside gets only as it was before. In models that add up over branches no more than this may be neglected, for
 /// its size.
 const CONSERVED: f64 = 1e-11;
@@ -99,7 +99,7 @@ struct Region {
     rings: Vec<usize>,
 }
 
-/// The motion of a region.
+/// The trajectory of a region.
 #[derive(Clone, Default)]
 struct Trial {
     stretches: Vec<Dense>,
@@ -112,23 +112,23 @@ struct Trial {
 impl FlowStage<'_, '_> {
     /// Lets some coupled modules, of which some have just joined, go on with new equations; false if that is better
     /// done by a new common step.
-    pub fn repair(&mut self, seeds: &[ModuleId], joined: &[ModuleId]) -> bool {
-        let Some(course) = &self.world.coupled else { return false };
-        let room = course.end.since(self.instant.at);
+    pub fn reintegrate(&mut self, seeds: &[ModuleId], joined: &[ModuleId]) -> bool {
+        let Some(solution) = &self.world.coupled else { return false };
+        let room = solution.end.since(self.instant.at);
         if self.is_cut_by_events() || room <= 64.0 * self.instant.at.resolution() {
             return false;
         }
         self.number_newcomers(seeds);
         let (region, trial) =
-            (&mut self.flows.coupled.repairer.region, &mut self.flows.coupled.repairer.trial);
+            (&mut self.flows.coupled.reintegration.region, &mut self.flows.coupled.reintegration.trial);
         let (mut region, mut trial) = (std::mem::take(region), std::mem::take(trial));
-        let repaired = self.repair_within(&mut region, &mut trial, seeds, joined);
+        let reintegrated = self.reintegrate_within(&mut region, &mut trial, seeds, joined);
         trial.stretches.clear();
-        (self.flows.coupled.repairer.region, self.flows.coupled.repairer.trial) = (region, trial);
-        repaired
+        (self.flows.coupled.reintegration.region, self.flows.coupled.reintegration.trial) = (region, trial);
+        reintegrated
     }
 
-    fn repair_within(
+    fn reintegrate_within(
         &mut self,
         region: &mut Region,
         trial: &mut Trial,
@@ -137,7 +137,7 @@ impl FlowStage<'_, '_> {
     ) -> bool {
         // Within a slice of time nobody sees what happens to others.
         let sliced = self.setup.settings.is_sliced();
-        let mut rings = if sliced { 0 } else { self.flows.coupled.repairer.rings };
+        let mut rings = if sliced { 0 } else { self.flows.coupled.reintegration.rings };
         loop {
             self.surround(region, seeds, rings);
             if !sliced && region.members.len() as f64 > MOST * self.flows.coupled.members.len() as f64 {
@@ -150,7 +150,7 @@ impl FlowStage<'_, '_> {
             let closed = region.rings.len() <= rings;
             if reach < region.rings.len() || closed {
                 // One ring beyond the last that changed.
-                self.flows.coupled.repairer.rings = (reach + 1).clamp(1, MAX_RINGS);
+                self.flows.coupled.reintegration.rings = (reach + 1).clamp(1, MAX_RINGS);
                 self.flows.coupled.members.extend_from_slice(joined);
                 self.take_over(region, trial);
                 // A common step that begins now finds what has been overlooked.
@@ -163,20 +163,21 @@ impl FlowStage<'_, '_> {
         }
     }
 
-    /// Gives components to the parameters of modules that have begun new motions.
+    /// Gives components to the parameters of modules that have begun new trajectories.
     fn number_newcomers(&mut self, seeds: &[ModuleId]) {
         let known = self.flows.coupled.system.places.len();
         for &id in seeds {
-            let fresh = |s: &State| s.motions.iter().any(|m| matches!(m, Motion::Step(_)));
+            let fresh = |s: &State| s.trajectories.iter().any(|m| matches!(m, Trajectory::Step(_)));
             if !self.world.state(id).is_some_and(fresh) {
                 continue;
             }
             self.settle_values(id);
             let state = self.world.state(id).expect("a seed");
             for &parameter in integrated(self.setup.model, state) {
-                let course = self.world.coupled.as_mut().expect("seen above");
-                let component = course.add(known) as u32;
-                self.world.state_mut(id).expect("a seed").motions[parameter] = Motion::Coupled(component);
+                let solution = self.world.coupled.as_mut().expect("seen above");
+                let component = solution.add(known) as u32;
+                self.world.state_mut(id).expect("a seed").trajectories[parameter] =
+                    Trajectory::Coupled(component);
             }
         }
     }
@@ -194,7 +195,7 @@ impl FlowStage<'_, '_> {
 
     /// Makes a region of the seeds and so many rings around them.
     fn surround(&mut self, region: &mut Region, seeds: &[ModuleId], rings: usize) {
-        let visit = self.flows.coupled.repairer.begin_visit();
+        let visit = self.flows.coupled.reintegration.begin_visit();
         let Region { members, rings: begins } = region;
         members.clear();
         begins.clear();
@@ -223,12 +224,12 @@ impl FlowStage<'_, '_> {
         }
     }
 
-    /// The motion of a region from now to the end of the common step; None if there is none.
+    /// The trajectory of a region from now to the end of the common step; None if there is none.
     fn integrate(&mut self, region: &Region, trial: &mut Trial) -> Option<()> {
-        let course = self.world.coupled.as_ref()?;
+        let solution = self.world.coupled.as_ref()?;
         let Trial { stretches, components, rings } = trial;
-        let Repairer { integrator, control, numbers, system, memory, y, .. } =
-            &mut self.flows.coupled.repairer;
+        let Reintegration { integrator, control, numbers, system, memory, y, .. } =
+            &mut self.flows.coupled.reintegration;
         stretches.clear();
         components.clear();
         rings.clear();
@@ -239,9 +240,9 @@ impl FlowStage<'_, '_> {
             }
             let (state, values) = (self.world.state(id)?, self.world.tree.parameters(id));
             for &parameter in integrated(self.setup.model, state) {
-                if let Motion::Coupled(component) = state.motions[parameter] {
+                if let Trajectory::Coupled(component) = state.trajectories[parameter] {
                     components.push(component);
-                    y.push(course.value(component as usize, self.instant.at).unwrap_or(values[parameter]));
+                    y.push(solution.value(component as usize, self.instant.at).unwrap_or(values[parameter]));
                 }
             }
         }
@@ -263,12 +264,12 @@ impl FlowStage<'_, '_> {
         control.error =
             self.flows.coupled.control.error + INNER_TOLERANCE * self.setup.coupled_settings.tolerance;
         let mut from = self.instant.at;
-        while course.end.since(from) > 0.0 {
+        while solution.end.since(from) > 0.0 {
             if stretches.len() >= MAX_STEPS {
                 return None;
             }
-            let mut equations = Equations::within(std::mem::take(memory), system, rules, Some(course));
-            let end = Some(course.end);
+            let mut equations = Equations::within(std::mem::take(memory), system, rules, Some(solution));
+            let end = Some(solution.end);
             let stats = &mut self.log.stats;
             let step =
                 integrator.step(&self.setup.coupled_settings, control, &mut equations, y, from, end, stats);
@@ -282,7 +283,7 @@ impl FlowStage<'_, '_> {
             }
             *memory = equations.memory;
             integrator.advance(y);
-            if course.end.since(from) > 0.0 {
+            if solution.end.since(from) > 0.0 {
                 system.advance(from);
             }
         }
@@ -291,7 +292,7 @@ impl FlowStage<'_, '_> {
 
     /// The number of rings that a trial changes by more than may be neglected.
     fn reach(&self, trial: &Trial) -> usize {
-        let Some(course) = &self.world.coupled else { return 0 };
+        let Some(solution) = &self.world.coupled else { return 0 };
         let tolerance = INNER_TOLERANCE * self.setup.coupled_settings.tolerance;
         let tolerance = if self.setup.gathers { tolerance.min(CONSERVED) } else { tolerance };
         let changes = |number: usize, component: u32| {
@@ -299,7 +300,7 @@ impl FlowStage<'_, '_> {
                 [0.5, 1.0].into_iter().any(|position| {
                     let at = if position == 1.0 { dense.end } else { dense.start.after(position * dense.h) };
                     let new = dense.value(number, position);
-                    let old = course.value(component as usize, at);
+                    let old = solution.value(component as usize, at);
                     old.is_none_or(|old| (new - old).abs() > tolerance * new.abs().max(old.abs()))
                 })
             })
@@ -309,12 +310,12 @@ impl FlowStage<'_, '_> {
         last.map_or(0, |(number, _)| trial.rings.partition_point(|first| *first <= number))
     }
 
-    /// Makes a trial the motion of its region, and finds the region's next events.
+    /// Makes a trial the trajectory of its region, and finds the region's next events.
     fn take_over(&mut self, region: &Region, trial: &mut Trial) {
         let all = self.flows.coupled.system.places.len();
-        let course: &mut Course = self.world.coupled.as_mut().expect("seen above");
-        course.replace(&mut trial.stretches, &trial.components, all);
-        self.flows.coupled.repaired = true;
+        let solution: &mut CoupledSolution = self.world.coupled.as_mut().expect("seen above");
+        solution.replace(&mut trial.stretches, &trial.components, all);
+        self.flows.coupled.reintegrated = true;
         let tolerance = self.setup.coupled_settings.tolerance;
         let known = &mut self.flows.coupled.control.error;
         *known = (*known + INNER_TOLERANCE * tolerance).min(CERTAINTY * tolerance);
