@@ -5,7 +5,7 @@ use super::commands;
 use super::loaded::{LoadedModel, misused};
 use super::state::{CommandError, SessionState};
 use crate::model::{KindId, Model};
-use crate::sim::{ModuleView, brief, describe};
+use crate::sim::{InspectedModule, brief, describe};
 use crate::syntax::suggest::did_you_mean;
 use crate::tree::{Lineage, Module, ModuleString};
 
@@ -177,7 +177,7 @@ impl LoadedModel<'_> {
         let line = |span: crate::diagnostic::Span| session.source.position(span.start).0;
         let present = self.string(state)?;
         let count = modules(present).count();
-        let name = |seen: &ModuleView| describe(model, seen.kind, &seen.parameters);
+        let name = |seen: &InspectedModule| describe(model, seen.kind, &seen.parameters);
         let mut out = format!("{}\n", name(&all.module));
         let ago = brief(t - all.birth, 6);
         out += &format!(
@@ -214,7 +214,7 @@ impl LoadedModel<'_> {
             let title = if i == 0 { "state" } else { "" };
             out += &format!("  {title:8}  {parameter:a$} = {value:b$}   {rate:c$} = {of}\n");
         }
-        let mut neighbour = |title: &str, seen: &Option<ModuleView>| {
+        let mut neighbour = |title: &str, seen: &Option<InspectedModule>| {
             let Some(seen) = seen else {
                 out += &format!("  {title:8}  none\n");
                 return;
@@ -229,7 +229,7 @@ impl LoadedModel<'_> {
         };
         neighbour("left", &all.left);
         neighbour("right", &all.right);
-        let apart = |seen: &&ModuleView| {
+        let apart = |seen: &&InspectedModule| {
             [&all.left, &all.right].into_iter().flatten().all(|n| n.lineage != seen.lineage)
         };
         for seen in all.context.iter().filter(apart) {

@@ -78,6 +78,6 @@ pub use error::{Error, Near, Site, Unsolved};
 pub use event::MAX_ROUNDS;
 pub use kernel::Simulation;
 pub use log::{Event, ModuleState, Transition};
-pub use observe::inspect::{Inspection, ModuleView};
+pub use observe::inspect::{InspectedModule, Inspection};
 pub use settings::{Scheduler, Settings, Stats};
 pub use world::{brief, describe};

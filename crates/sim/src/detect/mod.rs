@@ -33,7 +33,11 @@ pub struct Detector {
 
 impl Detector {
     /// Records the atoms of a search whose sides are nearer each other than the error of integration.
+    #[inline]
     pub fn note_approach(&mut self, rule: usize, found: u64, before: u64, at: SimTime) {
+        if found == before {
+            return;
+        }
         for atom in (0..64).filter(|atom| (found ^ before) & 1 << atom != 0) {
             if found & 1 << atom != 0 {
                 self.approached.entry((rule, atom)).or_insert((at.to_f64(), 0)).1 += 1;

@@ -7,7 +7,7 @@ use dlsys_tree::{Lineage, ModuleId, SimTime, Visit};
 
 /// A module as it is seen from another.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ModuleView {
+pub struct InspectedModule {
     pub kind: KindId,
     pub lineage: Lineage,
     /// At the time of the inspection.
@@ -17,7 +17,7 @@ pub struct ModuleView {
 /// A module with its rates and its neighbours.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inspection {
-    pub module: ModuleView,
+    pub module: InspectedModule,
     /// Derivatives of the parameters by time, in the model's unit.
     pub rates: Vec<f64>,
     /// Time of birth.
@@ -27,10 +27,10 @@ pub struct Inspection {
     pub rule: Option<usize>,
     pub solve: Option<usize>,
     /// The modules that the rule's context has found, left to right as written.
-    pub context: Vec<ModuleView>,
+    pub context: Vec<InspectedModule>,
     /// The nearest modules that count as context, to the left and to the right (LANGUAGE, "Context").
-    pub left: Option<ModuleView>,
-    pub right: Option<ModuleView>,
+    pub left: Option<InspectedModule>,
+    pub right: Option<InspectedModule>,
 }
 
 impl Simulation<'_> {
@@ -82,12 +82,12 @@ impl Simulation<'_> {
         lazy::materialise(&mut self.world, rules, id, &self.instant, &mut self.scratch);
     }
 
-    fn seen(&mut self, id: ModuleId) -> ModuleView {
+    fn seen(&mut self, id: ModuleId) -> InspectedModule {
         self.materialise(id);
         let mut parameters = Vec::new();
         self.world.values(id, self.instant.at, &mut parameters);
         let tree = &self.world.tree;
         parameters.truncate(tree.shown(id));
-        ModuleView { kind: tree.kind(id), lineage: tree.lineage(id), parameters }
+        InspectedModule { kind: tree.kind(id), lineage: tree.lineage(id), parameters }
     }
 }
