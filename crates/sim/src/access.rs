@@ -1,8 +1,8 @@
-//! NextKind random access in time needs of a simulation: to go on bit by bit, and to know what may be shown.
+//! Random access in time: advancing in small pieces, and the times that can still be shown.
 //!
 //! A copy of a simulation goes on as the simulation does, to the same bits, so copies are the marks from which earlier
-//! times are reached again (`replay`). Between two entries of its queues a simulation knows everything: any time
-//! in between is a matter of evaluating formulas and dense output, forwards or backwards.
+//! times are reached again (`replay`). Between two entries of its schedule the state of a simulation is known at any time:
+//! closed forms and dense output are evaluated there, forwards or backwards.
 
 use crate::error::Error;
 use crate::kernel::Simulation;
@@ -64,7 +64,7 @@ impl Simulation<'_> {
     /// A measure of the work done so far, in units of very roughly a tenth of a microsecond. It grows
     /// with time, and is the same in every run of the model.
     pub fn work(&self) -> u64 {
-        /// A step of a module alone; one of a reintegration, with what it takes to look at its neighbours.
+        /// The cost of a step of an independent module; of a step of a re-integration, with the search of its neighbours.
         const STEP: [u64; 2] = [10, 100];
         let stats = self.stats();
         let steps = STEP[usize::from(self.setup.looks_around)] * stats.steps;

@@ -1,8 +1,8 @@
-//! NextKind a run may take: productions and steps, seconds, memory. So that what runs away ends with a message.
+//! The limits of a run: productions and steps, seconds, memory. A run that would not end stops with a message.
 //!
 //! A life of 1e-18, an event at rate 1e300 or a step of 1e-300 never ends, and no count of modules grows. So time is
 //! watched, too: where at the pace of the last hundred thousand things, and of those before, a run would take a hundred
-//! times what it may, it is stopped at once. A structure of many modules may have much to do at one time: what counts is many
+//! times the limit, it is stopped at once. A structure of many modules may have many events at one time: the measure is many
 //! things for each module. Results do not depend on any of this, unless it is exceeded.
 
 use std::time::{Duration, Instant as Wall};
@@ -22,14 +22,14 @@ const LOOK_PER_MODULE: u64 = 25;
 /// Looks in a row that must find the run too slow, none much better than the first.
 const LOOKS: u32 = 4;
 const BETTER: f64 = 2.0;
-/// A run is stopped if it is foreseen to need so many times what it may.
+/// A run is stopped if it is foreseen to need so many times its limit.
 const FAR_TOO_MANY: f64 = 100.0;
 
-/// Bytes a module in lists of what happens at one instant, and in a string that is observed.
+/// Bytes a module in the lists of one instant, and in a string that is observed.
 const IN_LISTS: u64 = 64;
 const IN_STRING: u64 = 160;
 
-/// NextKind was spent so far.
+/// The work and the time spent so far.
 #[derive(Clone, Debug, Default)]
 pub struct Budget {
     /// The count of productions and steps at which to look next.
@@ -67,7 +67,7 @@ impl Budget {
         self.since = settings.max_seconds.is_finite().then(Wall::now);
     }
 
-    /// Ends what [`Budget::start_clock`] has begun.
+    /// Stops counting seconds.
     pub fn stop_clock(&mut self) {
         if let Some(since) = self.since.take() {
             self.spent += since.elapsed();
@@ -88,7 +88,7 @@ impl Budget {
     /// Checks that the next entry of the schedule may still be passed, on the way to some time.
     ///
     /// # Errors
-    /// If a limit is exceeded, or is foreseen to be exceeded by far; `site` names the module whose turn it is.
+    /// If a limit is exceeded, or is foreseen to be exceeded by far; `site` names the next module.
     #[cold]
     pub fn check(
         &mut self,
@@ -162,7 +162,7 @@ pub fn afford_round(
     afford(setup, world, 3 * bytes, site)
 }
 
-/// Asks for what it takes to write the structure out.
+/// Asks for the memory that the string of the structure takes.
 ///
 /// # Errors
 /// As of [`afford`].

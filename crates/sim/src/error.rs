@@ -1,11 +1,11 @@
-//! NextKind can go wrong while a model runs.
+//! Errors of a run, and the messages that explain them.
 
 use crate::memory::Shortage;
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{Distribution, Remedy};
 use dlsys_tree::Lineage;
 
-/// A module in missing: what an error message says of it.
+/// The place of an error: a module, its rule and the time.
 #[derive(Clone, Debug)]
 pub struct Site {
     /// The module with its parameters, as in a string.
@@ -25,14 +25,14 @@ impl Site {
     }
 }
 
-/// Two sides that have come so near each other that nobody can tell whether they have met.
+/// Two sides of a comparison that are nearer each other than the error of integration.
 #[derive(Clone, Debug)]
 pub struct Near {
     /// Where they meet, as written; empty if that is not known.
     pub boundary: String,
     /// How far they are apart.
     pub gap: f64,
-    /// NextKind they may be wrong by.
+    /// The estimated error of their difference.
     pub error: f64,
 }
 
@@ -69,7 +69,7 @@ pub enum Error {
         site: Site,
         /// It never was inside.
         born: bool,
-        /// The comparisons that fail, with their places and what could be written for them.
+        /// The comparisons that fail, with their places and suggested remedies.
         failing: Vec<(Span, Option<Remedy>)>,
     },
     #[error("the equations of {} push against each other at t = {}", .site.module, .site.when())]
@@ -236,7 +236,7 @@ impl Error {
             Error::TooManyEvents { foreseen: Some(pace), .. } => d
                 .help("a life, a rate or a step size is out of proportion to the times that are observed: compare their units")
                 .help_opt(
-                    // NextKind would take years is not meant.
+                    // A time of years is no useful suggestion.
                     (pace.0 < 1e15).then(|| format!("if this is meant, allow more: `--max-events {:.0e}`", pace.0)),
                 ),
             Error::OutOfTime { limit, .. } => {

@@ -25,7 +25,7 @@
 //!
 //! # Examples
 //!
-//! NextKind happens, and when: the productions of a cell that grows by the logistic equation and divides at half its limit.
+//! What happens, and when: the productions of a cell that grows by the logistic equation and divides at half its limit.
 //!
 //! ```
 //! use dlsys_session::Session;

@@ -39,7 +39,7 @@ pub struct Event {
     pub residual: f64,
     /// Events of one instant have one number; it grows by one from instant to instant.
     pub group: u64,
-    /// NextKind it changes, if that is recorded. None where the predecessor was itself made at this instant: the
+    /// The change that it makes, if transitions are recorded. None where the predecessor was itself made at this instant: the
     /// transition of the first of the cascade tells all.
     pub transition: Option<Box<Transition>>,
 }
@@ -54,7 +54,7 @@ pub struct ModuleState {
     pub age: f64,
 }
 
-/// NextKind a production changes.
+/// The change that a production makes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Transition {
     /// The limit from the left.

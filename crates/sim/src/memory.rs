@@ -1,14 +1,14 @@
 //! Whether there is memory for what comes next: asked before a large list grows, because a program that is refused memory in the
 //! middle of that is ended by the system without a word.
 //!
-//! Three things say how much there is: what the system calls available (with the limit of its control group), a limit of
+//! Three sources say how much there is: the figure that the system calls available (with the limit of its control group), a limit of
 //! our own, and whether the allocator would give a block of that size at all (`ulimit -v`, address space).
 
 use std::fs::read_to_string;
 
 /// Less than this is given without a question: asking costs some microseconds.
 const SMALL: u64 = 16 << 20;
-/// This part of what is available may be taken; others live here, too.
+/// The part of the available memory that may be taken; the rest is for other processes.
 const SHARE: f64 = 0.9;
 
 /// Memory that is not there.

@@ -11,12 +11,12 @@ const CLOCK_TOLERANCE: f64 = 1e-11;
 /// The modules that are integrated again after an event, among those that are integrated together.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Scheduler {
-    /// As many of the neighbours as the tolerance asks for.
+    /// As many of the neighbours as the tolerance requires.
     #[default]
     Auto,
     /// All: one clock, and time is cut at every event. The reference.
     Global,
-    /// Nobody: equations see their neighbours as they were at the start of the slice of time, or at the module's last
+    /// None: equations see their neighbours as they were at the start of the slice of time, or at the module's last
     /// event in it. The approximation that the paper makes for speed (section 5); its error is of the order of the
     /// slice.
     Local {
@@ -34,7 +34,7 @@ pub struct Settings {
     pub tolerance: f64,
     /// Step of the methods that have a fixed one, in units of time. Steps end at its multiples.
     pub step_size: f64,
-    /// NextKind random numbers follow from.
+    /// The seed of all random numbers.
     pub seed: u64,
     /// More modules than this are an error.
     pub max_modules: usize,
@@ -44,14 +44,14 @@ pub struct Settings {
     /// More seconds than this, spent in calls of the simulation, are an error. Infinite by default.
     pub max_seconds: f64,
     /// More bytes of memory than this, of the process as a whole where the system tells them, are an error. By
-    /// default only what the system has not got.
+    /// default only as much as the system does not have.
     pub max_memory: u64,
     /// Productions are recorded for [`Simulation::take_events`].
     pub log: bool,
-    /// Everything is done the general way; for tests of the quick one.
+    /// Disables the fast path (differential tests).
     #[doc(hidden)]
     pub slow: bool,
-    /// With `log`: what each production changes is recorded, too ([`Event::transition`]). Every event then costs work
+    /// With `log`: the change that each production makes is recorded, too ([`Event::transition`]). Every event then costs work
     /// for all modules whose rules have a context.
     pub transitions: bool,
 }
@@ -76,14 +76,9 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// NextKind a run may take unless something else is said: so much that only what runs away takes more.
+    /// Default limits, so large that only a run without end exceeds them.
     pub const MODULES: usize = 10_000_000;
     pub const EVENTS: u64 = 10_000_000_000;
-
-    /// The grid on which steps of fixed size end.
-    pub(crate) fn grid(&self) -> Option<f64> {
-        self.method.is_fixed_step().then_some(self.step_size)
-    }
 
     /// For equations that decide by chance: there is no tolerance in when an event happens that has no time of its own.
     pub(crate) fn for_clocks(&self, has_clocks: bool) -> Settings {

@@ -1,4 +1,4 @@
-//! The facts of a run that do not change: the model, the settings, and what follows from both.
+//! The facts of a run that do not change: the model, the settings, and their consequences.
 
 use super::{Method, Settings};
 use dlsys_model::{CUT, KindId, Model};

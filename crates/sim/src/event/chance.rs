@@ -1,7 +1,7 @@
-//! NextKind chance decides when a production takes place: which successor, with which parameters, and how long the clocks of
+//! Random choices of a production: its successor, the random parameters, and how long the clocks of
 //! its modules run.
 //!
-//! All ways in which events are taken (`settle`, `light`, and the beginning of a run) come here, so they agree. NextKind is
+//! All ways to take an event (materialised, lazy, and the beginning of a run) use this file, so they agree. A number that is
 //! drawn belongs to the lineage of the module that it is drawn for ([`Seed`]), never to the order of events.
 
 use smallvec::SmallVec;
@@ -41,8 +41,8 @@ impl Undrawn {
     }
 }
 
-/// Chooses the successor of a module and appends its parameters to `out`; returns its number and the lineage of what is
-/// made. The variables in `scratch` are those of the rule.
+/// Chooses the successor of a module and appends its parameters to `out`; returns its number and the lineage of the new
+/// modules. The variables in `scratch` are those of the rule.
 pub fn successor(
     seed: Seed,
     clause: &Produce,

@@ -1,8 +1,10 @@
-//! Consistent values: what is given by a value or an equation, at an instant.
+//! Consistent values at an instant: algebraic parameters, which are given by a value or an equation.
 //!
 //! When modules are born, change their equations or get other neighbours, their algebraic parameters are solved for
-//! before anything is judged, together with those of all modules that depend on them. NextKind nobody but the drawing and
-//! successors read is not kept up to date: it is computed when somebody looks.
+//! before anything is judged, together with those of all modules that depend on them. Parameters that
+//! only drawing and successors read are not kept up to date: they are computed on observation.
+
+use std::collections::HashSet;
 
 use super::EventStage;
 use crate::error::Error;
@@ -10,19 +12,49 @@ use crate::flow::algebraic::{Solved, is_algebraic};
 use dlsys_model::Truth;
 use dlsys_tree::ModuleId;
 
-/// Values that differ by more than so many tolerances have jumped; less is what they may err by.
+/// Values that differ by more than so many tolerances have jumped; a smaller difference may be their error.
 const JUMP: f64 = 10.0;
-/// Most times at one instant that values change, and what they decide with them.
+/// Most times at one instant that values change and conditions with them.
 const MAX_ROUNDS: usize = 100;
 
 impl EventStage<'_, '_> {
     /// Makes the algebraic parameters consistent of all modules that the instant concerns. `chosen`: they have their
-    /// equations, and what has been followed may have jumped. True if something has changed that conditions may read.
+    /// equations, and values that were followed may have jumped. True if values have changed that conditions may read.
     pub fn make_consistent(&mut self, chosen: bool) -> Result<bool, Error> {
         if !self.setup.is_algebraic {
             return Ok(false);
         }
         self.events.consistency_rounds += 1;
+        let wanted = self.modules_to_solve(chosen);
+        if wanted.is_empty() {
+            return Ok(false);
+        }
+        let solved = self.flow().solve_algebraic(&wanted)?;
+        let changed = self.take_over(&solved);
+        if changed.is_empty() {
+            return Ok(false);
+        }
+        let mut again = changed.clone();
+        for &id in &changed {
+            self.neighbours.readers(self.world, self.setup.model, id, |reader, _| again.push(reader));
+        }
+        again.sort_unstable();
+        again.dedup();
+        let mut matters = false;
+        for id in again {
+            matters |= self.place_again(id, changed.contains(&id));
+        }
+        if matters && self.events.consistency_rounds > MAX_ROUNDS {
+            let id = changed[0];
+            let site = self.world.site_of_rule(self.setup.model, id, self.instant.at);
+            return Err(Error::Chattering { site });
+        }
+        Ok(matters)
+    }
+
+    /// The modules whose algebraic parameters may be inconsistent: those that the instant concerns, and all that depend on
+    /// them.
+    fn modules_to_solve(&mut self, chosen: bool) -> Vec<ModuleId> {
         let mut wanted: Vec<ModuleId> = Vec::new();
         for &id in self.events.opened.iter().chain(&self.events.ready) {
             let Some(state) = self.world.state_mut(id) else { continue };
@@ -42,10 +74,10 @@ impl EventStage<'_, '_> {
             wanted.push(id);
         }
         // One that has got several rules at the instant is there several times.
-        let mut once = std::collections::HashSet::new();
+        let mut once = HashSet::new();
         wanted.retain(|id| once.insert(*id));
-        // And whoever depends on them.
-        let mut known: std::collections::HashSet<ModuleId> = wanted.iter().copied().collect();
+        // And all modules that depend on them.
+        let mut known: HashSet<ModuleId> = wanted.iter().copied().collect();
         let mut at = 0;
         while at < wanted.len() {
             let mut found = Vec::new();
@@ -55,12 +87,14 @@ impl EventStage<'_, '_> {
             at += 1;
         }
         wanted.retain(|id| is_algebraic(self.setup.model, self.world, *id));
-        if wanted.is_empty() {
-            return Ok(false);
-        }
-        let Solved { places, before, values } = self.flow().solve_algebraic(&wanted)?;
+        wanted
+    }
+
+    /// Writes solved values into the tree where they differ; returns the modules that have changed by more than rounding.
+    fn take_over(&mut self, solved: &Solved) -> Vec<ModuleId> {
+        let Solved { places, before, values } = solved;
         let mut changed: Vec<ModuleId> = Vec::new();
-        for ((&(_, id, parameter), &before), &value) in places.iter().zip(&before).zip(&values) {
+        for ((&(_, id, parameter), &before), &value) in places.iter().zip(before).zip(values) {
             let state = self.world.state(id).expect("wanted");
             let in_question = self.events.ready.contains(&id) && state.open.is_none();
             let elsewhere = in_question || state.open.as_ref().is_some_and(|open| open.flow.is_none());
@@ -78,32 +112,7 @@ impl EventStage<'_, '_> {
             }
         }
         changed.dedup();
-        if changed.is_empty() {
-            return Ok(false);
-        }
-        let mut again = changed.clone();
-        for &id in &changed {
-            self.neighbours.readers(self.world, self.setup.model, id, |reader, _| again.push(reader));
-        }
-        again.sort_unstable();
-        again.dedup();
-        let mut matters = false;
-        for id in again {
-            matters |= self.place_again(id, changed.contains(&id));
-        }
-        if matters && self.events.consistency_rounds > MAX_ROUNDS {
-            let id = changed[0];
-            let rule = self.world.state(id).and_then(|s| s.rule).unwrap_or(0);
-            let site = self.world.site(
-                self.setup.model,
-                id,
-                rule,
-                self.setup.model.rules[rule].span,
-                self.instant.at,
-            );
-            return Err(Error::Chattering { site });
-        }
-        Ok(matters)
+        changed
     }
 
     /// Judges the signs of a module anew by its values; true if it has any.
@@ -112,7 +121,7 @@ impl EventStage<'_, '_> {
         let Some(rule) = state.rule else { return false };
         let compiled = &self.setup.model.rules[rule];
         let is_open = state.open.is_some();
-        // NextKind was followed here has its signs, unless it has jumped itself.
+        // Signs that were followed to the instant are valid, unless the module itself has jumped.
         if !own && is_open && state.open.as_ref().is_some_and(|open| open.flow.is_some()) {
             return false;
         }

@@ -1,7 +1,7 @@
 //! `%`: the rest of a branch goes (ABOP, section 3.3).
 //!
-//! Whoever is cut off is gone at once: before anything else is asked of the structure, and in no frame. A light module
-//! leaves an entry in the agenda behind, which knows it by its slot; so the slot is kept empty until the entry comes up.
+//! Modules that are cut off are removed at once, before anything else is done with the structure, and are in no frame. A lazy
+//! module leaves an entry in the calendar queue behind, by its slot; so the slot is kept empty until the entry comes up.
 
 use super::EventStage;
 use dlsys_tree::ModuleId;

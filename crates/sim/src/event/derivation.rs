@@ -1,7 +1,7 @@
 //! Derivation steps: discrete rules, applied to the whole string at the multiples of the period (ABOP, chapter 1).
 //!
-//! A step is part of the first round of productions at its instant (`settle`): its rules see the values from before the
-//! instant, as continuous productions of that round do, and what they make is not replaced once more by the step. Time is
+//! A step is part of the first round of productions at its instant (`iterate`): its rules see the values from before the
+//! instant, as continuous productions of that round do, and their successors are not replaced once more by the step. Time is
 //! counted in steps, so the instant of step n is n times the period, rounded once, however many there were.
 //!
 //! The modules that may be replaced are listed, so a step costs what it examines and not the size of the structure. A module
@@ -21,10 +21,10 @@ use crate::world::context::Context;
 use dlsys_model::{Model, Rule, Sign, Truth};
 use dlsys_tree::{ModuleId, SimTime};
 
-/// NextKind is known of the steps.
+/// The state of derivation steps.
 #[derive(Clone, Debug, Default)]
 pub struct Steps {
-    /// Number of the last step, the period being what separates two.
+    /// Number of the last step; two steps are one period apart.
     passed: f64,
     scheduled: bool,
     /// The step belongs to the instant under examination.
@@ -39,7 +39,7 @@ pub struct Steps {
     pub has_rules: Vec<bool>,
     /// By kind: if no rule applies to a module at its first step, none ever does.
     is_settled: Vec<bool>,
-    /// By rule and atom: what it compares is exact.
+    /// By rule and atom: both sides are exact.
     exact: Vec<Vec<bool>>,
 }
 
@@ -56,7 +56,7 @@ impl Steps {
         Steps { has_rules: has_rules.collect(), is_settled: is_settled.collect(), exact, ..Steps::default() }
     }
 
-    /// Whoever may be replaced first, and how many there are.
+    /// The first module that may be replaced.
     pub fn first(&self) -> Option<ModuleId> {
         self.population.first().copied()
     }
@@ -72,14 +72,14 @@ impl Steps {
 }
 
 impl EventStage<'_, '_> {
-    /// Sees to it that the next step takes place, if there is anybody to take part in it.
+    /// Schedules the next step, if discrete rules may apply to some module.
     pub fn arrange_step(&mut self) -> Result<(), Error> {
         if self.events.steps.scheduled || self.events.steps.population.is_empty() {
             return Ok(());
         }
         let (now, period) = (self.instant.at, self.setup.model.period);
         let mut next = (now.to_f64() / period).floor().max(self.events.steps.passed) + 1.0;
-        // NextKind is made within the resolution of time of a step is made at that step.
+        // A module that is born within the resolution of time of a step is born at that step.
         while SimTime::multiple(next - 1.0, period).since(now) > now.resolution() {
             next -= 1.0;
         }

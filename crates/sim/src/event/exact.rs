@@ -1,6 +1,6 @@
 //! Which comparisons of discrete rules are between exact values.
 //!
-//! A value that no equation moves, and that is computed from such values only, is what the text says, to the last bit, as in
+//! A value that no equation moves, and that is computed from such values only, is exactly what the text says, as in
 //! every other interpreter of L-systems: 0.1 added up eight times is less than 0.8 or it is not. Values of equations have
 //! errors of an integration, and so has time, which is rounded; these are compared with a tolerance.
 
@@ -21,7 +21,7 @@ pub fn exact_atoms(model: &Model) -> Vec<Vec<bool>> {
     model.rules.iter().map(of_rule).collect()
 }
 
-/// By kind and parameter: an equation moves it, or what it is made of at some birth.
+/// By kind and parameter: an equation moves it, or a value from which it is computed at some birth.
 fn inexact(model: &Model) -> Vec<Vec<bool>> {
     let width = |rule: usize| model.rules[rule].parameters.len();
     let mut inexact: Vec<Vec<bool>> = (model.kinds.iter())
@@ -34,7 +34,7 @@ fn inexact(model: &Model) -> Vec<Vec<bool>> {
             moves
         })
         .collect();
-    // NextKind is made of what moves, until nothing is added.
+    // Values computed from inexact ones are inexact, until nothing is added.
     loop {
         let mut news: Vec<(KindId, usize)> = Vec::new();
         for rule in &model.rules {
@@ -74,6 +74,6 @@ fn reads(model: &Model, inexact: &[Vec<bool>], rule: &Rule, variable: usize) -> 
         }
         first += pattern.width;
     }
-    // Sums over children and time; random numbers, behind them, are what they are.
+    // Sums over children and time are inexact; random numbers, behind them, are exact.
     variable < rule.variables
 }

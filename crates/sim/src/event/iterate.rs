@@ -27,7 +27,7 @@ impl EventStage<'_, '_> {
         self.instant.number += 1;
         let lazy = std::mem::take(&mut self.events.firing_lazy);
         self.replace_all_lazy(lazy, 1)?;
-        // NextKind is made may have to be looked at, or end at once.
+        // New modules may have to be looked up, or end at once.
         if self.events.fresh.is_empty() && self.events.firing_lazy.is_empty() {
             Ok(())
         } else {
@@ -35,7 +35,7 @@ impl EventStage<'_, '_> {
         }
     }
 
-    /// NextKind happens at the instant after so many rounds of productions.
+    /// Goes on with the instant after so many rounds of productions.
     fn iterate_from(&mut self, mut rounds: usize) -> Result<(), Error> {
         let mut hurried = false;
         loop {

@@ -148,7 +148,7 @@ impl EventStage<'_, '_> {
         }
     }
 
-    /// Lets those who looked at a module that has been replaced look again, and hands its neighbours on.
+    /// Marks the modules that have looked at a module that is replaced, and hands its neighbours on.
     pub fn hand_on(&mut self, id: ModuleId, kind: KindId, successor: &Successor, made: &[ModuleId]) {
         if !self.setup.hands_on {
             return;
@@ -157,7 +157,7 @@ impl EventStage<'_, '_> {
         self.events.to_look.extend_from_slice(self.neighbours.lookers(id));
         self.neighbours.bury(id);
         self.neighbours.hand_on(Some(id), &successor.kinds, made, skipped);
-        // NextKind was skipped may turn into something that stands between others.
+        // A skipped module may be replaced by one that stands between others.
         let counts = |kind: &KindId| !kind.is_bracket() && !skipped(*kind);
         self.events.lost |= skipped(kind) && successor.kinds.iter().any(counts);
     }

@@ -25,8 +25,8 @@ fn closing(shape: &[Turn]) -> usize {
 }
 
 impl EventStage<'_, '_> {
-    /// Collects the context that a rule asks for, in the order of the rule's variables; false if it is
-    /// not there. `lasting` says that the module goes on looking at what it has found.
+    /// Collects the context of a rule, in the order of the rule's variables; false if it does not match. `lasting`: the
+    /// module is noted as a looker of all modules that were examined.
     pub fn context(&mut self, id: ModuleId, rule: &Rule, lasting: bool, out: &mut Context) -> bool {
         out.clear();
         let skipped = |kind| self.setup.model.kinds.get(kind).skipped;
@@ -68,8 +68,7 @@ impl EventStage<'_, '_> {
         true
     }
 
-    /// Finds the modules attached to one, and notes, if that is to last, that somebody has looked at them. Tells whether the last is on its
-    /// axis.
+    /// Finds the modules attached to one, and notes, if `lasting`, the looker. Returns whether the last one is on its axis.
     fn attached_to(&mut self, (looker, lasting): (ModuleId, bool), id: ModuleId) -> bool {
         let (tree, neighbours) = (&self.world.tree, &mut self.neighbours);
         self.events.attached.clear();
@@ -82,7 +81,7 @@ impl EventStage<'_, '_> {
     }
 
     /// Collects a right context with branches, as seen from a module: each branch stands for the first one, after those
-    /// before it, that begins with what is written. None if it is not there. No deeper than brackets in a text.
+    /// before it, that begins as written. None if it does not match. No deeper than brackets in a text.
     fn follow(
         &mut self,
         looker: (ModuleId, bool),

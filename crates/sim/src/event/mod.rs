@@ -1,4 +1,4 @@
-//! Event iteration: what happens at one instant, until nothing happens any more.
+//! Event iteration: the productions and changes of equations of one instant, until nothing changes any more.
 //!
 //! ```text
 //! look up rules and contexts ─▶ judge at the instant ─▶ apply productions in parallel ─┐
@@ -58,7 +58,7 @@ pub struct Firing {
     pub produce: usize,
 }
 
-/// NextKind an instant concerns, and what is left to do at it.
+/// The modules that an instant concerns, and the work that is left to do at it.
 #[derive(Clone, Debug, Default)]
 pub struct Events {
     /// Modules that the instant concerns.

@@ -1,4 +1,4 @@
-//! The choice of equations at an instant, so that they agree with where they lead.
+//! Mode selection: the choice of equations at an instant, so that they agree with where they lead.
 //!
 //! Which clause is active just after an instant depends on signs just after it, and those on the equations. The first
 //! choice follows what is known; a choice that leads out of its own domain is given up for the next.
@@ -24,23 +24,80 @@ const NOISE: f64 = 16.0 * f64::EPSILON;
 /// Rates that differ by no more than this part of them, or of the module's parameters over a step, are the same.
 const SMOOTH: f64 = 1e-9;
 
-/// Why a module has no equations.
+/// A module without equations, and the reason.
 struct NoMode {
     id: ModuleId,
     chattering: bool,
     signs: Signs,
 }
 
+/// One pass over the open modules.
+#[derive(Default)]
+struct Pass {
+    /// Some module has got other equations.
+    changed: bool,
+    missing: Option<NoMode>,
+    /// Modules whose equations agree with their signs just after the instant, with these.
+    settled: SmallVec<[(ModuleId, Signs); 4]>,
+}
+
 impl EventStage<'_, '_> {
     /// Chooses the equations of the open modules; finds productions whose conditions become true just after the
     /// instant.
     pub fn select_modes(&mut self, hurried: &mut bool, firing: &mut Vec<Firing>) -> Result<(), Error> {
-        let rules = &self.setup.model.rules;
         let opened = std::mem::take(&mut self.events.opened);
-        // First choice: the first clause that can hold where the signs are expected to go.
-        for id in &opened {
+        let outcome = self.select_modes_of(&opened, hurried, firing);
+        self.events.opened = opened;
+        outcome
+    }
+
+    fn select_modes_of(
+        &mut self,
+        opened: &[ModuleId],
+        hurried: &mut bool,
+        firing: &mut Vec<Firing>,
+    ) -> Result<(), Error> {
+        self.choose_first(opened);
+        self.flows.known_rates.clear();
+        for choice in 0.. {
+            let mut pass = Pass::default();
+            for &id in opened {
+                if self.world.state(id).is_none_or(|s| s.rule.is_none()) {
+                    continue;
+                }
+                let (signs, snapped) = self.signs_after(id);
+                // A value born within the resolution of time of zero is born on it.
+                *hurried |= snapped;
+                match self.production_at(id, &signs) {
+                    Some(fire) => firing.push(fire),
+                    None => self.reconsider(id, signs, &mut pass),
+                }
+            }
+            if !firing.is_empty() {
+                return Ok(());
+            }
+            if pass.missing.is_none() && pass.changed && choice > MAX_CHOICES {
+                let (id, signs) = pass.settled.pop().unwrap_or((opened[0], Signs::new()));
+                pass.missing = Some(NoMode { id, chattering: true, signs });
+            }
+            if let Some(missing) = pass.missing {
+                return Err(self.no_equations(&missing));
+            }
+            if !pass.changed {
+                for (id, signs) in pass.settled {
+                    self.world.state_mut(id).expect("settled").signs = signs;
+                }
+                return Ok(());
+            }
+        }
+        Ok(())
+    }
+
+    /// The first choice: the first clause that can hold where the signs are expected to go.
+    fn choose_first(&mut self, opened: &[ModuleId]) {
+        for id in opened {
             let Some(state) = self.world.state_mut(*id) else { continue };
-            let Some(rule) = state.rule.map(|r| &rules[r]) else { continue };
+            let Some(rule) = state.rule.map(|r| &self.setup.model.rules[r]) else { continue };
             let entry = open(state);
             entry.tried.clear();
             entry.flips = 0;
@@ -48,102 +105,67 @@ impl EventStage<'_, '_> {
             state.solve = next_clause(rule, &guess, &[]);
             state.switches = switches(rule, state.solve, &guess);
         }
-        self.flows.known_rates.clear();
-        let mut outcome = Ok(());
-        for choice in 0.. {
-            let mut changed = false;
-            let mut missing: Option<NoMode> = None;
-            let mut settled: SmallVec<[(ModuleId, Signs); 4]> = SmallVec::new();
-            for &id in &opened {
-                if self.world.state(id).is_none_or(|s| s.rule.is_none()) {
-                    continue;
-                }
-                let (signs, snapped) = self.signs_after(id);
-                // A value born within the resolution of time of zero is born on it.
-                *hurried |= snapped;
-                let state = self.world.state_mut(id).expect("seen above");
-                let index = state.rule.expect("seen above");
-                let rule = &rules[index];
-                let entry = state.open.as_mut().expect("open");
-                let holds = |signs: &[Sign]| {
-                    rule.produces.iter().position(|p| p.guard.judge(|i| signs[i]) == Truth::Yes)
-                };
-                if let Some(produce) = holds(&entry.at).or_else(|| holds(&signs)) {
-                    firing.push(Firing { id, rule: index, produce });
-                    continue;
-                }
-                let first = rule.solves.iter().position(|s| s.guard.judge(|i| signs[i]) == Truth::Yes);
-                if first != state.solve || (first.is_none() && !rule.solves.is_empty()) {
-                    entry.tried.extend(state.solve);
-                    // Any zero may yet go either way under other equations.
-                    let any: Signs =
-                        entry.at.iter().map(|&s| if s == Sign::Zero { Sign::Any } else { s }).collect();
-                    let next = first
-                        .filter(|f| !entry.tried.contains(f))
-                        .or_else(|| next_clause(rule, &any, &entry.tried));
-                    match next {
-                        Some(next) => {
-                            state.solve = Some(next);
-                            state.switches = switches(rule, state.solve, &signs);
-                            self.flows.known_rates.forget(id);
-                            changed = true;
-                        }
-                        None => {
-                            let chattering = entry.tried.len() > 1;
-                            missing.get_or_insert(NoMode { id, chattering, signs: signs.clone() });
-                        }
-                    }
-                    continue;
-                }
-                let wanted = switches(rule, state.solve, &signs);
-                if wanted != state.switches {
-                    entry.flips += 1;
-                    let undecided = entry.flips > 2;
-                    let other = std::mem::replace(&mut state.switches, wanted);
+    }
+
+    /// The production of an open module that holds at the instant or just after it.
+    fn production_at(&self, id: ModuleId, after: &[Sign]) -> Option<Firing> {
+        let state = self.world.state(id)?;
+        let rule = state.rule?;
+        let produces = &self.setup.model.rules[rule].produces;
+        let holds = |signs: &[Sign]| produces.iter().position(|p| p.guard.judge(|i| signs[i]) == Truth::Yes);
+        let produce = holds(&state.open.as_ref()?.at).or_else(|| holds(after))?;
+        Some(Firing { id, rule, produce })
+    }
+
+    /// Compares the equations of a module with the signs just after the instant that follow from them, and chooses again
+    /// if they disagree.
+    fn reconsider(&mut self, id: ModuleId, signs: Signs, pass: &mut Pass) {
+        let state = self.world.state_mut(id).expect("open modules have a state");
+        let rule = &self.setup.model.rules[state.rule.expect("open modules have a rule")];
+        let entry = state.open.as_mut().expect("open");
+        let first = rule.solves.iter().position(|s| s.guard.judge(|i| signs[i]) == Truth::Yes);
+        if first != state.solve || (first.is_none() && !rule.solves.is_empty()) {
+            entry.tried.extend(state.solve);
+            // Any zero may yet go either way under other equations.
+            let any: Signs = entry.at.iter().map(|&s| if s == Sign::Zero { Sign::Any } else { s }).collect();
+            let untried = first.filter(|f| !entry.tried.contains(f));
+            match untried.or_else(|| next_clause(rule, &any, &entry.tried)) {
+                Some(next) => {
+                    state.solve = Some(next);
+                    state.switches = switches(rule, state.solve, &signs);
                     self.flows.known_rates.forget(id);
-                    if undecided && self.is_smooth_across(id, &other) {
-                        // Whichever way it goes, it goes on alike: it rests on the boundary.
-                        let state = self.world.state_mut(id).expect("seen above");
-                        let at = &state.open.as_ref().expect("open").at;
-                        let rest: Signs = at
-                            .iter()
-                            .zip(&signs)
-                            .map(|(at, after)| match at {
-                                Sign::Zero => Sign::Zero,
-                                _ => *after,
-                            })
-                            .collect();
-                        state.switches = switches(rule, state.solve, &rest);
-                        settled.push((id, rest));
-                        continue;
-                    }
-                    if undecided {
-                        missing.get_or_insert(NoMode { id, chattering: true, signs: signs.clone() });
-                    }
-                    changed = true;
+                    pass.changed = true;
                 }
-                settled.push((id, signs));
-            }
-            if !firing.is_empty() {
-                break;
-            }
-            if missing.is_none() && changed && choice > MAX_CHOICES {
-                let (id, signs) = settled.pop().unwrap_or((opened[0], Signs::new()));
-                missing = Some(NoMode { id, chattering: true, signs });
-            }
-            if let Some(missing) = missing {
-                outcome = Err(self.no_equations(&missing));
-                break;
-            }
-            if !changed {
-                for (id, signs) in settled {
-                    self.world.state_mut(id).expect("settled").signs = signs;
+                None => {
+                    let chattering = entry.tried.len() > 1;
+                    pass.missing.get_or_insert(NoMode { id, chattering, signs });
                 }
-                break;
             }
+            return;
         }
-        self.events.opened = opened;
-        outcome
+        let wanted = switches(rule, state.solve, &signs);
+        if wanted != state.switches {
+            entry.flips += 1;
+            let undecided = entry.flips > 2;
+            let other = std::mem::replace(&mut state.switches, wanted);
+            self.flows.known_rates.forget(id);
+            if undecided && self.is_smooth_across(id, &other) {
+                // It goes on alike on both sides: it rests on the boundary.
+                let state = self.world.state_mut(id).expect("seen above");
+                let at = &state.open.as_ref().expect("open").at;
+                let both = at.iter().zip(&signs);
+                let rest: Signs =
+                    both.map(|(at, after)| if *at == Sign::Zero { Sign::Zero } else { *after }).collect();
+                state.switches = switches(rule, state.solve, &rest);
+                pass.settled.push((id, rest));
+                return;
+            }
+            if undecided {
+                pass.missing.get_or_insert(NoMode { id, chattering: true, signs: signs.clone() });
+            }
+            pass.changed = true;
+        }
+        pass.settled.push((id, signs));
     }
 
     /// True if a module's rates are the same under other conditions inside its equations.
@@ -158,7 +180,7 @@ impl EventStage<'_, '_> {
         let own = swap(self, other.clone());
         self.flow().rates_now(id, &mut there);
         swap(self, own);
-        // NextKind an integrated value is off by, a kink in it is off by, too.
+        // A kink in an integrated value has the error of the value.
         let smooth = if self.flows.error_of(self.world, id) > 0.0 {
             SMOOTH.max(self.setup.settings.tolerance)
         } else {
@@ -243,8 +265,8 @@ impl EventStage<'_, '_> {
         let index = self.world.state(id).and_then(|s| s.rule).expect("open modules have a rule");
         let rule = &self.setup.model.rules[index];
         let site = self.world.site(self.setup.model, id, index, rule.span, self.instant.at);
-        // A life about as short as the resolution of time, at the end of a line of lives: what comes first at its
-        // end can no longer be told.
+        // A life about as short as the resolution of time, at the end of a line of lives: the order of events at its end
+        // is lost in rounding.
         let age = self.instant.at.since(self.world.tree.birth(id));
         let generation = self.world.tree.lineage(id).generation;
         if age > 0.0 && age <= SHORT_LIFE * self.instant.at.resolution() && generation > 4 {
@@ -258,7 +280,7 @@ impl EventStage<'_, '_> {
         self.world.variables(rule, id, &state.context, self.instant.at, &mut variables);
         let mut sides = vec![0.0; rule.sides.outputs()];
         rule.sides.eval(&variables, &mut scratch, &mut sides);
-        // The signs are those just behind the instant; a production is for what is met at it.
+        // The signs are those just behind the instant; a production applies to those at it.
         let meet = |atom: usize| {
             let (a, b): (f64, f64) = (sides[2 * atom], sides[2 * atom + 1]);
             (a - b).abs() <= 1e-9 * a.abs().max(b.abs()).max(1.0)
@@ -287,7 +309,7 @@ fn next_clause(rule: &Rule, signs: &[Sign], tried: &[usize]) -> Option<usize> {
         .map(|(i, _)| i)
 }
 
-/// The conditions inside a clause's equations. NextKind may hold is first taken to hold.
+/// The conditions inside a clause's equations. A condition that may hold is first taken to hold.
 fn switches(rule: &Rule, solve: Option<usize>, signs: &[Sign]) -> Switches {
     let all = solve.map_or(&[][..], |s| &rule.solves[s].switches);
     all.iter().map(|s| s.condition.judge(|a| signs[a]) != Truth::No).collect()

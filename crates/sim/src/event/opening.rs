@@ -1,4 +1,4 @@
-//! Modules that an instant concerns: how they are opened, and the fast path past all that.
+//! The modules that an instant concerns: how they are opened, and the fast path for predicted lives.
 
 use smallvec::SmallVec;
 
@@ -77,7 +77,7 @@ impl EventStage<'_, '_> {
         }
     }
 
-    /// Opens the modules that rest on a boundary and look at their neighbours: it may be that those move now.
+    /// Opens the modules that rest on a boundary and have a context: their neighbours may move now.
     pub fn open_resting(&mut self) {
         let mut resting = std::mem::take(&mut self.events.resting);
         for id in resting.drain(..) {
@@ -94,7 +94,7 @@ impl EventStage<'_, '_> {
         for &id in modules {
             let state = self.world.state(id);
             let rests = |s: &State| {
-                // NextKind stands still until an event of its own is not moved by others.
+                // Sides that are constant until the module's own event are not moved by its neighbours.
                 let watch = s.rule.map_or(&[][..], |rule| self.setup.model.rules[rule].watch(s.solve));
                 let mut atoms = s.signs.iter().zip(watch);
                 atoms.any(|(sign, watch)| *sign == Sign::Zero && !matches!(watch, ZeroCrossing::Constant))
@@ -168,7 +168,7 @@ impl EventStage<'_, '_> {
         true
     }
 
-    /// The production that a module's event is, if that is all there is to it; its values are then those of the event.
+    /// The production of a module whose event was predicted, with its values moved to the event; None if more has to be examined.
     pub fn fire_predicted(&mut self, slot: usize) -> Option<Firing> {
         let state = self.world.states.get(slot)?.as_ref()?;
         if !self.setup.fast_path || state.next.kind != NextKind::Event || state.is_numeric() || state.coupled
@@ -191,7 +191,7 @@ impl EventStage<'_, '_> {
     }
 }
 
-/// NextKind is open about a module, which must be.
+/// The open questions of a module at the instant.
 pub fn open(state: &mut State) -> &mut Open {
     state.open.get_or_insert_with(Box::default)
 }

@@ -9,7 +9,7 @@ use dlsys_model::Sign;
 use dlsys_tree::ModuleId;
 
 impl EventStage<'_, '_> {
-    /// Lets modules that look at one whose event it is, and cannot be told to have theirs later, have it now.
+    /// Opens the modules that read one that has an event now, and whose own event is not later by more than the error.
     pub fn join_ties(&mut self) {
         if !self.setup.looks_around {
             return;
@@ -34,15 +34,15 @@ impl EventStage<'_, '_> {
         }
     }
 
-    /// The production of a module that it cannot be told to have later than now, beside an event of one whose values may be
-    /// wrong by so much.
+    /// The production of a module that is not later than now by more than the error, beside an event of a module whose
+    /// values have the error `other`.
     fn tie(&mut self, id: ModuleId, other: f64) -> Option<Change> {
         let state = self.world.state(id).filter(|s| s.is_numeric() && s.open.is_none())?;
         let rule = &self.setup.model.rules[state.rule?];
         if rule.produces.is_empty() || rule.atoms.is_empty() {
             return None;
         }
-        // NextKind is known to come, or how far that is known, is mostly far away.
+        // The next event, or the end of the searched stretch, is mostly far away.
         let known = match (&state.next.kind, &self.world.coupled, &state.step) {
             (NextKind::Event, ..) => state.next.touched[0].time,
             (_, Some(solution), _) if state.coupled => solution.end,

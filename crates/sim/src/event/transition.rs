@@ -1,7 +1,7 @@
-//! NextKind a production changes, for those who ask ([`Settings::transitions`](super::Settings::transitions)): the
+//! The change that a production makes, recorded on request ([`Settings::transitions`](crate::Settings::transitions)): the
 //! predecessor just before the instant and the successor just after it, both with their rates.
 //!
-//! A successor that is itself replaced at the same instant is not seen by anybody, so a transition goes across the
+//! A successor that is itself replaced at the same instant is never observed, so a transition goes across the
 //! whole cascade: from a module that was there before the instant to the modules that stand there after it, with
 //! the rates of the equations that were chosen for them.
 
@@ -81,7 +81,7 @@ impl EventStage<'_, '_> {
         self.events.recorder = Some(recorder);
     }
 
-    /// Remembers what a module was replaced by.
+    /// Records the successor of a module.
     pub fn note_successor(&mut self, id: ModuleId, successor: &Successor, made: &[ModuleId]) {
         let Some(fired) = self.events.recorder.as_mut().and_then(|r| r.fired.get_mut(&id)) else { return };
         let mut made = made.iter().copied();
@@ -125,7 +125,7 @@ impl EventStage<'_, '_> {
     }
 }
 
-/// True for what leaves a trace in a picture.
+/// True for a kind that is drawn.
 fn is_drawn(model: &Model, kind: KindId) -> bool {
     let by_name =
         |kind: &Kind| DRAWN_WORDS.contains(&kind.base()) || BUILT_IN_SURFACES.contains(&kind.name.as_str());

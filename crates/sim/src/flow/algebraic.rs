@@ -112,7 +112,7 @@ impl FlowStage<'_, '_> {
         Ok(Solved { places: system.places, before, values })
     }
 
-    /// Brings up to date what is computed only when somebody looks, of all modules, at an instant.
+    /// Brings the parameters up to date that are computed only on observation, of all modules, at an instant.
     pub fn refresh(&mut self, at: SimTime) -> Result<(), Error> {
         if !self.flows.lazy_algebra {
             return Ok(());

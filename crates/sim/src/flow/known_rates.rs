@@ -10,7 +10,7 @@ use smallvec::SmallVec;
 
 use dlsys_tree::ModuleId;
 
-/// NextKind is known of an instant.
+/// The rates that were found at an instant.
 #[derive(Clone, Debug, Default)]
 pub struct KnownRates {
     /// Of each module, by the time ahead of the instant.
@@ -32,7 +32,7 @@ impl KnownRates {
         self.readers.clear();
     }
 
-    /// Forgets what follows from the equations of a module, for it has others now.
+    /// Removes the rates that follow from the equations of a module, for these have changed.
     pub fn forget(&mut self, id: ModuleId) {
         let mut stale = vec![id];
         while let Some(module) = stale.pop() {

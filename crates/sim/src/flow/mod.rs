@@ -45,7 +45,7 @@ const ARRIVED: f64 = 0.01;
 /// Growth of the stretches that are searched on closed forms.
 const WIDENING: f64 = 4.0;
 
-/// NextKind flows keep from step to step.
+/// The data that flows keep from step to step.
 #[derive(Clone)]
 pub struct Flows {
     pub coupled: Coupled,
@@ -183,7 +183,7 @@ impl FlowStage<'_, '_> {
         }
     }
 
-    /// Finds out what comes next for a module that is not coupled, from an instant on, and puts it into the queue.
+    /// Finds the next event of a module that is not coupled, from an instant on, and schedules it.
     pub fn look_ahead(&mut self, id: ModuleId, from: SimTime) -> Result<(), Error> {
         let model = self.setup.model;
         let who = Owner::Module(id.slot() as u32);
@@ -296,9 +296,9 @@ impl FlowStage<'_, '_> {
         }
     }
 
-    /// Forgets all about a module that has been replaced, or has lost its rule.
+    /// Removes the state of a module that has been replaced, or has lost its rule.
     pub fn forget(&mut self, id: ModuleId) {
-        // NextKind was kept of it stays as memory for the next that lives there.
+        // Its memory stays for the next module in the slot.
         if let Some(state) = self.world.state_mut(id) {
             state.is_alive = false;
             if state.coupled {
@@ -309,7 +309,7 @@ impl FlowStage<'_, '_> {
         }
     }
 
-    /// Two sides of a condition that have come too near each other for anybody to tell whether they have met.
+    /// The error of two sides of a condition that are nearer each other than the error of integration.
     pub fn in_doubt(&mut self, id: ModuleId, atom: usize) -> Error {
         let index = self.world.rule_and_clause(id).0.unwrap_or(0);
         let rule = &self.setup.model.rules[index];

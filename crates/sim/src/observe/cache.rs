@@ -37,7 +37,7 @@ impl Clone for FrameCache {
     }
 }
 
-/// The light modules of a class that move.
+/// The moving lazy modules of a class.
 #[derive(Clone, Debug, Default)]
 pub struct Column {
     pub rows: Vec<Row>,
@@ -45,7 +45,7 @@ pub struct Column {
     pub places: Vec<u32>,
 }
 
-/// A light module with its twins: those after it in the string that were born at the same instant with the same values,
+/// A lazy module with its twins: those after it in the string that were born at the same instant with the same values,
 /// so that they are the same at all times.
 #[derive(Clone, Copy, Debug)]
 pub struct Row {

@@ -1,8 +1,8 @@
 //! Observation: the structure written out at an instant, in two passes.
 //!
-//! The first goes through the structure in string order and writes who is there, with the values of which trajectories are
-//! displacements; it also notes who moves. It is made anew only when the structure has changed: from frame to frame a
-//! string stays, but for the second pass, which goes through those that move, by class: the coefficients of their
+//! The first goes through the structure in string order and writes every module with the values from which its
+//! trajectories are displacements; it also collects the moving modules. It is made anew only when the structure has changed: from frame to frame a
+//! string stays, but for the second pass, which goes through the moving ones, by class: the coefficients of their
 //! trajectories are evaluated for many modules at once (`Program::eval_lanes`, to the same bits as one by one), and once
 //! for twins.
 
@@ -59,7 +59,7 @@ impl Simulation<'_> {
         }
         for (label, column) in cache.columns.iter().enumerate().filter(|(_, column)| !column.rows.is_empty())
         {
-            let class = self.world.lives.get(label as u16).expect("a light module's label");
+            let class = self.world.lives.get(label as u16).expect("a lazy module's label");
             let registers = &mut cache.registers;
             let place = self.show_column(class, column, now, again, registers, out.parameters_mut());
             bad = bad.min(place);
@@ -67,7 +67,7 @@ impl Simulation<'_> {
         self.frames = cache;
         match self.owner(bad) {
             Some((id, parameter)) => {
-                // Not what anybody may go on from.
+                // Values that no caller may use.
                 out.reset(t);
                 Err(self.world.not_finite(self.setup.model, id, parameter, now))
             }
@@ -82,7 +82,7 @@ impl Simulation<'_> {
         columns.resize(self.world.lives.len(), Column::default());
         others.clear();
         let world = &self.world;
-        // NextKind rests need not be looked at again.
+        // Modules at rest need not be visited again.
         let moves: Vec<bool> = (0..world.lives.len())
             .map(|label| {
                 let class = world.lives.get(label as u16).expect("as many as there are columns");
@@ -133,7 +133,7 @@ impl Simulation<'_> {
                     continue;
                 }
                 let moved: Lanes = match law {
-                    // NextKind is at rest is what it was in the frame before.
+                    // A parameter at rest is as it was in the frame before.
                     Law::Polynomial(program) if again && is_zero(program) => continue,
                     Law::Polynomial(program) => polynomial(program, registers, parameter, &tau),
                     Law::Quadratic(program) => {
@@ -233,7 +233,7 @@ fn polynomial(program: &Program, registers: &mut Vec<Lanes>, parameter: usize, t
     }
     let starts = &registers[parameter];
     if program.outputs() == 1 {
-        // NextKind is added to the first coefficient is zero.
+        // The higher coefficients are zero.
         return std::array::from_fn(|i| starts[i] + tau[i] * (c[0][i] + tau[i] * 0.0));
     }
     std::array::from_fn(|i| {

@@ -1,8 +1,8 @@
-//! The events of light modules, in order of time.
+//! The calendar queue: the events of lazy modules, in order of time.
 //!
 //! An entry is 12 bytes: the time as a float, and the slot. Instants to all their digits are computed again for those
-//! that come first (`light`), so entries of one float are one bundle here, and order within it is decided there. A
-//! light module stays what it is until its event, so nothing is ever taken back.
+//! that come first (`Schedule::peek`), so entries of one float are one bundle here, and the order within it is decided there. A lazy module
+//! does not change until its event, so no entry is ever taken back.
 
 use std::collections::VecDeque;
 
@@ -42,8 +42,8 @@ impl CalendarEntry {
 /// Events in order, in which many of one time are one entry: a thousand cells that divide together cost one place in
 /// the order, and one push each.
 ///
-/// NextKind is put in is mostly later than all before it of its kind: newborns that live as long as each other. Such events
-/// wait in a few lines, first in, first out; the heap is for what comes out of turn. A line is read and written in the
+/// A new entry is mostly later than all before it of its kind: newborns that live as long as each other. Such events
+/// wait in a few lines, first in, first out; the heap is for entries out of turn. A line is read and written in the
 /// order of memory, a heap of a million events at ten places for each.
 #[derive(Clone, Debug)]
 pub struct CalendarQueue {
@@ -57,7 +57,7 @@ pub struct CalendarQueue {
     free_runs: Vec<u32>,
     /// Times lately put in, by a hash, with their runs.
     recent: [(u64, u32); RECENT],
-    /// The earliest entry and the line where it stands (none for the heap), once somebody has asked.
+    /// The earliest entry and the line where it stands (none for the heap), once it has been found.
     first: Option<(CalendarEntry, Option<usize>)>,
 }
 
@@ -170,7 +170,7 @@ impl CalendarQueue {
 
     fn push_entry(&mut self, time: f64, slot: u32) {
         let entry = CalendarEntry::new(time, slot);
-        // The line that it fits best: the others stay free for what comes earlier.
+        // The line that it fits best: the others stay free for earlier entries.
         let mut line = None;
         for (i, end) in self.ends.iter().enumerate() {
             if *end <= time && line.is_none_or(|other: usize| *end > self.ends[other]) {
@@ -222,7 +222,7 @@ impl CalendarQueue {
         {
             self.sift_down(last);
         }
-        // NextKind goes from the heap into lines is not to be paid for twice.
+        // Entries that go from the heap into lines are not paid for twice.
         if self.heap.capacity() > LARGE && self.heap.len() < self.heap.capacity() / 2 {
             self.heap.shrink_to(self.heap.len() + self.heap.len() / 4);
         }

@@ -67,13 +67,13 @@ impl IndexedQueue {
         }
     }
 
-    /// Forgets what was known.
+    /// Removes the entry of an owner.
     pub fn cancel(&mut self, owner: Owner) {
         let serial = self.serial(owner);
         *serial = serial.wrapping_add(1);
     }
 
-    /// Puts in what is known now, in place of what was.
+    /// Puts in the entry of an owner, in place of its earlier one.
     pub fn schedule(&mut self, owner: Owner, at: SimTime) {
         self.cancel(owner);
         let serial = *self.serial(owner);
@@ -101,7 +101,7 @@ impl IndexedQueue {
         self.heap.iter().filter(move |entry| serial(entry.owner) == Some(entry.serial))
     }
 
-    /// Takes out what `peek` has shown.
+    /// Removes the entry that `peek` has returned.
     pub fn pop(&mut self) {
         self.heap.pop();
     }

@@ -75,8 +75,8 @@ impl NextEvent {
     }
 }
 
-/// True if what comes at an instant is passed on the way to another: events of that instant itself take place, what is
-/// known up to there is enough.
+/// True if an entry at an instant is passed on the way to `until`: events of that instant itself take place, a stretch that
+/// was searched up to there is enough.
 pub fn is_before(at: SimTime, event: bool, until: SimTime) -> bool {
     let ahead = at.since(until);
     if event { ahead <= until.resolution() } else { ahead < 0.0 }

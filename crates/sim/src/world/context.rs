@@ -1,4 +1,4 @@
-//! NextKind a module reads of others: its context, and the modules attached to it.
+//! The modules that a rule reads: its context, and the modules attached to its module.
 
 use std::ops::Deref;
 

@@ -12,7 +12,7 @@ pub struct CoupledSolution {
     /// By component: where it is found. Empty as long as there is the common step only.
     tracks: Vec<Track>,
     pub end: SimTime,
-    /// NextKind the components may be wrong by, relative, in the worst of the stretches.
+    /// The estimated relative error of the components, in the worst of the stretches.
     pub error: f64,
 }
 
@@ -105,7 +105,7 @@ impl CoupledSolution {
         self.tracks.len() - 1
     }
 
-    /// Puts stretches in place of what some components have followed. `components` are numbered as in the stretches.
+    /// Puts stretches in place of those that some components have followed. `components` are numbered as in the stretches.
     pub fn replace(&mut self, stretches: &mut Vec<Dense>, components: &[u32], all: usize) {
         for component in self.tracks.len()..all {
             self.tracks.push(Track { first: 0, count: 1, component: component as u32 });
@@ -154,7 +154,7 @@ impl<'c> DenseComponent<'c> {
         self.scaled(self.dense.stretch(&mut sum, self.position(lo), self.position(hi)))
     }
 
-    /// NextKind it may be wrong by, as a part of its size.
+    /// The estimated error, relative to its size.
     pub fn error(&self) -> f64 {
         self.dense.error
     }

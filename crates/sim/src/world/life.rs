@@ -1,9 +1,9 @@
-//! NextKind is known of a light module besides its numbers.
+//! Life classes: the data of lazy modules besides their numbers.
 //!
-//! A module is *light* if it reads nobody, is read by nobody, follows formulas only, and if its next event is a formula
-//! and a production (`quick` finds that out when it is born). Then its birth and the values it was born with determine
+//! A module is *lazy* if it reads no module and no module reads it, all its parameters have closed forms, and its next event
+//! has one and is a production (`flow::prediction` decides that at birth). Then its birth and the values it was born with determine
 //! all its life: trajectories, instant of the event, successor. They are computed from them by the same code, hence to the
-//! same bits, whenever somebody asks, and nothing is kept of the module but a number: that of its [`LifeClass`]. A model
+//! same bits, on demand, and nothing is kept of the module but the number of its [`LifeClass`]. A model
 //! has a few classes; a module has one from its birth to its end.
 
 use smallvec::SmallVec;
@@ -14,19 +14,19 @@ use dlsys_expr::Program;
 use dlsys_model::{Law, Model, Rule, Sign, Solve, ZeroCrossing};
 use dlsys_tree::{NO_LABEL, SimTime};
 
-/// A module with this label is not light, and that is known.
+/// The label of a module that is known not to be lazy.
 pub const REFUSED: u16 = NO_LABEL - 1;
 /// Most classes of one rule; a model with more of them has conditions without number.
 const MAX_CAREERS: usize = 64;
 
-/// NextKind all modules that live through the same have in common.
+/// The common data of all modules with the same rule, clause, signs and kind of end.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LifeClass {
     pub rule: usize,
     pub solve: Option<usize>,
     /// Of the rule's atoms, from birth to the event.
     pub signs: Signs,
-    /// NextKind comes; None if nothing does.
+    /// The production at the end; None if there is none.
     pub end: Option<End>,
 }
 
@@ -51,7 +51,7 @@ impl LifeClass {
     }
 }
 
-/// The life of one module, and what it leaves: kept in case that the next one lives the same. Many modules are born
+/// The life of one module and its successor: kept because the next life may be the same. Many modules are born
 /// with the same values, and many of those at one instant.
 #[derive(Clone, Debug, Default)]
 pub struct Life {
@@ -66,7 +66,7 @@ pub struct Life {
     pub tau: Option<f64>,
     /// The parameter that meets a level at the event, with the level.
     pub level: Option<(usize, f64)>,
-    /// When it was replaced, if what follows is known.
+    /// When it was replaced, if the successor is known.
     pub replaced: Option<SimTime>,
     /// Of the successor.
     pub arguments: Vec<f64>,
@@ -79,7 +79,7 @@ pub struct Life {
     pub lasting: bool,
 }
 
-/// NextKind modules of a rule are going to do that are born with these values, whenever that is.
+/// The prediction for modules of a rule that are born with these values, whenever that is.
 #[derive(Clone, Debug)]
 pub struct CachedPrediction {
     pub values: SmallVec<[f64; 4]>,
@@ -88,10 +88,10 @@ pub struct CachedPrediction {
     pub tau: Option<f64>,
 }
 
-/// NextKind a module of a successor is going to do.
+/// The predicted life of a module of a successor.
 #[derive(Clone, Copy, Debug)]
 pub struct Newborn {
-    /// Of its class; or [`REFUSED`]; or [`NO_LABEL`]: there is nothing to know, or it has a context.
+    /// Of its class; or [`REFUSED`]; or [`NO_LABEL`]: it has no rules, or a context.
     pub label: u16,
     /// Of its event.
     pub time: Option<f64>,
@@ -116,7 +116,7 @@ impl Life {
         true
     }
 
-    /// Lets the end be the same as that of the last one who lived this life, now. False if that cannot be said.
+    /// Takes over the end of the last module that lived this life, now. False if it may differ.
     pub fn end_again(&mut self, now: SimTime) -> bool {
         if !self.lasting || self.tau != Some(now.since(self.birth)) {
             return false;
@@ -145,11 +145,11 @@ pub struct Lives {
     all: Vec<LifeClass>,
     lives: Vec<Option<Box<Life>>>,
     of_rule: Vec<Vec<u16>>,
-    /// By kind: the rule of those that can be light.
+    /// By kind: the rule of those that can be lazy.
     rules: Vec<Option<usize>>,
     /// By rule: nothing in it depends on the time of birth.
     timeless: Vec<bool>,
-    /// By rule and production: what comes of it depends on the values at birth only.
+    /// By rule and production: its successor depends on the values at birth only.
     lasting: Vec<Vec<bool>>,
     /// By rule: the last one, if it is timeless.
     pub cached: Vec<Option<CachedPrediction>>,
@@ -169,7 +169,7 @@ impl Lives {
         let rules = (model.kinds.iter())
             .map(|(id, kind)| {
                 let alone = !kinds_with_context[id.index()] && !seen[id.index()] && kind.steps.is_empty();
-                // NextKind has a value or an equation must be made consistent first.
+                // Algebraic parameters must be made consistent first.
                 kind.rules.first().copied().filter(|rule| alone && !model.rules[*rule].is_algebraic())
             })
             .collect();
@@ -185,12 +185,12 @@ impl Lives {
         self.timeless[rule]
     }
 
-    /// True if what comes of a production depends on the values at birth only, whenever that is.
+    /// True if the successor of a production depends on the values at birth only, whenever that is.
     pub fn is_lasting(&self, rule: usize, produce: usize) -> bool {
         self.lasting[rule][produce]
     }
 
-    /// The rule of a kind whose modules can be light.
+    /// The rule of a kind whose modules can be lazy.
     pub fn rule(&self, kind: dlsys_model::KindId) -> Option<usize> {
         self.rules[kind.index()]
     }
@@ -252,7 +252,7 @@ fn is_timeless(rule: &Rule) -> bool {
         && rule.solves.iter().all(solve_is_blind)
 }
 
-/// Of each production of a rule, whether what comes of it depends on the values at birth only: neither chance, nor `t`,
+/// Of each production of a rule, whether its successor depends on the values at birth only: neither chance, nor `t`,
 /// nor `age`, which is rounded.
 fn lasting_productions(rule: &Rule) -> Vec<bool> {
     let time = rule.time_variable();

@@ -37,9 +37,9 @@ pub struct Instant {
 pub struct World {
     /// Its values are those at the start of each trajectory.
     pub tree: Tree,
-    /// By slot of the tree, as far as there are any; None for modules without rules, and for light ones.
+    /// By slot of the tree, as far as there are any; None for modules without rules, and for lazy ones.
     pub states: Vec<Option<Box<State>>>,
-    /// NextKind is known of light modules, whose labels in the tree are numbers of life classes.
+    /// Lazy modules: their labels in the tree are numbers of life classes.
     pub lives: Lives,
     /// How the coupled modules move.
     pub coupled: Option<CoupledSolution>,
@@ -79,14 +79,14 @@ impl World {
         self.states[slot].get_or_insert_with(|| Box::new(State::new(id)))
     }
 
-    /// Gives a module a state that knows nothing yet.
+    /// Gives a module an empty state.
     pub fn new_state(&mut self, id: ModuleId) -> &mut State {
         let state = self.make_state(id);
         *state = State::new(id);
         state
     }
 
-    /// True for a module that is alive and light.
+    /// True for a module that is alive and lazy.
     pub fn is_lazy(&self, id: ModuleId) -> bool {
         self.tree.label_if_alive(id).is_some_and(|label| self.lives.get(label).is_some())
     }
@@ -116,7 +116,7 @@ impl World {
         }
     }
 
-    /// The parameters of a module at an instant, appended to `out`; not of a light one, whose trajectories are not here.
+    /// The parameters of a module at an instant, appended to `out`; not of a lazy one, whose trajectories are not stored.
     pub fn values(&self, id: ModuleId, at: SimTime, out: &mut Vec<f64>) {
         debug_assert!(self.lives.get(self.tree.label(id)).is_none_or(|class| class.is_over_at_birth()));
         let values = self.tree.parameters(id);
@@ -201,7 +201,7 @@ impl World {
         gather(rule, around, time, out, &mut Vec::new(), |_| true, values);
     }
 
-    /// The same where only some variables are read: what is not read may be any number.
+    /// The same where only some variables are read: the others may be any number.
     pub fn variables_read(
         &self,
         (rule, reads): (&Rule, &[bool]),

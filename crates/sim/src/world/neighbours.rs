@@ -2,10 +2,11 @@
 //!
 //! The nearest module that is not skipped, on either side, is remembered once it has been found, and handed on from a
 //! module to its successor. So finding a context costs the same however many finished branches stand between: they are
-//! not passed again. NextKind is remembered stays right until the neighbour dies, because nothing else can come between;
+//! not passed again. A remembered neighbour stays right until it dies, because nothing else can come between;
 //! only where a skipped module turns into one that counts is everything forgotten.
 //!
-//! Whoever was looked at, matching or not, knows who looked: when it dies, those look again, and nobody else.
+//! For each module its *lookers* are recorded, the modules whose contexts were matched against it, successfully or not: when
+//! it dies, their contexts are matched again, and no others.
 
 use std::collections::HashMap;
 
@@ -37,17 +38,17 @@ impl From<Option<ModuleId>> for Link {
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Near {
-    /// Whose neighbours these are; of another, nothing is known.
+    /// The module whose neighbours these are.
     of: Option<ModuleId>,
     left: Link,
     right: Link,
 }
 
-/// NextKind is remembered, by slot of the tree.
+/// Neighbours and lookers, by slot of the tree.
 #[derive(Clone, Debug, Default)]
 pub struct Neighbours {
     near: Vec<Near>,
-    /// NextKind stands left of what stood right of a module that has died at this instant.
+    /// The left neighbour, now, of the right neighbour of a module that has died at this instant.
     forwards: Forwards,
     lookers: Vec<SmallVec<[ModuleId; 4]>>,
 }
@@ -114,8 +115,8 @@ impl Neighbours {
         }
     }
 
-    /// A left neighbour, or what has taken its place at this instant. The way there is made short for the next who asks:
-    /// a million branches may ask one after another.
+    /// A left neighbour, or its replacement at this instant. The path to it is compressed: a million branches may need it
+    /// one after another.
     fn forwarded(&mut self, tree: &Tree, known: Link) -> Link {
         let mut way: SmallVec<[ModuleId; 8]> = SmallVec::new();
         let mut link = known;
@@ -132,7 +133,7 @@ impl Neighbours {
         link
     }
 
-    /// Says that everybody has looked who had to look at this instant.
+    /// Ends an instant: all contexts have been matched.
     pub fn end_instant(&mut self) {
         self.forwards.clear();
     }
@@ -161,7 +162,7 @@ impl Neighbours {
             return;
         }
         if lookers.len() == lookers.capacity() {
-            // Those who have gone, and who have looked twice.
+            // Dead lookers and duplicates.
             lookers.sort_unstable();
             lookers.dedup();
             lookers.retain(|id| tree.is_alive(*id));
@@ -169,7 +170,7 @@ impl Neighbours {
         lookers.push(looker);
     }
 
-    /// Those who have looked at a slot's module, living and dead; some maybe at an earlier one.
+    /// The lookers of a slot's module, living and dead; some maybe of an earlier module.
     pub fn lookers(&self, id: ModuleId) -> &[ModuleId] {
         self.lookers.get(id.slot()).map_or(&[], |all| all)
     }
@@ -192,7 +193,7 @@ impl Neighbours {
         }
     }
 
-    /// Forgets who looked at a module that has died.
+    /// Removes the lookers of a module that has died.
     pub fn bury(&mut self, id: ModuleId) {
         if let Some(lookers) = self.lookers.get_mut(id.slot()) {
             lookers.clear();
@@ -205,7 +206,7 @@ impl Neighbours {
         self.end_instant();
     }
 
-    /// Hands the neighbours of a module on to what has taken its place: `made` are the modules of a string of `kinds`.
+    /// Hands the neighbours of a module on to its successor: `made` are the modules of a string of `kinds`.
     /// Without a module, the string is the initial one.
     pub fn hand_on(
         &mut self,
@@ -222,7 +223,7 @@ impl Neighbours {
             None => (Link::End, Link::End),
         };
         let mut made = made.iter().copied();
-        // NextKind stands left of the next module, and the last on the same axis.
+        // The left neighbour of the next module, and the last module on the same axis.
         let (mut before, mut last): (Link, Option<ModuleId>) = (left, None);
         let mut outer = Vec::new();
         let mut first = None;

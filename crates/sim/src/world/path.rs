@@ -23,7 +23,7 @@ pub struct Path<'p> {
     age: f64,
     /// Which variables are wanted; all where this is empty.
     wanted: &'p [bool],
-    /// The module's own step, if it is not yet among what is known.
+    /// The module's own step, if it is not stored in its state yet.
     step: Option<&'p Dense>,
 }
 
@@ -44,7 +44,7 @@ impl<'p> Path<'p> {
         Path { wanted: &[], step, ..Path::new(world, state, rule, start, h) }
     }
 
-    /// NextKind numeric trajectories follow along this stretch.
+    /// The dense output that a numeric trajectory follows along this stretch.
     fn piece<'s>(&'s self, state: &'s State, trajectory: &Trajectory) -> Option<DenseComponent<'s>> {
         match trajectory {
             Trajectory::Step(c) => {
@@ -148,7 +148,7 @@ impl<'p> Path<'p> {
         out.extend(self.state.switches.iter().map(|&on| f64::from(u8::from(on))));
     }
 
-    /// Bounds of all variables that equations read. If `held`, what is integrated stays as it is in the middle.
+    /// Bounds of all variables that equations read. If `held`, integrated values are those of the middle.
     pub fn everything_over(&self, lo: f64, hi: f64, held: bool, out: &mut Vec<Interval>) {
         let h = self.h;
         self.each(
@@ -210,7 +210,7 @@ impl<'p> Path<'p> {
         Some(Dual { value: Interval { lo: value.lo + constant, hi: value.hi + constant, ..value }, rate })
     }
 
-    /// NextKind the values may be at a position, given the errors of integration and of rounding.
+    /// Bounds of the values at a position, given the errors of integration and of rounding.
     pub fn uncertain(&self, position: f64, out: &mut Vec<Interval>) {
         let tau = position * self.h;
         let around = |x: f64, more: f64| {
@@ -229,7 +229,7 @@ impl<'p> Path<'p> {
         );
     }
 
-    /// NextKind integrated values along the path may be wrong by, as a part of their size; 0 if there are none.
+    /// The estimated error of integrated values along the path, relative to their size; 0 if there are none.
     pub fn error(&self) -> f64 {
         let solution = self.world.coupled.as_ref().map_or(0.0, |solution| solution.error);
         if self.state.coupled && solution > 0.0 {

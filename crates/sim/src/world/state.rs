@@ -1,4 +1,4 @@
-//! NextKind the simulation keeps of a module that has rules.
+//! The state of a materialised module: rule, clause, signs, trajectories, next event.
 
 use smallvec::SmallVec;
 
@@ -36,7 +36,7 @@ pub struct State {
     pub window: f64,
     /// All equations are integrated numerically, formulas or not.
     pub numeric_only: bool,
-    /// It is integrated together with others.
+    /// It is integrated together with its neighbours.
     pub coupled: bool,
     /// Number of the last walk through neighbours that came by.
     pub visited: u64,
@@ -61,7 +61,7 @@ pub struct Step {
     pub since_mark: usize,
 }
 
-/// NextKind is known to come.
+/// The next entry of the schedule for a module.
 #[derive(Clone, Debug, Default)]
 pub struct Next {
     pub kind: NextKind,
@@ -71,7 +71,7 @@ pub struct Next {
     pub changes: Vec<Change>,
     /// All this follows from formulas, and holds whatever a common step brings.
     pub lasting: bool,
-    /// Atoms, one bit each, whose sides have come so near each other that nobody can tell on which side of zero they are.
+    /// Atoms, one bit each, whose sides are nearer each other than the error of integration.
     pub near: u64,
 }
 
@@ -108,7 +108,7 @@ pub struct Change {
     pub level: Option<(usize, f64)>,
 }
 
-/// NextKind is still open about a module at the instant under examination.
+/// The open questions of a module at the instant under examination.
 #[derive(Clone, Debug, Default)]
 pub struct Open {
     /// The signs at the instant.
