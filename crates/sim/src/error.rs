@@ -10,11 +10,13 @@ use dlsys_tree::Lineage;
 pub struct Site {
     /// The module with its parameters, as in a string.
     pub module: String,
+    /// The module itself, whatever its parameters are.
     pub lineage: Lineage,
     /// The head of its rule.
     pub rule: String,
     /// The place in the text to point at.
     pub span: Span,
+    /// The instant, in the model's unit of time.
     pub time: f64,
 }
 
@@ -36,13 +38,19 @@ pub struct Near {
     pub error: f64,
 }
 
-/// Why a parameter cannot be solved for.
+/// The reason why a parameter cannot be solved for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Unsolved {
+    /// The equations are singular at the values that were found.
     Singular,
+    /// Newton's method has found no values.
     Nothing,
+    /// The equations have no finite values.
     NotFinite,
+    /// The equations become singular along the trajectory.
     Fading,
+    /// The values change faster than they can be followed.
     Rough,
 }
 
@@ -60,65 +68,144 @@ impl Unsolved {
 
 /// An error of a run. All name the rule, the module with its lineage, and the time.
 #[derive(Clone, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
+    /// No clause of the rule holds, and no production applies.
     #[error(
         "{} {} its domain at t = {} and no production applies", .site.module,
         if *.born { "is born outside" } else { "left" }, .site.when()
     )]
     OutsideDomain {
+        /// The module that has no equations.
         site: Site,
         /// It never was inside.
         born: bool,
         /// The comparisons that fail, with their places and suggested remedies.
         failing: Vec<(Span, Option<Remedy>)>,
     },
+    /// Each of two clauses leads into the domain of the other, or equations change without end at one instant.
     #[error("the equations of {} push against each other at t = {}", .site.module, .site.when())]
-    Chattering { site: Site },
+    Chattering {
+        /// The module whose equations contradict each other.
+        site: Site,
+    },
+    /// Productions follow one another at one instant more than [`MAX_ROUNDS`](crate::MAX_ROUNDS) times.
     #[error("productions go on without end at t = {}", .site.when())]
-    Cascade { site: Site, rounds: usize },
+    Cascade {
+        /// The next production.
+        site: Site,
+        /// Rounds of productions so far.
+        rounds: usize,
+    },
+    /// Lives become as short as the resolution of time: events accumulate (Zeno's paradox).
     #[error("events pile up before t = {}", .site.when())]
-    Zeno { site: Site },
+    Zeno {
+        /// A module with such a life.
+        site: Site,
+    },
+    /// The period of derivation steps is shorter than the resolution of time.
     #[error("steps that are {period} apart cannot be told apart at t = {}", .site.when())]
-    PeriodTooShort { site: Site, period: f64 },
+    PeriodTooShort {
+        /// A module to which discrete rules may apply.
+        site: Site,
+        /// The period, in the model's unit of time.
+        period: f64,
+    },
+    /// A value or a rate is infinite or undefined.
     #[error("{what} of {} is not finite at t = {}", .site.module, .site.when())]
-    NotFinite { site: Site, what: String },
+    NotFinite {
+        /// The module with the value.
+        site: Site,
+        /// The value, as a message names it.
+        what: String,
+    },
+    /// A distribution has parameters that it cannot have.
     #[error("`{}` cannot be drawn from at t = {}: {why}", .distribution.name(), .site.when())]
-    BadDraw { site: Site, distribution: Distribution, why: Box<str> },
+    BadDraw {
+        /// The module that is replaced, at the draw in its successor.
+        site: Site,
+        /// The distribution.
+        distribution: Distribution,
+        /// The reason, as a message gives it.
+        why: Box<str>,
+    },
+    /// The weights of several successors are no weights.
     #[error("no successor can be chosen for {} at t = {}: {why}", .site.module, .site.when())]
-    BadWeights { site: Site, why: String },
+    BadWeights {
+        /// The module that is replaced.
+        site: Site,
+        /// The reason, as a message gives it.
+        why: String,
+    },
+    /// The rate of a random event became negative.
     #[error("the rate of an event of {} is negative at t = {}", .site.module, .site.when())]
-    NegativeRate { site: Site },
+    NegativeRate {
+        /// The module, at the clause with the rate.
+        site: Site,
+    },
+    /// Two sides came nearer each other than the error of integration and parted again: whether they met decides a production.
     #[error(
         "{} has come near {} and turned back at t = {}: whether it met it, the error of integration does not tell",
         .site.module, if .near.boundary.is_empty() { "a boundary" } else { &.near.boundary }, .site.when()
     )]
-    InDoubt { site: Site, near: Box<Near> },
+    InDoubt {
+        /// The module, at the comparison.
+        site: Site,
+        /// The distance of the two sides.
+        near: Box<Near>,
+    },
+    /// No step of the integration goes on.
     #[error("the step size fell to nothing at t = {}", .site.when())]
-    StepTooSmall { site: Site },
+    StepTooSmall {
+        /// The module with the component that limits the step.
+        site: Site,
+    },
+    /// An algebraic parameter has no value.
     #[error("{} of {} {} at t = {}", .unknown.0, .site.module, .unknown.1.message(), .site.when())]
     Unsolved {
+        /// The module with the parameter.
         site: Site,
         /// The parameter that is solved for, and why that fails.
         unknown: Box<(String, Unsolved)>,
     },
+    /// More modules than [`Settings::max_modules`](crate::Settings::max_modules).
     #[error("more than {limit} modules at t = {}", .site.when())]
     TooManyModules {
+        /// The production that is one too many.
         site: Site,
+        /// The limit.
         limit: usize,
         /// Productions that had followed one another at this instant.
         rounds: usize,
     },
+    /// More productions and steps than [`Settings::max_events`](crate::Settings::max_events), or far more foreseen.
     #[error("{}", too_many(*.limit, .foreseen, .site))]
     TooManyEvents {
+        /// The next module.
         site: Site,
+        /// The limit.
         limit: u64,
-        /// As many as it would take up to some time, at the present pace.
+        /// The number that is foreseen up to some time at the present pace, and that time.
         foreseen: Option<Box<(f64, f64)>>,
     },
+    /// More seconds than [`Settings::max_seconds`](crate::Settings::max_seconds).
     #[error("{limit} seconds are over at t = {}", .site.when())]
-    OutOfTime { site: Site, limit: f64 },
+    OutOfTime {
+        /// The next module.
+        site: Site,
+        /// The limit, in seconds.
+        limit: f64,
+    },
+    /// The system, or [`Settings::max_memory`](crate::Settings::max_memory), refuses memory.
     #[error("no memory for more than {modules} modules at t = {}", .site.when())]
-    OutOfMemory { site: Site, modules: usize, shortage: Box<Shortage> },
+    OutOfMemory {
+        /// The production that needs it.
+        site: Site,
+        /// Modules that there are.
+        modules: usize,
+        /// The bytes wanted and available.
+        shortage: Box<Shortage>,
+    },
 }
 
 fn too_many(limit: u64, foreseen: &Option<Box<(f64, f64)>>, site: &Site) -> String {
@@ -134,6 +221,29 @@ fn too_many(limit: u64, foreseen: &Option<Box<(f64, f64)>>, site: &Site) -> Stri
 }
 
 impl Error {
+    /// The name of the kind of error, as the enum has it.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Error::OutsideDomain { .. } => "OutsideDomain",
+            Error::Chattering { .. } => "Chattering",
+            Error::Cascade { .. } => "Cascade",
+            Error::Zeno { .. } => "Zeno",
+            Error::NotFinite { .. } => "NotFinite",
+            Error::BadDraw { .. } => "BadDraw",
+            Error::BadWeights { .. } => "BadWeights",
+            Error::NegativeRate { .. } => "NegativeRate",
+            Error::StepTooSmall { .. } => "StepTooSmall",
+            Error::InDoubt { .. } => "InDoubt",
+            Error::Unsolved { .. } => "Unsolved",
+            Error::PeriodTooShort { .. } => "PeriodTooShort",
+            Error::TooManyModules { .. } => "TooManyModules",
+            Error::TooManyEvents { .. } => "TooManyEvents",
+            Error::OutOfTime { .. } => "OutOfTime",
+            Error::OutOfMemory { .. } => "OutOfMemory",
+        }
+    }
+
+    /// The place of the error.
     pub fn site(&self) -> &Site {
         match self {
             Error::OutsideDomain { site, .. }

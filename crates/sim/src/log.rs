@@ -24,9 +24,11 @@ impl Log {
 /// A production that took place.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Event {
+    /// The instant, in the model's unit of time.
     pub time: f64,
     /// The module that was replaced.
     pub lineage: Lineage,
+    /// The kind of the module that was replaced.
     pub kind: KindId,
     /// Index into the model's rules.
     pub rule: usize,
@@ -47,10 +49,13 @@ pub struct Event {
 /// A module, or a bracket, at an instant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModuleState {
+    /// Its kind; brackets are kinds.
     pub kind: KindId,
+    /// The parameters that are written, not the hidden ones.
     pub values: Vec<f64>,
     /// Of the values, per unit of time.
     pub rates: Vec<f64>,
+    /// The time since its birth.
     pub age: f64,
 }
 

@@ -28,7 +28,9 @@ pub enum Scheduler {
 /// How a simulation is run.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
+    /// The integration method; `Auto` uses closed forms where there are any.
     pub method: Method,
+    /// The treatment of coupled modules at events.
     pub scheduler: Scheduler,
     /// Error aimed at in every parameter at every time, relative to max(1, |value|).
     pub tolerance: f64,
@@ -76,8 +78,9 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Default limits, so large that only a run without end exceeds them.
+    /// Default limit of modules, so large that only a run without end exceeds it.
     pub const MODULES: usize = 10_000_000;
+    /// Default limit of productions and steps.
     pub const EVENTS: u64 = 10_000_000_000;
 
     /// For equations that decide by chance: there is no tolerance in when an event happens that has no time of its own.

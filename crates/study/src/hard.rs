@@ -340,29 +340,8 @@ impl<'a> Judge<'a> {
 /// A word for why a run ended, and the time to which it came.
 fn end_of(stop: &EarlyEnd) -> (&'static str, f64) {
     match stop {
-        EarlyEnd::Error(fault) => (fault_name(fault), fault.site().time),
+        EarlyEnd::Error(fault) => (fault.name(), fault.site().time),
         EarlyEnd::Overtime { t, .. } => ("it takes too long", *t),
-    }
-}
-
-fn fault_name(fault: &sim::Error) -> &'static str {
-    match fault {
-        sim::Error::OutsideDomain { .. } => "OutsideDomain",
-        sim::Error::Chattering { .. } => "Chattering",
-        sim::Error::Cascade { .. } => "Cascade",
-        sim::Error::Zeno { .. } => "Zeno",
-        sim::Error::NotFinite { .. } => "NotFinite",
-        sim::Error::BadDraw { .. } => "BadDraw",
-        sim::Error::BadWeights { .. } => "BadWeights",
-        sim::Error::NegativeRate { .. } => "NegativeRate",
-        sim::Error::StepTooSmall { .. } => "StepTooSmall",
-        sim::Error::InDoubt { .. } => "InDoubt",
-        sim::Error::Unsolved { .. } => "Unsolved",
-        sim::Error::PeriodTooShort { .. } => "PeriodTooShort",
-        sim::Error::TooManyModules { .. } => "TooManyModules",
-        sim::Error::TooManyEvents { .. } => "TooManyEvents",
-        sim::Error::OutOfTime { .. } => "OutOfTime",
-        sim::Error::OutOfMemory { .. } => "OutOfMemory",
     }
 }
 

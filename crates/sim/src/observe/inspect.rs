@@ -1,4 +1,4 @@
-//! All that is known of one module at a time.
+//! Inspection: one module at a time, with its rates, its rule and its neighbours.
 
 use crate::flow::lazy;
 use crate::kernel::Simulation;
@@ -8,7 +8,9 @@ use dlsys_tree::{Lineage, ModuleId, SimTime, Visit};
 /// A module as it is seen from another.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InspectedModule {
+    /// Its kind.
     pub kind: KindId,
+    /// Its lineage: the path of productions from the axiom.
     pub lineage: Lineage,
     /// At the time of the inspection.
     pub parameters: Vec<f64>,
@@ -17,19 +19,21 @@ pub struct InspectedModule {
 /// A module with its rates and its neighbours.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inspection {
+    /// The module itself.
     pub module: InspectedModule,
     /// Derivatives of the parameters by time, in the model's unit.
     pub rates: Vec<f64>,
     /// Time of birth.
     pub birth: f64,
-    /// The rule that applies and its `solve` clause, as indices into the model's; None if there is none, or, of a rule,
-    /// if no rule's context is there.
+    /// Index of the rule that applies; None if the kind has no rules, or no context matches.
     pub rule: Option<usize>,
+    /// Index of the active `solve` clause in the rule.
     pub solve: Option<usize>,
     /// The modules that the rule's context has found, left to right as written.
     pub context: Vec<InspectedModule>,
-    /// The nearest modules that count as context, to the left and to the right (LANGUAGE, "Context").
+    /// The nearest module to the left that counts as context.
     pub left: Option<InspectedModule>,
+    /// The nearest module to the right that counts as context.
     pub right: Option<InspectedModule>,
 }
 
