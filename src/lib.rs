@@ -55,6 +55,8 @@
 //! Each is a crate of its own. Imports go down this arrow and never back; `lang`, `sim` and `turtle` do not know one another.
 //! `ARCHITECTURE.md` tells why things are as they are.
 
+#![warn(missing_docs)]
+
 pub mod cli;
 mod front;
 pub mod interrupt;

@@ -107,7 +107,7 @@ fn hard(args: &ReportArgs, folder: Option<&Path>) -> Result<(), Failure> {
             CASES.iter().map(|(name, text)| (format!("models/hard/{name}"), (*text).to_owned())).collect()
         }
     };
-    let fault = |error: study::CaseError| Failure::Model(format!("error: {error}\n"));
+    let fault = |error: study::Error| Failure::Model(format!("error: {error}\n"));
     let mut cases = Vec::new();
     for (file, text) in &texts {
         cases.push(Case::parse(file, text).map_err(fault)?);

@@ -10,9 +10,7 @@ use super::progress::Progress;
 use super::values::positive;
 use crate::session::Session;
 use crate::sim::{Method, Settings};
-use crate::study::{
-    Unverified, complaint, unverified, verification_rows, verification_table, verify as compare,
-};
+use crate::study::{self, complaint, unverified, verification_rows, verification_table, verify as compare};
 
 #[derive(Debug, Args)]
 pub struct VerifyArgs {
@@ -30,10 +28,11 @@ pub struct VerifyArgs {
     pub time_limit: f64,
 }
 
-fn failure(session: &Session, why: Unverified) -> Failure {
+fn failure(session: &Session, why: study::Error) -> Failure {
     match why {
-        Unverified::Fault(error) => Failure::Model(error.diagnostic().render(&session.source, coloured())),
-        Unverified::NoOtherWay(refused) => Failure::Model(unverified(&refused)),
+        study::Error::Run(error) => Failure::Model(error.diagnostic().render(&session.source, coloured())),
+        study::Error::NoOtherMethod(refused) => Failure::Model(unverified(&refused)),
+        other => Failure::Model(format!("error: {other}\n")),
     }
 }
 
@@ -62,7 +61,7 @@ pub fn verify_all(
 ) -> Result<bool, Failure> {
     let methods = args.methods.clone().unwrap_or_else(|| vec![Method::Auto]);
     if let Some(fixed) = methods.iter().find(|m| m.is_fixed_step()) {
-        let name = crate::study::method_name(*fixed);
+        let name = study::method_name(*fixed);
         return Err(Failure::Usage(format!(
             "error: a report is verified at its tolerances, and `{name}` has a fixed step; verify a run: `dlsys run … --verify`\n"
         )));
