@@ -1,4 +1,4 @@
-//! Arguments that several commands have: what is run, until when, how, and on which budget.
+//! Arguments that several commands share: model, times, methods and limits.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ use crate::lang::Setting;
 use crate::sim::{Method, Settings};
 use crate::study::method_name;
 
-/// What a run may take, so that what runs away ends with a message.
+/// Limits of a run, so that a run that would not end stops with a message.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct BudgetArgs {
     /// More modules than this are an error

@@ -1,6 +1,6 @@
-//! `dlsys run --verify` and `dlsys report --verify`: the answer is computed again by an independent way.
+//! `dlsys run --verify` and `dlsys report --verify`: the results are computed again in an independent way.
 //!
-//! The table of a run goes to standard error: what is on standard output is the same with the flag and without it.
+//! The table of a run goes to standard error, so that standard output is the same with and without the flag.
 
 use clap::Args;
 
@@ -36,7 +36,7 @@ fn failure(session: &Session, why: study::Error) -> Failure {
     }
 }
 
-/// Verifies a run that is done.
+/// Verifies a completed run.
 pub fn verify(args: &VerifyArgs, run: &ModelRun) -> Result<(), Failure> {
     let mut progress = Progress::new("verifying", 0);
     let session = &run.session;
@@ -50,8 +50,8 @@ pub fn verify(args: &VerifyArgs, run: &ModelRun) -> Result<(), Failure> {
     }
 }
 
-/// Verifies each method of a report at each of its tolerances, and prints the table. True if all is well; if not, the first
-/// complaint was said.
+/// Verifies each method of a report at each of its tolerances, and prints the table. False if that fails; the first
+/// failure has been printed.
 pub fn verify_all(
     args: &ReportArgs,
     session: &Session,

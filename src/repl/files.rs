@@ -1,4 +1,4 @@
-//! Commands that write files: `save` and `export`. Files are whole or absent, and other people's are left alone.
+//! Commands that write files: `save` and `export`. Files are complete or absent, and files of others are not overwritten.
 
 use std::path::{Path, PathBuf};
 
@@ -9,7 +9,7 @@ use crate::cli::run::Printer;
 use crate::render::{self, Format, FrameWriter, Page, Size, Survey, View};
 use crate::sim::brief;
 
-/// Says whether a file may be written.
+/// Refuses to overwrite a file that this session has not written.
 fn spare(path: &Path, force: bool, state: &SessionState) -> Result<(), CommandError> {
     if path.exists() && !force && !state.written.contains(&real(path)) {
         let path = path.display();
@@ -20,7 +20,7 @@ fn spare(path: &Path, force: bool, state: &SessionState) -> Result<(), CommandEr
     Ok(())
 }
 
-/// One name for a file, however it is spelt.
+/// The canonical path of a file.
 fn real(path: &Path) -> PathBuf {
     path.canonicalize().unwrap_or_else(|_| path.to_owned())
 }
@@ -36,14 +36,14 @@ fn write(path: &Path, bytes: &[u8], state: &mut SessionState) -> Result<(), Comm
     Ok(())
 }
 
-/// Takes a flag without value out of the words.
+/// Removes a flag without a value from the words; true if it was there.
 fn flag(words: &mut Vec<String>, name: &str) -> bool {
     let before = words.len();
     words.retain(|word| word != name);
     words.len() < before
 }
 
-/// Takes a flag with its value out of the words.
+/// Removes a flag with its value from the words.
 fn value(words: &mut Vec<String>, name: &str) -> Result<Option<String>, CommandError> {
     let Some(at) = words.iter().position(|word| word == name) else { return Ok(None) };
     words.remove(at);
