@@ -14,16 +14,16 @@ use crate::study::{self, complaint, unverified, verification_rows, verification_
 
 #[derive(Debug, Args)]
 pub struct VerifyArgs {
-    /// Compute everything again by an independent way and compare; exit with status 1 if something differs by more than
+    /// Compute everything again in an independent way and compare; exit with status 1 if something differs by more than
     /// 100 tolerances
     ///
-    /// The other way has another method, which integrates what has formulas, too, a hundredth of the tolerance, and one
-    /// clock for all modules. Compared are all parameters at the observed times, relative to max(1, |value|), and the time and
+    /// The second run has another method, which integrates even parameters with formulas, a hundredth of the tolerance, and one
+    /// clock for all modules. All parameters at the observed times are compared, relative to max(1, |value|), and the times and
     /// the order of all productions. The table of differences, in units of `--tolerance`, goes to standard error. If no
-    /// other way comes to the last time, nothing is verified: status 1.
+    /// other method reaches the last time, nothing is verified: status 1.
     #[arg(long)]
     pub verify: bool,
-    /// With --verify: seconds that another way may take
+    /// With --verify: allowed seconds for each other method
     #[arg(long, value_name = "S", allow_negative_numbers = true, default_value = "60", value_parser = positive, requires = "verify")]
     pub time_limit: f64,
 }

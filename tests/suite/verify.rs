@@ -1,4 +1,4 @@
-//! `dlsys run --verify` and `dlsys report --verify`: what passes, what fails and what is said of it.
+//! `dlsys run --verify` and `dlsys report --verify`: runs that pass, runs that fail, and the messages.
 
 use dlsys::sim::{Method, Settings};
 use dlsys::study::{Error, Verification, verify};

@@ -1,8 +1,7 @@
-//! Texts that nobody would write: the models of the repository, the mistakes among them, with random changes. The changes are
-//! the same in every run.
+//! The models of the repository, including the ones with mistakes, with random changes, which are the same in every run.
 //!
-//! Here: whatever the text is, reading it ends with a model or with messages that can be drawn, never with a panic. What
-//! `fmt` makes of these texts is looked at in [`layout`](super::layout).
+//! Reading any text ends with a model or with messages that can be rendered, never with a panic.
+//! [`layout`](super::layout) formats these texts.
 
 use std::path::PathBuf;
 

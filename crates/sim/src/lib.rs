@@ -24,34 +24,42 @@
 //!
 //! # Examples
 //!
-//! What happens, and when: the productions of a cell that grows by the logistic equation and divides at half its limit.
+//! The productions of a cell that grows by the logistic equation and divides at half its limit:
 //!
 //! ```
 //! use dlsys_session::Session;
 //! use dlsys_sim::Settings;
 //!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let text = "initial string: C(0.25)\nC(x): if x < 0.5 solve dx/dt = x*(1 - x)\n if x = 0.5 produce C(x/2) C(x/2)";
-//! let session = Session::from_text("cells.dls", text, &[]).expect("a good model");
+//! let session = Session::from_text("cells.dls", text, &[])?;
 //! let settings = Settings { tolerance: 1e-9, log: true, ..Settings::default() };
-//! let mut simulation = session.simulate(settings).expect("it starts");
+//! let mut simulation = session.simulate(settings)?;
 //! let mut string = Default::default();
-//! simulation.at(3.0, &mut string).expect("it runs");
+//! simulation.at(3.0, &mut string)?;
 //! let events = simulation.take_events();
 //! // The logistic goes from 1/4 to 1/2 in ln 3 units of time.
 //! assert_eq!((events.len(), string.len()), (3, 4));
 //! assert!((events[0].time - 3f64.ln()).abs() < 1e-9 && (events[2].time - 9f64.ln()).abs() < 1e-9);
+//! # Ok(())
+//! # }
 //! ```
 //!
-//! A run that goes wrong says where, and what to try:
+//! The error of a run names the place and a remedy:
 //!
 //! ```
 //! # use dlsys_session::Session;
-//! let session = Session::from_text("cell.dls", "initial string: C(1)\nC(x): if x < 2 solve dx/dt = 1", &[]).unwrap();
-//! let mut simulation = session.simulate(Default::default()).expect("it starts");
-//! let error = simulation.at(5.0, &mut Default::default()).expect_err("nothing is said of x = 2");
-//! let message = error.diagnostic().render(&session.source, false);
-//! assert!(message.starts_with("error: C(2) left its domain at t = 1"));
-//! assert!(message.contains("`if x = 2 produce C_end(x)`"));
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let text = "initial string: C(1)\nC(x): if x < 2 solve dx/dt = 1";
+//! let session = Session::from_text("cell.dls", text, &[])?;
+//! let mut simulation = session.simulate(Default::default())?;
+//! if let Err(error) = simulation.at(5.0, &mut Default::default()) {
+//!     let message = error.diagnostic().render(&session.source, false);
+//!     assert!(message.starts_with("error: C(2) left its domain at t = 1"));
+//!     assert!(message.contains("`if x = 2 produce C_end(x)`"));
+//! }
+//! # Ok(())
+//! # }
 //! ```
 
 mod access;
