@@ -321,7 +321,9 @@ impl ModelRun {
             seed: self.settings.seed,
             counts,
         };
-        let text = serde_json::to_string_pretty(&file).expect("numbers become JSON") + "\n";
+        let text = serde_json::to_string_pretty(&file)
+            .map_err(|error| Failure::Model(format!("error: cannot write {}: {error}\n", path.display())))?
+            + "\n";
         output::write(path, &text)
     }
 }

@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use super::commands;
 use super::loaded::{LoadedModel, misused};
 use super::state::{CommandError, SessionState};
 use crate::cli::run::Printer;
@@ -68,7 +67,7 @@ impl LoadedModel<'_> {
                 }
             },
             [name] => PathBuf::from(name),
-            _ => return Err(misused(commands::find("save").expect("it is one"))),
+            _ => return Err(misused("save")),
         };
         if state.draft.text.trim().is_empty() {
             return Err(CommandError::new("there is nothing to save yet"));
@@ -118,7 +117,7 @@ impl LoadedModel<'_> {
             number(value(&mut words, "--perspective")?, "--perspective", render::Camera::FIELDS)?;
         let side = f64::from(Page::MOST_ON_A_SIDE);
         let width = number(value(&mut words, "--width")?, "--width", 1.0..=side)?;
-        let [name] = &words[..] else { return Err(misused(commands::find("export").expect("it is one"))) };
+        let [name] = &words[..] else { return Err(misused("export")) };
         let path = PathBuf::from(name);
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_lowercase();
         self.replay()?;

@@ -121,8 +121,8 @@ impl<'m> LoadedModel<'m> {
         if let Err(error) = self.replay()?.string() {
             return Err(self.drawn(&error, state));
         }
-        let formed = self.replay()?.string();
-        Ok(formed.expect("it was formed"))
+        // The same string again: the borrow of the first call would last until the end of this function.
+        self.replay()?.string().map_err(CommandError::new)
     }
 
     /// Executes a statement.
@@ -167,7 +167,7 @@ impl<'m> LoadedModel<'m> {
             "quit" => return nothing(NextStep::Quit),
             "help" => state.say(&commands::help(&rest.join(" ")).map_err(CommandError::new)?)?,
             "load" => {
-                let [file] = rest else { return Err(misused(command)) };
+                let [file] = rest else { return Err(misused(command.name)) };
                 return state.load(std::path::Path::new(file), &[]);
             }
             "reload" => {
@@ -176,7 +176,7 @@ impl<'m> LoadedModel<'m> {
             }
             "new" => {
                 nothing(NextStep::Continue)?;
-                return Ok(state.begin_empty());
+                return state.begin_empty();
             }
             "undo" => {
                 nothing(NextStep::Continue)?;
@@ -247,14 +247,15 @@ impl<'m> LoadedModel<'m> {
                 };
                 return state.set(name, value, self.time().unwrap_or(0.0));
             }
-            _ => return Err(misused(commands::find("set").expect("it is one"))),
+            _ => return Err(misused("set")),
         }
         Ok(NextStep::Continue)
     }
 }
 
 /// The error for a command with wrong arguments.
-pub fn misused(command: &commands::Command) -> CommandError {
+pub fn misused(name: &str) -> CommandError {
+    let Some(command) = commands::find(name) else { return unknown(name) };
     let example = command
         .examples
         .first()

@@ -69,11 +69,11 @@ pub fn repl(args: &ReplArgs) -> Result<(), Failure> {
             // On a terminal the user may correct the file and load it again.
             Err(CommandError::Message(message)) if interactive => {
                 state.complain(&message);
-                state.begin_empty()
+                state.begin_empty()?
             }
             Err(CommandError::Message(message)) => return Err(Failure::Model(message)),
         },
-        None => state.begin_empty(),
+        None => state.begin_empty()?,
     };
     // Each iteration is one model; a change of the model begins another.
     while let NextStep::Model { session, time } = start {

@@ -1,6 +1,5 @@
 //! Commands about time: `run`, `step`, `back`, `time`.
 
-use super::commands;
 use super::grammar::{Statement, classify};
 use super::loaded::{LoadedModel, NextStep, misused};
 use super::state::{CommandError, SessionState};
@@ -48,7 +47,7 @@ impl LoadedModel<'_> {
                 Some(more) => present + time_of(more)?,
                 None => time_of(text)?,
             },
-            _ => return Err(misused(commands::find("run").expect("it is one"))),
+            _ => return Err(misused("run")),
         };
         self.go(t, state)
     }
@@ -68,7 +67,7 @@ impl LoadedModel<'_> {
             ["frame"] => return self.step_frames(1, state),
             ["frame", n] => return self.step_frames(count_of(n)? as i64, state),
             [n] | ["event", n] => count_of(n)?,
-            _ => return Err(misused(commands::find("step").expect("it is one"))),
+            _ => return Err(misused("step")),
         };
         let start = self.replay()?.time();
         let limit = self.horizon(start);
@@ -113,7 +112,7 @@ impl LoadedModel<'_> {
                 return self.go(t, state);
             }
             [n] | ["event", n] => count_of(n)?,
-            _ => return Err(misused(commands::find("back").expect("it is one"))),
+            _ => return Err(misused("back")),
         };
         if present == 0.0 {
             return state.say("this is the start, t = 0\n");

@@ -34,7 +34,7 @@ impl LoadedModel<'_> {
             })?;
         }
         if rest.len() > 2 {
-            return Err(misused(commands::find("draw").expect("it is one")));
+            return Err(misused("draw"));
         }
         let scene = self.scene(state)?;
         for warning in &scene.warnings {

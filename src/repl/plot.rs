@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 
 use super::braille::Sheet;
-use super::commands;
 use super::loaded::{LoadedModel, misused};
 use super::navigation::time_of;
 use super::show::{is_called, known_name};
@@ -129,7 +128,7 @@ impl LoadedModel<'_> {
             }
             [spec] if spec.starts_with('#') => {
                 let Some((number, parameter)) = spec[1..].split_once('.') else {
-                    return Err(misused(commands::find("plot").expect("it is one")));
+                    return Err(misused("plot"));
                 };
                 let (number, lineage) = self.find(&[number.to_owned()], state)?;
                 let model = &self.session.model;
@@ -150,7 +149,7 @@ impl LoadedModel<'_> {
                 }
                 None => Err(CommandError::new(format!("`{how}` is none of sum, mean, max, min, count"))),
             },
-            _ => Err(misused(commands::find("plot").expect("it is one"))),
+            _ => Err(misused("plot")),
         }
     }
 

@@ -1,7 +1,6 @@
 //! Commands about modules and texts: `list`, `show`, `inspect`, `events`.
 
 use super::assist::coloured;
-use super::commands;
 use super::loaded::{LoadedModel, misused};
 use super::state::{CommandError, SessionState};
 use crate::diagnostic::Span;
@@ -69,7 +68,7 @@ impl LoadedModel<'_> {
                 }
                 wanted
             }
-            _ => return Err(misused(commands::find("list").expect("it is one"))),
+            _ => return Err(misused("list")),
         };
         if text.trim().is_empty() {
             return state.say("nothing was typed yet, and no file is loaded\n");
@@ -111,7 +110,7 @@ impl LoadedModel<'_> {
                 let most = if more.is_empty() { MOST_LINES } else { usize::MAX };
                 state.say(&table(model, rows, most)?)
             }
-            _ => Err(misused(commands::find("show").expect("it is one"))),
+            _ => Err(misused("show")),
         }
     }
 
@@ -160,7 +159,7 @@ impl LoadedModel<'_> {
                 };
                 found(all.nth(nth - 1), which)
             }
-            _ => Err(misused(commands::find("inspect").expect("it is one"))),
+            _ => Err(misused("inspect")),
         }
     }
 
@@ -214,7 +213,7 @@ impl LoadedModel<'_> {
         let name = match rest {
             [] => None,
             [name] => Some(known_name(model, name)?),
-            _ => return Err(misused(commands::find("events").expect("it is one"))),
+            _ => return Err(misused("events")),
         };
         let replay = self.replay()?;
         let wanted = |kind: KindId| name.is_none_or(|name| is_called(model, kind, name));

@@ -132,13 +132,14 @@ impl SessionState {
     }
 
     /// Begins without a model.
-    pub fn begin_empty(&mut self) -> NextStep {
+    pub fn begin_empty(&mut self) -> Result<NextStep, CommandError> {
         (self.draft, self.set) = Default::default();
         self.warned.clear();
         self.waiting.clear();
-        let session = Session::from_text("typed", "initial string: ε", &[]).expect("an empty model is one");
+        let session = Session::from_text("typed", "initial string: ε", &[])
+            .map_err(|refused| self.refusal(&refused))?;
         *self.names.borrow_mut() = Names::of(&session.model, "");
-        NextStep::Model { session: Box::new(session), time: 0.0 }
+        Ok(NextStep::Model { session: Box::new(session), time: 0.0 })
     }
 
     /// Reads a model file.
