@@ -1,4 +1,4 @@
-//! The front page of the library: a model, its development in time, the plant at a time, and its picture.
+//! The main types of the library: a model, its run, the plant at a time, and its picture.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use dlsys_tree::ModuleString;
 
 /// A model that has been read and checked.
 ///
-/// It holds the compiled rules and the text, which messages quote. A [`Run`] develops it; any number of them may do so at a
+/// It holds the compiled rules and the text, which messages quote. Any number of [`Run`]s may develop it at the same
 /// time.
 #[derive(Clone, Debug)]
 pub struct Model {
@@ -23,7 +23,7 @@ impl Model {
     /// Reads a model file, and the files that it names.
     ///
     /// # Errors
-    /// [`Error::Load`]: the file cannot be read, or its text is no model.
+    /// [`Error::Load`]: the file cannot be read, or its text is not a valid model.
     pub fn load(path: impl AsRef<Path>) -> Result<Model, Error> {
         Model::load_with(path, &[])
     }
@@ -36,7 +36,7 @@ impl Model {
         Ok(Model { session: Session::open(path.as_ref(), &settings(parameters))? })
     }
 
-    /// Takes the text of a model from memory. It can name no files.
+    /// Reads a model from memory. It cannot name files.
     ///
     /// # Errors
     /// As of [`Model::load`].
@@ -49,12 +49,12 @@ impl Model {
         self.session.model.title.as_deref()
     }
 
-    /// What there is to say about the text though it runs, as it is to be printed.
+    /// Warnings about the text, in the format in which the program prints them.
     pub fn warnings(&self) -> Vec<String> {
         self.session.warnings.iter().map(|warning| warning.render(&self.session.source, false)).collect()
     }
 
-    /// The compiled model and its text, for the modules of this library.
+    /// The compiled model and its text, for use with the modules of this library.
     pub fn session(&self) -> &Session {
         &self.session
     }
@@ -95,12 +95,12 @@ pub struct Run<'m> {
 }
 
 impl Run<'_> {
-    /// The plant at time `t`, in the model's unit of time. At the time of an event the successors are there. Times must not
-    /// decrease from call to call ([`crate::replay`] goes back, too).
+    /// The plant at time `t`, in the model's unit of time. At the time of an event it contains the successors. Times must not
+    /// decrease from call to call ([`crate::replay`] can go back).
     ///
     /// # Errors
-    /// [`Error::Run`]: what the model does before that time cannot be computed to the tolerance, or is undefined. Every further
-    /// call gives the same error.
+    /// [`Error::Run`]: the development up to `t` is undefined, or cannot be computed to the tolerance. Every further
+    /// call returns the same error.
     pub fn at(&mut self, t: f64) -> Result<Plant<'_>, Error> {
         self.simulation.at(t, &mut self.string).map_err(|error| self.model.failed(error))?;
         Ok(Plant { model: self.model, string: &self.string })
@@ -121,7 +121,7 @@ pub struct Module<'r> {
     pub name: &'r str,
     /// Its parameters at this time.
     pub parameters: &'r [f64],
-    /// The time since it was made; 0 for a bracket.
+    /// The time since its production, or since t = 0, in the model's unit; 0 for a bracket.
     pub age: f64,
 }
 
@@ -136,7 +136,7 @@ impl<'r> Plant<'r> {
         self.string.len()
     }
 
-    /// True if no modules are left.
+    /// True if the string has no modules.
     pub fn is_empty(&self) -> bool {
         self.string.len() == 0
     }
@@ -151,17 +151,17 @@ impl<'r> Plant<'r> {
         })
     }
 
-    /// What the turtle draws.
+    /// The drawing of the turtle.
     ///
     /// # Errors
-    /// [`Error::Draw`]: a length, an angle or a width is not finite, or the drawing is without bound.
+    /// [`Error::Draw`]: a length, an angle or a width is not finite, or the drawing is unbounded.
     pub fn scene(&self) -> Result<Scene, Error> {
         let mut scene = turtle::blank(&self.model.session.model);
         turtle::draw(&self.model.session.model, self.string, &mut scene)?;
         Ok(scene)
     }
 
-    /// A picture, or a mesh, as the bytes of a file: all of the plant, seen from the front.
+    /// A picture or a mesh of the whole plant, seen from the front, as the bytes of a file.
     ///
     /// # Errors
     /// As of [`Plant::scene`].
@@ -172,10 +172,10 @@ impl<'r> Plant<'r> {
         Ok(FrameWriter::new(format, survey.fit()).write(&scene, self.model.title().unwrap_or("a plant")))
     }
 
-    /// Writes a picture into a file; the end of its name says in which format (`svg`, `png`, `obj`).
+    /// Writes a picture into a file; the extension determines the format (`svg`, `png`, `obj`).
     ///
     /// # Errors
-    /// As of [`Plant::picture`]; [`Error::Format`] for another ending, [`Error::Write`] if the file cannot be written.
+    /// As of [`Plant::picture`]; [`Error::Format`] for another extension, [`Error::Write`] if the file cannot be written.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), Error> {
         let path = path.as_ref();
         let format = path.extension().unwrap_or_default().to_string_lossy().parse()?;
@@ -184,7 +184,7 @@ impl<'r> Plant<'r> {
     }
 }
 
-/// The string as it would be typed, with six digits: `F(1.5) [ + A(0.25) ]`.
+/// The string in the notation of the language, with six digits: `F(1.5) [ + A(0.25) ]`.
 impl fmt::Display for Plant<'_> {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         for (place, module) in self.string.iter().enumerate() {
@@ -196,17 +196,17 @@ impl fmt::Display for Plant<'_> {
     }
 }
 
-/// Why there is no model, no plant or no picture. As text it is the message that the program prints.
+/// The error type of the library. It displays as the message that the program prints.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The model cannot be read.
+    /// The model cannot be loaded.
     #[error(transparent)]
     Load(#[from] Box<LoadError>),
-    /// The run cannot go on.
+    /// The run ended with an error.
     #[error("{message}")]
     Run {
-        /// What it is, for a program.
+        /// The error, for programs.
         error: Box<dlsys_sim::Error>,
         /// The message, which quotes the model.
         message: String,
@@ -222,7 +222,7 @@ pub enum Error {
     Write {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the operating system.
         error: std::io::Error,
     },
 }

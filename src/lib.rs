@@ -22,8 +22,8 @@
 //! # }
 //! ```
 //!
-//! [`Model::load`] reads a file, [`Plant::save`] writes one, and errors are the messages of the program. The module
-//! [`sim`] has the settings of a run (tolerance, method, seed, limits), [`replay`] goes back in time, [`render`] writes
+//! [`Model::load`] reads a file, [`Plant::save`] writes one, and an [`Error`] displays as the message of the program.
+//! [`Settings`] has the tolerance, method, seed and limits of a run, [`replay`] goes back in time, and [`render`] writes
 //! frames that share one picture area.
 //!
 //! # The stages
@@ -32,29 +32,31 @@
 //! text ──syntax──▶ Document ──compile──▶ Model ──sim──▶ Tree at any time t ──turtle──▶ Scene ──render──▶ SVG, PNG, OBJ
 //! ```
 //!
-//! | module | what it is |
+//! | module | content |
 //! |---|---|
-//! | [`expr`] | pure mathematics: expressions, compiled, evaluated as numbers, bounds or derivatives |
-//! | [`syntax`] | the notation: text to syntax tree and back, layout, the words of the language |
-//! | [`compile`] | the syntax tree to the model: names, rules, checks, formulas |
-//! | [`model`] | what a model says: kinds of modules, rules, conditions |
-//! | [`tree`] | modules and how they hang together: tree, string, identity, birth |
-//! | [`ode`] | steps, dense output, roots: nothing about plants |
+//! | [`expr`] | expressions, compiled and evaluated as numbers, intervals or derivatives |
+//! | [`syntax`] | the notation: text to syntax tree and back, formatter, the table of declarations |
+//! | [`compile`] | from the syntax tree to the model: names, rules, checks, closed forms |
+//! | [`model`] | the compiled model: kinds of modules, rules, conditions |
+//! | [`tree`] | the tree and the string of modules, their identity and birth |
+//! | [`ode`] | integration steps, dense output and roots of ordinary differential equations |
 //! | [`sim`] | development in time: integration, event location, productions |
-//! | [`turtle`] | strings as geometry |
-//! | [`scene`] | geometry that knows no file format |
-//! | [`render`] | files |
-//! | [`player`] | a plant as something to walk around: recordings, a page that plays them, a window |
-//! | [`session`] | the pipeline as a whole |
-//! | [`replay`] | any time after any other |
+//! | [`turtle`] | from strings to geometry |
+//! | [`scene`] | geometry, independent of file formats |
+//! | [`render`] | SVG, PNG and OBJ files |
+//! | [`player`] | recordings, the page that plays them, and the window |
+//! | [`session`] | from a file to a simulation |
+//! | [`replay`] | random access to simulated time |
 //! | [`repl`] | the interactive session |
-//! | [`study`] | how good the answers are, and what they cost |
-//! | [`cli`] | the program |
-//! | [`rescue`] | what is said and saved when the program is at fault |
+//! | [`study`] | accuracy and cost of methods; verification |
+//! | [`cli`] | the command line |
+//! | [`rescue`] | report and recovery after a bug in the program |
 //! | [`diagnostic`] | messages that point at the text |
 //!
-//! Each is a crate of its own. Imports go down this arrow and never back; `compile`, `sim` and `turtle` do not know one another.
-//! `ARCHITECTURE.md` tells why things are as they are.
+//! Each stage is a crate. Dependencies follow the arrow; `compile`, `sim` and `turtle` do not depend on each other.
+//! `ARCHITECTURE.md` explains the design.
+
+#![warn(missing_docs)]
 
 pub mod cli;
 mod front;
@@ -80,7 +82,7 @@ pub use dlsys_study as study;
 pub use dlsys_syntax as syntax;
 pub use dlsys_tree as tree;
 
-/// The listings of the book's chapter about the library are compiled and run.
+/// Compiles and runs the listings of the book's chapter about the library.
 #[cfg(doctest)]
 #[doc = include_str!("../docs/src/library.md")]
 struct BookOfTheLibrary;

@@ -1,25 +1,25 @@
-//! When the program itself is at fault: what is said then, and what is saved.
+//! Bugs of the program itself: the message, and the recovery of unsaved text.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// Exit status of a panic, as everywhere.
+/// Exit status after a panic, as usual for Rust programs.
 pub const STATUS: u8 = 101;
 
 /// The text of a session that is not saved yet.
 static UNSAVED: Mutex<Option<String>> = Mutex::new(None);
 
-/// Remembers a text that must not be lost; `None` when it is saved.
+/// Registers a text that is saved if the program panics; `None` when it has been saved.
 pub fn remember(text: Option<&str>) {
     *UNSAVED.lock().unwrap_or_else(PoisonError::into_inner) = text.map(str::to_owned);
 }
 
-/// Does something. If it panics, what was remembered is written into a file in the folder, and a message is returned.
+/// Calls a function. If it panics, the registered text is written into a new file in the folder.
 ///
 /// # Errors
-/// The message of the panic.
+/// The message for the user, if the function panics.
 pub fn guarded<T>(folder: &Path, work: impl FnOnce() -> T) -> Result<T, String> {
     catch_unwind(AssertUnwindSafe(work)).map_err(|panic| {
         let text = UNSAVED.lock().unwrap_or_else(PoisonError::into_inner).take();

@@ -24,24 +24,24 @@ use crate::sim::Method;
 pub struct Command {
     #[command(subcommand)]
     pub action: Action,
-    /// Show the progress of long work on standard error even where that is no terminal: a line every 5 seconds
+    /// Show the progress of long work on standard error even if that is not a terminal: a line every 5 seconds
     #[arg(long, global = true)]
     pub progress: bool,
 }
 
 #[derive(Debug, Subcommand)]
 pub enum Action {
-    /// Write a model to begin with, NAME.dls, with comments; never over a file that is there
+    /// Write a small commented model, NAME.dls; an existing file is never overwritten
     New(NewArgs),
-    /// Read a model and say what is wrong with it, without running it
+    /// Read a model and report errors and warnings, without running it
     Check(CheckArgs),
-    /// Lay out model files canonically; comments and line breaks stay, and so does what they say
+    /// Lay out model files canonically; comments, line breaks and meaning stay the same
     ///
-    /// A declaration or rule begins in the first column, clauses are indented by 2, what follows an `if` on lines of
-    /// their own by 4. Binary + - < = & | have spaces around them, * / ^ none; in strings of modules one space or none,
+    /// A declaration or rule begins in the first column, clauses are indented by 2, lines that continue a clause
+    /// by 4. Binary + - < = & | have spaces around them, * / ^ none; in strings of modules one space or none,
     /// as written. A file that does not parse stays as it is. A file is replaced as a whole or not at all.
     Fmt(FmtArgs),
-    /// Say how much work each equation and each condition of a model is (with the method `auto`), and why
+    /// Print how each equation and each condition of a model is solved (with the method `auto`), and why
     #[command(after_long_help = EXPLAIN_JSON)]
     Explain(ExplainArgs),
     /// Run a model and print its strings of modules
@@ -51,39 +51,38 @@ pub enum Action {
     Render(RenderArgs),
     /// Look at a growing plant in a window, or write a page for the browser that plays its growth
     ///
-    /// The window plays, goes to any time, turns; has a slider for each param with a range; reads the model again when it is
-    /// saved, and shows what is wrong with it. It is there if dlsys was built with `--features viewer`.
+    /// The window plays, goes to any time, and rotates; it has a slider for each param with a range, reads the model again when
+    /// it is saved, and shows errors. It is available if dlsys was built with `--features viewer`.
     ///
-    /// With -o FILE: a page, one file that needs no network, with orbit, timeline, productions and the values of the params it
-    /// was made with.
+    /// With -o FILE: a page, one file that needs no network, with orbit, timeline, productions and the values of its params.
     View(ViewArgs),
     /// Draw the paper's figures that show development, from the models that come with the program
     ///
-    /// Each figure is what `dlsys render` makes of a line; --list prints the lines. Writes a folder for each picture,
-    /// the models, and index.html, which shows them all.
+    /// Each figure is made by a `dlsys render` command; --list prints the commands. Writes a folder for each picture,
+    /// the models, and index.html, which shows all pictures.
     Gallery(GalleryArgs),
     /// Compare methods on models: errors, wall times, counts of work; or run the hard cases
     ///
     /// Each model is run by each method at each tolerance or step size. The error is the largest over all
-    /// times and parameters, relative to max(1, |value|), against the closed form where there is one, or the
-    /// tightest run of another method, whose own error is shown. Productions in another order and other
-    /// modules are reported as such, with the first that differs; the error is then that before it. Wall
+    /// times and parameters, relative to max(1, |value|), against the closed form if there is one, or the
+    /// run of another method with the tightest tolerance, whose own error is shown. Different productions, orders of
+    /// productions or modules are reported with the first difference; the error is then that before it. Wall
     /// times are medians of several runs, one at a time; the spread is half the distance from the fastest to
-    /// the slowest. The order observed is the slope of error against step size or, for methods with step
+    /// the slowest. The observed order is the slope of error against step size or, for methods with step
     /// control, against evaluations of the right-hand side.
     ///
-    /// With --hard, models are run that state their exact answers in their first lines, and checked.
+    /// With --hard, models that state their exact answers in their first lines are run and checked.
     Report(ReportArgs),
     /// Print a script that completes commands and flags in a shell
     #[command(after_long_help = shell::WHERE, after_help = shell::WHERE)]
     Completions(CompletionsArgs),
     /// Print a manual page: `dlsys man > dlsys.1`, `dlsys man render | man -l -`
     Man(ManArgs),
-    /// Write a model, run it, look at it and change it, line by line
+    /// Write, run, inspect and change a model interactively
     ///
     /// Type declarations and rules as in a model file, and commands: run, step, back, show, inspect, plot, draw, export …;
-    /// `help` lists them. Without a terminal the lines of standard input are done one after another; exit status 1 if
-    /// one of them failed. The history is kept in $XDG_STATE_HOME/dlsys (or ~/.local/state/dlsys).
+    /// `help` lists them. Without a terminal the lines of standard input are executed in order; the exit status is 1 if
+    /// one of them fails. The history is kept in $XDG_STATE_HOME/dlsys (or ~/.local/state/dlsys).
     Repl(ReplArgs),
 }
 
@@ -132,34 +131,34 @@ pub struct CheckArgs {
     pub settings: Vec<Setting>,
     #[command(flatten)]
     pub include: IncludeArgs,
-    /// Run the model, too, and say which productions make what is drawn jump (C0), or its speed (C1)
+    /// Also run the model and report the productions at which the drawing (C0) or its speed (C1) jumps
     ///
-    /// At every production that fires, the predecessor just before is drawn against all that stands in its place just
-    /// after, from the same turtle. Compared are the position and the direction (heading, and roll) with which the
+    /// At every production, the predecessor just before and its successor just after are drawn from the same turtle and
+    /// compared: the position and the direction (heading and roll) in which the
     /// turtle leaves, the total drawn length, and the speeds of all three. Surfaces count with their size as length;
-    /// widths and colours do not count. Direction counts only where something drawn follows. What several productions
-    /// do at one instant, one upon the other, is taken together. Jumps are relative to the larger of both sides, or to
-    /// a thousandth of the largest in the whole run. A production of the initial string at t = 0 has no speed before it.
+    /// widths and colours do not count. Direction counts only if something drawn follows. Several productions
+    /// in succession at one instant are taken together. Jumps are relative to the larger of both sides, or to
+    /// a thousandth of the largest in the whole run. A production at t = 0 has no speed before it.
     #[arg(long)]
     pub continuity: bool,
-    /// With --continuity: up to when the model is run [default: the end of its `frames`]
+    /// With --continuity: the time up to which the model is run [default: the end of its `frames`]
     #[arg(long, value_name = "T", value_parser = time, requires = "continuity")]
     pub to: Option<f64>,
-    /// With --continuity: relative jumps up to this are none (of angles: in radians)
+    /// With --continuity: smaller relative jumps are ignored (for angles: in radians)
     #[arg(long, value_name = "TOL", allow_negative_numbers = true, default_value = "1e-6", value_parser = tolerance, requires = "continuity")]
     pub tolerance: f64,
     /// With --continuity: exit with status 1 if a production makes a jump of this order or lower. Without this flag
-    /// a jump is a finding, not a fault
+    /// a jump is reported but is not an error
     #[arg(long, value_enum, requires = "continuity")]
     pub deny: Option<Order>,
     #[command(flatten)]
     pub budget: BudgetArgs,
 }
 
-/// Where else files are looked for that a model names.
+/// Further folders for files that a model names.
 #[derive(Debug, Args)]
 pub struct IncludeArgs {
-    /// Look in this folder, too, for files that a model names (`include`, `table`, `surface`) and that are not in its own;
+    /// Search this folder for files that a model names (`include`, `table`, `surface`) and that are not in its own folder;
     /// can be repeated
     #[arg(long = "include-path", value_name = "DIR")]
     pub folders: Vec<PathBuf>,
@@ -183,7 +182,7 @@ pub struct ExplainArgs {
     pub settings: Vec<Setting>,
     #[command(flatten)]
     pub include: IncludeArgs,
-    /// How it is printed; JSON is one object, with `kinds`, `rules` and `summary`
+    /// Output format; JSON is one object, with `kinds`, `rules` and `summary`
     #[arg(long, value_enum, default_value_t = TextFormat::Text)]
     pub format: TextFormat,
 }
@@ -194,18 +193,18 @@ pub struct RunArgs {
     pub shared: SharedArgs,
     #[command(flatten)]
     pub verify: VerifyArgs,
-    /// How strings, or measures, are printed
+    /// Output format of strings or measures
     #[arg(long, value_enum, default_value_t = TextFormat::Text)]
     pub format: TextFormat,
-    /// Run specimens with these seeds, both ends included, and tell how what is measured of them is distributed, at each
+    /// Run specimens with these seeds, both ends included, and print the distributions of their measures at each
     /// time
     ///
-    /// As text: number of specimens, mean, standard deviation (of a sample: divided by one less than their number),
-    /// quantiles (between the two nearest values by proportion). As JSON: one line for each specimen, in the order of seeds, with
+    /// As text: number of specimens, mean, sample standard deviation,
+    /// quantiles (interpolated linearly between the two nearest values). As JSON: one line for each specimen, in the order of seeds, with
     /// seed, t (the times), and for each measure its values at these times.
     #[arg(long, value_name = "A..B", value_parser = seeds, conflicts_with_all = ["seed", "events", "stats", "verify"])]
     pub seeds: Option<Seeds>,
-    /// What is measured of each specimen: 'F(x): x' is the sum of x over all modules F(x), 'F(x)' their number; can be
+    /// A measure of each specimen: 'F(x): x' is the sum of x over all modules F(x), 'F(x)' their number; can be
     /// repeated [default: the number of all modules]
     #[arg(long = "measure", value_name = "HEAD: EXPR", requires = "seeds")]
     pub measures: Vec<String>,
@@ -215,7 +214,7 @@ pub struct RunArgs {
     /// Draw the distributions of the measures over time as SVG: median, mean, bands of 50 and 90 per cent of specimens
     #[arg(long, value_name = "FILE", requires = "seeds")]
     pub plot: Option<PathBuf>,
-    /// Specimens that are run at once; nothing depends on it [default: one for each core]
+    /// Number of specimens run at once, with no effect on the results [default: one for each core]
     #[arg(long, value_name = "N", value_parser = threads, requires = "seeds")]
     pub threads: Option<usize>,
 }
@@ -251,17 +250,17 @@ pub struct RenderArgs {
     /// With --layout stack: from one line to the next, in scene units [default: the height of the highest]
     #[arg(long, value_name = "H", allow_negative_numbers = true, value_parser = positive)]
     pub row_height: Option<f64>,
-    /// From where to look: front, side, top, or AZIMUTH,ELEVATION in degrees
+    /// Direction of view: front, side, top, or AZIMUTH,ELEVATION in degrees
     #[arg(long, default_value = "front", allow_hyphen_values = true)]
     pub view: String,
-    /// How far what is drawn may be from a curved surface, in scene units [default: 1/2000 of the extent of the
+    /// Largest distance of the drawing from a curved surface, in scene units [default: 1/2000 of the extent of the
     /// whole animation]
     ///
-    /// Of stems, bent stems and Bézier patches, up to 4096 sides of a stem and 64 pieces on an edge of a patch. The leaf
-    /// @L, the flower @K and meshes from files have the faces that they have.
+    /// Applies to stems and Bézier patches, with at most 4096 sides of a stem and 64 pieces on an edge of a patch. The leaf
+    /// @L, the flower @K and meshes from files are not subdivided.
     #[arg(long, value_name = "L", value_parser = positive)]
     pub accuracy: Option<f64>,
-    /// Look in perspective, from where all that is drawn at any time fills this angle (1 to 120 degrees) [default:
+    /// Draw in perspective with this field of view (1 to 120 degrees), filled by the drawings of all times [default:
     /// orthographic]
     #[arg(long, value_name = "DEGREES", value_parser = field_of_view)]
     pub perspective: Option<f64>,
@@ -277,17 +276,17 @@ pub struct RenderArgs {
     /// More bytes than this, in all files of the render, are an error, such as 500MB
     #[arg(long, value_name = "BYTES", default_value = "10GB", value_parser = bytes)]
     pub max_output: u64,
-    /// Threads that draw and write while the simulation goes on; files do not depend on it [default: one for each core]
+    /// Number of threads that draw and write during the simulation, with no effect on the files [default: one for each core]
     #[arg(long, value_name = "N", value_parser = threads)]
     pub threads: Option<usize>,
     /// Write into a directory that holds other files
     #[arg(long)]
     pub force: bool,
-    /// Go on until Ctrl-C: render again whenever the model, or a surface that it uses, is saved. An error is shown, and
-    /// the frames of the last good model stay
+    /// Render again whenever the model, or a file that it names, is saved, until Ctrl-C. Errors are shown, and
+    /// the frames of the last valid model stay
     #[arg(long)]
     pub watch: bool,
-    /// Say nothing of what was written, and show no progress
+    /// Print no summary and show no progress
     #[arg(short, long)]
     pub quiet: bool,
 }
@@ -311,11 +310,11 @@ pub struct ViewArgs {
     /// Play for so many seconds and say how many pictures a second there were
     #[arg(long, value_name = "S", value_parser = positive, conflicts_with = "out", hide = true)]
     pub play: Option<f64>,
-    /// How far what is drawn may be from a curved surface, in scene units [default: 1/2000 of the extent of the
+    /// Largest distance of the drawing from a curved surface, in scene units [default: 1/2000 of the extent of the
     /// whole animation]
     ///
-    /// Of stems, bent stems and Bézier patches, up to 4096 sides of a stem and 64 pieces on an edge of a patch. The leaf
-    /// @L, the flower @K and meshes from files have the faces that they have.
+    /// Applies to stems and Bézier patches, with at most 4096 sides of a stem and 64 pieces on an edge of a patch. The leaf
+    /// @L, the flower @K and meshes from files are not subdivided.
     #[arg(long, value_name = "L", value_parser = positive, requires = "out")]
     pub accuracy: Option<f64>,
     /// Write over a file that is not a page of dlsys
@@ -388,7 +387,7 @@ pub struct ReportArgs {
     pub time_limit: f64,
     #[command(flatten)]
     pub budget: BudgetArgs,
-    /// Instead of the study: compute everything again by an independent way, as `dlsys run --verify` does, at each tolerance,
+    /// Instead of the study: compute everything again in an independent way, as `dlsys run --verify` does, at each tolerance,
     /// with the method `auto` or those of --methods. Exit status 1 if something differs by more than 100 tolerances
     #[arg(long, conflicts_with_all = ["hard", "out", "step_sizes", "slices"])]
     pub verify: bool,
@@ -414,7 +413,7 @@ pub struct ReplArgs {
     pub solver: SolverArgs,
     #[command(flatten)]
     pub budget: BudgetArgs,
-    /// Print each line before what it does, as on a terminal; for transcripts
+    /// Print each line before its answer, as on a terminal; for transcripts
     #[arg(long)]
     pub echo: bool,
 }

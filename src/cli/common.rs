@@ -1,4 +1,4 @@
-//! What the commands share: reading the model, times, settings, statistics, failures.
+//! Parts that the commands share: reading the model, times, settings, statistics, failures.
 
 use std::collections::HashSet;
 use std::io::IsTerminal;
@@ -20,21 +20,21 @@ use crate::sim::{self, Settings, Simulation, Stats};
 use crate::tree::ModuleString;
 use crate::turtle;
 
-/// Why a command ends without success; its exit status.
+/// Why a command ends without success, which determines the exit status.
 #[derive(Debug)]
 pub enum Failure {
-    /// The model or the run is at fault: 1. The message is already drawn.
+    /// An error in the model or the run, with the rendered message: status 1.
     Model(String),
-    /// The command line is: 2.
+    /// An error in the command line, with the message: status 2.
     Usage(String),
-    /// Nobody reads the output any more. That is their right: 0.
+    /// The reader of standard output has closed the pipe, which is not an error: status 0.
     ClosedPipe,
-    /// What was under way is of no use any more, because a file that it reads has changed.
+    /// A file that the command reads has changed, so its result would be obsolete.
     Stale,
 }
 
 impl Failure {
-    /// The same, with the seed of the specimen that failed.
+    /// Adds the seed of the specimen that failed.
     pub fn of_seed(self, seed: u64) -> Failure {
         match self {
             Failure::Model(message) => {
@@ -48,7 +48,7 @@ impl Failure {
     }
 }
 
-/// What an error of standard output means.
+/// The failure for an error of standard output.
 pub fn out_error(error: std::io::Error) -> Failure {
     match error.kind() {
         std::io::ErrorKind::BrokenPipe => Failure::ClosedPipe,
@@ -56,7 +56,7 @@ pub fn out_error(error: std::io::Error) -> Failure {
     }
 }
 
-/// Writes a message. If nobody reads it, that is no reason to fail in another way than one does.
+/// Writes a message to standard error. Errors of that are ignored.
 pub fn tell(message: &str) {
     use std::io::Write;
     let _ = std::io::stderr().write_all(message.as_bytes());
@@ -67,7 +67,7 @@ pub fn count_of(count: usize, what: &str) -> String {
     if count == 1 { format!("1 {what}") } else { format!("{count} {what}s") }
 }
 
-/// A number of bytes as people read it.
+/// A number of bytes with its unit.
 pub fn size_of(bytes: u64) -> String {
     match bytes as f64 {
         n if n >= 1e9 => format!("{:.2} GB", n / 1e9),
@@ -82,10 +82,10 @@ pub fn coloured() -> bool {
     std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none()
 }
 
-/// Most messages that are printed of one model.
+/// Largest number of messages printed for one model.
 const MOST_SHOWN: usize = 50;
 
-/// Reads a model, prints its warnings.
+/// Reads a model and prints its warnings.
 pub fn open(path: &Path, settings: &[Setting], include: &IncludeArgs) -> Result<Session, Failure> {
     match Session::open_with(path, settings, &include.folders) {
         Ok(session) => {
@@ -111,7 +111,7 @@ pub fn open(path: &Path, settings: &[Setting], include: &IncludeArgs) -> Result<
     }
 }
 
-/// Time spent, by stage.
+/// Time spent in each stage.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Clock {
     pub parse: Duration,
@@ -119,41 +119,41 @@ pub struct Clock {
     pub output: Duration,
 }
 
-/// A model that was read, and what is to be done with it.
+/// A model, with the times and settings with which it is to be run.
 pub struct ModelRun {
     pub session: Session,
-    /// What has been said of its drawings, and what is still to be said.
+    /// Warnings found while drawing.
     remarks: Mutex<Remarks>,
     pub times: Vec<f64>,
     pub settings: Settings,
-    /// Time spent on reading the model.
+    /// Time spent; at first that of reading the model.
     pub clock: Clock,
 }
 
-/// Warnings of frames, each kept once.
+/// Warnings of frames, without duplicates.
 #[derive(Default)]
 struct Remarks {
     known: HashSet<(String, Option<Span>)>,
     waiting: Vec<Diagnostic>,
 }
 
-/// What `--stats` writes.
+/// The content of the file of `--stats`.
 #[derive(Serialize)]
 struct StatsFile {
     parse_s: f64,
     simulate_s: f64,
     output_s: f64,
     frames: usize,
-    /// Of random numbers.
+    /// Seed of the random numbers.
     seed: u64,
     #[serde(flatten)]
     counts: Stats,
 }
 
-/// Most slices of time of the scheduler `local`, like the most frames.
+/// Largest number of slices of the scheduler `local`, the same as that of frames.
 const MAX_SLICES: f64 = 1e7;
 
-/// Refuses to write over the model, or two things into one file.
+/// Refuses to overwrite the model, or to write two outputs into one file.
 fn spare_files(args: &SharedArgs) -> Result<(), Failure> {
     let there = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let named =
@@ -171,7 +171,7 @@ fn spare_files(args: &SharedArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Refuses what is wrong with the flags, whatever the model says.
+/// Refuses flags that are wrong for any model.
 fn ready(args: &SharedArgs) -> Result<(), Failure> {
     args.solver.apply(Settings::default())?;
     for (flag, path) in [("--stats", &args.stats), ("--events", &args.events)] {
@@ -182,7 +182,7 @@ fn ready(args: &SharedArgs) -> Result<(), Failure> {
                 path.join(if flag == "--stats" { "stats.json" } else { "events.jsonl" }).display()
             )));
         }
-        // Found out now, not when a long run is over.
+        // Checked before a long run, not after it.
         let folder = path.as_ref().and_then(|path| path.parent()).filter(|f| !f.as_os_str().is_empty());
         if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
             return Err(Failure::Usage(format!(
@@ -195,17 +195,17 @@ fn ready(args: &SharedArgs) -> Result<(), Failure> {
     spare_files(args)
 }
 
-/// The settings that the flags say.
+/// The settings given by the flags.
 ///
 /// # Errors
-/// What is wrong with them, whatever the model says.
+/// Flags that are wrong for any model.
 pub fn settings(args: &SharedArgs) -> Result<Settings, Failure> {
     ready(args)?;
     let settings = args.solver.apply(args.budget.settings())?;
     Ok(Settings { scheduler: scheduler(args)?, log: args.events.is_some(), ..settings })
 }
 
-/// The scheduler that the flags say.
+/// The scheduler given by the flags.
 fn scheduler(args: &SharedArgs) -> Result<sim::Scheduler, Failure> {
     let usage = |message: &str| Err(Failure::Usage(format!("error: {message}\n")));
     match (args.scheduler, args.slice) {
@@ -233,7 +233,7 @@ impl ModelRun {
         Ok(run)
     }
 
-    /// Of a model that was read.
+    /// A run of a model that has been read.
     pub fn of(session: Session, args: &SharedArgs) -> Result<ModelRun, Failure> {
         let settings = settings(args)?;
         let times = times(args, &session)?;
@@ -264,7 +264,7 @@ impl ModelRun {
         self.session.simulate(self.settings).map_err(|error| self.fault(&error))
     }
 
-    /// An error of the run, drawn.
+    /// The failure for an error of the run, with the rendered message.
     pub fn fault(&self, error: &sim::Error) -> Failure {
         Failure::Model(error.diagnostic().render(&self.session.source, coloured()))
     }
@@ -272,13 +272,13 @@ impl ModelRun {
     /// Draws a frame.
     ///
     /// # Errors
-    /// That of the turtle, with its place in the text.
+    /// An error of the turtle, with its place in the text.
     pub fn draw(&self, string: &ModuleString, scene: &mut Scene) -> Result<(), Failure> {
         turtle::draw(&self.session.model, string, scene)
             .map_err(|error| Failure::Model(error.diagnostic().render(&self.session.source, coloured())))
     }
 
-    /// Takes the warnings of a frame; those that no frame before had are kept for [`ModelRun::warn`].
+    /// Adds the warnings of a frame; new ones are kept for [`ModelRun::warn`].
     pub fn note(&self, warnings: Vec<Diagnostic>) {
         if warnings.is_empty() {
             return;
@@ -292,7 +292,7 @@ impl ModelRun {
         }
     }
 
-    /// Says so if nothing is drawn in any frame.
+    /// Adds a warning if nothing is drawn in any frame.
     pub fn note_what_is_seen(&self, bounds: bool) {
         if !bounds {
             let warning = Diagnostic::warning("nothing is drawn in any frame").help(
@@ -302,7 +302,7 @@ impl ModelRun {
         }
     }
 
-    /// Prints what was noted.
+    /// Prints the new warnings.
     pub fn warn(&self) {
         let mut remarks = self.remarks.lock().unwrap_or_else(PoisonError::into_inner);
         for warning in remarks.waiting.drain(..).take(MOST_SHOWN) {
@@ -310,7 +310,7 @@ impl ModelRun {
         }
     }
 
-    /// Writes the file that `--stats` asks for.
+    /// Writes the file of `--stats`.
     pub fn write_stats(&self, args: &SharedArgs, clock: Clock, counts: Stats) -> Result<(), Failure> {
         let Some(path) = &args.stats else { return Ok(()) };
         let file = StatsFile {
@@ -321,12 +321,14 @@ impl ModelRun {
             seed: self.settings.seed,
             counts,
         };
-        let text = serde_json::to_string_pretty(&file).expect("numbers become JSON") + "\n";
+        let text = serde_json::to_string_pretty(&file)
+            .map_err(|error| Failure::Model(format!("error: cannot write {}: {error}\n", path.display())))?
+            + "\n";
         output::write(path, &text)
     }
 }
 
-/// The observation times that were asked for, in order, each once.
+/// The observed times, in ascending order without duplicates.
 fn times(args: &SharedArgs, session: &Session) -> Result<Vec<f64>, Failure> {
     if let Some(at) = &args.at {
         let mut times = at.clone();
@@ -335,7 +337,7 @@ fn times(args: &SharedArgs, session: &Session) -> Result<Vec<f64>, Failure> {
         return Ok(times);
     }
     let own = session.model.frames;
-    // What is not said is as in the model.
+    // The model gives the values that the flags leave out.
     let (from, to, step) = (
         args.from.or(own.map(|own| own.from)),
         args.to.or(own.map(|own| own.to)),

@@ -1,5 +1,5 @@
-//! Commands of the command line, with all their flags, on a model in hand: what `render`, `explain` and `report` are in
-//! an interactive session.
+//! The commands `render`, `explain` and `report` in an interactive session, with all flags of the command line, applied to
+//! the loaded model.
 
 use clap::Parser;
 
@@ -8,10 +8,10 @@ use super::common::{Failure, ModelRun};
 use super::{explain, render, report};
 use crate::session::Session;
 
-/// Runs a command; `words` is its name and what follows, without the model.
+/// Runs a command; `words` are its name and arguments, without the model.
 ///
 /// # Errors
-/// As on the command line; help that was asked for is no error.
+/// As on the command line; `--help` is not an error.
 pub fn run(session: &Session, words: &[String]) -> Result<(), Failure> {
     if words.iter().any(|word| word == "--set" || word.starts_with("--set=")) {
         let message = "error: params are set by the command `set NAME = VALUE` here, not by `--set`\n";
@@ -19,7 +19,7 @@ pub fn run(session: &Session, words: &[String]) -> Result<(), Failure> {
     }
     let mut line = vec!["dlsys".to_owned()];
     line.extend(words.iter().take(1).cloned());
-    // A name that begins with a dash is no flag.
+    // A name that begins with a dash must not look like a flag.
     line.push(format!("./{}", session.source.name).replace(".//", "/"));
     line.extend(words.iter().skip(1).cloned());
     let command = match Command::try_parse_from(&line) {

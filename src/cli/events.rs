@@ -1,4 +1,4 @@
-//! `--events FILE`: the productions of a run, one JSON object a line.
+//! `--events FILE`: the productions of a run, one JSON object per line.
 //!
 //! ```text
 //! {"t":1,"group":1,"lineage":"3","id":"2x0…","module":"F_r","rule":"F_r(x, s)","clause":1,"line":22,"residual":0}
@@ -12,8 +12,8 @@
 //! | `id` | its name: 13 characters, the same that exported frames use |
 //! | `module` | the name of its kind |
 //! | `rule` | the head of the rule |
-//! | `clause` | which of the rule's `produce` clauses, from 1 |
-//! | `successor` | of a clause with several successors: which of them, from 1 |
+//! | `clause` | number of the `produce` clause in the rule, from 1 |
+//! | `successor` | for a clause with several successors, the number of the chosen one, from 1 |
 //! | `line` | the clause's line in the model file |
 //! | `residual` | difference of the two sides of the condition at the located instant; `null` if not finite |
 
@@ -32,7 +32,7 @@ pub struct EventLog {
     rules: Vec<(String, Vec<usize>)>,
     /// Per kind: its name as a JSON string.
     kinds: Vec<String>,
-    /// The engine's number of the last instant, which counts changes of equations too, and ours.
+    /// The simulation's number of the last instant, which also counts changes of equations, and the number in the log.
     group: (u64, u64),
     text: String,
 }
@@ -42,7 +42,7 @@ fn json(text: &str) -> String {
 }
 
 impl EventLog {
-    /// Makes the file that was asked for.
+    /// Creates the file, if a path is given.
     pub fn create(path: Option<&Path>, run: &ModelRun) -> Result<Option<EventLog>, Failure> {
         let Some(path) = path else { return Ok(None) };
         let (model, source) = (&run.session.model, &run.session.source);
@@ -58,7 +58,7 @@ impl EventLog {
         }))
     }
 
-    /// Writes what has happened since the last time.
+    /// Writes productions.
     pub fn write(&mut self, events: &[Event]) -> Result<(), Failure> {
         for event in events {
             self.line(event);
@@ -67,7 +67,7 @@ impl EventLog {
         Ok(())
     }
 
-    /// Brings everything to the disk.
+    /// Flushes the file.
     pub fn finish(self) -> Result<(), Failure> {
         self.file.finish()
     }

@@ -21,7 +21,7 @@ pub struct FmtArgs {
     pub check: bool,
 }
 
-/// Lays out files anew. A file that cannot be read or parsed stays as it is; the others are laid out all the same.
+/// Formats files. A file that cannot be read or parsed is not changed; the others are formatted.
 pub fn fmt(args: &FmtArgs) -> Result<(), Failure> {
     let (mut failed, mut differing) = (0, 0);
     for path in &args.files {
@@ -60,7 +60,7 @@ fn shown(path: &Path) -> String {
     if path == Path::new("-") { "<stdin>".to_owned() } else { path.display().to_string() }
 }
 
-/// The text of a file in its canonical layout, and the first line that is another, if there is one.
+/// The text of a file in its canonical layout, and the first line that differs, if any.
 fn laid_out(name: &str, bytes: Vec<u8>) -> Result<(String, Option<usize>), Failure> {
     let original = bytes.clone();
     let draw = |source: &Source, all: &[Diagnostic]| {
@@ -77,7 +77,7 @@ fn laid_out(name: &str, bytes: Vec<u8>) -> Result<(String, Option<usize>), Failu
     Ok((text, differs))
 }
 
-/// Standard input to standard output.
+/// Formats standard input to standard output.
 fn stream(check: bool) -> Result<Option<usize>, Failure> {
     let mut bytes = Vec::new();
     std::io::stdin()
@@ -91,7 +91,7 @@ fn stream(check: bool) -> Result<Option<usize>, Failure> {
     Ok(differs)
 }
 
-/// Replaces a file if its layout is another.
+/// Replaces a file if its layout differs.
 fn file(path: &Path, check: bool) -> Result<Option<usize>, Failure> {
     let fault = |action: &str, error: std::io::Error| {
         let help = match error.kind() {
@@ -110,8 +110,8 @@ fn file(path: &Path, check: bool) -> Result<Option<usize>, Failure> {
     Ok(differs)
 }
 
-/// Writes a file aside and renames it: it is there as a whole, the old or the new. Where the name is a link, what it
-/// leads to is replaced.
+/// Writes a temporary file and renames it, so that the file always has its complete old or new text. If the path is a link,
+/// its target is replaced.
 fn replace(path: &Path, text: &str) -> std::io::Result<()> {
     let path = path.canonicalize()?;
     let folder = path.parent().unwrap_or(Path::new("."));

@@ -1,4 +1,4 @@
-//! A running simulation, frame by frame, and what is drawn of it on other threads.
+//! The frames of a running simulation, drawn on other threads.
 
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -13,11 +13,11 @@ use crate::sim::{Event, Settings, Simulation, Stats};
 use crate::tree::ModuleString;
 use crate::turtle;
 
-/// The structure at one observation time.
+/// The string of modules at one observed time.
 pub struct Frame {
     pub index: usize,
     pub time: f64,
-    /// What has happened since the one before.
+    /// Productions since the frame before.
     events: Vec<Event>,
     string: Result<ModuleString, Failure>,
 }
@@ -29,13 +29,13 @@ impl Frame {
         string.map_or(0, |string| string.iter().filter(|m| !m.kind.is_bracket()).count())
     }
 
-    /// What has happened since the frame before, if the settings ask for a log.
+    /// Productions since the frame before, if the settings include the log.
     pub fn events(&self) -> &[Event] {
         &self.events
     }
 }
 
-/// A simulation and the times at which it is looked at.
+/// A simulation and the times at which it is observed.
 struct FrameSource<'r> {
     run: &'r ModelRun,
     simulation: Simulation<'r>,
@@ -49,7 +49,7 @@ impl<'r> FrameSource<'r> {
         Ok(FrameSource { run, simulation, next: 0, failed: false })
     }
 
-    /// Goes on to the next time; `None` after the last, or after an error.
+    /// The frame at the next time; `None` after the last, or after an error.
     fn next_frame(&mut self) -> Option<Frame> {
         let index = self.next;
         let &time = self.run.times.get(index).filter(|_| !self.failed)?;
@@ -66,7 +66,7 @@ impl<'r> FrameSource<'r> {
     }
 }
 
-/// How a model is run and drawn.
+/// Settings of one pass through the animation.
 #[derive(Clone, Copy)]
 pub struct Pass {
     pub settings: Settings,
@@ -75,10 +75,10 @@ pub struct Pass {
 }
 
 /// Runs a model from the beginning: `work` is done on each of its scenes, on several threads, and `take` gets the
-/// results in the order of time. Time spent goes on the clock; on drawing and writing, that of all threads.
+/// results in the order of time. The time spent is added to the clock; for drawing and writing, the sum over all threads.
 ///
 /// # Errors
-/// The first in the order of time: of the run, of drawing, of `take`.
+/// The first error in the order of time, of the run, of drawing, or of `take`.
 pub fn play<Done: Send>(
     run: &ModelRun,
     pass: Pass,
@@ -91,7 +91,7 @@ pub fn play<Done: Send>(
     let mut source = FrameSource::start(run, pass.settings)?;
     let mut blank = turtle::blank(&run.session.model);
     blank.accuracy = pass.accuracy;
-    // One for each thread, in the end: scenes keep their memory.
+    // Scenes are reused, because they keep their memory; there is at most one for each thread.
     let scenes: Mutex<Vec<Scene>> = Mutex::default();
     let pool = || scenes.lock().unwrap_or_else(PoisonError::into_inner);
     let Clock { mut simulate, mut output, .. } = *clock;
@@ -125,7 +125,7 @@ pub fn play<Done: Send>(
     taken.map(|()| source.simulation.stats())
 }
 
-/// Draws what is to be seen of a frame.
+/// Draws a frame.
 fn draw_frame(run: &ModelRun, frame: &mut Frame, scene: &mut Scene) -> Result<(), Failure> {
     scene.clear();
     match &mut frame.string {

@@ -1,7 +1,7 @@
 //! The command line: `dlsys check`, `explain`, `run`, `render`, `view`, `gallery`, `report` and `repl`; `new`, `fmt`; `completions`,
 //! `man`.
 //!
-//! Exit status: 0 done; 1 the model or the run is at fault; 2 the command line is; 101 dlsys itself is.
+//! Exit status: 0 success; 1 an error in the model or the run; 2 an error in the command line; 101 a bug in dlsys.
 
 pub(crate) mod args;
 pub(crate) mod common;

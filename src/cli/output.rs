@@ -1,4 +1,4 @@
-//! Files that flags name: `--stats`, `--events`, `--csv`, `--plot`. The path `-` is standard output.
+//! Output files of the flags `--stats`, `--events`, `--csv` and `--plot`. The path `-` is standard output.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -6,14 +6,14 @@ use std::path::{Path, PathBuf};
 
 use super::common::{Failure, out_error};
 
-/// A file, or standard output, that is written piece by piece.
+/// A file, or standard output, written in pieces.
 pub struct Output {
     path: PathBuf,
     writer: BufWriter<Box<dyn Write>>,
 }
 
 impl Output {
-    /// Makes the file, or takes standard output.
+    /// Creates the file, or uses standard output.
     pub fn create(path: &Path) -> Result<Output, Failure> {
         let writer: Box<dyn Write> = match is_stdout(path) {
             true => Box::new(std::io::stdout()),
@@ -26,7 +26,7 @@ impl Output {
         self.writer.write_all(text.as_bytes()).map_err(|error| cannot_write(&self.path, error))
     }
 
-    /// Brings everything to its place.
+    /// Flushes all text.
     pub fn finish(mut self) -> Result<(), Failure> {
         self.writer.flush().map_err(|error| cannot_write(&self.path, error))
     }

@@ -1,17 +1,17 @@
-//! Work on several threads, its results in order.
+//! Jobs on several threads, with results in order.
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::{Mutex, PoisonError, mpsc};
 
-/// Jobs under way for each thread. So many results wait at most, whichever is slow.
+/// Largest number of jobs in progress or waiting for each thread.
 const AHEAD: usize = 2;
 
-/// Makes jobs until there are no more, works on them on `threads` threads, and takes in the results in the order of the
-/// jobs. Jobs are made and results taken in on this thread. Neither depends on the number of threads.
+/// Makes jobs until there are no more, runs `work` on `threads` threads, and passes the results to `take` in the order of
+/// the jobs. `make` and `take` run on this thread. Jobs and results do not depend on the number of threads.
 ///
 /// # Errors
-/// The first of `take`; no more jobs are then made.
+/// The first error of `take`, after which no more jobs are made.
 pub fn in_order<Job: Send, Done: Send, Error>(
     threads: usize,
     mut make: impl FnMut() -> Option<Job>,
@@ -27,10 +27,10 @@ pub fn in_order<Job: Send, Done: Send, Error>(
     let (jobs, queue) = mpsc::channel::<(usize, Job)>();
     let queue = Mutex::new(queue);
     std::thread::scope(|scope| {
-        // Moved here, so that it goes when this is done.
+        // Moved here, so that the channel closes at the end of this scope.
         let jobs = jobs;
         let (results, done) = mpsc::channel();
-        // Threads end when the last job is done and `jobs` is gone.
+        // The threads end when `jobs` is dropped and the queue is empty.
         for _ in 0..threads {
             let (queue, results, work) = (&queue, results.clone(), &work);
             let next = move || queue.lock().unwrap_or_else(PoisonError::into_inner).recv();
@@ -49,7 +49,7 @@ pub fn in_order<Job: Send, Done: Send, Error>(
         loop {
             while more && made - taken < AHEAD * threads {
                 match make() {
-                    // Sent while there are threads, which end after this one has.
+                    // Sending succeeds, because the threads outlive this loop.
                     Some(job) => more = jobs.send((made, job)).is_ok(),
                     None => more = false,
                 }

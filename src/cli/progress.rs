@@ -1,7 +1,7 @@
-//! Progress of long work, on standard error: how far, how fast, how long still.
+//! Progress of long work on standard error: position, rate and remaining time.
 //!
-//! Nothing is shown of what takes less than a second, and nothing where standard error is no terminal, unless
-//! `--progress` asks for it: then a line now and then, which can be read in a log.
+//! Work of less than a second shows no progress. If standard error is not a terminal, progress is shown only with
+//! `--progress`, as a line every few seconds, suitable for logs.
 
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -12,30 +12,30 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use super::common::tell;
 use crate::sim::brief;
 
-/// Work that is done earlier shows no progress.
+/// Time before progress is shown.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// Time between the lines of a log.
+/// Time between lines if standard error is not a terminal.
 const BETWEEN: Duration = Duration::from_secs(5);
 
 /// `--progress` was given.
 static ASKED: AtomicBool = AtomicBool::new(false);
 
-/// From now on progress is shown wherever standard error leads.
+/// Shows progress even if standard error is not a terminal.
 pub fn ask() {
     ASKED.store(true, Ordering::Relaxed);
 }
 
-/// Work of so many parts, of which some are done.
+/// The progress of work with a known number of parts.
 pub struct Progress {
     bar: ProgressBar,
     begun: Instant,
-    /// When something was shown last.
+    /// Time of the last output.
     shown: Option<Instant>,
     quiet: bool,
 }
 
 impl Progress {
-    /// Begins; `what` is what is being done, as in “writing”.
+    /// Begins; `what` names the work, such as “writing”.
     pub fn new(what: impl Into<String>, count: usize) -> Progress {
         let style = ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} {per_sec}, {eta} left");
         let bar = ProgressBar::with_draw_target(Some(count as u64), ProgressDrawTarget::hidden())
@@ -44,19 +44,19 @@ impl Progress {
         Progress { bar, begun: Instant::now(), shown: None, quiet: false }
     }
 
-    /// Work whose results are printed as it goes on: on a terminal they are progress enough.
+    /// For work that prints its results as it proceeds: on a terminal these show the progress.
     pub fn of_printed(what: impl Into<String>, count: usize) -> Progress {
         if std::io::stdout().is_terminal() { Progress::quiet() } else { Progress::new(what, count) }
     }
 
-    /// Work that shows nothing, whoever asks.
+    /// For work that never shows progress.
     pub fn quiet() -> Progress {
         let mut progress = Progress::new("", 0);
         progress.quiet = true;
         progress
     }
 
-    /// Says what is being done now.
+    /// Changes the name of the work.
     pub fn say(&mut self, what: impl Into<String>) {
         self.bar.set_message(what.into());
         self.show();
@@ -68,14 +68,14 @@ impl Progress {
         self.show();
     }
 
-    /// So much of all of it is done, from 0 to 1.
+    /// Sets the part that is done, from 0 to 1.
     pub fn reach(&mut self, part: f64) {
         let all = self.bar.length().unwrap_or(0);
         self.bar.set_position((part.clamp(0.0, 1.0) * all as f64) as u64);
         self.show();
     }
 
-    /// Hides it while something else is printed.
+    /// Hides the progress bar while something else is printed.
     pub fn suspend<R>(&self, print: impl FnOnce() -> R) -> R {
         self.bar.suspend(print)
     }
@@ -95,7 +95,7 @@ impl Progress {
         self.shown = Some(Instant::now());
     }
 
-    /// As in `writing 120/800, 41.7/s, 16 s left`.
+    /// A line such as `writing 120/800, 41.7/s, 16 s left`.
     fn line(&self) -> String {
         let (done, all) = (self.bar.position(), self.bar.length().unwrap_or(0));
         let rate = done as f64 / self.begun.elapsed().as_secs_f64().max(1e-9);

@@ -28,7 +28,7 @@ pub fn report(args: &ReportArgs) -> Result<(), Failure> {
     for model in &args.models {
         let session = open(model, &args.settings, &args.include)?;
         let stem = model.file_stem().map_or("model".to_owned(), |s| s.to_string_lossy().into_owned());
-        // Two models of the same name have two sets of files.
+        // A second model of the same name gets other names of files.
         let count = names.entry(stem.clone()).or_insert(0);
         *count += 1;
         let name = if *count == 1 { stem } else { format!("{stem}-{count}") };
@@ -46,13 +46,13 @@ pub fn report(args: &ReportArgs) -> Result<(), Failure> {
     }
 }
 
-/// Computes what a model comes to again, at each tolerance. True if all is well; what is not was said.
+/// Verifies a model at each tolerance. False if that fails; the reason has been printed.
 fn verify(args: &ReportArgs, session: &Session) -> Result<bool, Failure> {
     let tolerances = args.tolerances.clone().unwrap_or_else(Plan::default_tolerances);
     super::verify::verify_all(args, session, &tolerances, &times(args, session)?, &print)
 }
 
-/// Studies a model that was read; `name` is that of its files.
+/// Studies a model that has been read; `name` is the stem of the files.
 pub fn study(args: &ReportArgs, session: &Session, name: &str) -> Result<(), Failure> {
     let plan = Plan {
         methods: args.methods.clone().unwrap_or_else(|| Method::NAMED.iter().map(|(_, m)| *m).collect()),
@@ -65,7 +65,7 @@ pub fn study(args: &ReportArgs, session: &Session, name: &str) -> Result<(), Fai
         base: args.budget.settings(),
     };
     let progress = RefCell::new(Progress::of_printed(name, plan.points(session)));
-    // Each method's block is printed when it is there.
+    // The block of each method is printed when it is complete.
     let mut printed = Ok(());
     let study = study::study(
         session,
@@ -99,7 +99,7 @@ pub fn study(args: &ReportArgs, session: &Session, name: &str) -> Result<(), Fai
     write(out, &format!("{name}.svg"), &study::svg(&study))
 }
 
-/// Runs hard cases: those of a folder, or those that are built in.
+/// Runs the hard cases of a folder, or the built-in ones.
 fn hard(args: &ReportArgs, folder: Option<&Path>) -> Result<(), Failure> {
     let texts = match folder {
         Some(folder) => read_folder(folder)?,
@@ -107,7 +107,7 @@ fn hard(args: &ReportArgs, folder: Option<&Path>) -> Result<(), Failure> {
             CASES.iter().map(|(name, text)| (format!("models/hard/{name}"), (*text).to_owned())).collect()
         }
     };
-    let fault = |error: study::CaseError| Failure::Model(format!("error: {error}\n"));
+    let fault = |error: study::Error| Failure::Model(format!("error: {error}\n"));
     let mut cases = Vec::new();
     for (file, text) in &texts {
         cases.push(Case::parse(file, text).map_err(fault)?);
@@ -182,7 +182,7 @@ fn read_folder(folder: &Path) -> Result<Vec<(String, String)>, Failure> {
     paths.into_iter().map(read).collect()
 }
 
-/// The times to observe, in order, each once.
+/// The observed times, in ascending order without duplicates.
 fn times(args: &ReportArgs, session: &Session) -> Result<Vec<f64>, Failure> {
     let mut times = match (&args.at, args.from, args.to, args.step) {
         (Some(at), ..) => at.clone(),
@@ -208,7 +208,7 @@ fn times(args: &ReportArgs, session: &Session) -> Result<Vec<f64>, Failure> {
     Ok(times)
 }
 
-/// The strings of all of them are kept for comparison.
+/// Largest number of times, because all strings are kept for the comparison.
 const MOST_TIMES: usize = 10_000;
 
 fn print(text: &str) -> Result<(), Failure> {
@@ -216,7 +216,7 @@ fn print(text: &str) -> Result<(), Failure> {
     out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(out_error)
 }
 
-/// Writes a file of the report; an earlier report of the same name is replaced.
+/// Writes a file of the report, replacing an earlier one of the same name.
 fn write(folder: &Path, name: &str, text: &str) -> Result<(), Failure> {
     fs::create_dir_all(folder)
         .map_err(|error| Failure::Model(format!("error: cannot make {}: {error}\n", folder.display())))?;

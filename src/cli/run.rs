@@ -21,7 +21,7 @@ pub fn check(args: &CheckArgs) -> Result<(), Failure> {
     let summary = format!(
         "{title}{}, {} of modules, {}, {}",
         count_of(model.rules.len(), "rule"),
-        // Brackets are kinds, but nobody counts them.
+        // Without the two brackets, which are kinds as well.
         count_of(model.kinds.len() - 2, "kind"),
         count_of(model.parameters.len(), "param"),
         if warnings == 0 { "no warnings".to_owned() } else { count_of(warnings, "warning") }
@@ -30,9 +30,9 @@ pub fn check(args: &CheckArgs) -> Result<(), Failure> {
     if args.continuity { super::continuity::check(args, &session) } else { Ok(()) }
 }
 
-/// Parts of a way whose progress is told.
+/// Parts of a run to a single time, for its progress.
 const WAY: usize = 1000;
-/// Events and steps that are passed before it is told how far that is.
+/// Number of events and steps between updates of the progress.
 const STRIDE: usize = 1000;
 
 /// Runs a model and prints its strings.
@@ -49,7 +49,7 @@ pub fn run(args: &RunArgs) -> Result<(), Failure> {
         let mut simulation = run.simulate()?;
         let mut string = ModuleString::default();
         let mut text = String::new();
-        // On the way to one time only, the way is what is told.
+        // For a single observed time, the progress is that of the simulated time.
         let alone = run.times.len() == 1;
         let mut progress = match alone {
             true => Progress::new("running", WAY),
@@ -81,7 +81,7 @@ pub fn run(args: &RunArgs) -> Result<(), Failure> {
         run.note(simulation.remarks());
         Ok(simulation.stats())
     })();
-    // What was computed before an error is written before the error is reported.
+    // Results before an error are written before the error is reported.
     events.map_or(Ok(()), EventLog::finish)?;
     out.flush().map_err(out_error)?;
     drop(out);
@@ -93,7 +93,7 @@ pub fn run(args: &RunArgs) -> Result<(), Failure> {
 /// Writes strings of modules as text.
 pub struct Printer<'m> {
     model: &'m Model,
-    /// Each kind's name as a JSON string.
+    /// The name of each kind as a JSON string.
     names: Vec<String>,
 }
 
@@ -124,7 +124,7 @@ impl<'m> Printer<'m> {
         out.push_str("]}\n");
     }
 
-    /// The time, and the string as it would be typed, with six digits.
+    /// The time, and the string in the notation of the language, with six digits.
     pub fn text(&self, string: &ModuleString, out: &mut String) {
         out.push_str("t = ");
         number(string.time, out);

@@ -1,4 +1,4 @@
-//! Arguments that several commands have: what is run, until when, how, and on which budget.
+//! Arguments that several commands share: model, times, methods and limits.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ use crate::compile::Setting;
 use crate::sim::{Method, Settings};
 use crate::study::method_name;
 
-/// What a run may take, so that what runs away ends with a message.
+/// Limits of a run, so that a run that would not end stops with a message.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct BudgetArgs {
     /// More modules than this are an error
@@ -19,14 +19,14 @@ pub struct BudgetArgs {
     pub max_modules: usize,
     /// More productions and steps than this are an error, such as 1e12
     ///
-    /// So is a run in which time hardly goes on, such that it would take a hundred times as many.
+    /// So is a run that hardly advances in time and would take a hundred times as many.
     #[arg(long, value_name = "N", default_value = "1e10", value_parser = events)]
     pub max_events: u64,
     /// A simulation that takes longer than this is an error [default: none does]
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
     pub max_seconds: Option<f64>,
-    /// A simulation for which dlsys would take more memory than this is an error, such as 500MB or 8GB [default: what the
-    /// system has]
+    /// A simulation that needs more memory than this is an error, such as 500MB or 8GB [default: the memory of the
+    /// system]
     #[arg(long, value_name = "BYTES", value_parser = bytes)]
     pub max_memory: Option<u64>,
 }
@@ -47,10 +47,10 @@ impl BudgetArgs {
 /// Flags that say how the equations of a model are solved, and with which random numbers.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct SolverArgs {
-    /// Error aimed at in every parameter, relative to max(1, |value|)
+    /// Target error of every parameter, relative to max(1, |value|)
     #[arg(long, value_name = "TOL", allow_negative_numbers = true, default_value = "1e-6", value_parser = tolerance)]
     pub tolerance: f64,
-    /// How equations are integrated: auto, dopri5, dop853, radau, rk4, euler; all but auto integrate what has formulas, too
+    /// Method of integration: auto, dopri5, dop853, radau, rk4, euler; all but auto integrate parameters with formulas, too
     #[arg(long, default_value = "auto", value_parser = method)]
     pub method: Method,
     /// Step of the methods with a fixed one (rk4, euler)
@@ -113,7 +113,7 @@ pub struct SharedArgs {
     pub include: IncludeArgs,
     #[command(flatten)]
     pub solver: SolverArgs,
-    /// How time is advanced for modules that read their neighbours
+    /// Scheduler of modules that read their neighbours
     #[arg(long, value_enum, default_value_t = Scheduler::Auto)]
     pub scheduler: Scheduler,
     /// Length of the slices of time of the scheduler `local`; its error is of that order
@@ -136,18 +136,18 @@ pub struct SharedArgs {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Scheduler {
-    /// After an event, only as many neighbours as the tolerance asks for are solved again
+    /// After an event, only as many neighbours as the tolerance requires are integrated again
     Auto,
     /// One clock for all modules, cut at every event: the reference
     Global,
-    /// Neighbours are seen as they were at the start of a slice of time (--slice): the paper's approximation
+    /// Neighbours are constant during a slice of time (--slice): the paper's approximation
     Local,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum TextFormat {
-    /// For people
+    /// Text for reading
     Text,
-    /// One JSON object; of `run` one a line and a time
+    /// One JSON object; for `run`, one per time, each on a line
     Json,
 }

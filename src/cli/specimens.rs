@@ -1,7 +1,7 @@
-//! `dlsys run --seeds A..B`: many specimens of one model, and how what is measured of them is distributed.
+//! `dlsys run --seeds A..B`: many specimens of one model, and the distribution of measures over them.
 //!
-//! Specimens are run side by side on several threads; results are taken in the order of seeds, so nothing depends on how
-//! many threads there are.
+//! Specimens are run in parallel on several threads; results are taken in the order of seeds, so nothing depends on the
+//! number of threads.
 
 use std::io::Write;
 use std::path::Path;
@@ -20,13 +20,13 @@ use crate::sim::Settings;
 use crate::study::{Spread, SpreadSeries, band_svg, spread_csv, spread_table};
 use crate::tree::ModuleString;
 
-/// Most numbers that are kept, one for each specimen, measure and time.
+/// Largest number of values kept: one for each specimen, measure and time.
 const MOST: usize = 100_000_000;
 
-/// What is measured where nothing is asked for.
+/// Name of the default measure, the number of all modules.
 const ALL: &str = "modules";
 
-/// Runs all specimens and tells how they differ.
+/// Runs all specimens and prints the distributions of their measures.
 pub fn summarise(args: &RunArgs, run: &ModelRun, seeds: Seeds) -> Result<(), Failure> {
     let measures: Vec<Measure> =
         args.measures.iter().map(|text| measure(run, text)).collect::<Result<_, _>>()?;
@@ -45,7 +45,7 @@ pub fn summarise(args: &RunArgs, run: &ModelRun, seeds: Seeds) -> Result<(), Fai
     let threads = args.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, |n| n.get()));
     let mut progress = Progress::of_printed("specimens", seeds.count());
     let mut out = std::io::BufWriter::new(std::io::stdout().lock());
-    // By measure and time; of each, the specimens in the order of seeds.
+    // One list for each measure and time, with the specimens in the order of seeds.
     let mut values: Vec<Vec<f64>> = vec![Vec::with_capacity(seeds.count()); width * times];
     let mut all = seeds.iter();
     let done = parallel::in_order(
@@ -93,12 +93,12 @@ pub fn summarise(args: &RunArgs, run: &ModelRun, seeds: Seeds) -> Result<(), Fai
 
 /// Reads a measure.
 fn measure(run: &ModelRun, text: &str) -> Result<Measure, Failure> {
-    run.session.measure(text).map_err(|(source, said)| {
-        Failure::Usage(said.iter().map(|d| d.render(&source, coloured())).collect())
+    run.session.measure(text).map_err(|error| {
+        Failure::Usage(error.diagnostics.iter().map(|d| d.render(&error.source, coloured())).collect())
     })
 }
 
-/// Refuses to write over the model, or two things into one file.
+/// Refuses to overwrite the model, or to write two outputs into one file.
 fn spare(args: &RunArgs) -> Result<(), Failure> {
     let there = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let files = [("--csv", args.csv.as_deref()), ("--plot", args.plot.as_deref())];
@@ -119,7 +119,7 @@ fn spare(args: &RunArgs) -> Result<(), Failure> {
     }
 }
 
-/// Everything that is measured of one specimen: of each measure, its values at all times.
+/// The measures of one specimen: for each measure, its values at all times.
 fn specimen(run: &ModelRun, seed: u64, measures: &[Measure]) -> Result<Vec<f64>, Failure> {
     let times = run.times.len();
     let settings = Settings { seed, log: false, ..run.settings };

@@ -1,4 +1,4 @@
-//! Values of command-line arguments: how each is read, and what is said of one that is none.
+//! Parsers of command-line values, with their error messages.
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
@@ -7,7 +7,7 @@ use crate::render::{Camera, Format, Layout, Page};
 use crate::scene::Color;
 use crate::sim::Method;
 
-/// A format for frames, of those that there are.
+/// A format for frames.
 pub(super) fn frame_format() -> impl TypedValueParser<Value = Format> {
     let values = Format::all().map(|format| PossibleValue::new(format.extension()).help(format.about()));
     PossibleValuesParser::new(values).try_map(|name| name.parse::<Format>())
@@ -25,7 +25,7 @@ pub(super) fn number(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A number of things, which may be written as 1e12.
+/// A whole number, which may be written as 1e12.
 pub(super) fn events(text: &str) -> Result<u64, String> {
     match number(text)? {
         n if n >= 1.0 && n.fract() == 0.0 => Ok(n as u64),
@@ -72,7 +72,7 @@ pub(super) fn tolerance(text: &str) -> Result<f64, String> {
     }
 }
 
-/// What pictures are drawn on; `None` is nothing.
+/// The background of pictures; `None` is transparent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Background(pub Option<Color>);
 

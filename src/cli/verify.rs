@@ -1,6 +1,6 @@
-//! `dlsys run --verify` and `dlsys report --verify`: the answer is computed again by an independent way.
+//! `dlsys run --verify` and `dlsys report --verify`: the results are computed again in an independent way.
 //!
-//! The table of a run goes to standard error: what is on standard output is the same with the flag and without it.
+//! The table of a run goes to standard error, so that standard output is the same with and without the flag.
 
 use clap::Args;
 
@@ -10,34 +10,33 @@ use super::progress::Progress;
 use super::values::positive;
 use crate::session::Session;
 use crate::sim::{Method, Settings};
-use crate::study::{
-    Unverified, complaint, unverified, verification_rows, verification_table, verify as compare,
-};
+use crate::study::{self, complaint, unverified, verification_rows, verification_table, verify as compare};
 
 #[derive(Debug, Args)]
 pub struct VerifyArgs {
-    /// Compute everything again by an independent way and compare; exit with status 1 if something differs by more than
+    /// Compute everything again in an independent way and compare; exit with status 1 if something differs by more than
     /// 100 tolerances
     ///
-    /// The other way has another method, which integrates what has formulas, too, a hundredth of the tolerance, and one
-    /// clock for all modules. Compared are all parameters at the observed times, relative to max(1, |value|), and the time and
+    /// The second run has another method, which integrates even parameters with formulas, a hundredth of the tolerance, and one
+    /// clock for all modules. All parameters at the observed times are compared, relative to max(1, |value|), and the times and
     /// the order of all productions. The table of differences, in units of `--tolerance`, goes to standard error. If no
-    /// other way comes to the last time, nothing is verified: status 1.
+    /// other method reaches the last time, nothing is verified: status 1.
     #[arg(long)]
     pub verify: bool,
-    /// With --verify: seconds that another way may take
+    /// With --verify: allowed seconds for each other method
     #[arg(long, value_name = "S", allow_negative_numbers = true, default_value = "60", value_parser = positive, requires = "verify")]
     pub time_limit: f64,
 }
 
-fn failure(session: &Session, why: Unverified) -> Failure {
+fn failure(session: &Session, why: study::Error) -> Failure {
     match why {
-        Unverified::Fault(error) => Failure::Model(error.diagnostic().render(&session.source, coloured())),
-        Unverified::NoOtherWay(refused) => Failure::Model(unverified(&refused)),
+        study::Error::Run(error) => Failure::Model(error.diagnostic().render(&session.source, coloured())),
+        study::Error::NoOtherMethod(refused) => Failure::Model(unverified(&refused)),
+        other => Failure::Model(format!("error: {other}\n")),
     }
 }
 
-/// Verifies a run that is done.
+/// Verifies a completed run.
 pub fn verify(args: &VerifyArgs, run: &ModelRun) -> Result<(), Failure> {
     let mut progress = Progress::new("verifying", 0);
     let session = &run.session;
@@ -51,8 +50,8 @@ pub fn verify(args: &VerifyArgs, run: &ModelRun) -> Result<(), Failure> {
     }
 }
 
-/// Verifies each method of a report at each of its tolerances, and prints the table. True if all is well; if not, the first
-/// complaint was said.
+/// Verifies each method of a report at each of its tolerances, and prints the table. False if that fails; the first
+/// failure has been printed.
 pub fn verify_all(
     args: &ReportArgs,
     session: &Session,
@@ -62,7 +61,7 @@ pub fn verify_all(
 ) -> Result<bool, Failure> {
     let methods = args.methods.clone().unwrap_or_else(|| vec![Method::Auto]);
     if let Some(fixed) = methods.iter().find(|m| m.is_fixed_step()) {
-        let name = crate::study::method_name(*fixed);
+        let name = study::method_name(*fixed);
         return Err(Failure::Usage(format!(
             "error: a report is verified at its tolerances, and `{name}` has a fixed step; verify a run: `dlsys run … --verify`\n"
         )));

@@ -1,4 +1,4 @@
-//! `dlsys view`: the growing plant in a window, or as a page for the browser that plays it.
+//! `dlsys view`: the growing plant in a window, or as a page for the browser.
 
 use std::io::Write;
 use std::path::Path;
@@ -12,7 +12,7 @@ use crate::render::{self, Survey, View};
 use crate::scene::Scene;
 use crate::sim::Settings;
 
-/// Most frames of a recording; a screen shows no more in five minutes.
+/// Largest number of frames of a recording, about five minutes at 60 frames per second.
 const MOST_FRAMES: usize = 20_000;
 
 /// Opens the window, or writes a page.
@@ -38,7 +38,7 @@ fn open(args: &ViewArgs) -> Result<(), Failure> {
     let shared = &args.shared;
     let model = shared.model.clone();
     if !model.is_file() {
-        // The message of everybody else.
+        // The same message as from other commands.
         return super::common::open(&model, &shared.settings, &shared.include).map(drop);
     }
     let range = shared.from.zip(shared.to).map(|(from, to)| [from, to]);
@@ -89,7 +89,7 @@ fn write(args: &ViewArgs, out: &Path) -> Result<(), Failure> {
         .map_err(out_error)
 }
 
-/// Refuses to write over what is not a page of ours.
+/// Refuses to overwrite a file that is not a page of dlsys.
 fn spare(args: &ViewArgs, out: &Path) -> Result<(), Failure> {
     use std::io::Read;
     let usage = |message: String| Err(Failure::Usage(format!("error: {message}\n")));
@@ -108,8 +108,8 @@ fn spare(args: &ViewArgs, out: &Path) -> Result<(), Failure> {
     ))
 }
 
-/// Runs the model twice: what is recorded is in parts of its extent. Frames are drawn on all cores; the recording does not
-/// depend on how many there are.
+/// Runs the model twice, because recorded coordinates are relative to the extent of the animation. Frames are drawn on all
+/// cores; the recording does not depend on their number.
 fn record(run: &ModelRun, accuracy: Option<f64>) -> Result<Recording, Failure> {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let mut clock = run.clock;

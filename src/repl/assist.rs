@@ -1,4 +1,4 @@
-//! What the terminal does while somebody types: completion, hints, colours, and whether Enter ends the input.
+//! Line editing on a terminal: completion, hints, colours, and whether Enter ends the input.
 
 use std::borrow::Cow;
 use std::cell::RefCell;
@@ -15,21 +15,21 @@ use super::grammar::{self, StatementKind};
 use crate::model::Model;
 use crate::syntax::words;
 
-/// Names of the model in hand.
+/// Names of the loaded model.
 #[derive(Clone, Debug, Default)]
 pub struct Names {
-    /// Of modules.
+    /// Names of modules.
     pub kinds: Vec<String>,
     /// `F.x` for a parameter x of F.
     pub plots: Vec<String>,
-    /// What can be set.
+    /// Names of params.
     pub parameters: Vec<String>,
-    /// Everything else that is declared.
+    /// All other declared names.
     pub others: Vec<String>,
 }
 
 impl Names {
-    /// Those of a model and of its text.
+    /// The names of a model and of its text.
     pub fn of(model: &Model, text: &str) -> Names {
         let mut names = Names::default();
         for (id, kind) in model.kinds.iter().filter(|(id, _)| !id.is_bracket()) {
@@ -49,7 +49,7 @@ impl Names {
     }
 }
 
-/// The helper that rustyline asks.
+/// The helper of rustyline.
 pub struct Assistant {
     pub names: Rc<RefCell<Names>>,
     pub coloured: bool,
@@ -61,7 +61,7 @@ impl Assistant {
         Assistant { names, coloured, files: FilenameCompleter::new() }
     }
 
-    /// What may stand at the end of this line, and where the word begins that it completes. None: a file.
+    /// Completions at the end of a line, with the start of the word that they complete; `None` for the name of a file.
     fn candidates(&self, line: &str) -> Option<(usize, Vec<String>)> {
         let names = self.names.borrow();
         let owned =
@@ -132,7 +132,7 @@ impl Completer for Assistant {
     }
 }
 
-/// A hint after the cursor: what it shows, and what the right arrow takes of it.
+/// A hint after the cursor: its text, and the part that the right arrow accepts.
 pub struct Remark {
     shown: String,
     taken: Option<usize>,
@@ -169,7 +169,7 @@ impl Hinter for Assistant {
             let space = if line.ends_with(' ') { "" } else { " " };
             return remark(format!("{space}{usage}"));
         }
-        // The one word that begins so.
+        // The only completion.
         let mut all = commands::names().chain(words::declarations()).filter(|name| name.starts_with(word));
         match (all.next(), all.next()) {
             (Some(only), None) if line.ends_with(word) && only.len() > word.len() => {
@@ -181,7 +181,7 @@ impl Hinter for Assistant {
     }
 }
 
-/// Colours of the terminal: those that every palette has.
+/// Colours of the terminal, from the basic palette.
 mod ink {
     pub const COMMAND: &str = "\x1b[1m";
     pub const WORD: &str = "\x1b[35m";
@@ -193,7 +193,7 @@ mod ink {
     pub const END: &str = "\x1b[0m";
 }
 
-/// A text of a model, or a command, in colours.
+/// Highlights the text of a model, or a command.
 pub fn coloured(text: &str, names: &Names) -> String {
     let mut out = String::new();
     let command = grammar::classify(text.lines().next().unwrap_or("")) == StatementKind::Command;
@@ -229,7 +229,7 @@ pub fn coloured(text: &str, names: &Names) -> String {
         };
         let (token, after) = rest.split_at(length);
         first &= token.trim().is_empty() || token == ":";
-        // A line break inside a colour would colour the next line's prompt.
+        // A colour that spans a line break would colour the prompt of the next line.
         if ink.is_empty() {
             out += token;
         } else {

@@ -1,13 +1,13 @@
-//! A sheet of dots: Braille characters hold two columns and four rows of them each.
+//! A raster of dots made of Braille characters, each with two columns and four rows of dots.
 
-/// Dots, each with a colour or without.
+/// A raster of dots, each with or without a colour.
 #[derive(Clone, Debug)]
 pub struct Sheet {
     /// Size in characters.
     columns: usize,
     rows: usize,
     cells: Vec<u8>,
-    /// Sum of the colours of a cell's dots, and how many have one.
+    /// For each character, the sum of the colours of its dots, and the number of coloured dots.
     colours: Vec<([u32; 3], u32)>,
 }
 
@@ -25,7 +25,7 @@ impl Sheet {
         [2 * self.columns, 4 * self.rows]
     }
 
-    /// Sets a dot, counted from the upper left; beyond the sheet there are none.
+    /// Sets a dot, counted from the upper left; dots outside the sheet are ignored.
     pub fn dot(&mut self, x: usize, y: usize, colour: Option<[u8; 3]>) {
         let (column, row) = (x / 2, y / 4);
         if column >= self.columns || row >= self.rows {
@@ -52,7 +52,7 @@ impl Sheet {
         }
     }
 
-    /// The rows as text, without space at their ends; with colours, if that is asked for.
+    /// The rows as text without trailing space, optionally with colours.
     pub fn rows(&self, coloured: bool) -> Vec<String> {
         let row = |row: usize| {
             let mut out = String::new();
@@ -68,7 +68,7 @@ impl Sheet {
                         &wanted.map_or("\x1b[0m".to_owned(), |[r, g, b]| format!("\x1b[38;2;{r};{g};{b}m"));
                     ink = wanted;
                 }
-                // An empty pattern is not as wide as others in some fonts.
+                // In some fonts the empty pattern has a different width.
                 let pattern = char::from_u32(0x2800 + u32::from(bits)).unwrap_or(' ');
                 out.push(if bits == 0 { ' ' } else { pattern });
             }

@@ -1,8 +1,8 @@
-//! The commands: their names, how they are used, and what `help` says of them.
+//! The commands: names, usage, and the text of `help`.
 
 use crate::syntax::suggest::did_you_mean;
 
-/// What stands after a command, for completion.
+/// The argument of a command, for completion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Argument {
     Nothing,
@@ -300,7 +300,7 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     COMMANDS.iter().map(|command| command.name).filter(|name| !name.is_empty())
 }
 
-/// What `help` prints.
+/// The text of `help`.
 ///
 /// # Errors
 /// If there is no such command.
@@ -342,7 +342,7 @@ fn overview() -> String {
     text
 }
 
-/// Text in lines of so many columns, indented.
+/// Wraps and indents a text.
 pub fn wrapped(text: &str, indent: usize, columns: usize) -> String {
     let mut out = String::new();
     let mut line = String::new();

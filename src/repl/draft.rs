@@ -1,14 +1,13 @@
-//! The text of the model in hand: typed piece by piece, or read from a file and changed.
+//! The text of the loaded model, typed piece by piece, or read from a file and changed.
 //!
-//! A declaration or rule takes the place of the one before it with the same name or head; anything else is added
-//! at the end. What the text was before can be had back (`undo`). Whether a new text is good is not decided here: the caller reads
-//! it, and keeps it only if it is.
+//! A declaration or rule replaces the earlier one with the same name or head; anything else is added
+//! at the end. `undo` restores an earlier text. The caller reads a changed text and accepts it only if it is valid.
 
 use std::path::{Path, PathBuf};
 
 use crate::syntax::outline::{Entry, outline};
 
-/// Most texts that `undo` remembers.
+/// Largest number of texts kept for `undo`.
 const MOST_UNDONE: usize = 100;
 
 /// The text and where it came from.
@@ -23,17 +22,17 @@ pub struct Draft {
     last_rule: Option<String>,
 }
 
-/// A text that may take the place of the present one.
+/// A proposed new text.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TextChange {
     pub text: String,
-    /// What was done, for people: `F(x) replaced`.
+    /// Descriptions of the changes, such as `F(x) replaced`.
     pub done: Vec<String>,
     last_rule: Option<String>,
 }
 
 impl TextChange {
-    /// Another text altogether.
+    /// A change of the whole text.
     pub fn whole(text: String) -> TextChange {
         TextChange { text, done: Vec::new(), last_rule: None }
     }
@@ -60,7 +59,7 @@ impl Draft {
         self.text == self.saved || self.text.trim().is_empty()
     }
 
-    /// True if a file is there that holds neither what was read from it or saved in it, nor what is to be saved.
+    /// True if the file exists and holds neither the text last read or saved, nor the present one.
     pub fn was_changed_elsewhere(&self, path: &Path) -> bool {
         let Ok(found) = std::fs::read(path) else { return false };
         let found = String::from_utf8_lossy(&found);
@@ -78,13 +77,13 @@ impl Draft {
         let known = outline(&self.text);
         let new = outline(typed);
         if new.is_empty() {
-            // It cannot be read; whoever tries will say why.
+            // It cannot be parsed; the caller reports why.
             return TextChange { text: joined(&self.text, typed), done: Vec::new(), last_rule: None };
         }
         let mut text = self.text.clone();
         let mut added = String::new();
         let mut done = Vec::new();
-        // From the last to the first of the old text, so that places stay what they are.
+        // From the last to the first, so that spans stay valid.
         let mut replaced: Vec<(&Entry, String)> = Vec::new();
         for (i, entry) in new.iter().enumerate() {
             let begin = if i == 0 { 0 } else { entry.span.range().start };
@@ -127,7 +126,7 @@ impl Draft {
         })
     }
 
-    /// Makes a change.
+    /// Applies a change.
     pub fn accept(&mut self, change: TextChange) {
         let before = std::mem::replace(&mut self.text, change.text);
         self.before.push(before);
@@ -142,7 +141,7 @@ impl Draft {
         self.before.last().map(String::as_str)
     }
 
-    /// Takes the last change back.
+    /// Reverts the last change.
     pub fn undo(&mut self) {
         if let Some(before) = self.before.pop() {
             self.text = before;

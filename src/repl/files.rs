@@ -1,15 +1,14 @@
-//! Commands that write files: `save` and `export`. Files are whole or absent, and other people's are left alone.
+//! Commands that write files: `save` and `export`. Files are complete or absent, and files of others are not overwritten.
 
 use std::path::{Path, PathBuf};
 
-use super::commands;
 use super::loaded::{LoadedModel, misused};
 use super::state::{CommandError, SessionState};
 use crate::cli::run::Printer;
 use crate::render::{self, Format, FrameWriter, Page, Size, Survey, View};
 use crate::sim::brief;
 
-/// Says whether a file may be written.
+/// Refuses to overwrite a file that this session has not written.
 fn spare(path: &Path, force: bool, state: &SessionState) -> Result<(), CommandError> {
     if path.exists() && !force && !state.written.contains(&real(path)) {
         let path = path.display();
@@ -20,7 +19,7 @@ fn spare(path: &Path, force: bool, state: &SessionState) -> Result<(), CommandEr
     Ok(())
 }
 
-/// One name for a file, however it is spelt.
+/// The canonical path of a file.
 fn real(path: &Path) -> PathBuf {
     path.canonicalize().unwrap_or_else(|_| path.to_owned())
 }
@@ -36,14 +35,14 @@ fn write(path: &Path, bytes: &[u8], state: &mut SessionState) -> Result<(), Comm
     Ok(())
 }
 
-/// Takes a flag without value out of the words.
+/// Removes a flag without a value from the words; true if it was there.
 fn flag(words: &mut Vec<String>, name: &str) -> bool {
     let before = words.len();
     words.retain(|word| word != name);
     words.len() < before
 }
 
-/// Takes a flag with its value out of the words.
+/// Removes a flag with its value from the words.
 fn value(words: &mut Vec<String>, name: &str) -> Result<Option<String>, CommandError> {
     let Some(at) = words.iter().position(|word| word == name) else { return Ok(None) };
     words.remove(at);
@@ -68,7 +67,7 @@ impl LoadedModel<'_> {
                 }
             },
             [name] => PathBuf::from(name),
-            _ => return Err(misused(commands::find("save").expect("it is one"))),
+            _ => return Err(misused("save")),
         };
         if state.draft.text.trim().is_empty() {
             return Err(CommandError::new("there is nothing to save yet"));
@@ -118,7 +117,7 @@ impl LoadedModel<'_> {
             number(value(&mut words, "--perspective")?, "--perspective", render::Camera::FIELDS)?;
         let side = f64::from(Page::MOST_ON_A_SIDE);
         let width = number(value(&mut words, "--width")?, "--width", 1.0..=side)?;
-        let [name] = &words[..] else { return Err(misused(commands::find("export").expect("it is one"))) };
+        let [name] = &words[..] else { return Err(misused("export")) };
         let path = PathBuf::from(name);
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_lowercase();
         self.replay()?;

@@ -1,22 +1,22 @@
-//! What a line is: a command, or text of the model; and when text of the model is complete.
+//! Classification of lines as commands or text of the model, and detection of complete statements.
 //!
-//! - `:word …` is a command, always, and so is `?`.
-//! - A line that begins with a word of the language (`param`, `interpret`, …), or that has a `:` outside parentheses,
+//! - `:word …` is always a command, and so is `?`.
+//! - A line that begins with a keyword of the language (`param`, `interpret`, …), or that has a `:` outside parentheses,
 //!   is a declaration or a rule.
-//! - A line that begins with `if`, `solve`, `produce`, `at` (rate) or `or` is one more clause of the rule that was typed last.
-//! - A line that begins with the name of a command is that command. A module may be called like a command: then its rule
-//!   is told by what follows the name, `(`, `<`, `>` or `:`.
+//! - A line that begins with `if`, `solve`, `produce`, `at` (rate) or `or` is a further clause of the rule typed last.
+//! - A line that begins with the name of a command is that command. A module may have the name of a command: its rule
+//!   is recognised by the `(`, `<`, `>` or `:` after the name.
 //!
-//! Text goes on over lines: as long as something is open, as long as lines are indented, and as long as they begin with a
-//! clause. On a terminal a rule of several lines ends with an empty one.
+//! A statement continues over lines while a parenthesis or an operator is open, and with lines that are indented or begin
+//! with a clause. On a terminal an empty line ends a rule of several lines.
 
 use super::commands;
 use crate::syntax::words;
 
-/// What a line begins.
+/// The kind of statement that a line begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StatementKind {
-    /// Nothing, or a remark.
+    /// Nothing, or a comment.
     Blank,
     Command,
     /// A declaration or a rule.
@@ -34,7 +34,7 @@ pub struct Statement {
     pub line: usize,
 }
 
-/// The line without its remark.
+/// The line without its comment.
 fn code(line: &str) -> &str {
     let mut quoted = false;
     for (at, c) in line.char_indices() {
@@ -54,7 +54,7 @@ pub fn first_word(line: &str) -> (&str, &str) {
     (&line[..end], line[end..].trim_start())
 }
 
-/// Tells what a line begins.
+/// Classifies a line.
 pub fn classify(line: &str) -> StatementKind {
     if line.trim_start().starts_with('?') || line.trim_start().starts_with(':') {
         return StatementKind::Command;
@@ -88,7 +88,7 @@ fn has_colon(text: &str) -> bool {
     })
 }
 
-/// True if text of a model needs more to come.
+/// True if the text of a model is incomplete.
 pub fn is_open(text: &str) -> bool {
     let body: String = text.lines().map(|line| code(line).to_owned() + "\n").collect();
     let mut depth = 0i64;
@@ -98,7 +98,7 @@ pub fn is_open(text: &str) -> bool {
     let end = body.trim_end();
     let last = end.rsplit(|c: char| !(c.is_alphanumeric() || c == '_')).next().unwrap_or("");
     let waits = words::CLAUSES.contains(&last) || words::PARTICLES.contains(&last) && !last.is_empty();
-    // The turtle's symbols may end a string; what may not, asks for an operand.
+    // Symbols of the turtle may end a string; other operators need an operand.
     let operator = end.ends_with([':', ',', '=', '*', '<', '>', '≤', '≥', '≠']) || end.ends_with("..");
     let clause = body.rmatch_indices(|c: char| !(c.is_alphanumeric() || c == '_')).count() > 0 && {
         let mut words = body.split(|c: char| !(c.is_alphanumeric() || c == '_')).rev();
@@ -107,7 +107,7 @@ pub fn is_open(text: &str) -> bool {
     depth > 0 || waits || operator || clause && has_colon(&body)
 }
 
-/// True if the line belongs to the text before it.
+/// True if the line continues the text before it.
 fn goes_on(text: &str, line: &str) -> bool {
     let indented = line.starts_with(char::is_whitespace);
     match classify(line) {
@@ -119,7 +119,7 @@ fn goes_on(text: &str, line: &str) -> bool {
     }
 }
 
-/// True if what was typed on a terminal can be taken as it is; otherwise Enter begins another line of it.
+/// True if input on a terminal is complete; otherwise Enter begins another line.
 pub fn is_complete(input: &str) -> bool {
     let first = input.lines().find(|line| classify(line) != StatementKind::Blank);
     match first.map(classify) {
@@ -132,21 +132,21 @@ pub fn is_complete(input: &str) -> bool {
         return true;
     }
     let several = input.trim_end().contains('\n');
-    // An empty line ends what has lines; a declaration that is complete has no more of them.
+    // A rule of several lines ends with an empty line; a declaration ends when it is complete.
     let (word, _) = first_word(first.unwrap_or(""));
     let strings = ["initial", "axiom", "interpret"].contains(&word);
     let is_declaration = words::declarations().any(|known| known == word) && !strings;
     !is_open(input) && (!several || is_declaration)
 }
 
-/// Cuts lines into statements; blank lines and remarks between them fall away.
+/// Splits lines into statements; blank lines and comments between them are dropped.
 #[derive(Debug, Default)]
 pub struct Splitter {
     open: Option<Statement>,
 }
 
 impl Splitter {
-    /// Takes a line; gives what it completes: the text before it, and itself if it stands alone.
+    /// Adds a line; returns the statements that it completes: the one before it, and itself if it stands alone.
     pub fn line(&mut self, line: &str, number: usize) -> Vec<Statement> {
         let mut done = Vec::new();
         if let Some(open) = &mut self.open {
@@ -166,7 +166,7 @@ impl Splitter {
         done
     }
 
-    /// What is left at the end.
+    /// The last statement.
     pub fn finish(&mut self) -> Option<Statement> {
         self.open.take()
     }

@@ -1,4 +1,4 @@
-//! A model in time, and who does what with it.
+//! The loaded model, its replay position, and the dispatch of commands.
 
 use super::commands;
 use super::grammar::{Statement, StatementKind, first_word};
@@ -11,24 +11,24 @@ use crate::sim::{self, brief};
 use crate::syntax::{suggest::did_you_mean, words};
 use crate::tree::ModuleString;
 
-/// What comes after a statement.
+/// What the session does after a statement.
 #[derive(Debug)]
 pub enum NextStep {
     Continue,
     Quit,
-    /// Another model, to be shown at a time.
+    /// Load another model, at a time.
     Model {
         session: Box<Session>,
         time: f64,
     },
 }
 
-/// A model and its time.
+/// A model and its replay.
 pub struct LoadedModel<'m> {
     pub session: &'m Session,
-    /// None if the model cannot start, or if there is nothing to start.
+    /// `None` if the model cannot start, or has no initial string.
     replay: Option<Replay<'m>>,
-    /// Why it cannot.
+    /// Why it cannot start.
     error: Option<sim::Error>,
 }
 
@@ -47,7 +47,7 @@ impl<'m> LoadedModel<'m> {
         LoadedModel { session, replay, error }
     }
 
-    /// Goes to the time at which the model is to be shown.
+    /// Goes to the initial time.
     pub fn set(&mut self, time: f64, state: &SessionState) -> Result<(), CommandError> {
         if let Some(error) = &self.error {
             return Err(self.drawn(error, state));
@@ -61,15 +61,15 @@ impl<'m> LoadedModel<'m> {
         Ok(())
     }
 
-    /// The present, if there is something to be seen.
+    /// The present time, if the model has started.
     pub fn time(&self) -> Option<f64> {
         self.replay.as_ref().map(Replay::time)
     }
 
-    /// The running model.
+    /// The replay of the model.
     ///
     /// # Errors
-    /// If there is none.
+    /// The model has not started.
     pub fn replay(&mut self) -> Result<&mut Replay<'m>, CommandError> {
         let why = match &self.error {
             Some(error) => format!("the model does not start: {error}"),
@@ -81,12 +81,12 @@ impl<'m> LoadedModel<'m> {
         self.replay.as_mut().ok_or_else(|| CommandError::new(why))
     }
 
-    /// An error of the run, drawn.
+    /// The rendered message of an error of the run.
     pub fn drawn(&self, error: &sim::Error, state: &SessionState) -> CommandError {
         CommandError::Message(error.diagnostic().render(&self.session.source, state.screen.coloured))
     }
 
-    /// What came of a way to another time.
+    /// Reports the result of a seek.
     pub fn arrive(
         &mut self,
         gone: Result<Stop, sim::Error>,
@@ -109,23 +109,23 @@ impl<'m> LoadedModel<'m> {
         }
     }
 
-    /// Goes the way to the present, if nobody wanted to see it before.
+    /// Moves the simulation to the present if that was deferred.
     pub fn settle(&mut self, state: &SessionState) -> Result<(), CommandError> {
         let gone = self.replay()?.settle();
         self.arrive(gone, state).map(|_| ())
     }
 
-    /// The structure at present.
+    /// The string at present.
     pub fn string(&mut self, state: &SessionState) -> Result<&ModuleString, CommandError> {
         self.settle(state)?;
         if let Err(error) = self.replay()?.string() {
             return Err(self.drawn(&error, state));
         }
-        let formed = self.replay()?.string();
-        Ok(formed.expect("it was formed"))
+        // The same string again: the borrow of the first call would last until the end of this function.
+        self.replay()?.string().map_err(CommandError::new)
     }
 
-    /// Does what a statement says.
+    /// Executes a statement.
     pub fn obey(
         &mut self,
         statement: &Statement,
@@ -167,7 +167,7 @@ impl<'m> LoadedModel<'m> {
             "quit" => return nothing(NextStep::Quit),
             "help" => state.say(&commands::help(&rest.join(" ")).map_err(CommandError::new)?)?,
             "load" => {
-                let [file] = rest else { return Err(misused(command)) };
+                let [file] = rest else { return Err(misused(command.name)) };
                 return state.load(std::path::Path::new(file), &[]);
             }
             "reload" => {
@@ -176,7 +176,7 @@ impl<'m> LoadedModel<'m> {
             }
             "new" => {
                 nothing(NextStep::Continue)?;
-                return Ok(state.begin_empty());
+                return state.begin_empty();
             }
             "undo" => {
                 nothing(NextStep::Continue)?;
@@ -201,7 +201,7 @@ impl<'m> LoadedModel<'m> {
         Ok(NextStep::Continue)
     }
 
-    /// Commands that the command line has, too.
+    /// Commands of the command line.
     fn embedded(&mut self, name: &str, rest: &[String]) -> Result<(), CommandError> {
         if name != "explain" {
             self.replay()?;
@@ -247,14 +247,15 @@ impl<'m> LoadedModel<'m> {
                 };
                 return state.set(name, value, self.time().unwrap_or(0.0));
             }
-            _ => return Err(misused(commands::find("set").expect("it is one"))),
+            _ => return Err(misused("set")),
         }
         Ok(NextStep::Continue)
     }
 }
 
-/// A command with too much or too little after it.
-pub fn misused(command: &commands::Command) -> CommandError {
+/// The error for a command with wrong arguments.
+pub fn misused(name: &str) -> CommandError {
+    let Some(command) = commands::find(name) else { return unknown(name) };
     let example = command
         .examples
         .first()
@@ -262,7 +263,7 @@ pub fn misused(command: &commands::Command) -> CommandError {
     CommandError::new(format!("it is used as `{} {}`{example}", command.name, command.usage))
 }
 
-/// A line that is nothing.
+/// The error for a line that is neither a command nor text of a model.
 fn unknown(text: &str) -> CommandError {
     let line = text.lines().next().unwrap_or("").trim();
     let (word, _) = first_word(line);

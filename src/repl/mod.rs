@@ -5,13 +5,14 @@
 //!                       grammar, assist      └─ commands ──▶ LoadedModel (a Session and its Replay) ──▶ answers
 //! ```
 //!
-//! - `input`, `grammar`, `assist`: lines, what they are, and what helps to type them; `commands`: the list of commands.
-//! - `draft`: the model's text, changed piece by piece. A change that cannot be read is rolled back whole.
-//! - `state`: all that outlives a model. `loaded`: a model in time, and what commands do with it.
-//! - `navigation`, `show`, `plot`, `picture`, `files`: the commands, by what they are about. `braille`: pictures made of dots.
+//! - `input`, `grammar`, `assist`: input lines, their classification, completion and hints; `commands`: the list of commands.
+//! - `draft`: the text of the model and its changes. A change that cannot be read is rejected as a whole.
+//! - `state`: the state of the session beyond a single model. `loaded`: the loaded model, its replay position, and dispatch of
+//!   commands.
+//! - `navigation`, `show`, `plot`, `picture`, `files`: the commands, by subject. `braille`: pictures made of dots.
 //!
-//! Answers go to standard output, complaints to standard error. Without a terminal the statements of standard input are done
-//! one after another, and the exit status is 1 if one of them has failed.
+//! Answers go to standard output, errors to standard error. Without a terminal the statements of standard input are executed
+//! in order, and the exit status is 1 if one of them fails.
 
 mod assist;
 mod braille;
@@ -53,7 +54,6 @@ pub fn repl(args: &ReplArgs) -> Result<(), Failure> {
         false => Input::script(),
     };
     if interactive {
-        // Only who goes on after it needs to hear it.
         interrupt::listen();
         let version = env!("CARGO_PKG_VERSION");
         state.say(&format!(
@@ -66,16 +66,16 @@ pub fn repl(args: &ReplArgs) -> Result<(), Failure> {
             Err(error @ (CommandError::OutputClosed | CommandError::OutputFailed(_))) => {
                 return Err(error.into());
             }
-            // On a terminal somebody may mend the file and try again.
+            // On a terminal the user may correct the file and load it again.
             Err(CommandError::Message(message)) if interactive => {
                 state.complain(&message);
-                state.begin_empty()
+                state.begin_empty()?
             }
             Err(CommandError::Message(message)) => return Err(Failure::Model(message)),
         },
-        None => state.begin_empty(),
+        None => state.begin_empty()?,
     };
-    // Each round is one model; whatever changes it begins another.
+    // Each iteration is one model; a change of the model begins another.
     while let NextStep::Model { session, time } = start {
         let mut loaded = LoadedModel::new(&session, &state);
         let set = loaded.set(time, &state);
@@ -89,7 +89,7 @@ pub fn repl(args: &ReplArgs) -> Result<(), Failure> {
     log.verdict()
 }
 
-/// Does one statement after another, until there is another model or no more to do.
+/// Executes statements until the model changes or the session ends.
 fn play(
     loaded: &mut LoadedModel,
     state: &mut SessionState,
@@ -127,7 +127,7 @@ fn play(
     }
 }
 
-/// A statement as it would look on a terminal.
+/// A statement in the format of a terminal.
 fn echo(statement: &Statement) -> String {
     let mut lines = statement.text.lines();
     let mut text = format!("> {}\n", lines.next().unwrap_or(""));
@@ -135,18 +135,18 @@ fn echo(statement: &Statement) -> String {
     text
 }
 
-/// What has failed.
+/// The failed statements of a session.
 #[derive(Debug, Default)]
 struct Log {
     echo: bool,
     interactive: bool,
     statements: usize,
-    /// Lines of the input.
+    /// Their lines in the input.
     failed: Vec<usize>,
 }
 
 impl Log {
-    /// Takes what came of a statement; says what is wrong with it.
+    /// Records the result of a statement, and prints its error.
     fn take<T>(
         &mut self,
         done: Result<T, CommandError>,
@@ -172,7 +172,7 @@ impl Log {
         }
     }
 
-    /// The end of a script.
+    /// The result of a script.
     fn verdict(&self) -> Result<(), Failure> {
         if self.failed.is_empty() || self.interactive {
             return Ok(());
@@ -190,7 +190,7 @@ impl Log {
 }
 
 impl Statement {
-    /// A command's name and what follows it; quotes hold spaces together.
+    /// The name of a command and its arguments; an argument in quotes may contain spaces.
     fn words(&self) -> Vec<String> {
         debug_assert!(self.kind == StatementKind::Command);
         let text = self.text.trim();
@@ -201,7 +201,7 @@ impl Statement {
         while let Some(c) = chars.next() {
             match c {
                 '"' => (quoted, any) = (!quoted, true),
-                // A remark; but `#3` is a module.
+                // A comment, but `#3` is a module.
                 '#' if !quoted && !any && !chars.peek().is_some_and(char::is_ascii_digit) => break,
                 c if c.is_whitespace() && !quoted => {
                     if std::mem::take(&mut any) {

@@ -1,20 +1,19 @@
 //! Commands about time: `run`, `step`, `back`, `time`.
 
-use super::commands;
 use super::grammar::{Statement, classify};
 use super::loaded::{LoadedModel, NextStep, misused};
 use super::state::{CommandError, SessionState};
 use crate::replay::Stop;
 use crate::sim::{Event, brief};
 
-/// Most lines about what happened on the way.
+/// Largest number of lines about passed events.
 const MOST_LINES: usize = 8;
-/// Most events of one command.
+/// Largest number of events in one command.
 const MOST_EVENTS: usize = 1_000_000;
-/// How far a model without `frames` is searched for an event, in its unit of time.
+/// Time span in which the next event is searched for if the model has no `frames`.
 const FAR: f64 = 100.0;
 
-/// A time as it is typed; it begins at 0.
+/// Parses a time, which must not be negative.
 pub fn time_of(text: &str) -> Result<f64, CommandError> {
     match text.parse::<f64>() {
         Ok(t) if t.is_finite() && t >= 0.0 => Ok(t + 0.0),
@@ -48,7 +47,7 @@ impl LoadedModel<'_> {
                 Some(more) => present + time_of(more)?,
                 None => time_of(text)?,
             },
-            _ => return Err(misused(commands::find("run").expect("it is one"))),
+            _ => return Err(misused("run")),
         };
         self.go(t, state)
     }
@@ -68,7 +67,7 @@ impl LoadedModel<'_> {
             ["frame"] => return self.step_frames(1, state),
             ["frame", n] => return self.step_frames(count_of(n)? as i64, state),
             [n] | ["event", n] => count_of(n)?,
-            _ => return Err(misused(commands::find("step").expect("it is one"))),
+            _ => return Err(misused("step")),
         };
         let start = self.replay()?.time();
         let limit = self.horizon(start);
@@ -79,7 +78,7 @@ impl LoadedModel<'_> {
                 Stop::There => {}
                 Stop::Interrupted => break,
                 Stop::Nothing => {
-                    // Where nothing happens nobody wants to be.
+                    // Without an event the time does not change.
                     let gone = self.replay()?.seek(before);
                     self.arrive(gone, state)?;
                     let what = if count == 1 { "no event" } else { "no more events" };
@@ -113,7 +112,7 @@ impl LoadedModel<'_> {
                 return self.go(t, state);
             }
             [n] | ["event", n] => count_of(n)?,
-            _ => return Err(misused(commands::find("back").expect("it is one"))),
+            _ => return Err(misused("back")),
         };
         if present == 0.0 {
             return state.say("this is the start, t = 0\n");
@@ -132,7 +131,7 @@ impl LoadedModel<'_> {
         state.say(&self.status()?)
     }
 
-    /// Over so many of the model's frames, backwards if it is negative.
+    /// Moves by a number of frames, backwards if it is negative.
     fn step_frames(&mut self, count: i64, state: &SessionState) -> Result<(), CommandError> {
         let Some(frames) = self.session.model.frames else {
             return Err(CommandError::new(
@@ -142,7 +141,7 @@ impl LoadedModel<'_> {
         let t = self.replay()?.time();
         let place = (t - frames.from) / frames.step;
         let last = frames.count() as i64 - 1;
-        // A time that is a frame's but for rounding is that frame.
+        // A time that differs from a frame only by rounding counts as that frame.
         let near = place.round();
         let at_frame = (place - near).abs() < 1e-6;
         let here = if at_frame {
@@ -162,7 +161,7 @@ impl LoadedModel<'_> {
         self.go(if beyond { t } else { target }, state)
     }
 
-    /// How far ahead events are searched for.
+    /// The time up to which events are searched for.
     pub fn horizon(&self, t: f64) -> f64 {
         match self.session.model.frames {
             Some(frames) if t < frames.to => frames.to,
@@ -171,7 +170,7 @@ impl LoadedModel<'_> {
         }
     }
 
-    /// Where we are, in a line.
+    /// Time, modules and productions in a line.
     pub fn status(&mut self) -> Result<String, CommandError> {
         let replay = self.replay()?;
         let plural = |n: usize, word: &str| format!("{n} {word}{}", if n == 1 { "" } else { "s" });
@@ -183,7 +182,7 @@ impl LoadedModel<'_> {
         ))
     }
 
-    /// The productions after a time, those of one clause and instant together.
+    /// The productions after a time, grouped by clause and instant.
     fn happened_since(&mut self, start: f64) -> Result<String, CommandError> {
         let session = self.session;
         let replay = self.replay()?;

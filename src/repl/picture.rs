@@ -8,11 +8,11 @@ use crate::render::{Fit, Page, Size, Survey, View, pixels};
 use crate::scene::Scene;
 use crate::turtle;
 
-/// A dot is set where so much of it (of 255) is covered; stems may be thinner than a dot.
+/// Coverage (of 255) from which a dot is set; stems may be thinner than a dot.
 const COVERED: u8 = 48;
 
 impl LoadedModel<'_> {
-    /// What is to be seen at present.
+    /// The drawing at present.
     pub fn scene(&mut self, state: &SessionState) -> Result<Scene, CommandError> {
         let model = &self.session.model;
         let mut scene = turtle::blank(model);
@@ -34,7 +34,7 @@ impl LoadedModel<'_> {
             })?;
         }
         if rest.len() > 2 {
-            return Err(misused(commands::find("draw").expect("it is one")));
+            return Err(misused("draw"));
         }
         let scene = self.scene(state)?;
         for warning in &scene.warnings {
@@ -58,7 +58,7 @@ impl LoadedModel<'_> {
         let side = |length: f64, most: f64| (length * scale).round().clamp(2.0, most) as u32;
         let size = Size::Exact(side(width, most[0]), side(height, most[1]));
         let page = Page::new(picture, size, None).map_err(CommandError::new)?;
-        // Lines of default width are a dot wide: thinner, they would be seen here and there only.
+        // Lines of default width are a dot wide; thinner ones would be broken.
         fit.default_width = 1.4 / scale;
         let lines = match blocks {
             true => half_blocks(&scene, &fit, &page, state.screen.coloured),
@@ -83,7 +83,7 @@ fn usage() -> &'static str {
     commands::find("draw").map_or("", |command| command.usage)
 }
 
-/// The colour of a pixel, which is given times its opacity.
+/// The colour of a pixel with premultiplied alpha.
 fn colour([r, g, b, a]: [u8; 4]) -> [u8; 3] {
     [r, g, b].map(|c| (u32::from(c) * 255 / u32::from(a.max(1))).min(255) as u8)
 }

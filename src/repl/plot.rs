@@ -1,9 +1,8 @@
-//! `plot`: a parameter over time, in dots.
+//! `plot`: a parameter over time, drawn with Braille dots.
 
 use std::collections::BTreeMap;
 
 use super::braille::Sheet;
-use super::commands;
 use super::loaded::{LoadedModel, misused};
 use super::navigation::time_of;
 use super::show::{is_called, known_name};
@@ -16,11 +15,11 @@ use crate::study::LinearAxis;
 use crate::syntax::suggest::did_you_mean;
 use crate::tree::{Lineage, ModuleString};
 
-/// What is plotted.
+/// The quantity that is plotted.
 enum Subject {
-    /// Each module of these kinds is a dot: kinds with the place of the parameter.
+    /// The parameter of each module of these kinds, with its index: a dot for each module.
     Each(BTreeMap<KindId, usize>),
-    /// One number for all of them.
+    /// One number for all modules of these kinds.
     Whole(Summary, BTreeMap<KindId, usize>),
     Count(Vec<KindId>),
     One(Lineage, usize),
@@ -37,7 +36,7 @@ enum Summary {
 const SUMMARIES: [(&str, Summary); 4] =
     [("sum", Summary::Sum), ("mean", Summary::Mean), ("max", Summary::Max), ("min", Summary::Min)];
 
-/// Room for the numbers on the left.
+/// Width of the column of numbers on the left.
 const MARGIN: usize = 11;
 const INK: [u8; 3] = [90, 170, 90];
 
@@ -129,7 +128,7 @@ impl LoadedModel<'_> {
             }
             [spec] if spec.starts_with('#') => {
                 let Some((number, parameter)) = spec[1..].split_once('.') else {
-                    return Err(misused(commands::find("plot").expect("it is one")));
+                    return Err(misused("plot"));
                 };
                 let (number, lineage) = self.find(&[number.to_owned()], state)?;
                 let model = &self.session.model;
@@ -150,11 +149,11 @@ impl LoadedModel<'_> {
                 }
                 None => Err(CommandError::new(format!("`{how}` is none of sum, mean, max, min, count"))),
             },
-            _ => Err(misused(commands::find("plot").expect("it is one"))),
+            _ => Err(misused("plot")),
         }
     }
 
-    /// The kinds that `NAME.PARAM` means.
+    /// The kinds denoted by `NAME.PARAM`.
     fn kinds_with(&self, spec: &str) -> Result<BTreeMap<KindId, usize>, CommandError> {
         let model = &self.session.model;
         let Some((name, parameter)) = spec.rsplit_once('.').filter(|(name, _)| !name.is_empty()) else {
@@ -179,7 +178,7 @@ impl LoadedModel<'_> {
     }
 }
 
-/// The place of a parameter, by name or by number from 1.
+/// The index of a parameter, given by name or by number from 1.
 fn parameter_place(model: &Model, kind: KindId, parameter: &str) -> Result<usize, CommandError> {
     let names = model.parameter_names(kind);
     let kind = model.kinds.get(kind);
@@ -196,7 +195,7 @@ fn parameter_place(model: &Model, kind: KindId, parameter: &str) -> Result<usize
 }
 
 impl Subject {
-    /// What is to be seen of a string.
+    /// The values for a string.
     fn values(&self, string: &ModuleString) -> Vec<f64> {
         let of = |kinds: &BTreeMap<KindId, usize>| -> Vec<f64> {
             let value =

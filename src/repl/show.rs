@@ -1,20 +1,21 @@
 //! Commands about modules and texts: `list`, `show`, `inspect`, `events`.
 
 use super::assist::coloured;
-use super::commands;
 use super::loaded::{LoadedModel, misused};
 use super::state::{CommandError, SessionState};
+use crate::diagnostic::Span;
 use crate::model::{KindId, Model};
-use crate::sim::{InspectedModule, brief, describe};
+use crate::session::Session;
+use crate::sim::{InspectedModule, Inspection, brief, describe};
 use crate::syntax::suggest::did_you_mean;
 use crate::tree::{Lineage, Module, ModuleString};
 
-/// Lines of a string, or rows of a table, that are printed unless more are asked for.
+/// Default number of lines of a string, or rows of a table.
 const MOST_LINES: usize = 16;
-/// Productions that `events` prints.
+/// Default number of productions in `events`.
 const MOST_EVENTS: usize = 20;
 
-/// A module of the present string with its number, brackets not counted.
+/// A module of the present string with its number, without brackets.
 pub struct Numbered<'a> {
     pub number: usize,
     pub module: Module<'a>,
@@ -26,13 +27,13 @@ pub fn modules(string: &ModuleString) -> impl Iterator<Item = Numbered<'_>> {
     all.zip(1..).map(|(module, number)| Numbered { number, module })
 }
 
-/// True if a kind is meant by a name: its own, or, without `_`, its base.
+/// True if a name denotes a kind: the name of the kind or, without `_`, its base name.
 pub fn is_called(model: &Model, kind: KindId, name: &str) -> bool {
     let kind = model.kinds.get(kind);
     kind.name == name || !name.contains('_') && kind.base() == name
 }
 
-/// The name of modules, if the model has some.
+/// Checks that the model has modules of a name.
 pub fn known_name<'n>(model: &Model, name: &'n str) -> Result<&'n str, CommandError> {
     let kinds = || model.kinds.iter().filter(|(id, _)| !id.is_bracket());
     if kinds().any(|(id, _)| is_called(model, id, name)) {
@@ -67,7 +68,7 @@ impl LoadedModel<'_> {
                 }
                 wanted
             }
-            _ => return Err(misused(commands::find("list").expect("it is one"))),
+            _ => return Err(misused("list")),
         };
         if text.trim().is_empty() {
             return state.say("nothing was typed yet, and no file is loaded\n");
@@ -109,11 +110,11 @@ impl LoadedModel<'_> {
                 let most = if more.is_empty() { MOST_LINES } else { usize::MAX };
                 state.say(&table(model, rows, most)?)
             }
-            _ => Err(misused(commands::find("show").expect("it is one"))),
+            _ => Err(misused("show")),
         }
     }
 
-    /// The module that words name.
+    /// The module denoted by the arguments of a command: number and lineage.
     pub fn find(&mut self, rest: &[String], state: &SessionState) -> Result<(usize, Lineage), CommandError> {
         let model = &self.session.model;
         let present = self.string(state)?;
@@ -158,7 +159,7 @@ impl LoadedModel<'_> {
                 };
                 found(all.nth(nth - 1), which)
             }
-            _ => Err(misused(commands::find("inspect").expect("it is one"))),
+            _ => Err(misused("inspect")),
         }
     }
 
@@ -174,79 +175,26 @@ impl LoadedModel<'_> {
         let Some(all) = replay.simulation().ok().and_then(|now| now.inspect(t, number - 1)) else {
             return Err(CommandError::new("this module cannot be looked at now"));
         };
-        let line = |span: crate::diagnostic::Span| session.source.position(span.start).0;
         let present = self.string(state)?;
         let count = modules(present).count();
-        let name = |seen: &InspectedModule| describe(model, seen.kind, &seen.parameters);
-        let mut out = format!("{}\n", name(&all.module));
+        let mut out = format!("{}\n", described(model, &all.module));
         let ago = brief(t - all.birth, 6);
         out += &format!(
             "  module {number} of {count}, lineage {lineage}, born at t = {} ({ago} old)\n",
             brief(all.birth, 9)
         );
-        match all.rule {
-            Some(rule) => {
-                out +=
-                    &format!("  rule      {}, line {}", model.rules[rule].label, line(model.rules[rule].span))
-            }
-            None if model.kinds.get(all.module.kind).rules.is_empty() => {
-                out += "  rule      none: it stays as it is"
-            }
-            None => out += "  rule      none whose context is there: it stays as it is",
-        }
-        if let (Some(rule), Some(solve)) = (all.rule, all.solve) {
-            out += &format!("; equations of line {}", line(model.rules[rule].solves[solve].span));
-        }
-        out.push('\n');
-        let names = match all.rule {
-            Some(rule) => model.rules[rule].parameters.clone(),
-            None => model.parameter_names(all.module.kind),
-        };
-        let mut rows = Vec::new();
-        for (i, value) in all.module.parameters.iter().enumerate() {
-            let parameter = names.get(i).cloned().unwrap_or_default();
-            let rate = all.rates.get(i).copied().unwrap_or(0.0);
-            rows.push([parameter.clone(), brief(*value, 9), format!("d{parameter}/dt"), brief(rate, 9)]);
-        }
-        let width = |k: usize| rows.iter().map(|row: &[String; 4]| row[k].chars().count()).max().unwrap_or(0);
-        let [a, b, c] = [width(0), width(1), width(2)];
-        for ([parameter, value, rate, of], i) in rows.iter().zip(0..) {
-            let title = if i == 0 { "state" } else { "" };
-            out += &format!("  {title:8}  {parameter:a$} = {value:b$}   {rate:c$} = {of}\n");
-        }
-        let mut neighbour = |title: &str, seen: &Option<InspectedModule>| {
-            let Some(seen) = seen else {
-                out += &format!("  {title:8}  none\n");
-                return;
-            };
-            let at = modules(present).find(|m| m.module.lineage == seen.lineage).map_or(0, |m| m.number);
-            let read = if all.context.iter().any(|other| other.lineage == seen.lineage) {
-                ", in the rule's context"
-            } else {
-                ""
-            };
-            out += &format!("  {title:8}  {} (module {at}{read})\n", name(seen));
-        };
-        neighbour("left", &all.left);
-        neighbour("right", &all.right);
-        let apart = |seen: &&InspectedModule| {
-            [&all.left, &all.right].into_iter().flatten().all(|n| n.lineage != seen.lineage)
-        };
-        for seen in all.context.iter().filter(apart) {
-            out += &format!("  context   {}\n", name(seen));
-        }
-        match end {
+        out += &rule_line(session, &all);
+        out += &state_lines(model, &all);
+        out += &neighbour_lines(model, &all, present);
+        out += &match end {
             Some(event) => {
                 let rule = &model.rules[event.rule];
-                let clause = line(rule.produces[event.clause].span);
-                out += &format!(
-                    "  next      replaced at t = {}, by line {clause} ({})\n",
-                    brief(event.time, 9),
-                    rule.label
-                );
+                let clause = line_of(session, rule.produces[event.clause].span);
+                let t = brief(event.time, 9);
+                format!("  next      replaced at t = {t}, by line {clause} ({})\n", rule.label)
             }
-            None => out += &format!("  next      no production up to t = {}\n", brief(limit, 9)),
-        }
+            None => format!("  next      no production up to t = {}\n", brief(limit, 9)),
+        };
         state.say(&out)
     }
 
@@ -265,7 +213,7 @@ impl LoadedModel<'_> {
         let name = match rest {
             [] => None,
             [name] => Some(known_name(model, name)?),
-            _ => return Err(misused(commands::find("events").expect("it is one"))),
+            _ => return Err(misused("events")),
         };
         let replay = self.replay()?;
         let wanted = |kind: KindId| name.is_none_or(|name| is_called(model, kind, name));
@@ -298,7 +246,78 @@ impl LoadedModel<'_> {
     }
 }
 
-/// The string as it would be typed.
+fn line_of(session: &Session, span: Span) -> usize {
+    session.source.position(span.start).0
+}
+
+fn described(model: &Model, seen: &InspectedModule) -> String {
+    describe(model, seen.kind, &seen.parameters)
+}
+
+/// `inspect`: the rule that applies, and its active equations.
+fn rule_line(session: &Session, all: &Inspection) -> String {
+    let model = &session.model;
+    let mut out = match all.rule {
+        Some(rule) => {
+            let line = line_of(session, model.rules[rule].span);
+            format!("  rule      {}, line {line}", model.rules[rule].label)
+        }
+        None if model.kinds.get(all.module.kind).rules.is_empty() => {
+            "  rule      none: it stays as it is".to_owned()
+        }
+        None => "  rule      none whose context is there: it stays as it is".to_owned(),
+    };
+    if let (Some(rule), Some(solve)) = (all.rule, all.solve) {
+        out += &format!("; equations of line {}", line_of(session, model.rules[rule].solves[solve].span));
+    }
+    out + "\n"
+}
+
+/// `inspect`: parameters and their rates.
+fn state_lines(model: &Model, all: &Inspection) -> String {
+    let names = match all.rule {
+        Some(rule) => model.rules[rule].parameters.clone(),
+        None => model.parameter_names(all.module.kind),
+    };
+    let mut rows = Vec::new();
+    for (i, value) in all.module.parameters.iter().enumerate() {
+        let parameter = names.get(i).cloned().unwrap_or_default();
+        let rate = all.rates.get(i).copied().unwrap_or(0.0);
+        rows.push([parameter.clone(), brief(*value, 9), format!("d{parameter}/dt"), brief(rate, 9)]);
+    }
+    let width = |k: usize| rows.iter().map(|row: &[String; 4]| row[k].chars().count()).max().unwrap_or(0);
+    let [a, b, c] = [width(0), width(1), width(2)];
+    let mut out = String::new();
+    for ([parameter, value, rate, of], i) in rows.iter().zip(0..) {
+        let title = if i == 0 { "state" } else { "" };
+        out += &format!("  {title:8}  {parameter:a$} = {value:b$}   {rate:c$} = {of}\n");
+    }
+    out
+}
+
+/// `inspect`: the neighbours, and other modules of the context.
+fn neighbour_lines(model: &Model, all: &Inspection, present: &ModuleString) -> String {
+    let mut out = String::new();
+    for (title, seen) in [("left", &all.left), ("right", &all.right)] {
+        let Some(seen) = seen else {
+            out += &format!("  {title:8}  none\n");
+            continue;
+        };
+        let at = modules(present).find(|m| m.module.lineage == seen.lineage).map_or(0, |m| m.number);
+        let is_read = all.context.iter().any(|other| other.lineage == seen.lineage);
+        let read = if is_read { ", in the rule's context" } else { "" };
+        out += &format!("  {title:8}  {} (module {at}{read})\n", described(model, seen));
+    }
+    let apart = |seen: &&InspectedModule| {
+        [&all.left, &all.right].into_iter().flatten().all(|n| n.lineage != seen.lineage)
+    };
+    for seen in all.context.iter().filter(apart) {
+        out += &format!("  context   {}\n", described(model, seen));
+    }
+    out
+}
+
+/// The string in the notation of the language.
 fn string(model: &Model, all: &ModuleString, width: usize, most: usize) -> String {
     let (mut out, mut lines, mut line, mut shown) = (String::new(), 0, String::new(), 0);
     let count = |range: std::ops::Range<usize>| range.filter(|i| !all.get(*i).kind.is_bracket()).count();
@@ -356,7 +375,7 @@ fn table<'a>(
     Ok(text)
 }
 
-/// Rows under headings, each column as wide as it must be.
+/// Rows under headings, in aligned columns.
 fn columns(heads: [&str; 4], rows: Vec<[String; 4]>) -> String {
     let mut all = vec![heads.map(str::to_owned)];
     all.extend(rows);

@@ -1,4 +1,4 @@
-//! What outlives a model: its text as it is being written, the params that were set, the screen.
+//! The state of a session beyond a single model: the text, the params that were set, the screen.
 
 use std::cell::RefCell;
 use std::collections::HashSet;
@@ -15,17 +15,17 @@ use crate::diagnostic::{Diagnostic, Severity};
 use crate::session::{LoadError, Session};
 use crate::sim::{Settings, brief};
 
-/// Most messages that are printed of one text.
+/// Largest number of messages printed for one text.
 const MOST_SHOWN: usize = 20;
 
-/// Why a statement has failed.
+/// Why a statement failed.
 #[derive(Debug)]
 pub enum CommandError {
-    /// The message, drawn.
+    /// The rendered message.
     Message(String),
-    /// Nobody reads the answers any more.
+    /// The reader of standard output has closed the pipe.
     OutputClosed,
-    /// Answers cannot be written, to a full disk for instance: the message.
+    /// Answers cannot be written, for instance to a full disk; the message.
     OutputFailed(String),
 }
 
@@ -55,7 +55,7 @@ impl From<CommandError> for Failure {
     }
 }
 
-/// Where answers appear.
+/// The screen for answers.
 #[derive(Clone, Copy, Debug)]
 pub struct Screen {
     pub coloured: bool,
@@ -65,7 +65,7 @@ pub struct Screen {
 }
 
 impl Screen {
-    /// That of this process. Without a terminal all screens are alike, so that transcripts are.
+    /// The screen of this process. Without a terminal it has a fixed size, so that transcripts are reproducible.
     pub fn of_process() -> Screen {
         let plain = Screen { coloured: false, columns: 80, rows: 24 };
         if !std::io::stdout().is_terminal() {
@@ -78,21 +78,21 @@ impl Screen {
     }
 }
 
-/// See the module.
+/// The state of a session; it outlives the loaded model.
 pub struct SessionState {
     pub draft: Draft,
     /// Values of params.
     pub set: Vec<Setting>,
-    /// Folders besides the model's own in which files are looked for.
+    /// Folders that are searched besides the model's own.
     include: Vec<PathBuf>,
     pub settings: Settings,
     pub screen: Screen,
-    /// For completion.
+    /// Names for completion.
     pub names: Rc<RefCell<Names>>,
-    /// Files that this session has written, and may write again.
+    /// Files that this session has written and may overwrite.
     pub written: HashSet<PathBuf>,
-    /// Warnings that were shown, and those that will be, with what they are known by: much of what is missing while somebody
-    /// types is typed next, so these wait until the model is run.
+    /// Keys of warnings that were shown, and pending warnings with their keys. Warnings wait until the model is run, because
+    /// the next lines often resolve them.
     warned: HashSet<String>,
     waiting: Vec<(String, String)>,
 }
@@ -106,7 +106,7 @@ impl SessionState {
     /// Prints an answer.
     ///
     /// # Errors
-    /// If nobody reads it.
+    /// Standard output is closed or cannot be written.
     pub fn say(&self, text: &str) -> Result<(), CommandError> {
         let mut out = std::io::stdout().lock();
         out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(|error| {
@@ -117,13 +117,13 @@ impl SessionState {
         })
     }
 
-    /// Prints what is wrong.
+    /// Prints an error.
     pub fn complain(&self, text: &str) {
         let text = text.trim_end();
         crate::cli::common::tell(&format!("{text}\n"));
     }
 
-    /// What a terminal shows before a line.
+    /// The prompt of a terminal.
     pub fn prompt(&self, loaded: &LoadedModel) -> String {
         match loaded.time() {
             Some(t) => format!("t={}> ", brief(t, 6)),
@@ -131,14 +131,15 @@ impl SessionState {
         }
     }
 
-    /// Begins with no model at all.
-    pub fn begin_empty(&mut self) -> NextStep {
+    /// Begins without a model.
+    pub fn begin_empty(&mut self) -> Result<NextStep, CommandError> {
         (self.draft, self.set) = Default::default();
         self.warned.clear();
         self.waiting.clear();
-        let session = Session::from_text("typed", "initial string: ε", &[]).expect("an empty model is one");
+        let session = Session::from_text("typed", "initial string: ε", &[])
+            .map_err(|refused| self.refusal(&refused))?;
         *self.names.borrow_mut() = Names::of(&session.model, "");
-        NextStep::Model { session: Box::new(session), time: 0.0 }
+        Ok(NextStep::Model { session: Box::new(session), time: 0.0 })
     }
 
     /// Reads a model file.
@@ -152,7 +153,7 @@ impl SessionState {
         Ok(self.begin(session, 0.0))
     }
 
-    /// Reads the file again; what was typed since is gone.
+    /// Reads the file again; changes since then are lost.
     pub fn reload(&mut self, time: f64) -> Result<NextStep, CommandError> {
         let Some(path) = self.draft.path.clone() else {
             return Err(CommandError::new(
@@ -171,7 +172,7 @@ impl SessionState {
         Ok(self.begin(session, time))
     }
 
-    /// Reads a changed text, and keeps it if it is good.
+    /// Reads a changed text, and keeps it if it is valid.
     pub fn change(&mut self, change: TextChange, time: f64) -> Result<NextStep, CommandError> {
         let session = self.read(&change.text, &self.set)?;
         self.note_warnings(&session);
@@ -183,7 +184,7 @@ impl SessionState {
         Ok(self.begin(session, time))
     }
 
-    /// Takes the last change back.
+    /// Reverts the last change.
     pub fn undo(&mut self, time: f64) -> Result<NextStep, CommandError> {
         let Some(text) = self.draft.previous().map(str::to_owned) else {
             let set = if self.set.is_empty() { "" } else { "; params go back with `set`" };
@@ -207,12 +208,12 @@ impl SessionState {
     }
 
     fn read(&self, text: &str, set: &[Setting]) -> Result<Session, CommandError> {
-        // As long as there is no initial string, the empty one stands for it.
+        // Without an initial string the model has the empty one.
         let whole = match Draft::has_axiom(text) {
             true => text.to_owned(),
             false => format!("{text}\ninitial string: ε\n"),
         };
-        // A param that was set and is no more is no mistake of what was typed.
+        // Values of params that no longer exist are dropped.
         let declared = |setting: &&Setting| {
             // It may be declared in a file that the text includes.
             let mut entries = crate::syntax::outline::outline(text).into_iter();
@@ -246,7 +247,7 @@ impl SessionState {
         ))
     }
 
-    /// Remembers the warnings that were not shown before.
+    /// Keeps the warnings that were not shown before.
     fn note_warnings(&mut self, session: &Session) {
         self.waiting.clear();
         for warning in session.warnings.iter().take(MOST_SHOWN) {
@@ -258,7 +259,7 @@ impl SessionState {
         }
     }
 
-    /// Prints the warnings that wait.
+    /// Prints the pending warnings.
     pub fn warn(&mut self) {
         for (key, text) in std::mem::take(&mut self.waiting) {
             self.complain(&text);
@@ -266,7 +267,7 @@ impl SessionState {
         }
     }
 
-    /// All that is wrong with a text.
+    /// The errors of a text.
     pub fn refusal(&self, refused: &LoadError) -> CommandError {
         let wrong = |d: &&Diagnostic| d.severity == Severity::Error;
         let all: Vec<&Diagnostic> =

@@ -1,4 +1,4 @@
-//! Parameters given by values and by equations to be solved, and sums over what is attached: against exact answers.
+//! Parameters given by values and by equations, and sums over attached modules, against exact answers.
 
 use dlsys::sim::{Error, Method, Scheduler, Settings};
 

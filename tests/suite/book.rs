@@ -1,24 +1,24 @@
-//! The book in `docs/`, followed literally: what it lists runs, what it shows is what comes out.
+//! The book in `docs/`: its listings are run, and its outputs and pictures are compared with the results.
 //!
-//! Pages of one folder are followed one after another in one scratch folder, which holds a copy of `models/`.
-//! The first line of a fenced block says what it is:
+//! The pages of a folder are processed in order, in one scratch folder with a copy of `models/`.
+//! The info string of a fenced block determines its treatment:
 //!
-//! | block | what is done with it |
+//! | block | treatment |
 //! |---|---|
 //! | `dlsys NAME.dls` | a whole model: saved, checked without a warning, run to the end of its `frames` (or t = 1) and drawn |
 //! | `dlsys` | the same, not saved |
 //! | `dlsys fragment` | a part of a model: parsed |
 //! | `dlsys wrong NAME.dls` | a model with a mistake: saved; it is refused, or gets a warning |
-//! | `sh` | commands, a line each: those that begin with `dlsys` are run and must succeed |
+//! | `sh` | commands, one per line: those that begin with `dlsys` are run and must succeed |
 //! | `sh fails` | the last of them must fail with status 1 |
 //! | `sh unrun` | not run; subcommands and flags must be those of `--help` |
-//! | `repl` | a session, maybe with a model: lines that begin with `> ` or `  if` are typed, the others are the answers |
-//! | `output` | what the block of commands before it prints; a line `…` stands for any lines |
+//! | `repl` | a session, optionally with a model: lines that begin with `> ` or `  if` are input, the others are the expected answers |
+//! | `output` | the expected output of the preceding block of commands; a line `…` stands for any lines |
 //! | `KIND NAME.EXT` | any other file: saved |
 //! | `rust`, `lpy`, `cpfg`, `text`, `json` | nothing |
 //!
-//! A picture whose title names a file, `![…](x.png "stem/grid.png")`, is that file, as the commands before it made it. With
-//! `DLSYS_RENEW_GOLDEN=1` outputs and pictures are renewed; look at every difference.
+//! A picture whose title names a file, `![…](x.png "stem/grid.png")`, must equal that file as written by the preceding commands. With
+//! `DLSYS_RENEW_GOLDEN=1` outputs and pictures are renewed; review every difference.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};

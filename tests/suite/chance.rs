@@ -1,8 +1,8 @@
-//! Chance: times of events at a rate, draws and choices against their distributions; and that what is drawn depends on the
+//! Chance: times of events at a rate, draws and choices, compared with their distributions; random numbers depend on the
 //! seed, the lineage and the place in the text, and on nothing else.
 //!
-//! The seeds are fixed, so a test passes or fails for good. Bounds are those that a right distribution exceeds once in a
-//! thousand seeds.
+//! The seeds are fixed, so the tests are deterministic. A correct distribution exceeds the bounds for one seed in a
+//! thousand.
 
 use std::collections::HashMap;
 

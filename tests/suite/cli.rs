@@ -1,4 +1,4 @@
-//! The program as it is typed: output, files, exit status.
+//! The command line: output, files, exit status.
 
 use std::path::Path;
 use std::process::{Command, Output};

@@ -1,11 +1,11 @@
-//! What several tests need: scenes from strings written by hand, and models that are run.
+//! Helpers for several tests: scenes from strings written by hand, paths of models, and runs.
 
 use dlsys::model::Model;
 use dlsys::scene::Scene;
 use dlsys::tree::{Lineage, ModuleString};
 use dlsys::turtle;
 
-/// What the turtle draws for a string; the angle of a turn without a parameter is 45 degrees.
+/// The drawing of a string; the angle of a turn without a parameter is 45 degrees.
 pub fn scene(text: &str) -> Scene {
     let mut model = Model { angle: 45.0, ..Model::default() };
     let string = modules(&mut model, text);
@@ -75,7 +75,7 @@ pub fn plain(model: &Model, string: &ModuleString) -> Vec<Plain> {
     string.iter().map(|m| (model.kinds.get(m.kind).name.clone(), m.parameters.to_vec())).collect()
 }
 
-/// Reads a model that is expected to be good.
+/// Reads a model that must be valid.
 pub fn session(text: &str) -> dlsys::session::Session {
     dlsys::session::Session::from_text("test.dls", text, &[]).unwrap_or_else(|refused| {
         let all: String = refused.diagnostics.iter().map(|d| d.render(&refused.source, false)).collect();

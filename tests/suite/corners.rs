@@ -1,5 +1,5 @@
 //! Corners and jumps: conditions inside equations, values that come to rest on a boundary, knots of curves, modules that
-//! get several rules at one instant. Each case has an exact answer; most of them once gave another, or none.
+//! get several rules at one instant. Each case has an exact answer; most of them once failed.
 
 use dlsys::sim::{Method, Scheduler, Settings};
 

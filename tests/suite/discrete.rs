@@ -1,5 +1,5 @@
 //! Discrete rules: models of *The Algorithmic Beauty of Plants* (ABOP), chapter 1, against strings and counts that were
-//! found by other means, and what happens where steps meet continuous time.
+//! computed independently, and steps combined with continuous time.
 
 use std::collections::HashMap;
 

@@ -1,4 +1,4 @@
-//! Events of integrated values: what is found, what is not there, and what is said to be in doubt.
+//! Events of integrated values: those that are found, those that do not exist, and those that are reported as undecided.
 
 use dlsys::sim::{Error, Method, Settings};
 

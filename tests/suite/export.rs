@@ -1,7 +1,7 @@
-//! What the exporters write, read back by programs that are not ours, and compared with golden files.
+//! Files of the exporters, read back by independent libraries, and compared with golden files.
 //!
-//! The golden files under `tests/golden` are small enough to be read. To renew them after a change that is
-//! meant, run the tests with `DLSYS_RENEW_GOLDEN=1` and look at the difference.
+//! The golden files under `tests/golden` are small enough to be read. To renew them after an intended change,
+//! run the tests with `DLSYS_RENEW_GOLDEN=1` and review the difference.
 
 use std::collections::HashMap;
 

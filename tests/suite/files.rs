@@ -1,4 +1,4 @@
-//! Files that a model names: included texts and tables; where they are looked for, and what is said of them.
+//! Files that a model names: included texts and tables, where they are searched for, and the messages about them.
 
 use std::path::{Path, PathBuf};
 

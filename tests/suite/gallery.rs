@@ -1,9 +1,9 @@
-//! The error gallery: one small model per mistake in `tests/errors`, its message beside it.
+//! The error gallery: one small model per mistake in `tests/errors`, with its message beside it.
 //!
 //! `NAME.dls` is a mistake that reading finds; `warn_NAME.dls` gets a warning and passes; `run_NAME.dls`
 //! reads well and fails when it runs; `draw_NAME.dls` fails when it is drawn, and `warn_draw_NAME.dls` gets a warning
-//! there. `NAME.txt` is what a user sees. To renew the messages after a
-//! change that is meant, run the tests with `DLSYS_RENEW_GOLDEN=1`, and read every difference.
+//! there. `NAME.txt` is the message. To renew the messages after an
+//! intended change, run the tests with `DLSYS_RENEW_GOLDEN=1`, and review every difference.
 
 use dlsys::diagnostic::{Diagnostic, Severity, Source};
 use dlsys::scene::Scene;

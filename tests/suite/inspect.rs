@@ -1,4 +1,4 @@
-//! What `explain`, `--events` and `check --continuity` say of models.
+//! Output of `explain`, `--events` and `check --continuity`.
 
 use std::collections::BTreeMap;
 

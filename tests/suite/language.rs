@@ -1,4 +1,4 @@
-//! Text to model: the notation, its round trip, and input that means harm.
+//! From text to model: the notation, its round trip, and hostile input.
 
 use std::time::{Duration, Instant};
 

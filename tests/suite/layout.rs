@@ -1,7 +1,7 @@
-//! What `dlsys fmt` may not do to any text: lose a character, move a meaning, want a second pass.
+//! `dlsys fmt` must not lose a character, change the meaning of a text, or need a second pass.
 //!
-//! All models of the repository, the mistakes among them, and thousands of random changes of each: other texts than
-//! anybody would write, of which many still parse.
+//! The tests use all models of the repository, including the ones with mistakes, and many random changes of each, of which
+//! many still parse.
 
 use dlsys::diagnostic::Source;
 use dlsys::session::Session;

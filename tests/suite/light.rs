@@ -1,5 +1,5 @@
-//! The quick way against the general way: random models of formulas must give the same bits, the same log of events and the
-//! same errors, whichever frames are asked for.
+//! The fast path against the reference path: both must give the same bits, the same log of events and the same errors,
+//! whichever times are observed.
 
 use dlsys::session::Session;
 use dlsys::sim::Settings;

@@ -1,5 +1,5 @@
-//! Nothing runs away, nothing panics, nothing is half-written: runs without end, extreme numbers in every format, killed
-//! renders, full disks, little memory.
+//! Limits and robustness: runs that would not end, extreme numbers in every format, killed renders, full disks, little
+//! memory.
 
 use std::path::Path;
 use std::process::{Command, Output};

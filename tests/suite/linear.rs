@@ -1,5 +1,5 @@
-//! Neighbours with linear equations, as `auto` solves them, against closed forms: transport one way, what is left of a large
-//! start, stiff chains, growth, signs. Each at several tolerances, and to the same bits whatever else is looked at.
+//! Neighbours with linear equations, solved by `auto`, against closed forms: one-way transport, decay from a large
+//! start, stiff chains, growth, signs. Each at several tolerances, and with the same bits whichever times are observed.
 
 use dlsys::sim::{Method, Settings};
 

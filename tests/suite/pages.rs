@@ -1,4 +1,4 @@
-//! Markdown, as far as the tests of the book need it: fenced blocks, pictures, links and headings.
+//! A Markdown reader for the tests of the book: fenced blocks, pictures, links and headings.
 
 use std::path::{Path, PathBuf};
 

@@ -1,5 +1,4 @@
-//! Pictures as others see them: pixels at places that can be computed, sheets of several frames, and the flags of
-//! `render` that ask for them.
+//! Pictures: pixels at places that can be computed, sheets of several frames, and the flags of `render` for them.
 
 use crate::cli::{bad, good};
 use crate::common::scene;

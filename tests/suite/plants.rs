@@ -1,4 +1,4 @@
-//! The plants of the paper as models: in which order they flower, what jumps and what does not, how petals move.
+//! The plants of the paper: order of flowering, continuity, motion of petals, the gallery.
 
 use dlsys::model::Model;
 use dlsys::scene::{Patch, Point, Scene};

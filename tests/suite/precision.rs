@@ -1,5 +1,5 @@
 //! Digits that are easily lost, in time and in value: long waits before an event, growth from very little, limits and
-//! thresholds that almost coincide, instants that are shared, singularities.
+//! thresholds that almost coincide, shared instants, singularities.
 
 use dlsys::sim::{Error, Method, Settings};
 

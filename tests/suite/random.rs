@@ -1,9 +1,9 @@
-//! Random coupled models, solved by four ways that have little in common: with local repair and with one clock for all,
-//! by explicit methods of two orders and by an implicit one. Where two of them disagree by more than the tolerance allows,
-//! and none of them has said anything, one is wrong.
+//! Random coupled models, solved in four ways that have little in common: with local repair and with one clock for all,
+//! by explicit methods of two orders and by an implicit one. If two of them disagree by more than the tolerance allows
+//! without a warning or an error, one is wrong.
 //!
-//! A model follows from a number. `MODELS=10000 SEED=1 FIRST=0 VERBOSE=1 cargo test --release --test suite random -- --nocapture` tries more
-//! of them, and others.
+//! A model is determined by a number. `MODELS=10000 SEED=1 FIRST=0 VERBOSE=1 cargo test --release --test suite random -- --nocapture` tests more
+//! and other models.
 
 use dlsys::sim::{Method, Scheduler, Settings};
 use dlsys::tree::ModuleString;

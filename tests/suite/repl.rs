@@ -1,7 +1,7 @@
 //! The interactive session: transcripts of scripts, and a terminal with keys pressed.
 //!
-//! `tests/sessions/NAME.txt` is a script, `tests/golden/repl-NAME.txt` what comes of it, errors included. To renew the
-//! transcripts after a change that is meant, run the tests with `DLSYS_RENEW_GOLDEN=1`, and read every difference.
+//! `tests/sessions/NAME.txt` is a script, `tests/golden/repl-NAME.txt` its output, errors included. To renew the
+//! transcripts after an intended change, run the tests with `DLSYS_RENEW_GOLDEN=1`, and review every difference.
 
 use std::io::Write;
 use std::process::{Command, Stdio};

@@ -1,4 +1,5 @@
-//! Random access in time: whatever way a time is come to, the state is the one that a run to it gives, bit for bit.
+//! Random access in time: the state at a time is that of a run from the start, bit for bit, on whatever path the time is
+//! reached.
 
 use dlsys::replay::{Replay, Stop};
 use dlsys::session::Session;

@@ -1,4 +1,4 @@
-//! `dlsys report`: tables, files, plots; verdicts on what is wrong; hard cases.
+//! `dlsys report`: tables, files, plots; verdicts on wrong results; hard cases.
 
 use std::path::Path;
 use std::process::{Command, Output};

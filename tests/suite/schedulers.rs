@@ -1,4 +1,4 @@
-//! Who is solved again after an event, and who looks again at whom: cheap ways against plain ones.
+//! Re-integration and matching of contexts after events: the local algorithms against the global ones.
 
 use dlsys::sim::{Error, Method, Scheduler, Settings};
 use proptest::prelude::*;

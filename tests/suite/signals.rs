@@ -1,4 +1,4 @@
-//! What flows along branches: sums over children, right contexts with branches, times given in advance.
+//! Signals along branches: sums over attached modules, right contexts with branches, events at given times.
 
 use dlsys::sim::{Scheduler, Settings};
 

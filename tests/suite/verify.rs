@@ -1,7 +1,7 @@
-//! `dlsys run --verify` and `dlsys report --verify`: what passes, what fails and what is said of it.
+//! `dlsys run --verify` and `dlsys report --verify`: runs that pass, runs that fail, and the messages.
 
 use dlsys::sim::{Method, Settings};
-use dlsys::study::{Unverified, Verification, verify};
+use dlsys::study::{Error, Verification, verify};
 
 use crate::cli::dlsys;
 use crate::common::session;
@@ -232,7 +232,7 @@ fn not_verified_is_not_verified() {
     );
     let session = session("initial string: A(1)\nA(x): if x < 2 solve dx/dt = 1\n");
     let why = verify(&session, Settings::default(), &[3.0], 9.0, &mut |_| ()).expect_err("outside");
-    assert!(matches!(why, Unverified::Fault(_)));
+    assert!(matches!(why, Error::Run(_)));
     let (_folder, path) = model(CELLS);
     assert_eq!(run(&["run", &path, "--time-limit", "5"]).0, Some(2));
     assert_eq!(run(&["run", &path, "--seeds", "0..3", "--verify"]).0, Some(2));

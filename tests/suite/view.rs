@@ -1,4 +1,4 @@
-//! Pages that play a recording: what is in them, read back by a reader of its own, against the model run again.
+//! Pages that play a recording: their content, decoded independently, against the model run again.
 
 use std::fs;
 use std::io::Read;

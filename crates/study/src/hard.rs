@@ -1,37 +1,46 @@
 //! Runs hard cases and checks everything that they expect.
 
-use super::case::{Case, CaseError, Expectation, PlainModule, Within};
+use super::case::{Case, Expectation, PlainModule, Within};
+use super::error::Error;
 use super::record::{Driver, EarlyEnd, method_name};
 use dlsys_model::{KindId, Model};
 use dlsys_session::Session;
 use dlsys_sim::{self as sim, Event, Method, Settings, Simulation, Stats, brief};
 use dlsys_tree::ModuleString;
 
-/// How cases are run.
+/// Settings for running cases.
 #[derive(Clone, Debug)]
 pub struct HardPlan {
-    /// Instead of those that a case names.
+    /// Methods, instead of those of each case.
     pub methods: Option<Vec<Method>>,
+    /// Tolerances, instead of those of each case.
     pub tolerances: Option<Vec<f64>>,
-    /// Seconds after which a run is stopped and has failed.
+    /// Seconds after which a run is stopped and counts as failed.
     pub time_limit: f64,
 }
 
-/// A run of a case: what came of it.
+/// The result of one run of a case.
 #[derive(Clone, Debug)]
 pub struct CaseResult {
+    /// Name of the case.
     pub case: String,
+    /// Theme of the case.
     pub group: String,
+    /// Path or name of its file.
     pub file: String,
+    /// Method, as on the command line.
     pub method: &'static str,
+    /// Tolerance of the run.
     pub tolerance: f64,
     /// The largest error of a number, as the case measures it; None if no numbers were compared.
     pub error: Option<f64>,
-    /// The largest part that an error is of what is allowed.
+    /// The largest quotient of an error and the allowed error.
     pub ratio: Option<f64>,
+    /// Counts of work.
     pub stats: Stats,
+    /// Wall time in seconds.
     pub seconds: f64,
-    /// What is not as it should be; none: the run passes.
+    /// Expectations that are not met; the run passes if there are none.
     pub mismatches: Vec<Mismatch>,
 }
 
@@ -40,18 +49,21 @@ pub struct CaseResult {
 pub struct Mismatch {
     /// Line of the file.
     pub line: usize,
-    /// Where, and by how much.
+    /// The quantity, its time, and by how much it is off.
     pub what: String,
+    /// The expected value, as text.
     pub expected: String,
+    /// The value of the run, as text.
     pub found: String,
 }
 
 impl CaseResult {
+    /// True if all expectations are met.
     pub fn passes(&self) -> bool {
         self.mismatches.is_empty()
     }
 
-    /// The first thing that is wrong, in a few words.
+    /// The first mismatch and the number of the others, or `pass`.
     pub fn summary(&self) -> String {
         let Some(first) = self.mismatches.first() else { return "pass".to_owned() };
         let more = match self.mismatches.len() {
@@ -62,19 +74,15 @@ impl CaseResult {
     }
 }
 
-/// Runs a case with every method and tolerance. `watch` is told what is about to be done.
+/// Runs a case with every method and tolerance. `watch` is called before each run with a description of it.
 ///
 /// # Errors
 /// If the model cannot be read.
-pub fn run_case(
-    case: &Case,
-    plan: &HardPlan,
-    watch: &mut dyn FnMut(&str),
-) -> Result<Vec<CaseResult>, CaseError> {
+pub fn run_case(case: &Case, plan: &HardPlan, watch: &mut dyn FnMut(&str)) -> Result<Vec<CaseResult>, Error> {
     let session = Session::from_text(&case.file, &case.text, &case.settings).map_err(|refused| {
         let all = refused.diagnostics.iter().chain(&refused.settings);
         let message: String = all.map(|d| d.render(&refused.source, false)).collect();
-        CaseError { file: case.file.clone(), line: 0, message: message.trim_end().to_owned() }
+        Error::Case { file: case.file.clone(), line: 0, message: message.trim_end().to_owned() }
     })?;
     let mut rows = Vec::new();
     for &method in plan.methods.as_ref().unwrap_or(&case.methods) {
@@ -86,7 +94,7 @@ pub fn run_case(
     Ok(rows)
 }
 
-/// Goes through a run and compares.
+/// Compares a run with the expectations, time by time.
 struct Judge<'a> {
     case: &'a Case,
     model: &'a Model,
@@ -300,17 +308,17 @@ impl<'a> Judge<'a> {
         });
         let found = match &stop {
             None => "no error".to_owned(),
-            Some(EarlyEnd::Error(fault)) => format!("{}: {fault} ({})", fault_name(fault), fault.site().time),
+            Some(EarlyEnd::Error(fault)) => format!("{}: {fault} ({})", fault.name(), fault.site().time),
             Some(stop) => stop.to_string(),
         };
         match (&stop, wanted) {
             (None, None) => {}
             (Some(EarlyEnd::Error(fault)), Some((line, faults, t, within)))
-                if faults.contains(&fault_name(fault)) =>
+                if faults.contains(&fault.name()) =>
             {
                 if let Some(off) = self.check_number(fault.site().time, t, within) {
                     let expected = format!("{} at t = {t}", faults.join(" or "));
-                    self.miss(line, format!("time of {} is {off}", fault_name(fault)), expected, found);
+                    self.miss(line, format!("time of {} is {off}", fault.name()), expected, found);
                 }
             }
             (stop, Some((line, faults, t, _))) => {

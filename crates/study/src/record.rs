@@ -1,4 +1,4 @@
-//! One run of a model, with everything about it that can be compared or counted.
+//! One run of a model, with its states, productions and counts of work.
 
 use std::time::Instant;
 
@@ -6,7 +6,7 @@ use dlsys_session::Session;
 use dlsys_sim::{self as sim, Event, Method, Scheduler, Settings, Simulation, Stats, brief};
 use dlsys_tree::ModuleString;
 
-/// What a method is asked for.
+/// The setting that determines the accuracy of a method.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Accuracy {
     /// Error aimed at, relative to max(1, |value|).
@@ -18,7 +18,7 @@ pub enum Accuracy {
 }
 
 impl Accuracy {
-    /// The number alone.
+    /// The number, without its meaning.
     pub fn value(self) -> f64 {
         match self {
             Accuracy::Tolerance(x) | Accuracy::StepSize(x) | Accuracy::Slice(x) => x,
@@ -45,10 +45,12 @@ impl std::fmt::Display for Accuracy {
     }
 }
 
-/// A method and what it is asked for.
+/// A method and its accuracy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setup {
+    /// The method of integration.
     pub method: Method,
+    /// Its tolerance, step size or slice.
     pub accuracy: Accuracy,
 }
 
@@ -83,10 +85,15 @@ pub fn method_name(method: Method) -> &'static str {
 /// Why a run ended before its last time.
 #[derive(Clone, Debug)]
 pub enum EarlyEnd {
-    /// The run met an error.
+    /// The run ended with an error.
     Error(sim::Error),
-    /// It took too long: the time that it had come to, and the seconds that it was allowed.
-    Overtime { t: f64, limit: f64 },
+    /// The run was stopped because it took too long.
+    Overtime {
+        /// Time reached, in the model's unit.
+        t: f64,
+        /// Allowed wall time in seconds.
+        limit: f64,
+    },
 }
 
 impl std::fmt::Display for EarlyEnd {
@@ -100,21 +107,23 @@ impl std::fmt::Display for EarlyEnd {
     }
 }
 
-/// What came of a run.
+/// The result of a run.
 #[derive(Clone, Debug)]
 pub struct Record {
-    /// The structure at each time up to the end or to where it stopped.
+    /// The string at each observed time that was reached.
     pub states: Vec<ModuleString>,
-    /// All productions, in the order of time; empty if they were not asked for.
+    /// All productions, in the order of time; empty if they were not logged.
     pub events: Vec<Event>,
+    /// Counts of work.
     pub stats: Stats,
     /// Wall time from the initial string to the last state, in seconds.
     pub seconds: f64,
+    /// Why the run ended before its last time; `None` if it did not.
     pub stop: Option<EarlyEnd>,
 }
 
 impl Record {
-    /// True if two runs did the same in every number: then they are one method under two names.
+    /// True if two runs agree in every number, because two names chose the same method.
     pub fn is_same_run(&self, other: &Record) -> bool {
         let same_state = |a: &ModuleString, b: &ModuleString| {
             a.len() == b.len()
@@ -126,34 +135,35 @@ impl Record {
     }
 }
 
-/// A model, and what is to be seen of it.
+/// A model, and the times and limits of its runs.
 #[derive(Clone, Copy, Debug)]
 pub struct Task<'a> {
+    /// The model.
     pub session: &'a Session,
     /// Times to observe, increasing.
     pub times: &'a [f64],
     /// Seconds after which a run is stopped.
     pub limit: f64,
-    /// What it may take.
+    /// Settings of all runs but for method and accuracy, such as limits.
     pub base: Settings,
 }
 
-/// Brings a simulation on, and stops it when it takes too long.
+/// Advances a simulation, and stops it when it takes too long.
 pub(super) struct Driver {
     start: Instant,
-    /// Seconds that it may take.
+    /// Allowed wall time in seconds.
     limit: f64,
     /// Last time of the run.
     end: f64,
-    /// Where it has come to.
+    /// Time reached.
     t: f64,
-    /// Modules written only to look at the clock.
+    /// Modules of strings formed only to check the wall time.
     looked: usize,
 }
 
-/// A run looks at the clock so many times on its way, evenly in its own time.
+/// Number of checks of the wall time during a run, at equal intervals of simulated time.
 const LOOKS: f64 = 64.0;
-/// Unless it has written more modules than this for it: that would cost time itself.
+/// No more checks once they have formed this many modules, because they would distort the timing.
 const MOST_LOOKED: usize = 100_000;
 
 impl Driver {
@@ -166,7 +176,7 @@ impl Driver {
         self.start.elapsed().as_secs_f64()
     }
 
-    /// Goes to a time and writes the structure there. Looking on the way changes no result.
+    /// Advances to a time and forms the string there. The checks on the way change no result.
     pub fn go(
         &mut self,
         simulation: &mut Simulation<'_>,
@@ -196,7 +206,7 @@ impl<'a> Task<'a> {
         self.times.last().copied().unwrap_or(0.0)
     }
 
-    /// Runs, and keeps all states; with `log`, all productions too.
+    /// Runs, and keeps all states; with `log`, also all productions.
     pub fn record(&self, setup: Setup, log: bool) -> Record {
         let mut record = Record {
             states: Vec::with_capacity(self.times.len()),
@@ -215,7 +225,7 @@ impl<'a> Task<'a> {
         record
     }
 
-    /// Runs for the time that it takes, in seconds: states are written and dropped.
+    /// Wall time of a run in seconds; states are formed and dropped.
     pub fn time(&self, setup: Setup) -> f64 {
         self.run(setup, false, |_| ()).0
     }

@@ -1,5 +1,5 @@
-//! What is taken as the truth for a method: the closed form where there is one, otherwise the tightest run of
-//! another method, with an estimate of its own error from a third.
+//! The reference of a method: the closed form if the whole model has one, otherwise the run of another method with the
+//! tightest tolerance, with an estimate of its own error from a third method.
 
 use std::collections::BTreeMap;
 use std::rc::Rc;
@@ -10,32 +10,34 @@ use super::record::{Accuracy, Record, Setup, Task, method_name};
 use dlsys_session::Session;
 use dlsys_sim::Method;
 
-/// The tightest tolerance that can be asked for.
+/// The tightest tolerance of a simulation.
 pub(super) const TIGHTEST: f64 = 1e-13;
-/// A tight run may take so many times as long as a point of the study.
+/// Time limit of a tight run, relative to that of a point of the study.
 const PATIENCE: f64 = 3.0;
 
-/// True if `auto` solves the whole model exactly, so that it is the truth for all other methods.
+/// True if `auto` solves the whole model by formulas, so that it is the reference of all other methods.
 fn is_exact(session: &Session) -> bool {
     session.model.is_closed_form()
 }
 
-/// The truth for a method.
+/// The run against which a method is judged.
 #[derive(Clone, Debug)]
 pub struct Reference {
+    /// Method and accuracy of the run.
     pub setup: Setup,
+    /// The run.
     pub record: Rc<Record>,
-    /// Estimate of its error: how far the run that it was checked with is from it. 0 for a closed form;
-    /// None if they have no time in common before they differ in structure.
+    /// Estimate of its error, relative to max(1, |value|): the difference from a second run. 0 for a closed form;
+    /// `None` if the two differ in structure before the first observed time.
     pub error: Option<f64>,
-    /// The run that it was checked with, for people, and whether they disagree in structure.
+    /// Description of the second run, and whether the two differ in structure.
     pub check: String,
+    /// Whether the reference is a closed form, exact to rounding.
     pub is_closed_form: bool,
 }
 
 impl Reference {
-    /// Times closer than this to a production of the reference are not told apart, for a run with this
-    /// setup: ten tolerances.
+    /// The time within which productions of a run with this setup may be exchanged: ten tolerances.
     pub fn slack(setup: Setup) -> f64 {
         match setup.accuracy {
             Accuracy::Tolerance(tolerance) => 10.0 * tolerance,
@@ -57,7 +59,7 @@ impl std::fmt::Display for Reference {
     }
 }
 
-/// Tight runs of a model, made when they are first needed.
+/// Tight runs of a model, computed on first use.
 pub struct References<'a> {
     task: Task<'a>,
     /// Step of the tight runs of methods that have a fixed one.
@@ -74,11 +76,11 @@ impl<'a> References<'a> {
         References { task, step_size, exact: is_exact(task.session), runs: BTreeMap::new() }
     }
 
-    /// The truth for a method.
+    /// The reference of a method. If only the judged method itself reaches the last time, it is compared with itself, and
+    /// [`Reference::check`] says so.
     ///
     /// # Errors
-    /// If no method comes to the last time: why the one that should have did not. If it is the judged one
-    /// alone that does, it is compared with itself, and the reference says so.
+    /// If no method reaches the last time: why the preferred one did not.
     pub fn of(&mut self, judged: Method) -> Result<Reference, String> {
         if self.exact && judged != Method::Auto {
             let record = self.run(Method::Auto, false);

@@ -1,30 +1,34 @@
-//! How measures of many specimens are distributed, time by time.
+//! Distributions of measures over many specimens, at each observed time.
 
 use std::fmt::Write;
 
 use super::table::Table;
 use dlsys_sim::brief;
 
-/// The quantiles that are told.
+/// Probabilities of the quantiles in tables and plots.
 pub const QUANTILES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
 
 /// The distribution of a measure at one time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spread {
+    /// Time, in the model's unit.
     pub time: f64,
     /// Number of specimens.
     pub count: usize,
+    /// Arithmetic mean.
     pub mean: f64,
-    /// Of a sample: the square root of the sum of squares by one less than their number; 0 for a single specimen.
+    /// Sample standard deviation (divided by the number of specimens less one); 0 for a single specimen.
     pub deviation: f64,
+    /// Minimum.
     pub least: f64,
-    /// At [`QUANTILES`], between the two nearest values by proportion (Hyndman and Fan 1996, type 7).
+    /// Quantiles at [`QUANTILES`], by linear interpolation between the two nearest values (Hyndman and Fan 1996, type 7).
     pub quantiles: [f64; 5],
+    /// Maximum.
     pub most: f64,
 }
 
 impl Spread {
-    /// Of the values of all specimens, at least one, in any order.
+    /// The distribution of the values of all specimens, in any order. There must be at least one.
     pub fn new(time: f64, mut values: Vec<f64>) -> Spread {
         values.sort_by(f64::total_cmp);
         let n = values.len();
@@ -43,12 +47,13 @@ impl Spread {
 /// A measure over time.
 #[derive(Clone, Debug)]
 pub struct SpreadSeries {
-    /// As the measure is written.
+    /// The measure, as written on the command line.
     pub name: String,
+    /// Its distribution at each time, in the order of time.
     pub spreads: Vec<Spread>,
 }
 
-/// All measures for people, to six digits.
+/// A table of all measures as text, with six digits.
 pub fn spread_table(courses: &[SpreadSeries]) -> String {
     let mut out = String::new();
     for (i, course) in courses.iter().enumerate() {

@@ -1,29 +1,31 @@
 //! A work-precision study of one model: every method at every accuracy, with errors, wall times and counts.
 
 use super::compare::{Agreement, compare};
+use super::error::Error;
 use super::order::{nominal_order, observed_order};
 use super::record::{Accuracy, Setup, Task, method_name};
 use super::reference::{Reference, References};
 use dlsys_session::Session;
 use dlsys_sim::{Method, Stats};
 
-/// What is to be studied.
+/// The methods, accuracies and times of a study.
 #[derive(Clone, Debug)]
 pub struct Plan {
+    /// Methods to compare, in this order.
     pub methods: Vec<Method>,
-    /// For methods with step control.
+    /// Tolerances of methods with step control.
     pub tolerances: Vec<f64>,
-    /// For methods with a fixed step; None for powers of two that suit the model's span of time.
+    /// Step sizes of methods with a fixed step; `None` for [`Plan::default_step_sizes`].
     pub step_sizes: Option<Vec<f64>>,
-    /// For the scheduler `local`, by which modules that read neighbours are studied besides; None for ten powers of two.
+    /// Slices of the scheduler `local`, which is also studied if modules read neighbours; `None` for ten powers of two.
     pub slices: Option<Vec<f64>>,
     /// Times to observe, increasing; see [`default_times`].
     pub times: Vec<f64>,
-    /// Timed runs of a point, at least 1; fewer if together they take longer than a few seconds.
+    /// Timed runs of a point, at least 1; fewer if together they take more than 3 seconds.
     pub runs: usize,
-    /// Seconds that a single run may take.
+    /// Allowed wall time of a single run in seconds.
     pub time_limit: f64,
-    /// What a run may take.
+    /// Settings of all runs but for method and accuracy, such as limits.
     pub base: dlsys_sim::Settings,
 }
 
@@ -33,8 +35,8 @@ impl Plan {
         vec![1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11]
     }
 
-    /// Step sizes of a study that ends at `end`: powers of two, ten from about 64 steps to about 32,768. A
-    /// method of order 1 gets four more, or it would never come near to the answer.
+    /// Step sizes of a study that ends at `end`: ten powers of two, from about 64 steps to about 32,768. A
+    /// method of order 1 gets four more, because it converges slowly.
     pub fn default_step_sizes(end: f64, order: Option<u32>) -> Vec<f64> {
         let largest = if end > 0.0 { (end / 64.0).log2().round() } else { 0.0 };
         let count = if order == Some(1) { 14 } else { 10 };
@@ -58,9 +60,13 @@ pub fn default_times(session: &Session) -> Option<Vec<f64>> {
 /// Wall time of several runs, in seconds.
 #[derive(Clone, Copy, Debug)]
 pub struct Wall {
+    /// Median.
     pub median: f64,
+    /// Shortest run.
     pub min: f64,
+    /// Longest run.
     pub max: f64,
+    /// Number of runs.
     pub runs: usize,
 }
 
@@ -80,7 +86,7 @@ impl Wall {
 }
 
 impl Plan {
-    /// How often [`study`] tells what it is about to do, if nothing is left out.
+    /// Number of calls of `watch` in [`study`], if no point is left out.
     pub fn points(&self, session: &Session) -> usize {
         let steps = |given: &Option<Vec<f64>>, order| {
             given.as_ref().map_or_else(|| Plan::default_step_sizes(1.0, order).len(), Vec::len)
@@ -94,28 +100,31 @@ impl Plan {
     }
 }
 
-/// What neighbours do matters only if somebody reads them.
+/// True if some rule reads the parameters of neighbours.
 fn reads_context(session: &Session) -> bool {
     session.model.rules.iter().any(|rule| rule.reads_context)
 }
 
-/// What came of a point.
+/// The result of a point.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// Largest error over all times and parameters, relative to max(1, |value|); over the times before the
     /// first difference if productions differ. None if there is no such time.
     pub error: Option<f64>,
+    /// Whether the structure is that of the reference.
     pub agreement: Agreement,
+    /// Wall time.
     pub wall: Wall,
-    /// Counts of the run; `modules` is what was there at the end.
+    /// Counts of work; `modules` is the number at the end.
     pub stats: Stats,
 }
 
 /// A method at one accuracy.
 #[derive(Clone, Debug)]
 pub struct Point {
+    /// Tolerance, step size or slice.
     pub accuracy: Accuracy,
-    /// What came of it, or, if it was left out, the seconds that it would have taken.
+    /// The result, or, if the point was left out, its estimated wall time in seconds.
     pub result: Result<Outcome, f64>,
 }
 
@@ -125,13 +134,18 @@ const LOCAL: &str = "local";
 /// All points of a method, or of the scheduler `local` (with the method `auto`).
 #[derive(Clone, Debug)]
 pub struct Series {
+    /// The method.
     pub method: Method,
+    /// Its name as on the command line, or `local`.
     pub name: &'static str,
-    /// Order by the books, and as observed: error against step size or, with step control, against
-    /// evaluations of the right-hand side; of `local` against the length of the slice.
+    /// Order of convergence according to the literature; see [`nominal_order`].
     pub order: Option<u32>,
+    /// Observed order: error against step size, against slice or, with step control, against evaluations of the
+    /// right-hand side; see [`observed_order`].
     pub observed: Option<f64>,
+    /// The run against which the errors are measured.
     pub reference: Reference,
+    /// Its points, in the order of increasing work.
     pub points: Vec<Point>,
 }
 
@@ -140,31 +154,35 @@ pub struct Series {
 pub struct Study {
     /// Name for files.
     pub name: String,
+    /// Title of the model, or the name of its file.
     pub title: String,
+    /// Observed times, increasing.
     pub times: Vec<f64>,
-    /// Productions and modules at the end, according to the reference.
+    /// Number of productions of the reference.
     pub events: u64,
+    /// Number of modules of the reference at the end.
     pub modules: u64,
     /// Timed runs of a point, at most.
     pub runs: usize,
+    /// The results of each method.
     pub series: Vec<Series>,
 }
 
 /// No more timed runs of a point once they have taken so many seconds.
 const LONG: f64 = 3.0;
 
-/// Makes all runs. `watch` is told what is about to be done; `done` gets each method's series when it is
-/// there, with the study so far.
+/// Makes all runs of a study. `watch` is called before each point with a description of it, `done` after each method
+/// with the study so far.
 ///
 /// # Errors
-/// If there is no reference, because no method comes to the last time: why.
+/// [`Error::NoReference`] if no method reaches the last time.
 pub fn study(
     session: &Session,
     name: &str,
     plan: &Plan,
     watch: &mut dyn FnMut(&str),
     done: &mut dyn FnMut(&Study),
-) -> Result<Study, String> {
+) -> Result<Study, Error> {
     let task = Task { session, times: &plan.times, limit: plan.time_limit, base: plan.base };
     let steps = Plan::default_step_sizes(task.end(), None);
     let mut references = References::new(task, steps.last().copied().unwrap_or(1.0) / 2.0);
@@ -181,7 +199,7 @@ pub fn study(
     let all = plan.methods.iter().map(|&method| (method, method_name(method))).chain(local);
     for (method, name) in all {
         watch(&format!("{name}: reference"));
-        let reference = references.of(method)?;
+        let reference = references.of(method).map_err(Error::NoReference)?;
         if study.series.is_empty() {
             (study.events, study.modules) = (reference.record.stats.events, reference.record.stats.modules);
         }

@@ -1,4 +1,4 @@
-//! What a transition does to the drawing: turtles before and after, and how fast they go.
+//! The jump of the drawing at a production: positions, directions, lengths and their speeds on both sides.
 
 use crate::model::Model;
 use crate::scene::{Patch, Point, Scene, Vector};
@@ -6,37 +6,37 @@ use crate::sim::{ModuleState, Transition};
 use crate::tree::{Lineage, ModuleString};
 use crate::turtle::{self, Error};
 
-/// Part of a time scale over which speeds are taken.
+/// Step of the difference quotients for speeds, relative to the time scale.
 const PROBE: f64 = 1e-5;
 /// Speeds below this part of (size / time scale) are rounding of the difference quotient: some units of 1e-16/[`PROBE`].
 const NOISE: f64 = 1e-9;
 
-/// One side of a quantity, or both sides' difference.
+/// A quantity before and after a production, and its jump.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sides {
     pub before: f64,
     pub after: f64,
-    /// Size of the difference; of vectors, of the vector of difference.
+    /// Absolute value of the difference; for vectors, norm of the difference.
     pub jump: f64,
 }
 
-/// What a production does at one instant. Lengths in scene units, angles in degrees, speeds per unit of time.
+/// The jump at a production. Lengths in scene units, angles in degrees, speeds per unit of time.
 #[derive(Clone, Copy, Debug)]
 pub struct Jump {
     pub time: f64,
-    /// The largest length on either side, against which positions and lengths are judged.
+    /// The largest length on either side, the scale of positions and lengths.
     pub size: f64,
-    /// Of the turtle that leaves.
+    /// Position of the turtle at the end.
     pub position: Sides,
-    /// Of its heading; 0 where nothing follows.
+    /// Its heading; 0 if nothing is drawn after it.
     pub heading: Sides,
-    /// About its heading; 0 where nothing follows.
+    /// Its roll about the heading; 0 if nothing is drawn after it.
     pub roll: Sides,
-    /// Of all lines and outlines, and the sizes of surfaces.
+    /// Total length of lines and outlines, plus the sizes of surfaces.
     pub length: Sides,
-    /// None if the rates before are not known.
+    /// `None` if the rates before are unknown.
     pub speeds: Option<Speeds>,
-    /// Further productions of the same instant that are in this.
+    /// Number of further productions of the same instant that are included.
     pub cascade: usize,
 }
 
@@ -48,7 +48,7 @@ pub struct Speeds {
     pub length: Sides,
 }
 
-/// A drawing, as far as it matters.
+/// The measured properties of a drawing.
 #[derive(Clone, Copy)]
 struct Measurement {
     position: Point,
@@ -64,7 +64,7 @@ struct Motion {
     length: f64,
 }
 
-/// Draws modules on trial.
+/// Draws modules to measure their drawing.
 pub struct DrawingProbe<'m> {
     model: &'m Model,
     string: ModuleString,
@@ -126,7 +126,7 @@ impl<'m> DrawingProbe<'m> {
         })
     }
 
-    /// Rates at an instant by a one-sided difference quotient of second order; negative `h` measured back.
+    /// Rates at an instant by a one-sided difference quotient of second order; a negative `h` looks backwards in time.
     fn motion(&mut self, stands: &[ModuleState], time: f64, h: f64) -> Result<Motion, Error> {
         let measured = [
             self.measure(stands, time, 0.0)?,
@@ -144,7 +144,7 @@ impl<'m> DrawingProbe<'m> {
         })
     }
 
-    /// Draws modules as they are `tau` from now, from a turtle that measured up.
+    /// Draws modules, extrapolated by the time `tau`, with a turtle that heads up.
     fn measure(&mut self, stands: &[ModuleState], time: f64, tau: f64) -> Result<Measurement, Error> {
         self.string.reset(time + tau);
         for stand in stands {
@@ -167,7 +167,7 @@ impl<'m> DrawingProbe<'m> {
     }
 }
 
-/// A time in which no parameter changes by much more than itself, at most 1.
+/// A time in which no parameter changes by much more than its size, at most 1.
 fn time_scale<'s>(stands: impl Iterator<Item = &'s ModuleState>) -> f64 {
     stands
         .flat_map(|stand| stand.values.iter().zip(&stand.rates))

@@ -1,8 +1,8 @@
-//! `dlsys check --continuity`: productions that can be seen.
+//! `dlsys check --continuity`: productions at which the drawing jumps.
 //!
 //! "Correctly specified productions satisfy continuity criteria, which means that they conserve physical entities
 //! such as shape, mass, and velocity of modules" (paper, section 4.1; Prusinkiewicz and Lindenmayer 1990, chapter 6).
-//! A model is run, and every production that fires is judged by what it does to the drawing.
+//! A model is run, and for every production the drawings just before and just after are compared.
 //!
 //! ```text
 //! Simulation ──Transition──▶ measure (turtle before, turtle after, speeds) ──Jump──▶ report (worst of each production)
@@ -21,9 +21,9 @@ use crate::tree::ModuleString;
 use measure::DrawingProbe;
 use report::{Report, Verdict};
 
-/// Pieces of the time range after which the log of events is emptied.
+/// Number of parts of the time range; the log of events is emptied after each.
 const PIECES: usize = 256;
-/// More modules than this are an error: each that is made leaves a record until the end of a piece.
+/// More modules than this are an error, because each new module leaves a record until the end of a part.
 const MAX_MODULES: usize = 1_000_000;
 
 /// Runs a model and reports on the continuity of its productions.
@@ -32,25 +32,20 @@ pub fn check(args: &CheckArgs, session: &Session) -> Result<(), Failure> {
     let end = args.to.or(model.frames.map(|frames| frames.to)).ok_or_else(|| {
         Failure::Usage("error: the model has no `frames`: say how far to run it with `--to T`\n".to_owned())
     })?;
-    // What is located or integrated must be known better than jumps are told from none.
+    // Events and values must be more accurate than the threshold for jumps.
     let tolerance = (args.tolerance / 100.0).clamp(1e-12, 1e-4);
     let settings = {
         let given = args.budget.settings();
         let max_modules = given.max_modules.min(MAX_MODULES);
         Settings { tolerance, max_modules, log: true, transitions: true, ..given }
     };
-    let fault =
-        |error: &crate::sim::Error| Failure::Model(error.diagnostic().render(&session.source, coloured()));
-    let mut simulation = session.simulate(settings).map_err(|error| fault(&error))?;
+    let mut simulation = session.simulate(settings).map_err(|error| fault(session, &error))?;
     let mut report = Report::new(session, end, args.tolerance);
     let result = observe(&mut simulation, session, end, &mut report);
-    // What happened before an error is reported before the error.
+    // The findings before an error are reported before the error.
     let (text, worst) = report.show();
     std::io::stdout().write_all(text.as_bytes()).map_err(out_error)?;
-    result.map_err(|error| match error {
-        Trouble::Run(error) => fault(&error),
-        Trouble::Drawing(message) => Failure::Model(message),
-    })?;
+    result?;
     match args.deny {
         Some(Order::C0) if worst == Verdict::Discontinuous => denied("C0"),
         Some(Order::C1) if worst != Verdict::C1 => denied("C1"),
@@ -58,13 +53,12 @@ pub fn check(args: &CheckArgs, session: &Session) -> Result<(), Failure> {
     }
 }
 
-fn denied(order: &str) -> Result<(), Failure> {
-    Err(Failure::Model(format!("error: not every production is {order}, which `--deny` asks for\n")))
+fn fault(session: &Session, error: &crate::sim::Error) -> Failure {
+    Failure::Model(error.diagnostic().render(&session.source, coloured()))
 }
 
-enum Trouble {
-    Run(crate::sim::Error),
-    Drawing(String),
+fn denied(order: &str) -> Result<(), Failure> {
+    Err(Failure::Model(format!("error: not every production is {order}, which `--deny` asks for\n")))
 }
 
 fn observe(
@@ -72,7 +66,7 @@ fn observe(
     session: &Session,
     end: f64,
     report: &mut Report,
-) -> Result<(), Trouble> {
+) -> Result<(), Failure> {
     let mut probe = DrawingProbe::new(&session.model);
     let mut string = ModuleString::default();
     for piece in 0..=PIECES {
@@ -81,10 +75,10 @@ fn observe(
             let jump = event.transition.as_ref().map(|transition| probe.jump(event.time, transition));
             let jump = jump
                 .transpose()
-                .map_err(|error| Trouble::Drawing(format!("error: at t = {}: {error}\n", event.time)))?;
+                .map_err(|error| Failure::Model(format!("error: at t = {}: {error}\n", event.time)))?;
             report.add(&event, jump);
         }
-        done.map_err(Trouble::Run)?;
+        done.map_err(|error| fault(session, &error))?;
     }
     Ok(())
 }

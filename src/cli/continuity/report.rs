@@ -1,4 +1,4 @@
-//! The worst that each production did, and a verdict.
+//! The largest jumps of each production, and a verdict.
 
 use std::fmt::Write;
 
@@ -6,15 +6,15 @@ use super::measure::{Jump, Sides};
 use crate::session::Session;
 use crate::sim::{Event, brief};
 
-/// Sizes and speeds below this part of the largest in the run are judged against that.
+/// Smallest scale of sizes and speeds, relative to the largest in the run.
 const FLOOR: f64 = 1e-3;
 
-/// What can be said of a production.
+/// Continuity of a production.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Verdict {
     /// Neither the drawing nor its speed jumps.
     C1,
-    /// Its speed does.
+    /// Only the speed jumps.
     C0,
     Discontinuous,
 }
@@ -24,33 +24,33 @@ pub struct Report<'s> {
     session: &'s Session,
     end: f64,
     tolerance: f64,
-    /// Per rule and clause.
+    /// Findings for each rule and clause.
     productions: Vec<Vec<Production>>,
-    /// What each quantity is judged against at least.
+    /// Smallest scale of each quantity.
     floors: [f64; 7],
 }
 
 #[derive(Clone, Default)]
 struct Production {
     fired: usize,
-    /// Times that it went on with what another had made at the same instant.
+    /// Number of times that it replaced a module made at the same instant.
     followed_on: usize,
-    /// Times that there was no speed before it.
+    /// Number of times without a speed before it.
     without_speed: usize,
-    /// Most productions of one instant that were taken together with it.
+    /// Largest number of productions of one instant that were taken together with it.
     cascade: usize,
-    /// Those that may turn out to be jumps.
+    /// Candidates for jumps.
     jumps: Vec<Jump>,
 }
 
 /// The quantities that are compared, in the order of the report.
 const NAMES: [&str; 7] =
     ["position", "heading", "roll", "length", "speed of position", "speed of direction", "speed of length"];
-/// The first of the speeds.
+/// Index of the first speed.
 const FIRST_SPEED: usize = 4;
 const UNITS: [&str; 7] = ["", "°", "°", "", "", "°", ""];
 
-/// The same, of one jump.
+/// The values of these quantities for one jump.
 fn quantities(jump: &Jump) -> [Option<Sides>; 7] {
     let Jump { position, heading, roll, length, speeds, .. } = *jump;
     let [p, d, l] = match speeds {
@@ -60,7 +60,7 @@ fn quantities(jump: &Jump) -> [Option<Sides>; 7] {
     [Some(position), Some(heading), Some(roll), Some(length), p, d, l]
 }
 
-/// What a quantity's jump is relative to, unless that is too small: lengths on both sides, or speeds.
+/// The scale of the jump of a quantity, unless it is too small: the larger length, or the larger speed.
 fn size(jump: &Jump, quantity: usize, sides: Sides) -> f64 {
     match quantity {
         0 | 3 => jump.size,
@@ -81,14 +81,14 @@ impl<'s> Report<'s> {
     pub fn new(session: &'s Session, end: f64, tolerance: f64) -> Report<'s> {
         let rules = &session.model.rules;
         let productions = rules.iter().map(|rule| vec![Production::default(); rule.produces.len()]).collect();
-        // Angles are judged in radians.
+        // Jumps of angles are in radians.
         let radian = 1f64.to_degrees();
         let mut floors = [f64::MIN_POSITIVE; 7];
         (floors[1], floors[2]) = (radian, radian);
         Report { session, end, tolerance, productions, floors }
     }
 
-    /// Enters an event, and what it did unless that is in the jump of another.
+    /// Adds an event, and its jump unless that is included in the jump of another event.
     pub fn add(&mut self, event: &Event, jump: Option<Jump>) {
         let production = &mut self.productions[event.rule][event.clause];
         production.fired += 1;
@@ -105,7 +105,7 @@ impl<'s> Report<'s> {
             self.floors[i] = self.floors[i].max(FLOOR * size);
             seen |= sides.jump > self.tolerance * size.max(f64::MIN_POSITIVE);
         }
-        // What is none against its own size is none against a larger one.
+        // A jump that is negligible on its own scale is negligible on a larger one.
         if seen {
             production.jumps.push(jump);
         }
@@ -117,7 +117,7 @@ impl<'s> Report<'s> {
             for (i, sides) in quantities(jump).into_iter().enumerate() {
                 let Some(sides) = sides else { continue };
                 let relative = sides.jump / size(jump, i, sides).max(self.floors[i]);
-                // Of jumps that are the same but for rounding, the first is named.
+                // Of jumps that are equal up to rounding, the first is reported.
                 let more = worst[i].is_none_or(|w: Worst| relative > w.relative * (1.0 + 1e-6));
                 if more {
                     worst[i] = Some(Worst { sides, relative, time: jump.time });
@@ -182,7 +182,7 @@ impl<'s> Report<'s> {
             let Some(w) = worst[i].filter(|w| w.relative > self.tolerance) else { continue };
             let Sides { before, after, jump } = w.sides;
             let unit = UNITS[i];
-            // A place has no size that would say anything.
+            // The norm of a position is not informative.
             let sides = match i {
                 0..=2 => String::new(),
                 _ => format!("{}{unit} -> {}{unit}", brief(before, 5), brief(after, 5)),

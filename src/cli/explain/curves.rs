@@ -1,4 +1,4 @@
-//! What `explain` says of curves and tables.
+//! `explain`: curves and tables.
 
 use serde::Serialize;
 
@@ -17,7 +17,7 @@ pub struct CurvePlan {
     pub least: f64,
     pub greatest: f64,
     pub periodic: bool,
-    /// It rises throughout, or falls throughout.
+    /// Whether it is strictly monotone, so that it has an inverse.
     pub inverse: bool,
     #[serde(skip)]
     rises: bool,

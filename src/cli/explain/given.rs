@@ -1,10 +1,10 @@
-//! Parameters that have a value or an equation instead of a rate: how they are found.
+//! `explain`: parameters with a value or an equation instead of a rate.
 
 use super::plan::{Facts, ParameterPlan};
 use super::words::{list, variable};
 use crate::model::{Rule, Solve};
 
-/// What is said of one, by its place among the algebraic parameters of its clause.
+/// The class of a parameter and its reason, by its index among the algebraic parameters of its clause.
 pub fn parameter(facts: &Facts, rule: &Rule, solve: &Solve, place: usize) -> ParameterPlan {
     let algebraic = &solve.algebraic;
     let parameter = algebraic.of[place];

@@ -1,9 +1,9 @@
-//! `dlsys explain`: how much work each equation and each condition of a model is, and why; as a database explains
-//! the plan of a query.
+//! `dlsys explain`: how each equation and each condition of a model is solved, and why, comparable to the query plan of a
+//! database.
 //!
 //! ```text
-//! Model (classes found by model::analyse) ──plan──▶ Explanation ──▶ text, for people
-//!                                            words             JSON, for programs
+//! Model (classes found by model::analyse) ──plan──▶ Explanation ──▶ text
+//!                                            words             JSON
 //! ```
 //!
 //! # JSON
@@ -13,15 +13,15 @@
 //!   or `coupled`; `rules` are positions in the list `rules`; `drawn_only` the parameters that only drawing reads.
 //! - `rules`: `{head, line, kinds, solves, produces, conditions}`;
 //!   - a solve is `{line, condition, parameters}`, a parameter `{name, class, law, why, reads}`; `class` is `constant`,
-//!     `closed form`, `local`, `coupled and linear` or `coupled`, or, of one that has no rate but a value or an equation,
+//!     `closed form`, `local`, `coupled and linear` or `coupled`, or, for a parameter with a value or an equation instead of a rate,
 //!     `explicit formula`, `explicit` or `implicit`; `law` is the form of the solution, or null;
 //!   - a produce is `{line, condition}`;
-//!   - a condition is `{boundary, line, decides, found}`: `decides` says of which clauses (`{clause, line}`), `found`
+//!   - a condition is `{boundary, line, decides, found}`: `decides` names the clauses (`{clause, line}`), `found`
 //!     how its instant is found under each `solve`: `{line, class, why}`, line null if the rule has none; `class` is
 //!     `nothing to find`, `never met`, `closed-form time`, `root on a closed form` or `root on dense output`.
 //! - `curves`: a list of `{name, sort, points, from, to, least, greatest, periodic, inverse}`; `sort` is `linear`,
-//!   `monotone` or `spline`; `from` and `to` are arguments, `least` and `greatest` values; `inverse` tells that it rises
-//!   throughout, or falls throughout;
+//!   `monotone` or `spline`; `from` and `to` are arguments, `least` and `greatest` values; `inverse` tells whether it is strictly
+//!   monotone;
 //! - `summary`: names of kinds by `work`, and `closed_form`: true if nothing is ever integrated numerically.
 
 mod curves;
@@ -39,12 +39,12 @@ use super::common::{Failure, open, out_error};
 use super::shared::TextFormat;
 use crate::session::Session;
 
-/// Prints the classes of work of a model.
+/// Prints the explanation of a model.
 pub fn explain(args: &ExplainArgs) -> Result<(), Failure> {
     show(args, &open(&args.model, &args.settings, &args.include)?)
 }
 
-/// The same of a model that was read.
+/// Prints the explanation of a model that has been read.
 pub fn show(args: &ExplainArgs, session: &Session) -> Result<(), Failure> {
     let plan = plan::Explanation::new(session);
     let shown = match args.format {

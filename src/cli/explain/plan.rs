@@ -1,4 +1,4 @@
-//! The classes of a model, collected for printing.
+//! The explanation of a model, as data for printing.
 
 use serde::Serialize;
 
@@ -8,7 +8,7 @@ use crate::diagnostic::Source;
 use crate::model::{Class, Condition, DRAWN_WORDS, Kind, Law, Model, Produce, Rule, Solve, ZeroCrossing};
 use crate::session::Session;
 
-/// Everything that is said about a model. Field names are those of the JSON.
+/// The explanation of a model. Field names are those of the JSON.
 #[derive(Serialize)]
 pub struct Explanation {
     pub model: String,
@@ -26,12 +26,12 @@ pub struct KindPlan {
     pub work: Work,
     pub rules: Vec<usize>,
     pub drawn_only: Vec<String>,
-    /// The turtle does something for it.
+    /// Whether the turtle interprets it.
     #[serde(skip)]
     pub is_drawn: bool,
 }
 
-/// How the modules of a kind go through time.
+/// How the modules of a kind develop in time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum Work {
     /// It never changes.
@@ -62,9 +62,9 @@ pub struct RulePlan {
 #[derive(Serialize)]
 pub struct ClausePlan {
     pub line: usize,
-    /// As it is written, on one line, with the rate of an event at a rate; empty for always.
+    /// The condition as written, on one line, with the rate of an event at a rate; empty if there is none.
     pub condition: String,
-    /// Of a production: how many successors it has to choose from.
+    /// For a production, its number of successors.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub successors: Option<usize>,
 }
@@ -80,10 +80,10 @@ pub struct SolvePlan {
 pub struct ParameterPlan {
     pub name: String,
     pub class: &'static str,
-    /// The form of the solution, if it has one.
+    /// The form of the solution, if there is a formula.
     pub law: Option<String>,
     pub why: String,
-    /// What its rate reads: parameters, `t`, `age`.
+    /// The names that its rate reads: parameters, `t`, `age`.
     pub reads: Vec<String>,
 }
 
@@ -95,7 +95,7 @@ pub struct ConditionPlan {
     pub found: Vec<FoundPlan>,
 }
 
-/// A clause that a condition decides on.
+/// A clause that depends on a condition.
 #[derive(Clone, PartialEq, Serialize)]
 pub struct Use {
     pub clause: &'static str,
@@ -104,7 +104,7 @@ pub struct Use {
 
 #[derive(Serialize)]
 pub struct FoundPlan {
-    /// Of the `solve` that is active.
+    /// Line of the active `solve`.
     pub line: Option<usize>,
     pub class: &'static str,
     pub why: String,
@@ -120,11 +120,11 @@ pub struct Summary {
     pub closed_form: bool,
 }
 
-/// What the plan is made from.
+/// Input of the explanation.
 pub struct Facts<'m> {
     pub model: &'m Model,
     source: &'m Source,
-    /// Per kind.
+    /// For each kind.
     work: Vec<Work>,
 }
 
@@ -156,7 +156,7 @@ impl Explanation {
                 arity: kind.arity,
                 work,
                 rules: kind.rules.clone(),
-                // Of a kind without rules nothing is evaluated, drawn or not.
+                // A kind without rules has nothing to evaluate.
                 drawn_only: if kind.rules.is_empty() { Vec::new() } else { drawn_only.collect() },
             });
         }
@@ -171,7 +171,7 @@ impl Explanation {
     }
 }
 
-/// Names of a kind's parameters as its first rule has them.
+/// Names of a kind's parameters in its first rule.
 fn parameter_names(model: &Model, kind: &Kind) -> Vec<String> {
     kind.rules.first().map_or_else(Vec::new, |rule| model.rules[*rule].parameters[..kind.arity].to_vec())
 }
@@ -254,7 +254,7 @@ impl Facts<'_> {
         }
     }
 
-    /// The condition of a clause as it is written, on one line.
+    /// The condition of a clause as written, on one line.
     fn guard(&self, clause: crate::diagnostic::Span) -> String {
         let lines = self.source.slice(clause).lines().map(|line| line.split('#').next().unwrap_or(""));
         let text = lines.collect::<Vec<_>>().join(" ");
@@ -304,7 +304,7 @@ impl Facts<'_> {
             .collect()
     }
 
-    /// What an atom decides, and how its instant is found.
+    /// The clauses that depend on an atom, and how its instant is located.
     fn condition(&self, rule: &Rule, atom: usize) -> ConditionPlan {
         let mentions = |condition: &Condition| condition.atoms().any(|(a, _)| a == atom);
         let mut decides = Vec::new();
@@ -323,7 +323,7 @@ impl Facts<'_> {
             let (class, why) = self.watch(rule, solve, atom);
             FoundPlan { line: solve.map(|s| self.line(rule.solves[s].span.start)), class, why }
         };
-        // A module without an active clause is an error where there are clauses.
+        // With clauses, a module without an active one is an error.
         let found = match rule.solves.len() {
             0 => vec![found(None)],
             n => (0..n).map(|solve| found(Some(solve))).collect(),
@@ -342,7 +342,7 @@ impl Facts<'_> {
         self.clock(rule, variable).or_else(|| words::variable(rule, variable))
     }
 
-    /// What the clock of an event at a rate is called, if a variable is one.
+    /// The name of the clock of an event at a rate, if a variable is one.
     fn clock(&self, rule: &Rule, variable: usize) -> Option<String> {
         let clock = rule.clocks.iter().find(|clock| clock.parameter == variable)?;
         Some(format!("clock of line {}", self.line(rule.produces[clock.produce].span.start)))

@@ -1,4 +1,4 @@
-//! The plan as text of at most 100 columns.
+//! The explanation as text of at most 100 columns.
 
 use std::fmt::Write;
 
@@ -19,7 +19,7 @@ impl Table {
         let left = indent + widths[0] + widths[1] + 4;
         for [a, b, c] in &self.0 {
             let mut line = format!("{:indent$}{}  {}", "", padded(a, widths[0]), padded(b, widths[1]));
-            // What does not fit beside a long entry goes below it.
+            // Below a long entry, if there is no space beside it.
             if line.chars().count() > left - 2 {
                 let _ = writeln!(out, "{}", line.trim_end());
                 line = " ".repeat(left - 2);
@@ -42,7 +42,7 @@ fn padded(text: &str, width: usize) -> String {
     text.to_owned() + &" ".repeat(width.saturating_sub(text.chars().count()))
 }
 
-/// A line that is cut where the page ends.
+/// A line, wrapped at the width of the page.
 fn line(text: &str, out: &mut String) {
     if text.chars().count() > COLUMNS {
         out.extend(text.chars().take(COLUMNS - 1).chain(['…']));
@@ -101,7 +101,7 @@ fn rule(rule: &RulePlan, out: &mut String) {
     }
 }
 
-/// A row for each way in which the instant is found.
+/// A row for each method by which the instant is located.
 fn condition(condition: &ConditionPlan) -> Vec<[String; 3]> {
     let mut rows: Vec<(Vec<usize>, &str, &str)> = Vec::new();
     for found in &condition.found {
@@ -121,7 +121,7 @@ fn condition(condition: &ConditionPlan) -> Vec<[String; 3]> {
         .collect()
 }
 
-/// The whole plan, for people.
+/// The whole explanation.
 pub fn show(plan: &Explanation) -> String {
     let mut out = String::new();
     let title = plan.title.as_ref().map_or(String::new(), |title| format!(": {title}"));

@@ -1,11 +1,11 @@
-//! Laws and obstacles in words of the field.
+//! Descriptions of solutions and of the reasons for them.
 
 use super::plan::Facts;
 use crate::expr::Program;
 use crate::model::{Driven, Flow, Law, Numeric, Obstacle, Rule, Solve};
 use crate::sim::brief;
 
-/// The form of solutions that a run may refuse.
+/// The form of a solution that a run may replace by integration.
 pub const SUM: &str = "sum of exponentials and polynomials";
 
 /// `x`, `x and y`, `x, y and z`.
@@ -32,7 +32,7 @@ pub fn variable(rule: &Rule, variable: usize) -> Option<String> {
     }
 }
 
-/// How an equation is solved, the one at a position of a clause: the form of its solution if it has one, and why.
+/// How the equation at a position of a clause is solved: the form of its solution, if there is a formula, and why.
 pub fn law(
     facts: &Facts,
     rule: &Rule,
@@ -78,7 +78,7 @@ pub fn law(
     }
 }
 
-/// The name of a solution of `x' = c + b x + a x²`, and what its rate is.
+/// The name of the solution of `x' = c + b x + a x²`, and a description of its rate.
 fn quadratic(coefficients: &Program) -> (String, &'static str) {
     let [c, b, a] = [0, 1, 2].map(|i| coefficients.constant_output(i));
     let zero = |x: Option<f64>| x == Some(0.0);
@@ -103,7 +103,7 @@ fn quadratic(coefficients: &Program) -> (String, &'static str) {
     (name, "a quadratic")
 }
 
-/// The form of the solution of `x' = h(time) q(x)`, and why there is one.
+/// The form of the solution of `x' = h(time) q(x)`, and the reason.
 fn driven(rule: &Rule, x: &str, law: &Driven, piecewise: &str) -> (Option<String>, String) {
     let curves: Vec<String> = law.curves.iter().map(|curve| curve.name.clone()).collect();
     let pace = match (curves.len(), &law.pace) {

@@ -1,4 +1,4 @@
-//! Which pictures the gallery has.
+//! The pictures of the gallery.
 
 use crate::render::Format;
 
@@ -8,15 +8,15 @@ pub struct Picture {
     pub figure: u8,
     /// Its folder.
     pub name: &'static str,
-    /// Relative to the folder of the gallery, and to the repository.
+    /// Path of the model, relative to the folder of the gallery and to the repository.
     pub model: &'static str,
-    /// What is typed behind `dlsys render MODEL`, but for `-o` and `--format`.
+    /// Arguments of `dlsys render MODEL` without `-o` and `--format`.
     pub flags: &'static str,
-    /// What there is to be seen.
+    /// The caption.
     pub caption: &'static str,
 }
 
-/// In the order of the paper.
+/// All pictures in the order of the paper.
 pub const FIGURES: &[Picture] = &[
     Picture {
         figure: 6,
@@ -111,7 +111,7 @@ pub const FIGURES: &[Picture] = &[
     },
 ];
 
-/// Numbers of the figures, each once.
+/// Numbers of the figures without duplicates.
 pub fn numbers() -> Vec<u8> {
     let mut numbers: Vec<u8> = FIGURES.iter().map(|picture| picture.figure).collect();
     numbers.dedup();
@@ -137,7 +137,7 @@ pub fn models() -> [(&'static str, &'static str); 7] {
 }
 
 impl Picture {
-    /// The command that makes it.
+    /// The command that draws it.
     pub fn line(&self) -> String {
         format!("dlsys render {} {} -o {}", self.model, self.flags, self.name)
     }

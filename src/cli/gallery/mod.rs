@@ -1,11 +1,11 @@
 //! `dlsys gallery`: the paper's figures that show development, each from its model.
 //!
 //! ```text
-//! figures (figure, model, flags) ──typed into──▶ render ──▶ DIR/figure-06-a/overlay.svg … ──▶ DIR/index.html
+//! figures (figure, model, flags) ──arguments of──▶ render ──▶ DIR/figure-06-a/overlay.svg … ──▶ DIR/index.html
 //! ```
 //!
-//! A picture is what `dlsys render` makes of a line that anybody could type; there is no other way to draw here. The
-//! models are part of the program, and written to `DIR/models`, so that the lines can be typed.
+//! Every picture is made by a `dlsys render` command. The models are part of the program and are written to `DIR/models`,
+//! so that users can repeat the commands.
 
 mod figures;
 mod page;
@@ -23,7 +23,7 @@ use super::render::render;
 use crate::render::Content;
 use figures::{FIGURES, Picture, models};
 
-/// Renders the figures that are asked for, or lists them.
+/// Renders the selected figures, or lists them.
 pub fn gallery(args: &GalleryArgs) -> Result<(), Failure> {
     let known: Vec<String> = figures::numbers().iter().map(u8::to_string).collect();
     if let Some(number) = args.figures.iter().find(|n| !figures::numbers().contains(n)) {
@@ -68,7 +68,7 @@ fn draw(wanted: &[&Picture], out: &Path, args: &GalleryArgs) -> Result<(), Failu
     say(&format!("all        {}\n", index.display()))
 }
 
-/// Refuses to write over files that no gallery has written.
+/// Refuses to overwrite files that are not of a gallery.
 fn spare(out: &Path, folder: &Path) -> Result<(), Failure> {
     let foreign = |path: &Path, ours: &dyn Fn(&str) -> bool| match std::fs::read(path) {
         Ok(bytes) => !std::str::from_utf8(&bytes).is_ok_and(ours),
@@ -88,15 +88,17 @@ fn spare(out: &Path, folder: &Path) -> Result<(), Failure> {
     }
 }
 
-/// What the command line makes of a picture's line.
+/// The parsed command of a picture.
 fn typed(picture: &Picture, out: &Path, target: &Path, args: &GalleryArgs) -> Result<RenderArgs, Failure> {
     let words = ["dlsys", "render", "-o", ".", picture.model].into_iter().chain(picture.flags.split(' '));
     let typed = Command::try_parse_from(words).map_err(|error| Failure::Usage(error.to_string()))?;
-    let Action::Render(mut typed) = typed.action else { unreachable!("the line says `render`") };
+    let Action::Render(mut typed) = typed.action else {
+        return Err(Failure::Usage("error: the command of a picture is not `render`\n".to_owned()));
+    };
     typed.shared.model = out.join(picture.model);
     typed.out = target.to_owned();
     typed.format = args.format;
-    // The gallery says itself what it has drawn.
+    // The gallery prints its own summary.
     typed.quiet = true;
     Ok(typed)
 }

@@ -4,10 +4,10 @@ use std::fmt::Write;
 
 use super::figures::Picture;
 
-/// What every such page contains, and few others.
+/// The mark by which such a page is recognised.
 pub const MARK: &str = "<title>dlsys gallery</title>";
 
-/// The text of `index.html`: pictures, with their files, in the order given.
+/// The text of `index.html`: the pictures, with their files, in the given order.
 pub fn page(drawn: &[(&Picture, String)]) -> String {
     let mut out = format!("<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n{MARK}\n<style>\n");
     out.push_str(

@@ -1,4 +1,4 @@
-//! `dlsys new`: a model to begin with.
+//! `dlsys new`: a small commented model.
 
 use std::fs;
 use std::io::{ErrorKind, Write};
@@ -17,7 +17,7 @@ pub struct NewArgs {
     pub name: PathBuf,
 }
 
-/// Writes the model; a file that is there stays as it is.
+/// Writes the model, unless the file exists.
 pub fn new(args: &NewArgs) -> Result<(), Failure> {
     let path = if args.name.extension().is_some_and(|e| e == "dls") {
         args.name.clone()
@@ -70,14 +70,14 @@ pub fn new(args: &NewArgs) -> Result<(), Failure> {
     std::io::stdout().write_all(text.as_bytes()).map_err(out_error)
 }
 
-/// A name as a shell takes it.
+/// A name, quoted for a shell if necessary.
 fn typed(path: &Path) -> String {
     let name = path.display().to_string();
     let plain = |c: char| c.is_alphanumeric() || "._-/\\:~".contains(c);
     if name.chars().all(plain) { name } else { format!("'{}'", name.replace('\'', "'\\''")) }
 }
 
-/// The model's text. A name may have characters that a title cannot.
+/// The text of the model, without characters of the name that a title cannot have.
 fn text(name: &str) -> String {
     let name: String = name.chars().filter(|c| *c != '"' && !c.is_control()).collect();
     START.replace("NAME", &name)

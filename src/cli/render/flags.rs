@@ -1,4 +1,4 @@
-//! What the flags of `render` ask for, and which of them do not go together.
+//! Values of the flags of `render`, and combinations that are refused.
 
 use crate::cli::args::RenderArgs;
 use crate::cli::common::Failure;
@@ -9,7 +9,7 @@ fn usage(message: impl std::fmt::Display) -> Failure {
     Failure::Usage(format!("error: {message}\n"))
 }
 
-/// A survey of nothing yet, in the view that was asked for.
+/// An empty survey in the chosen view.
 pub fn survey(args: &RenderArgs) -> Result<Survey, Failure> {
     let view: View = args.view.parse().map_err(usage)?;
     let survey = Survey::new(view);
@@ -19,7 +19,7 @@ pub fn survey(args: &RenderArgs) -> Result<Survey, Failure> {
     })
 }
 
-/// Refuses flags that mean nothing with the format or the layout.
+/// Refuses flags that have no meaning for the format or the layout.
 pub fn agree(args: &RenderArgs) -> Result<(), Failure> {
     let extension = args.out.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let is_file = |name: &str| extension == name;
@@ -75,7 +75,7 @@ pub fn spacing(args: &RenderArgs) -> Spacing {
     Spacing { columns: args.columns, row_height: args.row_height }
 }
 
-/// The page that was asked for, for this picture.
+/// The page for a picture.
 pub fn page(args: &RenderArgs, picture: Picture) -> Result<Page, Failure> {
     let size = match (args.size, args.width) {
         (Some((width, height)), _) => Size::Exact(width, height),

@@ -2,8 +2,8 @@
 //!
 //! The animation is run twice. The first run measures it, so that all frames share one picture area and
 //! one default width; the second writes the frames. Both are the same to the last bit, and running again is
-//! cheaper than keeping every frame in memory. While the simulation goes on, frames are drawn and written on other
-//! threads; a file does not depend on how many there are.
+//! cheaper than keeping every frame in memory. Frames are drawn and written on other threads while the simulation
+//! continues; files do not depend on the number of threads.
 
 mod flags;
 mod watch;
@@ -33,7 +33,7 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     if args.watch { watch::watch(args) } else { once(args, &|| false) }
 }
 
-/// Renders, unless it becomes stale before anything is written.
+/// Renders, unless `stale` becomes true before anything is written.
 fn once(args: &RenderArgs, stale: &(dyn Fn() -> bool + Sync)) -> Result<(), Failure> {
     flags::survey(args)?;
     flags::agree(args)?;
@@ -84,7 +84,7 @@ fn specimens(args: &RenderArgs, mut run: ModelRun, seeds: Seeds) -> Result<(), F
     std::io::stdout().write_all(line.as_bytes()).map_err(out_error)
 }
 
-/// The same of a model that was read.
+/// Renders a model that has been read.
 pub fn render_run(
     args: &RenderArgs,
     run: ModelRun,
@@ -119,26 +119,26 @@ pub fn render_run(
     std::io::stdout().write_all(line.as_bytes()).map_err(out_error)
 }
 
-/// Bytes of a render that somebody may want to be fewer.
+/// Bytes from which a render gets a hint about its size.
 const LARGE: u64 = 50_000_000;
 
-/// What there is to be said of a render in one line.
+/// The summary of a render.
 struct Written {
     bytes: u64,
-    /// The first file and the last.
+    /// Names of the first and the last file.
     names: String,
 }
 
-/// What is being rendered.
+/// A render in progress.
 struct Render<'r> {
     args: &'r RenderArgs,
     run: &'r ModelRun,
-    /// Where to write.
+    /// The output directory.
     out: &'r Path,
     threads: usize,
-    /// Every frame's survey, where the layout asks for it.
+    /// The survey of every frame, if the layout needs it.
     frames: Vec<Survey>,
-    /// Whether somebody has changed what is being rendered.
+    /// Whether a file of the model has changed since it was read.
     stale: &'r (dyn Fn() -> bool + Sync),
 }
 
@@ -183,13 +183,13 @@ impl Render<'_> {
     fn frames(&self, fit: Fit, clock: &mut Clock) -> Result<(Stats, Written), Failure> {
         let mut writer = FrameWriter::new(self.args.format, fit);
         writer.page = flags::page(self.args, writer.page.picture)?;
-        // Only now that the run is known to be good, the directory is touched.
+        // The directory is created only after the first pass has succeeded.
         let mut directory = FrameDirectory::create(self.out, self.args.force)
             .map_err(out_of_directory)?
             .limited(self.args.max_output);
         let mut manifest = self.manifest(&writer.fit, &writer.page);
         let count = self.run.times.len();
-        // Frames side by side; threads that have none help with those of others.
+        // With fewer frames than threads, several threads share a frame.
         writer.threads = (self.threads / count.max(1)).max(1);
         let staging = directory.staging();
         let work = |frame: &Frame, scene: &Scene| {
@@ -281,7 +281,7 @@ impl Render<'_> {
         if self.args.quiet { Progress::quiet() } else { Progress::new(what, count) }
     }
 
-    /// Threads that draw on pages of this size: of large ones not so many are in memory at once.
+    /// Number of threads for pages of this size, so that large pages do not fill the memory.
     fn threads_for(&self, page: &Page) -> usize {
         const PIXELS_AT_ONCE: u64 = 100_000_000;
         let pixels = page.pixels.iter().map(|&side| u64::from(side)).product::<u64>();
@@ -297,7 +297,7 @@ impl Render<'_> {
         self.run.session.model.title.as_deref().unwrap_or(&self.run.session.source.name)
     }
 
-    /// The second pass: what happens has been told, and how large everything is, is known.
+    /// Settings of the second pass: without the log, and with the accuracy that follows from the extent.
     fn writing(&self, fit: &Fit) -> Pass {
         Pass { settings: Settings { log: false, ..self.run.settings }, accuracy: fit.accuracy }
     }
@@ -329,7 +329,7 @@ impl Render<'_> {
             described["size"] = json!(page.pixels);
             described["background"] = page.background.map(|color| color.to_string()).into();
         }
-        // The path as it was typed would make the bytes depend on the folder that one is in.
+        // A path would make the bytes depend on the working directory.
         let path = std::path::Path::new(&run.session.source.name);
         let name =
             path.file_name().map_or(run.session.source.name.clone(), |n| n.to_string_lossy().into_owned());
@@ -340,7 +340,7 @@ impl Render<'_> {
     }
 }
 
-/// What the manifest says of a frame.
+/// The entry of a frame in the manifest.
 fn record(fit: &Fit, frame: &Frame, scene: &Scene, file: String) -> FrameRecord {
     FrameRecord {
         index: frame.index,
@@ -351,7 +351,7 @@ fn record(fit: &Fit, frame: &Frame, scene: &Scene, file: String) -> FrameRecord 
     }
 }
 
-/// An error of a frame; of one that is too large, with what makes it so.
+/// The failure for an error of a frame; for one that is too large, with the module that draws most.
 fn explain(error: render::Error, frame: &Frame, scene: &Scene) -> Failure {
     let render::Error::TooLarge { limit } = error else { return out_of_directory(error) };
     let mut counts: HashMap<&str, usize> = HashMap::new();

@@ -1,8 +1,8 @@
-//! `dlsys render --watch`: renders again whenever a file that the model is made of changes.
+//! `dlsys render --watch`: renders again whenever a file of the model changes.
 //!
-//! Files are looked at a few times a second: that works on every file system and with every editor, also with those that
-//! write aside and rename. What is compared is when a file was changed, and its length, taken before it was read: so a
-//! change during a render is not missed. A render that has become stale is given up while nothing is written yet.
+//! Files are polled a few times a second, which works on every file system and with every editor, including those that
+//! rename a temporary file. Time of change and length are compared with those before the file was read, so that a
+//! change during a render is not missed. An obsolete render is abandoned if it has not written anything.
 
 use std::path::Path;
 use std::time::Duration;
@@ -12,16 +12,16 @@ use crate::cli::args::RenderArgs;
 use crate::cli::common::{Failure, tell};
 use crate::session::{Input, Session};
 
-/// Time between two looks.
+/// Time between two polls.
 const LOOK: Duration = Duration::from_millis(150);
 
 /// Renders until the process is ended.
 ///
 /// # Errors
-/// What is wrong with the command line, found at the first render.
+/// Errors in the command line, found by the first render.
 pub fn watch(args: &RenderArgs) -> Result<(), Failure> {
     let mut first = true;
-    // Whether the directory has the frames of a model that was good.
+    // Whether the directory has the frames of a valid model.
     let mut drawn = false;
     loop {
         let inputs = inputs(args);
@@ -45,7 +45,7 @@ pub fn watch(args: &RenderArgs) -> Result<(), Failure> {
     }
 }
 
-/// The files that the model is made of, as they are now.
+/// The files of the model in their present state.
 fn inputs(args: &RenderArgs) -> Vec<Input> {
     match Session::open_with(&args.shared.model, &args.shared.settings, &args.shared.include.folders) {
         Ok(session) => session.inputs,
@@ -53,7 +53,7 @@ fn inputs(args: &RenderArgs) -> Vec<Input> {
     }
 }
 
-/// Waits until a file changes, and then until it goes on changing no more; returns which.
+/// Waits until a file changes and has stopped changing; returns its path.
 fn wait(inputs: &[Input]) -> &Path {
     loop {
         std::thread::sleep(LOOK);
@@ -66,7 +66,7 @@ fn wait(inputs: &[Input]) -> &Path {
                 return &changed.path;
             }
             if !now.is_stale() && !changed.is_stale() {
-                // As it was before.
+                // Unchanged after all.
                 break;
             }
             if !now.is_there() {

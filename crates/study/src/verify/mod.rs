@@ -24,42 +24,45 @@ use parameters::Parameters;
 use productions::Matching;
 use table::way;
 
+use super::error::Error;
 use super::record::EarlyEnd;
 use super::reference::TIGHTEST;
 use dlsys_session::Session;
-use dlsys_sim::{self as sim, Method, Passed, Scheduler, Settings, Simulation};
+use dlsys_sim::{Method, Passed, Scheduler, Settings, Simulation};
 use dlsys_tree::{Module, ModuleString};
 
-/// Differences up to so many tolerances are within what is promised of a run.
+/// The promised accuracy of a run, in tolerances.
 pub const PROMISED: f64 = 100.0;
 
-/// The other way is asked for an error that is so many times smaller: what is promised of it is then one tolerance.
+/// The tolerance of the run in question divided by that of the other one, whose promised accuracy is then one tolerance.
 const TIGHTER: f64 = 100.0;
 
-/// The part of the time limit that each way gets before all of them get the whole: where equations are stiff, the wrong
-/// method goes on for hours.
+/// The part of the time limit that each method gets before any gets the whole: an explicit method would take hours for
+/// stiff equations.
 const FIRST_GO: f64 = 0.1;
 
-/// What became of a comparison.
+/// The result of a comparison.
 #[derive(Clone, Debug)]
 pub struct Verification {
-    /// How the run in question was made.
+    /// Settings of the run in question.
     pub checked: Settings,
-    /// How the one was made that it is compared with.
+    /// Settings of the run with which it is compared.
     pub other: Settings,
-    /// Ways that were tried before that, and why each ended.
+    /// Settings that were tried before, and why each run ended.
     pub refused: Vec<(Settings, EarlyEnd)>,
-    /// Both have used Radau's method: `auto` has gone over to it where equations are stiff.
+    /// Whether both runs used Radau's method, because `auto` found the equations stiff.
     pub has_same_method: bool,
-    /// Last time that was observed, and how many there were.
+    /// Last observed time.
     pub end: f64,
+    /// Number of observed times.
     pub times: usize,
-    /// Of these, times at which both have the same modules, so that parameters could be compared.
+    /// Number of times at which both runs have the same modules, so that parameters could be compared.
     pub compared: usize,
-    /// For each parameter of each kind of module that was there: the largest difference.
+    /// The largest difference for each parameter of each kind of module.
     pub parameters: Vec<Gap>,
+    /// Comparison of the productions.
     pub productions: Productions,
-    /// The first time at which the modules are others though all productions are the same, with their numbers.
+    /// The first time at which the modules differ although all productions agree, with the numbers of modules.
     pub modules: Option<(f64, usize, usize)>,
 }
 
@@ -85,36 +88,30 @@ impl Verification {
     }
 }
 
-/// Why there is nothing to compare.
-#[derive(Clone, Debug)]
-pub enum Unverified {
-    /// The run in question meets an error itself.
-    Fault(sim::Error),
-    /// No other way comes to the last time: why each of them ended.
-    NoOtherWay(Vec<(Settings, EarlyEnd)>),
-}
-
-/// Runs a model by other ways until one comes to the last of the times, which increase, and compares. `limit`: seconds that
-/// another way may take. `watch` is told what is about to be done.
+/// Runs a model with other methods until one reaches the last of the times, which must increase, and compares. `limit` is
+/// the allowed wall time of each in seconds. `watch` is called before each run with a description of it.
 ///
 /// # Errors
-/// If there is nothing to compare.
+/// [`Error::Run`] if the run in question ends with an error, [`Error::NoOtherMethod`] if no other one reaches the last time.
 ///
 /// # Examples
 ///
 /// ```
-/// use dlsys_study::verify;
 /// use dlsys_session::Session;
 /// use dlsys_sim::{Method, Settings};
+/// use dlsys_study::verify;
 ///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let text = "initial string: C(0.25)\nC(x): if x < 0.5 solve dx/dt = x*(1 - x)\n if x = 0.5 produce C(x/2) C(x/2)";
-/// let session = Session::from_text("cells.dls", text, &[]).expect("a good model");
-/// let good = verify(&session, Settings::default(), &[1.0, 2.0, 3.0], 10.0, &mut |_| ()).expect("compared");
+/// let session = Session::from_text("cells.dls", text, &[])?;
+/// let good = verify(&session, Settings::default(), &[1.0, 2.0, 3.0], 10.0, &mut |_| ())?;
 /// assert!(good.passes() && good.productions.ours == 3);
 ///
 /// let euler = Settings { method: Method::Euler, step_size: 0.1, ..Settings::default() };
-/// let bad = verify(&session, euler, &[1.0, 2.0, 3.0], 10.0, &mut |_| ()).expect("compared");
+/// let bad = verify(&session, euler, &[1.0, 2.0, 3.0], 10.0, &mut |_| ())?;
 /// assert!(!bad.passes());
+/// # Ok(())
+/// # }
 /// ```
 pub fn verify(
     session: &Session,
@@ -122,7 +119,7 @@ pub fn verify(
     times: &[f64],
     limit: f64,
     watch: &mut dyn FnMut(&str),
-) -> Result<Verification, Unverified> {
+) -> Result<Verification, Error> {
     let mut refused: Vec<(Settings, EarlyEnd)> = Vec::new();
     let mut ways: Vec<(Settings, Option<EarlyEnd>)> =
         other_ways(&checked).into_iter().map(|way| (way, None)).collect();
@@ -143,7 +140,7 @@ pub fn verify(
             }
         }
     }
-    Err(Unverified::NoOtherWay(refused))
+    Err(Error::NoOtherMethod(refused))
 }
 
 /// Ways that have as little as possible in common with the one in question, the best first: another method, which
@@ -178,9 +175,9 @@ fn side_by_side(
     other: Settings,
     times: &[f64],
     limit: f64,
-) -> Result<Result<Verification, EarlyEnd>, Unverified> {
+) -> Result<Result<Verification, EarlyEnd>, Error> {
     let checked = Settings { log: true, transitions: false, ..checked };
-    let mut ours = session.simulate(checked).map_err(Unverified::Fault)?;
+    let mut ours = session.simulate(checked)?;
     let mut theirs = match Limited::start(session, other, limit) {
         Ok(theirs) => theirs,
         Err(stop) => return Ok(Err(stop)),
@@ -190,7 +187,7 @@ fn side_by_side(
     let (mut parameters, mut matching) = (Parameters::new(&session.model), Matching::default());
     let (mut compared, mut modules) = (0, None);
     for &t in times {
-        ours.at(t, &mut string).map_err(Unverified::Fault)?;
+        ours.at(t, &mut string)?;
         if let Err(stop) = theirs.go(t) {
             return Ok(Err(stop));
         }

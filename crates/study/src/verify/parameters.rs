@@ -8,13 +8,17 @@ use dlsys_tree::{Lineage, Module, ModuleString};
 /// Where a parameter of a kind of module differs most.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gap {
+    /// The kind.
     pub kind: KindId,
-    /// Which of its parameters, from 0.
+    /// Index of the parameter, from 0.
     pub parameter: usize,
+    /// Time of the largest difference.
     pub t: f64,
+    /// Lineage of the module.
     pub lineage: Lineage,
-    /// The value in the run in question, and in the other.
+    /// The value in the run in question.
     pub ours: f64,
+    /// The value in the other run.
     pub theirs: f64,
     /// The difference, relative to max(1, |value|). Infinite if one of them is not a number.
     pub error: f64,

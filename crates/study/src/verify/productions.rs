@@ -10,10 +10,11 @@ use dlsys_sim::Event;
 /// A production that both runs have.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pair {
-    /// In the run in question.
+    /// The production in the run in question.
     pub event: Event,
-    /// Its time there, and in the other run.
+    /// Its time in the run in question.
     pub ours: f64,
+    /// Its time in the other run.
     pub theirs: f64,
 }
 
@@ -27,27 +28,29 @@ impl Pair {
 /// The first production that only one of the runs has.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Split {
-    /// In the run in question; None if it has none there.
+    /// The production of the run in question; `None` if it has none there.
     pub ours: Option<Event>,
-    /// In the other one.
+    /// The production of the other run.
     pub theirs: Option<Event>,
-    /// If only one has it: a production of both so near to it that the two cannot be told apart by the run in question.
-    /// Which of them comes first may have decided.
+    /// If only one run has it: a production of both so close in time that the run in question cannot order the two. Their
+    /// order may have been decisive.
     pub rival: Option<Pair>,
 }
 
-/// What is known of the productions of two runs.
+/// Comparison of the productions of two runs.
 #[derive(Clone, Debug, Default)]
 pub struct Productions {
-    /// How many there are in the run in question, and in the other.
+    /// Their number in the run in question.
     pub ours: usize,
+    /// Their number in the other run.
     pub theirs: usize,
-    /// That with the largest difference in time.
+    /// The one with the largest difference in time.
     pub worst: Option<Pair>,
-    /// The first two that come in another order.
+    /// The first two in a different order.
     pub swapped: Option<(Pair, Pair)>,
+    /// The first one that only one run has.
     pub split: Option<Split>,
-    /// Productions so near to the last time that only one run has them yet.
+    /// Number of productions so close to the last time that only one run has them yet.
     pub at_the_end: usize,
 }
 

@@ -2,9 +2,10 @@
 
 use std::fmt::Write;
 
+use super::super::error::Error;
 use super::super::record::{Accuracy, EarlyEnd, Setup};
 use super::super::table::Table;
-use super::{Gap, PROMISED, Pair, Split, Unverified, Verification};
+use super::{Gap, PROMISED, Pair, Split, Verification};
 use dlsys_model::Model;
 use dlsys_session::Session;
 use dlsys_sim::{Event, Method, Scheduler, Settings, brief};
@@ -256,7 +257,7 @@ pub fn unverified(refused: &[(Settings, EarlyEnd)]) -> String {
 pub fn verification_rows(
     session: &Session,
     times: &[f64],
-    rows: &[(Settings, Result<Verification, Unverified>)],
+    rows: &[(Settings, Result<Verification, Error>)],
 ) -> String {
     let model = &session.model;
     let title = model.title.as_ref().unwrap_or(&session.source.name);
