@@ -124,7 +124,9 @@ impl std::str::FromStr for Format {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Format, Error> {
-        Format::all().find(|format| format.extension() == name).ok_or_else(|| Error::UnknownFormat(name.to_owned()))
+        Format::all()
+            .find(|format| format.extension() == name)
+            .ok_or_else(|| Error::UnknownFormat(name.to_owned()))
     }
 }
 

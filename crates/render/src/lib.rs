@@ -73,8 +73,8 @@ mod tube;
 mod view;
 
 pub use camera::Camera;
-pub use fit::{Fit, Picture, Survey};
 pub use error::Error;
+pub use fit::{Fit, Picture, Survey};
 pub use format::{Content, Exporter, Format};
 pub use frames::{FrameDirectory, MANIFEST, Staged, Staging, replace};
 pub use layout::{Layout, Sheet, Spacing};

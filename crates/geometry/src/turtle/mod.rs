@@ -61,7 +61,7 @@ mod tests;
 use crate::scene::{Point, Scene, Vector};
 use dlsys_model::Model;
 use dlsys_tree::ModuleString;
-pub use error::{Error, Fault};
+pub use error::{Error, ErrorKind};
 
 /// Most modules that one frame may draw, those that interpretations make included.
 pub const MODULE_LIMIT: usize = 10_000_000;
