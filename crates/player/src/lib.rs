@@ -16,6 +16,7 @@
 #![warn(missing_docs)]
 
 mod encode;
+mod error;
 mod forms;
 mod history;
 pub mod page;
@@ -25,8 +26,9 @@ mod track;
 #[cfg(feature = "viewer")]
 pub mod window;
 
+pub use error::Error;
 pub use forms::{Forms, MeshForm, MeshVertex};
 pub use history::{Happening, History};
-pub use recording::{Recorder, Recording, TooMuch};
+pub use recording::{Recorder, Recording};
 pub use stage::{Form, Item, Key, Look, Stage};
 pub use track::Track;

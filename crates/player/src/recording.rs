@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use super::Error;
 use super::forms::Forms;
 use super::history::History;
 use super::stage::{Form, Item, Key, Stage};
@@ -43,14 +44,6 @@ pub struct Recording {
     pub unit: f64,
     /// The model's contours.
     pub contours: Vec<Vec<[f64; 2]>>,
-}
-
-/// More than a page can hold.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("there is too much to record: more than {limit} numbers by t = {time}", limit = Recorder::MOST_NUMBERS)]
-pub struct TooMuch {
-    /// Time of the first frame that does not fit, in units of the model.
-    pub time: f64,
 }
 
 /// A recording that is being made.
@@ -104,7 +97,7 @@ impl Recorder {
     ///
     /// # Errors
     /// If it is more than fits into memory or a page.
-    pub fn add(&mut self, time: f64, modules: u64, stage: &Stage) -> Result<(), TooMuch> {
+    pub fn add(&mut self, time: f64, modules: u64, stage: &Stage) -> Result<(), Error> {
         let recording = &mut self.recording;
         let frame = recording.times.len() as u32;
         recording.times.push(time);
@@ -147,7 +140,7 @@ impl Recorder {
         for (_, number) in std::mem::replace(&mut self.open, open) {
             self.close(number);
         }
-        if self.numbers > Recorder::MOST_NUMBERS { Err(TooMuch { time }) } else { Ok(()) }
+        if self.numbers > Recorder::MOST_NUMBERS { Err(Error::TooLong { time }) } else { Ok(()) }
     }
 
     fn close(&mut self, number: usize) {

@@ -8,8 +8,8 @@ mod bounds;
 mod build;
 mod piece;
 
-pub use build::{CurveFault, MAX_POINTS};
-use piece::Piece;
+pub use build::MAX_POINTS;
+use piece::Cubic;
 
 /// How a curve follows its points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,7 +70,7 @@ pub struct Curve {
     pub points: usize,
     /// Where pieces begin, and the last one ends; ascending.
     knots: Vec<f64>,
-    pieces: Vec<Piece>,
+    pieces: Vec<Cubic>,
     /// Integral from the first knot to each.
     sums: Vec<f64>,
     /// Least and greatest value.

@@ -1,4 +1,4 @@
-//! The window without hands: for tests, and for pictures of it.
+//! The window driven by a script: for tests, and for pictures of it.
 
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -13,10 +13,10 @@ use dlsys_lang::Setting;
 /// After so long the trial has failed.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-/// What is done, in this order; then the window closes. Nothing: hands do it all.
+/// The actions, in this order; then the window closes. Without actions the window belongs to the user.
 #[derive(Clone, Debug, Default)]
 pub struct Trial {
-    /// Seconds to wait before anything else: what other programs do meanwhile to the model or the window is seen.
+    /// Seconds to wait before anything else, for other programs to change the model or the window.
     pub delay: Option<f64>,
     /// Sliders are moved, one after the other; how long it takes until the new picture is on the screen is printed.
     pub slide: Vec<Setting>,
@@ -46,7 +46,7 @@ enum Stage {
     /// Until there is a picture.
     #[default]
     Begin,
-    /// The so-manieth slider is to be moved when all is still.
+    /// The slider with this number is to be moved when the picture is complete.
     Still(usize),
     /// It was moved then; the new picture is not on the screen yet.
     Slid(usize, Instant),
@@ -71,8 +71,7 @@ impl Runner {
         Runner { trial, outcome, stage: Stage::Begin, begun: None }
     }
 
-    /// Once for each time that the window is drawn, before anything is taken in: what the window shows then is on the screen, for what it
-    /// drew last has been handed over.
+    /// Called once for each frame of the window, before input is read: the picture drawn last is on the screen then.
     pub fn step(&mut self, window: &mut Window, context: &egui::Context) {
         let Trial { slide, play, screenshot, .. } = &self.trial;
         if slide.is_empty() && play.is_none() && screenshot.is_none() {
