@@ -30,5 +30,5 @@ pub use error::Error;
 pub use forms::{Forms, MeshForm, MeshVertex};
 pub use history::{Happening, History};
 pub use recording::{Recorder, Recording};
-pub use stage::{Form, Item, Key, Look, Stage};
+pub use stage::{Finish, Form, Item, Key, Stage};
 pub use track::Track;

@@ -26,7 +26,7 @@ pub struct Recording {
     pub modules: Vec<u64>,
     /// Productions, for the list beside the plant.
     pub history: History,
-    /// The materials that looks name.
+    /// The materials that finishes name.
     pub palette: Palette,
     /// The forms that things are placed copies of.
     pub forms: Forms,
@@ -105,10 +105,10 @@ impl Recorder {
         let mut open = HashMap::with_capacity(stage.items.len());
         let [meshes, cuts] = recording.forms.adopt(stage);
         for item in &stage.items {
-            let Item { mut key, mut look, .. } = *item;
+            let Item { mut key, mut finish, .. } = *item;
             match &mut key.form {
                 Form::Mesh(number) => *number = meshes[*number as usize],
-                Form::Polygon(_) => look.variant = cuts[look.variant as usize],
+                Form::Polygon(_) => finish.variant = cuts[finish.variant as usize],
                 Form::Stem(_) | Form::Patch => {}
             }
             let number = *open.entry(key).or_insert_with(|| {
@@ -117,7 +117,7 @@ impl Recorder {
                         form: key.form,
                         first: frame,
                         last: frame,
-                        looks: Vec::new(),
+                        finishes: Vec::new(),
                         samples: Vec::new(),
                         stride: 1,
                     });
@@ -126,8 +126,8 @@ impl Recorder {
             });
             let track = &mut recording.tracks[number];
             track.last = frame;
-            if track.looks.last().is_none_or(|(_, known)| *known != look) {
-                track.looks.push((frame, look));
+            if track.finishes.last().is_none_or(|(_, known)| *known != finish) {
+                track.finishes.push((frame, finish));
             }
             let steps = stage.numbers_of(item).iter().enumerate().map(|(i, x)| {
                 let from = if is_point(key.form, i) { recording.centre[i % 3] } else { 0.0 };

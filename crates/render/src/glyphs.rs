@@ -15,7 +15,7 @@ const ARC_STEP: f64 = 15.0;
 const ROUND: usize = 12;
 
 /// A line of text, in pixels.
-pub(super) struct Line<'a> {
+pub(super) struct GlyphLine<'a> {
     pub(super) middle: f64,
     pub(super) base: f64,
     /// Size of the letters.
@@ -68,7 +68,7 @@ fn strokes(character: char) -> &'static [Stroke] {
 }
 
 /// Draws lines of text in a picture of this size.
-pub(super) fn draw(size: [u32; 2], lines: &[Line], color: Color) -> Image {
+pub(super) fn draw(size: [u32; 2], lines: &[GlyphLine], color: Color) -> Image {
     let mut triangles: Vec<[Corner; 3]> = Vec::new();
     for line in lines {
         let count = line.text.chars().count();
@@ -135,7 +135,7 @@ mod tests {
 
     #[test]
     fn text_stands_in_the_middle() {
-        let line = Line { middle: 20.0, base: 15.0, size: 10.0, text: "-" };
+        let line = GlyphLine { middle: 20.0, base: 15.0, size: 10.0, text: "-" };
         let image = draw([40, 20], &[line], Color::hex(0));
         let inked = |x: usize, y: usize| image.pixels[y * 40 + x][3];
         assert!(inked(20, 12) > 100 && inked(10, 12) == 0 && inked(20, 5) == 0);

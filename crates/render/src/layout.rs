@@ -151,7 +151,7 @@ fn grid(seen: &[Option<[f64; 4]>], ground: f64, captions: &[String], columns: us
     let frames: Vec<[f64; 4]> = seen.iter().map(|f| f.unwrap_or([0.0, ground, 0.0, ground])).collect();
     let columns = columns.min(frames.len().max(1));
     let width_of = |i: usize| frames[i][2] - frames[i][0];
-    let rows: Vec<Row> = frames.chunks(columns).map(|row| Row::new(row, ground)).collect();
+    let rows: Vec<RowExtent> = frames.chunks(columns).map(|row| RowExtent::new(row, ground)).collect();
     let mut widths: Vec<f64> =
         (0..columns).map(|c| (c..frames.len()).step_by(columns).map(width_of).fold(0.0, f64::max)).collect();
     let gap = GAP * widths.iter().copied().fold(0.0, f64::max);
@@ -191,16 +191,16 @@ fn grid(seen: &[Option<[f64; 4]>], ground: f64, captions: &[String], columns: us
 }
 
 /// How far the frames of a row reach above and below the ground.
-struct Row {
+struct RowExtent {
     above: f64,
     below: f64,
 }
 
-impl Row {
-    fn new(frames: &[[f64; 4]], ground: f64) -> Row {
+impl RowExtent {
+    fn new(frames: &[[f64; 4]], ground: f64) -> RowExtent {
         let above = frames.iter().map(|frame| frame[3] - ground).fold(0.0, f64::max);
         let below = frames.iter().map(|frame| ground - frame[1]).fold(0.0, f64::max);
-        Row { above, below }
+        RowExtent { above, below }
     }
 }
 

@@ -171,11 +171,11 @@ impl Assembly<'_> {
         };
         let [a, b, c] = page.placement();
         let sheet = &self.writer.sheet;
-        let lines: Vec<glyphs::Line> = sheet
+        let lines: Vec<glyphs::GlyphLine> = sheet
             .cells
             .iter()
             .filter_map(|cell| cell.caption.as_ref())
-            .map(|caption| glyphs::Line {
+            .map(|caption| glyphs::GlyphLine {
                 middle: a * caption.x + b,
                 base: c - a * caption.y,
                 size: a * sheet.letters,
