@@ -17,7 +17,7 @@ use super::settle::Firing;
 use super::simulation::Simulation;
 use super::state::{Change, What};
 use dlsys_model::{Comparison, KindId, Outcome, Sign};
-use dlsys_tree::{Look, ModuleId, NO_LABEL, SimTime};
+use dlsys_tree::{ModuleId, ModuleView, NO_LABEL, SimTime};
 
 impl Simulation<'_> {
     /// Begins the life of a module whose kind may be light; false if it is not.
@@ -91,7 +91,7 @@ impl Simulation<'_> {
     /// The life of a light module, taken out of its career; to be given back.
     #[inline]
     fn life(&mut self, slot: u32) -> (u16, Box<Life>) {
-        let Look { label, birth, values, .. } = self.plant.tree.look(slot);
+        let ModuleView { label, birth, values, .. } = self.plant.tree.look(slot);
         let mut life = self.plant.careers.take_life(label);
         if !life.is_of(birth, values) {
             life.values.clear();
