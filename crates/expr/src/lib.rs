@@ -1,4 +1,5 @@
-//! Pure mathematics: expressions over numbered variables. No syntax, no time, no tree.
+//! Expressions over numbered variables: graphs, compiled programs, and evaluation in numbers, intervals and derivatives. Independent
+//! of syntax, plants and simulation.
 //!
 //! ```text
 //! Graph ──compile──▶ Program ──eval::<T>──▶ values of type T

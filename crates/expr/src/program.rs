@@ -1,4 +1,4 @@
-//! Straight-line code for expressions.
+//! Compilation of expressions to straight-line code with registers, and its evaluation for one row or many.
 
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
@@ -59,11 +59,10 @@ pub const LANES: usize = 32;
 /// One value of each row.
 pub type Lanes = [f64; LANES];
 
-/// Lanes that fit into the processor's registers together: no operand need be copied aside, though the result may take
-/// its place.
+/// Lanes that fit into the processor's registers together, so that the result may overwrite an operand without a copy.
 const PART: usize = 8;
 
-/// Does an operation in so many parts of the lanes.
+/// Applies an operation to the lanes, part by part.
 #[inline(always)]
 fn each(registers: &mut [Lanes], parts: usize, [to, a, b]: [Register; 3], f: impl Fn(f64, f64) -> f64) {
     let part = |of: Register, registers: &[Lanes], i: usize| -> [f64; PART] {
@@ -346,7 +345,7 @@ impl Program {
         self.eval_rows(registers, LANES)
     }
 
-    /// The same for the first `rows` only: what is in the other lanes afterwards means nothing.
+    /// The same for the first `rows` only; the other lanes have no meaning afterwards.
     pub fn eval_rows(
         &self,
         registers: &mut Vec<Lanes>,

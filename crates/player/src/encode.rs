@@ -1,4 +1,4 @@
-//! Tracks as bytes, for the page.
+//! Encoding of tracks as compressed bytes, for the page.
 //!
 //! Everything is a whole number of seven bits a byte, the lowest first, the eighth bit saying that there is more; signed
 //! numbers have their sign in the lowest bit. First of every track

@@ -1,4 +1,4 @@
-//! The forms that things have in common: meshes, and how polygons are cut. Both are numbered as they are first seen.
+//! Shapes shared by many things: meshes, and triangulations of polygons. Both are numbered in the order of first use.
 //!
 //! Each stage has its own, so that stages can be made side by side; a recording [adopts](Forms::adopt) them in order.
 
@@ -99,7 +99,7 @@ impl Forms {
         number
     }
 
-    /// Takes in the forms of a stage, in the order of its things. Returns the numbers that they have here, by those that they
+    /// Adds the forms of a stage, in the order of its things. Returns the numbers that they have here, by those that they
     /// have there: of meshes, and of cuts.
     pub(super) fn adopt(&mut self, stage: &Stage) -> [Vec<u32>; 2] {
         let theirs = &stage.forms;

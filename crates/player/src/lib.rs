@@ -1,17 +1,17 @@
-//! The live viewer: a growing plant as something to walk around.
+//! Recordings of growing plants, the HTML page that plays them, and (feature `viewer`) the window of `dlsys view`.
 //!
 //! ```text
 //! Scene ──▶ Stage ──▶ Recording ──▶ page (one HTML file that plays it)
 //! ```
 //!
-//! - [`Stage`]: a scene as things in their places. What repeats (a surface, the side of a stem, a patch) is a
+//! - [`Stage`]: a scene as things in their places. A shape that repeats (a surface, the side of a stem, a patch) is a
 //!   form; each thing is a few numbers that place its form. All of them are points or differences of points, so halfway
 //!   between two stages is halfway between their numbers.
 //! - [`Recording`]: stages over time, each thing followed by the lineage of its module.
 //! - [`page`]: the recording, a player and the shaders in one file that needs no network.
 //!
-//! The player makes triangles of what is to be seen at a time (`page/geometry.js`). The shaders (`shaders/`) have no version
-//! line: whoever compiles them puts it first.
+//! The page makes the triangles of one instant (`page/geometry.js`). The shaders (`shaders/`) have no version line: it is prepended
+//! when they are compiled.
 
 #![warn(missing_docs)]
 

@@ -1,4 +1,4 @@
-//! A plant through time: tracks of all things that were to be seen.
+//! Recording of a run: tracks of all things that are drawn, from frame to frame.
 
 use std::collections::HashMap;
 

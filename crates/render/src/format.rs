@@ -1,4 +1,4 @@
-//! Formats of files: one trait, and the list of those that there are.
+//! Formats of files: the trait that each implements, and the list of all.
 //!
 //! To add one: a file that implements [`Exporter`], and its line in [`EXPORTERS`]. Flags, messages and endings of
 //! file names follow from that.
@@ -14,14 +14,14 @@ use crate::{Error, FrameWriter, obj, png, svg};
 /// All formats, in the order in which help lists them.
 static EXPORTERS: [&dyn Exporter; 3] = [&svg::Svg, &png::Png, &obj::Obj];
 
-/// What a file of a format holds.
+/// The content of the files of a format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Content {
     /// Shapes of one view.
     Vectors,
     /// Pixels of one view.
     Pixels,
-    /// The scene in space, seen from nowhere.
+    /// The scene in space, without a view.
     Mesh,
 }
 
@@ -30,10 +30,10 @@ pub trait Exporter: Sync {
     /// Its name, which is also the ending of its files: `svg`.
     fn name(&self) -> &'static str;
 
-    /// What it is, in a line.
+    /// A description in one line, for help.
     fn about(&self) -> &'static str;
 
-    /// What its files hold.
+    /// The content of its files.
     fn content(&self) -> Content;
 
     /// Writes a file. Its surfaces are triangles already, where the accuracy asks for that; `title` is for people.
@@ -76,12 +76,12 @@ impl Format {
         self.0.name()
     }
 
-    /// What it is, in a line.
+    /// A description in one line, for help.
     pub fn about(self) -> &'static str {
         self.0.about()
     }
 
-    /// What its files hold.
+    /// The content of its files.
     pub fn content(self) -> Content {
         self.0.content()
     }

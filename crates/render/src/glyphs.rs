@@ -1,6 +1,6 @@
-//! Letters for the captions of PNG pictures: what a time consists of, drawn with a round pen.
+//! Letters for the captions of PNG pictures: the characters of a time, drawn with a round pen.
 //!
-//! A font would be a megabyte for fifteen characters. A glyph is made of lines and arcs of ellipses, in a box
+//! A font file would be a megabyte for fifteen characters. A glyph consists of lines and arcs of ellipses, in a box
 //! one half wide, with capitals and digits 0.7 high and small letters 0.5.
 
 use super::raster::{self, Corner, Image};
@@ -32,7 +32,7 @@ enum Stroke {
 
 use Stroke::{Arc, Lines};
 
-/// What a character is drawn with; nothing if it is not known.
+/// The strokes of a character; none if it is not known.
 fn strokes(character: char) -> &'static [Stroke] {
     match character {
         '0' => &[Arc([0.0, 0.35], [0.2, 0.35], [0.0, 360.0])],
@@ -84,7 +84,7 @@ pub(super) fn draw(size: [u32; 2], lines: &[GlyphLine], color: Color) -> Image {
     raster::draw(&raster::SIXTEEN, 1, size, triangles.len(), |n| triangles[n], |_, _| color)
 }
 
-/// The places that a stroke goes through.
+/// The points of a stroke.
 fn points(stroke: &Stroke) -> Vec<[f64; 2]> {
     match *stroke {
         Lines(points) => points.to_vec(),

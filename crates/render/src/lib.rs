@@ -91,7 +91,7 @@ use std::io::{self, Write};
 
 use dlsys_geometry::scene::Scene;
 
-/// Who wrote a file.
+/// Name and version of the program, for the header of files.
 pub const GENERATOR: &str = concat!("dlsys ", env!("CARGO_PKG_VERSION"));
 
 /// The second pass: one frame after another, each as the bytes of its file.
@@ -101,7 +101,7 @@ pub struct FrameWriter {
     pub format: Format,
     /// The scale and the style that all frames share.
     pub fit: Fit,
-    /// What pictures are drawn on (SVG and PNG).
+    /// The page that pictures are drawn on (SVG and PNG).
     pub page: Page,
     /// Sides of the tubes that stems are made of (OBJ only); 0 for as many as the accuracy takes, and 8 at least.
     pub sides: usize,
@@ -111,13 +111,13 @@ pub struct FrameWriter {
 
 impl FrameWriter {
     /// A writer of pictures 1000 pixels wide or high on the usual background, or of meshes with tubes as round as the
-    /// accuracy asks.
+    /// accuracy requires.
     pub fn new(format: Format, fit: Fit) -> FrameWriter {
         let page = Page::usual(fit.picture);
         FrameWriter { format, fit, page, sides: 0, threads: 1 }
     }
 
-    /// The file of a frame. `title` is for people: what it shows, and at which time.
+    /// The bytes of the file of a frame. `title` is its title for readers: the model and the time.
     pub fn write(&self, scene: &Scene, title: &str) -> Vec<u8> {
         let mut bytes = Vec::new();
         // Memory takes whatever is written to it.
@@ -143,9 +143,9 @@ impl FrameWriter {
 /// How smooth edges are in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Smoothness {
-    /// As in files: sixteen samples to a pixel.
+    /// Sixteen samples a pixel, as in files.
     Fine,
-    /// Four samples, for what moves.
+    /// Four samples a pixel, for animations on the screen.
     Quick,
 }
 
@@ -155,7 +155,7 @@ pub fn pixels(scene: &Scene, fit: &Fit, page: &Page) -> Vec<[u8; 4]> {
     pixels_by(scene, fit, page, Smoothness::Fine, 1)
 }
 
-/// The same, as smooth as it should be, made by so many threads; the pixels do not depend on that.
+/// The same with a choice of smoothness, by `threads` threads; the pixels do not depend on their number.
 pub fn pixels_by(
     scene: &Scene,
     fit: &Fit,

@@ -3,7 +3,7 @@
 //! A module's group is named `KIND.LINEAGE`, the same in every frame. Segments that share a ring of a tube
 //! share its vertices across their groups, so a tube is one closed mesh.
 //!
-//! The mesh is never in memory: parts of the text are made on several threads and go to the file at once.
+//! The mesh is never in memory as a whole: parts of the text are made on several threads and written at once.
 
 use super::format::{Content, Exporter};
 use std::io::{self, Write};
@@ -19,7 +19,7 @@ use dlsys_geometry::scene::{MaterialId, OwnerId, Palette, Point, Scene, Vector};
 const MATERIALS: &str = "materials.mtl";
 /// Decimals of a normal.
 const NORMAL_DECIMALS: usize = 4;
-/// Points of a part of the text, about: some hundred kilobytes, which stay in a cache.
+/// Approximate number of points of a part of the text: some hundred kilobytes, which fit into a cache.
 const PART: usize = 6000;
 
 /// A part of the text; items by number, of faces in the order of owners.

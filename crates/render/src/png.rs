@@ -1,4 +1,4 @@
-//! A scene as a PNG picture: stems as the tubes of the OBJ format, everything lit smoothly, what is nearer in front.
+//! A scene as a PNG picture: stems as the tubes of the OBJ format, smooth shading, hidden surfaces removed to the pixel.
 
 use std::io::{self, Write};
 
@@ -104,7 +104,7 @@ fn sides(scene: &Scene, fit: &Fit, scale: f64) -> usize {
     (wanted.ceil() as usize).next_multiple_of(4).clamp(8, 64).min((affordable / 4 * 4).max(4))
 }
 
-/// A page that images are laid on, with 16 bits to a channel, so that many faint ones leave their trace.
+/// A page for several images, with 16 bits a channel, so that many faint ones add up.
 #[derive(Debug)]
 pub(super) struct Canvas<'a> {
     page: &'a Page,
@@ -112,10 +112,10 @@ pub(super) struct Canvas<'a> {
     pixels: Vec<[u16; 4]>,
 }
 
-/// How what is laid on a page meets what is there, where both cover a pixel in part.
+/// The rule for pixels that a new image and the page both cover in part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Meeting {
-    /// By chance: each hides its share of the other.
+    /// Independent coverage: each hides its share of the other.
     Over,
     /// Side by side: neighbours that share an edge leave nothing open between them.
     Beside,
@@ -127,7 +127,7 @@ impl Canvas<'_> {
         Canvas { page, pixels: vec![[0; 4]; width * height] }
     }
 
-    /// Lays an image over what is there, its upper left corner at this pixel; what is beyond the page is cut off.
+    /// Puts an image over the page, its upper left corner at this pixel; parts beyond the page are cut off.
     pub(super) fn add(&mut self, image: &Image, [left, top]: [i64; 2], opacity: f64, meeting: Meeting) {
         let [width, height] = self.page.pixels.map(i64::from);
         let opacity = (opacity.clamp(0.0, 1.0) * 257.0).round() as u32;

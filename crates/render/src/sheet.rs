@@ -1,4 +1,4 @@
-//! Writing a [`Sheet`]: each frame by itself, on any thread, then all of them in order.
+//! Writing of a [`Sheet`]: each frame is drawn by itself, on any thread; then all are put together in order.
 
 use super::format::Content;
 use std::fmt::Write;
@@ -112,7 +112,7 @@ impl SheetWriter {
 }
 
 impl Assembly<'_> {
-    /// Puts the next frame on the sheet, over those before it.
+    /// Adds the next frame, over those before it.
     ///
     /// # Errors
     /// If the document becomes too long.
@@ -163,7 +163,7 @@ impl Assembly<'_> {
         }
     }
 
-    /// The file. `title` is for people: what it shows.
+    /// The bytes of the file. `title` is its title for readers.
     pub fn finish(self, title: &str) -> Vec<u8> {
         let page = &self.writer.page;
         let Some(mut canvas) = self.canvas else {

@@ -1,4 +1,4 @@
-//! Lines of numbers as bytes, written quickly: a mesh is little else.
+//! Fast formatting of numbers, for the lines of a mesh file.
 //!
 //! Digits are made eight at a time in the bytes of one integer, by multiplications (Khuong 2011; Lemire 2021), and
 //! copied as a whole into a line that has room for more than it needs.
@@ -13,7 +13,7 @@ pub(super) struct Text {
     len: usize,
 }
 
-/// A line that is being put together.
+/// Builds one line.
 pub(super) struct LineWriter<'t> {
     buffer: &'t mut [u8; LineWriter::SIZE],
     len: usize,

@@ -1,4 +1,4 @@
-//! Stems as tubes.
+//! Stems as tubes: rings, domes at the ends, and their vertices and triangles.
 //!
 //! Segments that continue one another make one closed tube: they share the ring of vertices where they
 //! meet, which lies in the plane that halves the bend, and the first and last end in a dome. Cross-sections

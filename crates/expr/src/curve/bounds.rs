@@ -4,7 +4,7 @@ use super::piece::{Cubic, differentiated, polynomial};
 use super::{Curve, Part, Place};
 use crate::{Array, Binary, Interval, Value};
 
-/// Over more pieces than this a bound is that of the whole curve: whoever wants better halves the stretch.
+/// Over more pieces than this the bounds are those of the whole curve; the caller halves the stretch for better ones.
 const MANY: usize = 64;
 
 /// Least and greatest value of a cubic between two arguments.

@@ -1,4 +1,4 @@
-//! Curves from their points.
+//! Construction of curves from their points: polygons, monotone cubics, B-splines.
 
 use super::piece::Cubic;
 use super::{Curve, Sort};

@@ -22,7 +22,7 @@ pub enum Sort {
     Spline,
 }
 
-/// What is computed of a curve.
+/// A function that is computed from a curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Part {
     /// The value.
@@ -44,7 +44,7 @@ pub enum Part {
 }
 
 impl Part {
-    /// What the derivative of a part is, if it is another one; the derivative of the others is left out as zero.
+    /// The derivative of a part, if it is another part; that of the others is taken as zero.
     pub fn derivative(self) -> Option<Part> {
         match self {
             Part::Value => Some(Part::Slope),
