@@ -21,25 +21,29 @@
 //! Three frames of a growing stem, all on one scale:
 //!
 //! ```
+//! use dlsys_geometry::turtle;
 //! use dlsys_render::{Format, FrameWriter, Survey, View};
 //! use dlsys_session::Session;
 //!
-//! let session = Session::from_text("stem.dls", "initial string: F(1)\nF(x): solve dx/dt = x", &[]).unwrap();
-//! let mut simulation = session.simulate(Default::default()).expect("it starts");
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let session = Session::from_text("stem.dls", "initial string: F(1)\nF(x): solve dx/dt = x", &[])?;
+//! let mut simulation = session.simulate(Default::default())?;
 //! let (mut survey, mut scenes) = (Survey::new(View::FRONT), Vec::new());
 //! for time in [0.0, 1.0, 2.0] {
 //!     let mut string = Default::default();
-//!     simulation.at(time, &mut string).expect("it runs");
-//!     let mut scene = dlsys_geometry::turtle::blank(&session.model);
-//!     dlsys_geometry::turtle::draw(&session.model, &string, &mut scene).expect("it can be drawn");
+//!     simulation.at(time, &mut string)?;
+//!     let mut scene = turtle::blank(&session.model);
+//!     turtle::draw(&session.model, &string, &mut scene)?;
 //!     survey.add(&scene);
 //!     scenes.push(scene);
 //! }
 //! let mut writer = FrameWriter::new(Format::SVG, survey.fit());
 //! let pictures: Vec<Vec<u8>> = scenes.iter().map(|scene| writer.write(scene, "a stem")).collect();
 //! writer.format = Format::OBJ;
-//! let mesh = String::from_utf8(writer.write(&scenes[2], "a stem, t = 2")).unwrap();
+//! let mesh = String::from_utf8(writer.write(&scenes[2], "a stem, t = 2"))?;
 //! assert!(pictures[0].starts_with(b"<svg") && mesh.contains("\nusemtl stem\n"));
+//! # Ok(())
+//! # }
 //! ```
 
 #![warn(missing_docs)]
@@ -48,7 +52,7 @@ mod camera;
 mod error;
 mod extent;
 mod fit;
-mod format;
+mod formats;
 mod frames;
 mod glyphs;
 mod layout;
@@ -57,15 +61,12 @@ mod light;
 mod manifest;
 mod name;
 mod number;
-mod obj;
 mod page;
 mod painter;
-mod png;
 mod raster;
 mod relay;
 mod sheet;
 mod stroke;
-mod svg;
 mod text;
 mod triangles;
 mod triangulate;
@@ -75,7 +76,7 @@ mod view;
 pub use camera::Camera;
 pub use error::Error;
 pub use fit::{Fit, Picture, Survey};
-pub use format::{Content, Exporter, Format};
+pub use formats::{Content, Description, Drawing, Exporter, Format};
 pub use frames::{FrameDirectory, MANIFEST, Staged, Staging, replace};
 pub use layout::{Layout, Sheet, Spacing};
 pub use lengths::{CrossSection, Length, cross_section, lengths};
@@ -131,7 +132,7 @@ impl FrameWriter {
     /// Those of `out`.
     pub fn write_to(&self, scene: &Scene, title: &str, out: &mut (dyn Write + Send)) -> io::Result<()> {
         let scene = &*scene.tessellated(self.fit.accuracy);
-        self.format.exporter().write(scene, self, title, out)
+        self.format.exporter().write(Drawing { scene, writer: self, title }, out)
     }
 
     /// The file that all frames refer to, if there is one: its name and its bytes.
@@ -164,5 +165,5 @@ pub fn pixels_by(
     threads: usize,
 ) -> Vec<[u8; 4]> {
     let scene = &*scene.tessellated(fit.accuracy);
-    png::picture(scene, fit, page.pixels, page.placement(), smoothness, threads).pixels
+    formats::png::picture(scene, fit, page.pixels, page.placement(), smoothness, threads).pixels
 }

@@ -1,13 +1,13 @@
 //! Writing of a [`Sheet`]: each frame is drawn by itself, on any thread; then all are put together in order.
 
-use super::format::Content;
+use super::formats::Content;
 use std::fmt::Write;
 
+use super::formats::png::{self, Canvas, Meeting};
 use super::layout::{Caption, Cell};
 use super::painter::{self, text};
-use super::png::{self, Canvas, Meeting};
 use super::raster::Image;
-use super::{Error, Fit, Format, Layout, Page, Sheet, Smoothness, glyphs, svg};
+use super::{Error, Fit, Format, Layout, Page, Sheet, Smoothness, formats::svg, glyphs};
 use dlsys_geometry::scene::{Color, Scene};
 
 /// Colour of captions.

@@ -1,4 +1,4 @@
-//! What the turtle draws, on strings written by hand.
+//! The drawings of the turtle, on strings written by hand.
 
 use super::*;
 use crate::scene::{MaterialId, Point, Vector, Width};

@@ -1,4 +1,4 @@
-//! The turtle itself: its state, and what each command does to it and to the scene.
+//! The turtle: its state, and the effect of each command on it and on the scene.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use dlsys_diagnostic::Span;
 use dlsys_model::{KindId, Model};
 use dlsys_tree::Lineage;
 
-/// What `!` without a parameter multiplies the width by.
+/// The factor by which `!` without a parameter multiplies the width.
 const THINNING: f64 = 0.7;
 
 /// The module of the string that is being drawn.
@@ -26,11 +26,11 @@ pub(super) struct DrawnModule {
     pub(super) lineage: Lineage,
 }
 
-/// What brackets remember.
+/// The state that brackets save and restore.
 #[derive(Clone)]
 struct State {
     position: Point,
-    /// What rounding has kept out of `position`: a million small steps should end where one large step does.
+    /// Rounding error of `position` (compensated summation): a million small steps end where one large step does.
     remainder: Vector,
     frame: Frame,
     width: Width,
@@ -42,14 +42,14 @@ struct State {
     strength: f64,
     /// The last segment on this axis, if the turtle still stands at its end.
     last: Option<usize>,
-    /// How many segments, the last one and those before it, were drawn since the width was set.
+    /// Number of segments on this axis since the width was set.
     run: usize,
 }
 
 /// A polygon that is open.
 struct Outline {
     vertices: Vec<Point>,
-    /// How many were made, those in one place with the one before included.
+    /// Number of vertices made, coinciding ones included.
     made: usize,
     /// The interpretation and the module that began it.
     begun: (Option<(usize, KindId)>, DrawnModule),
@@ -136,7 +136,7 @@ impl<'a> Walk<'a> {
         error::place(self.model, self.drawn.kind, self.drawn.lineage, self.inside)
     }
 
-    /// The string is at its end.
+    /// Ends the string: reports polygons that are still open.
     pub(super) fn finish(&mut self) {
         if let Some(open) = self.polygons.pop() {
             (self.inside, self.drawn) = open.begun;
@@ -302,7 +302,7 @@ impl<'a> Walk<'a> {
         Ok(())
     }
 
-    /// Goes a straight way, given with its direction, and draws it as a segment if asked to.
+    /// Moves straight, by a displacement with its direction, and draws a segment if `draw`.
     fn go(&mut self, way: Vector, direction: Vector, across: Vector, draw: bool) -> Result<(), Error> {
         let start = self.state.position;
         self.advance(way)?;
@@ -330,8 +330,8 @@ impl<'a> Walk<'a> {
         Ok(())
     }
 
-    /// Lets the segments drawn since the last width run evenly from that width to this one. A width that
-    /// nobody has set is not known before the whole animation is, and stays.
+    /// Lets the segments drawn since the last width run evenly from that width to this one. The
+    /// default width is not known before the whole animation is, and stays.
     fn taper(&mut self, to: Width) {
         let (Width::Set(from), Width::Set(to)) = (self.state.width, to) else { return };
         let chain = |scene: &Scene, last: Option<usize>| {
@@ -386,7 +386,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Looks at the number of a colour that was given, with or without a place in a gradient.
+    /// Warns of a number of a colour that does not exist, or of a gradient without a place in it.
     fn check_color(&mut self, number: f64, has_place: bool) {
         let [colors, gradients] = self.scene.palette.counts();
         let count = colors + gradients;
