@@ -23,7 +23,7 @@ pub fn front(bytes: &[u8]) {
     let source = match Source::from_bytes("input.dls", bytes.to_vec()) {
         Ok(source) => source,
         Err(refused) => {
-            refused.1.render(&refused.0, false);
+            refused.diagnostic.render(&refused.source, false);
             return;
         }
     };

@@ -66,7 +66,7 @@ fn laid_out(name: &str, bytes: Vec<u8>) -> Result<(String, Option<usize>), Failu
     let draw = |source: &Source, all: &[Diagnostic]| {
         Failure::Model(all.iter().map(|d| d.render(source, coloured())).collect())
     };
-    let source = Source::from_bytes(name, bytes).map_err(|bad| draw(&bad.0, &[bad.1]))?;
+    let source = Source::from_bytes(name, bytes).map_err(|bad| draw(&bad.source, &[bad.diagnostic]))?;
     let text = format(&source).map_err(|errors| draw(&source, &errors))?;
     let differs = (original != text.as_bytes()).then(|| {
         let mut new = text.split('\n');

@@ -17,7 +17,7 @@ use crate::common::repository;
 fn judge(name: &str, text: &[u8]) -> (Vec<Diagnostic>, Source, bool) {
     let source = match Source::from_bytes(name, text.to_vec()) {
         Ok(source) => source,
-        Err(bad) => return (vec![bad.1], bad.0, true),
+        Err(bad) => return (vec![bad.diagnostic], bad.source, true),
     };
     let session = match Session::from_text(name, &source.text, &[]) {
         Err(refused) => return (refused.diagnostics, source, true),

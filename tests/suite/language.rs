@@ -78,8 +78,7 @@ fn several_mistakes_are_all_reported() {
 #[test]
 fn bytes_that_are_no_text_are_refused_where_they_are() {
     let bad = Source::from_bytes("m", b"title \"x\"\naxiom: F\xff".to_vec()).expect_err("not UTF-8");
-    let (source, diagnostic) = *bad;
-    assert_eq!(source.position(diagnostic.labels[0].0.start), (2, 9));
+    assert_eq!(bad.source.position(bad.diagnostic.labels[0].0.start), (2, 9));
 }
 
 #[test]

@@ -9,7 +9,9 @@ use std::sync::Arc;
 use crate::scope::{FORMAL, Lowered, Scope, plural};
 use crate::table;
 use dlsys_diagnostic::{Diagnostic, Span};
-use dlsys_expr::{Array, Binary, Curve, CurveFault, Integral, Lookup, MAX_POINTS, NodeId, Part, Unary};
+use dlsys_expr::{
+    Array, Binary, Curve, Error as CurveError, Integral, Lookup, MAX_POINTS, NodeId, Part, Unary,
+};
 use dlsys_syntax::Files;
 use dlsys_syntax::ast::{Expr, ExprId, Expression, Expressions, Item, Name};
 use dlsys_syntax::suggest::did_you_mean;
@@ -73,7 +75,7 @@ impl Scope {
                         let made = Curve::new(&*name.text, *sort, &points, *periodic);
                         let line = |i: usize| format!("line {} of the file", rows[i].line);
                         match made {
-                            Err(CurveFault::NotAscending(i)) => {
+                            Err(CurveError::NotAscending(i)) => {
                                 let what = format!(
                                     "{}: its first number is not greater than the one before",
                                     line(i)
@@ -115,29 +117,30 @@ impl Scope {
         span: Span,
         at: &dyn Fn(usize) -> Span,
         what: &str,
-        made: Result<Curve, CurveFault>,
+        made: Result<Curve, CurveError>,
     ) -> Option<Curve> {
         let error = Diagnostic::error(format!("these {what}s make no curve"));
         let error = match made {
             Ok(curve) => return Some(curve),
-            Err(CurveFault::TooFew(least)) => error
+            Err(CurveError::TooFew(least)) => error
                 .at(span, format!("`{}` needs {least} {what}s or more", name.text))
                 .help("a spline has four control points or more, a periodic curve three points, any other two"),
-            Err(CurveFault::TooMany) => error
+            Err(CurveError::TooMany) => error
                 .at(name.span, format!("more than {MAX_POINTS} {what}s"))
                 .help("every tenth will show the same course"),
-            Err(CurveFault::NotAscending(i)) => error
+            Err(CurveError::NotAscending(i)) => error
                 .at(at(i), "its x is not greater than that of the point before")
                 .at(at(i - 1), "the point before")
                 .help("order the points by x; where a value jumps, put two points close to each other"),
-            Err(CurveFault::NotClosed { first, last }) => error
+            Err(CurveError::NotClosed { first, last }) => error
                 .at(span, format!("it begins with {first} and ends with {last}"))
                 .help(format!(
                     "a periodic curve ends, one period later, with the value that it begins with: end it with (…, {first})"
                 )),
-            Err(CurveFault::TooLarge) => error
+            Err(CurveError::TooLarge) => error
                 .at(span, "its slopes or areas are greater than any number")
                 .help("choose units in which the numbers are of moderate size"),
+            Err(other) => error.at(span, other.to_string()),
         };
         self.diagnostics.push(error);
         None

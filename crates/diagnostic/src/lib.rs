@@ -1,150 +1,30 @@
-//! What is said about a model: messages with the place in the text that they are about.
+//! Messages about a model, with the places in its text that they are about.
 //!
-//! Every stage has its own errors; all of them end here, in a [`Diagnostic`], and there is one function
-//! that draws them ([`Diagnostic::render`]), for the command line, the tests and whoever embeds the library.
+//! Every stage has errors of its own; each becomes a [`Diagnostic`], and one function draws them all ([`Diagnostic::render`]): for the
+//! command line, for tests, and for programs that embed the library. A [`Source`] holds the text, a [`Span`] is a place in it.
+//!
+//! ```
+//! use dlsys_diagnostic::{Diagnostic, Source, Span};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let source = Source::from_bytes("stem.dls", b"initial string: F(1) G".to_vec())?;
+//! let message = Diagnostic::error("there is no rule for `G`")
+//!     .at(Span::new(21, 22), "this module")
+//!     .help("write `G: …`");
+//! let text = message.render(&source, false);
+//! assert!(text.starts_with("error: there is no rule for `G`"));
+//! assert!(text.contains("stem.dls:1:22"));
+//! # Ok(())
+//! # }
+//! ```
 
 #![warn(missing_docs)]
 
-use std::ops::Range;
+mod source;
+
+pub use source::{Error, Source, Span};
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
-
-/// A stretch of the source text, in bytes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Span {
-    /// The first byte.
-    pub start: u32,
-    /// The byte after the last one.
-    pub end: u32,
-}
-
-impl Span {
-    /// The bytes from `start` up to `end`, excluded.
-    pub fn new(start: usize, end: usize) -> Span {
-        // Sources are bounded far below 4 GiB (`Source::LIMIT`).
-        Span { start: start as u32, end: end as u32 }
-    }
-
-    /// From the start of `self` to the end of `other`.
-    pub fn to(self, other: Span) -> Span {
-        Span { start: self.start.min(other.start), end: self.end.max(other.end) }
-    }
-
-    /// The bytes, for slicing [`Source::text`].
-    pub fn range(self) -> Range<usize> {
-        self.start as usize..self.end as usize
-    }
-}
-
-/// A model's text and where it came from. Texts that it includes stand behind it, so that a [`Span`] is a place in any of
-/// them.
-#[derive(Clone, Debug)]
-pub struct Source {
-    /// The file as the user named it.
-    pub name: String,
-    /// The text, UTF-8, with everything that it includes behind it.
-    pub text: String,
-    /// Byte at which each line starts.
-    lines: Vec<u32>,
-    /// Included texts: where each begins, its first line, and its name.
-    included: Vec<(u32, usize, String)>,
-}
-
-impl Source {
-    /// Greatest size of a model file, in bytes.
-    pub const LIMIT: usize = 256 << 20;
-
-    /// Takes text that is known to be good, as in tests and examples.
-    pub fn new(name: impl Into<String>, text: impl Into<String>) -> Source {
-        let text = text.into();
-        let mut lines = vec![0];
-        lines.extend(text.bytes().enumerate().filter(|(_, b)| *b == b'\n').map(|(i, _)| i as u32 + 1));
-        Source { name: name.into(), text, lines, included: Vec::new() }
-    }
-
-    /// Takes the bytes of a file: drops a byte-order mark, rejects what is not UTF-8.
-    pub fn from_bytes(name: impl Into<String>, bytes: Vec<u8>) -> Result<Source, Box<(Source, Diagnostic)>> {
-        let name = name.into();
-        if bytes.len() > Source::LIMIT {
-            let message =
-                format!("this file has {} MB; a model may have {}", bytes.len() >> 20, Source::LIMIT >> 20);
-            return Err(Box::new((Source::new(name, ""), Diagnostic::error(message))));
-        }
-        match String::from_utf8(bytes) {
-            Ok(mut text) => {
-                if text.starts_with('\u{feff}') {
-                    text.drain(..'\u{feff}'.len_utf8());
-                }
-                Ok(Source::new(name, text))
-            }
-            Err(error) => {
-                let at = error.utf8_error().valid_up_to();
-                let byte = error.as_bytes()[at];
-                // The text is shown with the bad bytes replaced; up to the first of them nothing moves.
-                let source = Source::new(name, String::from_utf8_lossy(error.as_bytes()).into_owned());
-                let diagnostic = Diagnostic::error("the file is not valid UTF-8")
-                    .at(
-                        Span::new(at, at + '\u{fffd}'.len_utf8()),
-                        format!("byte 0x{byte:02x} begins no character"),
-                    )
-                    .help("save the file as UTF-8 (in most editors: “Save with encoding”)");
-                Err(Box::new((source, diagnostic)))
-            }
-        }
-    }
-
-    /// Puts a text that the model includes behind what there is, and returns where it begins.
-    pub fn include(&mut self, name: impl Into<String>, text: &str) -> usize {
-        if !self.text.ends_with('\n') {
-            self.text.push('\n');
-            self.lines.push(self.text.len() as u32);
-        }
-        let start = self.text.len();
-        self.included.push((start as u32, self.lines.len() - 1, name.into()));
-        self.text.push_str(text);
-        let breaks = text.bytes().enumerate().filter(|(_, b)| *b == b'\n');
-        self.lines.extend(breaks.map(|(i, _)| (start + i) as u32 + 1));
-        start
-    }
-
-    /// The model's own text, without what it includes.
-    pub fn own_text(&self) -> &str {
-        self.included.first().map_or(&self.text, |first| &self.text[..first.0 as usize])
-    }
-
-    fn part(&self, byte: u32) -> Option<&(u32, usize, String)> {
-        self.included[..self.included.partition_point(|part| part.0 <= byte)].last()
-    }
-
-    /// The file that a byte stands in.
-    pub fn name_of(&self, byte: u32) -> &str {
-        self.part(byte).map_or(&self.name, |part| &part.2)
-    }
-
-    /// The line that a byte stands in, of all texts together.
-    fn line_of(&self, byte: u32) -> usize {
-        self.lines.partition_point(|&start| start <= byte) - 1
-    }
-
-    /// Line and column of a byte in its file, both from 1; columns count characters.
-    pub fn position(&self, byte: u32) -> (usize, usize) {
-        let line = self.line_of(byte);
-        let column = self.text[self.lines[line] as usize..].char_indices();
-        let offset = (byte - self.lines[line]) as usize;
-        let first = self.part(byte).map_or(0, |part| part.1);
-        (line - first + 1, column.take_while(|(i, _)| *i < offset).count() + 1)
-    }
-
-    /// The text of a span.
-    pub fn slice(&self, span: Span) -> &str {
-        &self.text[span.range()]
-    }
-
-    fn line_range(&self, line: usize) -> Range<usize> {
-        let end = self.lines.get(line + 1).map_or(self.text.len(), |&next| next as usize);
-        self.lines[line] as usize..end
-    }
-}
 
 /// How grave a message is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -162,11 +42,11 @@ pub struct Diagnostic {
     pub severity: Severity,
     /// One sentence without a full stop: what is wrong.
     pub message: String,
-    /// Places in the text with a remark each; the first is where the fault is.
+    /// Places in the text, each with a remark; the first is that of the mistake.
     pub labels: Vec<(Span, String)>,
     /// Further facts.
     pub notes: Vec<String>,
-    /// What to try.
+    /// Advice: what to write instead, or where to look.
     pub help: Vec<String>,
 }
 
@@ -209,15 +89,16 @@ impl Diagnostic {
         self
     }
 
-    /// Adds advice if there is any.
+    /// Adds advice, if there is any.
     pub fn help_opt(mut self, help: Option<String>) -> Diagnostic {
         self.help.extend(help);
         self
     }
 
-    /// Draws the message as text: what, where (file, line, column, source line), why, what to try.
+    /// Draws the message as text: the message, the places (file, line, column, the line itself) with their remarks, notes and advice.
+    /// With colours, it contains escape sequences of terminals. It ends with an empty line.
     pub fn render(&self, source: &Source, coloured: bool) -> String {
-        /// Lines longer than this are quoted in part: nobody reads a line of 50 MB.
+        /// Lines longer than this are quoted in part: a line of 50 MB helps nobody.
         const LONG: usize = 400;
         /// Up to this column lines are quoted from their beginning, so that places in them have their number.
         const FAR: usize = 10_000;
@@ -279,7 +160,6 @@ impl Diagnostic {
             group = group.element(Level::HELP.message(help));
         }
         let renderer = if coloured { Renderer::styled() } else { Renderer::plain() };
-        // An empty line sets messages apart.
         renderer.render(&[group]) + "\n\n"
     }
 }

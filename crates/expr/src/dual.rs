@@ -11,7 +11,7 @@ pub struct Dual<T> {
     pub rate: T,
 }
 
-/// What differentiation needs to know of the type it is done in.
+/// The operations that forward differentiation needs beyond those of [`Value`].
 pub trait Differentiable: Value {
     /// True if the value is exactly zero.
     fn is_zero(self) -> bool;

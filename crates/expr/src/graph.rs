@@ -1,4 +1,4 @@
-//! Hash-consed expression graphs.
+//! Hash-consed expression graphs: construction with folding of constants, rebuilding, and reachability.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -21,7 +21,7 @@ impl NodeId {
 pub enum Node {
     /// A constant, by its bits, so that it can be hashed.
     Const(u64),
-    /// A variable, by number; what it stands for is the user's business.
+    /// A variable, by number; its meaning is up to the caller.
     Var(u32),
     /// A function or operator of one operand.
     Unary(Unary, NodeId),
@@ -52,7 +52,7 @@ pub struct Graph {
     integrals: HashMap<NodeId, Integral>,
 }
 
-/// `derivative of whole by argument = the expression that this is said of`.
+/// An antiderivative of an expression: the expression is the derivative of `whole` by `argument`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Integral {
     /// The antiderivative.
@@ -82,13 +82,13 @@ impl Graph {
         id
     }
 
-    /// Takes a curve in.
+    /// Adds a curve.
     pub fn add_curve(&mut self, curve: Arc<Curve>) -> Lookup {
         self.curves.push(curve);
         Lookup(self.curves.len() as u32 - 1)
     }
 
-    /// Takes an array in.
+    /// Adds an array.
     pub fn add_array(&mut self, array: Arc<Array>) -> Lookup {
         self.arrays.push(array);
         Lookup(self.arrays.len() as u32 - 1)
@@ -104,7 +104,7 @@ impl Graph {
         &self.arrays[lookup.0 as usize]
     }
 
-    /// All curves, in the order in which they were taken in.
+    /// All curves, in the order in which they were added.
     pub fn curves(&self) -> &[Arc<Curve>] {
         &self.curves
     }
@@ -138,7 +138,7 @@ impl Graph {
         self.integrals.contains_key(&id) || matches!(self.node(id), Node::Curve(_, p, _) if part(p))
     }
 
-    /// Those of the given expressions of which [`Graph::know_integral`] was told.
+    /// Those of the given expressions for which [`Graph::know_integral`] was called.
     pub fn noted_integrals(&self, among: &[NodeId]) -> Vec<(NodeId, Integral)> {
         if self.integrals.is_empty() {
             return Vec::new();
@@ -219,8 +219,8 @@ impl Graph {
         }
     }
 
-    /// Rebuilds `roots` from the operands up. `replace` is asked for each node, which it gets as it was
-    /// (by id) and with its operands already rebuilt; where it answers, its answer stands for the node.
+    /// Rebuilds `roots` from the operands up. `replace` gets each node as it was (by id) and with its operands already
+    /// rebuilt; if it returns an expression, that replaces the node.
     pub fn rewrite(
         &mut self,
         roots: &[NodeId],
@@ -254,7 +254,7 @@ impl Graph {
         roots.iter().map(|r| new[r]).collect()
     }
 
-    /// Everything that `roots` are built from, operands first.
+    /// All expressions that `roots` are built from, operands first.
     pub fn reachable(&self, roots: &[NodeId]) -> Vec<NodeId> {
         let mut stack: Vec<NodeId> = roots.to_vec();
         let mut seen: std::collections::HashSet<NodeId> = roots.iter().copied().collect();

@@ -21,7 +21,7 @@ pub struct Interval {
 impl Interval {
     /// No value: the expression is undefined on the whole set.
     pub const EMPTY: Interval = Interval { lo: f64::NAN, hi: f64::NAN, partial: true };
-    /// Anything at all.
+    /// All numbers, without continuity.
     pub const ENTIRE: Interval = Interval { lo: f64::NEG_INFINITY, hi: f64::INFINITY, partial: true };
 
     /// The interval spanned by two numbers in any order.

@@ -1,4 +1,5 @@
-//! Pure mathematics: expressions over numbered variables. No syntax, no time, no tree.
+//! Expressions over numbered variables: graphs, compiled programs, and evaluation in numbers, intervals and derivatives. Independent
+//! of syntax, plants and simulation.
 //!
 //! ```text
 //! Graph ──compile──▶ Program ──eval::<T>──▶ values of type T
@@ -27,6 +28,7 @@ mod curve;
 mod derivative;
 mod dual;
 mod elimination;
+mod error;
 mod fold;
 mod graph;
 mod interval;
@@ -39,9 +41,10 @@ mod tests;
 mod time;
 
 pub use comparison::{Comparison, Truth};
-pub use curve::{Array, Curve, CurveFault, MAX_POINTS, Part, Sort};
+pub use curve::{Array, Curve, MAX_POINTS, Part, Sort};
 pub use dual::Dual;
 pub use elimination::eliminate;
+pub use error::Error;
 pub use fold::Fold;
 pub use graph::{Graph, Integral, Lookup, Node, NodeId};
 pub use interval::Interval;

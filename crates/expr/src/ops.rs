@@ -1,4 +1,4 @@
-//! The operations of an expression, and what a type must offer to be computed with.
+//! The operations of expressions, and the trait of types in which they are evaluated. To add a function of models, begin here.
 //!
 //! Truth values are numbers: 1 is true, 0 is false. A comparison with NaN is false, as in IEEE 754.
 
@@ -9,7 +9,7 @@ use super::{Array, Curve, Part};
 pub enum Unary {
     /// -a
     Neg,
-    /// What a product of something with itself is compiled to: bounds of it are narrower than those of a product.
+    /// The product of an expression with itself: its bounds are narrower than those of a product.
     Square,
     /// Logical negation of a truth value.
     Not,
@@ -113,7 +113,7 @@ impl Binary {
 
 /// A number-like type that a [`Program`](super::Program) can be evaluated in.
 pub trait Value: Copy {
-    /// The type's view of a number.
+    /// A number, as a value of the type.
     fn constant(x: f64) -> Self;
     /// A function or operator of one operand.
     fn unary(op: Unary, a: Self) -> Self;

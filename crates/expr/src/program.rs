@@ -1,4 +1,4 @@
-//! Straight-line code for expressions.
+//! Compilation of expressions to straight-line code with registers, and its evaluation for one row or many.
 
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
@@ -59,11 +59,10 @@ pub const LANES: usize = 32;
 /// One value of each row.
 pub type Lanes = [f64; LANES];
 
-/// Lanes that fit into the processor's registers together: no operand need be copied aside, though the result may take
-/// its place.
+/// Lanes that fit into the processor's registers together, so that the result may overwrite an operand without a copy.
 const PART: usize = 8;
 
-/// Does an operation in so many parts of the lanes.
+/// Applies an operation to the lanes, part by part.
 #[inline(always)]
 fn each(registers: &mut [Lanes], parts: usize, [to, a, b]: [Register; 3], f: impl Fn(f64, f64) -> f64) {
     let part = |of: Register, registers: &[Lanes], i: usize| -> [f64; PART] {
@@ -96,12 +95,26 @@ pub struct Program {
     arrays: Vec<Arc<Array>>,
 }
 
-/// The place of something in a list, to which it is added if it is new.
-fn listed<T>(list: &mut Vec<Arc<T>>, known: &mut HashMap<Lookup, u32>, lookup: Lookup, item: &Arc<T>) -> u32 {
-    *known.entry(lookup).or_insert_with(|| {
-        list.push(item.clone());
-        list.len() as u32 - 1
-    })
+/// The curves or arrays that a program reads, each once.
+struct Table<T> {
+    all: Vec<Arc<T>>,
+    numbers: HashMap<Lookup, u32>,
+}
+
+impl<T> Default for Table<T> {
+    fn default() -> Table<T> {
+        Table { all: Vec::new(), numbers: HashMap::new() }
+    }
+}
+
+impl<T> Table<T> {
+    /// The number of an item, which is added if it is new.
+    fn number(&mut self, lookup: Lookup, item: &Arc<T>) -> u32 {
+        *self.numbers.entry(lookup).or_insert_with(|| {
+            self.all.push(item.clone());
+            self.all.len() as u32 - 1
+        })
+    }
 }
 
 /// The number that a node is.
@@ -123,6 +136,78 @@ fn in_registers(graph: &Graph, id: NodeId) -> [Option<NodeId>; 3] {
     }
 }
 
+/// How often each expression is an operand in a register. An output has one use that never ends, so that its register is not given
+/// away.
+fn uses(graph: &Graph, order: &[NodeId], roots: &[NodeId]) -> HashMap<NodeId, usize> {
+    let mut uses: HashMap<NodeId, usize> = HashMap::new();
+    for &id in order {
+        for operand in in_registers(graph, id).into_iter().flatten() {
+            *uses.entry(operand).or_default() += 1;
+        }
+    }
+    for root in roots {
+        *uses.entry(*root).or_default() += 1;
+    }
+    uses
+}
+
+/// The state of a compilation.
+struct Compiler<'g> {
+    graph: &'g Graph,
+    /// Uses of each expression that are still to come.
+    uses: HashMap<NodeId, usize>,
+    /// Where values are.
+    place: HashMap<NodeId, Register>,
+    /// Registers whose values are no longer used.
+    free: Vec<Register>,
+    /// Number of registers so far.
+    registers: Register,
+    curves: Table<Curve>,
+    arrays: Table<Array>,
+}
+
+impl Compiler<'_> {
+    /// The instruction for an expression whose operands have been compiled.
+    fn instruction(&mut self, id: NodeId) -> Instruction {
+        let graph = self.graph;
+        let operands = in_registers(graph, id);
+        for operand in operands.into_iter().flatten() {
+            let left = self.uses.get_mut(&operand).expect("counted before");
+            *left -= 1;
+            if *left == 0 && !matches!(graph.node(operand), Node::Var(_)) {
+                self.free.push(self.place[&operand]);
+            }
+        }
+        let to = self.free.pop().unwrap_or_else(|| {
+            self.registers += 1;
+            self.registers - 1
+        });
+        let operands = operands.map(|o| o.map(|o| self.place[&o]));
+        self.place.insert(id, to);
+        match (graph.node(id), operands) {
+            (Node::Const(bits), _) => Instruction::Const(to, f64::from_bits(bits)),
+            (Node::Unary(op, _), [Some(a), ..]) => Instruction::Unary(op, to, a),
+            (Node::Binary(Binary::Mul, ..), [Some(a), Some(b), _]) if a == b => {
+                Instruction::Unary(Unary::Square, to, a)
+            }
+            (Node::Binary(op, ..), [Some(a), Some(b), _]) => Instruction::Binary(op, to, a, b),
+            (Node::Binary(op, x, _), [None, Some(b), _]) => Instruction::Left(op, to, constant(graph, x), b),
+            (Node::Binary(op, _, x), [Some(a), None, _]) => Instruction::Right(op, to, a, constant(graph, x)),
+            (Node::Select(..), [Some(c), Some(a), Some(b)]) => Instruction::Select(to, c, a, b),
+            (Node::Curve(curve, part, _), [Some(a), ..]) => {
+                Instruction::Curve(self.curves.number(curve, graph.curve_of(curve)), part, to, a)
+            }
+            (Node::Piece(curve, part, ..), [Some(i), Some(a), _]) => {
+                Instruction::Piece(self.curves.number(curve, graph.curve_of(curve)), part, to, i, a)
+            }
+            (Node::Element(array, _), [Some(i), ..]) => {
+                Instruction::Element(self.arrays.number(array, graph.array_of(array)), to, i)
+            }
+            _ => unreachable!("a node has the operands of its kind"),
+        }
+    }
+}
+
 impl Program {
     /// Compiles `roots`, which may read the variables `0..variables`.
     ///
@@ -130,78 +215,29 @@ impl Program {
     /// If a root reads a variable beyond that range: a mistake of the caller, not of a model.
     pub fn compile(graph: &Graph, roots: &[NodeId], variables: usize) -> Program {
         let order = graph.reachable(roots);
-        let mut uses: HashMap<NodeId, usize> = HashMap::new();
-        for &id in order.iter() {
-            for operand in in_registers(graph, id).into_iter().flatten() {
-                *uses.entry(operand).or_default() += 1;
-            }
-        }
-        for root in roots {
-            // One use that never ends: an output's register is not given away.
-            *uses.entry(*root).or_default() += 1;
-        }
-
-        let mut place: HashMap<NodeId, Register> = HashMap::new();
-        let mut free: Vec<Register> = Vec::new();
-        let mut registers = variables as Register;
+        let mut compiler = Compiler {
+            graph,
+            uses: uses(graph, &order, roots),
+            place: HashMap::new(),
+            free: Vec::new(),
+            registers: variables as Register,
+            curves: Table::default(),
+            arrays: Table::default(),
+        };
         let mut code = Vec::new();
-        let (mut curves, mut arrays) = (Vec::new(), Vec::new());
-        let (mut known_curves, mut known_arrays) = (HashMap::new(), HashMap::new());
         for id in order {
-            let node = graph.node(id);
-            if let Node::Var(v) = node {
-                assert!((v as usize) < variables, "variable {v} of {variables}");
-                place.insert(id, v);
-                continue;
+            match graph.node(id) {
+                Node::Var(v) => {
+                    assert!((v as usize) < variables, "variable {v} of {variables}");
+                    compiler.place.insert(id, v);
+                }
+                // A constant that stands in the instructions of its users.
+                Node::Const(_) if !compiler.uses.contains_key(&id) => {}
+                _ => code.push(compiler.instruction(id)),
             }
-            if matches!(node, Node::Const(_)) && !uses.contains_key(&id) {
-                continue;
-            }
-            let operands = in_registers(graph, id);
-            for operand in operands.into_iter().flatten() {
-                let left = uses.get_mut(&operand).expect("counted above");
-                *left -= 1;
-                if *left == 0 && !matches!(graph.node(operand), Node::Var(_)) {
-                    free.push(place[&operand]);
-                }
-            }
-            let to = free.pop().unwrap_or_else(|| {
-                registers += 1;
-                registers - 1
-            });
-            let operands = operands.map(|o| o.map(|o| place[&o]));
-            place.insert(id, to);
-            code.push(match (node, operands) {
-                (Node::Const(bits), _) => Instruction::Const(to, f64::from_bits(bits)),
-                (Node::Unary(op, _), [Some(a), ..]) => Instruction::Unary(op, to, a),
-                (Node::Binary(Binary::Mul, ..), [Some(a), Some(b), _]) if a == b => {
-                    Instruction::Unary(Unary::Square, to, a)
-                }
-                (Node::Binary(op, ..), [Some(a), Some(b), _]) => Instruction::Binary(op, to, a, b),
-                (Node::Binary(op, x, _), [None, Some(b), _]) => {
-                    Instruction::Left(op, to, constant(graph, x), b)
-                }
-                (Node::Binary(op, _, x), [Some(a), None, _]) => {
-                    Instruction::Right(op, to, a, constant(graph, x))
-                }
-                (Node::Select(..), [Some(c), Some(a), Some(b)]) => Instruction::Select(to, c, a, b),
-                (Node::Curve(curve, part, _), [Some(a), ..]) => {
-                    let which = listed(&mut curves, &mut known_curves, curve, graph.curve_of(curve));
-                    Instruction::Curve(which, part, to, a)
-                }
-                (Node::Piece(curve, part, ..), [Some(i), Some(a), _]) => {
-                    let which = listed(&mut curves, &mut known_curves, curve, graph.curve_of(curve));
-                    Instruction::Piece(which, part, to, i, a)
-                }
-                (Node::Element(array, _), [Some(i), ..]) => {
-                    let which = listed(&mut arrays, &mut known_arrays, array, graph.array_of(array));
-                    Instruction::Element(which, to, i)
-                }
-                _ => unreachable!("a node has the operands of its kind"),
-            });
         }
         let constants = roots.iter().map(|root| graph.as_constant(*root)).collect();
-        let outputs: Vec<Register> = roots.iter().map(|r| place[r]).collect();
+        let outputs: Vec<Register> = roots.iter().map(|r| compiler.place[r]).collect();
         let operands = code.iter().flat_map(|instruction: &Instruction| instruction.operands()).flatten();
         let mut reads: Vec<usize> = (operands.chain(outputs.iter().copied()))
             .map(|register| register as usize)
@@ -209,7 +245,9 @@ impl Program {
             .collect();
         reads.sort_unstable();
         reads.dedup();
-        Program { constants, curves, arrays, code, outputs, variables, registers: registers as usize, reads }
+        let Compiler { curves, arrays, registers, .. } = compiler;
+        let (curves, arrays, registers) = (curves.all, arrays.all, registers as usize);
+        Program { constants, curves, arrays, code, outputs, variables, registers, reads }
     }
 
     /// Number of values that an evaluation gives.
@@ -307,7 +345,7 @@ impl Program {
         self.eval_rows(registers, LANES)
     }
 
-    /// The same for the first `rows` only: what is in the other lanes afterwards means nothing.
+    /// The same for the first `rows` only; the other lanes have no meaning afterwards.
     pub fn eval_rows(
         &self,
         registers: &mut Vec<Lanes>,

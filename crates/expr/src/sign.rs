@@ -1,11 +1,11 @@
-//! Signs of differences, which conditions are judged by.
+//! Signs of differences: the values by which conditions are decided.
 
 /// The sign of `a - b`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Sign {
     /// `a < b`.
     Minus,
-    /// `a = b`, within the tolerance of whoever tells the sign.
+    /// `a = b`, within the tolerance of the caller.
     Zero,
     /// `a > b`.
     Plus,

@@ -1,4 +1,4 @@
-//! Points in simulated time, finer than a 64-bit float far from zero.
+//! Instants of simulated time, with a finer resolution than a 64-bit float far from zero.
 
 /// A time as the unevaluated sum of two floats (Dekker 1971), good to about 32 digits.
 ///

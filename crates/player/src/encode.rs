@@ -1,11 +1,11 @@
-//! Tracks as bytes, for the page.
+//! Encoding of tracks as compressed bytes, for the page.
 //!
 //! Everything is a whole number of seven bits a byte, the lowest first, the eighth bit saying that there is more; signed
 //! numbers have their sign in the lowest bit. First of every track
 //!
 //! ```text
 //! kind, outline / mesh / 0 / corners, first frame, frames after it, log₂ of the stride, samples,
-//! looks, and for each: frames since the one before, material + 1 or 0, variant
+//! finishes, and for each: frames since the one before, material + 1 or 0, variant
 //! ```
 //!
 //! (kind 0 is a stem, 1 a mesh, 2 a patch, 3 a polygon), then of every track, number by number, its samples: the first
@@ -43,15 +43,15 @@ pub(super) fn tracks(recording: &Recording) -> (Vec<u8>, Vec<Vec<Spoke>>) {
         };
         let span = u64::from(track.last - track.first);
         let (first, stride) = (u64::from(track.first), u64::from(track.stride.trailing_zeros()));
-        let looks = track.looks.len() as u64;
-        for number in [kind, detail, first, span, stride, track.len() as u64, looks] {
+        let finishes = track.finishes.len() as u64;
+        for number in [kind, detail, first, span, stride, track.len() as u64, finishes] {
             natural(number, &mut bytes);
         }
         let mut before = track.first;
-        for (frame, look) in &track.looks {
+        for (frame, finish) in &track.finishes {
             natural(u64::from(frame - before), &mut bytes);
-            natural(look.material.map_or(0, |material| material.index() as u64 + 1), &mut bytes);
-            natural(u64::from(look.variant), &mut bytes);
+            natural(finish.material.map_or(0, |material| material.index() as u64 + 1), &mut bytes);
+            natural(u64::from(finish.variant), &mut bytes);
             before = *frame;
         }
     }

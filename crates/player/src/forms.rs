@@ -1,4 +1,4 @@
-//! The forms that things have in common: meshes, and how polygons are cut. Both are numbered as they are first seen.
+//! Shapes shared by many things: meshes, and triangulations of polygons. Both are numbered in the order of first use.
 //!
 //! Each stage has its own, so that stages can be made side by side; a recording [adopts](Forms::adopt) them in order.
 
@@ -11,18 +11,18 @@ use dlsys_render::{normal, triangulate};
 
 /// A surface before it is placed.
 #[derive(Clone, Debug)]
-enum Source {
+enum MeshSource {
     Mesh(Arc<Mesh>),
     /// And the largest scale at which it has been placed.
     Patches(Arc<PatchSet>, f64),
 }
 
-impl Source {
+impl MeshSource {
     /// Where it is in memory.
     fn place(&self) -> usize {
         match self {
-            Source::Mesh(mesh) => Arc::as_ptr(mesh) as usize,
-            Source::Patches(patches, _) => Arc::as_ptr(patches) as usize,
+            MeshSource::Mesh(mesh) => Arc::as_ptr(mesh) as usize,
+            MeshSource::Patches(patches, _) => Arc::as_ptr(patches) as usize,
         }
     }
 }
@@ -30,7 +30,7 @@ impl Source {
 /// All forms that have been seen.
 #[derive(Clone, Debug, Default)]
 pub struct Forms {
-    meshes: Vec<Source>,
+    meshes: Vec<MeshSource>,
     /// Numbers of meshes by their place in memory, which stays theirs while `meshes` holds them.
     numbers: HashMap<usize, u32>,
     cuts: Vec<Vec<[u32; 3]>>,
@@ -63,18 +63,20 @@ impl Forms {
     /// The number of a surface's mesh.
     pub(super) fn mesh(&mut self, surface: &Surface) -> u32 {
         self.take_mesh(match &surface.patches {
-            Some(patches) => Source::Patches(patches.clone(), surface.placement.scale),
-            None => Source::Mesh(surface.mesh.clone()),
+            Some(patches) => MeshSource::Patches(patches.clone(), surface.placement.scale),
+            None => MeshSource::Mesh(surface.mesh.clone()),
         })
     }
 
-    fn take_mesh(&mut self, source: Source) -> u32 {
+    fn take_mesh(&mut self, source: MeshSource) -> u32 {
         let meshes = &mut self.meshes;
         let next = meshes.len() as u32;
         let number = *self.numbers.entry(source.place()).or_insert(next);
         match (meshes.get_mut(number as usize), &source) {
             (None, _) => meshes.push(source),
-            (Some(Source::Patches(_, largest)), Source::Patches(_, scale)) => *largest = largest.max(*scale),
+            (Some(MeshSource::Patches(_, largest)), MeshSource::Patches(_, scale)) => {
+                *largest = largest.max(*scale)
+            }
             _ => {}
         }
         number
@@ -97,7 +99,7 @@ impl Forms {
         number
     }
 
-    /// Takes in the forms of a stage, in the order of its things. Returns the numbers that they have here, by those that they
+    /// Adds the forms of a stage, in the order of its things. Returns the numbers that they have here, by those that they
     /// have there: of meshes, and of cuts.
     pub(super) fn adopt(&mut self, stage: &Stage) -> [Vec<u32>; 2] {
         let theirs = &stage.forms;
@@ -110,7 +112,7 @@ impl Forms {
                     meshes[number as usize].get_or_insert_with(|| self.take_mesh(source.clone()));
                 }
                 Form::Polygon(_) => {
-                    let number = item.look.variant as usize;
+                    let number = item.finish.variant as usize;
                     cuts[number].get_or_insert_with(|| self.take_cut(theirs.cuts[number].clone()));
                 }
                 Form::Stem(_) | Form::Patch => {}
@@ -132,8 +134,8 @@ impl Forms {
     /// A mesh, by number, no further than `accuracy` (scene units) from its surface where it is largest.
     pub fn mesh_form(&self, number: usize, accuracy: f64, palette: &Palette) -> MeshForm {
         let mesh = match &self.meshes[number] {
-            Source::Mesh(mesh) => mesh.clone(),
-            Source::Patches(patches, largest) => patches.mesh(accuracy / largest.max(f64::MIN_POSITIVE)),
+            MeshSource::Mesh(mesh) => mesh.clone(),
+            MeshSource::Patches(patches, largest) => patches.mesh(accuracy / largest.max(f64::MIN_POSITIVE)),
         };
         let mut form = MeshForm::default();
         let mut known = HashMap::new();

@@ -1,4 +1,4 @@
-//! What happens in a run, for people to look through: productions of one instant, rule and clause are one line.
+//! The list of productions of a run, for display: productions of one instant, rule and clause are one line.
 
 use serde::Serialize;
 
@@ -23,7 +23,7 @@ pub struct Happening {
     clause: (usize, usize),
 }
 
-/// What has happened in a run, up to a number of lines.
+/// The productions of a run, up to a number of lines.
 #[derive(Clone, Debug, Default)]
 pub struct History {
     /// The lines, in the order of time.
@@ -35,10 +35,10 @@ pub struct History {
 }
 
 impl History {
-    /// Most lines; nobody reads more.
+    /// Most lines of the list.
     pub const MOST: usize = 5000;
 
-    /// Takes in productions, in the order of time.
+    /// Adds productions, in the order of time.
     pub fn add(&mut self, events: &[Event], model: &Model, source: &Source) {
         for event in events {
             self.productions += 1;

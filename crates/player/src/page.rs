@@ -1,4 +1,4 @@
-//! A recording as one HTML file that plays it: no network, nothing but what it holds.
+//! A recording as one HTML file that plays it, without network or other files.
 //!
 //! The file has three parts that matter: the player and its shaders (`page/`, `shaders/`), a description of the recording as
 //! JSON, and its tracks (see `encode.rs`) in base64.
@@ -13,7 +13,7 @@ use dlsys_render::{GENERATOR, Spoke};
 
 const PAGE: &str = include_str!("page/page.html");
 const STYLE: &str = include_str!("page/style.css");
-/// In the order in which they need one another.
+/// The scripts, each after those that it needs.
 const SCRIPTS: [&str; 5] = [
     include_str!("page/recording.js"),
     include_str!("page/camera.js"),
@@ -26,7 +26,7 @@ const SCRIPTS: [&str; 5] = [
 pub const SHADERS: [(&str, &str); 2] =
     [("surface", include_str!("shaders/surface.vert")), ("light", include_str!("shaders/light.frag"))];
 
-/// With what every page of ours begins, so that nobody else's file is taken for one.
+/// The beginning of every page, by which it is told from files of other programs.
 pub const MARK: &str = "<!doctype html>\n<!-- dlsys view: a recorded plant -->\n";
 
 /// The document.

@@ -1,7 +1,8 @@
-//! A plant through time: tracks of all things that were to be seen.
+//! Recording of a run: tracks of all things that are drawn, from frame to frame.
 
 use std::collections::HashMap;
 
+use super::Error;
 use super::forms::Forms;
 use super::history::History;
 use super::stage::{Form, Item, Key, Stage};
@@ -25,7 +26,7 @@ pub struct Recording {
     pub modules: Vec<u64>,
     /// Productions, for the list beside the plant.
     pub history: History,
-    /// The materials that looks name.
+    /// The materials that finishes name.
     pub palette: Palette,
     /// The forms that things are placed copies of.
     pub forms: Forms,
@@ -43,14 +44,6 @@ pub struct Recording {
     pub unit: f64,
     /// The model's contours.
     pub contours: Vec<Vec<[f64; 2]>>,
-}
-
-/// More than a page can hold.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("there is too much to record: more than {limit} numbers by t = {time}", limit = Recorder::MOST_NUMBERS)]
-pub struct TooMuch {
-    /// Time of the first frame that does not fit, in units of the model.
-    pub time: f64,
 }
 
 /// A recording that is being made.
@@ -104,7 +97,7 @@ impl Recorder {
     ///
     /// # Errors
     /// If it is more than fits into memory or a page.
-    pub fn add(&mut self, time: f64, modules: u64, stage: &Stage) -> Result<(), TooMuch> {
+    pub fn add(&mut self, time: f64, modules: u64, stage: &Stage) -> Result<(), Error> {
         let recording = &mut self.recording;
         let frame = recording.times.len() as u32;
         recording.times.push(time);
@@ -112,10 +105,10 @@ impl Recorder {
         let mut open = HashMap::with_capacity(stage.items.len());
         let [meshes, cuts] = recording.forms.adopt(stage);
         for item in &stage.items {
-            let Item { mut key, mut look, .. } = *item;
+            let Item { mut key, mut finish, .. } = *item;
             match &mut key.form {
                 Form::Mesh(number) => *number = meshes[*number as usize],
-                Form::Polygon(_) => look.variant = cuts[look.variant as usize],
+                Form::Polygon(_) => finish.variant = cuts[finish.variant as usize],
                 Form::Stem(_) | Form::Patch => {}
             }
             let number = *open.entry(key).or_insert_with(|| {
@@ -124,7 +117,7 @@ impl Recorder {
                         form: key.form,
                         first: frame,
                         last: frame,
-                        looks: Vec::new(),
+                        finishes: Vec::new(),
                         samples: Vec::new(),
                         stride: 1,
                     });
@@ -133,8 +126,8 @@ impl Recorder {
             });
             let track = &mut recording.tracks[number];
             track.last = frame;
-            if track.looks.last().is_none_or(|(_, known)| *known != look) {
-                track.looks.push((frame, look));
+            if track.finishes.last().is_none_or(|(_, known)| *known != finish) {
+                track.finishes.push((frame, finish));
             }
             let steps = stage.numbers_of(item).iter().enumerate().map(|(i, x)| {
                 let from = if is_point(key.form, i) { recording.centre[i % 3] } else { 0.0 };
@@ -147,7 +140,7 @@ impl Recorder {
         for (_, number) in std::mem::replace(&mut self.open, open) {
             self.close(number);
         }
-        if self.numbers > Recorder::MOST_NUMBERS { Err(TooMuch { time }) } else { Ok(()) }
+        if self.numbers > Recorder::MOST_NUMBERS { Err(Error::TooLong { time }) } else { Ok(()) }
     }
 
     fn close(&mut self, number: usize) {

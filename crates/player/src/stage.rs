@@ -49,9 +49,9 @@ pub struct Key {
     pub count: u32,
 }
 
-/// How a thing looks at a time.
+/// Material and variant of a thing at a time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Look {
+pub struct Finish {
     /// `None`: each part of a mesh has its own.
     pub material: Option<MaterialId>,
     /// Of a stem: 1 if a dome closes its start, plus 2 if one closes its end. Of a polygon: how it is cut into
@@ -65,7 +65,7 @@ pub struct Item {
     /// Follows the item from frame to frame.
     pub key: Key,
     /// Its colours.
-    pub look: Look,
+    pub finish: Finish,
     /// Index of the first of its numbers.
     pub first: usize,
 }
@@ -94,40 +94,45 @@ impl Stage {
         for length in &stems {
             let segment = &scene.segments[length.segment];
             let [start, end] = length.caps.map(u32::from);
-            let look = Look { material: Some(segment.material), variant: start + 2 * end };
-            self.begin(scene, segment.owner, Form::Stem(segment.contour), look);
+            let finish = Finish { material: Some(segment.material), variant: start + 2 * end };
+            self.begin(scene, segment.owner, Form::Stem(segment.contour), finish);
             for CrossSection { centre, u, v } in length.ends {
                 [centre.coords, u, v].iter().for_each(|vector| self.numbers.extend(vector.iter()));
             }
         }
         for polygon in &scene.polygons {
-            let look = Look {
+            let finish = Finish {
                 material: Some(polygon.material),
                 variant: self.forms.triangulation(&polygon.vertices),
             };
-            self.begin(scene, polygon.owner, Form::Polygon(polygon.vertices.len() as u32), look);
+            self.begin(scene, polygon.owner, Form::Polygon(polygon.vertices.len() as u32), finish);
             self.place(&polygon.vertices);
         }
         for surface in &scene.surfaces {
             let placement = &surface.placement;
             let form = Form::Mesh(self.forms.mesh(surface));
-            self.begin(scene, surface.owner, form, Look { material: surface.tint, variant: 0 });
+            self.begin(scene, surface.owner, form, Finish { material: surface.tint, variant: 0 });
             self.numbers.extend(placement.origin.iter());
             for axis in &placement.axes[..2] {
                 self.numbers.extend((axis * placement.scale).iter());
             }
         }
         for patch in &scene.patches {
-            self.begin(scene, patch.owner, Form::Patch, Look { material: Some(patch.material), variant: 0 });
+            self.begin(
+                scene,
+                patch.owner,
+                Form::Patch,
+                Finish { material: Some(patch.material), variant: 0 },
+            );
             patch.net.iter().for_each(|row| self.place(row));
         }
     }
 
-    fn begin(&mut self, scene: &Scene, owner: OwnerId, form: Form, look: Look) {
+    fn begin(&mut self, scene: &Scene, owner: OwnerId, form: Form, finish: Finish) {
         let count = self.counts.entry((owner, form)).or_default();
         let key = Key { lineage: scene.owner(owner).lineage.id, form, count: *count };
         *count += 1;
-        self.items.push(Item { key, look, first: self.numbers.len() });
+        self.items.push(Item { key, finish, first: self.numbers.len() });
     }
 
     fn place(&mut self, points: &[Point]) {

@@ -3,7 +3,7 @@
 //! A track holds samples at every frame while it is recorded. Then samples are left out: those at the end that repeat the
 //! one before, and all but every second, fourth, … one if straight lines between the rest are as near as they should be.
 
-use super::stage::{Form, Look};
+use super::stage::{Finish, Form};
 
 /// One thing from the first frame in which it is there to the last.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,8 +14,8 @@ pub struct Track {
     pub first: u32,
     /// The last frame in which it is there, by index.
     pub last: u32,
-    /// Changes of look: the frame from which it holds. The first is `first`.
-    pub looks: Vec<(u32, Look)>,
+    /// Changes of finish: the frame from which it holds. The first is `first`.
+    pub finishes: Vec<(u32, Finish)>,
     /// Samples of all numbers, in steps of the recording's unit. Sample `i` is of frame `first + i * stride`, but that of the
     /// last frame is always the last one there would be; samples that are missing at the end repeat the last.
     pub samples: Vec<i32>,
@@ -115,12 +115,12 @@ mod tests {
         let numbers = Form::Mesh(0).numbers() as i32;
         let samples = (0..length).flat_map(|i| (0..numbers).map(|k| (k, i)).collect::<Vec<_>>());
         let samples = samples.map(|(k, i)| if k == 4 { path(i) } else { k }).collect();
-        let look = Look { material: None, variant: 0 };
+        let finish = Finish { material: None, variant: 0 };
         Track {
             form: Form::Mesh(0),
             first: 10,
             last: 9 + length,
-            looks: vec![(10, look)],
+            finishes: vec![(10, finish)],
             samples,
             stride: 1,
         }

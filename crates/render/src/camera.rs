@@ -1,4 +1,4 @@
-//! Where a scene is looked at from, and how its points come to lie in a picture.
+//! Cameras: the position of the viewer, and the projection of points to a picture.
 //!
 //! A camera stands in the direction of its [`View`]: infinitely far away (orthographic), or at an eye
 //! (perspective). Pictures have the same units either way: lengths in a plane through the middle of the plant, the plane
@@ -28,7 +28,7 @@ struct Eye {
 }
 
 impl Eye {
-    /// Nearer than this part of the distance, things stop growing: nothing that was surveyed is there.
+    /// Nearer than this part of the distance the magnification is constant: the survey found nothing there.
     const NEAR: f64 = 1e-3;
 
     fn magnification(&self, z: f64) -> f64 {
@@ -37,7 +37,7 @@ impl Eye {
 }
 
 impl Camera {
-    /// Fields of view that can be had, in degrees.
+    /// Possible fields of view, in degrees.
     pub const FIELDS: std::ops::RangeInclusive<f64> = 1.0..=120.0;
     /// The nearest point is at least this part of the plant's depth away from the eye, so that it is at most five times
     /// as large as the farthest.
@@ -48,7 +48,7 @@ impl Camera {
         Camera { view, eye: None }
     }
 
-    /// A camera as near as it can stand if all that casts this shadow is to be within an angle of `field` degrees, from
+    /// The nearest camera that sees all that casts this shadow within an angle of `field` degrees, from
     /// side to side and from top to bottom.
     pub(super) fn perspective(view: View, field: f64, shadow: &Shadow) -> Camera {
         let slope = (field.clamp(*Camera::FIELDS.start(), *Camera::FIELDS.end()) / 2.0).to_radians().tan();
@@ -73,13 +73,13 @@ impl Camera {
         Camera { view, eye: Some(Eye { x, y, focus, distance }) }
     }
 
-    /// The direction that it looks from.
+    /// The direction from the scene to the viewer.
     pub fn view(&self) -> View {
         self.view
     }
 
-    /// Where a point comes to lie: to the right and up in the picture, in scene units of the plane of focus; z tells
-    /// what is nearer (greater), and is linear along straight lines of the picture.
+    /// The projection of a point: to the right and up in the picture, in scene units of the plane of focus; z is greater for nearer
+    /// points, and linear along straight lines of the picture.
     pub fn project(&self, p: Point) -> Point {
         let p = self.view.see(p);
         match &self.eye {
@@ -95,7 +95,7 @@ impl Camera {
         }
     }
 
-    /// How much larger than in the plane of focus things are at a point with this z of [`project`](Camera::project).
+    /// The magnification at a point with this z of [`project`](Camera::project); 1 in the plane of focus.
     pub fn magnification(&self, z: f64) -> f64 {
         self.eye.map_or(1.0, |eye| 1.0 + z / eye.distance)
     }

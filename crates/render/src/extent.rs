@@ -1,7 +1,7 @@
-//! How much space scenes take up as seen in a view: outlines tight enough to place a camera by.
+//! Extents of scenes in a view: convex outlines, tight enough to place a camera by them.
 //!
-//! A box would do for an orthographic picture. How far away a perspective camera must stand depends on
-//! which parts are near, so here the shadows on the view's planes x, z and y, z are bounded by sixteen lines each (the
+//! A box is enough for an orthographic picture. The distance of a perspective camera depends on which
+//! parts are near, so here the shadows on the view's planes x, z and y, z are bounded by sixteen lines each (the
 //! support function of the shadow, at every 22.5 degrees). Such bounds are exact along the axes, merge in
 //! any order to the same bits, and grow by a radius by adding it.
 
@@ -16,7 +16,7 @@ const LINES: usize = 16;
 const STEP: f64 = 360.0 / LINES as f64;
 
 /// A convex outline in the plane of `a` (x or y of the view) and z: for each direction at `STEP * k` degrees
-/// from `a` towards z, how far it reaches.
+/// from `a` towards z, its support function.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Outline([f64; LINES]);
 
@@ -31,7 +31,7 @@ impl Outline {
         }
     }
 
-    /// Takes in another outline, all of it widened by a radius.
+    /// Includes another outline, widened by a radius.
     fn merge(&mut self, other: &Outline, radius: f64) {
         for (mine, reach) in self.0.iter_mut().zip(other.0) {
             *mine = mine.max(reach + radius);
@@ -82,7 +82,7 @@ impl Shadow {
     }
 }
 
-/// What a scene, or several, take up in a view, before the default width of lines is known.
+/// The extent of one or more scenes in a view, before the default width of lines is known.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Extent {
     /// Least and greatest z of all points, widths not counted.
@@ -124,7 +124,7 @@ impl Extent {
         extent
     }
 
-    /// Takes in another extent in the same view.
+    /// Includes another extent in the same view.
     pub(super) fn merge(&mut self, other: &Extent) {
         self.depth = [self.depth[0].min(other.depth[0]), self.depth[1].max(other.depth[1])];
         self.known.merge(&other.known, 0.0);

@@ -1,4 +1,4 @@
-//! What all frames of an animation share, found by looking at all of them first.
+//! The first pass over an animation, which finds what its frames share: scale, picture area, default width, camera, light.
 
 use super::camera::Camera;
 use super::extent::Extent;
@@ -6,7 +6,7 @@ use super::light::Light;
 use super::{View, number, painter};
 use dlsys_geometry::scene::{Bounds, Point, Scene};
 
-/// The first pass: how much space an animation takes up, in space and in its view.
+/// The first pass: the extent of an animation, in space and in its view.
 #[derive(Clone, Debug)]
 pub struct Survey {
     view: View,
@@ -17,30 +17,30 @@ pub struct Survey {
 }
 
 impl Survey {
-    /// Of nothing yet, in this view, orthographic.
+    /// An empty survey, orthographic, in this view.
     pub fn new(view: View) -> Survey {
         Survey { view, field: None, space: Bounds::default(), seen: Extent::EMPTY }
     }
 
-    /// In perspective: the camera stands where all that is drawn in any frame is just within an angle of so many
-    /// degrees (see [`Camera::FIELDS`]; others are brought to the nearest).
+    /// In perspective: the camera is as near as possible if all that is drawn in any frame is within this angle, in degrees (clamped
+    /// to [`Camera::FIELDS`]).
     pub fn with_perspective(self, field: f64) -> Survey {
         Survey { field: Some(field), ..self }
     }
 
-    /// Takes in the scene of a frame. The order does not matter.
+    /// Includes the scene of a frame. The result does not depend on the order.
     pub fn add(&mut self, scene: &Scene) {
         self.space.add(scene);
         self.seen.merge(&Extent::of(scene, &self.view));
     }
 
-    /// Takes in another survey in the same view, as of another thread.
+    /// Includes another survey in the same view, for example that of another thread.
     pub fn merge(&mut self, other: &Survey) {
         self.space.merge(&other.space);
         self.seen.merge(&other.seen);
     }
 
-    /// What all frames share.
+    /// The values that all frames share.
     pub fn fit(&self) -> Fit {
         let default_width = self.space.default_width();
         let extent = self.space.extent();
@@ -66,7 +66,7 @@ impl Survey {
     }
 }
 
-/// What all frames of an animation share.
+/// The values that all frames of an animation share.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fit {
     /// The camera that sees all frames.
@@ -75,8 +75,8 @@ pub struct Fit {
     pub default_width: f64,
     /// Largest side of the box around all points of all frames, in scene units; 0 if nothing is drawn.
     pub extent: f64,
-    /// How far what is written may be from a curved surface or a round stem, in scene units; a fixed part of
-    /// the extent unless somebody chooses another.
+    /// Greatest distance of meshes and outlines from curved surfaces and round stems, in scene units; a fixed part of
+    /// the extent by default.
     pub accuracy: f64,
     /// Opposite corners of the box around everything; `None` if nothing is drawn.
     pub bounds: Option<[Point; 2]>,
@@ -89,9 +89,9 @@ impl Fit {
     /// The default accuracy, in parts of the extent: half a pixel of a picture of a thousand.
     pub const ACCURACY: f64 = 1.0 / 2000.0;
 
-    /// The accuracy if this one is asked for: no finer than what the last digits of coordinates can show.
+    /// An accuracy in scene units, limited to what the last digits of coordinates can show.
     pub fn with_accuracy(self, accuracy: f64) -> Fit {
-        /// Files tell apart a millionth of the extent.
+        /// Coordinates in files have the resolution of a millionth of the extent.
         const FINEST: f64 = 5e-7;
         let size = self.accuracy / Fit::ACCURACY;
         Fit { accuracy: accuracy.max(size * FINEST), ..self }
@@ -102,7 +102,7 @@ impl Fit {
         Bounds::of(scene).corners(self.default_width)
     }
 
-    /// Left, bottom, right and top, as this camera sees it, of what one survey took in; `None` if that is nothing.
+    /// Left, bottom, right and top of a survey as this camera sees it; `None` if it is empty.
     pub(super) fn frame_of(&self, survey: &Survey) -> Option<[f64; 4]> {
         survey.seen.shadow(self.default_width).map(|shadow| self.camera.frame(&shadow))
     }
@@ -114,15 +114,14 @@ pub struct Picture {
     /// Left, bottom, width and height, in scene units of the plane of focus.
     pub area: [f64; 4],
     /// Picture units in one scene unit: a power of ten such that the larger side of the area is between 100
-    /// and 1000 picture units. Numbers stay short, and people can still read lengths off them.
+    /// and 1000 picture units. Numbers stay short, and lengths can still be read from them.
     pub scale: f64,
 }
 
 impl Picture {
     /// Margin on each side, in parts of the larger side of what is drawn.
     const MARGIN: f64 = 0.04;
-    /// The least that the smaller side may be, in parts of the larger one. A filament a thousand times as
-    /// long as it is wide should still be a picture.
+    /// Least ratio of the smaller side to the larger one, so that the picture of a filament has a useful shape.
     const SLIMMEST: f64 = 0.2;
 
     /// The area around what is drawn: left, bottom, right and top.

@@ -1,9 +1,8 @@
-//! The directory of an animation: frames that are whole or absent, and nobody else's files touched.
+//! The directory of an animation, written so that frames are whole or absent and foreign files are never touched.
 //!
-//! Every file is written aside and renamed, so whenever the process is killed, a frame is there as a whole
-//! or not at all; `manifest.json` comes last and says that the render is complete. Until then a journal lists
-//! what is ours, so that the next render can take over the directory of one that was killed, and of no one
-//! else.
+//! Every file is written under a temporary name and renamed, so that a frame is complete or absent whenever the process is killed;
+//! `manifest.json` comes last and marks the render as complete. Until then a journal lists the files of the render, so that the next
+//! render can take over the directory of one that was killed, and only of such a one.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -25,9 +24,9 @@ fn io_error<'a>(action: &'static str, path: &'a Path) -> impl FnOnce(io::Error) 
     move |source| Error::Io { action, path: path.to_owned(), source }
 }
 
-/// A directory that a render is being written to.
+/// The directory of a render in progress.
 ///
-/// Dropped without [`finish`](FrameDirectory::finish), it stays as that of a render that was killed.
+/// If it is dropped without [`finish`](FrameDirectory::finish), it stays like that of a render that was killed.
 #[derive(Debug)]
 pub struct FrameDirectory {
     path: PathBuf,
@@ -43,11 +42,11 @@ pub struct FrameDirectory {
     limit: u64,
     spent: Arc<AtomicU64>,
     journal: fs::File,
-    /// Held while the directory is written to; given back by the system when the process ends, however it does.
+    /// Held during the render; the system releases it when the process ends, in whatever way.
     _lock: Option<fs::File>,
 }
 
-/// Claims a directory for a render. Where the file system knows no locks there is none.
+/// Locks a directory for a render, where the file system has locks.
 fn lock(path: &Path) -> Result<Option<fs::File>, Error> {
     // Of a directory where it can be opened, so that nothing is left behind; else of a file in it.
     let opened = match cfg!(unix) {
@@ -63,8 +62,8 @@ fn lock(path: &Path) -> Result<Option<fs::File>, Error> {
 }
 
 impl FrameDirectory {
-    /// Makes the directory, or takes over that of an earlier render. With `force`, also one that holds
-    /// other files, which stay as they are: a frame that would have the name of one is an error.
+    /// Makes the directory, or takes over that of an earlier render. With `force`, also one with other
+    /// files, which stay as they are: a frame with the name of one of them is an error.
     ///
     /// # Errors
     /// If the directory holds files that no earlier render made, or cannot be written to.
@@ -115,7 +114,7 @@ impl FrameDirectory {
         })
     }
 
-    /// Writes no more than so many bytes in all.
+    /// Limits the bytes of all files together.
     pub fn limited(self, limit: u64) -> FrameDirectory {
         FrameDirectory { limit, ..self }
     }
@@ -127,7 +126,7 @@ impl FrameDirectory {
         format!("frame-{index:0digits$}.{extension}")
     }
 
-    /// Writes a file, which is there as a whole or not at all.
+    /// Writes a file, completely or not at all.
     ///
     /// # Errors
     /// If `name` is not a plain file name, or the file cannot be written.
@@ -142,7 +141,7 @@ impl FrameDirectory {
         self.bytes
     }
 
-    /// Where files are written before they have a name.
+    /// The place where files are written before they have their name.
     pub fn staging(&self) -> Staging {
         Staging { path: self.path.clone(), limit: self.limit, spent: self.spent.clone() }
     }
@@ -157,7 +156,7 @@ impl FrameDirectory {
         Ok(())
     }
 
-    /// Gives a file that was written aside its name.
+    /// Gives a staged file its name.
     ///
     /// # Errors
     /// If `name` is not a plain file name, or the file cannot be renamed.
@@ -171,7 +170,7 @@ impl FrameDirectory {
         Ok(())
     }
 
-    /// Removes what is left of earlier renders, and writes the manifest, which lists all files.
+    /// Removes the remaining files of earlier renders, and writes the manifest, which lists all files.
     ///
     /// # Errors
     /// If a file cannot be removed or written.
@@ -197,7 +196,7 @@ impl FrameDirectory {
     }
 }
 
-/// The place in a directory where files are written aside, on any thread.
+/// Writes files under temporary names in the directory, from any thread.
 #[derive(Clone, Debug)]
 pub struct Staging {
     path: PathBuf,
@@ -227,7 +226,7 @@ impl Write for Measured<'_> {
 }
 
 impl Staging {
-    /// Writes a file aside.
+    /// Writes a file under a temporary name.
     ///
     /// # Errors
     /// If it cannot be made, and those of `fill`.
@@ -242,7 +241,7 @@ impl Staging {
     }
 }
 
-/// A file that was written aside; gone when it is dropped.
+/// A file with a temporary name; removed when it is dropped.
 #[derive(Debug)]
 pub struct Staged(tempfile::NamedTempFile);
 
@@ -253,7 +252,7 @@ impl Staged {
     }
 }
 
-/// Writes a file aside and renames it.
+/// Writes a file under a temporary name and renames it.
 pub fn replace(directory: &Path, name: &str, bytes: &[u8]) -> Result<(), Error> {
     let target = directory.join(name);
     // A device or a pipe is written to; a file in its place would be the end of it.
@@ -278,7 +277,7 @@ fn aside(directory: &Path) -> Result<tempfile::NamedTempFile, Error> {
     builder.tempfile_in(directory).map_err(io_error("write to", directory))
 }
 
-/// Names of everything in a directory. Names that are not Unicode are shown as far as they are.
+/// Names of all entries of a directory, parts that are not Unicode replaced.
 fn list(directory: &Path) -> Result<BTreeSet<String>, Error> {
     let failed = || io_error("read", directory);
     let mut names = BTreeSet::new();
@@ -288,7 +287,7 @@ fn list(directory: &Path) -> Result<BTreeSet<String>, Error> {
     Ok(names)
 }
 
-/// What an earlier manifest of ours lists, and the manifest; nothing if it is not ours.
+/// The files listed in the manifest of an earlier render, and the manifest; nothing if it is of another program.
 fn listed_by_manifest(path: &Path) -> BTreeSet<String> {
     let parsed =
         fs::read(path).ok().and_then(|bytes| serde_json::from_slice::<serde_json::Value>(&bytes).ok());
@@ -302,13 +301,13 @@ fn listed_by_manifest(path: &Path) -> BTreeSet<String> {
     files.chain([MANIFEST]).filter(|name| is_plain(name)).map(str::to_owned).collect()
 }
 
-/// What the journal of a render that was killed lists.
+/// The files listed in the journal of a render that was killed.
 fn listed_by_journal(path: &Path) -> BTreeSet<String> {
     let text = fs::read_to_string(path).unwrap_or_default();
     text.lines().filter(|name| is_plain(name)).map(str::to_owned).collect()
 }
 
-/// Whether this is a name within a directory that is not one of our own hidden files.
+/// True for a plain name that is not that of a hidden file of renders.
 fn is_plain(name: &str) -> bool {
     !name.is_empty()
         && !name.starts_with('.')

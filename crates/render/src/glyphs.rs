@@ -1,6 +1,6 @@
-//! Letters for the captions of PNG pictures: what a time consists of, drawn with a round pen.
+//! Letters for the captions of PNG pictures: the characters of a time, drawn with a round pen.
 //!
-//! A font would be a megabyte for fifteen characters. A glyph is made of lines and arcs of ellipses, in a box
+//! A font file would be a megabyte for fifteen characters. A glyph consists of lines and arcs of ellipses, in a box
 //! one half wide, with capitals and digits 0.7 high and small letters 0.5.
 
 use super::raster::{self, Corner, Image};
@@ -15,7 +15,7 @@ const ARC_STEP: f64 = 15.0;
 const ROUND: usize = 12;
 
 /// A line of text, in pixels.
-pub(super) struct Line<'a> {
+pub(super) struct GlyphLine<'a> {
     pub(super) middle: f64,
     pub(super) base: f64,
     /// Size of the letters.
@@ -32,7 +32,7 @@ enum Stroke {
 
 use Stroke::{Arc, Lines};
 
-/// What a character is drawn with; nothing if it is not known.
+/// The strokes of a character; none if it is not known.
 fn strokes(character: char) -> &'static [Stroke] {
     match character {
         '0' => &[Arc([0.0, 0.35], [0.2, 0.35], [0.0, 360.0])],
@@ -68,7 +68,7 @@ fn strokes(character: char) -> &'static [Stroke] {
 }
 
 /// Draws lines of text in a picture of this size.
-pub(super) fn draw(size: [u32; 2], lines: &[Line], color: Color) -> Image {
+pub(super) fn draw(size: [u32; 2], lines: &[GlyphLine], color: Color) -> Image {
     let mut triangles: Vec<[Corner; 3]> = Vec::new();
     for line in lines {
         let count = line.text.chars().count();
@@ -84,7 +84,7 @@ pub(super) fn draw(size: [u32; 2], lines: &[Line], color: Color) -> Image {
     raster::draw(&raster::SIXTEEN, 1, size, triangles.len(), |n| triangles[n], |_, _| color)
 }
 
-/// The places that a stroke goes through.
+/// The points of a stroke.
 fn points(stroke: &Stroke) -> Vec<[f64; 2]> {
     match *stroke {
         Lines(points) => points.to_vec(),
@@ -135,7 +135,7 @@ mod tests {
 
     #[test]
     fn text_stands_in_the_middle() {
-        let line = Line { middle: 20.0, base: 15.0, size: 10.0, text: "-" };
+        let line = GlyphLine { middle: 20.0, base: 15.0, size: 10.0, text: "-" };
         let image = draw([40, 20], &[line], Color::hex(0));
         let inked = |x: usize, y: usize| image.pixels[y * 40 + x][3];
         assert!(inked(20, 12) > 100 && inked(10, 12) == 0 && inked(20, 5) == 0);

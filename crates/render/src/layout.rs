@@ -1,6 +1,6 @@
-//! Several frames on one sheet: over one another, one below the other, or in rows.
+//! Layouts of several frames on one sheet: over one another, one below the other, or in rows.
 //!
-//! All frames have one scale, and one camera looks at them all; a sheet only moves what it sees.
+//! All frames have one scale and one camera; a sheet only moves their pictures.
 
 use super::{Fit, Picture, Survey};
 use dlsys_geometry::scene::Point;
@@ -33,7 +33,7 @@ impl Layout {
     }
 }
 
-/// What else can be said about a layout.
+/// Distances in a layout.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Spacing {
     /// Frames in a row of a grid; `None`: all in one row.
@@ -45,7 +45,7 @@ pub struct Spacing {
 /// The place of a frame on a sheet. Coordinates are those that the camera sees, to the right and up.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Cell {
-    /// By how much it is moved.
+    /// Displacement of the frame.
     pub(super) offset: [f64; 2],
     /// Left, bottom, right and top of what is drawn there; `None` if nothing is.
     pub(super) frame: Option<[f64; 4]>,
@@ -71,7 +71,7 @@ pub struct Sheet {
     pub(super) cells: Vec<Cell>,
     /// Size of the captions' letters, in scene units.
     pub(super) letters: f64,
-    /// A stack of what is hardly more than lines.
+    /// A stack of frames that are hardly more than lines.
     pub(super) lines: bool,
 }
 
@@ -151,7 +151,7 @@ fn grid(seen: &[Option<[f64; 4]>], ground: f64, captions: &[String], columns: us
     let frames: Vec<[f64; 4]> = seen.iter().map(|f| f.unwrap_or([0.0, ground, 0.0, ground])).collect();
     let columns = columns.min(frames.len().max(1));
     let width_of = |i: usize| frames[i][2] - frames[i][0];
-    let rows: Vec<Row> = frames.chunks(columns).map(|row| Row::new(row, ground)).collect();
+    let rows: Vec<RowExtent> = frames.chunks(columns).map(|row| RowExtent::new(row, ground)).collect();
     let mut widths: Vec<f64> =
         (0..columns).map(|c| (c..frames.len()).step_by(columns).map(width_of).fold(0.0, f64::max)).collect();
     let gap = GAP * widths.iter().copied().fold(0.0, f64::max);
@@ -191,16 +191,16 @@ fn grid(seen: &[Option<[f64; 4]>], ground: f64, captions: &[String], columns: us
 }
 
 /// How far the frames of a row reach above and below the ground.
-struct Row {
+struct RowExtent {
     above: f64,
     below: f64,
 }
 
-impl Row {
-    fn new(frames: &[[f64; 4]], ground: f64) -> Row {
+impl RowExtent {
+    fn new(frames: &[[f64; 4]], ground: f64) -> RowExtent {
         let above = frames.iter().map(|frame| frame[3] - ground).fold(0.0, f64::max);
         let below = frames.iter().map(|frame| ground - frame[1]).fold(0.0, f64::max);
-        Row { above, below }
+        RowExtent { above, below }
     }
 }
 

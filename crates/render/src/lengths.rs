@@ -1,12 +1,12 @@
-//! Stems for those who make their own triangles, as graphics processors do: each length of a stem is what lies between two
-//! cross-sections, and a cross-section is a place and two vectors.
+//! Stems as lengths between cross-sections, for programs that make their own triangles, such as shaders: a cross-section is a point
+//! and two vectors.
 //!
 //! These are the tubes of the OBJ format: lengths that continue one another share the cross-section in which they meet.
 
 use super::tube::{Section, Spoke, Tubes, circle, curve, sides_for};
 use dlsys_geometry::scene::{Point, Scene, Vector};
 
-/// Where a stem is cut across: the corner at (x, y) of its outline, in parts of the radius, stands at
+/// A cross-section of a stem: the corner at (x, y) of its outline, in parts of the radius, is at
 /// `centre + x u + y v`. Vectors are in scene units, counter-clockwise seen from further along; both are 0 at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CrossSection {
@@ -34,7 +34,7 @@ impl CrossSection {
     }
 }
 
-/// What lies between two cross-sections.
+/// The part of a stem between two cross-sections.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Length {
     /// Index among the scene's segments.

@@ -21,25 +21,29 @@
 //! Three frames of a growing stem, all on one scale:
 //!
 //! ```
+//! use dlsys_geometry::turtle;
 //! use dlsys_render::{Format, FrameWriter, Survey, View};
 //! use dlsys_session::Session;
 //!
-//! let session = Session::from_text("stem.dls", "initial string: F(1)\nF(x): solve dx/dt = x", &[]).unwrap();
-//! let mut simulation = session.simulate(Default::default()).expect("it starts");
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let session = Session::from_text("stem.dls", "initial string: F(1)\nF(x): solve dx/dt = x", &[])?;
+//! let mut simulation = session.simulate(Default::default())?;
 //! let (mut survey, mut scenes) = (Survey::new(View::FRONT), Vec::new());
 //! for time in [0.0, 1.0, 2.0] {
 //!     let mut string = Default::default();
-//!     simulation.at(time, &mut string).expect("it runs");
-//!     let mut scene = dlsys_geometry::turtle::blank(&session.model);
-//!     dlsys_geometry::turtle::draw(&session.model, &string, &mut scene).expect("it can be drawn");
+//!     simulation.at(time, &mut string)?;
+//!     let mut scene = turtle::blank(&session.model);
+//!     turtle::draw(&session.model, &string, &mut scene)?;
 //!     survey.add(&scene);
 //!     scenes.push(scene);
 //! }
 //! let mut writer = FrameWriter::new(Format::SVG, survey.fit());
 //! let pictures: Vec<Vec<u8>> = scenes.iter().map(|scene| writer.write(scene, "a stem")).collect();
 //! writer.format = Format::OBJ;
-//! let mesh = String::from_utf8(writer.write(&scenes[2], "a stem, t = 2")).unwrap();
+//! let mesh = String::from_utf8(writer.write(&scenes[2], "a stem, t = 2"))?;
 //! assert!(pictures[0].starts_with(b"<svg") && mesh.contains("\nusemtl stem\n"));
+//! # Ok(())
+//! # }
 //! ```
 
 #![warn(missing_docs)]
@@ -48,7 +52,7 @@ mod camera;
 mod error;
 mod extent;
 mod fit;
-mod format;
+mod formats;
 mod frames;
 mod glyphs;
 mod layout;
@@ -57,15 +61,12 @@ mod light;
 mod manifest;
 mod name;
 mod number;
-mod obj;
 mod page;
 mod painter;
-mod png;
 mod raster;
 mod relay;
 mod sheet;
 mod stroke;
-mod svg;
 mod text;
 mod triangles;
 mod triangulate;
@@ -75,7 +76,7 @@ mod view;
 pub use camera::Camera;
 pub use error::Error;
 pub use fit::{Fit, Picture, Survey};
-pub use format::{Content, Exporter, Format};
+pub use formats::{Content, Description, Drawing, Exporter, Format};
 pub use frames::{FrameDirectory, MANIFEST, Staged, Staging, replace};
 pub use layout::{Layout, Sheet, Spacing};
 pub use lengths::{CrossSection, Length, cross_section, lengths};
@@ -91,7 +92,7 @@ use std::io::{self, Write};
 
 use dlsys_geometry::scene::Scene;
 
-/// Who wrote a file.
+/// Name and version of the program, for the header of files.
 pub const GENERATOR: &str = concat!("dlsys ", env!("CARGO_PKG_VERSION"));
 
 /// The second pass: one frame after another, each as the bytes of its file.
@@ -101,7 +102,7 @@ pub struct FrameWriter {
     pub format: Format,
     /// The scale and the style that all frames share.
     pub fit: Fit,
-    /// What pictures are drawn on (SVG and PNG).
+    /// The page that pictures are drawn on (SVG and PNG).
     pub page: Page,
     /// Sides of the tubes that stems are made of (OBJ only); 0 for as many as the accuracy takes, and 8 at least.
     pub sides: usize,
@@ -111,13 +112,13 @@ pub struct FrameWriter {
 
 impl FrameWriter {
     /// A writer of pictures 1000 pixels wide or high on the usual background, or of meshes with tubes as round as the
-    /// accuracy asks.
+    /// accuracy requires.
     pub fn new(format: Format, fit: Fit) -> FrameWriter {
         let page = Page::usual(fit.picture);
         FrameWriter { format, fit, page, sides: 0, threads: 1 }
     }
 
-    /// The file of a frame. `title` is for people: what it shows, and at which time.
+    /// The bytes of the file of a frame. `title` is its title for readers: the model and the time.
     pub fn write(&self, scene: &Scene, title: &str) -> Vec<u8> {
         let mut bytes = Vec::new();
         // Memory takes whatever is written to it.
@@ -131,7 +132,7 @@ impl FrameWriter {
     /// Those of `out`.
     pub fn write_to(&self, scene: &Scene, title: &str, out: &mut (dyn Write + Send)) -> io::Result<()> {
         let scene = &*scene.tessellated(self.fit.accuracy);
-        self.format.exporter().write(scene, self, title, out)
+        self.format.exporter().write(Drawing { scene, writer: self, title }, out)
     }
 
     /// The file that all frames refer to, if there is one: its name and its bytes.
@@ -143,9 +144,9 @@ impl FrameWriter {
 /// How smooth edges are in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Smoothness {
-    /// As in files: sixteen samples to a pixel.
+    /// Sixteen samples a pixel, as in files.
     Fine,
-    /// Four samples, for what moves.
+    /// Four samples a pixel, for animations on the screen.
     Quick,
 }
 
@@ -155,7 +156,7 @@ pub fn pixels(scene: &Scene, fit: &Fit, page: &Page) -> Vec<[u8; 4]> {
     pixels_by(scene, fit, page, Smoothness::Fine, 1)
 }
 
-/// The same, as smooth as it should be, made by so many threads; the pixels do not depend on that.
+/// The same with a choice of smoothness, by `threads` threads; the pixels do not depend on their number.
 pub fn pixels_by(
     scene: &Scene,
     fit: &Fit,
@@ -164,5 +165,5 @@ pub fn pixels_by(
     threads: usize,
 ) -> Vec<[u8; 4]> {
     let scene = &*scene.tessellated(fit.accuracy);
-    png::picture(scene, fit, page.pixels, page.placement(), smoothness, threads).pixels
+    formats::png::picture(scene, fit, page.pixels, page.placement(), smoothness, threads).pixels
 }

@@ -8,7 +8,7 @@ use dlsys_geometry::scene::Vector;
 
 /// Direction to the lamp: to the right, up, towards the viewer. Of unit length.
 pub(super) const LAMP: Vector = Vector::new(-0.36, 0.583, 0.728_361_861);
-/// What the lamp's direction counts, beside light that comes from everywhere.
+/// The weight of the lamp's direction, beside light from all directions.
 const DIFFUSE: f64 = 0.52;
 /// Strength and sharpness of the gloss (Blinn 1977).
 const GLOSS: f64 = 0.16;
@@ -30,7 +30,7 @@ pub struct Light {
 }
 
 impl Light {
-    /// For things between these depths, the greater one nearer; `extent` is the largest side of the whole.
+    /// The light on things between these depths, the greater one nearer; `extent` is the largest side of the whole, in scene units.
     pub(super) fn new([far, near]: [f64; 2], extent: f64) -> Light {
         let depth = if extent > 0.0 { ((near - far) / extent).max(0.0) } else { 0.0 };
         let falloff =
@@ -49,7 +49,7 @@ impl Light {
         self.at_depth(depth) + self.of_normal(normal)
     }
 
-    /// What the direction adds.
+    /// The part that depends on the direction.
     fn of_normal(&self, normal: Vector) -> f64 {
         // Half-way between the lamp and the viewer.
         let half = (LAMP + Vector::z()).normalize();
@@ -57,7 +57,7 @@ impl Light {
         self.relief * (DIFFUSE * (normal.dot(&LAMP).max(0.0) - LAMP.z) + GLOSS * gloss)
     }
 
-    /// What is left at a depth.
+    /// The part that is left at a depth.
     fn at_depth(&self, depth: f64) -> f64 {
         1.0 - self.falloff * (self.near - depth).max(0.0)
     }

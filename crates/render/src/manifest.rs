@@ -1,23 +1,23 @@
-//! `manifest.json`: what a directory of frames holds, and how it was made.
+//! `manifest.json`: the contents of a directory of frames, and the settings that it was made with.
 
 use serde::Serialize;
 
-/// Everything that can be said about a render, as it is written to `manifest.json`.
+/// The description of a render, as it is written to `manifest.json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Manifest {
-    /// Program and version. Filled in by [`Manifest::new`]; by it a directory is known to be ours.
+    /// Program and version, filled in by [`Manifest::new`]; it identifies the directory as that of a render.
     pub generator: String,
     /// Name of the model's file, without its folder: the same bytes wherever `render` is called.
     pub model: String,
     /// The model's `title`.
     pub title: Option<String>,
-    /// Whatever else decides what the frames look like: format, view, tolerance, method, parameters, ….
+    /// All settings that the frames depend on: format, view, tolerance, method, parameters, ….
     pub settings: serde_json::Value,
     /// `viewBox` that all frames share: left, top, width, height (SVG only).
     pub view_box: Option<[f64; 4]>,
     /// Opposite corners of the box around all frames, in scene units; `None` if nothing is drawn.
     pub bounds: Option<[[f64; 3]; 2]>,
-    /// In the order of time.
+    /// The frames, in the order of time.
     pub frames: Vec<FrameRecord>,
     /// Names of all files, frames included; filled in by
     /// [`FrameDirectory::finish`](super::FrameDirectory::finish).
@@ -27,7 +27,7 @@ pub struct Manifest {
 /// One frame of a [`Manifest`].
 #[derive(Clone, Debug, Serialize)]
 pub struct FrameRecord {
-    /// From 0.
+    /// Number of the frame, from 0.
     pub index: usize,
     /// Time of the simulation.
     pub time: f64,

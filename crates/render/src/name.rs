@@ -6,15 +6,15 @@ use std::sync::Arc;
 
 use dlsys_geometry::scene::{Owner, OwnerId, Scene};
 
-/// The names of the modules of a scene, `KIND` + separator + `LINEAGE`: by what a module is called, and by
-/// who it is ([`Lineage::name`](dlsys_tree::Lineage::name)). They consist of ASCII letters, digits,
-/// `_`, `-` and the separator and begin with a letter or `_`, so that they are good as XML ids and as OBJ
+/// The names of the modules of a scene, `KIND` + separator + `LINEAGE`: the name of a kind and the
+/// identity of the module ([`Lineage::name`](dlsys_tree::Lineage::name)). They consist of ASCII letters, digits,
+/// `_`, `-` and the separator and begin with a letter or `_`, so that they are valid as XML ids and as OBJ
 /// group names.
 pub(super) struct Names<'s> {
     owners: &'s [Owner],
     separator: char,
     kinds: HashMap<&'s str, String>,
-    /// The names of those that share a lineage: unique by construction, save for a hash that meets another.
+    /// The names of modules with equal lineages, which is possible only by a collision of hashes.
     shared: HashMap<usize, String>,
 }
 

@@ -6,11 +6,11 @@ use dlsys_geometry::scene::Color;
 /// Size of a picture, in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Size {
-    /// The larger side; the other one follows from what is drawn.
+    /// The larger side; the other one follows from the shape of the picture.
     Larger(u32),
     /// The width; the height follows.
     Width(u32),
-    /// Both; where what is drawn has another shape, there is more background.
+    /// Both; a picture of another shape gets more background.
     Exact(u32, u32),
 }
 
@@ -20,7 +20,7 @@ impl Default for Size {
     }
 }
 
-/// What a picture is drawn on.
+/// The page that a picture is drawn on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Page {
     /// The area of the scene that it shows.
@@ -39,7 +39,7 @@ impl Page {
     /// Most pixels in all.
     pub const MOST_PIXELS: u64 = 50_000_000;
 
-    /// A page for a picture. Sides that follow from what is drawn are even, as video encoders want them.
+    /// A page for a picture. Sides that are not given are even, as video encoders require.
     ///
     /// # Errors
     /// If a side is 0 or there are too many pixels.
@@ -63,7 +63,7 @@ impl Page {
         Page { picture, pixels: within(picture, 1000), background: Some(Page::BACKGROUND) }
     }
 
-    /// Where a point of the picture comes to lie, in pixels from the upper left corner, as `[ax + b, c - ay]`: `[a, b, c]`.
+    /// The map from the picture to the page, as `[a, b, c]`: a point is at `[ax + b, c - ay]` pixels from the upper left corner.
     /// The picture is in the middle where rounding has left the page another shape.
     pub(super) fn placement(&self) -> [f64; 3] {
         let [left, bottom, width, height] = self.picture.area;

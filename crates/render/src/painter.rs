@@ -1,7 +1,7 @@
 //! The elements of an SVG picture, from back to front.
 //!
 //! Stems are strokes with round ends, polygons and the triangles of surfaces are filled paths, in the same light as
-//! everywhere ([`Light`](super::Light)). A stem that is thick enough for it to be seen has a gradient across. Everything
+//! everywhere ([`Light`](super::Light)). Thick stems have a gradient across. Everything
 //! is drawn from back to front, by the depth of its middle; a surface is one thing in that order, and its triangles are
 //! in order among themselves. What is equally deep is drawn in string order.
 //!
@@ -27,7 +27,7 @@ const COARSE_SHADES: f64 = 8.0;
 /// Surfaces smaller than this part of the picture are small.
 const SMALL: f64 = 0.05;
 
-/// What the pictures of several frames share.
+/// The values that the pictures of several frames share.
 #[derive(Clone, Copy)]
 pub(super) struct Style<'a> {
     pub(super) fit: &'a Fit,
@@ -225,7 +225,7 @@ impl Painter<'_> {
 }
 
 impl Style<'_> {
-    /// Where a point comes to lie in the picture; y goes down, z is towards the viewer.
+    /// The projection of a point to the picture; y goes down, z is towards the viewer.
     pub(super) fn project(&self, p: Point) -> Point {
         let seen = self.fit.camera.project(p);
         Point::new(seen.x * self.scale, -seen.y * self.scale, seen.z * self.scale)

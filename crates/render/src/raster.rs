@@ -1,8 +1,8 @@
 //! Triangles as pixels, with a depth buffer and smooth edges.
 //!
-//! Each pixel has sixteen samples, or four where it must be quick, no two in one row or column (the usual patterns for so many),
+//! Each pixel has sixteen samples, or four for speed, no two in one row or column (the usual patterns for so many),
 //! so that edges of any direction come out smooth and a line thinner than a pixel is as faint as it is thin. A sample holds
-//! what is nearest there; where two things are equally near, the later one, as painters do. A triangle is shaded once in each
+//! the nearest triangle there; of two at the same depth, the later one. A triangle is shaded once in each
 //! pixel.
 //!
 //! Corners are rounded to 1/256 pixel and the rest is integers, so triangles that share an edge leave no gap, and pictures are
@@ -238,7 +238,7 @@ impl<const N: usize> Band<'_, N> {
         }
     }
 
-    /// Draws what of a triangle is in the `rows` rows from `top`.
+    /// Draws the part of a triangle in the `rows` rows from `top`.
     fn fill(
         &mut self,
         triangle: &Triangle<N>,

@@ -4,19 +4,19 @@ use std::io::{self, Write};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
 
-/// Whose turn it is to write.
+/// The part that is to be written next.
 struct Turn<'w> {
     next: usize,
     out: &'w mut (dyn Write + Send),
     /// Until the first that failed.
     result: io::Result<()>,
-    /// True if nobody need go on: writing failed, or a thread has ended by a bug.
+    /// True if all threads can stop: writing failed, or a thread has panicked.
     over: bool,
 }
 
 /// Makes `count` parts of a file by `make`, each into a buffer that is empty, and writes them one after the other. Every
 /// one of `threads` threads makes a part, waits for its turn, writes it and makes the next, so that buffers stay
-/// few and near, and making and writing go on at once. What is written does not depend on the number of threads.
+/// few and in the cache, and making and writing overlap. The bytes do not depend on the number of threads.
 ///
 /// # Errors
 /// The first error of writing.

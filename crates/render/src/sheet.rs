@@ -1,13 +1,13 @@
-//! Writing a [`Sheet`]: each frame by itself, on any thread, then all of them in order.
+//! Writing of a [`Sheet`]: each frame is drawn by itself, on any thread; then all are put together in order.
 
-use super::format::Content;
+use super::formats::Content;
 use std::fmt::Write;
 
+use super::formats::png::{self, Canvas, Meeting};
 use super::layout::{Caption, Cell};
 use super::painter::{self, text};
-use super::png::{self, Canvas, Meeting};
 use super::raster::Image;
-use super::{Error, Fit, Format, Layout, Page, Sheet, Smoothness, glyphs, svg};
+use super::{Error, Fit, Format, Layout, Page, Sheet, Smoothness, formats::svg, glyphs};
 use dlsys_geometry::scene::{Color, Scene};
 
 /// Colour of captions.
@@ -112,7 +112,7 @@ impl SheetWriter {
 }
 
 impl Assembly<'_> {
-    /// Puts the next frame on the sheet, over those before it.
+    /// Adds the next frame, over those before it.
     ///
     /// # Errors
     /// If the document becomes too long.
@@ -163,7 +163,7 @@ impl Assembly<'_> {
         }
     }
 
-    /// The file. `title` is for people: what it shows.
+    /// The bytes of the file. `title` is its title for readers.
     pub fn finish(self, title: &str) -> Vec<u8> {
         let page = &self.writer.page;
         let Some(mut canvas) = self.canvas else {
@@ -171,11 +171,11 @@ impl Assembly<'_> {
         };
         let [a, b, c] = page.placement();
         let sheet = &self.writer.sheet;
-        let lines: Vec<glyphs::Line> = sheet
+        let lines: Vec<glyphs::GlyphLine> = sheet
             .cells
             .iter()
             .filter_map(|cell| cell.caption.as_ref())
-            .map(|caption| glyphs::Line {
+            .map(|caption| glyphs::GlyphLine {
                 middle: a * caption.x + b,
                 base: c - a * caption.y,
                 size: a * sheet.letters,

@@ -1,8 +1,8 @@
 //! Stems as SVG strokes: plain where they are thin or the drawing is flat, else with a gradient across, as light falls on a
 //! cylinder.
 //!
-//! The colours across a stem depend on its direction and depth only, so they are shared by all stems of about the same; where
-//! they are to be put is told by a small gradient of each stem's own, which pieces of one straight stem share. A
+//! The colours across a stem depend on its direction and depth only, so they are shared by all stems of about the same; their
+//! position is given by a small gradient of each stem, which pieces of one straight stem share. A
 //! stem that is cut in two looks like a whole one.
 
 use std::collections::HashMap;
@@ -14,7 +14,7 @@ use dlsys_geometry::scene::{Color, Point, Scene, Segment};
 
 /// Stems thinner than this part of the picture's larger side (2.5 pixels of 1000) have one colour.
 const THIN: f64 = 0.0025;
-/// Places across a stem at which its colour is told: its edges are at -1 and 1.
+/// Places across a stem at which its colour is given: its edges are at -1 and 1.
 const PLACES: [f64; 5] = [-1.0, -0.55, 0.0, 0.55, 1.0];
 /// Least cosine of the angle between two pieces of a straight line.
 const STRAIGHT: f64 = 0.999_99;

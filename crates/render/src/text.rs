@@ -1,4 +1,4 @@
-//! Lines of numbers as bytes, written quickly: a mesh is little else.
+//! Fast formatting of numbers, for the lines of a mesh file.
 //!
 //! Digits are made eight at a time in the bytes of one integer, by multiplications (Khuong 2011; Lemire 2021), and
 //! copied as a whole into a line that has room for more than it needs.
@@ -13,9 +13,9 @@ pub(super) struct Text {
     len: usize,
 }
 
-/// A line that is being put together.
-pub(super) struct Line<'t> {
-    buffer: &'t mut [u8; Line::SIZE],
+/// Builds one line.
+pub(super) struct LineWriter<'t> {
+    buffer: &'t mut [u8; LineWriter::SIZE],
     len: usize,
 }
 
@@ -36,10 +36,10 @@ impl Text {
     }
 
     /// Appends what is written to a line.
-    pub(super) fn line(&mut self, write: impl FnOnce(&mut Line)) {
-        self.reserve(Line::SIZE);
+    pub(super) fn line(&mut self, write: impl FnOnce(&mut LineWriter)) {
+        self.reserve(LineWriter::SIZE);
         let Some(buffer) = self.bytes[self.len..].first_chunk_mut() else { return };
-        let mut line = Line { buffer, len: 0 };
+        let mut line = LineWriter { buffer, len: 0 };
         write(&mut line);
         self.len += line.len;
     }
@@ -93,7 +93,7 @@ impl Text {
 
 /// A number as [`number::push`] writes it.
 pub(super) struct Quick {
-    buffer: [u8; Line::SIZE],
+    buffer: [u8; LineWriter::SIZE],
     len: usize,
 }
 
@@ -106,14 +106,14 @@ impl Quick {
 /// A number rounded to so many decimals, if that is quickly done.
 pub(super) fn quick(x: f64, decimals: usize) -> Option<Quick> {
     let fixed = Fixed::new(x, *POWERS.get(decimals)?)?;
-    let mut buffer = [0; Line::SIZE];
-    let mut line = Line { buffer: &mut buffer, len: 0 };
+    let mut buffer = [0; LineWriter::SIZE];
+    let mut line = LineWriter { buffer: &mut buffer, len: 0 };
     line.fixed(fixed, decimals);
     let len = line.len;
     Some(Quick { buffer, len })
 }
 
-impl Line<'_> {
+impl LineWriter<'_> {
     /// Room for six corners, or three numbers, and a few bytes more than that.
     const SIZE: usize = 192;
 

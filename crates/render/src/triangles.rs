@@ -1,4 +1,4 @@
-//! A scene as triangles: their numbers and order, whatever becomes of them.
+//! A scene as triangles: their numbering and order, for every format of meshes.
 //!
 //! ```text
 //! Scene ──▶ Solid ──points, faces──▶ text of a file (obj), or Triangles in memory (png)

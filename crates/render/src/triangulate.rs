@@ -1,8 +1,8 @@
-//! Polygons as triangles.
+//! Triangulation of polygons in space.
 
 use dlsys_geometry::scene::{Point, Vector};
 
-/// More vertices than this are not worth a search for ears, which takes their square in time.
+/// Polygons with more vertices are not searched for ears, which takes quadratic time.
 const EAR_LIMIT: usize = 4096;
 
 /// The direction in which a polygon faces: its vertices go counter-clockwise about it. Newell's method, so

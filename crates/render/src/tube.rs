@@ -1,4 +1,4 @@
-//! Stems as tubes.
+//! Stems as tubes: rings, domes at the ends, and their vertices and triangles.
 //!
 //! Segments that continue one another make one closed tube: they share the ring of vertices where they
 //! meet, which lies in the plane that halves the bend, and the first and last end in a dome. Cross-sections
@@ -33,13 +33,13 @@ pub(super) struct Tubes<'s> {
     segments: &'s [Segment],
     profiles: Vec<Profile>,
     /// Along each tube, one tube after the other.
-    pieces: Vec<Piece>,
+    pieces: Vec<TubeSegment>,
     /// Numbers of vertices and of normals.
     pub(super) counts: [u32; 2],
 }
 
 /// A segment of a tube.
-struct Piece {
+struct TubeSegment {
     segment: usize,
     profile: usize,
     radii: [f64; 2],
@@ -154,7 +154,7 @@ impl<'s> Tubes<'s> {
             }
         };
         let end = if last { shape.dome(radii[1]) } else { [ring; 2] };
-        self.pieces.push(Piece { segment, profile, radii, section, begins, last, first: self.counts });
+        self.pieces.push(TubeSegment { segment, profile, radii, section, begins, last, first: self.counts });
         for (count, (a, b)) in self.counts.iter_mut().zip(start.into_iter().zip(end)) {
             *count = count.saturating_add(a.saturating_add(b));
         }

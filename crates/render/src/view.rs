@@ -1,4 +1,4 @@
-//! From where the scene is looked at.
+//! Directions of view, by name or by azimuth and elevation.
 
 use crate::Error;
 use std::fmt;
@@ -47,7 +47,7 @@ impl View {
         Ok(View { azimuth, elevation, right, up: towards.cross(&right), towards })
     }
 
-    /// A point as seen: to the right, up, and towards the viewer.
+    /// A point in the axes of the view: to the right, up, and towards the viewer; scene units.
     pub fn see(&self, p: Point) -> Point {
         Point::new(self.right.dot(&p.coords), self.up.dot(&p.coords), self.towards.dot(&p.coords))
     }
@@ -72,7 +72,7 @@ impl FromStr for View {
 }
 
 impl fmt::Display for View {
-    /// As it can be parsed.
+    /// The text from which the view can be parsed: `front`, `30,20`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (self.azimuth, self.elevation) {
             (0.0, 0.0) => write!(f, "front"),

@@ -130,7 +130,7 @@ impl Session {
                 .help("give the path of a model's file, `NAME.dls`; `dlsys new NAME` makes one");
             refuse(Source::new(&name, ""), diagnostic)
         })?;
-        let source = Source::from_bytes(name, bytes).map_err(|e| refuse(e.0, e.1))?;
+        let source = Source::from_bytes(name, bytes).map_err(|e| refuse(e.source, e.diagnostic))?;
         let folders = Folders::new(path.parent().unwrap_or(Path::new("")), others);
         folders.inputs.borrow_mut().push(model.clone());
         let read = Session::from_source(source, settings, &folders);
@@ -153,8 +153,8 @@ impl Session {
     ) -> Result<Session, Box<LoadError>> {
         let source = Source::from_bytes(name, text.as_bytes().to_vec()).map_err(|e| {
             Box::new(LoadError {
-                source: e.0,
-                diagnostics: vec![e.1],
+                source: e.source,
+                diagnostics: vec![e.diagnostic],
                 settings: Vec::new(),
                 inputs: Vec::new(),
             })

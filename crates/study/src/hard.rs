@@ -5,7 +5,7 @@ use super::error::Error;
 use super::record::{Driver, EarlyEnd, method_name};
 use dlsys_model::{KindId, Model};
 use dlsys_session::Session;
-use dlsys_sim::{self as sim, Event, Method, Settings, Simulation, Stats, brief};
+use dlsys_sim::{Event, Method, Settings, Simulation, Stats, brief};
 use dlsys_tree::ModuleString;
 
 /// Settings for running cases.

@@ -1,7 +1,7 @@
-//! Random numbers that belong to modules.
+//! Random numbers as functions of seed, module and purpose.
 //!
 //! A random number is a function of the seed, of the lineage of the module that it belongs to, and of the place in the
-//! text that asks for it, and of nothing else: there is no generator whose state goes from one draw to the next. So no
+//! text that uses it, and of nothing else: there is no generator whose state goes from one draw to the next. So no
 //! draw depends on threads, on the order of events, on what is observed, or on what happens elsewhere in the plant.
 //!
 //! The function is the finalizer of SplitMix64 (Steele, Lea, Flood 2014) over the three numbers, one after another:
@@ -14,7 +14,7 @@ use super::{Family, Lineage};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Seed(u64);
 
-/// What a random number is for.
+/// The use of a random number: numbers for different purposes are independent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Purpose {
     /// The draw of this number among those in the parameters of one module.
@@ -28,11 +28,11 @@ pub enum Purpose {
 impl Seed {
     /// The seed of a run. Numbers drawn from consecutive seeds are unrelated.
     pub fn new(seed: u64) -> Seed {
-        // Seeds that follow one another must have nothing in common.
+        // Consecutive seeds must give unrelated numbers.
         Seed(mix(0x6469_6365, seed))
     }
 
-    /// A number that is uniform between 0 and 1, neither of which it is, with 53 random bits.
+    /// A number uniformly distributed in the open interval from 0 to 1, with 53 random bits.
     pub fn unit(self, module: Lineage, purpose: Purpose) -> f64 {
         let (sort, number) = match purpose {
             Purpose::Parameter(number) => (1, u64::from(number)),
@@ -48,14 +48,14 @@ impl Seed {
         self.unit(family.child(place), purpose)
     }
 
-    /// How much cumulative hazard the clock of a module endures before its event: exponential with mean 1.
+    /// The cumulative hazard at which the clock of a module fires: exponentially distributed with mean 1.
     pub fn endurance(self, module: Lineage, key: u64) -> f64 {
         -self.unit(module, Purpose::Clock(key)).ln()
     }
 }
 
-/// A key for a clause: of the names of its rule's head, and its number there. It does not change with what other rules
-/// say, nor with where the rule stands.
+/// A key for a clause, from the head of its rule and its number there. It does not depend on other rules, or on the position of
+/// the rule in the text.
 pub fn key(head: &str, clause: usize) -> u64 {
     let letters = head.bytes().fold(0x6865_6164, |state, byte| mix(state, u64::from(byte)));
     mix(letters, clause as u64)

@@ -1,17 +1,27 @@
-//! Modules and how they hang together.
+//! The growing structure: modules on axes, their identity, and the string of modules that observers get.
 //!
-//! - [`Tree`]: the growing structure, linked, changed in place by productions.
-//! - [`ModuleString`]: the structure at one instant, written out in string order with brackets; what
-//!   an observer gets.
-//! - [`Lineage`]: who a module is, for as long as it lives, in every run.
+//! - [`Tree`]: the linked structure, changed in place by productions.
+//! - [`ModuleString`]: the structure at one instant, in string order with brackets.
+//! - [`Lineage`]: the identity of a module, by descent; the same in every run.
 //! - [`Seed`]: random numbers, each of which belongs to a module.
-//! - [`SimTime`]: when it was born, to more digits than a float has.
+//! - [`SimTime`]: instants, to about 32 digits.
+//!
+//! ```
+//! use dlsys_tree::{Lineage, Purpose, Seed};
+//!
+//! // The second successor of the third module of the initial string.
+//! let module = Lineage::of_axiom(2).child(0, 1);
+//! assert_eq!(module.to_string(), "3.2");
+//! // Its random numbers follow from the seed and from its identity.
+//! let draw = || Seed::new(7).unit(module, Purpose::Parameter(0));
+//! assert_eq!(draw(), draw());
+//! ```
 
 #![warn(missing_docs)]
 
-mod brood;
 mod chance;
 mod lineage;
+mod siblings;
 mod string;
 mod tree;
 mod walk;
@@ -21,5 +31,5 @@ pub use chance::{Purpose, Seed, key};
 pub use dlsys_expr::SimTime;
 pub use lineage::{Family, Lineage};
 pub use string::{Module, ModuleString, Version};
-pub use tree::{Look, ModuleId, NO_LABEL, Tree};
+pub use tree::{ModuleId, ModuleView, NO_LABEL, Tree};
 pub use walk::{Visit, Walk};

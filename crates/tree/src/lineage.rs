@@ -1,15 +1,15 @@
 //! Identity by descent.
 //!
-//! A module is known by its place in the initial string, or by the production that made it, the parent
-//! that it replaced, and its place in the successor. That is the same whichever frames are asked for and
-//! however the simulation was scheduled, so exported names, messages and random numbers hang on it.
+//! A module is identified by its place in the initial string, or by the production that made it, the parent
+//! that it replaced, and its place in the successor. That does not depend on the frames that are observed or
+//! on the scheduler, so exported names, messages and random numbers are derived from it.
 
 use std::fmt;
 
-/// Who a module is. Constant in size, however many generations there were.
+/// The identity of a module. Constant in size, whatever the number of generations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Lineage {
-    /// A hash of the whole line of descent; tells modules apart.
+    /// A hash of the whole line of descent, unique in practice (64 bits).
     pub id: u64,
     /// Number of productions between the initial string and this module.
     pub generation: u32,
@@ -18,7 +18,7 @@ pub struct Lineage {
     trail: u64,
 }
 
-/// What the lineages of the modules of one successor have in common.
+/// The common part of the lineages of the modules of one successor.
 #[derive(Clone, Copy, Debug)]
 pub struct Family {
     pub(super) mixed: u64,
@@ -50,7 +50,7 @@ impl Lineage {
         self.family(production).child(place)
     }
 
-    /// What all modules of the successor, by a production, have in common.
+    /// The common part of the lineages of all modules of the successor, by a production.
     pub fn family(self, production: u64) -> Family {
         Family {
             mixed: mix(self.id, production),
@@ -72,7 +72,7 @@ impl Lineage {
     }
 }
 
-/// Places are counted from 1, because people read them; larger ones are cut.
+/// Adds a place, counted from 1 as it is displayed; places from 255 on are not distinguished.
 fn trail(before: u64, place: usize) -> u64 {
     before << 8 | (place as u64 + 1).min(255)
 }
@@ -106,7 +106,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lineages_read_as_paths() {
+    fn lineages_are_displayed_as_paths_of_places() {
         let mut lineage = Lineage::of_axiom(2);
         assert_eq!(lineage.to_string(), "3");
         lineage = lineage.child(0, 0).child(5, 1);
@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn descent_tells_modules_apart() {
+    fn lineages_differ_by_place_production_and_parent() {
         let root = Lineage::of_axiom(0);
         let all = [root, root.child(0, 0), root.child(0, 1), root.child(1, 0), Lineage::of_axiom(1)];
         let ids: std::collections::HashSet<u64> = all.iter().map(|l| l.id).collect();

@@ -1,47 +1,47 @@
-//! The structure at one instant, in string order.
+//! The string of modules: the structure at one instant, in string order, as observers get it.
 
-use super::brood::{Broods, NO_BROOD};
+use super::siblings::{NO_GROUP, SiblingGroups};
 use super::{Lineage, SimTime};
 use dlsys_model::KindId;
 
 /// All modules alive at `time`, in string order, brackets included.
 ///
-/// Parameters lie one after another in a single array: a string of a million modules is a few
-/// allocations, and can be filled again for the next frame.
+/// Parameters are stored in a single array: a string of a million modules is a few allocations, and is filled again for the next
+/// frame.
 ///
-/// Of a module the birth is kept, not the age: from frame to frame a string whose modules are the same has nothing
-/// to write but the parameters that move.
+/// The birth of a module is stored, not its age: from one frame to the next, a string of the same modules changes in its moving
+/// parameters only.
 #[derive(Clone, Debug, Default)]
 pub struct ModuleString {
     /// Time of the simulation.
     pub time: f64,
-    /// What ages are counted to.
+    /// The instant at which ages end.
     now: SimTime,
-    entries: Vec<Entry>,
+    entries: Vec<StringEntry>,
     parameters: Vec<f64>,
-    broods: Broods,
-    /// Birth and lineage of modules that come from nowhere.
-    strangers: Vec<(SimTime, Lineage)>,
+    groups: SiblingGroups,
+    /// Birth and lineage of modules that belong to no group of a tree.
+    ungrouped: Vec<(SimTime, Lineage)>,
     version: Option<Version>,
 }
 
 /// Which modules a string is made of: the same number means the same ones, in the same order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Version {
-    /// Tells the simulations of a process apart.
+    /// Number of the simulation in this process.
     pub source: u64,
     /// Grows with every change of the structure.
     pub structure: u64,
 }
 
-/// Who a module is says its brood; of those of none, it is said apart.
+/// A module or bracket. Birth and lineage are those of its group and place.
 #[derive(Clone, Copy, Debug)]
-struct Entry {
+struct StringEntry {
     kind: KindId,
     /// Where the parameters begin. As in a tree, there are fewer than 2^32 of them.
     first: u32,
-    brood: u32,
-    /// In the brood; in `strangers`, for a module of no brood; `NO_BROOD` for a bracket.
+    group: u32,
+    /// Place in the group; for a module of no group, in `ungrouped`; `NO_GROUP` for a bracket.
     place: u32,
 }
 
@@ -52,9 +52,9 @@ pub struct Module<'a> {
     pub kind: KindId,
     /// Parameters shown to observers, in their order in the model.
     pub parameters: &'a [f64],
-    /// Time since the module was created.
+    /// Time since a production made the module, in units of simulated time; 0 for a bracket.
     pub age: f64,
-    /// Means nothing for a bracket.
+    /// Identity by descent; without meaning for a bracket.
     pub lineage: Lineage,
 }
 
@@ -64,17 +64,17 @@ impl ModuleString {
         (self.time, self.now, self.version) = (time, SimTime::ZERO, None);
         self.entries.clear();
         self.parameters.clear();
-        self.strangers.clear();
-        self.broods.clear();
+        self.ungrouped.clear();
+        self.groups.clear();
     }
 
-    /// Empties the string, for so many entries and parameters, of modules of these broods, at an instant.
-    pub(super) fn begin(&mut self, time: f64, now: SimTime, broods: &Broods, extent: (usize, usize)) {
+    /// Empties the string and reserves memory for `extent`, the numbers of entries and of parameters; ages end at `now`.
+    pub(super) fn begin(&mut self, time: f64, now: SimTime, groups: &SiblingGroups, extent: (usize, usize)) {
         self.reset(time);
         self.now = now;
         self.entries.reserve(extent.0);
         self.parameters.reserve(extent.1);
-        self.broods.copy(broods);
+        self.groups.copy(groups);
     }
 
     /// Appends a module.
@@ -86,37 +86,37 @@ impl ModuleString {
         lineage: Lineage,
     ) {
         let place = match kind.is_bracket() {
-            true => NO_BROOD,
+            true => NO_GROUP,
             false => {
-                self.strangers.push((self.now.after(-age), lineage));
-                self.strangers.len() as u32 - 1
+                self.ungrouped.push((self.now.after(-age), lineage));
+                self.ungrouped.len() as u32 - 1
             }
         };
         let first = self.parameters.len() as u32;
         self.parameters.extend(parameters);
         self.version = None;
-        self.entries.push(Entry { kind, first, brood: NO_BROOD, place });
+        self.entries.push(StringEntry { kind, first, group: NO_GROUP, place });
     }
 
-    /// Appends a module of a brood; returns the place of its first parameter.
-    pub(super) fn push_known(&mut self, kind: KindId, brood: u32, place: u16, parameters: &[f64]) -> usize {
+    /// Appends a module of a group; returns the place of its first parameter.
+    pub(super) fn push_known(&mut self, kind: KindId, group: u32, place: u16, parameters: &[f64]) -> usize {
         let first = self.parameters.len();
         self.parameters.extend(parameters);
-        self.entries.push(Entry { kind, first: first as u32, brood, place: u32::from(place) });
+        self.entries.push(StringEntry { kind, first: first as u32, group, place: u32::from(place) });
         first
     }
 
     pub(super) fn push_bracket(&mut self, kind: KindId) {
         let first = self.parameters.len() as u32;
-        self.entries.push(Entry { kind, first, brood: NO_BROOD, place: NO_BROOD });
+        self.entries.push(StringEntry { kind, first, group: NO_GROUP, place: NO_GROUP });
     }
 
-    /// Sets the time that the string shows, and the instant that ages are counted to.
+    /// Sets the time that the string shows, and the instant at which ages end.
     pub fn show(&mut self, time: f64, now: SimTime) {
         (self.time, self.now) = (time, now);
     }
 
-    /// Which modules these are, if a simulation has written them.
+    /// The version of the structure, if a simulation has written the string.
     pub fn version(&self) -> Option<Version> {
         self.version
     }
@@ -126,7 +126,7 @@ impl ModuleString {
         self.version = Some(version);
     }
 
-    /// The parameters of all modules, to be set by who has written them.
+    /// The parameters of all modules, one after another, for the writer of the string.
     pub fn parameters_mut(&mut self) -> &mut [f64] {
         &mut self.parameters
     }
@@ -143,13 +143,13 @@ impl ModuleString {
 
     /// The module or bracket at a place in string order, from 0. Panics beyond [`len`](ModuleString::len).
     pub fn get(&self, index: usize) -> Module<'_> {
-        let Entry { kind, first, brood, place } = self.entries[index];
+        let StringEntry { kind, first, group, place } = self.entries[index];
         let end = self.entries.get(index + 1).map_or(self.parameters.len(), |next| next.first as usize);
-        let (birth, lineage) = match (brood, place) {
-            // Brackets are no modules, have no identity, and are of no age.
-            (NO_BROOD, NO_BROOD) => (self.now, Lineage::of_axiom(0)),
-            (NO_BROOD, stranger) => self.strangers[stranger as usize],
-            _ => (self.broods.birth(brood), self.broods.lineage(brood, place as u16)),
+        let (birth, lineage) = match (group, place) {
+            // Brackets are no modules: they have no identity and no age.
+            (NO_GROUP, NO_GROUP) => (self.now, Lineage::of_axiom(0)),
+            (NO_GROUP, place) => self.ungrouped[place as usize],
+            _ => (self.groups.birth(group), self.groups.lineage(group, place as u16)),
         };
         let parameters = &self.parameters[first as usize..end];
         Module { kind, parameters, age: self.now.since(birth).max(0.0), lineage }

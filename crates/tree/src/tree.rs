@@ -1,17 +1,17 @@
-//! The growing structure: modules on axes, axes on modules.
+//! The linked tree of modules: axes of modules and branches, and the operations of productions on them.
 //!
 //! An axis is a doubly linked list of modules and branches; a branch holds an axis of its own. So a
-//! production costs what it replaces, and string order is a walk. Slots are used again, and a
-//! [`ModuleId`] carries the generation of its slot, so that an old id never means a new module.
+//! production costs as much as it replaces, and string order is a walk. Slots are used again, and a
+//! [`ModuleId`] contains the generation of its slot, so that an old id never means a new module.
 //!
-//! A module is a record of 28 bytes and its parameters; its birth and lineage are kept with those of its siblings
-//! (`brood`). At a million modules, what anything costs is the memory that it touches.
+//! A module is a record of 28 bytes and its parameters; its birth and lineage are stored with those of its siblings
+//! (`siblings.rs`). At a million modules, memory access dominates all costs.
 
 use std::collections::TryReserveError;
 
 use smallvec::SmallVec;
 
-use super::brood::{Broods, NO_BROOD};
+use super::siblings::{NO_GROUP, SiblingGroups};
 use super::{Family, Lineage, SimTime};
 use dlsys_model::{KindId, Successor};
 
@@ -36,8 +36,8 @@ impl ModuleId {
     }
 }
 
-/// What stands before or after on an axis: a module or a branch, by its slot; or nothing, and then it is known which
-/// branch the axis belongs to.
+/// The neighbour before or after on an axis: a module or a branch, by its slot; at an end of the axis, the branch that the axis
+/// belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Link(pub(super) u32);
 
@@ -55,27 +55,27 @@ impl Link {
     }
 }
 
-/// No module has this label.
+/// The label of modules that have been given none.
 pub const NO_LABEL: u16 = u16::MAX;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Node {
     /// `KindId::OPEN` for a branch.
     pub kind: KindId,
-    /// Of the slot.
+    /// Number of modules that the slot has had before.
     pub generation: u32,
     pub before: Link,
     pub after: Link,
-    /// Where the parameters begin; of a branch, what its own axis begins with.
+    /// Of a module, where the parameters begin; of a branch, the first node of its axis.
     pub first: u32,
-    pub brood: u32,
+    pub group: u32,
     pub place: u16,
     pub label: u16,
 }
 
-/// A module in a [`Tree`], looked at once.
+/// A module of a [`Tree`]: all that the tree stores of it, read at once.
 #[derive(Clone, Copy, Debug)]
-pub struct Look<'t> {
+pub struct ModuleView<'t> {
     /// Its id.
     pub id: ModuleId,
     /// Its kind.
@@ -86,7 +86,7 @@ pub struct Look<'t> {
     pub birth: SimTime,
     /// All its parameters, hidden ones last, with the values that the tree has of them.
     pub values: &'t [f64],
-    /// Brood, and place in it.
+    /// Sibling group, and place in it.
     member: (u32, u16),
 }
 
@@ -94,20 +94,19 @@ pub struct Look<'t> {
 #[derive(Clone, Debug)]
 pub struct Tree {
     pub(super) nodes: Vec<Node>,
-    pub(super) broods: Broods,
+    pub(super) groups: SiblingGroups,
     free: Vec<u32>,
     pub(super) values: Vec<f64>,
     /// Free blocks of `values`, by their length.
     free_values: Vec<Vec<u32>>,
     pub(super) arities: Vec<u32>,
-    /// Parameters of each kind that are shown to others: hidden ones are its last.
+    /// Number of parameters of each kind that observers see: hidden parameters are the last ones.
     pub(super) shown: Vec<u32>,
     modules: usize,
 }
 
 impl Tree {
-    /// An empty structure; `arities` gives the number of parameters of each kind, and `shown` how many of them an
-    /// observer gets to see.
+    /// An empty tree; `arities` gives the number of parameters of each kind, `shown` the number of those that observers see.
     pub fn new(arities: Vec<u32>, shown: Vec<u32>) -> Tree {
         let trunk = Node {
             kind: KindId::OPEN,
@@ -116,12 +115,12 @@ impl Tree {
             after: Link::end_of(TRUNK),
             first: Link::end_of(TRUNK).0,
             label: NO_LABEL,
-            brood: NO_BROOD,
+            group: NO_GROUP,
             place: 0,
         };
         Tree {
             nodes: vec![trunk],
-            broods: Broods::default(),
+            groups: SiblingGroups::default(),
             free: Vec::new(),
             values: Vec::new(),
             free_values: Vec::new(),
@@ -147,11 +146,11 @@ impl Tree {
         (self.modules + 2 * branches, self.values.len())
     }
 
-    /// Bytes that it takes, about.
+    /// Bytes of memory, about.
     pub fn size(&self) -> usize {
         size_of_val(&self.nodes[..])
             + size_of_val(&self.values[..])
-            + self.broods.size()
+            + self.groups.size()
             + 4 * self.free.len()
     }
 
@@ -171,23 +170,23 @@ impl Tree {
         node
     }
 
-    /// Who lives in a slot.
+    /// The module in a slot.
     pub fn id(&self, slot: u32) -> ModuleId {
         ModuleId { slot, generation: self.nodes[slot as usize].generation }
     }
 
-    /// All that is known of who lives in a slot.
+    /// All that is stored of the module in a slot.
     #[inline]
-    pub fn look(&self, slot: u32) -> Look<'_> {
+    pub fn look(&self, slot: u32) -> ModuleView<'_> {
         let node = &self.nodes[slot as usize];
-        let Node { kind, label, brood, place, generation, .. } = *node;
-        let (birth, values) = (self.broods.birth(brood), &self.values[node.places(&self.arities)]);
-        Look { id: ModuleId { slot, generation }, kind, label, birth, values, member: (brood, place) }
+        let Node { kind, label, group, place, generation, .. } = *node;
+        let (birth, values) = (self.groups.birth(group), &self.values[node.places(&self.arities)]);
+        ModuleView { id: ModuleId { slot, generation }, kind, label, birth, values, member: (group, place) }
     }
 
-    /// The lineage of one that was looked at.
-    pub fn lineage_of(&self, look: &Look) -> Lineage {
-        self.broods.lineage(look.member.0, look.member.1)
+    /// The lineage of a module that was read with [`Tree::look`].
+    pub fn lineage_of(&self, look: &ModuleView) -> Lineage {
+        self.groups.lineage(look.member.0, look.member.1)
     }
 
     /// The kind of a living module.
@@ -197,13 +196,13 @@ impl Tree {
 
     /// The time at which a production made a living module.
     pub fn birth(&self, id: ModuleId) -> SimTime {
-        self.broods.birth(self.node(id).brood)
+        self.groups.birth(self.node(id).group)
     }
 
     /// The lineage of a living module.
     pub fn lineage(&self, id: ModuleId) -> Lineage {
         let node = self.node(id);
-        self.broods.lineage(node.brood, node.place)
+        self.groups.lineage(node.group, node.place)
     }
 
     /// A number that the owner of the tree has given to a module; [`NO_LABEL`] from birth on.
@@ -216,7 +215,7 @@ impl Tree {
         self.nodes[id.slot()].label = label;
     }
 
-    /// The label of a module that may be dead: then there is none.
+    /// The label of a module; None if it has been replaced.
     pub fn label_if_alive(&self, id: ModuleId) -> Option<u16> {
         let node = &self.nodes[id.slot()];
         (node.generation == id.generation).then_some(node.label)
@@ -232,7 +231,7 @@ impl Tree {
         &self.values[self.places(id)]
     }
 
-    /// Number of a module's parameters that an observer gets to see.
+    /// Number of a module's parameters that observers see.
     pub fn shown(&self, id: ModuleId) -> usize {
         self.shown[self.node(id).kind.index()] as usize
     }
@@ -263,7 +262,7 @@ impl Tree {
         }
     }
 
-    /// Gives values a place, and tells where it begins.
+    /// Stores values, and returns the place of the first.
     fn store(&mut self, values: &[f64]) -> u32 {
         if values.is_empty() {
             return 0;
@@ -280,7 +279,7 @@ impl Tree {
         }
     }
 
-    /// True if modules of these kinds have a place without a list that grows.
+    /// True if modules of these kinds can be added without an allocation.
     #[inline]
     pub fn has_room(&self, kinds: &[KindId], width: usize) -> bool {
         let (nodes, values) = (&self.nodes, &self.values);
@@ -288,7 +287,7 @@ impl Tree {
             && (values.capacity() - values.len() >= width || self.has_free_values(kinds))
     }
 
-    /// True if the parameters of these kinds have a place that others have left.
+    /// True if the parameters of these kinds fit into freed blocks.
     fn has_free_values(&self, kinds: &[KindId]) -> bool {
         kinds.iter().filter(|kind| !kind.is_bracket()).all(|kind| {
             let arity = self.arities[kind.index()] as usize;
@@ -296,10 +295,11 @@ impl Tree {
         })
     }
 
-    /// Lets the lists of nodes and values grow as they would.
+    /// Allocates memory for modules of these kinds, in the steps in which vectors grow.
     ///
     /// # Errors
-    /// If there is no memory for that.
+    ///
+    /// There is not enough memory.
     pub fn make_room(&mut self, kinds: &[KindId], width: usize) -> Result<(), TryReserveError> {
         self.nodes.try_reserve(kinds.len().saturating_sub(self.free.len()))?;
         if self.has_free_values(kinds) { Ok(()) } else { self.values.try_reserve(width) }
@@ -310,7 +310,7 @@ impl Tree {
         self.free.push(slot);
     }
 
-    /// Ends the life of whoever is in a slot. The slot is not free yet.
+    /// Removes the module from a slot, without freeing the slot.
     fn vacate(&mut self, slot: u32) {
         let node = &mut self.nodes[slot as usize];
         node.generation = node.generation.wrapping_add(1);
@@ -359,8 +359,8 @@ impl Tree {
         family: Family,
         made: &mut Vec<ModuleId>,
     ) {
-        let Node { before, after, brood, .. } = *self.node(id);
-        self.broods.leave(brood);
+        let Node { before, after, group, .. } = *self.node(id);
+        self.groups.leave(group);
         if let [kind] = string.kinds[..]
             && kind != KindId::OPEN
         {
@@ -371,8 +371,7 @@ impl Tree {
         self.insert(before, after, string, arguments, birth, family, made);
     }
 
-    /// Puts a single module into the place of another. Its neighbours need not know, and at a million modules their
-    /// memory is far away.
+    /// Puts a single module into the slot of another. The links of its neighbours stay valid, so that their memory is not touched.
     fn succeed(
         &mut self,
         id: ModuleId,
@@ -384,26 +383,26 @@ impl Tree {
     ) {
         self.vacate(id.slot);
         let first = self.store(arguments);
-        let brood = self.broods.begin(family, birth, 0);
-        self.broods.count(brood, 1);
+        let group = self.groups.begin(family, birth, 0);
+        self.groups.count(group, 1);
         let node = &mut self.nodes[id.slot()];
-        (node.kind, node.first, node.brood, node.place, node.label) = (kind, first, brood, 0, NO_LABEL);
+        (node.kind, node.first, node.group, node.place, node.label) = (kind, first, group, 0, NO_LABEL);
         made.push(ModuleId { slot: id.slot, generation: node.generation });
     }
 
-    /// Takes out a module and all that follows on its axis, with all branches. Slots that are to be kept stay empty until
-    /// they are given back with [`Tree::free_slot`].
+    /// Removes a module and all that follows on its axis, with all branches. Slots for which `keep` is true stay empty until they are
+    /// freed with [`Tree::free_slot`].
     pub fn cut(&mut self, id: ModuleId, keep: impl Fn(u32) -> bool) {
         let before = self.node(id).before;
         let mut axes = vec![Link(id.slot)];
         let mut end = None;
         while let Some(mut at) = axes.pop() {
             while at.ended().is_none() {
-                let Node { kind, after, first, brood, .. } = self.nodes[at.0 as usize];
+                let Node { kind, after, first, group, .. } = self.nodes[at.0 as usize];
                 if kind == KindId::OPEN {
                     axes.push(Link(first));
                 } else {
-                    self.broods.leave(brood);
+                    self.groups.leave(group);
                     self.modules -= 1;
                 }
                 if keep(at.0) {
@@ -418,7 +417,7 @@ impl Tree {
         self.link_forward(before, end.expect("an axis has an end"));
     }
 
-    /// Gives back a slot that was kept when its module was cut off.
+    /// Frees a slot that was kept when its module was removed.
     pub fn free_slot(&mut self, slot: u32) {
         self.free.push(slot);
     }
@@ -438,8 +437,8 @@ impl Tree {
         // The branches that are open.
         let mut branches: SmallVec<[u32; 8]> = SmallVec::new();
         let mut place = 0;
-        // Of the present brood; a very long successor is several.
-        let (mut brood, mut members) = (NO_BROOD, 0);
+        // Of the present group; a very long successor is several.
+        let (mut group, mut members) = (NO_GROUP, 0);
         for &kind in &string.kinds {
             if kind == KindId::CLOSE {
                 let branch = branches.pop().expect("brackets match: the front end saw to it");
@@ -455,7 +454,7 @@ impl Tree {
                 after: before,
                 first: 0,
                 label: NO_LABEL,
-                brood: NO_BROOD,
+                group: NO_GROUP,
                 place: 0,
             };
             if kind == KindId::OPEN {
@@ -465,14 +464,14 @@ impl Tree {
                 before = Link::end_of(slot);
                 continue;
             }
-            if brood == NO_BROOD || members == u16::MAX {
-                self.broods.count(brood, members);
-                brood = self.broods.begin(family, birth, place);
+            if group == NO_GROUP || members == u16::MAX {
+                self.groups.count(group, members);
+                group = self.groups.begin(family, birth, place);
                 members = 0;
             }
             let own;
             (own, arguments) = arguments.split_at(self.arities[kind.index()] as usize);
-            (node.first, node.brood, node.place) = (self.store(own), brood, members);
+            (node.first, node.group, node.place) = (self.store(own), group, members);
             let id = self.allocate(node);
             self.link_forward(before, Link(id.slot));
             members += 1;
@@ -481,7 +480,7 @@ impl Tree {
             made.push(id);
         }
         self.modules += place as usize;
-        self.broods.count(brood, members);
+        self.groups.count(group, members);
         self.link_forward(before, after);
         if after.ended().is_none() {
             self.nodes[after.0 as usize].before = before;

@@ -4,7 +4,7 @@ use super::tree::{Link, TRUNK};
 use super::{ModuleId, ModuleString, SimTime, Tree};
 use dlsys_model::KindId;
 
-/// What a walk in string order meets.
+/// One step of a walk in string order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Visit {
     /// A module.
@@ -21,8 +21,8 @@ impl Tree {
         Walk::new(self, Link(self.nodes[TRUNK as usize].first))
     }
 
-    /// Writes the structure out, every parameter with the value that the tree has of it. `note` is told each module
-    /// with its label and where its parameters begin in the string.
+    /// Writes the structure to a string, with the parameters that the tree has. `note` is called for each module with its label and
+    /// the place at which its parameters begin in the string.
     pub fn write(
         &self,
         time: f64,
@@ -30,7 +30,7 @@ impl Tree {
         out: &mut ModuleString,
         mut note: impl FnMut(ModuleId, u16, usize),
     ) {
-        out.begin(time, now, &self.broods, self.extent());
+        out.begin(time, now, &self.groups, self.extent());
         let mut next = Link(self.nodes[TRUNK as usize].first);
         loop {
             match next.ended() {
@@ -47,7 +47,7 @@ impl Tree {
                         continue;
                     }
                     let places = node.places(&self.shown);
-                    let to = out.push_known(node.kind, node.brood, node.place, &self.values[places]);
+                    let to = out.push_known(node.kind, node.group, node.place, &self.values[places]);
                     let id = ModuleId::of_parts(next.0, node.generation);
                     note(id, node.label, to);
                     next = node.after;

@@ -1,4 +1,4 @@
-//! Ways through the tree: who stands before a module, who after it, who is attached to it.
+//! Neighbours in the tree: left and right context, children, and all that follows a module.
 
 use smallvec::SmallVec;
 
@@ -42,7 +42,7 @@ impl Tree {
     }
 
     /// The modules attached to this one, in string order, appended to `out`: the first of each side branch, then the next
-    /// on the same axis, modules of skipped kinds passed over. Also tells whether the last is on the axis.
+    /// on the same axis, modules of skipped kinds passed over. Returns whether the last one is on the axis.
     pub fn children(&self, id: ModuleId, skipped: impl Fn(KindId) -> bool, out: &mut Vec<ModuleId>) -> bool {
         let mut at = self.node(id).after;
         // The branches that are open.

@@ -1,10 +1,10 @@
 //! Bounds of curves over stretches of their argument.
 
-use super::piece::{Piece, differentiated, polynomial};
+use super::piece::{Cubic, differentiated, polynomial};
 use super::{Curve, Part, Place};
 use crate::{Array, Binary, Interval, Value};
 
-/// Over more pieces than this a bound is that of the whole curve: whoever wants better halves the stretch.
+/// Over more pieces than this the bounds are those of the whole curve; the caller halves the stretch for better ones.
 const MANY: usize = 64;
 
 /// Least and greatest value of a cubic between two arguments.
@@ -29,7 +29,7 @@ fn over_cubic(c: &[f64; 4], from: f64, to: f64) -> Interval {
     Interval { lo, hi, partial: false }
 }
 
-impl Piece {
+impl Cubic {
     /// A derivative, or the value, between two parameters.
     fn over(&self, part: Part, from: f64, to: f64) -> Interval {
         let op = Interval::binary;
@@ -221,7 +221,7 @@ impl Curve {
     }
 }
 
-impl Piece {
+impl Cubic {
     /// A piece that is not straight, with its Taylor polynomials at both ends.
     fn taylor_over(&self, part: Part, from: f64, to: f64) -> Interval {
         let (start, end) = (self.place(0.0), self.place(1.0));

@@ -1,59 +1,41 @@
-//! Curves from their points.
+//! Construction of curves from their points: polygons, monotone cubics, B-splines.
 
-use super::piece::Piece;
+use super::piece::Cubic;
 use super::{Curve, Sort};
+use crate::Error;
 
 /// Most points of one curve.
 pub const MAX_POINTS: usize = 1_000_000;
-
-/// Why points make no curve. Points are counted from 0.
-#[derive(Clone, Debug, PartialEq)]
-pub enum CurveFault {
-    /// So many are needed.
-    TooFew(usize),
-    /// More than [`MAX_POINTS`].
-    TooMany,
-    /// The x of this point is not greater than that of the one before.
-    NotAscending(usize),
-    /// A periodic curve whose last value is not its first.
-    NotClosed {
-        /// Value of the first point.
-        first: f64,
-        /// Value of the last point.
-        last: f64,
-    },
-    /// Slopes or areas leave the range of numbers.
-    TooLarge,
-}
 
 impl Curve {
     /// The curve of a sort by points. A periodic one ends on the value with which it begins.
     ///
     /// # Errors
-    /// What is wrong with the points.
+    ///
+    /// There are too few points or too many, they do not ascend or do not close, or the numbers are too large.
     pub fn new(
         name: impl Into<String>,
         sort: Sort,
         points: &[[f64; 2]],
         periodic: bool,
-    ) -> Result<Curve, CurveFault> {
+    ) -> Result<Curve, Error> {
         let least = match (sort, periodic) {
             (Sort::Spline, false) => 4,
             (_, true) => 3,
             _ => 2,
         };
         if points.len() < least {
-            return Err(CurveFault::TooFew(least));
+            return Err(Error::TooFew(least));
         }
         if points.len() > MAX_POINTS {
-            return Err(CurveFault::TooMany);
+            return Err(Error::TooMany);
         }
         if let Some(i) = points.windows(2).position(|pair| pair[1][0] <= pair[0][0]) {
-            return Err(CurveFault::NotAscending(i + 1));
+            return Err(Error::NotAscending(i + 1));
         }
         let (first, last) = (points[0][1], points[points.len() - 1][1]);
         if periodic && first != last {
-            return Err(CurveFault::NotClosed { first, last });
+            return Err(Error::NotClosed { first, last });
         }
         let pieces = match sort {
             Sort::Linear => linear(points),
@@ -72,7 +54,7 @@ impl Curve {
             && knots.windows(2).all(|k| k[0] < k[1])
             && pieces.iter().all(|p| p.taylor(0.5).iter().all(|x| x.is_finite()));
         if !sound {
-            return Err(CurveFault::TooLarge);
+            return Err(Error::TooLarge);
         }
         let mut range = (f64::INFINITY, f64::NEG_INFINITY);
         for piece in &pieces {
@@ -86,17 +68,17 @@ impl Curve {
     }
 }
 
-fn linear(points: &[[f64; 2]]) -> Vec<Piece> {
+fn linear(points: &[[f64; 2]]) -> Vec<Cubic> {
     let piece = |pair: &[[f64; 2]]| {
         let ([a, p], [b, q]) = (pair[0], pair[1]);
-        Piece::new([a, b - a, 0.0, 0.0], [p, q - p, 0.0, 0.0])
+        Cubic::new([a, b - a, 0.0, 0.0], [p, q - p, 0.0, 0.0])
     };
     points.windows(2).map(piece).collect()
 }
 
 /// Fritsch and Carlson, "Monotone piecewise cubic interpolation", SIAM J. Numer. Anal. 17 (1980): tangents are means of
 /// the slopes on both sides, zero at extremes, and cut back to the circle of radius 3 where they would overshoot.
-fn monotone(points: &[[f64; 2]], periodic: bool) -> Vec<Piece> {
+fn monotone(points: &[[f64; 2]], periodic: bool) -> Vec<Cubic> {
     let n = points.len() - 1;
     let width: Vec<f64> = points.windows(2).map(|p| p[1][0] - p[0][0]).collect();
     let slope: Vec<f64> = points.windows(2).zip(&width).map(|(p, w)| (p[1][1] - p[0][1]) / w).collect();
@@ -131,14 +113,14 @@ fn monotone(points: &[[f64; 2]], periodic: bool) -> Vec<Piece> {
             let ([x, p], [_, q]) = (points[i], points[i + 1]);
             let (a, b) = (tangent[i] * width[i], tangent[i + 1] * width[i]);
             let rise = q - p;
-            Piece::new([x, width[i], 0.0, 0.0], [p, a, 3.0 * rise - 2.0 * a - b, a + b - 2.0 * rise])
+            Cubic::new([x, width[i], 0.0, 0.0], [p, a, 3.0 * rise - 2.0 * a - b, a + b - 2.0 * rise])
         })
         .collect()
 }
 
 /// The uniform cubic B-spline in the plane. With ends its knots are 0, 0, 0, 0, 1, 2, …, n, n, n, n, so that it begins on
 /// the first control point and ends on the last; a periodic one has whole numbers throughout.
-fn spline(points: &[[f64; 2]], periodic: bool) -> Vec<Piece> {
+fn spline(points: &[[f64; 2]], periodic: bool) -> Vec<Cubic> {
     let distinct = points.len() - 1;
     let period = points[distinct][0] - points[0][0];
     let control = |i: i64| -> [f64; 2] {
@@ -176,7 +158,7 @@ fn spline(points: &[[f64; 2]], periodic: bool) -> Vec<Piece> {
                 let [p, q, r, s] = corners.map(|corner| corner[k]);
                 [p, 3.0 * (q - p), 3.0 * (p - 2.0 * q + r), s - p + 3.0 * (q - r)]
             };
-            Piece::new(power(0), power(1))
+            Cubic::new(power(0), power(1))
         })
         .collect()
 }

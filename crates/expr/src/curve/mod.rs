@@ -8,8 +8,8 @@ mod bounds;
 mod build;
 mod piece;
 
-pub use build::{CurveFault, MAX_POINTS};
-use piece::Piece;
+pub use build::MAX_POINTS;
+use piece::Cubic;
 
 /// How a curve follows its points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,7 +22,7 @@ pub enum Sort {
     Spline,
 }
 
-/// What is computed of a curve.
+/// A function that is computed from a curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Part {
     /// The value.
@@ -44,7 +44,7 @@ pub enum Part {
 }
 
 impl Part {
-    /// What the derivative of a part is, if it is another one; the derivative of the others is left out as zero.
+    /// The derivative of a part, if it is another part; that of the others is taken as zero.
     pub fn derivative(self) -> Option<Part> {
         match self {
             Part::Value => Some(Part::Slope),
@@ -70,7 +70,7 @@ pub struct Curve {
     pub points: usize,
     /// Where pieces begin, and the last one ends; ascending.
     knots: Vec<f64>,
-    pieces: Vec<Piece>,
+    pieces: Vec<Cubic>,
     /// Integral from the first knot to each.
     sums: Vec<f64>,
     /// Least and greatest value.

@@ -4,7 +4,7 @@ use super::Part;
 
 /// `x(u)`, which increases, and `y(u)`; coefficients from the constant one on.
 #[derive(Clone, Debug)]
-pub struct Piece {
+pub struct Cubic {
     pub x: [f64; 4],
     pub y: [f64; 4],
     /// `∫ y x' du` from 0: the coefficients of u, u², …, u⁶.
@@ -22,8 +22,8 @@ pub fn differentiated(c: &[f64; 4]) -> [f64; 4] {
     [c[1], 2.0 * c[2], 3.0 * c[3], 0.0]
 }
 
-impl Piece {
-    pub fn new(x: [f64; 4], y: [f64; 4]) -> Piece {
+impl Cubic {
+    pub fn new(x: [f64; 4], y: [f64; 4]) -> Cubic {
         let speed = [x[1], 2.0 * x[2], 3.0 * x[3]];
         let mut area = [0.0; 6];
         for (i, a) in y.iter().enumerate() {
@@ -33,7 +33,7 @@ impl Piece {
         }
         // A spline through evenly spaced points is straight in x but for rounding.
         let straight = x[2].abs().max(x[3].abs()) <= 1e-14 * x[1].abs();
-        Piece { x, y, area, straight }
+        Cubic { x, y, area, straight }
     }
 
     /// The parameter where x has a value, which lies in the piece.

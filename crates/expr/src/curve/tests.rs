@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::Error;
 use crate::{Dual, Interval, Value};
 
 const SORTS: [Sort; 3] = [Sort::Linear, Sort::Monotone, Sort::Spline];
@@ -67,13 +68,13 @@ fn monotone_curves_do_not_overshoot() {
 #[test]
 fn points_that_make_no_curve() {
     let fault = |sort, points: &[[f64; 2]], periodic| Curve::new("g", sort, points, periodic).err();
-    assert_eq!(fault(Sort::Linear, &[[0.0, 1.0]], false), Some(CurveFault::TooFew(2)));
+    assert_eq!(fault(Sort::Linear, &[[0.0, 1.0]], false), Some(Error::TooFew(2)));
     let twice = [[0.0, 1.0], [1.0, 1.0], [1.0, 2.0], [2.0, 1.0]];
-    assert_eq!(fault(Sort::Spline, &twice, false), Some(CurveFault::NotAscending(2)));
+    assert_eq!(fault(Sort::Spline, &twice, false), Some(Error::NotAscending(2)));
     let open = [[0.0, 1.0], [1.0, 2.0], [2.0, 3.0]];
-    assert_eq!(fault(Sort::Monotone, &open, true), Some(CurveFault::NotClosed { first: 1.0, last: 3.0 }));
+    assert_eq!(fault(Sort::Monotone, &open, true), Some(Error::NotClosed { first: 1.0, last: 3.0 }));
     let huge = [[0.0, -1e308], [1e-300, 1e308]];
-    assert_eq!(fault(Sort::Linear, &huge, false), Some(CurveFault::TooLarge));
+    assert_eq!(fault(Sort::Linear, &huge, false), Some(Error::TooLarge));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! How much space a scene takes up, before the default width of its lines is known.
+//! Bounds of scenes, before the default width of their lines is known.
 
 use super::{Point, Scene, Width};
 
@@ -19,7 +19,7 @@ impl Block {
         self.low.x > self.high.x
     }
 
-    /// Takes in a ball.
+    /// Includes a ball.
     fn include(&mut self, p: Point, radius: f64) {
         for i in 0..3 {
             self.low[i] = self.low[i].min(p[i] - radius);
@@ -35,10 +35,10 @@ impl Block {
     }
 }
 
-/// The space that scenes take up: everything drawn, with the widths of lines.
+/// The bounds of one or more scenes: everything drawn, with the widths of lines.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bounds {
-    /// Points only, no widths; what the default width is measured against.
+    /// Points only, without widths: the default width is relative to their extent.
     points: Block,
     /// Everything whose width is known.
     known: Block,
@@ -64,7 +64,7 @@ impl Bounds {
         bounds
     }
 
-    /// Takes in a scene.
+    /// Includes a scene.
     pub fn add(&mut self, scene: &Scene) {
         scene.each_point(|point, width| {
             self.points.include(point, 0.0);
@@ -78,7 +78,7 @@ impl Bounds {
         });
     }
 
-    /// Takes in other bounds, taken in the same coordinates.
+    /// Includes other bounds in the same coordinates.
     pub fn merge(&mut self, other: &Bounds) {
         self.points.merge(&other.points);
         self.known.merge(&other.known);
@@ -86,7 +86,7 @@ impl Bounds {
         self.factor = self.factor.max(other.factor);
     }
 
-    /// True if nothing was taken in.
+    /// True if nothing was included.
     pub fn is_empty(&self) -> bool {
         self.points.is_empty()
     }

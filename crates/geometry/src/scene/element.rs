@@ -1,4 +1,4 @@
-//! The elements of a scene.
+//! The elements of a scene: segments of stems, polygons, placed surfaces.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use super::{MaterialId, Mesh, OwnerId, PatchSet, Point, Vector};
 
 /// The width of a line.
 ///
-/// A model that sets no widths should be seen at any scale, and a scene does not know its own: the growing
+/// A model that sets no widths must be visible at any scale, and one scene does not show it: a growing
 /// plant is small at first. So a default width is a *style*, to be resolved when the bounds of the whole
 /// animation are known (see [`Bounds::default_width`](super::Bounds::default_width)).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -98,12 +98,12 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// Where a point of the mesh comes to lie.
+    /// The place of a point of the mesh in the scene.
     pub fn point(&self, p: Point) -> Point {
         self.origin + self.scale * self.direction(p.coords)
     }
 
-    /// Where a direction of the mesh comes to point.
+    /// A direction of the mesh in the scene.
     pub fn direction(&self, v: Vector) -> Vector {
         self.axes[0] * v.x + self.axes[1] * v.y + self.axes[2] * v.z
     }

@@ -1,7 +1,7 @@
-//! Materials: what a thing is made of, and the colour that goes with it.
+//! Materials and the palette: names and colours of everything that is drawn.
 //!
-//! A scene names materials, never colours. The first few are what plants are drawn in when a model says
-//! nothing; the numbered ones are what `;(n)` chooses: twelve that are built in, then the colours and the
+//! Elements of a scene refer to materials, never to colours. The first few are the defaults of organs; the
+//! numbered ones are chosen by `;(n)`: twelve that are built in, then the colours and the
 //! gradients that the model declares. A gradient is [`GRADIENT_STEPS`] materials, so that a material library
 //! stays small whatever is coloured by it.
 
@@ -152,7 +152,7 @@ impl Palette {
         palette
     }
 
-    /// Adds a material without a number, such as a surface brings with it.
+    /// Adds a material without a number, for example that of a surface.
     pub fn add(&mut self, name: &str, color: Color) -> MaterialId {
         let name = self.free_name(name);
         self.materials.push(Material { name: name.into(), color });

@@ -1,5 +1,5 @@
-//! What is to be seen, without a file format: segments, polygons and surfaces, each of a material and of a
-//! module.
+//! The scene: segments, polygons, surfaces and patches in space, each with its material and its module, independent of file
+//! formats.
 //!
 //! ```text
 //! turtle ──▶ Scene { segments, polygons, surfaces, patches } ──▶ export
@@ -8,8 +8,8 @@
 //! - [`Segment`]: a straight piece of a stem. Segments that continue one another form tubes.
 //! - [`Polygon`]: a filled outline. [`Surface`]: a [`Mesh`] placed in space; many share one mesh.
 //! - [`Patch`]: a bicubic Bézier patch; [`Scene::tessellated`] makes surfaces of patches.
-//! - [`Owner`]: the module that drew something. Its name lasts from frame to frame.
-//! - [`Bounds`]: how much space a scene, or all scenes of an animation, take up.
+//! - [`Owner`]: the module that drew an element. Its name is the same in every frame.
+//! - [`Bounds`]: the bounds of a scene, or of all scenes of an animation.
 //!
 //! Lengths are in *scene units*, the units of the model. The axes: `+X` right, `+Y` up, `+Z` towards the
 //! viewer of the front view.
@@ -45,7 +45,7 @@ pub type Vector = nalgebra::Vector3<f64>;
 pub struct Owner {
     /// Name of the module's kind, as in the model: `F_i`, `@L`.
     pub name: Arc<str>,
-    /// Who the module is.
+    /// Identity of the module.
     pub lineage: Lineage,
 }
 
@@ -60,7 +60,7 @@ impl OwnerId {
     }
 }
 
-/// A surface as it is before it is placed.
+/// A surface in its own coordinates.
 #[derive(Clone, Debug)]
 pub struct Shape {
     /// The mesh; of curved surfaces, a preview.
@@ -84,7 +84,7 @@ impl Shape {
     }
 }
 
-/// Everything that is to be seen at one instant.
+/// All elements that are drawn at one instant.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
     /// The materials; elements name them by number.
@@ -94,7 +94,7 @@ pub struct Scene {
     pub shapes: Vec<Shape>,
     /// The part of the model from which `shapes` and `palette` were made.
     pub prepared_for: Option<Arc<Appearance>>,
-    /// How far curves may be from what is drawn for them, in scene units, if that is known when the turtle
+    /// Greatest distance between a curve and the segments drawn for it, in scene units, if that is known when the turtle
     /// draws; 0 if not. Bent segments are drawn in pieces; see [`Fit::accuracy`](dlsys_render::Fit::accuracy).
     pub accuracy: f64,
     owners: Vec<Owner>,
@@ -106,12 +106,12 @@ pub struct Scene {
     pub surfaces: Vec<Surface>,
     /// Bézier patches drawn by `@PD`, in string order.
     pub patches: Vec<Patch>,
-    /// What is drawn, but hardly as it was meant.
+    /// Warnings: elements that are drawn, but hardly as they were meant.
     pub warnings: Vec<Diagnostic>,
 }
 
 impl Scene {
-    /// Takes everything out, keeping the palette and the memory.
+    /// Removes all elements and warnings; palette, shapes and memory stay.
     pub fn clear(&mut self) {
         self.owners.clear();
         self.segments.clear();
@@ -121,7 +121,7 @@ impl Scene {
         self.warnings.clear();
     }
 
-    /// True if there is nothing to be seen.
+    /// True if there are no elements.
     pub fn is_empty(&self) -> bool {
         self.segments.is_empty()
             && self.polygons.is_empty()
@@ -145,8 +145,8 @@ impl Scene {
         Cow::Owned(scene)
     }
 
-    /// Visits points that enclose everything that is to be seen, each with the width of the line there; corners of
-    /// what is not a line have the width 0.
+    /// Visits points whose hull contains all elements, each with the width of the line there; corners of surfaces
+    /// and polygons have the width 0.
     pub fn each_point(&self, mut visit: impl FnMut(Point, Width)) {
         for segment in &self.segments {
             visit(segment.start, segment.widths[0]);
@@ -161,7 +161,7 @@ impl Scene {
         corners.chain(surfaces).chain(patches).for_each(|point| visit(point, Width::Set(0.0)));
     }
 
-    /// Enters a module that draws something. Modules are entered in string order, each once.
+    /// Adds a module that draws something. Modules are added in string order, each once.
     pub fn add_owner(&mut self, owner: Owner) -> OwnerId {
         self.owners.push(owner);
         OwnerId((self.owners.len() - 1) as u32)

@@ -1,4 +1,4 @@
-//! What can go wrong in drawing, and what is drawn but hardly meant: both with the place in the text.
+//! Errors of drawing, and warnings of what is drawn but hardly meant: both with the place in the text.
 //!
 //! A module of the string is drawn by its own name, or as an `interpret` says. The text to look at is in the one case
 //! the production that makes such modules (or the initial string), in the other the line of the `interpret`.
@@ -11,82 +11,108 @@ use dlsys_tree::Lineage;
 /// Most warnings of one frame.
 const MAX_WARNINGS: usize = 20;
 
-/// What can go wrong.
+/// What a module that cannot be drawn does wrong.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum Fault {
+#[non_exhaustive]
+pub enum ErrorKind {
+    /// A parameter that it reads is NaN or infinite.
     #[error("its parameter is {value}")]
-    NotFinite { value: f64 },
+    NotFinite {
+        /// The parameter.
+        value: f64,
+    },
+    /// It leads beyond [`COORDINATE_LIMIT`].
     #[error("it goes beyond the greatest coordinate, {COORDINATE_LIMIT:e}")]
     TooFar,
+    /// With its interpretation the frame has more than [`MODULE_LIMIT`] modules.
     #[error("its interpretation brings the frame to more than {MODULE_LIMIT} modules")]
     TooMany,
+    /// Interpretations are nested deeper than [`DEPTH_LIMIT`].
     #[error("interpretations are nested more than {DEPTH_LIMIT} deep")]
     TooDeep,
+    /// `@PC` or `@PD` of a patch for which there was no `@PS`.
     #[error("patch {patch} is not begun; `@PS({patch})` comes before its points")]
-    PatchNotBegun { patch: i64 },
+    PatchNotBegun {
+        /// Number of the patch.
+        patch: i64,
+    },
+    /// `@PC` with a row or a column that a patch does not have.
     #[error("it sets row {row}, column {column} of a patch; both are 0, 1, 2 or 3")]
-    NoControlPoint { row: f64, column: f64 },
+    NoControlPoint {
+        /// The row given.
+        row: f64,
+        /// The column given.
+        column: f64,
+    },
+    /// `@PD` of a patch with fewer than 16 control points.
     #[error("patch {patch} has no control point at (row, column) {missing}")]
-    PatchIncomplete { patch: i64, missing: String },
+    PatchIncomplete {
+        /// Number of the patch.
+        patch: i64,
+        /// The points that are missing: `(0, 1), (3, 3)`.
+        missing: String,
+    },
+    /// More patches have been begun than a frame may have.
     #[error("it begins more patches than a frame may have")]
     TooManyPatches,
 }
 
-impl Fault {
+impl ErrorKind {
     fn help(&self) -> String {
         match self {
-            Fault::NotFinite { .. } => {
+            ErrorKind::NotFinite { .. } => {
                 "look for a division by zero, or a root or logarithm of a negative number, in what it is computed from"
                     .to_owned()
             }
-            Fault::TooFar => "look for a length or a size that grows without bound".to_owned(),
-            Fault::TooMany => "draw fewer modules for one, or let the rules make fewer".to_owned(),
-            Fault::TooDeep => {
+            ErrorKind::TooFar => "look for a length or a size that grows without bound".to_owned(),
+            ErrorKind::TooMany => "draw fewer modules for one, or let the rules make fewer".to_owned(),
+            ErrorKind::TooDeep => {
                 "let the drawing of a module name what is drawn, not another module with a drawing of its own"
                     .to_owned()
             }
-            Fault::PatchNotBegun { patch } => format!("write `@PS({patch})` before it in the same string"),
-            Fault::NoControlPoint { .. } => "write `@PC(n, row, column)`, row and column from 0 to 3".to_owned(),
-            Fault::PatchIncomplete { patch, .. } => {
+            ErrorKind::PatchNotBegun { patch } => format!("write `@PS({patch})` before it in the same string"),
+            ErrorKind::NoControlPoint { .. } => "write `@PC(n, row, column)`, row and column from 0 to 3".to_owned(),
+            ErrorKind::PatchIncomplete { patch, .. } => {
                 format!("set all 16 points with `@PC({patch}, row, column)` before `@PD({patch})`")
             }
-            Fault::TooManyPatches => {
+            ErrorKind::TooManyPatches => {
                 "use the number of a patch again when it is drawn: `@PS(1)` forgets the patch 1 that was there".to_owned()
             }
         }
     }
 }
 
-/// What went wrong, in the drawing of which module.
+/// A module that cannot be drawn, with its place in the string and in the text.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("cannot draw `{name}` (module {lineage}): {fault}")]
+#[non_exhaustive]
+#[error("cannot draw `{name}` (module {lineage}): {kind}")]
 pub struct Error {
     /// What is wrong.
-    pub fault: Fault,
-    /// The module of the string, or the part of its interpretation.
+    pub kind: ErrorKind,
+    /// Name of the module of the string, or of the part of its interpretation.
     pub name: String,
-    /// Of the module of the string.
+    /// Lineage of the module of the string.
     pub lineage: Lineage,
-    /// What the text says of it.
+    /// The place in the text that makes the module, or says how it is drawn.
     pub span: Option<Span>,
-    /// Of the string.
+    /// Time of the string.
     pub time: f64,
 }
 
 impl Error {
-    /// The message as it is drawn.
+    /// The error as a message that quotes the model, with advice.
     pub fn diagnostic(&self) -> Diagnostic {
-        let message = format!("cannot draw `{}` at t = {}: {}", self.name, short(self.time), self.fault);
+        let message = format!("cannot draw `{}` at t = {}: {}", self.name, short(self.time), self.kind);
         let error = Diagnostic::error(message);
         let error = match self.span {
             Some(span) => error.at(span, "drawn by this"),
             None => error,
         };
-        error.note(format!("it is drawn for module {}", self.lineage)).help(self.fault.help())
+        error.note(format!("it is drawn for module {}", self.lineage)).help(self.kind.help())
     }
 }
 
-/// What is drawn, but hardly as it was meant.
+/// Something that is drawn, but hardly as it was meant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Remark {
     NegativeWidth(f64),

@@ -5,8 +5,8 @@
 
 use super::command::Command;
 use super::prepare::prepare;
-use super::walk::{Source, Walk};
-use super::{DEPTH_LIMIT, Error, Fault, MODULE_LIMIT, Pose};
+use super::walk::{DrawnModule, Walk};
+use super::{DEPTH_LIMIT, Error, ErrorKind, MODULE_LIMIT, Pose};
 use crate::scene::Scene;
 use dlsys_model::{KindId, Model};
 use dlsys_tree::{Module, ModuleString};
@@ -29,8 +29,7 @@ pub(super) fn trace(model: &Model, string: &ModuleString, scene: &mut Scene) -> 
     let mut walk = Walk::new(model, scene, string.time);
     let mut expander = Expander::new(model, &commands, string);
     for module in string.iter() {
-        let source = Source { kind: module.kind, lineage: module.lineage };
-        walk.set_source(source);
+        walk.set_drawn(DrawnModule { kind: module.kind, lineage: module.lineage });
         match commands[module.kind.index()] {
             Command::Interpret(index) => expander.expand(index, module, &mut walk)?,
             command => walk.obey(command, module.parameters, module.kind)?,
@@ -87,12 +86,12 @@ impl<'a> Expander<'a> {
             level.next += arity;
             self.drawn += 1;
             if self.drawn > MODULE_LIMIT {
-                return Err(walk.complain(Fault::TooMany));
+                return Err(walk.error(ErrorKind::TooMany));
             }
             match self.commands[kind.index()] {
                 Command::Interpret(index) if !self.levels.iter().any(|level| level.index == index) => {
                     if self.levels.len() >= DEPTH_LIMIT {
-                        return Err(walk.complain(Fault::TooDeep));
+                        return Err(walk.error(ErrorKind::TooDeep));
                     }
                     self.variables.clear();
                     self.variables.extend_from_slice(&self.arguments[from..from + arity]);

@@ -32,14 +32,17 @@
 //! ```
 //! use dlsys_session::Session;
 //!
-//! let session = Session::from_text("hook.dls", "initial string: F(3) +(90) F(4) @C(7) F(1)", &[]).unwrap();
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let session = Session::from_text("hook.dls", "initial string: F(3) +(90) F(4) @C(7) F(1)", &[])?;
 //! let mut string = Default::default();
-//! session.simulate(Default::default()).unwrap().at(0.0, &mut string).expect("it runs");
+//! session.simulate(Default::default())?.at(0.0, &mut string)?;
 //! let mut scene = dlsys_geometry::turtle::blank(&session.model);
-//! let end = dlsys_geometry::turtle::trace(&session.model, &string, &mut scene).expect("it can be drawn").position;
+//! let end = dlsys_geometry::turtle::trace(&session.model, &string, &mut scene)?.position;
 //! assert!((end.x + 5.0).abs() < 1e-12 && (end.y - 3.0).abs() < 1e-12);
-//! // Nothing is called contour 7: it is drawn as a circle, and said.
+//! // There is no contour 7: the segment is drawn as a circle, with a warning.
 //! assert_eq!(scene.warnings[0].message, "there is no such contour");
+//! # Ok(())
+//! # }
 //! ```
 
 mod bend;
@@ -61,7 +64,7 @@ mod tests;
 use crate::scene::{Point, Scene, Vector};
 use dlsys_model::Model;
 use dlsys_tree::ModuleString;
-pub use error::{Error, Fault};
+pub use error::{Error, ErrorKind};
 
 /// Most modules that one frame may draw, those that interpretations make included.
 pub const MODULE_LIMIT: usize = 10_000_000;
@@ -69,11 +72,10 @@ pub const MODULE_LIMIT: usize = 10_000_000;
 pub const DEPTH_LIMIT: usize = 100;
 /// Coordinates and sizes beyond this are a mistake of the model.
 pub const COORDINATE_LIMIT: f64 = 1e100;
-/// Lengths, widths and sizes below this are none: the squares of areas could not be told from zero any more, and a
-/// direction is a quotient of such.
+/// Lengths, widths and sizes below this are treated as 0: squares of areas would underflow, and directions are quotients of them.
 pub const SMALLEST_LENGTH: f64 = 1e-80;
 
-/// Where a turtle stands.
+/// Position and orientation of a turtle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     /// Where it is, in scene units.
@@ -90,7 +92,7 @@ pub fn blank(model: &Model) -> Scene {
     scene
 }
 
-/// Draws a string of modules of this model, adding to the scene. What is drawn but hardly meant goes to its
+/// Draws a string of modules of this model, adding to the scene. Elements that are drawn but hardly meant add to its
 /// [`warnings`](Scene::warnings).
 ///
 /// # Errors
@@ -99,7 +101,7 @@ pub fn draw(model: &Model, string: &ModuleString, scene: &mut Scene) -> Result<(
     trace(model, string, scene).map(|_| ())
 }
 
-/// Draws, and tells where the turtle comes to stand.
+/// Draws as [`draw`] does, and returns the pose of the turtle at the end.
 ///
 /// # Errors
 /// As of [`draw`].

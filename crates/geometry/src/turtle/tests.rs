@@ -1,4 +1,4 @@
-//! What the turtle draws, on strings written by hand.
+//! The drawings of the turtle, on strings written by hand.
 
 use super::*;
 use crate::scene::{MaterialId, Point, Vector, Width};
@@ -103,7 +103,7 @@ fn parameters_that_are_no_numbers_are_errors() {
     let error = draw(&model, &bad, &mut Scene::default()).unwrap_err();
     assert_eq!(error.to_string(), "cannot draw `+_a` (module 2): its parameter is NaN");
     let far = string(&mut model, &[("F", &[1e100]), ("F", &[1e100])]);
-    assert!(matches!(draw(&model, &far, &mut Scene::default()), Err(Error { fault: Fault::TooFar, .. })));
+    assert!(matches!(draw(&model, &far, &mut Scene::default()), Err(Error { kind: ErrorKind::TooFar, .. })));
     let unread = string(&mut model, &[("A", &[f64::NAN]), ("F", &[1.0, f64::NAN])]);
     assert_eq!(draw(&model, &unread, &mut Scene::default()), Ok(()));
 }
@@ -157,14 +157,20 @@ fn interpretations_that_explode_are_stopped() {
         interpret(&mut model, &name, &[(&next, 1), (&next, 1)], |_, [x, _, _]| vec![x, x]);
     }
     let wide = string(&mut model, &[("A0", &[1.0])]);
-    assert!(matches!(draw(&model, &wide, &mut Scene::default()), Err(Error { fault: Fault::TooMany, .. })));
+    assert!(matches!(
+        draw(&model, &wide, &mut Scene::default()),
+        Err(Error { kind: ErrorKind::TooMany, .. })
+    ));
     let mut model = Model::default();
     for level in 0..101 {
         let (name, next) = (format!("A{level}"), format!("A{}", level + 1));
         interpret(&mut model, &name, &[(&next, 1)], |_, [x, _, _]| vec![x]);
     }
     let deep = string(&mut model, &[("A0", &[1.0])]);
-    assert!(matches!(draw(&model, &deep, &mut Scene::default()), Err(Error { fault: Fault::TooDeep, .. })));
+    assert!(matches!(
+        draw(&model, &deep, &mut Scene::default()),
+        Err(Error { kind: ErrorKind::TooDeep, .. })
+    ));
 }
 
 /// The dragon of the paper (section 4.1) between its stages: every segment is split in two at 45 degrees,

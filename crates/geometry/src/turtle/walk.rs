@@ -1,10 +1,10 @@
-//! The turtle itself: its state, and what each command does to it and to the scene.
+//! The turtle: its state, and the effect of each command on it and on the scene.
 
 use std::sync::Arc;
 
 use super::bend::Bend;
 use super::command::Command;
-use super::error::{self, Error, Fault, Remark, Remarks};
+use super::error::{self, Error, ErrorKind, Remark, Remarks};
 use super::frame::{Axis, Frame};
 use super::patch::OpenPatches;
 use super::{COORDINATE_LIMIT, Pose, SMALLEST_LENGTH, shapes};
@@ -16,21 +16,21 @@ use dlsys_diagnostic::Span;
 use dlsys_model::{KindId, Model};
 use dlsys_tree::Lineage;
 
-/// What `!` without a parameter multiplies the width by.
+/// The factor by which `!` without a parameter multiplies the width.
 const THINNING: f64 = 0.7;
 
 /// The module of the string that is being drawn.
 #[derive(Clone, Copy)]
-pub(super) struct Source {
+pub(super) struct DrawnModule {
     pub(super) kind: KindId,
     pub(super) lineage: Lineage,
 }
 
-/// What brackets remember.
+/// The state that brackets save and restore.
 #[derive(Clone)]
 struct State {
     position: Point,
-    /// What rounding has kept out of `position`: a million small steps should end where one large step does.
+    /// Rounding error of `position` (compensated summation): a million small steps end where one large step does.
     remainder: Vector,
     frame: Frame,
     width: Width,
@@ -42,17 +42,17 @@ struct State {
     strength: f64,
     /// The last segment on this axis, if the turtle still stands at its end.
     last: Option<usize>,
-    /// How many segments, the last one and those before it, were drawn since the width was set.
+    /// Number of segments on this axis since the width was set.
     run: usize,
 }
 
 /// A polygon that is open.
 struct Outline {
     vertices: Vec<Point>,
-    /// How many were made, those in one place with the one before included.
+    /// Number of vertices made, coinciding ones included.
     made: usize,
     /// The interpretation and the module that began it.
-    begun: (Option<(usize, KindId)>, Source),
+    begun: (Option<(usize, KindId)>, DrawnModule),
 }
 
 /// A turtle that walks through a string and draws into a scene.
@@ -66,8 +66,8 @@ pub(super) struct Walk<'a> {
     patches: OpenPatches,
     /// Direction of the tropism.
     target: Vector,
-    source: Source,
-    /// The source as an owner, once it has drawn something.
+    drawn: DrawnModule,
+    /// The same as an owner, once it has drawn something.
     owner: Option<OwnerId>,
     /// Names of the kinds that have drawn something, shared among their modules.
     names: Vec<Option<Arc<str>>>,
@@ -100,7 +100,7 @@ impl<'a> Walk<'a> {
             // Without a declaration, gravity.
             target: tropism.map_or(-Vector::y(), |tropism| Vector::from(tropism.direction)),
             // Replaced before the first command.
-            source: Source { kind: KindId::OPEN, lineage: Lineage::of_axiom(0) },
+            drawn: DrawnModule { kind: KindId::OPEN, lineage: Lineage::of_axiom(0) },
             owner: None,
             names: vec![None; model.kinds.len()],
             inside: None,
@@ -113,74 +113,56 @@ impl<'a> Walk<'a> {
         Pose { position: self.state.position, axes: self.state.frame.vectors() }
     }
 
-    /// Says on whose behalf the next commands are.
-    pub(super) fn set_source(&mut self, source: Source) {
-        self.source = source;
+    /// Sets the module for which the next commands are.
+    pub(super) fn set_drawn(&mut self, module: DrawnModule) {
+        self.drawn = module;
         self.owner = None;
     }
 
-    /// An error about the present source.
-    pub(super) fn complain(&self, fault: Fault) -> Error {
-        let Source { kind, lineage } = self.source;
-        let name = self.model.kinds.get(kind).name.clone();
-        Error { fault, name, lineage, span: self.written(), time: self.time }
+    /// An error of the module that is being drawn.
+    pub(super) fn error(&self, kind: ErrorKind) -> Error {
+        let name = self.model.kinds.get(self.drawn.kind).name.clone();
+        Error { kind, name, lineage: self.drawn.lineage, span: self.written(), time: self.time }
     }
 
-    /// A warning about the present source.
+    /// Adds a warning about the module that is being drawn.
     fn remark(&mut self, remark: Remark) {
         let span = self.written();
         self.scene.warnings.extend(self.remarks.add(remark, self.model, span, self.time));
     }
 
-    /// Where the text says how the present source is drawn.
+    /// The place in the text that says how the present module is drawn.
     fn written(&self) -> Option<Span> {
-        error::place(self.model, self.source.kind, self.source.lineage, self.inside)
+        error::place(self.model, self.drawn.kind, self.drawn.lineage, self.inside)
     }
 
-    /// The string is at its end.
+    /// Ends the string: reports polygons that are still open.
     pub(super) fn finish(&mut self) {
         if let Some(open) = self.polygons.pop() {
-            (self.inside, self.source) = open.begun;
+            (self.inside, self.drawn) = open.begun;
             self.remark(Remark::PolygonNotClosed);
         }
     }
 
-    /// Does what a module of this kind says.
+    /// Executes the command of a module of this kind.
     pub(super) fn obey(&mut self, command: Command, parameters: &[f64], kind: KindId) -> Result<(), Error> {
         let read = &parameters[..parameters.len().min(command.parameters())];
         if let Some(&value) = read.iter().find(|value| !value.is_finite()) {
             let name = self.model.kinds.get(kind).name.clone();
-            return Err(Error { name, ..self.complain(Fault::NotFinite { value }) });
+            return Err(Error { name, ..self.error(ErrorKind::NotFinite { value }) });
         }
         let given = read.first().copied();
         match command {
             Command::Nothing | Command::Interpret(_) => {}
             Command::Draw => self.step(given.unwrap_or(1.0), true)?,
             Command::Move => self.step(given.unwrap_or(1.0), false)?,
-            Command::Hop => {
-                // What is open waits, so that no vertex is recorded.
-                let open = std::mem::take(&mut self.polygons);
-                let done = self.step(given.unwrap_or(1.0), false);
-                self.polygons = open;
-                done?;
-            }
+            Command::Hop => self.hop(given.unwrap_or(1.0))?,
             Command::Turn(axis, sign) => {
                 self.state.frame.turn(axis, sign * given.unwrap_or(self.model.angle))
             }
             Command::TurnBack => self.state.frame.turn(Axis::Up, 180.0),
             Command::Level => self.state.frame.level(),
-            Command::Width => {
-                self.check_width(given);
-                self.state.width = match given {
-                    Some(width) => Width::Set(self.in_range(width.max(0.0))?),
-                    // Thinner and thinner, without end, is nothing at last.
-                    None => match self.state.width.scaled(THINNING) {
-                        Width::Set(width) => Width::Set(self.in_range(width)?),
-                        Width::Default(factor) => Width::Default(self.in_range(factor)?),
-                    },
-                };
-                self.state.run = 0;
-            }
+            Command::Width => self.set_width(given)?,
             Command::Taper => {
                 self.check_width(given);
                 let width = Width::Set(self.in_range(given.unwrap_or(0.0).max(0.0))?);
@@ -189,15 +171,7 @@ impl<'a> Walk<'a> {
                 self.state.run = 0;
             }
             Command::Bend => self.state.strength = self.in_range(given.unwrap_or(0.0))?,
-            Command::Contour => {
-                // 0, and what is no contour, is a circle.
-                let number = given.unwrap_or(0.0).round();
-                let count = self.model.appearance.contours.len();
-                if number != 0.0 && !(1.0..=count as f64).contains(&number) {
-                    self.remark(Remark::NoContour(number, count));
-                }
-                self.state.contour = (1.0..=count as f64).contains(&number).then(|| number as u32 - 1);
-            }
+            Command::Contour => self.set_contour(given.unwrap_or(0.0).round()),
             Command::Color => {
                 if let Some(number) = given {
                     self.check_color(number.round(), read.len() > 1);
@@ -219,7 +193,7 @@ impl<'a> Walk<'a> {
                 }
             }
             Command::BeginPolygon => {
-                let begun = (self.inside, self.source);
+                let begun = (self.inside, self.drawn);
                 self.polygons.push(Outline { vertices: Vec::new(), made: 0, begun });
             }
             Command::Vertex => self.record_vertex(),
@@ -238,17 +212,49 @@ impl<'a> Walk<'a> {
         Ok(())
     }
 
+    /// A step that is not drawn and makes no vertex: open polygons are put aside.
+    fn hop(&mut self, length: f64) -> Result<(), Error> {
+        let open = std::mem::take(&mut self.polygons);
+        let done = self.step(length, false);
+        self.polygons = open;
+        done
+    }
+
+    /// Sets the width of lines, or makes them thinner.
+    fn set_width(&mut self, given: Option<f64>) -> Result<(), Error> {
+        self.check_width(given);
+        self.state.width = match given {
+            Some(width) => Width::Set(self.in_range(width.max(0.0))?),
+            // The limit of thinner and thinner lines is 0.
+            None => match self.state.width.scaled(THINNING) {
+                Width::Set(width) => Width::Set(self.in_range(width)?),
+                Width::Default(factor) => Width::Default(self.in_range(factor)?),
+            },
+        };
+        self.state.run = 0;
+        Ok(())
+    }
+
+    /// Sets the cross-section of stems; 0, and the number of no contour, is a circle.
+    fn set_contour(&mut self, number: f64) {
+        let count = self.model.appearance.contours.len();
+        if number != 0.0 && !(1.0..=count as f64).contains(&number) {
+            self.remark(Remark::NoContour(number, count));
+        }
+        self.state.contour = (1.0..=count as f64).contains(&number).then(|| number as u32 - 1);
+    }
+
     /// Begins a patch, sets a point of it, or draws it.
     fn patch(&mut self, command: Command, parameters: &[f64]) -> Result<(), Error> {
         let given = |i: usize| parameters.get(i).copied().unwrap_or(0.0);
         match command {
-            Command::BeginPatch => self.patches.begin(given(0)).map_err(|fault| self.complain(fault))?,
+            Command::BeginPatch => self.patches.begin(given(0)).map_err(|fault| self.error(fault))?,
             Command::ControlPoint => {
                 let set = self.patches.set([0, 1, 2].map(given), self.state.position);
-                set.map_err(|fault| self.complain(fault))?;
+                set.map_err(|fault| self.error(fault))?;
             }
             _ => {
-                let net = self.patches.net(given(0)).map_err(|fault| self.complain(fault))?;
+                let net = self.patches.net(given(0)).map_err(|fault| self.error(fault))?;
                 let material = self.chosen().unwrap_or(MaterialId::PETAL);
                 let owner = self.owner();
                 // All in one place there is nothing to see, as at the birth of an organ.
@@ -265,7 +271,7 @@ impl<'a> Walk<'a> {
         if x.abs() < SMALLEST_LENGTH {
             return Ok(0.0);
         }
-        if x.abs() <= COORDINATE_LIMIT { Ok(x) } else { Err(self.complain(Fault::TooFar)) }
+        if x.abs() <= COORDINATE_LIMIT { Ok(x) } else { Err(self.error(ErrorKind::TooFar)) }
     }
 
     /// A step along the heading, drawn if `draw` and if no polygon is open; along an arc where there is a
@@ -296,7 +302,7 @@ impl<'a> Walk<'a> {
         Ok(())
     }
 
-    /// Goes a straight way, given with its direction, and draws it as a segment if asked to.
+    /// Moves straight, by a displacement with its direction, and draws a segment if `draw`.
     fn go(&mut self, way: Vector, direction: Vector, across: Vector, draw: bool) -> Result<(), Error> {
         let start = self.state.position;
         self.advance(way)?;
@@ -324,8 +330,8 @@ impl<'a> Walk<'a> {
         Ok(())
     }
 
-    /// Lets the segments drawn since the last width run evenly from that width to this one. A width that
-    /// nobody has set is not known before the whole animation is, and stays.
+    /// Lets the segments drawn since the last width run evenly from that width to this one. The
+    /// default width is not known before the whole animation is, and stays.
     fn taper(&mut self, to: Width) {
         let (Width::Set(from), Width::Set(to)) = (self.state.width, to) else { return };
         let chain = |scene: &Scene, last: Option<usize>| {
@@ -380,7 +386,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Looks at the number of a colour that was given, with or without a place in a gradient.
+    /// Warns of a number of a colour that does not exist, or of a gradient without a place in it.
     fn check_color(&mut self, number: f64, has_place: bool) {
         let [colors, gradients] = self.scene.palette.counts();
         let count = colors + gradients;
@@ -431,12 +437,12 @@ impl<'a> Walk<'a> {
         self.scene.palette.chosen(number, value)
     }
 
-    /// The present source as an owner.
+    /// The module that is being drawn, as an owner.
     fn owner(&mut self) -> OwnerId {
         if let Some(owner) = self.owner {
             return owner;
         }
-        let Source { kind, lineage } = self.source;
+        let DrawnModule { kind, lineage } = self.drawn;
         let kinds = &self.model.kinds;
         let name =
             self.names[kind.index()].get_or_insert_with(|| kinds.get(kind).name.as_str().into()).clone();

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use eframe::egui::{self, Color32, Key, Sense, TextureHandle, TextureOptions};
 
 use super::life::Life;
-use super::look::{Look, Space};
+use super::look::{Space, Viewpoint};
 use super::orders::STILL;
 use super::player::{Player, SPEEDS};
 use super::trial::{Outcome, Runner};
@@ -43,7 +43,7 @@ pub struct Window {
     /// Values of params that hands have changed, or the command line.
     pub(super) set: Vec<Setting>,
     pub(super) player: Player,
-    pub(super) look: Option<Look>,
+    pub(super) look: Option<Viewpoint>,
     pub(super) space: Space,
     /// Somebody has turned or moved the plant.
     touched: bool,
@@ -143,7 +143,7 @@ impl Window {
                 if self.look.is_none() || !self.touched && !self.life.as_ref().is_some_and(|l| l.whole) {
                     self.space = life.space.clone();
                     let (azimuth, elevation, perspective) = (0.0, 0.0, true);
-                    self.look = Some(Look::at(&self.space, azimuth, elevation, perspective));
+                    self.look = Some(Viewpoint::at(&self.space, azimuth, elevation, perspective));
                 }
                 self.life = Some(*life);
                 self.aged = false;
@@ -174,13 +174,13 @@ impl Window {
             self.space = life.space.clone();
         }
         let perspective = self.look.as_ref().is_none_or(|look| look.perspective);
-        self.look = Some(Look::at(&self.space, azimuth, elevation, perspective));
+        self.look = Some(Viewpoint::at(&self.space, azimuth, elevation, perspective));
         self.touched = true;
     }
 
     fn toggle_perspective(&mut self) {
         if let Some(look) = &self.look {
-            self.look = Some(Look::at(&self.space, look.azimuth, look.elevation, !look.perspective));
+            self.look = Some(Viewpoint::at(&self.space, look.azimuth, look.elevation, !look.perspective));
         }
     }
 

@@ -57,7 +57,7 @@ impl Space {
 
 /// A direction of view, what is in the middle, and how large it is.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Look {
+pub struct Viewpoint {
     /// Degrees, as of [`View`].
     pub azimuth: f64,
     pub elevation: f64,
@@ -70,11 +70,17 @@ pub struct Look {
     reach: [f64; 2],
 }
 
-impl Look {
+impl Viewpoint {
     /// At everything, from a side.
-    pub fn at(space: &Space, azimuth: f64, elevation: f64, perspective: bool) -> Look {
-        let mut look =
-            Look { azimuth, elevation, perspective, target: Vector::zeros(), zoom: 1.0, reach: [1.0; 2] };
+    pub fn at(space: &Space, azimuth: f64, elevation: f64, perspective: bool) -> Viewpoint {
+        let mut look = Viewpoint {
+            azimuth,
+            elevation,
+            perspective,
+            target: Vector::zeros(),
+            zoom: 1.0,
+            reach: [1.0; 2],
+        };
         let [right, up, towards] = look.axes();
         let sides = space.sides();
         let half = |axis: Vector| axis.abs().dot(&sides) / 2.0;
@@ -150,7 +156,7 @@ mod tests {
     use super::*;
 
     /// Where a point comes to lie, from the middle of the picture, in parts of its height.
-    fn seen(look: &Look, space: &Space, p: Point) -> [f64; 2] {
+    fn seen(look: &Viewpoint, space: &Space, p: Point) -> [f64; 2] {
         let (fit, page) = look.camera(space, [300, 200], 0.5);
         let [left, bottom, width, height] = page.picture.area;
         let at = fit.camera.project(p);
@@ -163,7 +169,7 @@ mod tests {
             Space { corners: [Point::new(1.0, 0.0, -1.0), Point::new(3.0, 9.0, 1.0)], default_width: 0.1 };
         for perspective in [false, true] {
             for (azimuth, elevation) in [(0.0, 0.0), (90.0, 0.0), (0.0, 90.0), (30.0, 20.0), (200.0, -50.0)] {
-                let look = Look::at(&space, azimuth, elevation, perspective);
+                let look = Viewpoint::at(&space, azimuth, elevation, perspective);
                 for i in 0..8 {
                     let corner = |k: usize| space.corners[i >> k & 1][k];
                     let [x, y] = seen(&look, &space, Point::new(corner(0), corner(1), corner(2)));
@@ -176,7 +182,7 @@ mod tests {
     #[test]
     fn what_is_under_the_pointer_stays_there() {
         let space = Space::default();
-        let mut look = Look::at(&space, 20.0, 10.0, false);
+        let mut look = Viewpoint::at(&space, 20.0, 10.0, false);
         let point = Point::new(0.2, -0.1, 0.3);
         let [x, y] = seen(&look, &space, point);
         look.magnify(3.0, x, y, 1.5);

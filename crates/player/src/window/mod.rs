@@ -1,18 +1,19 @@
-//! The window of `dlsys view`: a plant that grows while one looks at it and changes it.
+//! The window of `dlsys view`: a growing plant, with controls for time, view and parameters.
 //!
 //! ```text
 //! Window (widgets) ──Order──▶ worker (simulation, drawing) ──News──▶ Window
 //! ```
 //!
-//! - [`look`]: from where the plant is looked at.
-//! - [`player`]: time that goes on, stands still, begins again.
-//! - [`life`]: the whole of it, for the timeline.
-//! - [`worker`]: a thread that reads the model, goes to a time, draws; it can be interrupted.
-//! - [`orders`]: what is asked of it, when, and how well drawn.
-//! - [`app`], [`panel`], [`timeline`]: what is on the screen.
+//! - [`look`]: the camera: direction, centre, size.
+//! - [`player`]: the clock of the animation: running, paused, starting again.
+//! - [`life`]: numbers of modules over the whole run, for the timeline.
+//! - [`worker`]: a thread that reads the model, goes to a time and draws; it can be interrupted.
+//! - [`orders`]: the requests to it: when they are sent, and the quality of the picture.
+//! - [`app`], [`panel`], [`timeline`]: the widgets.
+//! - [`trial`]: the window driven by a script, for tests.
 //!
-//! Pictures are those of the PNG export, drawn by our own rasteriser: the same on every machine, whatever it has for a
-//! graphics processor, which only brings them to the screen.
+//! Pictures are those of the PNG export, drawn by our own rasteriser, so they are the same on every machine; the graphics processor
+//! only shows them.
 
 mod app;
 mod life;
@@ -24,6 +25,7 @@ mod timeline;
 mod trial;
 mod worker;
 
+use crate::Error;
 use std::path::PathBuf;
 
 use dlsys_compile::Setting;
@@ -31,31 +33,23 @@ use dlsys_sim::Settings;
 
 pub use trial::Trial;
 
-/// What is shown, and how.
+/// The model to show, and how.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// The model file.
     pub model: PathBuf,
     /// Values of `param`s to begin with.
     pub set: Vec<Setting>,
-    /// Where files are that it names and that are not in its folder.
+    /// Folders of files that it names and that are not in its own folder.
     pub include: Vec<PathBuf>,
+    /// Settings of the run.
     pub settings: Settings,
     /// First and last time, in the model's unit; `None`: those of its `frames`.
     pub range: Option<[f64; 2]>,
     /// Time to begin with, standing still; `None`: plays from the first.
     pub at: Option<f64>,
-    /// What is done without hands, for tests and documents.
+    /// Actions of a script, for tests and pictures in documents; none by default.
     pub trial: Trial,
-}
-
-/// Why there is no window.
-#[derive(Debug, thiserror::Error)]
-pub enum Error {
-    #[error("no window can be opened: {0}")]
-    Screen(String),
-    #[error("{0}")]
-    Trial(String),
 }
 
 /// Opens the window; returns when it is closed.

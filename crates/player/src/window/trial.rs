@@ -1,4 +1,4 @@
-//! The window without hands: for tests, and for pictures of it.
+//! The window driven by a script: for tests, and for pictures of it.
 
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -13,10 +13,10 @@ use dlsys_compile::Setting;
 /// After so long the trial has failed.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-/// What is done, in this order; then the window closes. Nothing: hands do it all.
+/// The actions, in this order; then the window closes. Without actions the window belongs to the user.
 #[derive(Clone, Debug, Default)]
 pub struct Trial {
-    /// Seconds to wait before anything else: what other programs do meanwhile to the model or the window is seen.
+    /// Seconds to wait before anything else, for other programs to change the model or the window.
     pub delay: Option<f64>,
     /// Sliders are moved, one after the other; how long it takes until the new picture is on the screen is printed.
     pub slide: Vec<Setting>,
@@ -46,7 +46,7 @@ enum Stage {
     /// Until there is a picture.
     #[default]
     Begin,
-    /// The so-manieth slider is to be moved when all is still.
+    /// The slider with this number is to be moved when the picture is complete.
     Still(usize),
     /// It was moved then; the new picture is not on the screen yet.
     Slid(usize, Instant),
@@ -71,10 +71,9 @@ impl Runner {
         Runner { trial, outcome, stage: Stage::Begin, begun: None }
     }
 
-    /// Once for each time that the window is drawn, before anything is taken in: what the window shows then is on the screen, for what it
-    /// drew last has been handed over.
+    /// Called once for each frame of the window, before input is read: the picture drawn last is on the screen then.
     pub fn step(&mut self, window: &mut Window, context: &egui::Context) {
-        let Trial { delay, slide, play, screenshot } = &self.trial;
+        let Trial { slide, play, screenshot, .. } = &self.trial;
         if slide.is_empty() && play.is_none() && screenshot.is_none() {
             return;
         }
@@ -84,93 +83,103 @@ impl Runner {
             context.send_viewport_cmd(ViewportCommand::Close);
             return;
         }
-        let next = |number: usize| {
-            if number < slide.len() {
-                Stage::Still(number)
-            } else if play.is_some() {
-                Stage::Playing(Instant::now(), 0, f64::NAN)
-            } else {
-                Stage::Screenshot
-            }
-        };
-        match &mut self.stage {
+        if let Some(next) = self.follow(window, context) {
+            self.stage = next;
+        }
+    }
+
+    /// The stage from the slider with this number on.
+    fn slider_or_later(&self, number: usize) -> Stage {
+        if number < self.trial.slide.len() {
+            Stage::Still(number)
+        } else if self.trial.play.is_some() {
+            Stage::Playing(Instant::now(), 0, f64::NAN)
+        } else {
+            Stage::Screenshot
+        }
+    }
+
+    /// Goes on within a stage; the next stage, if this one is over.
+    fn follow(&mut self, window: &mut Window, context: &egui::Context) -> Option<Stage> {
+        match &self.stage {
             Stage::Begin => {
                 let passed = self.begun.map_or(0.0, |begun| begun.elapsed().as_secs_f64());
                 let ready = window.settled || window.shown.is_some() && window.player.playing;
-                if ready && passed >= delay.unwrap_or(0.0) {
-                    self.stage = next(0);
-                }
+                (ready && passed >= self.trial.delay.unwrap_or(0.0)).then(|| self.slider_or_later(0))
             }
             Stage::Still(number) => {
-                if window.settled {
-                    window.set(&slide[*number].name, slide[*number].value);
-                    self.stage = Stage::Slid(*number, Instant::now());
-                }
+                let Setting { name, value } = self.trial.slide.get(*number).filter(|_| window.settled)?;
+                window.set(name, *value);
+                Some(Stage::Slid(*number, Instant::now()))
             }
             Stage::Slid(number, since) => {
-                let new = window.shown.as_ref().filter(|(order, ..)| order.set == window.set);
-                if let Some((_, _, spent)) = new {
-                    let Setting { name, value } = &slide[*number];
-                    let [ran, drawn] = spent.map(milliseconds);
-                    say(&format!(
-                        "{name} = {value}: on the screen after {:.1} ms (read and run {ran:.1}, drawn {drawn:.1})",
-                        milliseconds(since.elapsed())
-                    ));
-                    self.stage = next(*number + 1);
-                }
+                let (_, _, spent) = window.shown.as_ref().filter(|(order, ..)| order.set == window.set)?;
+                let Setting { name, value } = self.trial.slide.get(*number)?;
+                let [ran, drawn] = spent.map(milliseconds);
+                say(&format!(
+                    "{name} = {value}: on the screen after {:.1} ms (read and run {ran:.1}, drawn {drawn:.1})",
+                    milliseconds(since.elapsed())
+                ));
+                Some(self.slider_or_later(*number + 1))
             }
             Stage::Playing(since, pictures, last) => {
-                if *pictures == 0 {
-                    window.player.play(true);
-                    *since = Instant::now();
-                }
-                let time = window
-                    .shown
-                    .as_ref()
-                    .and_then(|(order, ..)| order.shot.as_ref())
-                    .map_or(f64::NAN, |s| s.time);
-                if time != *last {
-                    (*pictures, *last) = (*pictures + 1, time);
-                }
-                let passed = since.elapsed().as_secs_f64();
-                if passed >= play.unwrap_or(0.0) {
-                    say(&format!("{:.1} pictures a second", f64::from(*pictures) / passed));
-                    window.player.play(false);
-                    self.stage = Stage::Screenshot;
-                }
+                let playing = play(window, self.trial.play.unwrap_or(0.0), (*since, *pictures, *last));
+                Some(playing.map_or(Stage::Screenshot, |(since, pictures, last)| {
+                    Stage::Playing(since, pictures, last)
+                }))
             }
-            Stage::Screenshot => match screenshot {
-                Some(_) if window.settled => {
-                    context.send_viewport_cmd(ViewportCommand::Screenshot(egui::UserData::default()));
-                    self.stage = Stage::Asked;
-                }
-                Some(_) => {}
-                None => {
-                    context.send_viewport_cmd(ViewportCommand::Close);
-                    self.stage = Stage::Over;
-                }
-            },
+            Stage::Screenshot if self.trial.screenshot.is_none() => {
+                context.send_viewport_cmd(ViewportCommand::Close);
+                Some(Stage::Over)
+            }
+            Stage::Screenshot => window.settled.then(|| {
+                context.send_viewport_cmd(ViewportCommand::Screenshot(egui::UserData::default()));
+                Stage::Asked
+            }),
             Stage::Asked => {
-                let taken = context.input(|input| {
+                let image = context.input(|input| {
                     input.events.iter().find_map(|event| match event {
                         Event::Screenshot { image, .. } => Some(image.clone()),
                         _ => None,
                     })
-                });
-                if let (Some(image), Some(path)) = (taken, screenshot) {
-                    if let Err(error) = write(path, &image) {
-                        self.outcome.fail(format!("cannot write {}: {error}", path.display()));
-                    }
-                    context.send_viewport_cmd(ViewportCommand::Close);
-                    self.stage = Stage::Over;
+                })?;
+                let path = self.trial.screenshot.as_ref()?;
+                if let Err(error) = write(path, &image) {
+                    self.outcome.fail(format!("cannot write {}: {error}", path.display()));
                 }
+                context.send_viewport_cmd(ViewportCommand::Close);
+                Some(Stage::Over)
             }
-            Stage::Over => {}
+            Stage::Over => None,
         }
     }
 }
 
-/// Nobody need listen.
+/// Plays for some seconds, since when so many pictures were seen, the last one of this time; None when they are over.
+fn play(
+    window: &mut Window,
+    seconds: f64,
+    (mut since, mut pictures, mut last): (Instant, u32, f64),
+) -> Option<(Instant, u32, f64)> {
+    if pictures == 0 {
+        window.player.play(true);
+        since = Instant::now();
+    }
+    let order = window.shown.as_ref().and_then(|(order, ..)| order.shot.as_ref());
+    let time = order.map_or(f64::NAN, |shot| shot.time);
+    if time != last {
+        (pictures, last) = (pictures + 1, time);
+    }
+    let passed = since.elapsed().as_secs_f64();
+    if passed < seconds {
+        return Some((since, pictures, last));
+    }
+    say(&format!("{:.1} pictures a second", f64::from(pictures) / passed));
+    window.player.play(false);
+    None
+}
+
+/// Writes a line to standard output; errors of writing are ignored.
 fn say(line: &str) {
     let _ = writeln!(std::io::stdout(), "{line}");
 }

@@ -12,7 +12,7 @@ use eframe::egui::{Color32, ColorImage};
 
 use super::Options;
 use super::life::{Life, Living};
-use super::look::{Look, Space};
+use super::look::{Space, Viewpoint};
 use dlsys_compile::Setting;
 use dlsys_geometry::scene::Scene;
 use dlsys_geometry::turtle;
@@ -42,7 +42,7 @@ pub struct Order {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shot {
     pub time: f64,
-    pub look: Look,
+    pub look: Viewpoint,
     pub space: Space,
     pub pixels: [u32; 2],
     /// As good as a file; else what is quick.

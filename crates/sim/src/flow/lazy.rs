@@ -10,7 +10,7 @@ use crate::world::life::{CachedPrediction, End, Life, LifeClass, Newborn, REFUSE
 use crate::world::state::{Change, NextKind};
 use crate::world::{Instant, World};
 use dlsys_model::{Rule, Sign};
-use dlsys_tree::{Look, ModuleId, NO_LABEL, SimTime};
+use dlsys_tree::{ModuleId, ModuleView, NO_LABEL, SimTime};
 use smallvec::SmallVec;
 
 /// The class of a module that is born now with the parameters in `scratch`, and its event.
@@ -67,7 +67,7 @@ pub fn classify(
 /// [`Lives::keep`](crate::world::life::Lives::keep).
 #[inline]
 pub fn life(world: &mut World, rules: &[Rule], slot: u32, scratch: &mut Scratch) -> (u16, Box<Life>) {
-    let Look { label, birth, values, .. } = world.tree.look(slot);
+    let ModuleView { label, birth, values, .. } = world.tree.look(slot);
     let mut life = world.lives.take_life(label);
     if !life.is_of(birth, values) {
         life.values.clear();

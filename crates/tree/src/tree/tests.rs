@@ -43,14 +43,14 @@ pub fn grown(text: &str, swaps: &[(usize, &str)]) -> (Kinds, Tree) {
 }
 
 #[test]
-fn productions_splice_the_string() {
+fn a_production_replaces_a_module_by_its_successor_in_place() {
     let (kinds, tree) = grown("AB[C[D]E]F", &[(2, "X[Y]"), (0, ""), (0, "PQ")]);
     assert_eq!(show(&kinds, &tree), "PQ[X[Y][D]E]F");
     assert_eq!(tree.len(), 7);
 }
 
 #[test]
-fn what_is_cut_leaves_room_for_others() {
+fn slots_and_values_of_removed_modules_are_used_again() {
     let (mut kinds, mut tree) = grown("A[B[C]%D[E[F]G]H]IXYZ", &[]);
     let more = string(&mut kinds, "XY[Z]");
     let cut = kinds.find("%", 0).expect("%");

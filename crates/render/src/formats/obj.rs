@@ -3,23 +3,23 @@
 //! A module's group is named `KIND.LINEAGE`, the same in every frame. Segments that share a ring of a tube
 //! share its vertices across their groups, so a tube is one closed mesh.
 //!
-//! The mesh is never in memory: parts of the text are made on several threads and go to the file at once.
+//! The mesh is never in memory as a whole: parts of the text are made on several threads and written at once.
 
-use super::format::{Content, Exporter};
+use super::{Content, Description, Drawing, Exporter};
 use std::io::{self, Write};
 use std::ops::Range;
 
-use super::name::Names;
-use super::text::{Corner, Text};
-use super::triangles::{Faces, Points, Ring, Solid};
-use super::{Fit, FrameWriter, GENERATOR, number, relay};
+use crate::name::Names;
+use crate::text::{Corner, Text};
+use crate::triangles::{Faces, Points, Ring, Solid};
+use crate::{GENERATOR, number, relay};
 use dlsys_geometry::scene::{MaterialId, OwnerId, Palette, Point, Scene, Vector};
 
 /// Name of the material library that all frames refer to.
 const MATERIALS: &str = "materials.mtl";
 /// Decimals of a normal.
 const NORMAL_DECIMALS: usize = 4;
-/// Points of a part of the text, about: some hundred kilobytes, which stay in a cache.
+/// Approximate number of points of a part of the text: some hundred kilobytes, which fit into a cache.
 const PART: usize = 6000;
 
 /// A part of the text; items by number, of faces in the order of owners.
@@ -30,76 +30,50 @@ enum Part {
 }
 
 /// Wavefront OBJ.
-pub(super) struct Obj;
+pub(crate) struct Obj;
 
 impl Exporter for Obj {
-    fn name(&self) -> &'static str {
-        "obj"
-    }
-
-    fn about(&self) -> &'static str {
-        "Meshes in three dimensions"
-    }
-
-    fn content(&self) -> Content {
-        Content::Mesh
+    fn description(&self) -> Description {
+        Description { name: "obj", about: "Meshes in three dimensions", content: Content::Mesh }
     }
 
     fn write(
         &self,
-        scene: &Scene,
-        writer: &FrameWriter,
-        title: &str,
+        Drawing { scene, writer, title }: Drawing<'_>,
         out: &mut (dyn Write + Send),
     ) -> io::Result<()> {
-        write(scene, &writer.fit, writer.sides, title, writer.threads, out)
+        let solid = Solid::new(scene, &writer.fit, writer.sides);
+        if solid.counts.contains(&u32::MAX) {
+            return Err(io::Error::other("a mesh has at most 4e9 points: choose a coarser accuracy"));
+        }
+        let names = Names::new(scene, '.');
+        let order = solid.by_owner();
+        let points = solid.parts(0..solid.len(), PART);
+        let faces = whole_groups(&solid, &order);
+        let parts: Vec<Part> = (points.iter().cloned().map(Part::Vertices))
+            .chain(points.iter().cloned().map(Part::Normals))
+            .chain(faces.into_iter().map(Part::Faces))
+            .collect();
+        let title: String = title.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+        writeln!(out, "# {GENERATOR}\n# {title}\n# Up axis: +Y; front: +Z. Units: those of the model.")?;
+        writeln!(out, "mtllib {MATERIALS}")?;
+        let decimals = number::decimals_for(writer.fit.extent);
+        let make = |part: usize, draft: &mut Draft| {
+            draft.text.clear();
+            match &parts[part] {
+                Part::Vertices(items) => {
+                    solid.points(items.clone(), &mut Vertices { text: &mut draft.text, decimals });
+                }
+                Part::Normals(items) => solid.points(items.clone(), &mut Normals { text: &mut draft.text }),
+                Part::Faces(items) => draft.groups(&solid, &names, &order[items.clone()]),
+            }
+        };
+        relay::write(writer.threads, parts.len(), make, |draft| draft.text.bytes(), out)
     }
 
     fn companion(&self, scene: &Scene) -> Option<(&'static str, Vec<u8>)> {
         Some((MATERIALS, materials(&scene.palette)))
     }
-}
-
-/// Writes the document of one frame. Tubes have so many sides; 0: as many as it takes. The bytes do not depend on the
-/// number of threads.
-///
-/// # Errors
-/// Those of `out`.
-fn write(
-    scene: &Scene,
-    fit: &Fit,
-    sides: usize,
-    title: &str,
-    threads: usize,
-    out: &mut (dyn Write + Send),
-) -> io::Result<()> {
-    let solid = Solid::new(scene, fit, sides);
-    if solid.counts.contains(&u32::MAX) {
-        return Err(io::Error::other("a mesh has at most 4e9 points: choose a coarser accuracy"));
-    }
-    let names = Names::new(scene, '.');
-    let order = solid.by_owner();
-    let points = solid.parts(0..solid.len(), PART);
-    let faces = whole_groups(&solid, &order);
-    let parts: Vec<Part> = (points.iter().cloned().map(Part::Vertices))
-        .chain(points.iter().cloned().map(Part::Normals))
-        .chain(faces.into_iter().map(Part::Faces))
-        .collect();
-    let title: String = title.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
-    writeln!(out, "# {GENERATOR}\n# {title}\n# Up axis: +Y; front: +Z. Units: those of the model.")?;
-    writeln!(out, "mtllib {MATERIALS}")?;
-    let decimals = number::decimals_for(fit.extent);
-    let make = |part: usize, draft: &mut Draft| {
-        draft.text.clear();
-        match &parts[part] {
-            Part::Vertices(items) => {
-                solid.points(items.clone(), &mut Vertices { text: &mut draft.text, decimals });
-            }
-            Part::Normals(items) => solid.points(items.clone(), &mut Normals { text: &mut draft.text }),
-            Part::Faces(items) => draft.groups(&solid, &names, &order[items.clone()]),
-        }
-    };
-    relay::write(threads, parts.len(), make, |draft| draft.text.bytes(), out)
 }
 
 /// Parts of a list of items by owner in which no owner is cut.

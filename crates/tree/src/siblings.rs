@@ -1,56 +1,55 @@
-//! What the modules of one successor have in common: when they were born, and of whom.
+//! Sibling groups: birth and line of descent of the modules of one successor, stored once for all of them.
 //!
-//! A production makes several modules at once. Birth and line of descent are kept once for all of them, and given up
-//! when the last of them is gone.
+//! A production makes several modules at once. Their group is freed when the last of them has been replaced.
 
 use std::collections::BTreeMap;
 
 use super::{Family, Lineage, SimTime};
 
-/// No brood: brackets are of none.
-pub(super) const NO_BROOD: u32 = u32::MAX;
+/// The number of no group: brackets belong to none.
+pub(super) const NO_GROUP: u32 = u32::MAX;
 
 /// Places of the last seven generations: the eighth is that of the module itself. The highest byte counts modules.
 const TRAIL: u64 = (1 << 56) - 1;
 const ONE: u64 = 1 << 56;
-/// So many are not counted any more; what is known of them is kept for good.
+/// Groups of so many modules are not counted, and never freed.
 const UNCOUNTED: u64 = 255;
 
 #[derive(Clone, Copy, Debug)]
-struct Brood {
+struct SiblingGroup {
     mixed: u64,
     trail: u64,
     birth: SimTime,
 }
 
-/// All broods, by number; numbers are used again.
+/// All groups, by number; numbers of freed groups are used again.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Broods {
-    all: Vec<Brood>,
-    /// Their numbers of generations. Beside the rest, so that neither leaves a gap.
+pub(super) struct SiblingGroups {
+    all: Vec<SiblingGroup>,
+    /// Number of generations of each, in an array of its own, so that neither array has padding.
     generations: Vec<u32>,
-    /// Where the places of a brood begin in the successor, for the further ones of a very long successor.
+    /// The place in the successor at which a group begins, for all but the first group of a very long successor.
     begins: BTreeMap<u32, u32>,
     free: Vec<u32>,
 }
 
-impl Broods {
-    /// Bytes that they take, about.
+impl SiblingGroups {
+    /// Bytes of memory, about.
     pub fn size(&self) -> usize {
         size_of_val(&self.all[..]) + size_of_val(&self.generations[..]) + 4 * self.free.len()
     }
 
-    /// A new brood, of nobody yet, whose modules stand at these places of the successor (brackets not counted).
+    /// A new group, without modules yet, of those from place `first` of the successor on (brackets not counted).
     pub fn begin(&mut self, family: Family, birth: SimTime, first: u32) -> u32 {
-        let brood = Brood { mixed: family.mixed, trail: family.trail & TRAIL, birth };
+        let group = SiblingGroup { mixed: family.mixed, trail: family.trail & TRAIL, birth };
         let number = match self.free.pop() {
             Some(number) => {
-                self.all[number as usize] = brood;
+                self.all[number as usize] = group;
                 self.generations[number as usize] = family.generation;
                 number
             }
             None => {
-                self.all.push(brood);
+                self.all.push(group);
                 self.generations.push(family.generation);
                 self.all.len() as u32 - 1
             }
@@ -61,26 +60,26 @@ impl Broods {
         number
     }
 
-    /// Counts the modules of a new brood, if it is one.
+    /// Sets the number of modules of a new group; nothing for [`NO_GROUP`].
     pub fn count(&mut self, number: u32, modules: u16) {
-        if number != NO_BROOD {
+        if number != NO_GROUP {
             self.all[number as usize].trail += u64::from(modules).min(UNCOUNTED) * ONE;
         }
     }
 
-    /// One module is gone.
+    /// Removes one module; the last one frees the group.
     pub fn leave(&mut self, number: u32) {
-        let brood = &mut self.all[number as usize];
-        match brood.trail / ONE {
+        let group = &mut self.all[number as usize];
+        match group.trail / ONE {
             UNCOUNTED => {}
             1 => {
-                brood.trail -= ONE;
+                group.trail -= ONE;
                 self.free.push(number);
                 if !self.begins.is_empty() {
                     self.begins.remove(&number);
                 }
             }
-            _ => brood.trail -= ONE,
+            _ => group.trail -= ONE,
         }
     }
 
@@ -89,15 +88,15 @@ impl Broods {
     }
 
     pub fn lineage(&self, number: u32, place: u16) -> Lineage {
-        let Brood { mixed, trail, .. } = self.all[number as usize];
+        let SiblingGroup { mixed, trail, .. } = self.all[number as usize];
         let generation = self.generations[number as usize];
         let first = if self.begins.is_empty() { None } else { self.begins.get(&number) };
         let place = *first.unwrap_or(&0) as usize + usize::from(place);
         Family { mixed, generation, trail: trail & TRAIL }.child(place)
     }
 
-    /// Becomes the same as another, but for what only matters to those who add to it.
-    pub fn copy(&mut self, other: &Broods) {
+    /// Copies all that lookups need; what is needed to add groups is left out.
+    pub fn copy(&mut self, other: &SiblingGroups) {
         self.all.clone_from(&other.all);
         self.generations.clone_from(&other.generations);
         self.begins.clone_from(&other.begins);

@@ -1,7 +1,11 @@
-//! Formats of files: one trait, and the list of those that there are.
+//! Formats of files: the trait that each implements, and the list of all.
 //!
-//! To add one: a file that implements [`Exporter`], and its line in [`EXPORTERS`]. Flags, messages and endings of
-//! file names follow from that.
+//! **To add a format**: write a file here that implements [`Exporter`], and add its `mod` line and its line in [`EXPORTERS`] below.
+//! Flags, help, messages and extensions of files follow from that.
+
+pub(crate) mod obj;
+pub(crate) mod png;
+pub(crate) mod svg;
 
 use std::fmt;
 use std::hash::{Hash, Hasher};
@@ -9,44 +13,55 @@ use std::io::{self, Write};
 
 use dlsys_geometry::scene::Scene;
 
-use crate::{Error, FrameWriter, obj, png, svg};
+use crate::{Error, FrameWriter};
 
 /// All formats, in the order in which help lists them.
 static EXPORTERS: [&dyn Exporter; 3] = [&svg::Svg, &png::Png, &obj::Obj];
 
-/// What a file of a format holds.
+/// The content of the files of a format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Content {
     /// Shapes of one view.
     Vectors,
     /// Pixels of one view.
     Pixels,
-    /// The scene in space, seen from nowhere.
+    /// The scene in space, without a view.
     Mesh,
+}
+
+/// What is known of a format without a scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Description {
+    /// Its name, which is also the extension of its files: `svg`.
+    pub name: &'static str,
+    /// A description in one line, for help.
+    pub about: &'static str,
+    /// The content of its files.
+    pub content: Content,
+}
+
+/// One frame to be written.
+#[derive(Clone, Copy)]
+pub struct Drawing<'a> {
+    /// The scene. Its surfaces are meshes of the accuracy that the writer asks for; there are no patches.
+    pub scene: &'a Scene,
+    /// Scale, page, and settings of meshes.
+    pub writer: &'a FrameWriter,
+    /// Its title for readers: the model and the time. May contain any characters.
+    pub title: &'a str,
 }
 
 /// Writes scenes in one file format.
 pub trait Exporter: Sync {
-    /// Its name, which is also the ending of its files: `svg`.
-    fn name(&self) -> &'static str;
+    /// What is known of the format without a scene.
+    fn description(&self) -> Description;
 
-    /// What it is, in a line.
-    fn about(&self) -> &'static str;
-
-    /// What its files hold.
-    fn content(&self) -> Content;
-
-    /// Writes a file. Its surfaces are triangles already, where the accuracy asks for that; `title` is for people.
+    /// Writes a file.
     ///
     /// # Errors
-    /// Those of `out`.
-    fn write(
-        &self,
-        scene: &Scene,
-        writer: &FrameWriter,
-        title: &str,
-        out: &mut (dyn Write + Send),
-    ) -> io::Result<()>;
+    ///
+    /// Those of `out`, and what the format cannot hold.
+    fn write(&self, drawing: Drawing<'_>, out: &mut (dyn Write + Send)) -> io::Result<()>;
 
     /// The file that all frames refer to, if there is one: its name and its bytes.
     fn companion(&self, _scene: &Scene) -> Option<(&'static str, Vec<u8>)> {
@@ -73,17 +88,17 @@ impl Format {
 
     /// Its name, which is also the extension of its files.
     pub fn extension(self) -> &'static str {
-        self.0.name()
+        self.0.description().name
     }
 
-    /// What it is, in a line.
+    /// A description in one line, for help.
     pub fn about(self) -> &'static str {
-        self.0.about()
+        self.0.description().about
     }
 
-    /// What its files hold.
+    /// The content of its files.
     pub fn content(self) -> Content {
-        self.0.content()
+        self.0.description().content
     }
 
     /// Their names, for people: `svg, png and obj`.

@@ -1,37 +1,26 @@
-//! A scene as an SVG picture: the document around its [elements](super::painter).
+//! A scene as an SVG picture: the document around its [elements](crate::painter).
 
 use std::io::{self, Write};
 
-use super::format::{Content, Exporter};
+use super::{Content, Description, Drawing, Exporter};
 use svg::Document;
 use svg::node::Blob;
 use svg::node::element::{Group, Rectangle, Title};
 
-use super::painter::{self, Style, text};
-use super::{Fit, FrameWriter, Page};
-use dlsys_geometry::scene::Scene;
+use crate::painter::{self, Style, text};
+use crate::{Fit, Page};
 
 /// Scalable Vector Graphics.
-pub(super) struct Svg;
+pub(crate) struct Svg;
 
 impl Exporter for Svg {
-    fn name(&self) -> &'static str {
-        "svg"
-    }
-
-    fn about(&self) -> &'static str {
-        "Vector graphics, one view"
-    }
-
-    fn content(&self) -> Content {
-        Content::Vectors
+    fn description(&self) -> Description {
+        Description { name: "svg", about: "Vector graphics, one view", content: Content::Vectors }
     }
 
     fn write(
         &self,
-        scene: &Scene,
-        writer: &FrameWriter,
-        title: &str,
+        Drawing { scene, writer, title }: Drawing<'_>,
         out: &mut (dyn Write + Send),
     ) -> io::Result<()> {
         let style = style(&writer.fit, &writer.page);
@@ -40,13 +29,13 @@ impl Exporter for Svg {
 }
 
 /// How frames are painted on a page.
-pub(super) fn style<'a>(fit: &'a Fit, page: &Page) -> Style<'a> {
+pub(crate) fn style<'a>(fit: &'a Fit, page: &Page) -> Style<'a> {
     let [_, _, width, height] = page.picture.view_box();
     Style { fit, scale: page.picture.scale, side: width.max(height) }
 }
 
 /// The document of a page with these elements, each with its line's end.
-pub(super) fn around(page: &Page, title: &str, mut elements: String) -> String {
+pub(crate) fn around(page: &Page, title: &str, mut elements: String) -> String {
     let view_box = page.picture.view_box();
     let [left, top, width, height] = view_box;
     elements.truncate(elements.trim_end().len());

@@ -1,10 +1,10 @@
-//! A scene as a PNG picture: stems as the tubes of the OBJ format, everything lit smoothly, what is nearer in front.
+//! A scene as a PNG picture: stems as the tubes of the OBJ format, smooth shading, hidden surfaces removed to the pixel.
 
 use std::io::{self, Write};
 
-use super::format::{Content, Exporter};
-use super::raster::{self, Corner, Image};
-use super::{Fit, FrameWriter, Page, Smoothness, triangles};
+use super::{Content, Description, Drawing, Exporter};
+use crate::raster::{self, Corner, Image};
+use crate::{Fit, Page, Smoothness, triangles};
 use dlsys_geometry::scene::{Color, Scene, Vector};
 
 /// How far a tube's outline may be from a circle, in pixels.
@@ -15,29 +15,24 @@ const FULL: u32 = 65535;
 const MOST_TRIANGLES: usize = 4_000_000;
 
 /// Portable Network Graphics.
-pub(super) struct Png;
+pub(crate) struct Png;
 
 impl Exporter for Png {
-    fn name(&self) -> &'static str {
-        "png"
-    }
-
-    fn about(&self) -> &'static str {
-        "Pixels, one view; what is nearer is in front to the pixel"
-    }
-
-    fn content(&self) -> Content {
-        Content::Pixels
+    fn description(&self) -> Description {
+        Description {
+            name: "png",
+            about: "Pixels, one view; what is nearer is in front to the pixel",
+            content: Content::Pixels,
+        }
     }
 
     fn write(
         &self,
-        scene: &Scene,
-        FrameWriter { fit, page, .. }: &FrameWriter,
-        title: &str,
+        Drawing { scene, writer, title }: Drawing<'_>,
         out: &mut (dyn Write + Send),
     ) -> io::Result<()> {
-        let image = picture(scene, fit, page.pixels, page.placement(), Smoothness::Fine, 1);
+        let page = &writer.page;
+        let image = picture(scene, &writer.fit, page.pixels, page.placement(), Smoothness::Fine, 1);
         let mut canvas = Canvas::new(page);
         canvas.add(&image, [0, 0], 1.0, Meeting::Over);
         out.write_all(&canvas.encode(title))
@@ -47,7 +42,7 @@ impl Exporter for Png {
 /// Pixels of a scene, transparent where nothing is. A point that the camera sees at x, y is at `a x + b` and `c - a y`
 /// pixels from the upper left corner.
 /// The pixels do not depend on the number of threads.
-pub(super) fn picture(
+pub(crate) fn picture(
     scene: &Scene,
     fit: &Fit,
     size: [u32; 2],
@@ -104,31 +99,31 @@ fn sides(scene: &Scene, fit: &Fit, scale: f64) -> usize {
     (wanted.ceil() as usize).next_multiple_of(4).clamp(8, 64).min((affordable / 4 * 4).max(4))
 }
 
-/// A page that images are laid on, with 16 bits to a channel, so that many faint ones leave their trace.
+/// A page for several images, with 16 bits a channel, so that many faint ones add up.
 #[derive(Debug)]
-pub(super) struct Canvas<'a> {
+pub(crate) struct Canvas<'a> {
     page: &'a Page,
     /// Colour times opacity, and opacity.
     pixels: Vec<[u16; 4]>,
 }
 
-/// How what is laid on a page meets what is there, where both cover a pixel in part.
+/// The rule for pixels that a new image and the page both cover in part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Meeting {
-    /// By chance: each hides its share of the other.
+pub(crate) enum Meeting {
+    /// Independent coverage: each hides its share of the other.
     Over,
     /// Side by side: neighbours that share an edge leave nothing open between them.
     Beside,
 }
 
 impl Canvas<'_> {
-    pub(super) fn new(page: &Page) -> Canvas<'_> {
+    pub(crate) fn new(page: &Page) -> Canvas<'_> {
         let [width, height] = page.pixels.map(|side| side as usize);
         Canvas { page, pixels: vec![[0; 4]; width * height] }
     }
 
-    /// Lays an image over what is there, its upper left corner at this pixel; what is beyond the page is cut off.
-    pub(super) fn add(&mut self, image: &Image, [left, top]: [i64; 2], opacity: f64, meeting: Meeting) {
+    /// Puts an image over the page, its upper left corner at this pixel; parts beyond the page are cut off.
+    pub(crate) fn add(&mut self, image: &Image, [left, top]: [i64; 2], opacity: f64, meeting: Meeting) {
         let [width, height] = self.page.pixels.map(i64::from);
         let opacity = (opacity.clamp(0.0, 1.0) * 257.0).round() as u32;
         for y in 0.max(-top)..(image.height as i64).min(height - top) {
@@ -153,7 +148,7 @@ impl Canvas<'_> {
     }
 
     /// The file. `title` is for people.
-    pub(super) fn encode(&self, title: &str) -> Vec<u8> {
+    pub(crate) fn encode(&self, title: &str) -> Vec<u8> {
         let background = self.page.background.map(|Color { red, green, blue }| [red, green, blue]);
         let opaque = background.is_some();
         let mut data = Vec::with_capacity(self.pixels.len() * if opaque { 3 } else { 4 });
