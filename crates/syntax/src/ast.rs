@@ -5,6 +5,7 @@
 
 use std::sync::Arc;
 
+use crate::declarations::Declaration;
 use dlsys_diagnostic::Span;
 use dlsys_expr::{Comparison, Fold, Sort};
 
@@ -293,6 +294,51 @@ pub enum Item {
         drawn: Vec<Module>,
     },
     Rule(Rule),
+}
+
+impl Item {
+    /// Its row in the table of declarations; None for rules.
+    pub fn declaration(&self) -> Option<&'static Declaration> {
+        Declaration::of_word(match self {
+            Item::Title(_) => "title",
+            Item::Include(_) => "include",
+            Item::Const { .. } | Item::Array { .. } => "const",
+            Item::Param { .. } => "param",
+            Item::Def { .. } => "def",
+            Item::Curve { .. } => "curve",
+            Item::Table { .. } => "table",
+            Item::Angle(_) => "angle",
+            Item::Period(_) => "period",
+            Item::Frames { .. } => "frames",
+            Item::Color { .. } => "color",
+            Item::Gradient { .. } => "gradient",
+            Item::Surface { .. } => "surface",
+            Item::Contour { .. } => "contour",
+            Item::Tropism { .. } => "tropism",
+            Item::Ignore(_) => "ignore",
+            Item::Consider(_) => "consider",
+            Item::Axiom(_) => "initial",
+            Item::Interpret { .. } => "interpret",
+            Item::Rule(_) => return None,
+        })
+    }
+
+    /// The name that it declares.
+    pub fn name(&self) -> Option<&Name> {
+        match self {
+            Item::Const { name, .. }
+            | Item::Array { name, .. }
+            | Item::Param { name, .. }
+            | Item::Def { name, .. }
+            | Item::Curve { name, .. }
+            | Item::Table { name, .. }
+            | Item::Color { name, .. }
+            | Item::Gradient { name, .. }
+            | Item::Surface { name, .. }
+            | Item::Contour { name, .. } => Some(name),
+            _ => None,
+        }
+    }
 }
 
 /// A parsed model.

@@ -12,16 +12,19 @@
 //! - [`parse`]: text to [`ast::Document`]; [`read`] also parses the files that a text includes.
 //! - [`print`]: the syntax tree as text.
 //! - [`format`]: the canonical layout of a text (`dlsys fmt`).
+//! - [`declarations`]: the table of declarations: words, notation, descriptions.
 //! - [`words`]: the words of the language, for highlighting and completion.
 //! - [`outline`]: the declarations of a text and their places, for programs that edit texts.
 
 pub mod ast;
+pub mod declarations;
 mod files;
 pub mod foreign_syntax;
 pub mod format;
 mod include;
 mod layout;
 mod lexeme;
+mod notation;
 pub mod outline;
 pub mod parse;
 pub mod print;

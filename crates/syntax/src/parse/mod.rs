@@ -7,7 +7,7 @@
 //! Each item is parsed alone: its mistakes are reported, the others are read all the same.
 
 mod advice;
-mod build;
+pub(crate) mod build;
 mod expected;
 mod expression;
 mod hints;
@@ -17,6 +17,7 @@ use std::collections::HashSet;
 use pest::Parser;
 
 use crate::ast::{Document, Expression, HeadModule, Item, Module};
+use crate::declarations::{Body, Named};
 use crate::foreign_syntax;
 use crate::layout::{ItemKind, RawItem, layout};
 use dlsys_diagnostic::{Diagnostic, Source, Span};
@@ -26,7 +27,7 @@ use dlsys_diagnostic::{Diagnostic, Source, Span};
 #[grammar = "../grammars/dlsys.pest"]
 pub(super) struct Grammar;
 
-type Pair<'i> = pest::iterators::Pair<'i, Rule>;
+pub(crate) type Pair<'i> = pest::iterators::Pair<'i, Rule>;
 
 /// Most errors that are collected from one text; who wants more can mend these first.
 const MAX_ERRORS: usize = 50;
@@ -64,7 +65,9 @@ impl Reader {
             let known = foreign_syntax::commented_definitions(text);
             self.document.commented.extend(known.map(|(name, meaning)| (name.into(), meaning.to_owned())));
         }
-        let functions = cut.items.iter().filter(|item| item.kind == ItemKind::Def);
+        let functions = cut.items.iter().filter(|item| {
+            item.kind.declaration().is_some_and(|declaration| declaration.named == Named::Function)
+        });
         self.defined.extend(functions.filter_map(|item| declared_word(&cut.text, item).map(str::to_owned)));
         let mut items = Vec::new();
         for item in &cut.items {
@@ -100,11 +103,11 @@ fn declared_word<'t>(text: &'t str, item: &RawItem) -> Option<&'t str> {
     let mut words = line.split(|c: char| !(c.is_alphanumeric() || c == '_')).filter(|w| !w.is_empty());
     let first = words.next()?;
     let name = match item.kind {
-        ItemKind::Const | ItemKind::Param | ItemKind::Def => words.next()?,
-        ItemKind::Color | ItemKind::Gradient | ItemKind::Contour => words.next()?,
-        ItemKind::Curve | ItemKind::Table => {
-            words.find(|word| !matches!(*word, "linear" | "monotone" | "spline"))?
-        }
+        ItemKind::Declaration(declaration) => match declaration.named {
+            Named::Word | Named::Function => words.next()?,
+            Named::AfterOption => words.find(|word| !declaration.has_before_name(word))?,
+            _ => return None,
+        },
         ItemKind::Unknown if line.strip_prefix(first)?.trim_start().starts_with('=') => first,
         ItemKind::Unknown => words.next()?,
         _ => return None,
@@ -168,27 +171,12 @@ fn pest_parse(rule: Rule, text: &str, offset: usize) -> Result<Pair<'_>, Box<Dia
 
 fn read_item(text: &str, item: &RawItem, builder: &mut build::Builder) -> Result<Item, Box<Diagnostic>> {
     let rule = match item.kind {
-        ItemKind::Title => Rule::title_item,
-        ItemKind::Include => Rule::include_item,
-        ItemKind::Curve => Rule::curve_item,
-        ItemKind::Table => Rule::table_item,
-        ItemKind::Const => Rule::const_item,
-        ItemKind::Param => Rule::param_item,
-        ItemKind::Def => Rule::def_item,
-        ItemKind::Angle => Rule::angle_item,
-        ItemKind::Period => Rule::period_item,
-        ItemKind::Frames => Rule::frames_item,
-        ItemKind::Color => Rule::color_item,
-        ItemKind::Gradient => Rule::gradient_item,
-        ItemKind::Surface => Rule::surface_item,
-        ItemKind::Contour => Rule::contour_item,
-        ItemKind::Tropism => Rule::tropism_item,
-        ItemKind::Ignore => Rule::ignore_item,
-        ItemKind::Consider => Rule::consider_item,
-        ItemKind::Interpret => Rule::interpret_item,
+        ItemKind::Declaration(declaration) if declaration.body == Body::String => {
+            return read_axiom(text, item, builder);
+        }
+        ItemKind::Declaration(declaration) => declaration.rule,
         ItemKind::Rule => Rule::rule_item,
         ItemKind::Step => Rule::step_item,
-        ItemKind::Axiom => return read_axiom(text, item, builder),
         ItemKind::Unknown => return Err(Box::new(expected::unknown_line(text, item))),
     };
     builder.offset = item.start;
