@@ -17,11 +17,13 @@ pub struct Declaration {
     pub usage: &'static str,
     /// One sentence about its meaning.
     pub summary: &'static str,
+    /// The group in which help lists it.
     pub category: Category,
     /// Whether its word is followed by a name that it declares.
     pub named: Named,
     /// Which other declarations cannot stand beside it.
     pub repeats: Repeats,
+    /// What follows its head.
     pub body: Body,
     /// Words that it may contain.
     pub options: &'static [OptionWord],
@@ -142,7 +144,9 @@ pub(crate) enum Begins {
 /// A word inside a declaration that is no name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OptionWord {
+    /// The word as it is written.
     pub word: &'static str,
+    /// What must follow it.
     pub follow: Follow,
 }
 

@@ -16,6 +16,8 @@
 //! - [`words`]: the words of the language, for highlighting and completion.
 //! - [`outline`]: the declarations of a text and their places, for programs that edit texts.
 
+#![warn(missing_docs)]
+
 pub mod ast;
 pub mod declarations;
 mod files;

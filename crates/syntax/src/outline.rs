@@ -12,8 +12,11 @@ pub struct Entry {
     pub key: Option<String>,
     /// What it is called, if it has a name: `r`, `F_a(x, n)`, `frames`.
     pub name: String,
+    /// It is a rule, continuous or discrete.
     pub is_rule: bool,
+    /// It is the initial string.
     pub is_axiom: bool,
+    /// The whole of it, without white space at its end.
     pub span: Span,
 }
 

@@ -22,10 +22,15 @@ use crate::foreign_syntax;
 use crate::layout::{ItemKind, RawItem, layout};
 use dlsys_diagnostic::{Diagnostic, Source, Span};
 
-/// The pest parser of `grammars/dlsys.pest`.
-#[derive(pest_derive::Parser)]
-#[grammar = "../grammars/dlsys.pest"]
-pub(super) struct Grammar;
+/// The pest parser of `grammars/dlsys.pest`, and its rules.
+#[allow(missing_docs)] // The macro documents nothing.
+mod grammar {
+    #[derive(pest_derive::Parser)]
+    #[grammar = "../grammars/dlsys.pest"]
+    pub struct Grammar;
+}
+
+pub(crate) use grammar::{Grammar, Rule};
 
 pub(crate) type Pair<'i> = pest::iterators::Pair<'i, Rule>;
 
