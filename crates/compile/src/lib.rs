@@ -38,7 +38,7 @@ mod table;
 use dlsys_diagnostic::{Diagnostic, Severity, Source};
 use dlsys_expr::{Binary, Unary};
 use dlsys_model::{Distribution, Model};
-pub use dlsys_syntax::{Files, NoFiles};
+pub use dlsys_syntax::{Errors, Files, NoFiles};
 
 pub use measure::measure;
 use scope::Scope;

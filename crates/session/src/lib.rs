@@ -199,7 +199,7 @@ impl Session {
         let source = Source::new("measure", text);
         let folders = Folders { paths: self.folders.clone(), inputs: RefCell::default() };
         let read = dlsys_compile::measure(&self.source, &folders, &settings, &self.model, &source);
-        read.map_err(|said| (source, said))
+        read.map_err(|said| (source, said.into_diagnostics()))
     }
 
     /// Starts the model at t = 0.

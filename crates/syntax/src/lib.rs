@@ -20,6 +20,7 @@
 
 pub mod ast;
 pub mod declarations;
+mod error;
 mod files;
 pub mod foreign_syntax;
 pub mod format;
@@ -33,6 +34,7 @@ pub mod print;
 pub mod suggest;
 pub mod words;
 
+pub use error::Errors;
 pub use files::{Files, NoFiles, is_inside};
 pub use include::{library_names, read};
 pub use layout::MAX_DEPTH;

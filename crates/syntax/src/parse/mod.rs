@@ -16,6 +16,7 @@ use std::collections::HashSet;
 
 use pest::Parser;
 
+use crate::Errors;
 use crate::ast::{Document, Expression, HeadModule, Item, Module};
 use crate::declarations::{Body, Named};
 use crate::foreign_syntax;
@@ -121,10 +122,10 @@ fn declared_word<'t>(text: &'t str, item: &RawItem) -> Option<&'t str> {
 }
 
 /// Reads one expression.
-pub fn parse_expression(source: &Source) -> Result<(Document, Expression), Vec<Diagnostic>> {
+pub fn parse_expression(source: &Source) -> Result<(Document, Expression), Errors> {
     let cut = layout(&format!("const it =\n{}", source.text));
     if !cut.errors.is_empty() {
-        return Err(cut.errors);
+        return Err(cut.errors.into());
     }
     let mut document = Document::default();
     let mut interner = build::Interner::default();
@@ -134,17 +135,17 @@ pub fn parse_expression(source: &Source) -> Result<(Document, Expression), Vec<D
         offset: 0,
         defined: None,
     };
-    let pair = pest_parse(Rule::lone_expr, &source.text, 0).map_err(|e| vec![*e])?;
+    let pair = pest_parse(Rule::lone_expr, &source.text, 0).map_err(|e| Errors::from(*e))?;
     let inner = pair.into_inner().next().expect("the grammar has an expression here");
-    let expression = builder.expression(inner).map_err(|e| vec![*e])?;
+    let expression = builder.expression(inner).map_err(|e| Errors::from(*e))?;
     Ok((document, expression))
 }
 
 /// Reads what is to be measured: the head of a module, and the expression that is added up, if it is not just counted.
-pub fn parse_measure(source: &Source) -> Result<(Document, HeadModule, Option<Expression>), Vec<Diagnostic>> {
+pub fn parse_measure(source: &Source) -> Result<(Document, HeadModule, Option<Expression>), Errors> {
     let cut = layout(&format!("const it =\n{}", source.text));
     if !cut.errors.is_empty() {
-        return Err(vec![Diagnostic::error("this cannot be measured").help(MEASURE)]);
+        return Err(Diagnostic::error("this cannot be measured").help(MEASURE).into());
     }
     let mut document = Document::default();
     let mut interner = build::Interner::default();
@@ -154,8 +155,8 @@ pub fn parse_measure(source: &Source) -> Result<(Document, HeadModule, Option<Ex
         offset: 0,
         defined: None,
     };
-    let pair = pest_parse(Rule::measure, &source.text, 0).map_err(|e| vec![(*e).help(MEASURE)])?;
-    let (head, expression) = builder.measure(pair).map_err(|e| vec![*e])?;
+    let pair = pest_parse(Rule::measure, &source.text, 0).map_err(|e| Errors::from((*e).help(MEASURE)))?;
+    let (head, expression) = builder.measure(pair).map_err(|e| Errors::from(*e))?;
     Ok((document, head, expression))
 }
 
