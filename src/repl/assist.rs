@@ -13,6 +13,7 @@ use rustyline::{Context, Helper};
 use super::commands::{self, Argument};
 use super::grammar::{self, StatementKind};
 use crate::model::Model;
+use crate::syntax::declarations::Declaration;
 use crate::syntax::words;
 
 /// Names of the loaded model.
@@ -106,9 +107,10 @@ impl Assistant {
         if line.matches('"').count() % 2 == 1 {
             return None;
         }
-        let mut all =
-            owned(&mut words::CLAUSES.into_iter().chain(crate::compile::functions()).chain(words::PARTICLES));
-        all.extend(owned(&mut words::ENDINGS.into_iter()));
+        let mut all = owned(
+            &mut words::CLAUSES.into_iter().chain(crate::compile::functions()).chain(words::particles()),
+        );
+        all.extend(owned(&mut words::endings()));
         all.extend(names.kinds.iter().chain(&names.others).cloned());
         all.extend(owned(&mut words::declarations()));
         Some((word_start("@"), all))
@@ -164,7 +166,10 @@ impl Hinter for Assistant {
         if word.is_empty() || !rest.is_empty() {
             return None;
         }
-        let usage = commands::find(word).map_or(words::usage(word), |command| command.usage);
+        let usage = commands::find(word)
+            .map_or(Declaration::of_word(word).map_or("", |declaration| declaration.usage), |command| {
+                command.usage
+            });
         if !usage.is_empty() {
             let space = if line.ends_with(' ') { "" } else { " " };
             return remark(format!("{space}{usage}"));

@@ -1,5 +1,6 @@
 //! The commands: names, usage, and the text of `help`.
 
+use crate::syntax::declarations::{self, Category, DECLARATIONS, Declaration};
 use crate::syntax::suggest::did_you_mean;
 
 /// The argument of a command, for completion.
@@ -309,7 +310,11 @@ pub fn help(name: &str) -> Result<String, String> {
         return Ok(overview());
     }
     let Some(command) = find(name) else {
-        let hint = did_you_mean(name, names()).map(|hint| format!("; {hint}")).unwrap_or_default();
+        if let Some(Declaration { word, usage, summary, .. }) = Declaration::of_word(name) {
+            return Ok(format!("{word} {usage}\n  {summary}\n"));
+        }
+        let known = names().chain(declarations::words());
+        let hint = did_you_mean(name, known).map(|hint| format!("; {hint}")).unwrap_or_default();
         return Err(format!("there is no command `{name}`{hint}; `help` lists them all"));
     };
     let mut text = format!("{} {}\n  {}\n", command.name, command.usage, command.summary);
@@ -337,6 +342,12 @@ fn overview() -> String {
         }
         let lines = wrapped(command.summary, 11, 80);
         text += &format!("  {:8} {}", command.name, lines.trim_start());
+    }
+    text += "\nDeclarations, which `help NAME` explains, too:\n";
+    for category in Category::ALL {
+        let words = DECLARATIONS.iter().filter(|d| d.category == category).map(|d| d.word);
+        let line = words.collect::<Vec<_>>().join(", ");
+        text += &format!("  {:8} {line}\n", category.title());
     }
     text += "\n`help COMMAND` gives usage and examples. Tab completes, the right arrow takes a hint,\nCtrl-R searches the history. `:COMMAND` is always a command, never a rule.\n";
     text
@@ -379,7 +390,7 @@ mod tests {
     fn help_fits_on_a_screen() {
         let long = |text: &str| text.lines().find(|line| line.chars().count() > 92).map(str::to_owned);
         assert_eq!(long(&help("").expect("the list")), None);
-        for name in names() {
+        for name in names().chain(declarations::words()) {
             assert_eq!(long(&help(name).expect("help")), None, "{name}");
         }
         assert!(help("plto").unwrap_err().contains("did you mean `plot`"));

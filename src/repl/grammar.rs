@@ -11,6 +11,7 @@
 //! with a clause. On a terminal an empty line ends a rule of several lines.
 
 use super::commands;
+use crate::syntax::declarations::Declaration;
 use crate::syntax::words;
 
 /// The kind of statement that a line begins.
@@ -97,7 +98,7 @@ pub fn is_open(text: &str) -> bool {
     }
     let end = body.trim_end();
     let last = end.rsplit(|c: char| !(c.is_alphanumeric() || c == '_')).next().unwrap_or("");
-    let waits = words::CLAUSES.contains(&last) || words::PARTICLES.contains(&last) && !last.is_empty();
+    let waits = words::CLAUSES.contains(&last) || words::particles().any(|word| word == last);
     // Symbols of the turtle may end a string; other operators need an operand.
     let operator = end.ends_with([':', ',', '=', '*', '<', '>', '≤', '≥', '≠']) || end.ends_with("..");
     let clause = body.rmatch_indices(|c: char| !(c.is_alphanumeric() || c == '_')).count() > 0 && {
@@ -134,8 +135,7 @@ pub fn is_complete(input: &str) -> bool {
     let several = input.trim_end().contains('\n');
     // A rule of several lines ends with an empty line; a declaration ends when it is complete.
     let (word, _) = first_word(first.unwrap_or(""));
-    let strings = ["initial", "axiom", "interpret"].contains(&word);
-    let is_declaration = words::declarations().any(|known| known == word) && !strings;
+    let is_declaration = Declaration::of_word(word).is_some_and(|declaration| !declaration.has_string());
     !is_open(input) && (!several || is_declaration)
 }
 

@@ -86,8 +86,21 @@ impl Scope {
         if let Some(distribution) = Distribution::named(name) {
             return self.draw(distribution, span, nodes);
         }
+        self.unknown_function(all, name, span, arguments, variables);
+        None
+    }
+
+    /// Complains about a function that nothing declares, once.
+    fn unknown_function(
+        &mut self,
+        all: &Expressions,
+        name: &Arc<str>,
+        span: Span,
+        arguments: &[(ExprId, Lowered)],
+        variables: &Variables,
+    ) {
         if self.poisoned.contains(name) || !self.unknown.insert(name.clone()) {
-            return None;
+            return;
         }
         let built_in = Unary::NAMED.iter().map(|(n, _)| *n).chain(Binary::NAMED.iter().map(|(n, _)| *n));
         let own = self.functions.keys().chain(self.curves.keys()).filter(|_| self.suggests());
@@ -109,7 +122,6 @@ impl Scope {
             None => error.help(format!("declare it: `def {name}(…) = …`")),
         };
         self.diagnostics.push(error);
-        None
     }
 
     /// Advice for a name that only a comment defines.

@@ -7,6 +7,8 @@
 //! [`load`] is the whole of it. Mistakes are collected, not thrown: a text with three mistakes gets three
 //! messages. Every pass is linear in the text, and none recurses deeper than a fixed bound.
 
+#![warn(missing_docs)]
+
 mod advice;
 mod analysis;
 mod appearance;
@@ -36,7 +38,7 @@ mod table;
 use dlsys_diagnostic::{Diagnostic, Severity, Source};
 use dlsys_expr::{Binary, Unary};
 use dlsys_model::{Distribution, Model};
-pub use dlsys_syntax::{Files, NoFiles};
+pub use dlsys_syntax::{Errors, Files, NoFiles};
 
 pub use measure::measure;
 use scope::Scope;
@@ -44,16 +46,20 @@ use scope::Scope;
 /// A value for a `param`, given from outside.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
+    /// The name of the `param`.
     pub name: String,
+    /// The value that takes the place of the declared one.
     pub value: f64,
 }
 
 /// What came of a text: a model unless there are errors, and everything there is to say about it.
 #[derive(Debug)]
 pub struct Loaded {
+    /// The compiled model; None if there are errors.
     pub model: Option<Model>,
     /// The text with all that it includes, if that is more than was given: places in messages are places in it.
     pub source: Option<Source>,
+    /// Errors, then warnings, each in the order of their places.
     pub diagnostics: Vec<Diagnostic>,
     /// What is wrong with the settings; then there is no model either.
     pub refused_settings: Vec<Diagnostic>,

@@ -8,7 +8,7 @@ use dlsys_diagnostic::{Diagnostic, Source};
 use dlsys_expr::Program;
 use dlsys_model::{Measure, Model};
 use dlsys_syntax::suggest::did_you_mean;
-use dlsys_syntax::{Files, parse, read};
+use dlsys_syntax::{Errors, Files, parse, read};
 
 /// Compiles a measure over the modules of a model, which was read from `model_text` and `files` with these settings.
 pub fn measure(
@@ -17,7 +17,7 @@ pub fn measure(
     settings: &[Setting],
     model: &Model,
     source: &Source,
-) -> Result<Measure, Vec<Diagnostic>> {
+) -> Result<Measure, Errors> {
     let (document, head, expression) = parse::parse_measure(source)?;
     // The model was good when it was read; it says nothing new.
     let mut scope = Scope::default();
@@ -60,6 +60,6 @@ pub fn measure(
             of.iter().for_each(|kind| kinds[kind.index()] = true);
             Ok(Measure { name, kinds, program })
         }
-        _ => Err(scope.diagnostics),
+        _ => Err(scope.diagnostics.into()),
     }
 }

@@ -262,17 +262,15 @@ impl Scope {
             Expr::Number(x) => number(self.graph.constant(*x)),
             Expr::Name(name) => number(self.name(name, span, variables)?),
             Expr::Call(name, arguments) => {
+                let functional = self.is_functional(name);
                 let mut nodes = Vec::with_capacity(arguments.len());
-                if self.is_functional(name) {
-                    for &argument in arguments.iter().skip(1) {
-                        nodes.push((argument, done(argument)?));
-                    }
-                    return self.functional(all, name, span, arguments.first().copied(), &nodes);
-                }
-                for &argument in arguments {
+                for &argument in arguments.iter().skip(usize::from(functional)) {
                     nodes.push((argument, done(argument)?));
                 }
-                self.call(all, name, span, &nodes, variables)
+                match functional {
+                    true => self.functional(all, name, span, arguments.first().copied(), &nodes),
+                    false => self.call(all, name, span, &nodes, variables),
+                }
             }
             Expr::Index(name, index) => {
                 let index = self.expect_number(all, *index, done(*index)?)?;
@@ -316,28 +314,7 @@ impl Scope {
                 };
                 number(self.graph.binary(op, left?, right?))
             }
-            Expr::Compare(first, links) => {
-                let mut a = self.expect_number(all, *first, done(*first)?);
-                let mut a_id = *first;
-                let mut whole: Option<NodeId> = None;
-                for (comparison, operand) in links {
-                    let b = self.expect_number(all, *operand, done(*operand)?);
-                    let (Some(left), Some(right)) = (a, b) else { return None };
-                    let link = self.compare(*comparison, left, right);
-                    self.comparisons.entry(link).or_insert_with(|| {
-                        let sides = [a_id, *operand].map(|id| print::expression(all, id));
-                        // A choice binds loosest of all.
-                        let sides = sides.map(|s| if s.starts_with("if ") { format!("({s})") } else { s });
-                        (all.span(a_id).to(all.span(*operand)), sides.into())
-                    });
-                    whole = Some(match whole {
-                        Some(before) => self.graph.binary(Binary::And, before, link),
-                        None => link,
-                    });
-                    (a, a_id) = (b, *operand);
-                }
-                condition(whole?)
-            }
+            Expr::Compare(first, links) => condition(self.chain(all, *first, links, done)?),
             Expr::If(c, a, b) => {
                 let (test, then, otherwise) = (done(*c)?, done(*a)?, done(*b)?);
                 let test = self.expect_condition(all, *c, test);
@@ -346,6 +323,36 @@ impl Scope {
                 number(self.graph.select(test?, then?, otherwise?))
             }
         }
+    }
+
+    /// `a < b <= c`: all links hold.
+    fn chain(
+        &mut self,
+        all: &Expressions,
+        first: ExprId,
+        links: &[(Comparison, ExprId)],
+        done: impl Fn(ExprId) -> Option<Lowered>,
+    ) -> Option<NodeId> {
+        let mut a = self.expect_number(all, first, done(first)?);
+        let mut a_id = first;
+        let mut whole: Option<NodeId> = None;
+        for (comparison, operand) in links {
+            let b = self.expect_number(all, *operand, done(*operand)?);
+            let (Some(left), Some(right)) = (a, b) else { return None };
+            let link = self.compare(*comparison, left, right);
+            self.comparisons.entry(link).or_insert_with(|| {
+                let sides = [a_id, *operand].map(|id| print::expression(all, id));
+                // A choice binds loosest of all.
+                let sides = sides.map(|s| if s.starts_with("if ") { format!("({s})") } else { s });
+                (all.span(a_id).to(all.span(*operand)), sides.into())
+            });
+            whole = Some(match whole {
+                Some(before) => self.graph.binary(Binary::And, before, link),
+                None => link,
+            });
+            (a, a_id) = (b, *operand);
+        }
+        whole
     }
 
     /// The variable of an aggregate.

@@ -8,11 +8,21 @@ use crate::chance::Drawn;
 use crate::rules::RuleBuilder;
 use crate::scope::{Variables, plural};
 use dlsys_diagnostic::{Diagnostic, Span};
-use dlsys_expr::Program;
+use dlsys_expr::{NodeId, Program};
 use dlsys_model::{Class, Outcome, Successor, choose, class_of};
 use dlsys_syntax::ast::{self, Alternative, HeadModule};
 use dlsys_syntax::print;
 use dlsys_syntax::suggest::{looks_like, meant};
+
+/// What a module is in the balance of brackets.
+enum Bracket {
+    /// A bracket that matches as far as is known, or none at all.
+    Good,
+    /// A `]` without its `[`.
+    Unmatched,
+    /// A bracket with arguments, which is read no further.
+    WithArguments,
+}
 
 impl RuleBuilder<'_> {
     /// A string of modules that are made, over the given variables.
@@ -77,61 +87,18 @@ impl RuleBuilder<'_> {
         let mut good = true;
         for module in modules {
             let kind = self.kinds.intern(&module.name, module.arguments.len());
-            match &*module.name {
-                "[" | "]" if !module.arguments.is_empty() => {
-                    self.error(
-                        Diagnostic::error("a bracket has no parameters")
-                            .at(module.span, "a `(` cannot follow a bracket")
-                            .help(
-                                "write it alone; a branch that turns away has a turn in it: `[ +(45) F(1) ]`",
-                            ),
-                    );
+            match self.bracket(module, &mut open) {
+                Bracket::Good => {}
+                Bracket::Unmatched => good = false,
+                Bracket::WithArguments => {
                     good = false;
-                    if &*module.name == "[" {
-                        open.push(module.span);
-                    } else {
-                        open.pop();
-                    }
                     continue;
                 }
-                "[" => open.push(module.span),
-                "]" if open.pop().is_none() => {
-                    self.error(
-                        Diagnostic::error("this `]` closes no branch")
-                            .at(module.span, "there is no `[` before it in this string")
-                            .help("brackets must match within each string"),
-                    );
-                    good = false;
-                }
-                _ => {}
             }
             self.occurs.entry(kind).or_insert(module.span);
             kinds.push(kind);
             let first = self.scope.draws.all.len() as u32;
-            for &argument in &module.arguments {
-                let known = self.scope.diagnostics.len();
-                let Some(node) = self.scope.number(&self.document.expressions, argument, variables) else {
-                    good = false;
-                    advice::of_look(module, &self.document.expressions, &mut self.scope.diagnostics[known..]);
-                    if count > 0
-                        && known < self.scope.diagnostics.len()
-                        && let Some(head) = self.looks_like_a_head(module)
-                    {
-                        let error = self.scope.diagnostics.last_mut().expect("one was added");
-                        error.help.push(format!("if `{head}` is the head of a rule, end it with `:`"));
-                    }
-                    continue;
-                };
-                if let Some(value) = self.scope.graph.as_constant(node).filter(|x| !x.is_finite()) {
-                    self.error(
-                        Diagnostic::error("this has no finite value")
-                            .at(self.document.expressions.span(argument.root), format!("it is {value}"))
-                            .help(advice::not_finite(value)),
-                    );
-                    good = false;
-                }
-                roots.push(node);
-            }
+            good &= self.arguments(module, variables, count > 0, &mut roots);
             let draws = first..self.scope.draws.all.len() as u32;
             if !draws.is_empty() {
                 drawn.modules.push((place, draws));
@@ -155,6 +122,75 @@ impl RuleBuilder<'_> {
         }
         let (arguments, draws) = drawn.compile(self.scope, roots, count);
         Some(Successor { kinds, arguments, draws, clocks, places })
+    }
+
+    /// Lowers the arguments of a module; false if one is at fault. `in_rule` tells that the string may end where the head
+    /// of another rule was meant.
+    fn arguments(
+        &mut self,
+        module: &ast::Module,
+        variables: &Variables,
+        in_rule: bool,
+        roots: &mut Vec<NodeId>,
+    ) -> bool {
+        let mut good = true;
+        for &argument in &module.arguments {
+            let known = self.scope.diagnostics.len();
+            let Some(node) = self.scope.number(&self.document.expressions, argument, variables) else {
+                good = false;
+                advice::of_look(module, &self.document.expressions, &mut self.scope.diagnostics[known..]);
+                if in_rule
+                    && known < self.scope.diagnostics.len()
+                    && let Some(head) = self.looks_like_a_head(module)
+                    && let Some(error) = self.scope.diagnostics.last_mut()
+                {
+                    error.help.push(format!("if `{head}` is the head of a rule, end it with `:`"));
+                }
+                continue;
+            };
+            if let Some(value) = self.scope.graph.as_constant(node).filter(|x| !x.is_finite()) {
+                self.error(
+                    Diagnostic::error("this has no finite value")
+                        .at(self.document.expressions.span(argument.root), format!("it is {value}"))
+                        .help(advice::not_finite(value)),
+                );
+                good = false;
+            }
+            roots.push(node);
+        }
+        good
+    }
+
+    /// Keeps count of the brackets that are open, and complains about those that cannot stand here.
+    fn bracket(&mut self, module: &ast::Module, open: &mut Vec<Span>) -> Bracket {
+        match &*module.name {
+            "[" | "]" if !module.arguments.is_empty() => {
+                self.error(
+                    Diagnostic::error("a bracket has no parameters")
+                        .at(module.span, "a `(` cannot follow a bracket")
+                        .help("write it alone; a branch that turns away has a turn in it: `[ +(45) F(1) ]`"),
+                );
+                if &*module.name == "[" {
+                    open.push(module.span);
+                } else {
+                    open.pop();
+                }
+                Bracket::WithArguments
+            }
+            "[" => {
+                open.push(module.span);
+                Bracket::Good
+            }
+            "]" if open.pop().is_none() => {
+                self.error(
+                    Diagnostic::error("this `]` closes no branch")
+                        .at(module.span, "there is no `[` before it in this string")
+                        .help("brackets must match within each string"),
+                );
+                Bracket::Unmatched
+            }
+            _ => Bracket::Good,
+        }
     }
 
     /// A module whose arguments are bare names, as a rule's head has them.

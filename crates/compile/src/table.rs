@@ -76,30 +76,7 @@ fn parse(text: &str, column: Option<&str>) -> Result<Vec<Row>, Fault> {
     let titled = names.iter().all(|name| name.parse::<f64>().is_err());
     let which = match column {
         None => 1,
-        Some(_) if !titled => {
-            let mut fault = Fault::new(
-                Some(first),
-                "its columns have no names",
-                "without `column …` the second column is taken; names stand in the first line",
-            );
-            fault.of_column = true;
-            return Err(fault);
-        }
-        Some(wanted) => names.iter().position(|name| name == wanted).ok_or_else(|| {
-            let mut fault = Fault::new(
-                None,
-                format!("the file has no column \"{}\"", shown(wanted)),
-                dlsys_syntax::suggest::did_you_mean(wanted, names.iter().map(String::as_str)).unwrap_or_else(
-                    || {
-                        let known: Vec<String> =
-                            names.iter().take(12).map(|n| format!("\"{}\"", shown(n))).collect();
-                        format!("it has {}", known.join(", "))
-                    },
-                ),
-            );
-            fault.of_column = true;
-            fault
-        })?,
+        Some(wanted) => column_of(wanted, &names, titled, first)?,
     };
     let mut rows = Vec::new();
     for (line, text) in lines.skip(usize::from(titled)) {
@@ -136,6 +113,31 @@ fn parse(text: &str, column: Option<&str>) -> Result<Vec<Row>, Fault> {
         ));
     }
     Ok(rows)
+}
+
+/// The place of a column that is chosen by its name. `first` is the line of the names, if it is `titled`.
+fn column_of(wanted: &str, names: &[String], titled: bool, first: usize) -> Result<usize, Fault> {
+    let found = names.iter().position(|name| name == wanted).filter(|_| titled);
+    found.ok_or_else(|| {
+        let mut fault = if titled {
+            let near = dlsys_syntax::suggest::did_you_mean(wanted, names.iter().map(String::as_str));
+            let known = || {
+                let known: Vec<String> =
+                    names.iter().take(12).map(|name| format!("\"{}\"", shown(name))).collect();
+                format!("it has {}", known.join(", "))
+            };
+            let what = format!("the file has no column \"{}\"", shown(wanted));
+            Fault::new(None, what, near.unwrap_or_else(known))
+        } else {
+            Fault::new(
+                Some(first),
+                "its columns have no names",
+                "without `column …` the second column is taken; names stand in the first line",
+            )
+        };
+        fault.of_column = true;
+        fault
+    })
 }
 
 /// The beginning of a cell, for a message.

@@ -36,6 +36,7 @@ pub struct Algebraic {
 }
 
 impl Algebraic {
+    /// True if all parameters have rates.
     pub fn is_empty(&self) -> bool {
         self.of.is_empty()
     }
@@ -55,7 +56,9 @@ impl Algebraic {
 /// Something of all modules attached to one: `sum(B(x, c): D*(c - c_0))`. Of no modules it is 0.
 #[derive(Clone, Debug)]
 pub struct Aggregate {
+    /// How the values of the children are combined.
     pub fold: Fold,
+    /// The children that count.
     pub pattern: Pattern,
     /// The value of one child. It reads the variables of the rule, then the parameters of the child.
     pub term: Program,
@@ -65,6 +68,7 @@ pub struct Aggregate {
     pub moves: bool,
     /// As it is written, without the term.
     pub label: String,
+    /// Where the head of the child is written.
     pub span: Span,
 }
 
@@ -92,8 +96,10 @@ impl Aggregate {
 /// A part of a right context: `> [ C(z) ] D(w)`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Turn {
+    /// A module: the next one of the right context.
     Module,
     /// A branch begins.
     Open,
+    /// The branch ends.
     Close,
 }

@@ -14,9 +14,11 @@ pub struct Appearance {
     pub colors: Vec<NamedColor>,
     /// In the order written; their numbers follow those of the colours.
     pub gradients: Vec<Gradient>,
+    /// Surfaces read from files, in the order written.
     pub surfaces: Vec<Arc<SurfaceShape>>,
     /// In the order written; contour `i` is number `i + 1` of `@C(n)`.
     pub contours: Vec<Contour>,
+    /// The direction towards which headings bend, if the model has one.
     pub tropism: Option<Tropism>,
 }
 
@@ -29,13 +31,16 @@ pub type Rgb = u32;
 /// `color name = "#rrggbb"`
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NamedColor {
+    /// The name as declared, or as the material is called in its file.
     pub name: Arc<str>,
+    /// Its colour.
     pub rgb: Rgb,
 }
 
 /// `gradient name = "#rrggbb", …`: colours at equal distances from 0 to 1.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Gradient {
+    /// The name as declared.
     pub name: Arc<str>,
     /// Two or more.
     pub stops: Vec<Rgb>,
@@ -65,6 +70,7 @@ pub struct SurfaceShape {
     pub vertices: Vec<[f64; 3]>,
     /// One for each vertex, or none at all if the file has none.
     pub normals: Vec<[f64; 3]>,
+    /// Numbers of three vertices each, counter-clockwise as seen from the front.
     pub triangles: Vec<[u32; 3]>,
     /// Colours that the file gives, with their names.
     pub materials: Vec<NamedColor>,
@@ -78,6 +84,7 @@ pub struct SurfaceShape {
 /// the origin. Lengths are in parts of the stem's radius.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contour {
+    /// The name as declared.
     pub name: Arc<str>,
     /// Three or more.
     pub points: Vec<[f64; 2]>,

@@ -46,6 +46,7 @@ impl Distribution {
         Distribution::NAMED.into_iter().find(|(_, d, _)| *d == self).expect("all are named")
     }
 
+    /// The word of the language for it.
     pub fn name(self) -> &'static str {
         self.entry().0
     }
@@ -137,6 +138,7 @@ fn normal(u: f64) -> f64 {
 /// A random number in the parameters of a module of a successor.
 #[derive(Clone, Debug)]
 pub struct Draw {
+    /// The family from which the number is drawn.
     pub distribution: Distribution,
     /// Its parameters. They read the variables of the rule, then the draws before this one.
     pub parameters: Program,
@@ -146,6 +148,7 @@ pub struct Draw {
     pub number: u32,
     /// It is needed in one branch of an `if` only, so that wrong parameters may not matter.
     pub conditional: bool,
+    /// Where the draw is written.
     pub span: Span,
 }
 

@@ -14,8 +14,11 @@ pub enum Step {
     Atom(u32, Comparison),
     /// True or false, whatever happens.
     Constant(bool),
+    /// The conjunction of the two values before it: the lesser of them.
     And,
+    /// The disjunction of the two values before it: the greater of them.
     Or,
+    /// The negation of the value before it.
     Not,
 }
 

@@ -12,6 +12,7 @@ impl KindId {
     /// `]`: a branch ends.
     pub const CLOSE: KindId = KindId(1);
 
+    /// Its place in the table of kinds, from 0.
     pub fn index(self) -> usize {
         self.0 as usize
     }
@@ -36,6 +37,7 @@ pub enum Class {
 /// A module's name and number of parameters, and what the model says of it.
 #[derive(Clone, Debug)]
 pub struct Kind {
+    /// The name with its suffix, as in `F_h`, `@L` or `+`.
     pub name: String,
     /// Number of parameters.
     pub arity: usize,
@@ -65,6 +67,7 @@ impl Kind {
         self.rules.iter().chain(&self.steps).copied()
     }
 
+    /// True if no rule, continuous or discrete, is for it.
     pub fn has_no_rules(&self) -> bool {
         self.rules.is_empty() && self.steps.is_empty()
     }
@@ -74,6 +77,7 @@ impl Kind {
         if rule.discrete { &self.steps } else { &self.rules }
     }
 
+    /// How its name is written.
     pub fn class(&self) -> Class {
         class_of(&self.name)
     }
@@ -154,22 +158,27 @@ impl Kinds {
         id
     }
 
+    /// The kind of this name and number of parameters, if the model mentions it.
     pub fn find(&self, name: &str, arity: usize) -> Option<KindId> {
         self.ids.get(&(name.to_owned(), arity)).copied()
     }
 
+    /// A kind by its number. The number must come from this table.
     pub fn get(&self, id: KindId) -> &Kind {
         &self.all[id.index()]
     }
 
+    /// A kind by its number, for a compiler that fills in its rules.
     pub fn get_mut(&mut self, id: KindId) -> &mut Kind {
         &mut self.all[id.index()]
     }
 
+    /// Number of kinds, the two brackets included.
     pub fn len(&self) -> usize {
         self.all.len()
     }
 
+    /// False: a table holds the brackets at least.
     pub fn is_empty(&self) -> bool {
         self.all.is_empty()
     }

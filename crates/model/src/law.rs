@@ -34,6 +34,7 @@ pub enum Law {
 /// The growth of one parameter by a formula; `x' = h(time) q(x)`.
 #[derive(Clone, Debug)]
 pub struct Driven {
+    /// The form of q.
     pub flow: Flow,
     /// Coefficients of q, in the order that [`Flow`] says.
     pub coefficients: Program,
@@ -63,6 +64,7 @@ pub struct Numeric {
     pub coupled: bool,
     /// Its rate is linear, with constant coefficients, in everything that changes.
     pub linear: bool,
+    /// The reason why there is no formula.
     pub obstacle: Obstacle,
 }
 
@@ -83,6 +85,7 @@ pub enum Obstacle {
 }
 
 impl Law {
+    /// True if the parameter follows a formula, so that nothing is integrated.
     pub fn is_closed(&self) -> bool {
         !matches!(self, Law::Numeric(_))
     }
@@ -109,6 +112,7 @@ pub enum ZeroCrossing {
 /// `constant + Σ factor · variable`.
 #[derive(Clone, Debug)]
 pub struct Sum {
+    /// The value where all variables are 0.
     pub constant: f64,
     /// Variables and their factors.
     pub terms: Vec<(usize, f64)>,
@@ -128,5 +132,6 @@ pub struct Linear {
 pub struct Jacobian {
     /// Position of the rate in the clause, and number of the variable.
     pub entries: Vec<(usize, usize)>,
+    /// The derivatives, in the order of the entries.
     pub values: Program,
 }

@@ -29,6 +29,8 @@
 //! assert!(!matches!(rule.solves[0].laws[0], Law::Numeric(_)));
 //! ```
 
+#![warn(missing_docs)]
+
 mod algebraic;
 mod appearance;
 mod chance;
@@ -74,13 +76,17 @@ pub struct Model {
     pub period: f64,
     /// What can be set from outside (`param`), with the values in force.
     pub parameters: Vec<Parameter>,
+    /// All kinds of modules that the model mentions, brackets included.
     pub kinds: Kinds,
     /// The initial string; its arguments read no variables.
     pub axiom: Successor,
     /// Where it is written.
     pub axiom_span: Span,
+    /// The rules, in the order written; [`Kind::rules`] refers to them by number.
     pub rules: Vec<Rule>,
+    /// The drawings; [`Kind::interpretation`] refers to them by number.
     pub interpretations: Vec<Interpretation>,
+    /// Colours, surfaces, contours and tropism.
     pub appearance: Arc<Appearance>,
     /// Per kind and parameter: no rule reads it, so that only drawing and output do.
     pub drawn_only: Vec<Vec<bool>>,
@@ -132,8 +138,11 @@ impl Default for Model {
 /// Equidistant observation times: `from + i * step` while not beyond `to`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frames {
+    /// The first time, at least 0.
     pub from: f64,
+    /// The last time, unless a whole number of steps misses it.
     pub to: f64,
+    /// The time between two frames, greater than 0.
     pub step: f64,
 }
 
@@ -165,8 +174,12 @@ impl Frames {
 /// A `param`: a constant that can be set from outside.
 #[derive(Clone, Debug)]
 pub struct Parameter {
+    /// The name by which it is set.
     pub name: String,
+    /// The value in force: that of the text, or that given from outside.
     pub value: f64,
+    /// The least and the greatest value that it may have, if the text gives them.
     pub range: Option<(f64, f64)>,
+    /// Where its name is declared.
     pub span: Span,
 }

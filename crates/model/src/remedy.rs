@@ -15,6 +15,7 @@ pub struct Boundary {
 }
 
 impl Boundary {
+    /// The sides as written; `turned` if the atom has them the other way round.
     pub fn new(left: &str, right: &str, turned: bool) -> Boundary {
         Boundary { left: left.to_owned(), right: right.to_owned(), turned }
     }

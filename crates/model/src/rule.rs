@@ -21,6 +21,7 @@ pub struct Rule {
     pub index: usize,
     /// The head as written.
     pub label: String,
+    /// Where the head is written.
     pub span: Span,
     /// It applies at the multiples of the model's period only, has no equations and one production.
     pub discrete: bool,
@@ -112,6 +113,7 @@ pub struct Pattern {
 }
 
 impl Pattern {
+    /// True if a module of this kind can stand at this place.
     pub fn matches(&self, kind: KindId) -> bool {
         self.kinds.binary_search(&kind).is_ok()
     }
@@ -120,7 +122,9 @@ impl Pattern {
 /// A `solve` clause.
 #[derive(Clone, Debug)]
 pub struct Solve {
+    /// The clause is active while this holds.
     pub guard: Condition,
+    /// Where the clause is written.
     pub span: Span,
     /// Parameters that have a derivative, in the order of the outputs of `rates`. A parameter that is
     /// not named, or whose derivative is the constant 0, is not here: it stays as it is.
@@ -144,11 +148,13 @@ pub struct Solve {
     pub jacobian: Jacobian,
     /// Parameters with a value or an equation instead of a rate.
     pub algebraic: Algebraic,
+    /// How the zero of each atom is found while the clause is active.
     pub watch: Vec<ZeroCrossing>,
     /// Rates depend on time in a way that may be over before a step notices: not as polynomials.
     pub has_pulses: bool,
     /// The clock of an event at a rate runs, and something is integrated numerically.
     pub has_hazard_clock: bool,
+    /// The components of the equations, and the variables that a step reads.
     pub stepping: Stepping,
 }
 
@@ -156,18 +162,22 @@ pub struct Solve {
 /// the instants at which the condition changes.
 #[derive(Clone, Debug)]
 pub struct Switch {
+    /// The variable is 1 while this holds, and 0 otherwise.
     pub condition: Condition,
 }
 
 /// A `produce` clause.
 #[derive(Clone, Debug)]
 pub struct Produce {
+    /// The production applies at the instant at which this holds.
     pub guard: Condition,
+    /// Where the clause is written.
     pub span: Span,
     /// Tells the productions of a rule apart: [`key`](dlsys_tree::key).
     pub key: u64,
     /// No production: the rate of another clause has become negative.
     pub is_fault: bool,
+    /// The modules that take the place of this one.
     pub outcome: Outcome,
 }
 
@@ -206,6 +216,7 @@ pub struct Successor {
     pub kinds: Vec<KindId>,
     /// The arguments of all modules, one after another, clocks left out. They read the draws, too.
     pub arguments: Program,
+    /// The random numbers that the arguments read.
     pub draws: Vec<Draw>,
     /// In the order of the modules.
     pub clocks: Vec<NewClock>,
@@ -245,6 +256,8 @@ impl Successor {
 /// Its expressions read the module's parameters, then `t`, then `age`.
 #[derive(Clone, Debug)]
 pub struct Interpretation {
+    /// Where its head is written.
     pub span: Span,
+    /// The modules that are drawn.
     pub drawn: Successor,
 }

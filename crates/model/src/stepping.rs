@@ -17,9 +17,11 @@ pub struct Stepping {
 /// A variable of a rule that is a parameter.
 #[derive(Clone, Copy, Debug)]
 pub struct Read {
+    /// Number of the variable among those of the rule.
     pub variable: usize,
     /// Number in the context; None for the module itself.
     pub neighbour: Option<usize>,
+    /// Number of the parameter in its module.
     pub parameter: usize,
 }
 

@@ -211,7 +211,8 @@ impl Session {
         let source = Source::new("measure", text);
         let folders = Folders { paths: self.folders.clone(), inputs: RefCell::default() };
         let read = dlsys_compile::measure(&self.source, &folders, &settings, &self.model, &source);
-        read.map_err(|diagnostics| {
+        read.map_err(|errors| {
+            let diagnostics = errors.into_diagnostics();
             Box::new(LoadError { source, diagnostics, settings: Vec::new(), inputs: Vec::new() })
         })
     }

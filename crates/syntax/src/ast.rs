@@ -5,13 +5,16 @@
 
 use std::sync::Arc;
 
+use crate::declarations::Declaration;
 use dlsys_diagnostic::Span;
 use dlsys_expr::{Comparison, Fold, Sort};
 
 /// A name and where it stands.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Name {
+    /// The name as written.
     pub text: Arc<str>,
+    /// Where it is written.
     pub span: Span,
 }
 
@@ -22,28 +25,45 @@ pub struct ExprId(pub u32);
 /// A whole expression: its nodes are those from `first` to `root`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Expression {
+    /// The node that was read first.
     pub first: ExprId,
+    /// The node of the whole expression.
     pub root: ExprId,
 }
 
+/// An operator between two operands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Operator {
+    /// `a + b`
     Add,
+    /// `a - b`
     Sub,
+    /// `a*b`
     Mul,
+    /// `a/b`
     Div,
+    /// `a^b`
     Pow,
+    /// `a & b`, of conditions.
     And,
+    /// `a | b`, of conditions.
     Or,
 }
 
+/// A node of an expression.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Expr {
+    /// A number as written, always finite and without a sign.
     Number(f64),
+    /// A constant, parameter or variable.
     Name(Arc<str>),
+    /// A function and its arguments.
     Call(Arc<str>, Vec<ExprId>),
+    /// `-a`
     Negate(ExprId),
+    /// `!a`, of a condition.
     Not(ExprId),
+    /// `a + b` and the like.
     Binary(Operator, ExprId, ExprId),
     /// `2c`: a number written directly before its factor.
     Scale(f64, ExprId),
@@ -55,6 +75,7 @@ pub enum Expr {
     Match(ExprId, Vec<(ExprId, ExprId)>, ExprId),
     /// `a[i]`
     Index(Arc<str>, ExprId),
+    /// `(a)`; kept because it groups what is written.
     Parenthesis(ExprId),
     /// `sum(B(x, c): D*(c - c_0))`
     Aggregate(Box<Aggregate>),
@@ -63,7 +84,9 @@ pub enum Expr {
 /// Something of all modules attached to one that match.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Aggregate {
+    /// How the values are combined.
     pub fold: Fold,
+    /// The modules that count, with names for their parameters.
     pub head: HeadModule,
     /// What is added up; its nodes stand before that of the aggregate. None for a number of modules.
     pub term: Option<Expression>,
@@ -77,6 +100,7 @@ pub struct Expressions {
 }
 
 impl Expressions {
+    /// Adds a node whose operands are there already.
     pub fn push(&mut self, node: Expr, span: Span) -> ExprId {
         self.nodes.push(node);
         self.spans.push(span);
@@ -88,14 +112,17 @@ impl Expressions {
         ExprId(self.nodes.len() as u32)
     }
 
+    /// A node of this arena.
     pub fn get(&self, id: ExprId) -> &Expr {
         &self.nodes[id.0 as usize]
     }
 
+    /// A node of this arena, to be changed.
     pub fn get_mut(&mut self, id: ExprId) -> &mut Expr {
         &mut self.nodes[id.0 as usize]
     }
 
+    /// Where a node is written.
     pub fn span(&self, id: ExprId) -> Span {
         self.spans[id.0 as usize]
     }
@@ -125,16 +152,22 @@ impl Expressions {
 /// A module of the initial string or of a successor.
 #[derive(Clone, Debug)]
 pub struct Module {
+    /// The name with its mark, as in `F`, `@L` or `+`.
     pub name: Arc<str>,
+    /// Name and arguments.
     pub span: Span,
+    /// The values of its parameters.
     pub arguments: Vec<Expression>,
 }
 
 /// A module of a rule's head: a name and the names of its parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeadModule {
+    /// The name of the module.
     pub name: Name,
+    /// The names of its parameters.
     pub parameters: Vec<Name>,
+    /// Name and parameters.
     pub span: Span,
 }
 
@@ -149,11 +182,14 @@ pub enum Turn {
     Close,
 }
 
+/// A rule, continuous or discrete.
 #[derive(Clone, Debug)]
 pub struct Rule {
+    /// The left context in reading order.
     pub left: Vec<HeadModule>,
     /// The strict predecessor; its name is `±` where one rule stands for both turns.
     pub predecessor: HeadModule,
+    /// The modules of the right context in reading order.
     pub right: Vec<HeadModule>,
     /// How its modules stand: one after another, or on branches.
     pub right_shape: Vec<Turn>,
@@ -163,22 +199,29 @@ pub struct Rule {
     pub locals: Vec<(Name, Expression)>,
     /// Written with `->`: applied at the multiples of the period. It has one clause, which produces.
     pub discrete: bool,
+    /// In the order written; there is one at least.
     pub clauses: Vec<Clause>,
     /// The expressions of the whole rule: from the first to before the second.
     pub nodes: (ExprId, ExprId),
 }
 
+/// A clause of a rule.
 #[derive(Clone, Debug)]
 pub struct Clause {
+    /// The condition behind `if`, or before the arrow of a discrete rule.
     pub guard: Option<Expression>,
     /// `at rate …`, of a production.
     pub hazard: Option<Expression>,
+    /// The equations, or the successors.
     pub action: Action,
+    /// The whole clause.
     pub span: Span,
 }
 
+/// What a clause does while, or when, its condition holds.
 #[derive(Clone, Debug)]
 pub enum Action {
+    /// Equations that hold while the clause is active.
     Solve(Vec<Equation>),
     /// One successor, or several with weights.
     Produce(Vec<Alternative>),
@@ -189,18 +232,36 @@ pub enum Action {
 pub struct Alternative {
     /// `2:` before it.
     pub weight: Option<Expression>,
+    /// The string; empty for `ε`.
     pub modules: Vec<Module>,
 }
 
 /// An equation of a `solve`.
 #[derive(Clone, Debug)]
 pub enum Equation {
-    /// `dx/dt = …`; the parameter is without the `d`.
-    Rate { parameter: Name, rate: Expression },
+    /// `dx/dt = …`
+    Rate {
+        /// The parameter, without the `d`.
+        parameter: Name,
+        /// Its derivative by time.
+        rate: Expression,
+    },
     /// `x = …`
-    Value { parameter: Name, value: Expression },
+    Value {
+        /// The parameter on the left side.
+        parameter: Name,
+        /// Its value at every instant.
+        value: Expression,
+    },
     /// `0 = …`, and maybe for which parameter it is to be solved; the place is that of the whole.
-    Zero { residual: Expression, unknown: Option<Name>, span: Span },
+    Zero {
+        /// The right side, which must be 0.
+        residual: Expression,
+        /// The parameter behind `for`.
+        unknown: Option<Name>,
+        /// The whole equation.
+        span: Span,
+    },
 }
 
 impl Equation {
@@ -217,82 +278,103 @@ impl Equation {
 /// A text in quotes, without them, and where it stands.
 #[derive(Clone, Debug)]
 pub struct Text {
+    /// What stands between the quotes.
     pub text: String,
     /// With the quotes.
     pub span: Span,
 }
 
+/// A declaration or a rule.
 #[derive(Clone, Debug)]
+#[allow(missing_docs)] // Fields are named as in the notation that each variant shows.
 pub enum Item {
+    /// `title "text"`
     Title(String),
-    Array {
-        name: Name,
-        values: Vec<Expression>,
-    },
-    Curve {
-        name: Name,
-        sort: Sort,
-        points: Vec<[Expression; 2]>,
-        periodic: bool,
-    },
-    Table {
-        name: Name,
-        sort: Sort,
-        file: Text,
-        column: Option<Text>,
-        periodic: bool,
-    },
+    /// `const name = [values]`
+    Array { name: Name, values: Vec<Expression> },
+    /// `curve sort name = points periodic`
+    Curve { name: Name, sort: Sort, points: Vec<[Expression; 2]>, periodic: bool },
+    /// `table sort name from "file" column "column" periodic`
+    Table { name: Name, sort: Sort, file: Text, column: Option<Text>, periodic: bool },
+    /// `include "file"`
     Include(Text),
-    Const {
-        name: Name,
-        value: Expression,
-    },
-    Param {
-        name: Name,
-        value: Expression,
-        range: Option<(Expression, Expression)>,
-    },
-    Def {
-        name: Name,
-        parameters: Vec<Name>,
-        body: Expression,
-    },
+    /// `const name = value`
+    Const { name: Name, value: Expression },
+    /// `param name = value in range`
+    Param { name: Name, value: Expression, range: Option<(Expression, Expression)> },
+    /// `def name(parameters) = body`
+    Def { name: Name, parameters: Vec<Name>, body: Expression },
+    /// `angle value`, in degrees.
     Angle(Expression),
-    /// Of the discrete rules.
+    /// `period value`, of the discrete rules.
     Period(Expression),
-    Frames {
-        from: Expression,
-        to: Expression,
-        step: Expression,
-    },
-    Color {
-        name: Name,
-        value: Text,
-    },
-    Gradient {
-        name: Name,
-        stops: Vec<Text>,
-    },
-    Surface {
-        name: Name,
-        file: Text,
-    },
-    Contour {
-        name: Name,
-        points: Vec<[Expression; 2]>,
-    },
-    Tropism {
-        direction: [Expression; 3],
-        strength: Option<Expression>,
-    },
+    /// `frames from .. to step step`
+    Frames { from: Expression, to: Expression, step: Expression },
+    /// `color name = "value"`
+    Color { name: Name, value: Text },
+    /// `gradient name = "stop", "stop"`
+    Gradient { name: Name, stops: Vec<Text> },
+    /// `surface @name from "file"`
+    Surface { name: Name, file: Text },
+    /// `contour name = points`
+    Contour { name: Name, points: Vec<[Expression; 2]> },
+    /// `tropism x, y, z strength strength`
+    Tropism { direction: [Expression; 3], strength: Option<Expression> },
+    /// `ignore names`
     Ignore(Vec<Name>),
+    /// `consider names`
     Consider(Vec<Name>),
+    /// `initial string: modules`
     Axiom(Vec<Module>),
-    Interpret {
-        head: HeadModule,
-        drawn: Vec<Module>,
-    },
+    /// `interpret head: drawn`
+    Interpret { head: HeadModule, drawn: Vec<Module> },
+    /// `head: clauses`, or `head : condition -> successor`.
     Rule(Rule),
+}
+
+impl Item {
+    /// Its row in the table of declarations; None for rules.
+    pub fn declaration(&self) -> Option<&'static Declaration> {
+        Declaration::of_word(match self {
+            Item::Title(_) => "title",
+            Item::Include(_) => "include",
+            Item::Const { .. } | Item::Array { .. } => "const",
+            Item::Param { .. } => "param",
+            Item::Def { .. } => "def",
+            Item::Curve { .. } => "curve",
+            Item::Table { .. } => "table",
+            Item::Angle(_) => "angle",
+            Item::Period(_) => "period",
+            Item::Frames { .. } => "frames",
+            Item::Color { .. } => "color",
+            Item::Gradient { .. } => "gradient",
+            Item::Surface { .. } => "surface",
+            Item::Contour { .. } => "contour",
+            Item::Tropism { .. } => "tropism",
+            Item::Ignore(_) => "ignore",
+            Item::Consider(_) => "consider",
+            Item::Axiom(_) => "initial",
+            Item::Interpret { .. } => "interpret",
+            Item::Rule(_) => return None,
+        })
+    }
+
+    /// The name that it declares.
+    pub fn name(&self) -> Option<&Name> {
+        match self {
+            Item::Const { name, .. }
+            | Item::Array { name, .. }
+            | Item::Param { name, .. }
+            | Item::Def { name, .. }
+            | Item::Curve { name, .. }
+            | Item::Table { name, .. }
+            | Item::Color { name, .. }
+            | Item::Gradient { name, .. }
+            | Item::Surface { name, .. }
+            | Item::Contour { name, .. } => Some(name),
+            _ => None,
+        }
+    }
 }
 
 /// A parsed model.
@@ -300,6 +382,7 @@ pub enum Item {
 pub struct Document {
     /// The declarations and rules in the order written, each with its place.
     pub items: Vec<(Item, Span)>,
+    /// The arena in which all expressions of the items stand.
     pub expressions: Expressions,
     /// Names of global declarations that could not be read: whoever uses them is not to blame.
     pub unread: Vec<Arc<str>>,

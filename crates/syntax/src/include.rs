@@ -57,7 +57,8 @@ fn padded(start: usize, text: &str) -> String {
 /// True if an expression calls a name that the library declares and the model does not.
 fn wants_library(document: &Document) -> bool {
     let names: HashSet<&str> = library_names().collect();
-    let declared: HashSet<&str> = document.items.iter().filter_map(|(item, _)| declared(item)).collect();
+    let declared: HashSet<&str> =
+        document.items.iter().filter_map(|(item, _)| Some(&*item.name()?.text)).collect();
     document.expressions.iter().any(|expr| match expr {
         Expr::Call(name, _) | Expr::Name(name) => names.contains(&**name) && !declared.contains(&**name),
         _ => false,
@@ -68,22 +69,6 @@ fn wants_library(document: &Document) -> bool {
 pub fn library_names<'n>() -> impl Iterator<Item = &'n str> {
     let names = LIBRARY.lines().filter_map(|line| line.strip_prefix("def ")?.split_once('('));
     names.map(|(name, _)| name)
-}
-
-/// The global name that an item declares.
-fn declared(item: &Item) -> Option<&str> {
-    match item {
-        Item::Const { name, .. }
-        | Item::Param { name, .. }
-        | Item::Def { name, .. }
-        | Item::Array { name, .. }
-        | Item::Curve { name, .. }
-        | Item::Table { name, .. }
-        | Item::Color { name, .. }
-        | Item::Gradient { name, .. }
-        | Item::Contour { name, .. } => Some(&name.text),
-        _ => None,
-    }
 }
 
 type Items = Vec<(Item, Span)>;

@@ -13,6 +13,7 @@ mod ahead;
 mod keywords;
 mod recovery;
 
+use crate::declarations::{Begins, Body, Declaration};
 use crate::lexeme::{Lexeme, Token, in_name, number_length};
 use crate::words::FOLDS;
 use dlsys_diagnostic::{Diagnostic, Span};
@@ -23,28 +24,10 @@ pub const MAX_DEPTH: usize = 100;
 /// Greatest size of one declaration or rule, in bytes; the initial string is not bounded by it.
 const MAX_ITEM: usize = 1 << 20;
 
-/// What an item declares, told by its first word.
+/// The kind of an item, told by its first word, its colon or its arrow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ItemKind {
-    Title,
-    Include,
-    Curve,
-    Table,
-    Const,
-    Param,
-    Def,
-    Angle,
-    Period,
-    Frames,
-    Color,
-    Gradient,
-    Surface,
-    Contour,
-    Tropism,
-    Ignore,
-    Consider,
-    Axiom,
-    Interpret,
+    Declaration(&'static Declaration),
     Rule,
     /// A discrete rule, known by its arrow.
     Step,
@@ -52,29 +35,24 @@ pub enum ItemKind {
     Unknown,
 }
 
-/// The words that begin a declaration.
-pub const DECLARATIONS: [(&str, ItemKind); 20] = [
-    ("title", ItemKind::Title),
-    ("include", ItemKind::Include),
-    ("const", ItemKind::Const),
-    ("param", ItemKind::Param),
-    ("def", ItemKind::Def),
-    ("curve", ItemKind::Curve),
-    ("table", ItemKind::Table),
-    ("angle", ItemKind::Angle),
-    ("period", ItemKind::Period),
-    ("frames", ItemKind::Frames),
-    ("color", ItemKind::Color),
-    ("gradient", ItemKind::Gradient),
-    ("surface", ItemKind::Surface),
-    ("contour", ItemKind::Contour),
-    ("tropism", ItemKind::Tropism),
-    ("ignore", ItemKind::Ignore),
-    ("consider", ItemKind::Consider),
-    ("initial", ItemKind::Axiom),
-    ("axiom", ItemKind::Axiom),
-    ("interpret", ItemKind::Interpret),
-];
+impl ItemKind {
+    pub fn declaration(self) -> Option<&'static Declaration> {
+        match self {
+            ItemKind::Declaration(declaration) => Some(declaration),
+            _ => None,
+        }
+    }
+
+    /// The body of a declaration.
+    pub fn body(self) -> Option<Body> {
+        self.declaration().map(|declaration| declaration.body)
+    }
+
+    /// True for a declaration that ends with a string of modules.
+    pub fn has_string(self) -> bool {
+        self.declaration().is_some_and(Declaration::has_string)
+    }
+}
 
 /// One declaration or rule.
 #[derive(Clone, Copy, Debug)]
@@ -192,7 +170,7 @@ fn scan(text: &str, lexemes: Option<Vec<Lexeme>>) -> (Layout, Option<Vec<Lexeme>
     scanner.close_item(text.len());
     let Scanner { out, mut items, mut errors, lexemes, .. } = scanner;
     for item in &mut items {
-        if item.end - item.start > MAX_ITEM && item.kind != ItemKind::Axiom && !item.broken {
+        if item.end - item.start > MAX_ITEM && item.kind.body() != Some(Body::String) && !item.broken {
             item.broken = true;
             let message = format!("this declaration is longer than {} KiB", MAX_ITEM >> 10);
             errors.push(
@@ -332,19 +310,16 @@ impl Scanner<'_> {
         arrow: bool,
         tokens: &[(Token, usize, usize)],
     ) -> Option<ItemKind> {
-        let declared = DECLARATIONS.iter().find(|(name, _)| *name == word).map(|(_, kind)| *kind);
+        let declared = Declaration::of_word(word);
         let inside = self.levels.len() > 1;
-        // Words that came later may be names of modules in older models: they begin a declaration only where they
-        // cannot be the head of a rule.
-        let newer = matches!(word, "include" | "curve" | "table");
         let follows = |i: usize| tokens.get(i).map(|t| t.0);
         let plain = !colon && matches!(follows(1), Some(Token::Word | Token::Text));
-        if let Some(kind) = declared.filter(|_| !newer || plain) {
+        if let Some(declared) = declared.filter(|declared| declared.begins == Begins::Always || plain) {
             // Inside parentheses that somebody forgot to close, a declaration still begins one; but an
             // identifier that happens to be called `angle` does not.
             let next_is_word = matches!(tokens.get(1), Some((Token::Word | Token::Text, ..)));
             if !inside || next_is_word || colon || arrow {
-                return Some(kind);
+                return Some(ItemKind::Declaration(declared));
             }
         }
         // A clause with a colon too many is still a clause.
@@ -372,7 +347,8 @@ impl Scanner<'_> {
         let continues = match current.kind {
             // What follows a line that is not understood is not to be complained about again.
             ItemKind::Rule | ItemKind::Unknown => clause || matches!(word, "then" | "else"),
-            ItemKind::Axiom | ItemKind::Interpret | ItemKind::Step => true,
+            ItemKind::Step => true,
+            kind if kind.has_string() => true,
             _ => case || matches!(word, "then" | "else"),
         };
         (!continues).then_some(ItemKind::Unknown)
@@ -448,7 +424,7 @@ impl Scanner<'_> {
                     && item.after_colon.is_none()
                 {
                     item.after_colon = Some(end);
-                    self.in_string = matches!(item.kind, ItemKind::Axiom | ItemKind::Interpret);
+                    self.in_string = item.kind.has_string();
                     self.forget_pending();
                 }
             }

@@ -12,22 +12,29 @@
 //! - [`parse`]: text to [`ast::Document`]; [`read`] also parses the files that a text includes.
 //! - [`print`]: the syntax tree as text.
 //! - [`format`]: the canonical layout of a text (`dlsys fmt`).
+//! - [`declarations`]: the table of declarations: words, notation, descriptions.
 //! - [`words`]: the words of the language, for highlighting and completion.
 //! - [`outline`]: the declarations of a text and their places, for programs that edit texts.
 
+#![warn(missing_docs)]
+
 pub mod ast;
+pub mod declarations;
+mod error;
 mod files;
 pub mod foreign_syntax;
 pub mod format;
 mod include;
 mod layout;
 mod lexeme;
+mod notation;
 pub mod outline;
 pub mod parse;
 pub mod print;
 pub mod suggest;
 pub mod words;
 
+pub use error::Errors;
 pub use files::{Files, NoFiles, is_inside};
 pub use include::{library_names, read};
 pub use layout::MAX_DEPTH;

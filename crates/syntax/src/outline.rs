@@ -1,6 +1,7 @@
 //! What a text declares, and where: for those who change texts piece by piece.
 
 use crate::ast::{HeadModule, Item, Rule, Turn};
+use crate::declarations::Repeats;
 use crate::parse;
 use dlsys_diagnostic::{Source, Span};
 
@@ -11,8 +12,11 @@ pub struct Entry {
     pub key: Option<String>,
     /// What it is called, if it has a name: `r`, `F_a(x, n)`, `frames`.
     pub name: String,
+    /// It is a rule, continuous or discrete.
     pub is_rule: bool,
+    /// It is the initial string.
     pub is_axiom: bool,
+    /// The whole of it, without white space at its end.
     pub span: Span,
 }
 
@@ -24,36 +28,30 @@ pub fn outline(text: &str) -> Vec<Entry> {
 }
 
 fn entry(item: &Item, span: Span, source: &Source) -> Entry {
-    let single = |word: &str| (Some(word.to_owned()), word.to_owned());
-    let named = |sort: &str, name: &str| (Some(format!("{sort} {name}")), name.to_owned());
     let (key, name) = match item {
-        Item::Title(_) => single("title"),
-        Item::Angle(_) => single("angle"),
-        Item::Period(_) => single("period"),
-        Item::Frames { .. } => single("frames"),
-        Item::Tropism { .. } => single("tropism"),
-        Item::Axiom(_) => single("initial string"),
-        // Constants, parameters, functions, curves and arrays share their names; so do colours and gradients.
-        Item::Const { name, .. }
-        | Item::Param { name, .. }
-        | Item::Def { name, .. }
-        | Item::Array { name, .. }
-        | Item::Curve { name, .. }
-        | Item::Table { name, .. } => named("value", &name.text),
-        Item::Color { name, .. } | Item::Gradient { name, .. } => named("color", &name.text),
-        Item::Contour { name, .. } => named("contour", &name.text),
-        Item::Surface { name, .. } => named("surface", &name.text),
+        Item::Rule(rule) => (Some(head(rule)), source.slice(rule.head).trim().to_owned()),
+        Item::Axiom(_) => (Some("initial string".to_owned()), "initial string".to_owned()),
+        Item::Include(file) => (Some(format!("include {}", file.text)), format!("include \"{}\"", file.text)),
         Item::Interpret { head, .. } => (
             Some(format!("interpret {}", pattern(head))),
             format!("interpret {}", source.slice(head.span).trim()),
         ),
-        Item::Rule(rule) => (Some(head(rule)), source.slice(rule.head).trim().to_owned()),
-        Item::Include(file) => (Some(format!("include {}", file.text)), format!("include \"{}\"", file.text)),
-        Item::Ignore(_) => (None, "ignore".to_owned()),
-        Item::Consider(_) => (None, "consider".to_owned()),
+        item => declared(item),
     };
     let (is_rule, is_axiom) = (matches!(item, Item::Rule(_)), matches!(item, Item::Axiom(_)));
     Entry { key, name, is_rule, is_axiom, span }
+}
+
+/// The key of a declaration that is known by its word or its name, and what it is called.
+fn declared(item: &Item) -> (Option<String>, String) {
+    let Some(declaration) = item.declaration() else { return (None, String::new()) };
+    let name = item.name().map_or(declaration.word, |name| &*name.text);
+    let key = match declaration.repeats {
+        Repeats::Once => Some(declaration.word.to_owned()),
+        Repeats::PerName(sort) => Some(format!("{sort} {name}")),
+        _ => None,
+    };
+    (key, name.to_owned())
 }
 
 /// A module of a head without the names of its parameters.

@@ -3,13 +3,11 @@
 //! Parentheses are put where the tree needs them, so that what is printed reads back as the same tree.
 //! Printing works with an explicit stack: a tree may be deeper than the machine's.
 
-use std::fmt::Write;
-
 use crate::ast::{
-    Action, Alternative, Document, Equation, Expr, ExprId, Expressions, HeadModule, Item, Module, Name,
+    Action, Alternative, Clause, Document, Equation, Expr, ExprId, Expressions, HeadModule, Module, Name,
     Operator, Turn,
 };
-use dlsys_expr::Sort;
+use crate::notation;
 
 /// How tightly a node binds; the loosest is 0.
 fn strength(expr: &Expr) -> u8 {
@@ -66,102 +64,94 @@ pub fn expression(expressions: &Expressions, root: ExprId) -> String {
             }
             Task::Node(id, needed) => (id, needed),
         };
-        let node = expressions.get(id);
-        let own = strength(node);
-        let enclosed = own < needed;
-        // In the order of printing; pushed in reverse below.
+        let enclosed = strength(expressions.get(id)) < needed;
+        // In the order of printing; pushed in reverse.
         let mut parts: Vec<Task> = Vec::new();
         if enclosed {
             parts.push(Task::Text("("));
         }
-        match node {
-            Expr::Number(x) => {
-                // Writing to a string does not fail.
-                let _ = write!(out, "{x}");
-                continue;
-            }
-            Expr::Name(name) => parts.push(Task::Text(name)),
-            Expr::Call(name, arguments) => {
-                parts.extend([Task::Text(name), Task::Text("(")]);
-                for (i, argument) in arguments.iter().enumerate() {
-                    if i > 0 {
-                        parts.push(Task::Text(", "));
-                    }
-                    parts.push(Task::Node(*argument, 0));
-                }
-                parts.push(Task::Text(")"));
-            }
-            Expr::Index(name, index) => {
-                parts.extend([Task::Text(name), Task::Text("["), Task::Node(*index, 0), Task::Text("]")]);
-            }
-            Expr::Negate(a) => parts.extend([Task::Text("-"), Task::Node(*a, own)]),
-            Expr::Not(a) => parts.extend([Task::Text("!"), Task::Node(*a, own)]),
-            Expr::Scale(factor, a) => {
-                let _ = write!(out, "{}{factor}", if enclosed { "(" } else { "" });
-                if enclosed {
-                    parts.clear();
-                }
-                // Only a name, a call or a parenthesis can stand directly behind a number.
-                let first = leftmost(expressions, *a);
-                let bare =
-                    matches!(first, Expr::Name(_) | Expr::Call(..) | Expr::Index(..) | Expr::Parenthesis(_))
-                        && strength(expressions.get(*a)) >= own
-                        && !exponent_like(first);
-                if bare {
-                    parts.push(Task::Node(*a, own));
-                } else {
-                    parts.extend([Task::Text("("), Task::Node(*a, 0), Task::Text(")")]);
-                }
-            }
-            Expr::Binary(operator, a, b) => {
-                // Equal strength needs no parentheses on the side to which the operator associates.
-                let (left, right) = if *operator == Operator::Pow { (own + 1, own) } else { (own, own + 1) };
-                // A sign may open the right operand of a tighter operator, but an `if` reads to the end.
-                parts.extend([Task::Node(*a, left), Task::Text(operator.symbol()), Task::Node(*b, right)]);
-            }
-            Expr::Compare(first, links) => {
-                parts.push(Task::Node(*first, own + 1));
-                for (comparison, operand) in links {
-                    parts.extend([
-                        Task::Text(" "),
-                        Task::Text(comparison.symbol()),
-                        Task::Text(" "),
-                        Task::Node(*operand, own + 1),
-                    ]);
-                }
-            }
-            Expr::If(condition, then, otherwise) => parts.extend([
-                Task::Text("if "),
-                Task::Node(*condition, 0),
-                Task::Text(" then "),
-                Task::Node(*then, 0),
-                Task::Text(" else "),
-                Task::Node(*otherwise, 0),
-            ]),
-            Expr::Match(subject, cases, otherwise) => {
-                parts.extend([Task::Text("match "), Task::Node(*subject, 1)]);
-                for (value, then) in cases {
-                    // An inner `match` would take the cases that follow.
-                    parts.extend([Task::Text(" case "), Task::Node(*value, 1), Task::Text(": ")]);
-                    parts.push(Task::Node(*then, 1));
-                }
-                parts.extend([Task::Text(" else "), Task::Node(*otherwise, 0)]);
-            }
-            Expr::Aggregate(all) => {
-                parts.push(Task::Owned(format!("{}({}", all.fold.name(), head_module(&all.head))));
-                if let Some(term) = all.term {
-                    parts.extend([Task::Text(": "), Task::Node(term.root, 0)]);
-                }
-                parts.push(Task::Text(")"));
-            }
-            Expr::Parenthesis(a) => parts.extend([Task::Text("("), Task::Node(*a, 0), Task::Text(")")]),
-        }
+        push_parts(expressions, id, &mut parts);
         if enclosed {
             parts.push(Task::Text(")"));
         }
         tasks.extend(parts.into_iter().rev());
     }
     out
+}
+
+/// What a node is written as: signs, words, and its operands with the strength that each must have.
+fn push_parts<'e>(expressions: &'e Expressions, id: ExprId, parts: &mut Vec<Task<'e>>) {
+    let node = expressions.get(id);
+    let own = strength(node);
+    match node {
+        Expr::Number(x) => parts.push(Task::Owned(x.to_string())),
+        Expr::Name(name) => parts.push(Task::Text(name)),
+        Expr::Call(name, arguments) => {
+            parts.extend([Task::Text(name), Task::Text("(")]);
+            for (i, argument) in arguments.iter().enumerate() {
+                if i > 0 {
+                    parts.push(Task::Text(", "));
+                }
+                parts.push(Task::Node(*argument, 0));
+            }
+            parts.push(Task::Text(")"));
+        }
+        Expr::Index(name, index) => {
+            parts.extend([Task::Text(name), Task::Text("["), Task::Node(*index, 0), Task::Text("]")]);
+        }
+        Expr::Negate(a) => parts.extend([Task::Text("-"), Task::Node(*a, own)]),
+        Expr::Not(a) => parts.extend([Task::Text("!"), Task::Node(*a, own)]),
+        Expr::Scale(factor, a) => push_scaled(expressions, *factor, *a, own, parts),
+        Expr::Binary(operator, a, b) => {
+            // Equal strength needs no parentheses on the side to which the operator associates.
+            let (left, right) = if *operator == Operator::Pow { (own + 1, own) } else { (own, own + 1) };
+            // A sign may open the right operand of a tighter operator, but an `if` reads to the end.
+            parts.extend([Task::Node(*a, left), Task::Text(operator.symbol()), Task::Node(*b, right)]);
+        }
+        Expr::Compare(first, links) => {
+            parts.push(Task::Node(*first, own + 1));
+            for (comparison, operand) in links {
+                parts.extend([Task::Text(" "), Task::Text(comparison.symbol()), Task::Text(" ")]);
+                parts.push(Task::Node(*operand, own + 1));
+            }
+        }
+        Expr::If(condition, then, otherwise) => {
+            parts.extend([Task::Text("if "), Task::Node(*condition, 0)]);
+            parts.extend([Task::Text(" then "), Task::Node(*then, 0)]);
+            parts.extend([Task::Text(" else "), Task::Node(*otherwise, 0)]);
+        }
+        Expr::Match(subject, cases, otherwise) => {
+            parts.extend([Task::Text("match "), Task::Node(*subject, 1)]);
+            for (value, then) in cases {
+                // An inner `match` would take the cases that follow.
+                parts.extend([Task::Text(" case "), Task::Node(*value, 1), Task::Text(": ")]);
+                parts.push(Task::Node(*then, 1));
+            }
+            parts.extend([Task::Text(" else "), Task::Node(*otherwise, 0)]);
+        }
+        Expr::Aggregate(all) => {
+            parts.push(Task::Owned(format!("{}({}", all.fold.name(), head_module(&all.head))));
+            if let Some(term) = all.term {
+                parts.extend([Task::Text(": "), Task::Node(term.root, 0)]);
+            }
+            parts.push(Task::Text(")"));
+        }
+        Expr::Parenthesis(a) => parts.extend([Task::Text("("), Task::Node(*a, 0), Task::Text(")")]),
+    }
+}
+
+/// `2c`: a number directly before its factor. Only a name, a call or a parenthesis can stand there.
+fn push_scaled(expressions: &Expressions, factor: f64, a: ExprId, own: u8, parts: &mut Vec<Task>) {
+    parts.push(Task::Owned(factor.to_string()));
+    let first = leftmost(expressions, a);
+    let bare = matches!(first, Expr::Name(_) | Expr::Call(..) | Expr::Index(..) | Expr::Parenthesis(_))
+        && strength(expressions.get(a)) >= own
+        && !exponent_like(first);
+    if bare {
+        parts.push(Task::Node(a, own));
+    } else {
+        parts.extend([Task::Text("("), Task::Node(a, 0), Task::Text(")")]);
+    }
 }
 
 /// The first thing that is written of an expression.
@@ -209,7 +199,8 @@ pub fn head_module(module: &HeadModule) -> String {
     }
 }
 
-fn names(names: &[Name], between: &str) -> String {
+/// Names with something between them.
+pub(crate) fn names(names: &[Name], between: &str) -> String {
     let texts: Vec<&str> = names.iter().map(|n| &*n.text).collect();
     texts.join(between)
 }
@@ -234,16 +225,6 @@ pub fn head(rule: &crate::ast::Rule) -> String {
         }
     }
     out
-}
-
-/// The word for a sort of curve, which the default does not need.
-fn sort_word(sort: Sort, default: Sort) -> &'static str {
-    match sort {
-        sort if sort == default => "",
-        Sort::Linear => "linear ",
-        Sort::Monotone => "monotone ",
-        Sort::Spline => "spline ",
-    }
 }
 
 /// The successors of a clause, with their weights.
@@ -271,110 +252,57 @@ fn discrete_rule(expressions: &Expressions, rule: &crate::ast::Rule) -> String {
     text
 }
 
+/// A rule: its head, then one line for each `let` and each clause.
+pub(crate) fn rule(expressions: &Expressions, rule: &crate::ast::Rule) -> String {
+    if rule.discrete {
+        return discrete_rule(expressions, rule);
+    }
+    let mut text = head(rule) + ":";
+    for (name, value) in &rule.locals {
+        text += &format!("\n  let {} = {}", name.text, expression(expressions, value.root));
+    }
+    for one in &rule.clauses {
+        text += "\n  ";
+        text += &clause(expressions, one);
+    }
+    text
+}
+
+fn clause(expressions: &Expressions, clause: &Clause) -> String {
+    let mut text = String::new();
+    if let Some(guard) = &clause.guard {
+        text += &format!("if {}\n    ", expression(expressions, guard.root));
+    }
+    if let Some(hazard) = &clause.hazard {
+        text += &format!("at rate {}\n    ", expression(expressions, hazard.root));
+    }
+    match &clause.action {
+        Action::Solve(equations) => {
+            let all: Vec<String> = equations.iter().map(|one| equation(expressions, one)).collect();
+            text += &format!("solve {}", all.join(", "));
+        }
+        Action::Produce(successors) => {
+            text += &format!("produce {}", alternatives(expressions, successors).join("\n      or "));
+        }
+    }
+    text
+}
+
+fn equation(expressions: &Expressions, equation: &Equation) -> String {
+    let right = expression(expressions, equation.expression().root);
+    match equation {
+        Equation::Rate { parameter, .. } => format!("d{}/dt = {right}", parameter.text),
+        Equation::Value { parameter, .. } => format!("{} = {right}", parameter.text),
+        Equation::Zero { unknown: None, .. } => format!("0 = {right}"),
+        Equation::Zero { unknown: Some(name), .. } => format!("0 = {right} for {}", name.text),
+    }
+}
+
 /// A whole document, one declaration a line, one clause a line.
 pub fn document(document: &Document) -> String {
-    let e = &document.expressions;
-    let show = |x: &crate::ast::Expression| expression(e, x.root);
     let mut out = String::new();
     for (item, _) in &document.items {
-        out += &match item {
-            Item::Title(text) => format!("title \"{text}\""),
-            Item::Const { name, value } => format!("const {} = {}", name.text, show(value)),
-            Item::Include(file) => format!("include \"{}\"", file.text),
-            Item::Array { name, values } => {
-                let values: Vec<String> = values.iter().map(show).collect();
-                format!("const {} = [{}]", name.text, values.join(", "))
-            }
-            Item::Curve { name, sort, points, periodic } => {
-                let points: Vec<String> =
-                    points.iter().map(|[x, y]| format!("({}, {})", show(x), show(y))).collect();
-                let end = if *periodic { " periodic" } else { "" };
-                format!("curve {}{} = {}{end}", sort_word(*sort, Sort::Monotone), name.text, points.join(" "))
-            }
-            Item::Table { name, sort, file, column, periodic } => {
-                let column = column.as_ref().map(|c| format!(" column \"{}\"", c.text)).unwrap_or_default();
-                let end = if *periodic { " periodic" } else { "" };
-                let sort = sort_word(*sort, Sort::Linear);
-                format!("table {sort}{} from \"{}\"{column}{end}", name.text, file.text)
-            }
-            Item::Param { name, value, range: None } => format!("param {} = {}", name.text, show(value)),
-            Item::Param { name, value, range: Some((a, b)) } => {
-                format!("param {} = {} in {} .. {}", name.text, show(value), show(a), show(b))
-            }
-            Item::Def { name, parameters, body } => {
-                format!("def {}({}) = {}", name.text, names(parameters, ", "), show(body))
-            }
-            Item::Angle(value) => format!("angle {}", show(value)),
-            Item::Period(value) => format!("period {}", show(value)),
-            Item::Frames { from, to, step } => {
-                format!("frames {} .. {} step {}", show(from), show(to), show(step))
-            }
-            Item::Color { name, value } => format!("color {} = \"{}\"", name.text, value.text),
-            Item::Gradient { name, stops } => {
-                let stops: Vec<String> = stops.iter().map(|stop| format!("\"{}\"", stop.text)).collect();
-                format!("gradient {} = {}", name.text, stops.join(", "))
-            }
-            Item::Surface { name, file } => format!("surface {} from \"{}\"", name.text, file.text),
-            Item::Contour { name, points } => {
-                let points: Vec<String> =
-                    points.iter().map(|[x, y]| format!("({}, {})", show(x), show(y))).collect();
-                format!("contour {} = {}", name.text, points.join(" "))
-            }
-            Item::Tropism { direction, strength } => {
-                let [x, y, z] = direction.each_ref().map(show);
-                let strength = strength.as_ref().map(|e| format!(" strength {}", show(e)));
-                format!("tropism {x}, {y}, {z}{}", strength.unwrap_or_default())
-            }
-            Item::Ignore(list) => format!("ignore {}", names(list, " ")),
-            Item::Consider(list) => format!("consider {}", names(list, " ")),
-            Item::Axiom(string) => format!("initial string: {}", modules(e, string)),
-            Item::Interpret { head, drawn } => {
-                format!("interpret {}: {}", head_module(head), modules(e, drawn))
-            }
-            Item::Rule(rule) if rule.discrete => discrete_rule(e, rule),
-            Item::Rule(rule) => {
-                let mut text = head(rule) + ":";
-                for (name, value) in &rule.locals {
-                    text += &format!("\n  let {} = {}", name.text, show(value));
-                }
-                for clause in &rule.clauses {
-                    text += "\n  ";
-                    if let Some(guard) = &clause.guard {
-                        text += &format!("if {}\n    ", show(guard));
-                    }
-                    if let Some(hazard) = &clause.hazard {
-                        text += &format!("at rate {}\n    ", show(hazard));
-                    }
-                    match &clause.action {
-                        Action::Solve(equations) => {
-                            let all: Vec<String> = equations
-                                .iter()
-                                .map(|q| match q {
-                                    Equation::Rate { parameter, rate } => {
-                                        format!("d{}/dt = {}", parameter.text, show(rate))
-                                    }
-                                    Equation::Value { parameter, value } => {
-                                        format!("{} = {}", parameter.text, show(value))
-                                    }
-                                    Equation::Zero { residual, unknown: None, .. } => {
-                                        format!("0 = {}", show(residual))
-                                    }
-                                    Equation::Zero { residual, unknown: Some(name), .. } => {
-                                        format!("0 = {} for {}", show(residual), name.text)
-                                    }
-                                })
-                                .collect();
-                            text += &format!("solve {}", all.join(", "));
-                        }
-                        Action::Produce(successors) => {
-                            let all = alternatives(e, successors);
-                            text += &format!("produce {}", all.join("\n      or "));
-                        }
-                    }
-                }
-                text
-            }
-        };
+        out += &notation::write(&document.expressions, item);
         out.push('\n');
     }
     out

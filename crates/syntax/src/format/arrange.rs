@@ -212,7 +212,7 @@ impl Cursor {
 
     /// Keeps count of brackets, and of where a declared string begins.
     fn follow(&mut self, piece: &Piece<'_>, before: Option<&Piece<'_>>, made: &Made) {
-        let declared = matches!(piece.kind, ItemKind::Axiom | ItemKind::Interpret);
+        let declared = piece.kind.has_string();
         if declared && before.is_some_and(|before| before.place == Place::Colon) {
             self.string = Some((made.width - piece.text.chars().count(), piece.column));
         }

@@ -18,6 +18,7 @@
 mod arrange;
 mod pieces;
 
+use crate::Errors;
 use crate::ast::Document;
 use crate::{parse, print};
 use dlsys_diagnostic::{Diagnostic, Source};
@@ -28,10 +29,10 @@ use pieces::lines;
 ///
 /// # Errors
 /// What is wrong with a text that cannot be parsed. Nothing is said about what it means.
-pub fn format(source: &Source) -> Result<String, Vec<Diagnostic>> {
+pub fn format(source: &Source) -> Result<String, Errors> {
     let (document, errors) = parse::parse(source);
     if !errors.is_empty() {
-        return Err(errors);
+        return Err(errors.into());
     }
     let mut text = arrange::arrange(&lines(&source.text));
     if source.text.contains("\r\n") {
@@ -41,7 +42,7 @@ pub fn format(source: &Source) -> Result<String, Vec<Diagnostic>> {
     if !kept(&source.text, &text) || !says_the_same(&document, &text) {
         let fault = Diagnostic::error("this text cannot be laid out without changing what it says")
             .help("leave its layout as it is; please report it with the text");
-        return Err(vec![fault]);
+        return Err(fault.into());
     }
     Ok(text)
 }

@@ -1,5 +1,6 @@
 //! A text as lines of pieces: tokens as the grammar sees them, so that nothing is put between what belongs together.
 
+use crate::declarations::Body;
 use crate::layout::{ItemKind, RawItem, lexemes};
 use crate::lexeme::{Lexeme, Token};
 
@@ -139,8 +140,9 @@ impl<'t> Reader<'t, '_> {
             },
             None => Place::Head,
         };
-        let names = matches!(kind, ItemKind::Ignore | ItemKind::Consider);
-        let head = matches!(kind, ItemKind::Rule | ItemKind::Interpret) && place != Place::Body;
+        let names = kind.body() == Some(Body::Names);
+        let has_head = kind == ItemKind::Rule || kind.body() == Some(Body::Drawing);
+        let head = has_head && place != Place::Body;
         Piece {
             text: &self.text[first.start..until],
             token: first.token,

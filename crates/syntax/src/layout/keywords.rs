@@ -1,6 +1,7 @@
 //! Words that begin a string or an expression, what is open behind them, and line breaks, which may end it.
 
 use super::{ItemKind, Last, Level, Scanner};
+use crate::declarations::{Follow, OptionWord, options};
 use crate::lexeme::Token;
 
 impl Scanner<'_> {
@@ -62,11 +63,18 @@ impl Scanner<'_> {
                 self.pending -= dropped;
                 Last::Operator
             }
-            "step" | "in" | "string" => Last::Operator,
             "for" if in_rule && !inside && !self.in_string && self.last == Last::Operand => Last::Operator,
-            "strength" if self.items.last().is_some_and(|i| i.kind == ItemKind::Tropism) => Last::Operator,
+            word if self.goes_on_after(word) => Last::Operator,
             _ => Last::Operand,
         }
+    }
+
+    /// Whether a word is an option with a value behind it, so that a line break between them ends nothing.
+    fn goes_on_after(&self, word: &str) -> bool {
+        let declaration = self.items.last().and_then(|item| item.kind.declaration());
+        let is = |option: &OptionWord, follow| option.word == word && option.follow == follow;
+        options().any(|option| is(option, Follow::ValueEverywhere))
+            || declaration.is_some_and(|d| d.options.iter().any(|option| is(option, Follow::Value)))
     }
 
     fn count_if(&mut self, yes: bool) {

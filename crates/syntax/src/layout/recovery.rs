@@ -3,7 +3,8 @@
 //!
 //! A colon that lacks is complained about once, and put in: so the rule is read, and its other mistakes are found.
 
-use super::{DECLARATIONS, ItemKind, RawItem, Scanner};
+use super::{ItemKind, RawItem, Scanner};
+use crate::declarations::{self, Body};
 use crate::foreign_syntax;
 use crate::lexeme::Token;
 use crate::suggest::nearest;
@@ -35,14 +36,13 @@ impl Scanner<'_> {
             Some(ItemKind::Unknown) => {}
             None if current == ItemKind::Unknown => {}
             // In the successor of a clause, another clause may follow.
-            None if in_string
-                && matches!(current, ItemKind::Axiom | ItemKind::Interpret | ItemKind::Step) => {}
+            None if in_string && (current.has_string() || current == ItemKind::Step) => {}
             _ => return None,
         }
         let clause = self.first_clause(tokens)?;
         // In a drawing, `if` may be what somebody takes for a condition of it.
         let acts = |t: &Lexed| matches!(self.word(*t), "solve" | "produce");
-        if current == ItemKind::Interpret && !tokens.iter().any(acts) {
+        if current.body() == Some(Body::Drawing) && !tokens.iter().any(acts) {
             return None;
         }
         match clause {
@@ -109,7 +109,7 @@ impl Scanner<'_> {
         }
         let Some(&next) = rest.first() else { return foreign_syntax::stands_alone(word) };
         // A number behind a name may be the parameter of a module.
-        let meant = || nearest(word, DECLARATIONS.iter().map(|(name, _)| *name)).is_some();
+        let meant = || nearest(word, declarations::words()).is_some();
         if next.0 == Token::Number && meant() {
             return true;
         }

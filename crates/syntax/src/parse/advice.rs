@@ -1,6 +1,7 @@
 //! Advice for texts that cannot be parsed: how the declaration at hand is written.
 
 use super::Rule;
+use crate::declarations::Declaration;
 
 /// Advice for curves, tables, arrays and names within rules, by the text before the place and what was found there.
 pub fn for_block(item: Rule, before: &str, found: &str) -> Option<&'static str> {
@@ -29,30 +30,14 @@ pub fn for_block(item: Rule, before: &str, found: &str) -> Option<&'static str> 
     }
 }
 
-/// How a declaration is written, for mistakes about which nothing better is known.
+/// How a declaration or rule is written, for mistakes about which nothing better is known.
 pub fn usage(item: Rule) -> &'static str {
     match item {
-        Rule::title_item => "a title is written `title \"Anabaena\"`",
-        Rule::const_item => "a constant is written `const k = 0.5`",
-        Rule::param_item => "a param is written `param r = 0.5`, or with a range `param r = 0.5 in 0 .. 1`",
-        Rule::def_item => "a function is written `def growth(x, r) = r*x`",
-        Rule::include_item => "other texts are taken in by `include \"organs.dls\"`",
-        Rule::curve_item => "a curve is written `curve g = (0, 0) (1, 0.3) (2, 1)`",
-        Rule::table_item => "a table is written `table g from \"file.csv\"`",
-        Rule::angle_item => "the angle is written `angle 45`, in degrees",
-        Rule::period_item => "the period of discrete rules is written `period 1`",
-        Rule::frames_item => "frames are written `frames 0 .. 10 step 0.1`",
-        Rule::color_item => "a colour is written `color rose = \"#e573a5\"`",
-        Rule::gradient_item => "a gradient is written `gradient leaf = \"#b9cf6a\", \"#4d7d38\"`",
-        Rule::surface_item => "a surface is written `surface @P from \"petal.s\"`",
-        Rule::contour_item => "a contour is written `contour leaf = (1, 0) (0, 0.3) (-1, 0) (0, -0.3)`",
-        Rule::tropism_item => "a tropism is written `tropism 0, -1, 0 strength 0.2`",
-        Rule::ignore_item => "modules that are no context are written `ignore F_x @L`",
-        Rule::consider_item => "the modules that are context are written `consider F A`",
-        Rule::interpret_item => "a drawing is written `interpret A(x): !(0.1) F(x)`",
         Rule::step_item => "a discrete rule is written `A(x) : x > 3 -> F(x) A(x/2)`",
-        Rule::modules => "a string of modules is written `F(1) [ +(45) A(0) ] A(0)`",
-        _ => "a rule is written `A(x): if x < 1 solve dx/dt = 1 if x = 1 produce F(x) A(0)`",
+        _ => Declaration::of_rule(item).map_or(
+            "a rule is written `A(x): if x < 1 solve dx/dt = 1 if x = 1 produce F(x) A(0)`",
+            |declaration| declaration.written,
+        ),
     }
 }
 

@@ -1,21 +1,22 @@
 //! From pest's pairs to the syntax tree.
 
 use std::collections::{HashMap, HashSet};
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
-use super::{Pair, Rule};
+pub(crate) use super::Pair;
+use super::Rule;
 use crate::ast;
 use crate::ast::{
     Action, Alternative, Clause, Equation, Expr, ExprId, Expression, Expressions, HeadModule, Item, Module,
     Name, Text, Turn,
 };
+use crate::notation;
 use dlsys_diagnostic::{Diagnostic, Span};
-use dlsys_expr::Sort;
 
 /// Most symbols and names of a weight outside parentheses.
 const MAX_WEIGHT: usize = 200;
 
-pub(super) type Built<T> = Result<T, Box<Diagnostic>>;
+pub(crate) type Built<T> = Result<T, Box<Diagnostic>>;
 
 /// Keeps one copy of each name.
 #[derive(Default)]
@@ -49,164 +50,75 @@ impl Builder<'_> {
         Span::new(self.offset + span.start(), self.offset + span.start() + len)
     }
 
-    fn name(&mut self, pair: &Pair) -> Name {
+    pub(crate) fn name(&mut self, pair: &Pair) -> Name {
         Name { text: self.interner.get(pair.as_str()), span: self.span(pair) }
     }
 
-    fn text(&self, pair: &Pair) -> Text {
+    pub(crate) fn text(&self, pair: &Pair) -> Text {
         let inside = pair.as_str();
         Text { text: inside[1..inside.len() - 1].to_owned(), span: self.span(pair) }
     }
 
+    /// A declaration or a rule.
     pub fn item(&mut self, pair: Pair) -> Built<Item> {
-        let rule = pair.as_rule();
-        let mut inner = pair.into_inner().filter(|p| !is_punctuation(p.as_rule())).peekable();
-        let mut next = || inner.next().expect("the grammar has a part here");
-        Ok(match rule {
-            Rule::title_item => {
-                let text = next().into_inner().next().expect("the grammar has a text here");
-                Item::Title(text.as_str().to_owned())
-            }
-            Rule::include_item => Item::Include(self.text(&next())),
-            Rule::const_item => {
-                let (name, value) = (self.name(&next()), next());
-                if value.as_rule() == Rule::array {
-                    let values = value.into_inner().map(|p| self.expression(p)).collect::<Built<_>>()?;
-                    Item::Array { name, values }
-                } else {
-                    Item::Const { name, value: self.expression(value)? }
-                }
-            }
-            Rule::curve_item => {
-                let (sort, name) = self.sorted_name(&mut inner, Sort::Monotone);
-                let (mut points, mut periodic) = (Vec::new(), false);
-                for part in inner {
-                    match part.as_rule() {
-                        Rule::point => points.push(self.point(part)?),
-                        _ => periodic = true,
-                    }
-                }
-                Item::Curve { name, sort, points, periodic }
-            }
-            Rule::table_item => {
-                let (sort, name) = self.sorted_name(&mut inner, Sort::Linear);
-                let file = self.text(&inner.next().expect("the grammar has a file here"));
-                let (mut column, mut periodic) = (None, false);
-                for part in inner {
-                    match part.as_rule() {
-                        Rule::text => column = Some(self.text(&part)),
-                        _ => periodic = true,
-                    }
-                }
-                Item::Table { name, sort, file, column, periodic }
-            }
-            Rule::param_item => {
-                let (name, value) = (self.name(&next()), self.expression(next())?);
-                let range = match inner.next() {
-                    Some(from) => {
-                        let to = inner.next().expect("a range has two ends");
-                        Some((self.expression(from)?, self.expression(to)?))
-                    }
-                    None => None,
-                };
-                Item::Param { name, value, range }
-            }
-            Rule::def_item => Item::Def {
-                name: self.name(&next()),
-                parameters: self.formals(next()),
-                body: self.expression(next())?,
-            },
-            Rule::angle_item => Item::Angle(self.expression(next())?),
-            Rule::period_item => Item::Period(self.expression(next())?),
-            Rule::frames_item => Item::Frames {
-                from: self.expression(next())?,
-                to: self.expression(next())?,
-                step: self.expression(next())?,
-            },
-            Rule::color_item => Item::Color { name: self.name(&next()), value: self.text(&next()) },
-            Rule::gradient_item => {
-                Item::Gradient { name: self.name(&next()), stops: inner.map(|p| self.text(&p)).collect() }
-            }
-            Rule::surface_item => Item::Surface { name: self.name(&next()), file: self.text(&next()) },
-            Rule::contour_item => {
+        match pair.as_rule() {
+            Rule::rule_item => self.rule(pair),
+            Rule::step_item => self.discrete_rule(pair),
+            _ => notation::read(self, pair),
+        }
+    }
+
+    fn rule(&mut self, pair: Pair) -> Built<Item> {
+        let mut inner = pair.into_inner().filter(|p| !is_punctuation(p.as_rule()));
+        let head = inner.next().expect("the grammar has a head here");
+        let first = self.expressions.next();
+        let mut rule = self.head(head);
+        for part in inner {
+            if part.as_rule() == Rule::local {
+                let mut inner = part.into_inner().filter(|p| !is_punctuation(p.as_rule()));
+                let mut next = || inner.next().expect("a name and its meaning");
                 let name = self.name(&next());
-                Item::Contour { name, points: inner.map(|p| self.point(p)).collect::<Built<Vec<_>>>()? }
+                rule.locals.push((name, self.expression(next())?));
+            } else {
+                rule.clauses.push(self.clause(part)?);
             }
-            Rule::tropism_item => {
-                let direction =
-                    [self.expression(next())?, self.expression(next())?, self.expression(next())?];
-                let strength = inner.next().map(|p| self.expression(p)).transpose()?;
-                Item::Tropism { direction, strength }
-            }
-            Rule::ignore_item => Item::Ignore(inner.map(|p| self.name(&p)).collect()),
-            Rule::consider_item => Item::Consider(inner.map(|p| self.name(&p)).collect()),
-            Rule::interpret_item => {
-                Item::Interpret { head: self.head_module(next()), drawn: self.successor(next())? }
-            }
-            Rule::rule_item => {
-                let head = next();
-                let first = self.expressions.next();
-                let mut rule = self.head(head);
-                for part in inner {
-                    if part.as_rule() == Rule::local {
-                        let mut inner = part.into_inner().filter(|p| !is_punctuation(p.as_rule()));
-                        let mut next = || inner.next().expect("a name and its meaning");
-                        let name = self.name(&next());
-                        rule.locals.push((name, self.expression(next())?));
-                    } else {
-                        rule.clauses.push(self.clause(part)?);
-                    }
-                }
-                rule.nodes = (first, self.expressions.next());
-                Item::Rule(rule)
-            }
-            Rule::step_item => {
-                let head = next();
-                let first = self.expressions.next();
-                let mut rule = self.head(head);
-                rule.discrete = true;
-                let (mut guard, mut made) = (None, Vec::new());
-                let mut span = rule.head;
-                for part in inner {
-                    span = span.to(self.span(&part));
-                    match part.as_rule() {
-                        Rule::expr => guard = Some(self.expression(part)?),
-                        Rule::successor | Rule::choice => made = self.alternatives(part)?,
-                        _ => {}
-                    }
-                }
-                rule.clauses.push(Clause { guard, hazard: None, action: Action::Produce(made), span });
-                rule.nodes = (first, self.expressions.next());
-                Item::Rule(rule)
-            }
-            other => unreachable!("{other:?} is no item"),
-        })
+        }
+        rule.nodes = (first, self.expressions.next());
+        Ok(Item::Rule(rule))
     }
 
-    /// The name of a curve, after the word for its sort if there is one.
-    fn sorted_name<'i>(&mut self, inner: &mut impl Iterator<Item = Pair<'i>>, default: Sort) -> (Sort, Name) {
-        let mut next = || inner.next().expect("the grammar has a name here");
-        let first = next();
-        let sort = match (first.as_rule(), first.as_str()) {
-            (Rule::sort, "linear") => Sort::Linear,
-            (Rule::sort, "spline") => Sort::Spline,
-            (Rule::sort, _) => Sort::Monotone,
-            _ => return (default, self.name(&first)),
-        };
-        (sort, self.name(&next()))
+    fn discrete_rule(&mut self, pair: Pair) -> Built<Item> {
+        let mut inner = pair.into_inner().filter(|p| !is_punctuation(p.as_rule()));
+        let head = inner.next().expect("the grammar has a head here");
+        let first = self.expressions.next();
+        let mut rule = self.head(head);
+        rule.discrete = true;
+        let (mut guard, mut made) = (None, Vec::new());
+        let mut span = rule.head;
+        for part in inner {
+            span = span.to(self.span(&part));
+            match part.as_rule() {
+                Rule::expr => guard = Some(self.expression(part)?),
+                Rule::successor | Rule::choice => made = self.alternatives(part)?,
+                _ => {}
+            }
+        }
+        rule.clauses.push(Clause { guard, hazard: None, action: Action::Produce(made), span });
+        rule.nodes = (first, self.expressions.next());
+        Ok(Item::Rule(rule))
     }
 
-    fn point(&mut self, pair: Pair) -> Built<[Expression; 2]> {
+    pub(crate) fn point(&mut self, pair: Pair) -> Built<[Expression; 2]> {
         let mut ends = pair.into_inner().filter(|p| p.as_rule() == Rule::expr);
         let mut coordinate = || self.expression(ends.next().expect("a point has two coordinates"));
         Ok([coordinate()?, coordinate()?])
     }
 
-    fn formals(&mut self, pair: Pair) -> Vec<Name> {
+    pub(crate) fn formals(&mut self, pair: Pair) -> Vec<Name> {
         pair.into_inner().filter(|p| p.as_rule() == Rule::ident).map(|p| self.name(&p)).collect()
     }
 
-    pub(super) fn head_module(&mut self, pair: Pair) -> HeadModule {
+    pub(crate) fn head_module(&mut self, pair: Pair) -> HeadModule {
         let span = self.span(&pair);
         let sign = pair.as_rule() == Rule::plus_minus;
         let mut inner = pair.into_inner();
@@ -340,7 +252,7 @@ impl Builder<'_> {
         Ok(Equation::Rate { parameter, rate: self.expression(right())? })
     }
 
-    fn successor(&mut self, pair: Pair) -> Built<Vec<Module>> {
+    pub(crate) fn successor(&mut self, pair: Pair) -> Built<Vec<Module>> {
         pair.into_inner().filter(|p| p.as_rule() == Rule::module).map(|p| self.module(p)).collect()
     }
 
@@ -367,37 +279,22 @@ impl Builder<'_> {
     }
 }
 
-pub(super) fn is_punctuation(rule: Rule) -> bool {
-    matches!(
-        rule,
-        Rule::equals
-            | Rule::colon
-            | Rule::close
-            | Rule::range
-            | Rule::kw_include
-            | Rule::kw_curve
-            | Rule::kw_table
-            | Rule::kw_column
-            | Rule::kw_let
-            | Rule::kw_const
-            | Rule::kw_param
-            | Rule::kw_def
-            | Rule::kw_angle
-            | Rule::kw_period
-            | Rule::kw_frames
-            | Rule::kw_step
-            | Rule::kw_in
-            | Rule::kw_color
-            | Rule::kw_gradient
-            | Rule::kw_surface
-            | Rule::kw_from
-            | Rule::kw_contour
-            | Rule::kw_tropism
-            | Rule::kw_strength
-            | Rule::kw_ignore
-            | Rule::kw_consider
-            | Rule::kw_interpret
-            | Rule::kw_for
-            | Rule::EOI
-    )
+/// True for signs and words that carry no information once the grammar has read them.
+pub(crate) fn is_punctuation(rule: Rule) -> bool {
+    matches!(rule, Rule::equals | Rule::colon | Rule::close | Rule::range | Rule::EOI)
+        || keyword(rule).is_some()
+}
+
+/// The word in backquotes that a rule of the grammar stands for; those rules are known by their names, `kw_…`.
+pub(super) fn keyword(rule: Rule) -> Option<&'static str> {
+    static WORDS: LazyLock<Vec<Option<String>>> = LazyLock::new(|| {
+        let mut words = Vec::new();
+        for rule in Rule::all_rules() {
+            let word = format!("{rule:?}").strip_prefix("kw_").map(|word| format!("`{word}`"));
+            words.resize(words.len().max(*rule as usize + 1), None);
+            words[*rule as usize] = word;
+        }
+        words
+    });
+    WORDS.get(rule as usize)?.as_deref()
 }

@@ -6,9 +6,11 @@ use pest::error::{Error, ErrorVariant, InputLocation};
 
 use super::Rule;
 use super::advice;
+use super::build::keyword;
 use super::hints::{hint, is_derivative, keyword_hint};
+use crate::declarations::{self, Declaration};
 use crate::foreign_syntax;
-use crate::layout::{DECLARATIONS, RawItem};
+use crate::layout::RawItem;
 use dlsys_diagnostic::{Diagnostic, Span};
 
 /// A grammar rule as a person would call it; `None` for what is never named alone.
@@ -29,30 +31,21 @@ fn words(rule: Rule) -> Option<&'static str> {
         left_of => "`<` after the left context",
         right_of => "`>` and the right context",
         clause => "`if`, `solve` or `produce`",
-        local | kw_let => "`let`",
-        kw_match => "`match`",
-        kw_case => "`case`",
+        local => "`let`",
         kw_column => "`column` and its name",
         periodic => "`periodic`",
         sort => "`linear`, `monotone` or `spline`",
         kw_or => "`or` and another successor",
         hazard | kw_at => "`at rate`",
-        kw_rate => "`rate`",
         solve | kw_solve => "`solve`",
         produce | kw_produce => "`produce`",
         right_context => "a module",
         bracket_open => "`[`",
         bracket_close => "`]`",
-        aggregate | fold | kw_count => "an expression",
+        aggregate | fold | count_word => "an expression",
         kw_for => "`for` and a parameter",
-        kw_if => "`if`",
-        kw_then => "`then`",
-        kw_else => "`else`",
-        kw_dt => "`dt`",
-        kw_step => "`step`",
         kw_in => "`in` and a range",
         kw_from => "`from` and a file",
-        kw_strength => "`strength`",
         surface_name => "the name of a surface such as `@P`",
         point => "a point such as `(1, 0.5)`",
         equation | derivative | rate | zero => "an equation such as `dx/dt = …`, `x = …` or `0 = …`",
@@ -62,7 +55,8 @@ fn words(rule: Rule) -> Option<&'static str> {
         range => "`..`",
         text | text_body => "a text in quotes",
         EOI => "the end of the line",
-        _ => return None,
+        // The word of the declaration itself is there.
+        _ => return keyword(rule).filter(|known| Declaration::of_word(known.trim_matches('`')).is_none()),
     })
 }
 
@@ -132,18 +126,9 @@ pub fn explain(item: Rule, error: &Error<Rule>, text: &str, offset: usize) -> Di
     Diagnostic::error(message).at(span, what).help(advice.unwrap_or_else(|| advice::usage(item).to_owned()))
 }
 
+/// True for a declaration whose word is followed by a name without a mark.
 pub(super) fn is_item_with_name(item: Rule) -> bool {
-    matches!(
-        item,
-        Rule::const_item
-            | Rule::param_item
-            | Rule::def_item
-            | Rule::color_item
-            | Rule::gradient_item
-            | Rule::contour_item
-            | Rule::curve_item
-            | Rule::table_item
-    )
+    Declaration::of_rule(item).is_some_and(|declaration| declaration.named.is_word())
 }
 
 /// The word, number or symbol at a place.
@@ -175,7 +160,7 @@ pub fn unknown_line(text: &str, item: &RawItem) -> Diagnostic {
         return said;
     }
     let whole = &text[item.start..item.end];
-    let mut names: Vec<&'static str> = DECLARATIONS.iter().map(|(name, _)| *name).collect();
+    let mut names: Vec<&'static str> = declarations::words().collect();
     names.extend(["if", "solve", "produce"]);
     let diagnostic = Diagnostic::error(format!("`{first}` begins no declaration and no rule"))
         .at(span, "expected a declaration, or the head of a rule such as `F(x):`");
@@ -197,7 +182,7 @@ pub fn unknown_line(text: &str, item: &RawItem) -> Diagnostic {
     if line.contains('=') {
         return diagnostic.help("a constant is declared with `const NAME = VALUE`");
     }
-    let known: Vec<&str> = DECLARATIONS.iter().map(|(name, _)| *name).collect();
+    let known: Vec<&str> = declarations::words().collect();
     diagnostic
         .note(format!("declarations begin with {}", known.join(", ")))
         .help("a rule has a head with a colon, and clauses: `A(x): solve dx/dt = 1`")

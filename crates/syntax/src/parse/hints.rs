@@ -3,7 +3,7 @@
 use super::Rule;
 use super::advice;
 use super::expected::is_item_with_name;
-use crate::layout::DECLARATIONS;
+use crate::declarations;
 use crate::suggest::nearest;
 
 /// Advice for mistakes that people make.
@@ -11,7 +11,7 @@ pub(super) fn hint(item: Rule, text: &str, at: usize, found: &str) -> Option<Str
     let first = text.split_whitespace().next().unwrap_or_default();
     let first = first.trim_end_matches(|c: char| !c.is_alphanumeric());
     if matches!(item, Rule::rule_item)
-        && let Some(word) = nearest(first, DECLARATIONS.iter().map(|(name, _)| *name))
+        && let Some(word) = nearest(first, declarations::words())
         && first.len() > 3
     {
         return Some(format!("did you mean `{word}`?"));

@@ -7,7 +7,7 @@
 //! Each item is parsed alone: its mistakes are reported, the others are read all the same.
 
 mod advice;
-mod build;
+pub(crate) mod build;
 mod expected;
 mod expression;
 mod hints;
@@ -16,17 +16,24 @@ use std::collections::HashSet;
 
 use pest::Parser;
 
+use crate::Errors;
 use crate::ast::{Document, Expression, HeadModule, Item, Module};
+use crate::declarations::{Body, Named};
 use crate::foreign_syntax;
 use crate::layout::{ItemKind, RawItem, layout};
 use dlsys_diagnostic::{Diagnostic, Source, Span};
 
-/// The pest parser of `grammars/dlsys.pest`.
-#[derive(pest_derive::Parser)]
-#[grammar = "../grammars/dlsys.pest"]
-pub(super) struct Grammar;
+/// The pest parser of `grammars/dlsys.pest`, and its rules.
+#[allow(missing_docs)] // The macro documents nothing.
+mod grammar {
+    #[derive(pest_derive::Parser)]
+    #[grammar = "../grammars/dlsys.pest"]
+    pub struct Grammar;
+}
 
-type Pair<'i> = pest::iterators::Pair<'i, Rule>;
+pub(crate) use grammar::{Grammar, Rule};
+
+pub(crate) type Pair<'i> = pest::iterators::Pair<'i, Rule>;
 
 /// Most errors that are collected from one text; who wants more can mend these first.
 const MAX_ERRORS: usize = 50;
@@ -64,7 +71,9 @@ impl Reader {
             let known = foreign_syntax::commented_definitions(text);
             self.document.commented.extend(known.map(|(name, meaning)| (name.into(), meaning.to_owned())));
         }
-        let functions = cut.items.iter().filter(|item| item.kind == ItemKind::Def);
+        let functions = cut.items.iter().filter(|item| {
+            item.kind.declaration().is_some_and(|declaration| declaration.named == Named::Function)
+        });
         self.defined.extend(functions.filter_map(|item| declared_word(&cut.text, item).map(str::to_owned)));
         let mut items = Vec::new();
         for item in &cut.items {
@@ -100,11 +109,11 @@ fn declared_word<'t>(text: &'t str, item: &RawItem) -> Option<&'t str> {
     let mut words = line.split(|c: char| !(c.is_alphanumeric() || c == '_')).filter(|w| !w.is_empty());
     let first = words.next()?;
     let name = match item.kind {
-        ItemKind::Const | ItemKind::Param | ItemKind::Def => words.next()?,
-        ItemKind::Color | ItemKind::Gradient | ItemKind::Contour => words.next()?,
-        ItemKind::Curve | ItemKind::Table => {
-            words.find(|word| !matches!(*word, "linear" | "monotone" | "spline"))?
-        }
+        ItemKind::Declaration(declaration) => match declaration.named {
+            Named::Word | Named::Function => words.next()?,
+            Named::AfterOption => words.find(|word| !declaration.has_before_name(word))?,
+            _ => return None,
+        },
         ItemKind::Unknown if line.strip_prefix(first)?.trim_start().starts_with('=') => first,
         ItemKind::Unknown => words.next()?,
         _ => return None,
@@ -113,10 +122,10 @@ fn declared_word<'t>(text: &'t str, item: &RawItem) -> Option<&'t str> {
 }
 
 /// Reads one expression.
-pub fn parse_expression(source: &Source) -> Result<(Document, Expression), Vec<Diagnostic>> {
+pub fn parse_expression(source: &Source) -> Result<(Document, Expression), Errors> {
     let cut = layout(&format!("const it =\n{}", source.text));
     if !cut.errors.is_empty() {
-        return Err(cut.errors);
+        return Err(cut.errors.into());
     }
     let mut document = Document::default();
     let mut interner = build::Interner::default();
@@ -126,17 +135,17 @@ pub fn parse_expression(source: &Source) -> Result<(Document, Expression), Vec<D
         offset: 0,
         defined: None,
     };
-    let pair = pest_parse(Rule::lone_expr, &source.text, 0).map_err(|e| vec![*e])?;
+    let pair = pest_parse(Rule::lone_expr, &source.text, 0).map_err(|e| Errors::from(*e))?;
     let inner = pair.into_inner().next().expect("the grammar has an expression here");
-    let expression = builder.expression(inner).map_err(|e| vec![*e])?;
+    let expression = builder.expression(inner).map_err(|e| Errors::from(*e))?;
     Ok((document, expression))
 }
 
 /// Reads what is to be measured: the head of a module, and the expression that is added up, if it is not just counted.
-pub fn parse_measure(source: &Source) -> Result<(Document, HeadModule, Option<Expression>), Vec<Diagnostic>> {
+pub fn parse_measure(source: &Source) -> Result<(Document, HeadModule, Option<Expression>), Errors> {
     let cut = layout(&format!("const it =\n{}", source.text));
     if !cut.errors.is_empty() {
-        return Err(vec![Diagnostic::error("this cannot be measured").help(MEASURE)]);
+        return Err(Diagnostic::error("this cannot be measured").help(MEASURE).into());
     }
     let mut document = Document::default();
     let mut interner = build::Interner::default();
@@ -146,8 +155,8 @@ pub fn parse_measure(source: &Source) -> Result<(Document, HeadModule, Option<Ex
         offset: 0,
         defined: None,
     };
-    let pair = pest_parse(Rule::measure, &source.text, 0).map_err(|e| vec![(*e).help(MEASURE)])?;
-    let (head, expression) = builder.measure(pair).map_err(|e| vec![*e])?;
+    let pair = pest_parse(Rule::measure, &source.text, 0).map_err(|e| Errors::from((*e).help(MEASURE)))?;
+    let (head, expression) = builder.measure(pair).map_err(|e| Errors::from(*e))?;
     Ok((document, head, expression))
 }
 
@@ -168,27 +177,12 @@ fn pest_parse(rule: Rule, text: &str, offset: usize) -> Result<Pair<'_>, Box<Dia
 
 fn read_item(text: &str, item: &RawItem, builder: &mut build::Builder) -> Result<Item, Box<Diagnostic>> {
     let rule = match item.kind {
-        ItemKind::Title => Rule::title_item,
-        ItemKind::Include => Rule::include_item,
-        ItemKind::Curve => Rule::curve_item,
-        ItemKind::Table => Rule::table_item,
-        ItemKind::Const => Rule::const_item,
-        ItemKind::Param => Rule::param_item,
-        ItemKind::Def => Rule::def_item,
-        ItemKind::Angle => Rule::angle_item,
-        ItemKind::Period => Rule::period_item,
-        ItemKind::Frames => Rule::frames_item,
-        ItemKind::Color => Rule::color_item,
-        ItemKind::Gradient => Rule::gradient_item,
-        ItemKind::Surface => Rule::surface_item,
-        ItemKind::Contour => Rule::contour_item,
-        ItemKind::Tropism => Rule::tropism_item,
-        ItemKind::Ignore => Rule::ignore_item,
-        ItemKind::Consider => Rule::consider_item,
-        ItemKind::Interpret => Rule::interpret_item,
+        ItemKind::Declaration(declaration) if declaration.body == Body::String => {
+            return read_axiom(text, item, builder);
+        }
+        ItemKind::Declaration(declaration) => declaration.rule,
         ItemKind::Rule => Rule::rule_item,
         ItemKind::Step => Rule::step_item,
-        ItemKind::Axiom => return read_axiom(text, item, builder),
         ItemKind::Unknown => return Err(Box::new(expected::unknown_line(text, item))),
     };
     builder.offset = item.start;

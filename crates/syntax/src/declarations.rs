@@ -1,0 +1,428 @@
+//! The table of declarations: the one place where a declaration's word, notation and description stand.
+//!
+//! The first pass over a text, the parser's messages, `dlsys fmt`, the outline of a text, and completion, hints and help
+//! of the interactive session are derived from it. To add a declaration: a row here, its rule in `grammars/dlsys.pest`, a
+//! variant of [`Item`](crate::ast::Item), and how that is read and printed in `notation.rs`; then its meaning, in
+//! `dlsys-compile` and `dlsys-model`.
+
+use crate::parse::Rule;
+
+/// A kind of declaration.
+#[derive(Debug)]
+#[non_exhaustive]
+pub struct Declaration {
+    /// The word that begins it.
+    pub word: &'static str,
+    /// How it goes on after that word, for somebody who types it.
+    pub usage: &'static str,
+    /// One sentence about its meaning.
+    pub summary: &'static str,
+    /// The group in which help lists it.
+    pub category: Category,
+    /// Whether its word is followed by a name that it declares.
+    pub named: Named,
+    /// Which other declarations cannot stand beside it.
+    pub repeats: Repeats,
+    /// What follows its head.
+    pub body: Body,
+    /// Words that it may contain.
+    pub options: &'static [OptionWord],
+    /// Whether its word may also be the name of a module or parameter.
+    pub(crate) begins: Begins,
+    /// An example as a sentence, for mistakes about which nothing better is known.
+    pub(crate) written: &'static str,
+    /// The entry rule of the grammar.
+    pub(crate) rule: Rule,
+}
+
+/// Two declarations are the same if the grammar reads them alike: `initial string:` and `axiom:` are.
+impl PartialEq for Declaration {
+    fn eq(&self, other: &Declaration) -> bool {
+        self.rule == other.rule
+    }
+}
+
+impl Eq for Declaration {}
+
+/// What a declaration is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
+pub enum Category {
+    /// The text itself.
+    Text,
+    /// Numbers and functions.
+    Values,
+    /// Times at which something happens.
+    Time,
+    /// What modules look like.
+    Looks,
+    /// Strings of modules.
+    Modules,
+}
+
+impl Category {
+    /// All categories, in the order in which help lists them.
+    pub const ALL: [Category; 5] =
+        [Category::Text, Category::Values, Category::Time, Category::Looks, Category::Modules];
+
+    /// A heading for its declarations.
+    pub fn title(self) -> &'static str {
+        match self {
+            Category::Text => "text",
+            Category::Values => "values",
+            Category::Time => "time",
+            Category::Looks => "looks",
+            Category::Modules => "modules",
+        }
+    }
+}
+
+/// The name that a declaration makes known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Named {
+    /// It has none.
+    No,
+    /// A word: `const k = …`.
+    Word,
+    /// A word, maybe after one of the options: `curve linear g = …`.
+    AfterOption,
+    /// The name of a function: `def f(x) = …`.
+    Function,
+    /// A name with its mark: `surface @P from …`.
+    Surface,
+}
+
+impl Named {
+    /// True if the name is a word of letters, digits and `_`.
+    pub fn is_word(self) -> bool {
+        matches!(self, Named::Word | Named::AfterOption | Named::Function)
+    }
+}
+
+/// Which declarations replace one another where a text is put together piece by piece; in one text, two of them are an
+/// error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Repeats {
+    /// A text has one of them.
+    Once,
+    /// One for each name. Declarations with the same word here share their names.
+    PerName(&'static str),
+    /// One for each head of a module.
+    PerHead,
+    /// One for each file.
+    PerFile,
+    /// Any number.
+    Freely,
+}
+
+/// What follows the head of a declaration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Body {
+    /// Expressions and texts; a line break ends it.
+    Line,
+    /// Names of modules.
+    Names,
+    /// A `:` and a string of modules, in which line breaks mean nothing.
+    String,
+    /// The head of a module, a `:` and a string of modules.
+    Drawing,
+}
+
+/// When the word of a declaration begins one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Begins {
+    /// Wherever a declaration may begin: no module has this name.
+    Always,
+    /// Where a word or a text follows and no `:` makes it the head of a rule. For words that came later than models in which
+    /// modules are called like them.
+    BeforeName,
+}
+
+/// A word inside a declaration that is no name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct OptionWord {
+    /// The word as it is written.
+    pub word: &'static str,
+    /// What must follow it.
+    pub follow: Follow,
+}
+
+/// What follows an option.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Follow {
+    /// The name that is declared, on the same line.
+    Name,
+    /// A text in quotes, on the same line.
+    Text,
+    /// An expression; a line break before that ends nothing.
+    Value,
+    /// The same, and the word does so in every declaration and rule.
+    ValueEverywhere,
+    /// Nothing: the option ends the declaration.
+    Nothing,
+}
+
+const fn option(word: &'static str, follow: Follow) -> OptionWord {
+    OptionWord { word, follow }
+}
+
+const SORTS: [OptionWord; 3] =
+    [option("monotone", Follow::Name), option("spline", Follow::Name), option("linear", Follow::Name)];
+
+/// A row with what most declarations have in common.
+const fn row(word: &'static str, rule: Rule) -> Declaration {
+    Declaration {
+        word,
+        usage: "",
+        summary: "",
+        category: Category::Values,
+        named: Named::No,
+        repeats: Repeats::Once,
+        body: Body::Line,
+        options: &[],
+        begins: Begins::Always,
+        written: "",
+        rule,
+    }
+}
+
+/// All declarations, in the order in which messages list them.
+pub static DECLARATIONS: [Declaration; 20] = [
+    Declaration {
+        usage: "\"…\"",
+        summary: "the title of the model, shown above its pictures",
+        category: Category::Text,
+        written: "a title is written `title \"Anabaena\"`",
+        ..row("title", Rule::title_item)
+    },
+    Declaration {
+        usage: "\"FILE\"",
+        summary: "takes in the declarations and rules of another file",
+        category: Category::Text,
+        repeats: Repeats::PerFile,
+        begins: Begins::BeforeName,
+        written: "other texts are taken in by `include \"organs.dls\"`",
+        ..row("include", Rule::include_item)
+    },
+    Declaration {
+        usage: "NAME = VALUE, or NAME = [VALUE, …]",
+        summary: "a name for a number, or for an array of numbers",
+        named: Named::Word,
+        repeats: Repeats::PerName("value"),
+        written: "a constant is written `const k = 0.5`",
+        ..row("const", Rule::const_item)
+    },
+    Declaration {
+        usage: "NAME = VALUE in LOW .. HIGH",
+        summary: "a number that can be set from outside the model, with `set` or `--set`",
+        named: Named::Word,
+        repeats: Repeats::PerName("value"),
+        options: &[option("in", Follow::ValueEverywhere)],
+        written: "a param is written `param r = 0.5`, or with a range `param r = 0.5 in 0 .. 1`",
+        ..row("param", Rule::param_item)
+    },
+    Declaration {
+        usage: "NAME(x, …) = EXPRESSION",
+        summary: "a function of numbers",
+        named: Named::Function,
+        repeats: Repeats::PerName("value"),
+        written: "a function is written `def growth(x, r) = r*x`",
+        ..row("def", Rule::def_item)
+    },
+    Declaration {
+        usage: "monotone|spline|linear NAME = (x, y) (x, y) … periodic",
+        summary: "a function that goes through these points",
+        named: Named::AfterOption,
+        repeats: Repeats::PerName("value"),
+        options: &[SORTS[0], SORTS[1], SORTS[2], option("periodic", Follow::Nothing)],
+        begins: Begins::BeforeName,
+        written: "a curve is written `curve g = (0, 0) (1, 0.3) (2, 1)`",
+        ..row("curve", Rule::curve_item)
+    },
+    Declaration {
+        usage: "NAME from \"FILE\" column \"COLUMN\"",
+        summary: "a function that goes through the points of a file of comma-separated values",
+        named: Named::AfterOption,
+        repeats: Repeats::PerName("value"),
+        options: &[
+            SORTS[0],
+            SORTS[1],
+            SORTS[2],
+            option("from", Follow::Text),
+            option("column", Follow::Text),
+            option("periodic", Follow::Nothing),
+        ],
+        begins: Begins::BeforeName,
+        written: "a table is written `table g from \"file.csv\"`",
+        ..row("table", Rule::table_item)
+    },
+    Declaration {
+        usage: "DEGREES",
+        summary: "the angle of turns without a parameter; 90 if it is not given",
+        category: Category::Looks,
+        written: "the angle is written `angle 45`, in degrees",
+        ..row("angle", Rule::angle_item)
+    },
+    Declaration {
+        usage: "DURATION",
+        summary: "discrete rules apply at its multiples; 1 if it is not given",
+        category: Category::Time,
+        written: "the period of discrete rules is written `period 1`",
+        ..row("period", Rule::period_item)
+    },
+    Declaration {
+        usage: "FROM .. TO step STEP",
+        summary: "the times of an animation, and those that `run` prints",
+        category: Category::Time,
+        options: &[option("step", Follow::ValueEverywhere)],
+        written: "frames are written `frames 0 .. 10 step 0.1`",
+        ..row("frames", Rule::frames_item)
+    },
+    Declaration {
+        usage: "NAME = \"#rrggbb\"",
+        summary: "a name for a colour, used as `;(NAME)`",
+        category: Category::Looks,
+        named: Named::Word,
+        repeats: Repeats::PerName("color"),
+        written: "a colour is written `color rose = \"#e573a5\"`",
+        ..row("color", Rule::color_item)
+    },
+    Declaration {
+        usage: "NAME = \"#rrggbb\", \"#rrggbb\", …",
+        summary: "a name for a range of colours, used as `;(NAME, v)` with v from 0 to 1",
+        category: Category::Looks,
+        named: Named::Word,
+        repeats: Repeats::PerName("color"),
+        written: "a gradient is written `gradient leaf = \"#b9cf6a\", \"#4d7d38\"`",
+        ..row("gradient", Rule::gradient_item)
+    },
+    Declaration {
+        usage: "@NAME from \"FILE\"",
+        summary: "a surface from a file (.s or .obj), drawn by `@NAME(s)` at the size s",
+        category: Category::Looks,
+        named: Named::Surface,
+        repeats: Repeats::PerName("surface"),
+        options: &[option("from", Follow::Text)],
+        written: "a surface is written `surface @P from \"petal.s\"`",
+        ..row("surface", Rule::surface_item)
+    },
+    Declaration {
+        usage: "NAME = (x, y) (x, y) …",
+        summary: "a cross-section of stems, chosen by `@C(NAME)`",
+        category: Category::Looks,
+        named: Named::Word,
+        repeats: Repeats::PerName("contour"),
+        written: "a contour is written `contour leaf = (1, 0) (0, 0.3) (-1, 0) (0, -0.3)`",
+        ..row("contour", Rule::contour_item)
+    },
+    Declaration {
+        usage: "X, Y, Z strength E",
+        summary: "a direction towards which all headings bend",
+        category: Category::Looks,
+        options: &[option("strength", Follow::Value)],
+        written: "a tropism is written `tropism 0, -1, 0 strength 0.2`",
+        ..row("tropism", Rule::tropism_item)
+    },
+    Declaration {
+        usage: "NAME …",
+        summary: "modules that the search for context passes over",
+        category: Category::Modules,
+        repeats: Repeats::Freely,
+        body: Body::Names,
+        written: "modules that are no context are written `ignore F_x @L`",
+        ..row("ignore", Rule::ignore_item)
+    },
+    Declaration {
+        usage: "NAME …",
+        summary: "the only modules that the search for context does not pass over",
+        category: Category::Modules,
+        repeats: Repeats::Freely,
+        body: Body::Names,
+        written: "the modules that are context are written `consider F A`",
+        ..row("consider", Rule::consider_item)
+    },
+    Declaration {
+        usage: "string: MODULE …",
+        summary: "the modules at t = 0",
+        category: Category::Modules,
+        body: Body::String,
+        options: &[option("string", Follow::ValueEverywhere)],
+        written: "a string of modules is written `F(1) [ +(45) A(0) ] A(0)`",
+        ..row("initial", Rule::modules)
+    },
+    Declaration {
+        usage: ": MODULE …",
+        summary: "another word for `initial string`",
+        category: Category::Modules,
+        body: Body::String,
+        written: "a string of modules is written `F(1) [ +(45) A(0) ] A(0)`",
+        ..row("axiom", Rule::modules)
+    },
+    Declaration {
+        usage: "HEAD: MODULE …",
+        summary: "modules that are drawn in place of one",
+        category: Category::Modules,
+        repeats: Repeats::PerHead,
+        body: Body::Drawing,
+        written: "a drawing is written `interpret A(x): !(0.1) F(x)`",
+        ..row("interpret", Rule::interpret_item)
+    },
+];
+
+impl Declaration {
+    /// The declaration that a word begins.
+    pub fn of_word(word: &str) -> Option<&'static Declaration> {
+        DECLARATIONS.iter().find(|declaration| declaration.word == word)
+    }
+
+    /// The declaration that a rule of the grammar reads.
+    pub(crate) fn of_rule(rule: Rule) -> Option<&'static Declaration> {
+        DECLARATIONS.iter().find(|declaration| declaration.rule == rule)
+    }
+
+    /// True if it ends with a string of modules.
+    pub fn has_string(&self) -> bool {
+        matches!(self.body, Body::String | Body::Drawing)
+    }
+
+    /// True if this word may stand before the name that is declared.
+    pub(crate) fn has_before_name(&self, word: &str) -> bool {
+        self.options.iter().any(|option| option.word == word && option.follow == Follow::Name)
+    }
+}
+
+/// All options of all declarations; a word that several have is there several times.
+pub fn options() -> impl Iterator<Item = &'static OptionWord> {
+    DECLARATIONS.iter().flat_map(|declaration| declaration.options)
+}
+
+/// The words that begin a declaration.
+pub fn words() -> impl Iterator<Item = &'static str> + Clone {
+    DECLARATIONS.iter().map(|declaration| declaration.word)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_declaration_is_described() {
+        for Declaration { word, usage, summary, written, .. } in &DECLARATIONS {
+            assert!(!usage.is_empty() && !summary.is_empty() && written.contains('`'), "{word}");
+        }
+    }
+
+    #[test]
+    fn words_are_unique_and_belong_to_a_category() {
+        let mut all: Vec<&str> = words().collect();
+        all.sort_unstable();
+        all.dedup();
+        assert_eq!(all.len(), DECLARATIONS.len());
+        let listed = Category::ALL.iter().map(|c| DECLARATIONS.iter().filter(|d| d.category == *c).count());
+        assert_eq!(listed.sum::<usize>(), DECLARATIONS.len());
+    }
+}

@@ -1,0 +1,229 @@
+//! The notation of each declaration: from the pairs of the parser to the syntax tree, and from the tree to text.
+//!
+//! Reading and printing stand together so that they agree: what is printed reads back as the same tree.
+
+use crate::ast::{Expression, Expressions, Item, Name, Text};
+use crate::parse::Rule;
+use crate::parse::build::{Builder, Built, Pair, is_punctuation};
+use crate::print;
+use dlsys_expr::Sort;
+
+/// The sort of a curve, and that of a table, if the text does not say it.
+const CURVE: Sort = Sort::Monotone;
+const TABLE: Sort = Sort::Linear;
+
+/// Reads a declaration; the initial string is read in pieces elsewhere.
+pub(crate) fn read(builder: &mut Builder, pair: Pair) -> Built<Item> {
+    let rule = pair.as_rule();
+    let pairs: Vec<Pair> = pair.into_inner().filter(|p| !is_punctuation(p.as_rule())).collect();
+    let mut parts = Parts { builder, pairs: pairs.into_iter() };
+    Ok(match rule {
+        Rule::title_item => {
+            let text = parts.pair().into_inner().next().expect("the grammar has a text here");
+            Item::Title(text.as_str().to_owned())
+        }
+        Rule::include_item => Item::Include(parts.text()),
+        Rule::const_item => parts.constant()?,
+        Rule::curve_item => {
+            let (sort, name) = parts.sorted_name(CURVE);
+            Item::Curve { name, sort, points: parts.points()?, periodic: parts.has(Rule::periodic) }
+        }
+        Rule::table_item => {
+            let (sort, name) = parts.sorted_name(TABLE);
+            let (file, column) = (parts.text(), parts.text_if_any());
+            Item::Table { name, sort, file, column, periodic: parts.has(Rule::periodic) }
+        }
+        Rule::param_item => {
+            let (name, value) = (parts.name(), parts.expression()?);
+            let range = match parts.expression_if_any()? {
+                Some(from) => Some((from, parts.expression()?)),
+                None => None,
+            };
+            Item::Param { name, value, range }
+        }
+        Rule::def_item => {
+            let (name, formals) = (parts.name(), parts.pair());
+            let parameters = parts.builder.formals(formals);
+            Item::Def { name, parameters, body: parts.expression()? }
+        }
+        Rule::angle_item => Item::Angle(parts.expression()?),
+        Rule::period_item => Item::Period(parts.expression()?),
+        Rule::frames_item => {
+            Item::Frames { from: parts.expression()?, to: parts.expression()?, step: parts.expression()? }
+        }
+        Rule::color_item => Item::Color { name: parts.name(), value: parts.text() },
+        Rule::gradient_item => Item::Gradient { name: parts.name(), stops: parts.texts() },
+        Rule::surface_item => Item::Surface { name: parts.name(), file: parts.text() },
+        Rule::contour_item => Item::Contour { name: parts.name(), points: parts.points()? },
+        Rule::tropism_item => {
+            let direction = [parts.expression()?, parts.expression()?, parts.expression()?];
+            Item::Tropism { direction, strength: parts.expression_if_any()? }
+        }
+        Rule::ignore_item => Item::Ignore(parts.names()),
+        Rule::consider_item => Item::Consider(parts.names()),
+        Rule::interpret_item => {
+            let (head, string) = (parts.pair(), parts.pair());
+            Item::Interpret { head: parts.builder.head_module(head), drawn: parts.builder.successor(string)? }
+        }
+        other => unreachable!("{other:?} is no declaration"),
+    })
+}
+
+/// A declaration or rule as text, without a line break at its end.
+pub(crate) fn write(expressions: &Expressions, item: &Item) -> String {
+    let show = |x: &Expression| print::expression(expressions, x.root);
+    match item {
+        Item::Title(text) => format!("title \"{text}\""),
+        Item::Include(file) => format!("include \"{}\"", file.text),
+        Item::Const { name, value } => format!("const {} = {}", name.text, show(value)),
+        Item::Array { name, values } => {
+            let values: Vec<String> = values.iter().map(show).collect();
+            format!("const {} = [{}]", name.text, values.join(", "))
+        }
+        Item::Curve { name, sort, points, periodic } => {
+            let points = written_points(expressions, points);
+            format!("curve {}{} = {points}{}", sort_word(*sort, CURVE), name.text, ending(*periodic))
+        }
+        Item::Table { name, sort, file, column, periodic } => {
+            let column = column.as_ref().map(|c| format!(" column \"{}\"", c.text)).unwrap_or_default();
+            let sort = sort_word(*sort, TABLE);
+            format!("table {sort}{} from \"{}\"{column}{}", name.text, file.text, ending(*periodic))
+        }
+        Item::Param { name, value, range: None } => format!("param {} = {}", name.text, show(value)),
+        Item::Param { name, value, range: Some((a, b)) } => {
+            format!("param {} = {} in {} .. {}", name.text, show(value), show(a), show(b))
+        }
+        Item::Def { name, parameters, body } => {
+            format!("def {}({}) = {}", name.text, print::names(parameters, ", "), show(body))
+        }
+        Item::Angle(value) => format!("angle {}", show(value)),
+        Item::Period(value) => format!("period {}", show(value)),
+        Item::Frames { from, to, step } => {
+            format!("frames {} .. {} step {}", show(from), show(to), show(step))
+        }
+        Item::Color { name, value } => format!("color {} = \"{}\"", name.text, value.text),
+        Item::Gradient { name, stops } => {
+            let stops: Vec<String> = stops.iter().map(|stop| format!("\"{}\"", stop.text)).collect();
+            format!("gradient {} = {}", name.text, stops.join(", "))
+        }
+        Item::Surface { name, file } => format!("surface {} from \"{}\"", name.text, file.text),
+        Item::Contour { name, points } => {
+            format!("contour {} = {}", name.text, written_points(expressions, points))
+        }
+        Item::Tropism { direction, strength } => {
+            let [x, y, z] = direction.each_ref().map(show);
+            let strength = strength.as_ref().map(|e| format!(" strength {}", show(e)));
+            format!("tropism {x}, {y}, {z}{}", strength.unwrap_or_default())
+        }
+        Item::Ignore(list) => format!("ignore {}", print::names(list, " ")),
+        Item::Consider(list) => format!("consider {}", print::names(list, " ")),
+        Item::Axiom(string) => format!("initial string: {}", print::modules(expressions, string)),
+        Item::Interpret { head, drawn } => {
+            format!("interpret {}: {}", print::head_module(head), print::modules(expressions, drawn))
+        }
+        Item::Rule(rule) => print::rule(expressions, rule),
+    }
+}
+
+/// The parts of a declaration, in the order written. The grammar has checked that those which must be there are.
+struct Parts<'p, 'd, 'i> {
+    builder: &'p mut Builder<'d>,
+    pairs: std::vec::IntoIter<Pair<'i>>,
+}
+
+impl<'i> Parts<'_, '_, 'i> {
+    fn pair(&mut self) -> Pair<'i> {
+        self.pairs.next().expect("the grammar has a part here")
+    }
+
+    /// The next part, if it is of this kind.
+    fn pair_if(&mut self, rule: Rule) -> Option<Pair<'i>> {
+        let is = self.pairs.as_slice().first().is_some_and(|pair| pair.as_rule() == rule);
+        if is { self.pairs.next() } else { None }
+    }
+
+    fn has(&mut self, rule: Rule) -> bool {
+        self.pair_if(rule).is_some()
+    }
+
+    fn name(&mut self) -> Name {
+        let pair = self.pair();
+        self.builder.name(&pair)
+    }
+
+    fn names(&mut self) -> Vec<Name> {
+        self.pairs.by_ref().map(|pair| self.builder.name(&pair)).collect()
+    }
+
+    fn text(&mut self) -> Text {
+        let pair = self.pair();
+        self.builder.text(&pair)
+    }
+
+    fn text_if_any(&mut self) -> Option<Text> {
+        self.pair_if(Rule::text).map(|pair| self.builder.text(&pair))
+    }
+
+    fn texts(&mut self) -> Vec<Text> {
+        self.pairs.by_ref().map(|pair| self.builder.text(&pair)).collect()
+    }
+
+    fn expression(&mut self) -> Built<Expression> {
+        let pair = self.pair();
+        self.builder.expression(pair)
+    }
+
+    fn expression_if_any(&mut self) -> Built<Option<Expression>> {
+        self.pair_if(Rule::expr).map(|pair| self.builder.expression(pair)).transpose()
+    }
+
+    fn points(&mut self) -> Built<Vec<[Expression; 2]>> {
+        let mut points = Vec::new();
+        while let Some(pair) = self.pair_if(Rule::point) {
+            points.push(self.builder.point(pair)?);
+        }
+        Ok(points)
+    }
+
+    /// A number, or an array of numbers.
+    fn constant(&mut self) -> Built<Item> {
+        let name = self.name();
+        let value = self.pair();
+        if value.as_rule() != Rule::array {
+            return Ok(Item::Const { name, value: self.builder.expression(value)? });
+        }
+        let values = value.into_inner().map(|p| self.builder.expression(p)).collect::<Built<_>>()?;
+        Ok(Item::Array { name, values })
+    }
+
+    /// The name of a curve, after the word for its sort if there is one.
+    fn sorted_name(&mut self, default: Sort) -> (Sort, Name) {
+        let sort = match self.pair_if(Rule::sort).as_ref().map(Pair::as_str) {
+            Some("linear") => Sort::Linear,
+            Some("spline") => Sort::Spline,
+            Some(_) => Sort::Monotone,
+            None => default,
+        };
+        (sort, self.name())
+    }
+}
+
+/// The word for a sort of curve, which the default does not need.
+fn sort_word(sort: Sort, default: Sort) -> &'static str {
+    match sort {
+        sort if sort == default => "",
+        Sort::Linear => "linear ",
+        Sort::Monotone => "monotone ",
+        Sort::Spline => "spline ",
+    }
+}
+
+fn ending(periodic: bool) -> &'static str {
+    if periodic { " periodic" } else { "" }
+}
+
+fn written_points(expressions: &Expressions, points: &[[Expression; 2]]) -> String {
+    let show = |x: &Expression| print::expression(expressions, x.root);
+    let points: Vec<String> = points.iter().map(|[x, y]| format!("({}, {})", show(x), show(y))).collect();
+    points.join(" ")
+}
