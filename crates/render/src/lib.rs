@@ -68,6 +68,7 @@ mod relay;
 mod sheet;
 mod stroke;
 mod text;
+mod trace;
 mod triangles;
 mod triangulate;
 mod tube;

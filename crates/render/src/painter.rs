@@ -13,7 +13,7 @@ use std::fmt::Write;
 
 use super::name::Names;
 use super::stroke::{Stroke, Strokes};
-use super::{Fit, number, triangulate};
+use super::{Fit, number, trace, triangulate};
 use dlsys_geometry::scene::{Color, MaterialId, OwnerId, Point, Polygon, Scene, Segment, Surface, Vector};
 
 /// Decimals of a coordinate. The larger side of a picture is 100 to 1000 units, so the last digit is a
@@ -40,6 +40,12 @@ pub(super) struct Style<'a> {
 /// The elements of a scene, one a line. Names are those of modules; without them the elements have none, and `prefix`
 /// begins the ids of gradients, which must differ in a document.
 pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -> String {
+    // In a drawing without depth nothing is hidden, and every element keeps its shape.
+    if !style.fit.light.is_flat()
+        && let Some(traced) = trace::elements(scene, style, named, prefix)
+    {
+        return traced;
+    }
     let names = named.then(|| Names::new(scene, '-'));
     let mut painter = Painter {
         scene,

@@ -106,6 +106,68 @@ pub(super) fn draw<const N: usize>(
     Image { width, height, pixels }
 }
 
+/// The nearest triangle in the middle of each pixel: its number plus 1, or 0, and its depth. Of two at the same depth it is the later.
+pub(super) fn nearest(
+    [width, height]: [usize; 2],
+    count: usize,
+    corners: impl Fn(usize) -> [Corner; 3],
+) -> (Vec<u32>, Vec<f32>) {
+    const MIDDLE: Pattern<1> = [(0, 0)];
+    let (mut numbers, mut depths) = (vec![0; width * height], vec![f32::NEG_INFINITY; width * height]);
+    for number in 0..count {
+        let Some(triangle) = Triangle::new(&MIDDLE, number, corners(number), width, height) else { continue };
+        let [least, greatest] = triangle.depths;
+        let [origin, right, down] = triangle.depth;
+        for row in triangle.rows[0]..=triangle.rows[1] {
+            for column in triangle.columns[0]..=triangle.columns[1] {
+                let inside = (0..3).all(|k| {
+                    let [a, b, c] = triangle.sides[k];
+                    let corner =
+                        a * (column as i64 * STEPS) + b * (row as i64 * STEPS) + c + triangle.bias[k];
+                    corner + triangle.at_samples[k][0] >= 0
+                });
+                if !inside {
+                    continue;
+                }
+                let depth = origin + right * (column as f64 + 0.5) + down * (row as f64 + 0.5);
+                let depth = depth.clamp(least, greatest) as f32;
+                let held = &mut depths[row * width + column];
+                if depth + EQUAL >= *held {
+                    *held = depth.max(*held);
+                    numbers[row * width + column] = number as u32 + 1;
+                }
+            }
+        }
+    }
+    (numbers, depths)
+}
+
+/// Weights of corners in the middle of pixels, of one triangle after another.
+#[derive(Default)]
+pub(super) struct Weights {
+    triangle: Option<Triangle<1>>,
+}
+
+impl Weights {
+    /// The weights of a triangle's corners in the middle of a pixel, or near it if that is outside.
+    pub(super) fn at(
+        &mut self,
+        number: usize,
+        corners: impl FnOnce() -> [Corner; 3],
+        [column, row]: [usize; 2],
+    ) -> [f64; 3] {
+        if self.triangle.as_ref().is_none_or(|triangle| triangle.number != number) {
+            let far = FARTHEST as usize;
+            self.triangle = Triangle::new(&[(0, 0)], number, corners(), far, far);
+        }
+        let middle = |at: usize| at as i64 * STEPS + STEPS / 2;
+        match &self.triangle {
+            Some(triangle) => triangle.weights(middle(column), middle(row)),
+            None => [1.0 / 3.0; 3],
+        }
+    }
+}
+
 /// A coordinate in steps.
 fn snap(x: f64) -> i64 {
     (x.clamp(-FARTHEST, FARTHEST) * STEPS as f64).round() as i64

@@ -14,6 +14,8 @@ use dlsys_geometry::scene::{Color, Point, Scene, Segment};
 
 /// Stems thinner than this part of the picture's larger side (2.5 pixels of 1000) have one colour.
 const THIN: f64 = 0.0025;
+/// Stems thinner than this part are lines also where surfaces are regions: 1.2 pixels of 1000.
+const HAIR: f64 = 0.0012;
 /// Places across a stem at which its colour is given: its edges are at -1 and 1.
 const PLACES: [f64; 5] = [-1.0, -0.55, 0.0, 0.55, 1.0];
 /// Least cosine of the angle between two pieces of a straight line.
@@ -21,6 +23,17 @@ const STRAIGHT: f64 = 0.999_99;
 /// How far a piece of a line reaches under the one that continues it, in parts of the picture's larger side: less
 /// can be seen as a seam.
 const OVERLAP: f64 = 0.0004;
+
+/// True for a stem that is too thin for shades across it, though the scene has depth.
+pub(super) fn is_thin(segment: &Segment, style: Style) -> bool {
+    let Style { fit, scale, side } = style;
+    let width = |i: usize, p: Point| {
+        segment.widths[i].resolve(fit.default_width)
+            * scale
+            * fit.camera.magnification(fit.camera.project(p).z)
+    };
+    (width(0, segment.start) + width(1, segment.end)) / 2.0 < HAIR * side
+}
 
 /// How a segment is drawn.
 pub(super) enum Stroke {
@@ -138,7 +151,9 @@ impl<'a> Strokes<'a> {
         let (dx, dy) = (b.x - a.x, b.y - a.y);
         let length = dx.hypot(dy);
         if light.is_flat() || width < THIN * self.style.side || length < 1e-3 * width {
-            return lit(strengths.iter().sum::<f64>() / PLACES.len() as f64).to_string();
+            // The mean over the width, by the trapezoidal rule.
+            const SHARES: [f64; PLACES.len()] = [0.1125, 0.25, 0.275, 0.25, 0.1125];
+            return lit(strengths.iter().zip(SHARES).map(|(s, share)| s * share).sum()).to_string();
         }
         // In the picture y goes down; the stem's left is on the left of one who walks along it.
         let (ux, uy) = (dx / length, dy / length);

@@ -11,7 +11,7 @@ use std::ops::Range;
 
 use super::tube::Tubes;
 use super::{Fit, triangulate};
-use dlsys_geometry::scene::{MaterialId, OwnerId, Point, Scene, Vector};
+use dlsys_geometry::scene::{MaterialId, OwnerId, Point, Scene, Segment, Vector};
 
 /// Takes vertices and normals, in the order of their numbers.
 pub(super) trait Points {
@@ -275,6 +275,7 @@ impl<'s> Solid<'s> {
 
 /// A triangle: vertex and normal at each corner, by number.
 pub(super) struct Triangle {
+    pub(super) owner: OwnerId,
     pub(super) material: MaterialId,
     pub(super) corners: [(u32, u32); 3],
 }
@@ -284,6 +285,8 @@ pub(super) struct Triangles {
     pub(super) vertices: Vec<Point>,
     pub(super) normals: Vec<Vector>,
     pub(super) faces: Vec<Triangle>,
+    /// Of the triangles that come next.
+    owner: OwnerId,
     material: MaterialId,
 }
 
@@ -299,21 +302,34 @@ impl Points for Triangles {
 
 impl Faces for Triangles {
     fn face(&mut self, corners: [(u32, u32); 3]) {
-        self.faces.push(Triangle { material: self.material, corners });
+        self.faces.push(Triangle { owner: self.owner, material: self.material, corners });
     }
 }
 
-/// Everything in a scene as triangles, in string order; stems as tubes with so many sides.
-pub(super) fn triangles(scene: &Scene, fit: &Fit, sides: usize) -> Triangles {
+/// Everything in a scene as triangles, in string order; stems as tubes with so many sides, if they are to be `kept`.
+pub(super) fn triangles(
+    scene: &Scene,
+    fit: &Fit,
+    sides: usize,
+    kept: impl Fn(&Segment) -> bool,
+) -> Triangles {
     let solid = Solid::new(scene, fit, sides);
     let [vertices, normals] = solid.counts.map(|count| count as usize);
     let mut mesh = Triangles {
         vertices: Vec::with_capacity(vertices),
         normals: Vec::with_capacity(normals),
         faces: Vec::with_capacity(2 * vertices),
+        owner: OwnerId::default(),
         material: MaterialId::STEM,
     };
     solid.points(0..solid.len(), &mut mesh);
-    solid.faces(&solid.by_owner(), &mut mesh, |mesh, _, material| mesh.material = material);
+    let mut items = solid.by_owner();
+    items.retain(|&n| match solid.item(n as usize) {
+        Item::Stem(piece) => kept(solid.tubes.segment(piece)),
+        _ => true,
+    });
+    solid.faces(&items, &mut mesh, |mesh, owner, material| {
+        (mesh.owner, mesh.material) = (owner, material);
+    });
     mesh
 }

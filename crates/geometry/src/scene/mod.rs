@@ -50,7 +50,7 @@ pub struct Owner {
 }
 
 /// An [`Owner`] of a [`Scene`], by number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct OwnerId(u32);
 
 impl OwnerId {

@@ -4,8 +4,9 @@ use std::io::{self, Write};
 
 use super::{Content, Description, Drawing, Exporter};
 use crate::raster::{self, Corner, Image};
-use crate::{Fit, Page, Smoothness, triangles};
-use dlsys_geometry::scene::{Color, Scene, Vector};
+use crate::triangles::{self, Triangles};
+use crate::{Fit, Page, Smoothness};
+use dlsys_geometry::scene::{Color, Point, Scene, Vector};
 
 /// How far a tube's outline may be from a circle, in pixels.
 const ROUNDNESS: f64 = 0.1;
@@ -50,36 +51,11 @@ pub(crate) fn picture(
     smoothness: Smoothness,
     threads: usize,
 ) -> Image {
-    let mesh = triangles::triangles(scene, fit, sides(scene, fit, a));
-    let scale = if fit.extent > 0.0 { 1.0 / fit.extent } else { 1.0 };
-    let places: Vec<[f64; 3]> = mesh
-        .vertices
-        .iter()
-        .map(|&p| {
-            let p = fit.camera.project(p);
-            [a * p.x + b, c - a * p.y, p.z]
-        })
-        .collect();
-    let normals: Vec<Vector> = mesh.normals.iter().map(|&n| fit.camera.direction(n)).collect();
-    let corners = |n: usize| {
-        mesh.faces[n].corners.map(|(vertex, _)| {
-            let [x, y, z] = places[vertex as usize];
-            Corner { x, y, depth: z * scale }
-        })
-    };
+    let mesh = triangles::triangles(scene, fit, sides(scene, fit, a), |_| true);
+    let lit = Lit::new(&mesh, fit, [a, b, c]);
+    let corners = |n: usize| lit.corners(n);
     let shade = |n: usize, weights: [f64; 3]| {
-        let face = &mesh.faces[n];
-        let [p, q, r] = face.corners.map(|(vertex, _)| places[vertex as usize]);
-        // Of a surface that is seen from behind, the back is lit. Pixels go down.
-        let facing = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]) < 0.0;
-        let (mut normal, mut depth) = (Vector::zeros(), 0.0);
-        for (k, weight) in weights.into_iter().enumerate() {
-            let (vertex, at) = face.corners[k];
-            normal += normals[at as usize] * weight;
-            depth += places[vertex as usize][2] * weight;
-        }
-        let normal = normal.try_normalize(1e-12).unwrap_or_else(Vector::z) * if facing { 1.0 } else { -1.0 };
-        scene.palette.get(face.material).color.lit(fit.light.strength(normal, depth))
+        scene.palette.get(mesh.faces[n].material).color.lit(lit.strength(n, weights))
     };
     let count = mesh.faces.len();
     match smoothness {
@@ -88,8 +64,57 @@ pub(crate) fn picture(
     }
 }
 
+/// Triangles in pixels, and the light on them.
+pub(crate) struct Lit<'m> {
+    mesh: &'m Triangles,
+    fit: &'m Fit,
+    /// By vertex: pixels to the right and down, and depth in scene units.
+    places: Vec<[f64; 3]>,
+    normals: Vec<Vector>,
+    scale: f64,
+}
+
+impl<'m> Lit<'m> {
+    /// A point that the camera sees at x, y is at `a x + b` and `c - a y` pixels.
+    pub(crate) fn new(mesh: &'m Triangles, fit: &'m Fit, [a, b, c]: [f64; 3]) -> Lit<'m> {
+        let scale = if fit.extent > 0.0 { 1.0 / fit.extent } else { 1.0 };
+        let place = |p: &Point| {
+            let p = fit.camera.project(*p);
+            [a * p.x + b, c - a * p.y, p.z]
+        };
+        let places = mesh.vertices.iter().map(place).collect();
+        let normals = mesh.normals.iter().map(|&n| fit.camera.direction(n)).collect();
+        Lit { mesh, fit, places, normals, scale }
+    }
+
+    /// The corners of a triangle.
+    pub(crate) fn corners(&self, n: usize) -> [Corner; 3] {
+        self.mesh.faces[n].corners.map(|(vertex, _)| {
+            let [x, y, z] = self.places[vertex as usize];
+            Corner { x, y, depth: z * self.scale }
+        })
+    }
+
+    /// The strength of light at a place between the corners of a triangle. Of a surface that is seen from behind, the back
+    /// is lit.
+    pub(crate) fn strength(&self, n: usize, weights: [f64; 3]) -> f64 {
+        let face = &self.mesh.faces[n];
+        let [p, q, r] = face.corners.map(|(vertex, _)| self.places[vertex as usize]);
+        // Pixels go down.
+        let facing = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]) < 0.0;
+        let (mut normal, mut depth) = (Vector::zeros(), 0.0);
+        for (k, weight) in weights.into_iter().enumerate() {
+            let (vertex, at) = face.corners[k];
+            normal += self.normals[at as usize] * weight;
+            depth += self.places[vertex as usize][2] * weight;
+        }
+        let normal = normal.try_normalize(1e-12).unwrap_or_else(Vector::z) * if facing { 1.0 } else { -1.0 };
+        self.fit.light.strength(normal, depth)
+    }
+}
+
 /// Sides of tubes that look round at so many pixels for a scene unit.
-fn sides(scene: &Scene, fit: &Fit, scale: f64) -> usize {
+pub(crate) fn sides(scene: &Scene, fit: &Fit, scale: f64) -> usize {
     let widths = scene.segments.iter().flat_map(|s| s.widths).map(|w| w.resolve(fit.default_width));
     let radius = widths.fold(0.0, f64::max) * scale / 2.0;
     // The side of a polygon is r (1 - cos(π/n)) from its circle.

@@ -17,7 +17,7 @@ use dlsys_tree::{NO_LABEL, SimTime};
 /// The label of a module that is known not to be lazy.
 pub const REFUSED: u16 = NO_LABEL - 1;
 /// Most classes of one rule; a model with more of them has conditions without number.
-const MAX_CAREERS: usize = 64;
+const MAX_CLASSES: usize = 64;
 
 /// The common data of all modules with the same rule, clause, signs and kind of end.
 #[derive(Clone, Debug, PartialEq)]
@@ -206,7 +206,7 @@ impl Lives {
         if let Some(&label) = known.iter().find(|label| self.all[**label as usize] == class) {
             return Some(label);
         }
-        if known.len() >= MAX_CAREERS || self.all.len() >= usize::from(REFUSED) {
+        if known.len() >= MAX_CLASSES || self.all.len() >= usize::from(REFUSED) {
             return None;
         }
         let label = self.all.len() as u16;

@@ -1,0 +1,140 @@
+//! Outlines of sets of cells: followed along the edges of cells, then simplified.
+
+/// A rectangle of cells, each inside or outside of a set.
+pub struct Mask<'a> {
+    pub width: usize,
+    pub height: usize,
+    pub inside: &'a [bool],
+}
+
+/// A corner of an outline, in cells from the upper left corner of the mask.
+pub type Corner = [f64; 2];
+
+impl Mask<'_> {
+    fn at(&self, x: i64, y: i64) -> bool {
+        (0..self.width as i64).contains(&x)
+            && (0..self.height as i64).contains(&y)
+            && self.inside[y as usize * self.width + x as usize]
+    }
+
+    /// All outlines of the set, those of holes included: through the middles of the edges between cells inside and outside,
+    /// each simplified so that no middle is further than `tolerance` cells from it.
+    pub fn outlines(&self, tolerance: f64) -> Vec<Vec<Corner>> {
+        // An edge below a cell outside and above one inside, by cell: the outline goes to the right there.
+        let mut begun = vec![false; self.width * (self.height + 1)];
+        let mut outlines = Vec::new();
+        for y in 0..=self.height as i64 {
+            for x in 0..self.width as i64 {
+                let is_top = self.at(x, y) && !self.at(x, y - 1);
+                if is_top && !begun[y as usize * self.width + x as usize] {
+                    let middles = self.follow(x, y, &mut begun);
+                    outlines.push(simplified(&middles, tolerance));
+                }
+            }
+        }
+        outlines.retain(|outline| outline.len() >= 3);
+        outlines
+    }
+
+    /// The middles of the edges of the outline that begins with the upper edge of a cell, the set being on the right.
+    fn follow(&self, x: i64, y: i64, begun: &mut [bool]) -> Vec<Corner> {
+        let start = (x, y, (1, 0));
+        let (mut x, mut y, mut direction) = start;
+        let mut middles = Vec::new();
+        loop {
+            // The edge goes from the lattice point (x, y) in the direction; the cell on its right is inside.
+            let (dx, dy): (i64, i64) = direction;
+            if direction == (1, 0) {
+                begun[y as usize * self.width + x as usize] = true;
+            }
+            middles.push([x as f64 + 0.5 * dx as f64, y as f64 + 0.5 * dy as f64]);
+            (x, y) = (x + dx, y + dy);
+            // The two cells ahead, on the left and on the right of the direction.
+            let ahead = |side: i64| {
+                let (cx, cy) = (dx - dy * side, dy + dx * side);
+                // Of the four cells around the lattice point.
+                self.at(x + (cx - 1).div_euclid(2), y + (cy - 1).div_euclid(2))
+            };
+            direction = match (ahead(-1), ahead(1)) {
+                // Cells that touch in a corner only are apart.
+                (_, false) => (-dy, dx),
+                (false, true) => (dx, dy),
+                (true, true) => (dy, -dx),
+            };
+            if (x, y, direction) == start {
+                return middles;
+            }
+        }
+    }
+}
+
+/// A closed line with fewer corners, none of the given ones further than `tolerance` from it (Ramer, Douglas and Peucker).
+fn simplified(points: &[Corner], tolerance: f64) -> Vec<Corner> {
+    let n = points.len();
+    // Two corners that are far apart stay.
+    let far = |from: Corner| {
+        let distance = |p: &Corner| (p[0] - from[0]).powi(2) + (p[1] - from[1]).powi(2);
+        (0..n).max_by(|&i, &j| distance(&points[i]).total_cmp(&distance(&points[j]))).unwrap_or(0)
+    };
+    let a = far(points[0]);
+    let b = far(points[a]);
+    let (a, b) = (a.min(b), a.max(b));
+    let mut kept = vec![false; n];
+    (kept[a], kept[b]) = (true, true);
+    // Stretches of indices, which may go beyond the end.
+    let mut stretches = vec![(a, b), (b, a + n)];
+    while let Some((from, to)) = stretches.pop() {
+        let (p, q) = (points[from % n], points[to % n]);
+        let (dx, dy) = (q[0] - p[0], q[1] - p[1]);
+        let length = dx.hypot(dy);
+        let offset = |i: usize| {
+            let [x, y] = points[i % n];
+            let (ex, ey) = (x - p[0], y - p[1]);
+            if length > 0.0 { (ex * dy - ey * dx).abs() / length } else { ex.hypot(ey) }
+        };
+        let worst = (from + 1..to).max_by(|&i, &j| offset(i).total_cmp(&offset(j)));
+        if let Some(worst) = worst.filter(|&i| offset(i) > tolerance) {
+            kept[worst % n] = true;
+            stretches.extend([(from, worst), (worst, to)]);
+        }
+    }
+    points.iter().zip(&kept).filter(|(_, kept)| **kept).map(|(p, _)| *p).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mask(rows: &[&str]) -> Vec<Vec<Corner>> {
+        let inside: Vec<bool> = rows.iter().flat_map(|row| row.bytes().map(|b| b == b'#')).collect();
+        Mask { width: rows[0].len(), height: rows.len(), inside: &inside }.outlines(0.4)
+    }
+
+    fn area(outline: &[Corner]) -> f64 {
+        let next = outline.iter().cycle().skip(1);
+        outline.iter().zip(next).map(|(p, q)| p[0] * q[1] - q[0] * p[1]).sum::<f64>() / 2.0
+    }
+
+    #[test]
+    fn a_square_keeps_its_place_and_its_hole() {
+        let outlines = mask(&["######", "######", "##..##", "##..##", "######", "######"]);
+        assert_eq!(outlines.len(), 2);
+        // The corners of a cell are cut.
+        assert!((area(&outlines[0]) - 36.0).abs() <= 1.0, "{outlines:?}");
+        assert!((area(&outlines[1]) + 4.0).abs() <= 1.0, "{outlines:?}");
+    }
+
+    #[test]
+    fn cells_that_touch_in_a_corner_are_two_outlines() {
+        assert_eq!(mask(&["##..", "##..", "..##", "..##"]).len(), 2);
+    }
+
+    #[test]
+    fn a_slanted_edge_is_one_line() {
+        let rows: Vec<String> = (0..40).map(|y| "#".repeat(20 + y / 4) + &".".repeat(20 - y / 4)).collect();
+        let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
+        let inside: Vec<bool> = rows.iter().flat_map(|row| row.bytes().map(|b| b == b'#')).collect();
+        let outlines = Mask { width: 40, height: 40, inside: &inside }.outlines(0.75);
+        assert!(outlines.len() == 1 && outlines[0].len() <= 6, "{outlines:?}");
+    }
+}

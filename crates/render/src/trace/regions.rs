@@ -1,0 +1,184 @@
+//! Regions of one module and one shade, as sets of cells of a raster.
+//!
+//! Regions are painted one over the other, in order. Each covers its own cells, and reaches under those that are painted later:
+//! by a margin, so that no background shows through where two outlines meet; and through holes, so that an outline within another is
+//! needed once only.
+
+use std::collections::HashMap;
+
+use super::contour::{Corner, Mask};
+
+/// The width of the margin, in cells.
+const MARGIN: usize = 3;
+/// Regions of fewer cells are given to a neighbour.
+const SPECK: usize = 4;
+/// The distance of outlines from the edges of cells, in cells.
+const TOLERANCE: f64 = 0.7;
+
+/// No region.
+pub const NOTHING: u32 = u32::MAX;
+
+/// A raster of regions, by number in the order of painting.
+pub struct Regions {
+    pub width: usize,
+    pub height: usize,
+    /// By cell; [`NOTHING`] for the background.
+    pub labels: Vec<u32>,
+}
+
+/// The cells that a region may touch: first column and row, and those after the last.
+#[derive(Clone, Copy)]
+struct Bounds {
+    left: usize,
+    top: usize,
+    right: usize,
+    bottom: usize,
+}
+
+impl Regions {
+    /// Gives specks to a neighbour, so that noise of shading makes no outlines.
+    pub fn without_specks(&mut self, of_module: impl Fn(u32) -> u32) {
+        let mut seen = vec![false; self.labels.len()];
+        let mut stack = Vec::new();
+        let mut cells = Vec::new();
+        for start in 0..self.labels.len() {
+            let label = self.labels[start];
+            if label == NOTHING || seen[start] {
+                continue;
+            }
+            cells.clear();
+            seen[start] = true;
+            stack.push(start);
+            // Neighbouring regions of the same module, with the number of edges.
+            let mut beside: HashMap<u32, usize> = HashMap::new();
+            while let Some(cell) = stack.pop() {
+                cells.push(cell);
+                for next in self.around(cell) {
+                    let other = self.labels[next];
+                    if other == label {
+                        if !seen[next] {
+                            seen[next] = true;
+                            stack.push(next);
+                        }
+                    } else if cells.len() <= SPECK && other != NOTHING && of_module(other) == of_module(label)
+                    {
+                        *beside.entry(other).or_default() += 1;
+                    }
+                }
+            }
+            if cells.len() < SPECK
+                && let Some((&other, _)) = beside.iter().max_by_key(|(label, edges)| (**edges, **label))
+            {
+                cells.iter().for_each(|cell| self.labels[*cell] = other);
+            }
+        }
+    }
+
+    fn around(&self, cell: usize) -> impl Iterator<Item = usize> {
+        let (x, y, width, height) = (cell % self.width, cell / self.width, self.width, self.height);
+        [
+            (x > 0).then(|| cell - 1),
+            (x + 1 < width).then(|| cell + 1),
+            (y > 0).then(|| cell - width),
+            (y + 1 < height).then(|| cell + width),
+        ]
+        .into_iter()
+        .flatten()
+    }
+
+    /// The outlines of every region, by number, in cells from the upper left corner.
+    pub fn outlines(&self, count: usize) -> Vec<Vec<Vec<Corner>>> {
+        let mut bounds: Vec<Option<Bounds>> = vec![None; count];
+        for (cell, &label) in self.labels.iter().enumerate().filter(|(_, label)| **label != NOTHING) {
+            let (x, y) = (cell % self.width, cell / self.width);
+            let own = bounds[label as usize].get_or_insert(Bounds { left: x, top: y, right: x, bottom: y });
+            own.left = own.left.min(x);
+            own.right = own.right.max(x + 1);
+            own.bottom = own.bottom.max(y + 1);
+        }
+        let of = |(label, bounds): (usize, &Option<Bounds>)| match bounds {
+            Some(bounds) => self.outlines_of(label as u32, *bounds),
+            None => Vec::new(),
+        };
+        bounds.iter().enumerate().map(of).collect()
+    }
+
+    fn outlines_of(&self, label: u32, bounds: Bounds) -> Vec<Vec<Corner>> {
+        let (left, top) = (bounds.left.saturating_sub(MARGIN), bounds.top.saturating_sub(MARGIN));
+        let width = (bounds.right + MARGIN).min(self.width) - left;
+        let height = (bounds.bottom + MARGIN).min(self.height) - top;
+        let label_at = |i: usize| self.labels[(top + i / width) * self.width + left + i % width];
+        let is_later = |other: u32| other != NOTHING && other > label;
+        let mut inside: Vec<bool> = (0..width * height).map(|i| label_at(i) == label).collect();
+        let later: Vec<bool> = (0..width * height).map(|i| is_later(label_at(i))).collect();
+        spread(&mut inside, &later, width);
+        fill_holes(&mut inside, &later, width);
+        let mask = Mask { width, height, inside: &inside };
+        let mut outlines = mask.outlines(TOLERANCE);
+        for corner in outlines.iter_mut().flatten() {
+            *corner = [corner[0] + left as f64, corner[1] + top as f64];
+        }
+        outlines
+    }
+}
+
+/// Adds cells near the set, where they are free.
+fn spread(inside: &mut [bool], free: &[bool], width: usize) {
+    let mut edge: Vec<usize> = (0..inside.len()).filter(|i| inside[*i]).collect();
+    for _ in 0..MARGIN {
+        let mut next = Vec::new();
+        for &cell in &edge {
+            for other in neighbours(cell, width, inside.len()) {
+                if free[other] && !inside[other] {
+                    inside[other] = true;
+                    next.push(other);
+                }
+            }
+        }
+        edge = next;
+    }
+}
+
+/// Adds the cells that the set surrounds, where all of them are free.
+fn fill_holes(inside: &mut [bool], free: &[bool], width: usize) {
+    let height = inside.len() / width.max(1);
+    let mut seen = vec![false; inside.len()];
+    let mut stack = Vec::new();
+    let mut hole = Vec::new();
+    for start in 0..inside.len() {
+        if inside[start] || seen[start] {
+            continue;
+        }
+        hole.clear();
+        seen[start] = true;
+        stack.push(start);
+        let mut is_free = true;
+        while let Some(cell) = stack.pop() {
+            let (x, y) = (cell % width, cell / width);
+            is_free &= free[cell] && x > 0 && y > 0 && x + 1 < width && y + 1 < height;
+            hole.push(cell);
+            for other in neighbours(cell, width, inside.len()) {
+                if !inside[other] && !seen[other] {
+                    seen[other] = true;
+                    stack.push(other);
+                }
+            }
+        }
+        if is_free {
+            hole.iter().for_each(|cell| inside[*cell] = true);
+        }
+    }
+}
+
+/// The cells beside, above and below one.
+fn neighbours(cell: usize, width: usize, count: usize) -> impl Iterator<Item = usize> {
+    let x = cell % width;
+    [
+        (x > 0).then(|| cell - 1),
+        (x + 1 < width).then(|| cell + 1),
+        cell.checked_sub(width),
+        Some(cell + width).filter(|next| *next < count),
+    ]
+    .into_iter()
+    .flatten()
+}
