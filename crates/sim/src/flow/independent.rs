@@ -1,6 +1,6 @@
 //! Modules that are integrated alone, each with steps of its own.
 
-use crate::detect::pulse::{self, MAX_UNBOUNDED, PulseFinding};
+use crate::detect::pulse::{ExaminedStep, MAX_UNBOUNDED, PulseFinding};
 use crate::error::Error;
 use crate::flow::FlowStage;
 use crate::flow::integrator::StepError;
@@ -191,8 +191,8 @@ impl FlowStage<'_, '_> {
                 let (nodes, tolerance) = (&*self.flows.independent.nodes(), self.setup.settings.tolerance);
                 let (start, end, own) = (from, dense.end, Some(dense));
                 let step_made =
-                    pulse::Step { world, state, rule, solve, start, end, nodes, own, tolerance, stiff };
-                match self.detector.pulses.look(&step_made) {
+                    ExaminedStep { world, state, rule, solve, start, end, nodes, own, tolerance, stiff };
+                match self.detector.pulses.examine(&step_made) {
                     PulseFinding::Unbounded(at) if tries > MAX_UNBOUNDED => {
                         self.detector.unbounded.entry(index).or_insert(from.to_f64() + at * dense.h);
                         break step;

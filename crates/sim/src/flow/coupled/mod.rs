@@ -17,7 +17,7 @@ pub mod system;
 
 use super::FlowStage;
 use crate::detect::crossing::needs_search;
-use crate::detect::pulse::{self, MAX_UNBOUNDED, PulseFinding};
+use crate::detect::pulse::{ExaminedStep, MAX_UNBOUNDED, PulseFinding};
 use crate::error::Error;
 use crate::flow::coupled::couple::Affected;
 use crate::flow::coupled::equations::Equations;
@@ -231,7 +231,7 @@ impl FlowStage<'_, '_> {
                     let overlooked = pulsing.iter().filter_map(|id| {
                         let how = (settings.tolerance, stiff);
                         let step = step_of(self.world, rules, *id, from, &nodes, how)?;
-                        match self.detector.pulses.look(&step) {
+                        match self.detector.pulses.examine(&step) {
                             PulseFinding::Clear => None,
                             PulseFinding::Overlooked(at) => Some(at),
                             PulseFinding::Unbounded(at) if tries <= MAX_UNBOUNDED => Some(at),
@@ -404,7 +404,7 @@ impl FlowStage<'_, '_> {
         let nodes = &*self.flows.coupled.reintegration.nodes();
         pulsing.into_iter().any(|id| {
             let step = step_of(world, rules, id, self.instant.at, nodes, how);
-            step.is_some_and(|step| pulses.look(&step) != PulseFinding::Clear)
+            step.is_some_and(|step| pulses.examine(&step) != PulseFinding::Clear)
         })
     }
 
@@ -428,11 +428,11 @@ fn step_of<'p>(
     start: SimTime,
     nodes: &'p [f64],
     (tolerance, stiff): (f64, bool),
-) -> Option<pulse::Step<'p>> {
+) -> Option<ExaminedStep<'p>> {
     let state = world.state(id)?;
     let rule = &rules[state.rule?];
     let (solve, end) = (&rule.solves[state.solve?], world.coupled.as_ref()?.end);
-    Some(pulse::Step { world, state, rule, solve, start, end, nodes, own: None, tolerance, stiff })
+    Some(ExaminedStep { world, state, rule, solve, start, end, nodes, own: None, tolerance, stiff })
 }
 
 /// The parameters of a coupled module that are integrated, then those that are solved for, in the order of their
