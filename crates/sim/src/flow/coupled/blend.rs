@@ -10,7 +10,7 @@
 
 use std::sync::LazyLock;
 
-use crate::flow::coupled::algebra::Fault;
+use crate::flow::coupled::algebra::AlgebraicError;
 use crate::flow::coupled::equations::Equations;
 use dlsys_expr::eliminate;
 use dlsys_ode::{Dense, MAX_DEGREE};
@@ -46,7 +46,12 @@ static INTERPOLATION: LazyLock<([f64; POINTS], [[f64; POINTS]; POINTS])> = LazyL
 
 impl Equations<'_> {
     /// The dense output of a step from `start`, with its algebraic components, as one stretch or several.
-    pub fn blend(&mut self, step: &Dense, start: &[f64], tolerance: f64) -> Result<Vec<Dense>, Fault> {
+    pub fn blend(
+        &mut self,
+        step: &Dense,
+        start: &[f64],
+        tolerance: f64,
+    ) -> Result<Vec<Dense>, AlgebraicError> {
         let unknowns: Vec<usize> =
             self.system.algebra.unknowns.iter().map(|unknown| unknown.component as usize).collect();
         let mut stretches: Vec<Dense> = Vec::new();
@@ -82,7 +87,7 @@ impl Equations<'_> {
             }
             if !fits {
                 if stretches.len() + pieces.len() + 2 > MAX_STRETCHES {
-                    return Err(Fault::Rough(unknowns.first().copied().unwrap_or(0)));
+                    return Err(AlgebraicError::Rough(unknowns.first().copied().unwrap_or(0)));
                 }
                 let middle = 0.5 * (lo + hi);
                 pieces.extend([(middle, hi), (lo, middle)]);
@@ -98,7 +103,7 @@ impl Equations<'_> {
     }
 
     /// Goes to a position in a step, from a state near there.
-    fn follow(&mut self, step: &Dense, position: f64, state: &mut [f64]) -> Result<(), Fault> {
+    fn follow(&mut self, step: &Dense, position: f64, state: &mut [f64]) -> Result<(), AlgebraicError> {
         let system = self.system;
         for (component, value) in state.iter_mut().enumerate() {
             if !system.algebra.is_solved(component as u32) {

@@ -18,10 +18,9 @@
 //! ring k, and a handful of rings is enough.
 
 use crate::flow::FlowStage;
-use crate::flow::coupled::equations::{Equations, Memory};
-use crate::flow::coupled::integrated;
-use crate::flow::coupled::system::System;
-use crate::flow::integrator::{CERTAINTY, INNER_TOLERANCE, Integrator};
+use crate::flow::coupled::equations::{Equations, RateWorkspace};
+use crate::flow::coupled::system::{Membership, System, integrated};
+use crate::flow::integrator::{CERTAINTY, INNER_TOLERANCE, Integrator, StepRequest};
 use crate::schedule::Owner;
 use crate::trajectory::Trajectory;
 use crate::world::coupled_solution::CoupledSolution;
@@ -43,7 +42,7 @@ pub struct Reintegration {
     numbers: Vec<u32>,
     /// The equations of the region.
     system: System,
-    memory: Memory,
+    memory: RateWorkspace,
     region: Region,
     trial: Trial,
     y: Vec<f64>,
@@ -165,7 +164,7 @@ impl FlowStage<'_, '_> {
 
     /// Gives components to the parameters of modules that have begun new trajectories.
     fn number_newcomers(&mut self, seeds: &[ModuleId]) {
-        let known = self.flows.coupled.system.places.len();
+        let known = self.flows.coupled.system.table.places.len();
         for &id in seeds {
             let fresh = |s: &State| s.trajectories.iter().any(|m| matches!(m, Trajectory::Step(_)));
             if !self.world.state(id).is_some_and(fresh) {
@@ -255,7 +254,8 @@ impl FlowStage<'_, '_> {
         let number = |component: u32| numbers.get(component as usize).copied().filter(|n| *n != NOT_HERE);
         let rules = &self.setup.model.rules;
         let frozen = self.setup.settings.is_sliced();
-        system.rebuild(rules, self.world, &region.members, self.instant.at, number, frozen);
+        let (world, members, start) = (&*self.world, &region.members, self.instant.at);
+        system.rebuild(rules, &Membership { world, members, start, frozen }, number);
         for &component in &*components {
             numbers[component as usize] = NOT_HERE;
         }
@@ -271,8 +271,9 @@ impl FlowStage<'_, '_> {
             let mut equations = Equations::within(std::mem::take(memory), system, rules, Some(solution));
             let end = Some(solution.end);
             let stats = &mut self.log.stats;
-            let step =
-                integrator.step(&self.setup.coupled_settings, control, &mut equations, y, from, end, stats);
+            let settings = &self.setup.coupled_settings;
+            let request = StepRequest { settings, y, start: from, limit: end };
+            let step = integrator.step(request, control, &mut equations, stats);
             from = step.ok()?;
             if system.algebra.is_empty() {
                 stretches.push(integrator.dense(&mut equations, y));
@@ -312,7 +313,7 @@ impl FlowStage<'_, '_> {
 
     /// Makes a trial the trajectory of its region, and finds the region's next events.
     fn take_over(&mut self, region: &Region, trial: &mut Trial) {
-        let all = self.flows.coupled.system.places.len();
+        let all = self.flows.coupled.system.table.places.len();
         let solution: &mut CoupledSolution = self.world.coupled.as_mut().expect("seen above");
         solution.replace(&mut trial.stretches, &trial.components, all);
         self.flows.coupled.reintegrated = true;

@@ -1,7 +1,8 @@
 //! From the equations of coupled modules to a matrix.
 
 use super::{Linear, Problem};
-use crate::flow::coupled::system::{Formula, Source, System};
+use crate::flow::coupled::rows::{FormulaInput, VariableSource};
+use crate::flow::coupled::system::System;
 use crate::trajectory::Trajectory;
 use dlsys_expr::Scratch;
 use dlsys_model::Rule;
@@ -18,8 +19,8 @@ const NONE: u32 = u32::MAX;
 
 impl Unknowns {
     /// Makes what a source says an unknown of its own if it is a formula: None if that solves no linear equation.
-    fn number(&mut self, source: &Source, formulas: &[Formula]) -> Option<()> {
-        let Source::Formula(i) = *source else { return Some(()) };
+    fn number(&mut self, source: &VariableSource, formulas: &[FormulaInput]) -> Option<()> {
+        let VariableSource::Formula(i) = *source else { return Some(()) };
         if self.inputs[i as usize] != NONE {
             return Some(());
         }
@@ -47,23 +48,24 @@ impl Linear {
         if !system.algebra.is_empty() {
             return None;
         }
+        let table = &system.table;
         let mut unknown = vec![NONE; y.len()];
-        let mut all = Unknowns { inputs: vec![NONE; system.formulas.len()], ..Unknowns::default() };
+        let mut all = Unknowns { inputs: vec![NONE; table.formulas.len()], ..Unknowns::default() };
         all.problem.tolerance = tolerance;
         // Unknowns are numbered in string order: what stands left of a module before it.
-        for row in &system.rows {
+        for row in &table.rows {
             let rule = &rules[row.rule];
             let solve = &rule.solves[row.solve];
             if row.numeric_only {
                 return None;
             }
             let linear = solve.linear.as_ref()?;
-            let sources = &system.sources[row.first_source..row.first_source + row.sources];
+            let sources = &table.sources[row.first_source..row.first_source + row.sources];
             let before = rule.parameters.len() + rule.left.iter().map(|p| p.width).sum::<usize>();
             let read = |v: usize| linear.variables.iter().flatten().any(|r| *r == v);
             for (v, source) in sources.iter().enumerate().take(before) {
                 if read(v) {
-                    all.number(source, &system.formulas)?;
+                    all.number(source, &table.formulas)?;
                 }
             }
             for component in row.first_rate..row.first_rate + solve.numeric.len() {
@@ -73,15 +75,15 @@ impl Linear {
             }
             for (v, source) in sources.iter().enumerate().skip(before) {
                 if read(v) {
-                    all.number(source, &system.formulas)?;
+                    all.number(source, &table.formulas)?;
                 }
             }
         }
         let Unknowns { mut problem, inputs } = all;
         let (mut variables, mut scratch, mut out): (Vec<f64>, Scratch<f64>, Vec<f64>) = Default::default();
-        for row in &system.rows {
+        for row in &table.rows {
             let linear = rules[row.rule].solves[row.solve].linear.as_ref()?;
-            system.variables(rules, row, 0.0, y, &[], &mut variables);
+            table.variables(rules, row, 0.0, y, &[], &mut variables);
             out.resize(linear.coefficients.outputs(), 0.0);
             linear.coefficients.eval(&variables, &mut scratch, &mut out);
             let mut next = out.iter();
@@ -90,19 +92,19 @@ impl Linear {
                 problem.b[n as usize] += next.next()?;
                 for &v in reads {
                     let coefficient = *next.next()?;
-                    match system.sources[row.first_source + v] {
-                        Source::Fixed(x) => problem.b[n as usize] += coefficient * x,
-                        Source::State(component) => {
+                    match table.sources[row.first_source + v] {
+                        VariableSource::Fixed(x) => problem.b[n as usize] += coefficient * x,
+                        VariableSource::State(component) => {
                             problem.entries.push((n, unknown[component as usize], coefficient));
                         }
-                        Source::Formula(input) => {
+                        VariableSource::Formula(input) => {
                             problem.entries.push((n, inputs[input as usize], coefficient));
                         }
-                        Source::Input(_) | Source::Sum(_) => return None,
+                        VariableSource::Input(_) | VariableSource::Aggregate(_) => return None,
                     }
                 }
             }
         }
-        Linear::of(problem, unknown, system.start)
+        Linear::of(problem, unknown, table.start)
     }
 }

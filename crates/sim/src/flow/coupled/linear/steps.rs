@@ -1,7 +1,7 @@
 //! The equations in steps, where no other way can answer for its error.
 
 use super::Problem;
-use crate::flow::integrator::Integrator;
+use crate::flow::integrator::{Integrator, StepRequest};
 use crate::world::state::Control;
 use crate::{Settings, Stats};
 use dlsys_ode::Dense;
@@ -51,7 +51,8 @@ impl Steps {
             }
             *from = *end;
             *dense = None;
-            *end = integrator.step(settings, control, &mut flow, y, *from, None, stats).ok()?;
+            let request = StepRequest { settings, y, start: *from, limit: None };
+            *end = integrator.step(request, control, &mut flow, stats).ok()?;
         }
         let dense = dense.get_or_insert_with(|| integrator.dense(&mut flow, y));
         let position = dense.position(at);
