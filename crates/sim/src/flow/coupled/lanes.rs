@@ -1,5 +1,6 @@
-//! Rows of a table that have the same program, evaluated side by side: of each variable that the program reads, where
-//! those of all rows come from.
+//! Rates of many modules at once: rows with the same program, evaluated side by side in the lanes of vector registers.
+//!
+//! For each variable that the program reads, a [`LaneColumn`] holds the sources of that variable in all rows of a chunk.
 
 use crate::flow::coupled::rows::{EquationRow, EquationTable, VariableSource, program};
 use dlsys_expr::{LANES, Lanes};
@@ -29,7 +30,7 @@ struct Chunk {
     /// The columns that the program reads.
     first_column: usize,
     columns: usize,
-    /// LanePlaces of the first rate of each row.
+    /// The component of the first rate of each row.
     rates: LanePlaces,
 }
 
@@ -47,14 +48,14 @@ enum LaneColumn {
     Mixed(usize),
 }
 
-/// LanePlaces in a vector; mostly one after another, because rows stand in string order.
+/// Places in a vector; mostly consecutive, because rows stand in string order.
 #[derive(Clone, Copy, Debug)]
 enum LanePlaces {
     Run(usize),
     Any(usize),
 }
 
-/// NextKind the rows of a table read at one time.
+/// The values that the rows of a table read at one time.
 pub struct EvaluationPoint<'r> {
     /// The time since the start of the step.
     pub tau: f64,

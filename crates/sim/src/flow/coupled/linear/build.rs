@@ -1,4 +1,4 @@
-//! From the equations of coupled modules to a matrix.
+//! The matrix of the equations of coupled modules, with the closed forms that they read as further unknowns.
 
 use super::{Linear, Problem};
 use crate::flow::coupled::rows::{FormulaInput, VariableSource};
@@ -7,18 +7,18 @@ use crate::trajectory::Trajectory;
 use dlsys_expr::Scratch;
 use dlsys_model::Rule;
 
-/// The unknowns as they are numbered.
+/// The unknowns numbered so far.
 #[derive(Default)]
 struct Unknowns {
     problem: Problem,
-    /// The unknown that stands for each formula; `NONE` as long as there is none.
+    /// By closed form: the unknown that stands for it; [`NONE`] as long as there is none.
     inputs: Vec<u32>,
 }
 
 const NONE: u32 = u32::MAX;
 
 impl Unknowns {
-    /// Makes what a source says an unknown of its own if it is a formula: None if that solves no linear equation.
+    /// Makes a source an unknown of its own if it is a closed form; None if that solves no linear equation.
     fn number(&mut self, source: &VariableSource, formulas: &[FormulaInput]) -> Option<()> {
         let VariableSource::Formula(i) = *source else { return Some(()) };
         if self.inputs[i as usize] != NONE {
@@ -42,8 +42,8 @@ impl Unknowns {
 }
 
 impl Linear {
-    /// The equations of coupled modules, if they are linear and so is everything that they read, and if there is a way to
-    /// solve them without steps.
+    /// The solution of the equations of coupled modules, from the state `y`. None if the equations, or those of a closed form that
+    /// they read, are not linear, or no method solves them without steps. `tolerance` is relative to max(1, |value|).
     pub fn new(system: &System, rules: &[Rule], y: &[f64], tolerance: f64) -> Option<Linear> {
         if !system.algebra.is_empty() {
             return None;
@@ -52,7 +52,7 @@ impl Linear {
         let mut unknown = vec![NONE; y.len()];
         let mut all = Unknowns { inputs: vec![NONE; table.formulas.len()], ..Unknowns::default() };
         all.problem.tolerance = tolerance;
-        // Unknowns are numbered in string order: what stands left of a module before it.
+        // Unknowns are numbered in string order: the left context of a module before the module.
         for row in &table.rows {
             let rule = &rules[row.rule];
             let solve = &rule.solves[row.solve];
