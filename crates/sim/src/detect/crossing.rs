@@ -1,9 +1,9 @@
 //! Zero crossings of one atom: where the sides of a condition meet along a path.
 //!
-//! An atom is a comparison in a rule's conditions; its sign is that of the difference of its two sides. Where a closed form
-//! gives the instant at which a variable takes a level, that instant is taken ([`CrossingDetector::meet`]). Elsewhere the
-//! difference is bounded by interval arithmetic and its roots are isolated ([`CrossingDetector::root`]), unless the bounds
-//! over the whole path already exclude a change of sign.
+//! An atom is a comparison in a rule's conditions; its sign is that of the difference of its two sides. Where a closed
+//! form gives the instant at which a variable takes a level, that instant is taken ([`CrossingDetector::meet`]).
+//! Elsewhere the difference is bounded by interval arithmetic and its roots are isolated ([`CrossingDetector::root`]),
+//! unless the bounds over the whole path already exclude a change of sign.
 
 use crate::detect::signs::{Reach, opposite, rate_at, reach, sign_of};
 use crate::world::path::Path;
@@ -46,6 +46,7 @@ pub struct CrossingDetector {
 pub struct Crossing {
     /// Position on the path, in units of its length.
     pub position: f64,
+    /// The instant at that position.
     pub time: SimTime,
     /// The sign at the instant.
     pub at: Sign,
@@ -87,7 +88,8 @@ impl Function for Difference<'_, '_> {
     }
 }
 
-/// True if the crossings of some atom of a module can only be found by search, so that the stretch to search must be bounded.
+/// True if the crossings of some atom of a module can only be found by search, so that the stretch to search must be
+/// bounded.
 pub fn needs_search(state: &State, rule: &Rule) -> bool {
     let searched = |(atom, crossing)| {
         !is_unreachable(rule, state, atom)
@@ -124,8 +126,8 @@ pub(super) fn location_method<'w>(crossing: &'w ZeroCrossing, state: &State) -> 
 }
 
 impl CrossingDetector {
-    /// True if the dense output of a parameter stays away from the one level at which its atom's sides meet, by more than the
-    /// relative error of integration, `error`. Most steps need no other test.
+    /// True if the dense output of a parameter stays away from the one level at which its atom's sides meet, by more
+    /// than the relative error of integration, `error`. Most steps need no other test.
     pub(super) fn keeps_clear(
         &mut self,
         path: &Path,
@@ -246,8 +248,9 @@ impl CrossingDetector {
         if position > path.start.resolution() / path.h {
             return Some(crossing);
         }
-        // The crossing is at the start but for rounding, or before it: either it has been passed, or it fell on the very end of
-        // the stretch before this one and was missed. Only in the second case does the difference move towards zero.
+        // The crossing is at the start but for rounding, or before it: either it has been passed, or it fell on the
+        // very end of the stretch before this one and was missed. Only in the second case does the difference move
+        // towards zero.
         path.departure(&mut self.departure);
         self.departure_out.resize(path.rule.sides.outputs(), Dual::constant(0.0));
         path.rule.sides.eval(&self.departure, &mut self.departure_scratch, &mut self.departure_out);
@@ -259,8 +262,8 @@ impl CrossingDetector {
         Some(Crossing { position: position.max(0.0), time, ..crossing })
     }
 
-    /// Evaluates the sides of all atoms at the start and their bounds over the whole path: most atoms keep their sign on most
-    /// paths.
+    /// Evaluates the sides of all atoms at the start and their bounds over the whole path: most atoms keep their sign
+    /// on most paths.
     #[inline]
     pub(super) fn measure(&mut self, path: &Path) {
         let sides = &path.rule.sides;
@@ -272,9 +275,9 @@ impl CrossingDetector {
         sides.eval(&self.departure, &mut self.departure_scratch, &mut self.departure_out);
     }
 
-    /// The tolerance below which the difference counts as zero, if its bounds over the whole path admit a change of sign;
-    /// None if they exclude one. The tolerance has the scale of the start, not of the far end: a stretch may be a thousand
-    /// lives long.
+    /// The tolerance below which the difference counts as zero, if its bounds over the whole path admit a change of
+    /// sign; None if they exclude one. The tolerance has the scale of the start, not of the far end: a stretch may be a
+    /// thousand lives long.
     #[inline]
     pub(super) fn may_change(&self, path: &Path, atom: usize, sign: Sign) -> Option<f64> {
         let instant = path.start.resolution() / path.h;

@@ -1,11 +1,12 @@
 //! Crossings of integrated values: which changes of sign are evidence of an event.
 //!
-//! An integrated value is known up to some error, so a difference of two sides has a band around zero in which its sign is
-//! unknown. A change of sign that stays within the band is evidence neither of an event nor against one: neighbours that
-//! equalise approach each other without limit and never meet, and their difference then changes sign by rounding. Therefore
+//! An integrated value is known up to some error, so a difference of two sides has a band around zero in which its sign
+//! is unknown. A change of sign that stays within the band is evidence neither of an event nor against one: neighbours
+//! that equalise approach each other without limit and never meet, and their difference then changes sign by rounding.
+//! Therefore
 //!
-//! - a crossing counts when the difference leaves the band on the other side, now or in a later step; its instant is that of
-//!   the change of sign;
+//! - a crossing counts when the difference leaves the band on the other side, now or in a later step; its instant is
+//!   that of the change of sign;
 //! - a difference that stays in the band keeps the sign that it had;
 //! - a difference that comes from outside the band and leaves it on the same side may have touched zero or not: where a
 //!   production depends on it, that is reported ([`Error::InDoubt`](crate::error::Error::InDoubt)).
@@ -14,8 +15,8 @@
 //! where the integrated values change them, or else pieces of equations would be continued beyond their ends.
 //!
 //! Two modules, one of which reads the other, may have simultaneous events whose integrated instants differ; the second
-//! would then see the successors of the first. So when a module has its event, the events of those of its readers that are
-//! no further away than the error of integration happen with it
+//! would then see the successors of the first. So when a module has its event, the events of those of its readers that
+//! are no further away than the error of integration happen with it
 //! ([`is_about_to_meet`](CrossingDetector::is_about_to_meet)).
 
 use crate::detect::crossing::{Crossing, CrossingDetector};
@@ -40,6 +41,7 @@ const BLUR: f64 = 4.0;
 /// The result of looking ahead for one atom on a path. Positions are in units of the path's length.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Lookahead {
+    /// The next crossing, if there is one.
     pub next: Option<Crossing>,
     /// The position, before the next crossing, at which the sides have parted again after they had come near each other.
     pub doubt: Option<f64>,
@@ -64,9 +66,11 @@ impl Lookahead {
 /// One atom to look ahead for.
 #[derive(Clone, Copy)]
 pub struct AtomQuery {
+    /// Number of the atom in the rule.
     pub atom: usize,
-    /// Positions on the path.
+    /// The position from which on the path is searched.
     pub from: f64,
+    /// The position up to which it is searched.
     pub limit: f64,
     /// The sign at `from`: plus or minus.
     pub sign: Sign,
@@ -145,8 +149,8 @@ impl CrossingDetector {
         }
     }
 
-    /// From inside the band: the crossing, the doubt or the stay that follows. None if the difference leaves the band on its own
-    /// side, without doubt; `query` then begins there.
+    /// From inside the band: the crossing, the doubt or the stay that follows. None if the difference leaves the band
+    /// on its own side, without doubt; `query` then begins there.
     fn leave_band(
         &mut self,
         path: &Path,
@@ -174,7 +178,8 @@ impl CrossingDetector {
         }
     }
 
-    /// The position of the crossing of a difference that starts inside the band and leaves it on the other side at `down`.
+    /// The position of the crossing of a difference that starts inside the band and leaves it on the other side at
+    /// `down`.
     fn crossing_inside(&mut self, path: &Path, query: AtomQuery, start: f64, down: f64) -> f64 {
         let AtomQuery { atom, from, sign, .. } = query;
         if start > 0.0 {
@@ -191,8 +196,8 @@ impl CrossingDetector {
         }
     }
 
-    /// A doubt before the crossing, or before the limit if there is no crossing: the difference enters the band and leaves it
-    /// again, or stays in it. None if the crossing itself has to be confirmed.
+    /// A doubt before the crossing, or before the limit if there is no crossing: the difference enters the band and
+    /// leaves it again, or stays in it. None if the crossing itself has to be confirmed.
     fn approach(
         &mut self,
         path: &Path,
@@ -236,7 +241,7 @@ impl CrossingDetector {
         match (down, self.leaves(path, beyond, noise, sign)) {
             (Some(down), up) if up.is_none_or(|up| down < up) => Lookahead::crossing(next),
             (_, Some(out)) => Lookahead::in_doubt(out),
-            // The path ends too soon to tell. A difference that passes as fast as it came does not stay.
+            // The path ends too soon for a decision. A difference that passes as fast as it came does not stay.
             _ if self.passes(path, AtomQuery { limit: crossing, ..query }, noise) => {
                 Lookahead::crossing(next)
             }
@@ -244,8 +249,8 @@ impl CrossingDetector {
         }
     }
 
-    /// True if the difference comes from outside the band on this path and crosses zero, at the limit, at a steady rate. A
-    /// difference that only approaches zero is slower the nearer it is.
+    /// True if the difference comes from outside the band on this path and crosses zero, at the limit, at a steady
+    /// rate. A difference that only approaches zero is slower the nearer it is.
     fn passes(&mut self, path: &Path, query: AtomQuery, noise: f64) -> bool {
         let Some(enters) = self.falls_below(path, query, noise) else { return false };
         let crossing = query.limit;
@@ -286,8 +291,8 @@ impl CrossingDetector {
         None
     }
 
-    /// Half the width of the band: the effect of the errors of integration and rounding on the difference of two sides. 0 where
-    /// the difference jumps.
+    /// Half the width of the band: the effect of the errors of integration and rounding on the difference of two sides.
+    /// 0 where the difference jumps.
     fn noise(&mut self, path: &Path, atom: usize, at: f64) -> f64 {
         path.uncertain(at, &mut self.around);
         let sides = &path.rule.sides;
@@ -296,8 +301,8 @@ impl CrossingDetector {
         half_width(self.around_out[2 * atom], self.around_out[2 * atom + 1])
     }
 
-    /// True if the sides of an atom approach each other over the path, and are at its start no further apart than `factor` times
-    /// the error of integration.
+    /// True if the sides of an atom approach each other over the path, and are at its start no further apart than
+    /// `factor` times the error of integration.
     pub fn is_about_to_meet(&mut self, path: &Path, atom: usize, sign: Sign, factor: f64) -> bool {
         let gap = sign_of(sign) * self.difference(path, atom).value(0.0);
         if gap > FAR * factor * path.error() * (1.0 + gap) || gap > factor * self.noise(path, atom, 0.0) {

@@ -24,18 +24,20 @@ use pulse::PulseDetector;
 /// The detectors, and the remarks collected from their searches.
 #[derive(Clone, Debug, Default)]
 pub struct Detector {
+    /// Detects events of modules.
     pub crossings: CrossingDetector,
+    /// Detects steps that may have overlooked a pulse.
     pub pulses: PulseDetector,
     /// Rules whose rates could not be bounded, by number, with the time at which that first happened.
     pub unbounded: BTreeMap<usize, f64>,
-    /// By rule and atom whose sides have come nearer each other than the error of integration: the time at which that first
-    /// happened, and the number of modules for which it is still open whether they meet.
+    /// By rule and atom whose sides have come nearer each other than the error of integration: the time at which that
+    /// first happened, and the number of modules for which it is still open whether they meet.
     approached: BTreeMap<(usize, usize), (f64, usize)>,
 }
 
 impl Detector {
-    /// Records the atoms of a rule whose sides a search has left nearer each other than the error of integration: `found`, one
-    /// bit for each atom, given those of the search before. `at` is the end of the searched stretch.
+    /// Records the atoms of a rule whose sides a search has left nearer each other than the error of integration:
+    /// `found`, one bit for each atom, given those of the search before. `at` is the end of the searched stretch.
     #[inline]
     pub fn note_approach(&mut self, rule: usize, found: u64, before: u64, at: SimTime) {
         if found == before {
@@ -55,8 +57,8 @@ impl Detector {
     }
 
     /// Warnings about the run so far: rules whose rates could not be bounded somewhere, so that a pulse may have been
-    /// overlooked there; and sides of conditions that have come nearer each other than the error of integration, so that a
-    /// production may have been due.
+    /// overlooked there; and sides of conditions that have come nearer each other than the error of integration, so
+    /// that a production may have been due.
     pub fn remarks(&self, model: &Model) -> Vec<Diagnostic> {
         let remark = |(&rule, &t): (&usize, &f64)| {
             let rule = &model.rules[rule];

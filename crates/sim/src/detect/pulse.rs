@@ -1,17 +1,18 @@
 //! Pulses: rates that are large for a time so short that no stage of a step falls into it.
 //!
-//! Step control depends on rates where a stage evaluates them and nowhere else. A rate that is large for a ten-thousandth of
-//! a day, between two stages of a step of a day, is invisible to every method. So rates that may have pulses are bounded by
-//! interval arithmetic over pieces of the step, along its dense output, and compared with the rates at the stages: where
-//! the bounds are much larger, the step is cut.
+//! Step control depends on rates where a stage evaluates them and nowhere else. A rate that is large for a
+//! ten-thousandth of a day, between two stages of a step of a day, is invisible to every method. So rates that may have
+//! pulses are bounded by interval arithmetic over pieces of the step, along its dense output, and compared with the
+//! rates at the stages: where the bounds are much larger, the step is cut.
 //!
-//! The analysis of the model tells which rates may have pulses ([`Solve::has_pulses`](dlsys_model::Solve::has_pulses)): those
-//! that are not polynomial in the variables that move, and those that read a variable with a closed form, which a step does
-//! not resolve. An integrated variable is resolved by the step to the tolerance, and a polynomial of it has no pulses.
+//! The analysis of the model tells which rates may have pulses ([`Solve::has_pulses`](dlsys_model::Solve::has_pulses)):
+//! those that are not polynomial in the variables that move, and those that read a variable with a closed form, which a
+//! step does not resolve. An integrated variable is resolved by the step to the tolerance, and a polynomial of it has
+//! no pulses.
 //!
 //! In stiff equations bounds over a range of states carry no information: the rates of two states a tolerance apart may
-//! differ by any amount. There the states are held at the middle of a piece, and only time and closed forms vary. Steps whose
-//! rates cannot be bounded are counted; `run --stats` and `explain` report their rules.
+//! differ by any amount. There the states are held at the middle of a piece, and only time and closed forms vary. Steps
+//! whose rates cannot be bounded are counted; `run --stats` and `explain` report their rules.
 
 use smallvec::SmallVec;
 
@@ -45,11 +46,17 @@ pub enum PulseFinding {
 
 /// A step of a module's equations that is to be examined.
 pub struct ExaminedStep<'p> {
+    /// The world before the step, with the solution of the coupled modules.
     pub world: &'p World,
+    /// The module, its rule and its active equations.
     pub state: &'p State,
+    /// See `state`.
     pub rule: &'p Rule,
+    /// See `state`.
     pub solve: &'p Solve,
+    /// The instants between which rates are bounded.
     pub start: SimTime,
+    /// See `start`.
     pub end: SimTime,
     /// The positions in the step at which the method has evaluated rates, from 0 to 1.
     pub nodes: &'p [f64],
@@ -74,8 +81,8 @@ pub struct PulseDetector {
 }
 
 impl PulseDetector {
-    /// Bounds the rates of the module's equations, and its values that are solved for, along a step, and compares them with the
-    /// values at the stages.
+    /// Bounds the rates of the module's equations, and its values that are solved for, along a step, and compares them
+    /// with the values at the stages.
     pub fn examine(&mut self, step: &ExaminedStep) -> PulseFinding {
         let all = step.end.since(step.start);
         let rates = if step.state.numeric_only { &step.solve.rates } else { &step.solve.numeric_rates };
@@ -129,8 +136,8 @@ impl PulseDetector {
         }
     }
 
-    /// Compares bounds of a program along a path, which is the part `part` of the step, with its values at the stages. A rate
-    /// that lasts for the whole path contributes `scale` times its size to the values.
+    /// Compares bounds of a program along a path, which is the part `part` of the step, with its values at the stages.
+    /// A rate that lasts for the whole path contributes `scale` times its size to the values.
     fn compare(
         &mut self,
         path: &Path,

@@ -1,8 +1,8 @@
 //! The search of a stretch of time for a module's next event.
 //!
-//! The signs of the rule's atoms are known at the start of the stretch. An event is the first instant at which a change of
-//! signs has a consequence: the condition of a production becomes true, the condition of the active equations ends, or a
-//! condition inside them changes. Changes without consequence are recorded on the way.
+//! The signs of the rule's atoms are known at the start of the stretch. An event is the first instant at which a change
+//! of signs has a consequence: the condition of a production becomes true, the condition of the active equations ends,
+//! or a condition inside them changes. Changes without consequence are recorded on the way.
 //!
 //! ```text
 //! track_atoms ─▶ which atoms may change, and the first crossing or doubt of each   ([`crossing`], [`doubt`])
@@ -225,8 +225,8 @@ impl Search<'_, '_> {
         let Search { detector, path, now, tracked, .. } = self;
         for tracked in &*tracked {
             let atom = tracked.atom;
-            // The instant of a touch is known only to about the square root of the rounding: a difference that is zero here
-            // touches here.
+            // The instant of a touch is known only to about the square root of the rounding: a difference that is zero
+            // here touches here.
             let mut is_zero =
                 || detector.difference(path, atom).value(first.position).abs() <= tracked.tolerance;
             let here = match &tracked.ahead.next {
@@ -250,8 +250,8 @@ impl Search<'_, '_> {
         Coincidence { at, after, group }
     }
 
-    /// The last position that cannot be told from that of the first crossing, given the resolution of time and the error of
-    /// integration.
+    /// The last position that is indistinguishable from that of the first crossing, given the resolution of time and
+    /// the error of integration.
     fn last_together(&mut self, first: f64) -> f64 {
         let instant = first + self.path.start.after(first * self.path.h).resolution() / self.path.h;
         let crosses_first = |t: &TrackedAtom| t.ahead.next.is_some_and(|c| c.position == first);

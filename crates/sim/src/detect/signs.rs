@@ -1,4 +1,5 @@
-//! Signs of the differences that a rule's atoms compare: at birth, along closed forms, and the consequences of their changes.
+//! Signs of the differences that a rule's atoms compare: at birth, along closed forms, and the consequences of their
+//! changes.
 
 use smallvec::SmallVec;
 
@@ -33,8 +34,8 @@ pub fn opposite(sign: Sign) -> Sign {
 }
 
 /// The rate of a parameter where it has the value `value`, computed from the equation as written; 0 where the rate is no
-/// larger than the effect of rounding on it, and for parameters without an equation. `variables` are those of the rule, followed
-/// by the switches.
+/// larger than the effect of rounding on it, and for parameters without an equation. `variables` are those of the rule,
+/// followed by the switches.
 pub fn rate_at(
     clause: Option<&Solve>,
     variables: &[f64],
@@ -67,7 +68,8 @@ pub fn produces(rule: &Rule, signs: &[Sign], atom: usize) -> bool {
     !holds(signs[atom]) && (holds(Sign::Zero) || holds(opposite(signs[atom])))
 }
 
-/// True if the signs at an instant, or just after it, have a consequence: a production, other equations, or another switch.
+/// True if the signs at an instant, or just after it, have a consequence: a production, other equations, or another
+/// switch.
 pub fn matters(rule: &Rule, state: &State, at: &[Sign], after: &[Sign]) -> bool {
     let holds = |condition: &Condition, signs: &[Sign]| condition.judge(|i| signs[i]) == Truth::Yes;
     if rule.produces.iter().any(|p| holds(&p.guard, at) || holds(&p.guard, after)) {

@@ -151,8 +151,8 @@ impl Rates for Independent<'_> {
     }
 }
 
-/// The first position in a step, from 0 to 1, from which on a pulse may have been overlooked. A rule whose rates cannot be bounded
-/// in steps that have been cut often enough is recorded.
+/// The first position in a step, from 0 to 1, from which on a pulse may have been overlooked. A rule whose rates cannot
+/// be bounded in steps that have been cut often enough is recorded.
 fn overlooked(detector: &mut Detector, step: &ExaminedStep, rule: usize, tries: usize) -> Option<f64> {
     match detector.pulses.examine(step) {
         PulseFinding::Clear => None,
@@ -268,7 +268,8 @@ impl FlowStage<'_, '_> {
         step
     }
 
-    /// Adapts the step size with which the next module under these equations begins, after an event inside a module's own step.
+    /// Adapts the step size with which the next module under these equations begins, after an event inside a module's
+    /// own step.
     pub fn learn(&mut self, id: ModuleId) {
         let now = self.instant.at;
         let Some(state) = self.world.state(id) else { return };

@@ -9,7 +9,7 @@ use dlsys_tree::SimTime;
 
 pub use dlsys_ode::{CERTAINTY, Error as StepError, next_grid_time};
 
-/// The tolerance of a single step, as a part of the tolerance asked for.
+/// The tolerance of a single step, as a part of the tolerance of the run.
 pub const INNER_TOLERANCE: f64 = Stepper::TOLERANCE_SHARE;
 
 /// A step whose dense output takes this many pieces is long enough.
@@ -31,9 +31,11 @@ fn of_steps(settings: &Settings) -> StepSettings {
 /// The start of a step, and its limits.
 #[derive(Clone, Copy)]
 pub struct StepRequest<'r> {
+    /// Method, tolerance and step size.
     pub settings: &'r Settings,
     /// The components at the start.
     pub y: &'r [f64],
+    /// The instant at which the step begins.
     pub start: SimTime,
     /// The step goes no further than to this instant.
     pub limit: Option<SimTime>,
@@ -50,8 +52,8 @@ impl Integrator {
         self.stepper.overhead_is_high = true;
     }
 
-    /// Declares whether steps are free of searches for events. The dense output of such unwatched steps is refined for frames
-    /// inside them ([`Integrator::refined`]).
+    /// Declares whether steps are free of searches for events. The dense output of such unwatched steps is refined for
+    /// frames inside them ([`Integrator::refined`]).
     pub fn set_unwatched(&mut self, is_unwatched: bool) {
         self.stepper.is_unwatched = is_unwatched;
     }
@@ -61,7 +63,8 @@ impl Integrator {
         self.stepper.is_unwatched
     }
 
-    /// The positions in the step just made, from 0 to 1, at which the rates were evaluated that its error estimate depends on.
+    /// The positions in the step just made, from 0 to 1, at which the rates were evaluated that its error estimate
+    /// depends on.
     pub fn nodes(&self) -> Nodes {
         self.stepper.nodes()
     }
@@ -98,8 +101,8 @@ impl Integrator {
         end
     }
 
-    /// The dense output of the step just made from `y`. Some methods evaluate further rates for it, so it is computed only on
-    /// demand.
+    /// The dense output of the step just made from `y`. Some methods evaluate further rates for it, so it is computed
+    /// only on demand.
     pub fn dense(&mut self, system: &mut impl Rates, y: &[f64]) -> Dense {
         self.stepper.dense(system, y)
     }

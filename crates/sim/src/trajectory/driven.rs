@@ -1,5 +1,5 @@
-//! Solutions of `dx/dt = h(t) q(x)`: those of `dx/ds = q(x)` at `s = H(t)`, where the *pace* H, the integral of h, is an explicit
-//! function of time.
+//! Solutions of `dx/dt = h(t) q(x)`: those of `dx/ds = q(x)` at `s = H(t)`, where the *pace* H, the integral of h, is
+//! an explicit function of time.
 //!
 //! The equations of this form are those of [`dlsys_model::Driven`].
 
@@ -128,8 +128,8 @@ impl Pace {
         (hi > 0.0).then_some(hi)
     }
 
-    /// A time up to which H is proven to stay between two values, close to the first at which it does not; None if none is found
-    /// up to 1e15.
+    /// A time up to which H is proven to stay between two values, close to the first at which it does not; None if none
+    /// is found up to 1e15.
     fn leave(&self, below: f64, above: f64) -> Option<f64> {
         let (mut at, mut width) = (0.0, 1.0);
         for _ in 0..MOST {
@@ -152,7 +152,8 @@ impl Pace {
 }
 
 impl AutonomousFlow {
-    /// The solution from `x` of an equation of the given form with these coefficients; None where its closed form does not hold.
+    /// The solution from `x` of an equation of the given form with these coefficients; None where its closed form does
+    /// not hold.
     pub fn new(form: model::Flow, x: f64, [c, b, a]: [f64; 3]) -> Option<AutonomousFlow> {
         Some(match form {
             model::Flow::Quadratic => {

@@ -47,7 +47,8 @@ impl Growth {
         self.bend.map_or(y, |bend| y.ln_1p() / bend)
     }
 
-    /// The displacement at a time since the start, which may be negative. NaN or infinite beyond the end of the solution.
+    /// The displacement at a time since the start, which may be negative. NaN or infinite beyond the end of the
+    /// solution.
     pub fn value(&self, s: f64) -> f64 {
         if self.f == 0.0 || s == 0.0 {
             return 0.0;

@@ -87,8 +87,8 @@ impl Trajectory {
         }
     }
 
-    /// The first time after 0 at which the displacement is `u`, for trajectories that are monotonic; None for others. `rate`
-    /// computes the rate there from the equation as written.
+    /// The first time after 0 at which the displacement is `u`, for trajectories that are monotonic; None for others.
+    /// `rate` computes the rate there from the equation as written.
     pub fn reach(&self, u: f64, rate: impl FnOnce() -> f64) -> Option<f64> {
         match self {
             Trajectory::Polynomial([c, 0.0, 0.0, 0.0]) => {

@@ -120,8 +120,8 @@ impl Riccati {
         }
     }
 
-    /// The first time after 0 at which the displacement is `u`. `exact_rate` computes the rate there from the equation as
-    /// written, which near an equilibrium has more correct digits than the coefficients give.
+    /// The first time after 0 at which the displacement is `u`. `exact_rate` computes the rate there from the equation
+    /// as written, which near an equilibrium has more correct digits than the coefficients give.
     pub fn reach(&self, u: f64, exact_rate: impl FnOnce() -> f64) -> Option<f64> {
         let ahead = u * self.f > 0.0;
         let mut rate = self.rate(u);
@@ -161,8 +161,8 @@ impl Riccati {
         (tau.is_finite() && tau > 0.0).then_some(tau)
     }
 
-    /// Bounds of displacement and rate from one time since the start to another. The solution of an autonomous equation is
-    /// monotonic.
+    /// Bounds of displacement and rate from one time since the start to another. The solution of an autonomous equation
+    /// is monotonic.
     pub fn over(&self, from: f64, to: f64) -> Dual<Interval> {
         let (a, b) = (self.value(from), self.value(to));
         if !a.is_finite() || !b.is_finite() {

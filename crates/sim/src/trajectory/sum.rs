@@ -162,7 +162,8 @@ impl Terms {
         Some((a, b))
     }
 
-    /// The solution of `x' = b x + g` from `x`, where g is this sum; None if it is no such sum, or would lose too many digits.
+    /// The solution of `x' = b x + g` from `x`, where g is this sum; None if it is no such sum, or would lose too many
+    /// digits.
     pub fn solve(&self, x: f64, b: f64) -> Option<TermSum> {
         if self.refused {
             return None;

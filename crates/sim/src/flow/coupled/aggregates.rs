@@ -9,13 +9,14 @@ use dlsys_model::{Jacobian, Rule};
 /// A rule and the number of one of its aggregates.
 type TermKey = (usize, usize);
 
-/// At most [`LANES`] children of aggregates with the same term: by the number of the aggregate in the table, and of the child
-/// in it.
+/// At most [`LANES`] children of aggregates with the same term: by the number of the aggregate in the table, and of the
+/// child in it.
 pub type TermBatch = (TermKey, Vec<(u32, u32)>);
 
 /// A partial derivative by a component: directly, or by way of one child of an aggregate.
 #[derive(Clone, Copy, Debug)]
 pub struct Partial {
+    /// The component of the state vector that the derivative is by.
     pub component: u32,
     /// Index of the entry in the Jacobian.
     pub entry: usize,
@@ -133,8 +134,8 @@ impl EquationTable {
         }
     }
 
-    /// The slopes: the partial derivatives of the terms of a row's aggregates, one child after another. `variables` are those of
-    /// the row's rule, followed by the switches.
+    /// The slopes: the partial derivatives of the terms of a row's aggregates, one child after another. `variables` are
+    /// those of the row's rule, followed by the switches.
     pub fn slopes(
         &self,
         rules: &[Rule],

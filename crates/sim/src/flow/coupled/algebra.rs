@@ -3,8 +3,8 @@
 //! The equations are differential-algebraic of index 1: the integrated components determine these. Therefore the
 //! integrator works on an ordinary differential equation, in which each evaluation of rates solves for the algebraic
 //! components first (the state space form of Hairer and Wanner 1996, VI.1). Compared with index reduction, which
-//! differentiates the equations and integrates the algebraic components, nothing drifts and no projection is needed; and an
-//! explicit value costs one evaluation.
+//! differentiates the equations and integrates the algebraic components, nothing drifts and no projection is needed;
+//! and an explicit value costs one evaluation.
 //!
 //! Components that depend on one another in a circle, within a module or along the tree, are solved together by
 //! Newton's method; others one after another, in the order of their dependence (Tarjan's strongly connected components).
@@ -17,6 +17,7 @@ use dlsys_ode::Pattern;
 /// An algebraic component.
 #[derive(Clone, Copy, Debug)]
 pub struct Unknown {
+    /// Number of the component in the state vector.
     pub component: u32,
     row: u32,
     /// Index among the algebraic parameters of the row's clause.
@@ -26,6 +27,7 @@ pub struct Unknown {
 /// The algebraic components of a table of equations, in the order in which they are solved for.
 #[derive(Clone, Debug, Default)]
 pub struct Algebra {
+    /// All algebraic components, in string order.
     pub unknowns: Vec<Unknown>,
     blocks: Vec<Block>,
     /// By component: the index of the unknown, or [`NONE`].
@@ -78,8 +80,8 @@ const SMALL: f64 = 1e-9;
 const NOISE: f64 = 1e-13;
 /// A matrix is singular if a pivot is at most this part of its row.
 const SINGULAR: f64 = 1e-13;
-/// Unknowns whose influence on their equations is less than this part of the largest influence explain why steps have become
-/// too small.
+/// Unknowns whose influence on their equations is less than this part of the largest influence explain why steps have
+/// become too small.
 const FADING: f64 = 1e-2;
 /// Up to this many unknowns are eliminated with pivoting.
 const FEW: usize = 48;
@@ -115,6 +117,7 @@ impl Algebra {
         algebra
     }
 
+    /// True if no component is algebraic.
     pub fn is_empty(&self) -> bool {
         self.unknowns.is_empty()
     }
@@ -124,8 +127,8 @@ impl Algebra {
         self.number.get(component as usize).is_some_and(|n| *n != NONE)
     }
 
-    /// Puts the unknowns into the order of their dependence, those on a cycle together (Tarjan 1972; with an explicit stack,
-    /// because chains may be as long as the string).
+    /// Puts the unknowns into the order of their dependence, those on a cycle together (Tarjan 1972; with an explicit
+    /// stack, because chains may be as long as the string).
     fn sort(&mut self, table: &EquationTable, rules: &[Rule]) {
         let n = self.unknowns.len();
         let mut depends: Vec<Vec<u32>> = vec![Vec::new(); n];
@@ -190,8 +193,8 @@ impl Algebra {
         }
     }
 
-    /// Solves for the algebraic components of the state `y` at a time since the start of the step. The values that they have in
-    /// `y` are the first guess.
+    /// Solves for the algebraic components of the state `y` at a time since the start of the step. The values that they
+    /// have in `y` are the first guess.
     pub fn solve(
         &self,
         table: &EquationTable,
@@ -220,8 +223,8 @@ impl Algebra {
 }
 
 impl Algebra {
-    /// The unknowns whose equations become singular, and which therefore change ever faster, if there are any: the reason why steps
-    /// have become too small.
+    /// The unknowns whose equations become singular, and which therefore change ever faster, if there are any: the
+    /// reason why steps have become too small.
     pub fn fading(
         &self,
         table: &EquationTable,
@@ -357,15 +360,16 @@ impl Solver<'_> {
                 return Err(AlgebraicError::Singular(places[0]));
             };
             let start: Vec<f64> = places.iter().map(|p| y[*p]).collect();
-            // This correction and the next have one scale: a solution may be zero, and on the way to it every correction is
-            // large relative to the value that it is added to.
+            // This correction and the next have one scale: a solution may be zero, and on the way to it every
+            // correction is large relative to the value that it is added to.
             let scale = start.iter().fold(1e-300, |most: f64, x| most.max(x.abs()));
             let length = |c: &[f64]| {
                 let of = |(c, x): (&f64, &f64)| c.abs() / x.abs().max(1e-3 * scale).max(1e-12);
                 c.iter().zip(&start).map(of).fold(0.0, f64::max)
             };
             let whole = length(&correction);
-            // Near zero only rounding in the equations is left long before the correction is small relative to the unknown.
+            // Near zero only rounding in the equations is left long before the correction is small relative to the
+            // unknown.
             let noise = (correction.iter().zip(&start)).all(|(c, x)| c.abs() <= NOISE * x.abs().max(1.0));
             if whole == 0.0 {
                 return Ok(());

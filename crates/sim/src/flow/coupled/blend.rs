@@ -1,12 +1,12 @@
 //! Dense output of algebraic components: polynomials through points at which they were solved for.
 //!
-//! Between the ends of a step the integrated components are polynomials. The algebraic components are solved for at eight
-//! Chebyshev points, ends included, and interpolated. Between the points the interpolant is compared with the solution
-//! itself; where it errs by more than a step may, the stretch is halved. So events on algebraic components are located like
-//! all others, on polynomials with bounds.
+//! Between the ends of a step the integrated components are polynomials. The algebraic components are solved for at
+//! eight Chebyshev points, ends included, and interpolated. Between the points the interpolant is compared with the
+//! solution itself; where it errs by more than a step may, the stretch is halved. So events on algebraic components are
+//! located like all others, on polynomials with bounds.
 //!
-//! A stretch begins exactly where the one before ended, for example with the value on which an event was located. Solving
-//! there again gives another value within the tolerance; the difference vanishes within the first stretch.
+//! A stretch begins exactly where the one before ended, for example with the value on which an event was located.
+//! Solving there again gives another value within the tolerance; the difference vanishes within the first stretch.
 
 use std::sync::LazyLock;
 

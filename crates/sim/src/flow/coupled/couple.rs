@@ -130,9 +130,9 @@ impl FlowStage<'_, '_> {
         self.flows.coupled.loosened = near;
     }
 
-    /// True if a module has to be integrated together with neighbours: it reads one that is integrated, or it is integrated
-    /// itself and reads a neighbour or is read by one; or if it has algebraic components, which only coupled equations
-    /// solve for.
+    /// True if a module has to be integrated together with neighbours: it reads one that is integrated, or it is
+    /// integrated itself and reads a neighbour or is read by one; or if it has algebraic components, which only coupled
+    /// equations solve for.
     fn is_coupled(&self, id: ModuleId) -> bool {
         let Some(state) = self.world.state(id) else { return false };
         let Some(rule) = state.rule else { return false };

@@ -11,16 +11,20 @@ use dlsys_ode::Rates;
 
 /// The right-hand side of a [`System`].
 pub struct Equations<'s> {
+    /// The equations.
     pub system: &'s System,
+    /// The rules of the model, by index.
     pub rules: &'s [Rule],
     /// The trajectories of the components that are inputs.
     solution: Option<&'s CoupledSolution>,
+    /// Working memory of evaluations.
     pub memory: RateWorkspace,
 }
 
 /// Working memory of evaluations.
 #[derive(Clone, Debug, Default)]
 pub struct RateWorkspace {
+    /// Values of the inputs at `read_at`.
     pub inputs: Vec<f64>,
     /// The time at which the inputs were read, since the start of the step.
     read_at: Option<f64>,
@@ -32,10 +36,12 @@ pub struct RateWorkspace {
     consistent: Vec<f64>,
     variables: Vec<f64>,
     scratch: Scratch<f64>,
+    /// Vector registers of the programs.
     pub registers: Vec<Lanes>,
 }
 
 impl<'s> Equations<'s> {
+    /// The right-hand side of a system whose inputs follow `solution`; inputs are NaN without one.
     pub fn new(
         system: &'s System,
         rules: &'s [Rule],
@@ -86,8 +92,8 @@ impl<'s> Equations<'s> {
 }
 
 impl Equations<'_> {
-    /// Computes all aggregates. The terms of children of many modules are evaluated together; those of each aggregate are added
-    /// up in string order.
+    /// Computes all aggregates. The terms of children of many modules are evaluated together; those of each aggregate
+    /// are added up in string order.
     pub fn add_up(&mut self, tau: f64, y: &[f64]) {
         let table = &self.system.table;
         self.memory.aggregates.clear();
@@ -143,8 +149,8 @@ impl Equations<'_> {
         self.system.algebra.fading(&self.system.table, self.rules, &self.memory.inputs, y)
     }
 
-    /// The error of the algebraic components at the end of a step that follows from those of the integrated ones, in units of
-    /// the tolerance.
+    /// The error of the algebraic components at the end of a step that follows from those of the integrated ones, in
+    /// units of the tolerance.
     pub fn sensitivity(&mut self, tau: f64, end: &[f64], errors: &[f64], tolerance: f64) -> f64 {
         let there: Result<Vec<f64>, AlgebraicError> = (|| {
             let mut there = end.to_vec();

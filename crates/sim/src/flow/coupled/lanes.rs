@@ -8,8 +8,8 @@ use dlsys_model::Rule;
 use smallvec::SmallVec;
 use std::ops::Range;
 
-/// All rows with rates, in chunks. The contents of chunks and columns stand in a few long lists, so that the equations of
-/// another region are written into the memory of the last.
+/// All rows with rates, in chunks. The contents of chunks and columns stand in a few long lists, so that the equations
+/// of another region are written into the memory of the last.
 #[derive(Clone, Debug, Default)]
 pub struct LaneBatches {
     chunks: Vec<Chunk>,
@@ -61,9 +61,11 @@ pub struct EvaluationPoint<'r> {
     pub tau: f64,
     /// The components.
     pub y: &'r [f64],
+    /// The inputs.
     pub inputs: &'r [f64],
     /// Components, then inputs; empty if the table has no inputs.
     pub known: &'r [f64],
+    /// The aggregates.
     pub aggregates: &'r [f64],
 }
 

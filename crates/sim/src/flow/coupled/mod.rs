@@ -37,10 +37,13 @@ use dlsys_tree::{ModuleId, SimTime};
 pub struct Coupled {
     /// The modules of the common step in string order, then those that have joined since; some may be dead.
     pub members: Vec<ModuleId>,
+    /// The equations of the common step.
     pub system: System,
     /// The components at the start of the common step.
     y: Vec<f64>,
+    /// Makes the common steps.
     pub integrator: Integrator,
+    /// The experience of its step control.
     pub control: Control,
     /// The equations as a linear system, if they are solved without steps.
     pub linear: Option<Linear>,
@@ -50,14 +53,17 @@ pub struct Coupled {
     pub reintegrated: bool,
     /// Modules whose parameters are no longer read by a neighbour that has died.
     pub loosened: Vec<ModuleId>,
+    /// Local re-integrations within the common step.
     pub reintegration: Reintegration,
+    /// The modules that the last instant has affected.
     pub affected: Affected,
     /// A solution without steps has been tried since the common trajectory was last restarted.
     tried: bool,
     /// The number of times that an event has cut a trajectory without steps.
     pub cuts: u32,
-    /// An earlier time, and the number of common steps since then: to detect steps that hardly advance time.
+    /// An earlier time, to detect steps that hardly advance time.
     pub mark: SimTime,
+    /// The number of common steps since `mark`.
     pub since_mark: usize,
     /// Members whose rates may have pulses.
     pulsing: Vec<ModuleId>,

@@ -1,7 +1,7 @@
 //! Prefetching of memory that a traversal of modules will read soon.
 //!
-//! The states of modules stand in memory in the order of their birth, and a common step visits them in string order: for the
-//! processor, at random. Without prefetching each visit waits for memory.
+//! The states of modules stand in memory in the order of their birth, and a common step visits them in string order:
+//! for the processor, at random. Without prefetching each visit waits for memory.
 
 use crate::world::World;
 use dlsys_tree::ModuleId;
@@ -9,7 +9,8 @@ use dlsys_tree::ModuleId;
 /// Memory is prefetched this many modules ahead.
 const AHEAD: usize = 6;
 
-/// The states of fewer modules than this stay in the caches by themselves; prefetching would cost a third of a cheap step.
+/// The states of fewer modules than this stay in the caches by themselves; prefetching would cost a third of a cheap
+/// step.
 const FEW: usize = 2000;
 
 /// Bytes of a cache line.
@@ -41,9 +42,9 @@ fn fetch<T>(value: &T) {
         let first = std::ptr::from_ref(value).cast::<i8>();
         let offsets = (0..size_of::<T>()).step_by(LINE).chain(size_of::<T>().checked_sub(1));
         for offset in offsets {
-            // SAFETY: this is a hint for memory behind a reference; it reads nothing and cannot fail. The standard library
-            // has no safe equivalent. A filament of 45,000 coupled cells takes four fifths of the time with it (medians of
-            // five, in turns).
+            // SAFETY: this is a hint for memory behind a reference; it reads nothing and cannot fail. The standard
+            // library has no safe equivalent. A filament of 45,000 coupled cells takes four fifths of the time with it
+            // (medians of five, in turns).
             unsafe { _mm_prefetch::<_MM_HINT_T0>(first.wrapping_add(offset)) };
         }
     }

@@ -1,21 +1,22 @@
 //! Local re-integration: the effect of an event on the coupled modules around it, within the common step of the others.
 //!
-//! After an event at t' within the common step, the modules whose equations or inputs have changed (the *seeds*) and some
-//! rings of neighbours around them are integrated again from t' to the end of the step, with the trajectories of all
-//! other modules as inputs. Ring k + 1 consists of the modules that read one of ring k, since influence passes to the
-//! readers.
+//! After an event at t' within the common step, the modules whose equations or inputs have changed (the *seeds*) and
+//! some rings of neighbours around them are integrated again from t' to the end of the step, with the trajectories of
+//! all other modules as inputs. Ring k + 1 consists of the modules that read one of ring k, since influence passes to
+//! the readers.
 //!
 //! # Why the error stays under the tolerance
 //!
-//! Let ε be the error that a step may have ([`INNER_TOLERANCE`] times the tolerance). A re-integration has the step control
-//! of any other step. It neglects the change of the modules outside. These read the region only through its outermost
-//! ring, and the change of that ring, old trajectory against new, is measured along the whole rest of the step: if it
-//! exceeds ε anywhere, the re-integration is repeated with twice as many rings. So the neglected change enters the rates
-//! outside as a disturbance of at most ε times the Lipschitz constant L of the coupling, and over the rest of a step of
-//! length h it changes their values by at most ε (exp(L h) - 1). Explicit methods keep L h to a few units (beyond that
-//! their stability ends, the equations count as stiff, and every event ends the step): the neglected change is one more
-//! local error for each event, and accumulates as those do. Where the influence of neighbours is weak (diffusion between
-//! cells), it falls by a factor of about L h / k from ring k - 1 to ring k, and a handful of rings is enough.
+//! Let ε be the error that a step may have ([`INNER_TOLERANCE`] times the tolerance). A re-integration has the step
+//! control of any other step. It neglects the change of the modules outside. These read the region only through its
+//! outermost ring, and the change of that ring, old trajectory against new, is measured along the whole rest of the
+//! step: if it exceeds ε anywhere, the re-integration is repeated with twice as many rings. So the neglected change
+//! enters the rates outside as a disturbance of at most ε times the Lipschitz constant L of the coupling, and over the
+//! rest of a step of length h it changes their values by at most ε (exp(L h) - 1). Explicit methods keep L h to a few
+//! units (beyond that their stability ends, the equations count as stiff, and every event ends the step): the neglected
+//! change is one more local error for each event, and accumulates as those do. Where the influence of neighbours is
+//! weak (diffusion between cells), it falls by a factor of about L h / k from ring k - 1 to ring k, and a handful of
+//! rings is enough.
 
 use crate::flow::FlowStage;
 use crate::flow::coupled::equations::{Equations, RateWorkspace};
@@ -83,8 +84,8 @@ const MAX_STEPS: usize = 64;
 /// A region of more than this part of all coupled modules is replaced by a new common step.
 const MOST: f64 = 0.5;
 
-/// The relative change that may be neglected in models with aggregates. A flow along branches has to be conserved whatever the
-/// tolerance, but across the edge of a region the outside still receives the flow that it had before.
+/// The relative change that may be neglected in models with aggregates. A flow along branches has to be conserved
+/// whatever the tolerance, but across the edge of a region the outside still receives the flow that it had before.
 const CONSERVED: f64 = 1e-11;
 
 /// The number of a component outside the region.
@@ -109,8 +110,8 @@ struct TrialSolution {
 }
 
 impl FlowStage<'_, '_> {
-    /// Integrates some coupled modules, some of which have just joined, and their neighbours again from now on. False if a new common
-    /// step does that better.
+    /// Integrates some coupled modules, some of which have just joined, and their neighbours again from now on. False
+    /// if a new common step does that better.
     pub fn reintegrate(&mut self, seeds: &[ModuleId], joined: &[ModuleId]) -> bool {
         let Some(solution) = &self.world.coupled else { return false };
         let room = solution.end.since(self.instant.at);

@@ -27,9 +27,11 @@ pub enum VariableSource {
 /// The equations of some modules.
 #[derive(Clone, Debug, Default)]
 pub struct EquationTable {
+    /// The rows, in the order of the members.
     pub rows: Vec<EquationRow>,
     /// The sources of the variables of all rows, row after row; without `t`, `age` and switches.
     pub sources: Vec<VariableSource>,
+    /// The parameters with closed forms that rows read.
     pub formulas: Vec<FormulaInput>,
     /// The aggregates of all rows.
     pub aggregates: Vec<RowAggregate>,
@@ -52,6 +54,7 @@ pub struct EquationTable {
 /// A parameter with a closed form that rows read.
 #[derive(Clone, Debug)]
 pub struct FormulaInput {
+    /// The closed form.
     pub trajectory: Trajectory,
     /// The value at the start of the trajectory.
     pub x: f64,
@@ -63,13 +66,15 @@ pub struct FormulaInput {
 /// The equations of one module.
 #[derive(Clone, Copy, Debug)]
 pub struct EquationRow {
-    /// Index of the module's rule, and of the active `solve` clause in it.
+    /// Index of the module's rule.
     pub rule: usize,
+    /// Index of the active `solve` clause in the rule.
     pub solve: usize,
     /// All equations are integrated, those with closed forms too.
     pub numeric_only: bool,
-    /// The sources of the variables, in [`EquationTable::sources`].
+    /// The first source of a variable, in [`EquationTable::sources`].
     pub first_source: usize,
+    /// The number of variables with sources: all but `t`, `age` and switches.
     pub sources: usize,
     pub(super) first_switch: usize,
     pub(super) switches: usize,
@@ -125,8 +130,8 @@ impl EquationTable {
         self.given.clear();
     }
 
-    /// Adds a row with the algebraic parameters of a module only: with the first component and the places of the parameters
-    /// in the clause. The sources of the row and of its children have been added.
+    /// Adds a row with the algebraic parameters of a module only: with the first component and the places of the
+    /// parameters in the clause. The sources of the row and of its children have been added.
     pub fn push_algebraic(
         &mut self,
         (rule, solve): (usize, usize),

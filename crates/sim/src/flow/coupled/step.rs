@@ -185,7 +185,8 @@ impl FlowStage<'_, '_> {
         Ok(())
     }
 
-    /// Makes a step that resolves the algebraic components and overlooks no pulse; shorter ones are tried until one does.
+    /// Makes a step that resolves the algebraic components and overlooks no pulse; shorter ones are tried until one
+    /// does.
     fn make_step(&mut self, from: SimTime) -> CommonStep {
         let rules = &self.setup.model.rules;
         let limit = self.setup.settings.slice_end(from);
@@ -234,7 +235,8 @@ impl FlowStage<'_, '_> {
         (step, solution)
     }
 
-    /// The first position in a step of length `h`, from 0 to 1, at which a pulse of some member may have been overlooked.
+    /// The first position in a step of length `h`, from 0 to 1, at which a pulse of some member may have been
+    /// overlooked.
     fn first_overlooked(&mut self, from: SimTime, h: f64, tries: usize) -> Option<f64> {
         let Coupled { integrator, control, pulsing, .. } = &self.flows.coupled;
         let settings = &self.setup.coupled_settings;
@@ -359,8 +361,8 @@ impl FlowStage<'_, '_> {
             || self.flows.coupled.linear.is_some()
     }
 
-    /// Handles equations that end where no common step leads on: a boundary there, of the module that a component belongs to or
-    /// of one that it reads, has been reached. False if there is none.
+    /// Handles equations that end where no common step leads on: a boundary there, of the module that a component
+    /// belongs to or of one that it reads, has been reached. False if there is none.
     fn arrest_coupled(&mut self, component: usize, at: SimTime) -> bool {
         let Some((id, _)) = self.flows.coupled.system.owner(component) else { return false };
         let context = self.world.state(id).map(|s| s.context.to_vec()).unwrap_or_default();

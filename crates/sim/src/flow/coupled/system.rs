@@ -15,6 +15,7 @@ use smallvec::SmallVec;
 /// The equations of the coupled modules: a table, and the orders in which it is evaluated.
 #[derive(Clone, Debug, Default)]
 pub struct System {
+    /// The rows of the equations.
     pub table: EquationTable,
     /// The algebraic components, in the order in which they are solved for.
     pub algebra: Algebra,
@@ -29,6 +30,7 @@ const REGION: usize = 256;
 
 /// The modules whose equations form a system.
 pub struct Membership<'w> {
+    /// The world at the start of the step.
     pub world: &'w World,
     /// The modules, in the order of their rows.
     pub members: &'w [ModuleId],
@@ -46,8 +48,9 @@ impl System {
         system
     }
 
-    /// Makes these the equations of some of the coupled modules, in the memory of the equations before. `unknown` gives the
-    /// number here of a component of the coupled solution, in the order of the members; None if it is not integrated here.
+    /// Makes these the equations of some of the coupled modules, in the memory of the equations before. `unknown` gives
+    /// the number here of a component of the coupled solution, in the order of the members; None if it is not
+    /// integrated here.
     pub fn rebuild(&mut self, rules: &[Rule], modules: &Membership, unknown: impl Fn(u32) -> Option<u32>) {
         self.table.clear(modules.start);
         for (at, &id) in modules.members.iter().enumerate() {
@@ -77,8 +80,8 @@ impl System {
         self.table.owner(component)
     }
 
-    /// Calls a function with the number of the rate, and the partial derivative, for each partial derivative of a row's rates
-    /// by an integrated component.
+    /// Calls a function with the number of the rate, and the partial derivative, for each partial derivative of a row's
+    /// rates by an integrated component.
     pub fn row_partials(&self, rules: &[Rule], row: &EquationRow, mut each: impl FnMut(u32, Partial)) {
         let solve = &rules[row.rule].solves[row.solve];
         self.table.visit_partials(rules, row, &solve.jacobian, |partial| {

@@ -42,8 +42,9 @@ impl Unknowns {
 }
 
 impl Linear {
-    /// The solution of the equations of coupled modules, from the state `y`. None if the equations, or those of a closed form that
-    /// they read, are not linear, or no method solves them without steps. `tolerance` is relative to max(1, |value|).
+    /// The solution of the equations of coupled modules, from the state `y`. None if the equations, or those of a
+    /// closed form that they read, are not linear, or no method solves them without steps. `tolerance` is relative to
+    /// max(1, |value|).
     pub fn new(system: &System, rules: &[Rule], y: &[f64], tolerance: f64) -> Option<Linear> {
         if !system.algebra.is_empty() {
             return None;

@@ -1,7 +1,7 @@
 //! Coupled modules whose equations are linear with constant coefficients: `y' = A y + b`.
 //!
-//! The exact flow is the exponential of a matrix. Where no condition has to be searched for events there are no steps: the
-//! exponential is applied from the start of the trajectory to each time that is observed.
+//! The exact flow is the exponential of a matrix. Where no condition has to be searched for events there are no steps:
+//! the exponential is applied from the start of the trajectory to each time that is observed.
 //!
 //! | method | condition | cost |
 //! |---|---|---|
@@ -9,9 +9,9 @@
 //! | [`poles`]: rational approximation | a tree, and real eigenvalues | independent of time and stiffness |
 //! | [`steps`] | none | that of steps |
 //!
-//! At each time each method has a bound of its error, which is compared with the values at that time. The cheapest method
-//! is tried first; one whose bound is too large is rejected for that time only. So the state at a time depends on
-//! nothing but the time.
+//! At each time each method has a bound of its error, which is compared with the values at that time. The cheapest
+//! method is tried first; one whose bound is too large is rejected for that time only. So the state at a time depends
+//! on nothing but the time.
 
 mod build;
 mod poles;
@@ -31,8 +31,8 @@ use steps::LinearSteps;
 
 /// As many products of the matrix and a vector cost about as much as the rational approximation, once.
 const POLES_COST: f64 = 60.0;
-/// The same where the approximation has no bound of its error, so that it is made three times for an estimate, and the series is
-/// preferred for longer.
+/// The same where the approximation has no bound of its error, so that it is made three times for an estimate, and the
+/// series is preferred for longer.
 const UNPROVEN_POLES_COST: f64 = 2_000.0;
 /// More products than this cost more than steps.
 const MOST_PRODUCTS: f64 = 30_000.0;
@@ -46,6 +46,7 @@ const ROUNDING: f64 = 0.5 * f64::EPSILON;
 pub struct Problem {
     /// The entries of A: row, column and value; several entries of one place are added up.
     pub entries: Vec<(u32, u32, f64)>,
+    /// The constant term.
     pub b: Vec<f64>,
     /// The state at the start.
     pub y: Vec<f64>,
@@ -93,8 +94,8 @@ impl Linear {
         Some(Linear { problem, unknown, start, orthant, series: None, majorant: None, poles, steps: None })
     }
 
-    /// The components at an instant, as the dense output of a step of length 0. NaN where the solution exceeds the range of
-    /// numbers. `control` is the experience of step control, in case steps are needed.
+    /// The components at an instant, as the dense output of a step of length 0. NaN where the solution exceeds the
+    /// range of numbers. `control` is the experience of step control, in case steps are needed.
     pub fn at(&mut self, at: SimTime, settings: &Settings, control: &Control, stats: &mut Stats) -> Dense {
         let tau = at.since(self.start).max(0.0);
         let mut y = match tau {
@@ -147,7 +148,8 @@ impl Linear {
         self.series();
         let Linear { problem, orthant, series: Some(series), majorant, .. } = self else { return None };
         let (y, cut, rounding) = series.at(&problem.y, tau);
-        // The truncation error is bounded for all unknowns together, the rounding error relative to the sum of all sizes.
+        // The truncation error is bounded for all unknowns together, the rounding error relative to the sum of all
+        // sizes.
         let largest = series.largest(tau);
         if problem.allows(&y, |i| cut + rounding * if orthant.holds(i) { y[i].abs() } else { largest }) {
             return Some(y);

@@ -1,12 +1,13 @@
-//! The exponential of a matrix by the best rational approximation on the negative axis (`rational`): every pole costs one
-//! elimination from the tips to the root, and stiffness costs nothing (Trefethen, Weideman and Schmelzer 2006).
+//! The exponential of a matrix by the best rational approximation on the negative axis (`rational`): every pole costs
+//! one elimination from the tips to the root, and stiffness costs nothing (Trefethen, Weideman and Schmelzer 2006).
 //!
 //! The error is bounded on the spectrum only if the matrix is normal in some norm. Mutual influences make
-//! a tree's matrix similar to a symmetric one, by a diagonal matrix of weights: then the error of each unknown is bounded
-//! by its weight, the error of the approximation, and the size of the start, measured with the weights ([`Proof`]). The bound
-//! does not decrease with the values: a value that has decayed by twelve decades has no digits left. An influence in one
-//! direction is far from normal, though all eigenvalues are real; along a chain of such influences the approximation is
-//! meaningless. Then it is computed over the whole time, and again over two halves, each with an error of its own.
+//! a tree's matrix similar to a symmetric one, by a diagonal matrix of weights: then the error of each unknown is
+//! bounded by its weight, the error of the approximation, and the size of the start, measured with the weights
+//! ([`Proof`]). The bound does not decrease with the values: a value that has decayed by twelve decades has no digits
+//! left. An influence in one direction is far from normal, though all eigenvalues are real; along a chain of such
+//! influences the approximation is meaningless. Then it is computed over the whole time, and again over two halves,
+//! each with an error of its own.
 
 use super::rational::{ALPHA_0, POLES, RESIDUES};
 use super::{Problem, ROUNDING};
@@ -20,7 +21,8 @@ const ERROR: f64 = 5e-14;
 const ERROR_OF_SLOPE: f64 = 2e-11;
 /// The rounding error of an elimination, in units of that of the largest entry.
 const ROUNDINGS: f64 = 4.5;
-/// The effect of the roundings of the pivots and of the equilibrium, which last as disturbances do, in units of the memory.
+/// The effect of the roundings of the pivots and of the equilibrium, which last as disturbances do, in units of the
+/// memory.
 const MEMORIES: f64 = 8.0;
 /// The largest weight, and the inverse of the smallest, as a logarithm.
 const MOST_WEIGHT: f64 = 200.0;
@@ -69,7 +71,8 @@ struct Sizes {
     /// The largest value of the start, or of the equilibrium if there is one; if there is none, of the inflow.
     most: f64,
     inflow: f64,
-    /// The effect of a lasting disturbance is never larger than its contribution over this time; infinite until it is computed.
+    /// The effect of a lasting disturbance is never larger than its contribution over this time; infinite until it is
+    /// computed.
     memory: f64,
 }
 
@@ -95,8 +98,8 @@ impl Proof {
         Proof { weights, part, sizes, heaviest, remembers: false }
     }
 
-    /// True if the error of the state `y` at a time is allowed. `rounding` is the rounding error of the matrix, `growth` a bound
-    /// of the factor by which values have grown since the start.
+    /// True if the error of the state `y` at a time is allowed. `rounding` is the rounding error of the matrix,
+    /// `growth` a bound of the factor by which values have grown since the start.
     fn holds(&self, problem: &Problem, y: &[f64], tau: f64, growth: f64, rounding: f64) -> bool {
         let bound = |s: &Sizes| {
             let slope = ERROR * s.y.sqrt() + ERROR_OF_SLOPE * tau * s.b.sqrt();
@@ -173,7 +176,8 @@ impl Poles {
         regular.then_some(x)
     }
 
-    /// Computes the memories from the equilibrium under a disturbance of 1. False if they are known or cannot be computed.
+    /// Computes the memories from the equilibrium under a disturbance of 1. False if they are known or cannot be
+    /// computed.
     fn remember(&mut self) -> bool {
         let Some(proof) = self.proof.as_ref().filter(|proof| !proof.remembers) else { return false };
         let keeps_signs = self.a[proof.weights.len()..].iter().all(|a| *a >= 0.0);
@@ -215,7 +219,8 @@ impl Poles {
         }
         let half = self.propagate(&problem.y, &problem.b, 0.5 * tau)?;
         let halves = self.propagate(&half, &problem.b, 0.5 * tau)?;
-        // Values that accumulate in unknowns without losses have the same relative error over the whole and over the halves.
+        // Values that accumulate in unknowns without losses have the same relative error over the whole and over the
+        // halves.
         let flow = self.rest.min(tau * self.inflow);
         let most = problem.y.iter().chain(&halves).fold(flow, |m, y| m.max(y.abs()));
         if !problem.allows(&halves, |_| growth * (rounding * tau + ERROR_OF_SLOPE) * most) {

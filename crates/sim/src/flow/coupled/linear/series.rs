@@ -1,11 +1,12 @@
 //! Uniformisation: the exponential of a matrix as a series without cancellation.
 //!
-//! `exp(τ A) = exp(-q τ) exp(τ (A + q))`. If q is at least as large as every decay, and no unknown is decreased by another,
-//! `A + q` has no negative entry, and neither has any term of the series: the result is right to its own digits, down
-//! to the truncation error, and never negative (A. Jensen, Scand. Actuar. J. 1953; W. Grassmann, Comput. Oper. Res.
-//! 4 (1977) 47). Equations whose unknowns can be given signs so that they take this form (see [`Orthant`]) are as good.
-//! The spectrum does not matter: transport in one direction along a thousand cells is as easy as diffusion. The cost is
-//! one product of the matrix and a vector for each mean time between two events of the fastest unknown.
+//! `exp(τ A) = exp(-q τ) exp(τ (A + q))`. If q is at least as large as every decay, and no unknown is decreased by
+//! another, `A + q` has no negative entry, and neither has any term of the series: the result is right to its own
+//! digits, down to the truncation error, and never negative (A. Jensen, Scand. Actuar. J. 1953; W. Grassmann, Comput.
+//! Oper. Res. 4 (1977) 47). Equations whose unknowns can be given signs so that they take this form (see [`Orthant`])
+//! are as good. The spectrum does not matter: transport in one direction along a thousand cells is as easy as
+//! diffusion. The cost is one product of the matrix and a vector for each mean time between two events of the fastest
+//! unknown.
 //!
 //! Long times are cut into stretches on a grid that observation does not move. States at two grids, a coarse one and a
 //! fine one, are kept, so that repeated evaluations do not begin at the start each time.
@@ -18,7 +19,8 @@ const STRETCHES: [f64; 2] = [256.0, 64.0];
 const CUT: f64 = 1.0 / (1u64 << 56) as f64;
 /// The truncation error of a stretch, as a part of the tolerance.
 const CUT_OF_TOLERANCE: f64 = 1e-6;
-/// Couplings with the same difference of column and row are stored as a band if they occur in at least one of this many rows.
+/// Couplings with the same difference of column and row are stored as a band if they occur in at least one of this many
+/// rows.
 const DENSE: usize = 8;
 /// The number of terms that are added up between two tests of the truncation error.
 const STRIDE: usize = 3;
@@ -155,6 +157,7 @@ struct Checkpoint {
 }
 
 impl Series {
+    /// The series of a problem whose couplings keep an orthant ([`Orthant::new`]).
     pub fn new(problem: &Problem) -> Series {
         let Problem { entries, b, y, tolerance } = problem;
         let n = y.len();
@@ -252,8 +255,8 @@ impl Series {
         (self.growth[0] * tau).exp() * (self.sizes[0] + tau * self.sizes[1])
     }
 
-    /// The state some time after the start, which is `y`; a bound of the truncation error of every value; and a bound of the
-    /// rounding error, relative to the sum of the sizes of all terms of the value.
+    /// The state some time after the start, which is `y`; a bound of the truncation error of every value; and a bound
+    /// of the rounding error, relative to the sum of the sizes of all terms of the value.
     pub fn at(&mut self, y: &[f64], tau: f64) -> (Vec<f64>, f64, f64) {
         let [coarse, fine] = STRETCHES.map(|stretch| stretch / self.speed.max(f64::MIN_POSITIVE));
         let count = (tau / coarse).floor();

@@ -13,7 +13,8 @@ use dlsys_tree::SimTime;
 pub struct LinearSteps {
     integrator: Integrator,
     control: Control,
-    /// The state at the start of the last step, and the ends of that; before the first step, the start of the trajectory.
+    /// The state at the start of the last step, and the ends of that; before the first step, the start of the
+    /// trajectory.
     y: Vec<f64>,
     from: SimTime,
     end: SimTime,
@@ -22,6 +23,7 @@ pub struct LinearSteps {
 }
 
 impl LinearSteps {
+    /// Steps from the start of a problem, beginning with the experience `control`.
     pub fn new(problem: &Problem, settings: &Settings, control: Control) -> LinearSteps {
         let mut integrator = Integrator::default();
         integrator.restart(settings.method, problem.y.len());

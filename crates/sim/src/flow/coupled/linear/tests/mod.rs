@@ -40,7 +40,7 @@ impl Random {
     }
 }
 
-/// How neighbours weigh on each other.
+/// The relation of the two influences between neighbours.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Weighing {
     Alike,
@@ -196,8 +196,8 @@ fn neighbours_that_swing_are_left_to_steps() {
     answers(Weighing::Against, [50, 0, 0]);
 }
 
-/// Without losses the inflow accumulates, and every rounding of the matrix lasts. The bound of the error is hardly larger than
-/// the error here.
+/// Without losses the inflow accumulates, and every rounding of the matrix lasts. The bound of the error is hardly
+/// larger than the error here.
 #[test]
 fn flow_without_losses() {
     let mut answers = 0;
