@@ -1,83 +1,62 @@
-//! The search of a stretch of time for a module's next event.
+//! Zero crossings of one atom: where the sides of a condition meet along a path.
 //!
-//! The signs of the rule's atoms are known at the start. NextKind is looked for is the first instant at which a change of
-//! signs matters: a production's condition becomes true, the active equations' condition ends, or a condition inside
-//! them changes. Where a formula gives the instant it is taken; elsewhere the stretch is searched.
+//! An atom is a comparison in a rule's conditions; its sign is that of the difference of its two sides. Where a closed
+//! form gives the instant at which a variable takes a level, that instant is taken ([`CrossingDetector::meet`]).
+//! Elsewhere the difference is bounded by interval arithmetic and its roots are isolated ([`CrossingDetector::root`]),
+//! unless the bounds over the whole path already exclude a change of sign.
 
-use smallvec::SmallVec;
-
-use crate::detect::doubt::{Ahead, Question};
-use crate::detect::signs::{Reach, matters, opposite, produces, rate_at, reach, sign_of};
+use crate::detect::signs::{Reach, opposite, rate_at, reach, sign_of};
 use crate::world::path::Path;
-use crate::world::state::{Change, Signs, State};
+use crate::world::state::State;
 use dlsys_expr::{Binary, Dual, Interval, Program, Scratch, Value};
 use dlsys_model::{Rule, Sign, ZeroCrossing};
 use dlsys_ode::{Function, Root, first_root};
 use dlsys_tree::SimTime;
 
-/// Zero, for a difference of two sides, in units of their rounding.
+/// A difference of two sides counts as zero up to this many times the size of the sides.
 pub const TOUCH: f64 = 256.0 * f64::EPSILON;
 
-/// A difference of two sides of no more than this part of them, or of 1, may be what numerical trajectories leave of zero.
+/// Residue that numerical trajectories may leave of zero, relative to the size of the sides or to 1.
 const NOISE: f64 = 1e-10;
 
-/// Most changes of a module's signs that are followed within one stretch.
-const MAX_ROUNDS: usize = 50;
-
-/// NextKind a search found.
-#[derive(Clone, Debug, Default)]
-pub struct Found {
-    /// Position of the event, if there is one.
-    pub event: Option<f64>,
-    /// Signs that are zero at the event, the first one first.
-    pub touched: SmallVec<[Change; 1]>,
-    /// Signs that change without consequence before it, or before the end.
-    pub changes: Vec<Change>,
-    /// It is not known whether there is one.
-    pub in_doubt: bool,
-    /// As in [`Next`](super::state::Next).
-    pub near: u64,
-}
-
-/// Working memory of searches.
+/// Detects zero crossings along paths. The fields are working memory: a search allocates nothing once they have grown.
 #[derive(Clone, Debug, Default)]
 pub struct CrossingDetector {
-    pub values: Vec<f64>,
+    /// Values of the rule's variables where the difference was last evaluated.
+    pub(super) values: Vec<f64>,
     departure: Vec<Dual<f64>>,
     whole: Vec<Interval>,
     bounds: Vec<Dual<Interval>>,
     scratch: Scratch<f64>,
     departure_scratch: Scratch<Dual<f64>>,
-    pub whole_scratch: Scratch<Interval>,
-    pub around: Vec<Interval>,
-    pub around_out: Vec<Interval>,
+    pub(super) whole_scratch: Scratch<Interval>,
+    pub(super) around: Vec<Interval>,
+    pub(super) around_out: Vec<Interval>,
     bounds_scratch: Scratch<Dual<Interval>>,
-    pub out: Vec<f64>,
+    /// Both sides of every atom where the difference was last evaluated.
+    pub(super) out: Vec<f64>,
     departure_out: Vec<Dual<f64>>,
     whole_out: Vec<Interval>,
     bounds_out: Vec<Dual<Interval>>,
     rates: Vec<f64>,
 }
 
-/// An atom under watch.
-struct Watched {
-    atom: usize,
-    /// NextKind counts as zero; NaN for those whose instant is a formula.
-    tolerance: f64,
-    ahead: Ahead,
-}
-
 /// An instant at which the sides of an atom meet.
 #[derive(Clone, Copy, Debug)]
 pub struct Crossing {
+    /// Position on the path, in units of its length.
     pub position: f64,
+    /// The instant at that position.
     pub time: SimTime,
+    /// The sign at the instant.
     pub at: Sign,
+    /// The sign just after it.
     pub after: Sign,
+    /// The parameter that reaches a level there, and the level, if both are known.
     pub level: Option<(usize, f64)>,
 }
 
-/// The difference of two sides of an atom along a path.
+/// The difference of the two sides of an atom, as a function of the position on a path.
 pub struct Difference<'w, 'p> {
     path: &'w Path<'p>,
     sides: &'w Program,
@@ -87,7 +66,7 @@ pub struct Difference<'w, 'p> {
 
 impl Function for Difference<'_, '_> {
     fn bounds(&mut self, lo: f64, hi: f64) -> Dual<Interval> {
-        // Values that move together may differ by much less than each of them moves.
+        // The difference of values that move together may vary much less than each of them does.
         if let ZeroCrossing::Search(Some(sum)) = &self.path.rule.watch(self.path.state.solve)[self.atom]
             && let Some(bounds) = self.path.sum_over(sum, lo, hi)
         {
@@ -109,205 +88,54 @@ impl Function for Difference<'_, '_> {
     }
 }
 
-/// True if some atom of a module can only be found by search, so that the stretch must have an end.
+/// True if the crossings of some atom of a module can only be found by search, so that the stretch to search must be
+/// bounded.
 pub fn needs_search(state: &State, rule: &Rule) -> bool {
-    rule.watch(state.solve)
-        .iter()
-        .enumerate()
-        .any(|(atom, watch)| !is_unreachable(rule, state, atom) && matches!(how(watch, state), How::Search))
+    let searched = |(atom, crossing)| {
+        !is_unreachable(rule, state, atom)
+            && matches!(location_method(crossing, state), LocationMethod::Search)
+    };
+    rule.watch(state.solve).iter().enumerate().any(searched)
 }
 
-fn is_unreachable(rule: &Rule, state: &State, atom: usize) -> bool {
+/// True if the analysis of the model has proven that an atom keeps its sign under the active equations.
+pub(super) fn is_unreachable(rule: &Rule, state: &State, atom: usize) -> bool {
     state.solve.is_some_and(|s| rule.solves[s].unreachable[atom])
 }
 
-enum How<'w> {
-    Not,
+/// How the crossings of an atom are located.
+pub(super) enum LocationMethod<'w> {
+    /// There are none: both sides are constant.
+    Never,
+    /// By inverting the trajectory of a variable at a level.
     Formula(usize, &'w Program),
+    /// By isolating the roots of the difference.
     Search,
 }
 
-/// How an atom is watched, given how the parameters move.
-fn how<'w>(watch: &'w ZeroCrossing, state: &State) -> How<'w> {
-    match watch {
-        ZeroCrossing::Constant => How::Not,
+/// The location method of an atom, given the trajectories of the parameters.
+pub(super) fn location_method<'w>(crossing: &'w ZeroCrossing, state: &State) -> LocationMethod<'w> {
+    match crossing {
+        ZeroCrossing::Constant => LocationMethod::Never,
         ZeroCrossing::Formula { variable, level } => match state.trajectories.get(*variable) {
-            Some(trajectory) if !trajectory.is_formula() => How::Search,
-            _ => How::Formula(*variable, level),
+            Some(trajectory) if !trajectory.is_formula() => LocationMethod::Search,
+            _ => LocationMethod::Formula(*variable, level),
         },
-        ZeroCrossing::Search(_) => How::Search,
+        ZeroCrossing::Search(_) => LocationMethod::Search,
     }
 }
 
 impl CrossingDetector {
-    /// Searches the path up to the position `limit`.
-    pub fn search(&mut self, path: &Path, limit: f64) -> Found {
-        let (rule, state) = (path.rule, path.state);
-        let mut found = Found::default();
-        if rule.atoms.is_empty() {
-            return found;
-        }
-        let mut now = Signs::from_slice(&state.signs);
-        for change in &state.next.changes {
-            now[change.atom] = change.after;
-        }
-        let mut watched: SmallVec<[Watched; 4]> = SmallVec::new();
-        let mut measured = false;
-        // Where nothing is integrated, all is known to the last digits.
-        let error = path.error();
-        let integrated = error > 0.0;
-        let near = state.next.near;
-        for (atom, watch) in rule.watch(state.solve).iter().enumerate() {
-            if is_unreachable(rule, state, atom) {
-                continue;
-            }
-            match how(watch, state) {
-                How::Not => {}
-                How::Formula(variable, level) => {
-                    let next =
-                        self.meet(path, atom, variable, level, now[atom]).filter(|m| m.position <= limit);
-                    if next.is_some() {
-                        let ahead = Ahead { next, ..Ahead::default() };
-                        watched.push(Watched { atom, tolerance: f64::NAN, ahead });
-                    }
-                }
-                How::Search => {
-                    if self.keeps_clear(path, watch, now[atom], error) {
-                        continue;
-                    }
-                    if !std::mem::replace(&mut measured, true) {
-                        self.measure(path);
-                    }
-                    if let Some(tolerance) = self.may_change(path, atom, now[atom]) {
-                        let near = atom < 64 && near & 1 << atom != 0;
-                        let decides = integrated && produces(rule, &now, atom);
-                        let question = Question {
-                            atom,
-                            from: 0.0,
-                            limit,
-                            sign: now[atom],
-                            tolerance,
-                            near,
-                            decides,
-                            error,
-                        };
-                        let ahead = self.ahead(path, question);
-                        watched.push(Watched { atom, tolerance, ahead });
-                    }
-                }
-            }
-        }
-        let mut rounds = 0;
-        loop {
-            let first =
-                watched.iter().filter_map(|w| w.ahead.next).min_by(|a, b| a.position.total_cmp(&b.position));
-            let doubts = watched.iter().enumerate().filter_map(|(i, w)| Some((i, w.ahead.doubt?)));
-            let doubt = doubts.min_by(|(_, a), (_, b)| a.total_cmp(b));
-            if let Some((i, position)) = doubt
-                && first.is_none_or(|first| position < first.position)
-            {
-                let atom = watched[i].atom;
-                if produces(rule, &now, atom) {
-                    let (time, at, after) = (path.start.after(position * path.h), Sign::Zero, now[atom]);
-                    found.event = Some(position);
-                    found.touched.push(Change { atom, time, at, after, level: None });
-                    found.in_doubt = true;
-                    return found;
-                }
-                let (sign, tolerance, decides) = (now[atom], watched[i].tolerance, true);
-                let question =
-                    Question { atom, from: position, limit, sign, tolerance, near: false, decides, error };
-                rounds += 1;
-                watched[i].ahead = match rounds > MAX_ROUNDS {
-                    true => Ahead::default(),
-                    false => self.ahead(path, question),
-                };
-                continue;
-            }
-            let Some(first) = first else { break };
-            rounds += 1;
-            let mut together = path_together(path, first.position);
-            let others = watched.iter().filter(|w| w.ahead.next.is_some()).count();
-            if integrated && others > 1 && !first_is_exact(&watched, first.position) {
-                let atom =
-                    watched.iter().find(|w| w.ahead.next.is_some_and(|m| m.position == first.position));
-                together = together
-                    .max(first.position + atom.map_or(0.0, |w| self.slack(path, w.atom, first.position)));
-            }
-            let (mut at, mut after) = (Signs::from_slice(&now), Signs::from_slice(&now));
-            let mut group: SmallVec<[Change; 1]> = SmallVec::new();
-            for w in &watched {
-                // A touch is known only to about the root of the rounding; one that is zero here is here.
-                let mut zero = || self.difference(path, w.atom).value(first.position).abs() <= w.tolerance;
-                let here = match &w.ahead.next {
-                    Some(crossing) if crossing.position <= together => Some(*crossing),
-                    _ if w.tolerance.is_nan() => None,
-                    Some(crossing) if crossing.after == now[w.atom] && zero() => {
-                        Some(Crossing { at: Sign::Zero, time: first.time, ..*crossing })
-                    }
-                    None if now[w.atom] != Sign::Zero && zero() => {
-                        Some(Crossing { at: Sign::Zero, after: now[w.atom], level: None, ..first })
-                    }
-                    _ => None,
-                };
-                if let Some(m) = here {
-                    (at[w.atom], after[w.atom]) = (m.at, m.after);
-                    let time = if m.position <= first.position { first.time } else { m.time };
-                    group.push(Change { atom: w.atom, time, at: m.at, after: m.after, level: m.level });
-                }
-            }
-            // A condition that oscillates without end is cut into short stretches, each of bounded work.
-            if matters(rule, state, &at, &after) || rounds > MAX_ROUNDS {
-                found.event = Some(first.position);
-                group.sort_by(|a, b| a.time.since(b.time).total_cmp(&0.0));
-                found.touched = group;
-                return found;
-            }
-            now = after;
-            for w in &mut watched {
-                if group.iter().any(|change| change.atom == w.atom) {
-                    let from = w.ahead.next.map_or(first.position, |m| m.position.max(first.position));
-                    // One that moves one way only meets its level once.
-                    w.ahead = if w.tolerance.is_nan() {
-                        Ahead::default()
-                    } else {
-                        let (atom, tolerance) = (w.atom, w.tolerance);
-                        let decides = integrated && produces(rule, &now, atom);
-                        let question = Question {
-                            atom,
-                            from,
-                            limit,
-                            sign: now[atom],
-                            tolerance,
-                            near: false,
-                            decides,
-                            error,
-                        };
-                        self.ahead(path, question)
-                    };
-                }
-            }
-            found.changes.extend(group);
-        }
-        for w in watched.iter().filter(|w| w.ahead.near && w.atom < 64) {
-            found.near |= 1 << w.atom;
-        }
-        found
-    }
-
-    /// Looks ahead for an atom.
-    fn ahead(&mut self, path: &Path, question: Question) -> Ahead {
-        if question.error > 0.0 && matches!(question.sign, Sign::Plus | Sign::Minus) {
-            return self.look(path, question);
-        }
-        let Question { atom, from, limit, sign, tolerance, .. } = question;
-        Ahead { next: self.root(path, atom, from, limit, sign, tolerance), ..Ahead::default() }
-    }
-
-    /// True if a parameter that is integrated stays away from the one value at which its atom's sides meet: most steps
-    /// need no more than a look at its bounds.
-    fn keeps_clear(&mut self, path: &Path, watch: &ZeroCrossing, sign: Sign, error: f64) -> bool {
-        let ZeroCrossing::Formula { variable, level } = watch else { return false };
+    /// True if the dense output of a parameter stays away from the one level at which its atom's sides meet, by more
+    /// than the relative error of integration, `error`. Most steps need no other test.
+    pub(super) fn keeps_clear(
+        &mut self,
+        path: &Path,
+        crossing: &ZeroCrossing,
+        sign: Sign,
+        error: f64,
+    ) -> bool {
+        let ZeroCrossing::Formula { variable, level } = crossing else { return false };
         if !matches!(sign, Sign::Plus | Sign::Minus) {
             return false;
         }
@@ -317,7 +145,7 @@ impl CrossingDetector {
         level < bounds.lo - margin || level > bounds.hi + margin
     }
 
-    /// The value at which the sides of an atom meet.
+    /// The value of the variable at which the sides of an atom meet.
     fn level(&mut self, path: &Path, level: &Program) -> f64 {
         if let Some(&[level]) = level.constants() {
             return level;
@@ -328,11 +156,14 @@ impl CrossingDetector {
         out[0]
     }
 
-    pub fn difference<'w, 'p>(&'w mut self, path: &'w Path<'p>, atom: usize) -> Difference<'w, 'p> {
+    /// The difference of an atom's sides along a path.
+    pub(super) fn difference<'w, 'p>(&'w mut self, path: &'w Path<'p>, atom: usize) -> Difference<'w, 'p> {
         Difference { path, sides: &path.rule.sides, atom, memory: self }
     }
 
-    pub fn root(
+    /// The first crossing between the positions `from` and `limit`, of a difference that has `sign` at `from`. Up to
+    /// `tolerance` the difference counts as zero.
+    pub(super) fn root(
         &mut self,
         path: &Path,
         atom: usize,
@@ -341,8 +172,8 @@ impl CrossingDetector {
         sign: Sign,
         tolerance: f64,
     ) -> Option<Crossing> {
-        // The sign that a boundary was left with is believed against values that are rounding, and against a jump that
-        // comes within the rounding of time.
+        // The sign with which a boundary was left prevails over values that are rounding, and over a jump within the
+        // resolution of time.
         let (mut from, mut tolerance) = (from, tolerance);
         let start = self.difference(path, atom).value(from);
         if sign != Sign::Any && start != 0.0 && start * sign_of(sign) <= 0.0 {
@@ -363,7 +194,7 @@ impl CrossingDetector {
         Some(Crossing { position, time, at, after, level: None })
     }
 
-    /// NextKind rounding of the variables makes of the difference of two sides.
+    /// The effect of the rounding of the variables on the difference of two sides; 0 where the difference jumps.
     fn rounding(&mut self, path: &Path, atom: usize, at: f64) -> f64 {
         path.over(at, at, &mut self.bounds);
         for variable in &mut self.bounds {
@@ -376,13 +207,14 @@ impl CrossingDetector {
         sides.eval(&self.bounds, &mut self.bounds_scratch, &mut self.bounds_out);
         let [a, b] = [0, 1].map(|side| self.bounds_out[2 * atom + side].value);
         let width = (a.hi - a.lo) + (b.hi - b.lo);
-        // More than that is a jump.
+        // A larger effect is that of a jump.
         let size = a.magnitude().max(b.magnitude()).max(1.0);
         if width <= NOISE * size { width } else { 0.0 }
     }
 
-    /// When a variable that moves one way only takes the value at which its atom's sides meet.
-    fn meet(
+    /// The crossing at which a variable that moves monotonically takes the level at which its atom's sides meet.
+    #[inline]
+    pub(super) fn meet(
         &mut self,
         path: &Path,
         atom: usize,
@@ -416,8 +248,9 @@ impl CrossingDetector {
         if position > path.start.resolution() / path.h {
             return Some(crossing);
         }
-        // Here, but for rounding, or already behind: an instant that has been passed, or one that fell on the very end
-        // of the stretch before this one and was not seen? The difference goes towards zero, or away from it.
+        // The crossing is at the start but for rounding, or before it: either it has been passed, or it fell on the
+        // very end of the stretch before this one and was missed. Only in the second case does the difference move
+        // towards zero.
         path.departure(&mut self.departure);
         self.departure_out.resize(path.rule.sides.outputs(), Dual::constant(0.0));
         path.rule.sides.eval(&self.departure, &mut self.departure_scratch, &mut self.departure_out);
@@ -429,8 +262,10 @@ impl CrossingDetector {
         Some(Crossing { position: position.max(0.0), time, ..crossing })
     }
 
-    /// Values at the start and bounds over the whole path: most atoms keep their sign on most paths.
-    fn measure(&mut self, path: &Path) {
+    /// Evaluates the sides of all atoms at the start and their bounds over the whole path: most atoms keep their sign
+    /// on most paths.
+    #[inline]
+    pub(super) fn measure(&mut self, path: &Path) {
         let sides = &path.rule.sides;
         path.whole(&mut self.whole);
         self.whole_out.resize(sides.outputs(), Interval::EMPTY);
@@ -440,9 +275,11 @@ impl CrossingDetector {
         sides.eval(&self.departure, &mut self.departure_scratch, &mut self.departure_out);
     }
 
-    /// Whether an atom's sign may change, judged by its bounds over the whole path; and what counts as zero, on the
-    /// scale of the start, not of the far end: a stretch may be a thousand lives long.
-    fn may_change(&self, path: &Path, atom: usize, sign: Sign) -> Option<f64> {
+    /// The tolerance below which the difference counts as zero, if its bounds over the whole path admit a change of
+    /// sign; None if they exclude one. The tolerance has the scale of the start, not of the far end: a stretch may be a
+    /// thousand lives long.
+    #[inline]
+    pub(super) fn may_change(&self, path: &Path, atom: usize, sign: Sign) -> Option<f64> {
         let instant = path.start.resolution() / path.h;
         let start = [self.departure_out[2 * atom], self.departure_out[2 * atom + 1]];
         let size = start.iter().map(|s| s.value.abs()).filter(|s| s.is_finite()).fold(0.0, f64::max);
@@ -464,14 +301,4 @@ impl CrossingDetector {
         };
         may.then_some(tolerance)
     }
-}
-
-/// The last position that is the same instant as this one.
-pub fn path_together(path: &Path, position: f64) -> f64 {
-    position + path.start.after(position * path.h).resolution() / path.h
-}
-
-/// True if what comes first is known by a formula.
-fn first_is_exact(watched: &[Watched], position: f64) -> bool {
-    watched.iter().any(|w| w.tolerance.is_nan() && w.ahead.next.is_some_and(|m| m.position == position))
 }

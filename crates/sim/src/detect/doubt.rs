@@ -1,22 +1,23 @@
-//! Meetings of sides that are integrated: what is evidence of one, and what is not.
+//! Crossings of integrated values: which changes of sign are evidence of an event.
 //!
-//! An integrated value is known to some error, so a difference of two sides has a band around zero in which its sign says
-//! nothing. A change of sign that stays within the band is no evidence of an event and none against one: neighbours that
-//! equalise come as near each other as one likes and never meet, and their difference then turns about zero as
-//! rounding has it. So
+//! An integrated value is known up to some error, so a difference of two sides has a band around zero in which its sign
+//! is unknown. A change of sign that stays within the band is evidence neither of an event nor against one: neighbours
+//! that equalise approach each other without limit and never meet, and their difference then changes sign by rounding.
+//! Therefore
 //!
-//! - a crossing is one when the difference leaves the band on the other side, now or in a later step; its instant is where
-//!   the sign changed;
-//! - what stays in the band goes on with the sign it had;
-//! - what comes from outside the band and leaves it on the side where it came from may have touched, or not: that is said
-//!   ([`Error::InDoubt`](super::Error::InDoubt)) where something depends on it.
+//! - a crossing counts when the difference leaves the band on the other side, now or in a later step; its instant is
+//!   that of the change of sign;
+//! - a difference that stays in the band keeps the sign that it had;
+//! - a difference that comes from outside the band and leaves it on the same side may have touched zero or not: where a
+//!   production depends on it, that is reported ([`Error::InDoubt`](crate::error::Error::InDoubt)).
 //!
-//! A touch to the last digits counts as one, as everywhere. And all this is for productions: conditions inside equations
-//! change where the integrated values have them change, or pieces of equations would be continued beyond their ends.
+//! A touch to the last digits counts as one. All this is for productions only: conditions inside equations change
+//! where the integrated values change them, or else pieces of equations would be continued beyond their ends.
 //!
-//! Two modules of which one sees the other may have their events at one instant in truth, and at two instants as
-//! integrated; then the second would see what the first has made. So when a module has its event, those that look at it and
-//! are so near to theirs that the error of integration does not tell the two apart have it, too.
+//! Two modules, one of which reads the other, may have simultaneous events whose integrated instants differ; the second
+//! would then see the successors of the first. So when a module has its event, the events of those of its readers that
+//! are no further away than the error of integration happen with it
+//! ([`is_about_to_meet`](CrossingDetector::is_about_to_meet)).
 
 use crate::detect::crossing::{Crossing, CrossingDetector};
 use crate::detect::signs::{half_width, opposite, sign_of};
@@ -25,29 +26,65 @@ use dlsys_expr::{Dual, Interval};
 use dlsys_model::Sign;
 use dlsys_ode::{Function, first_root};
 
-/// The speed of a difference at a position is that around it, to as much of the path on both sides.
+/// The rate of a difference at a position is bounded over this part of the path on both sides of it.
 const NEARBY: f64 = 1e-6;
 
-/// NextKind is never slower, on its way through the band, than this part of its mean speed goes on.
+/// A difference that is never slower, on its way through the band, than this part of its mean rate passes zero.
 const STEADY: f64 = 0.5;
 
-/// A difference so many times larger than what the sides may be wrong by is no matter of evidence.
+/// A difference that is this many times larger than the error of its sides lies surely outside the band.
 pub const FAR: f64 = 1e3;
 
-/// So many roundings of a difference that neighbours approach are nothing.
+/// The band of a difference of values of neighbours is at least this many roundings wide.
 const BLUR: f64 = 4.0;
 
-/// NextKind is ahead of an atom on a path.
+/// The result of looking ahead for one atom on a path. Positions are in units of the path's length.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Ahead {
+pub struct Lookahead {
+    /// The next crossing, if there is one.
     pub next: Option<Crossing>,
-    /// Where the sides, before that, have come near each other and parted again.
+    /// The position, before the next crossing, at which the sides have parted again after they had come near each other.
     pub doubt: Option<f64>,
-    /// At the end they are so near each other that their sign says nothing, and came there from where it did.
+    /// At the end of the path the difference is inside the band, and has come there from outside.
     pub near: bool,
 }
 
-/// A function that is higher by something.
+impl Lookahead {
+    fn crossing(next: Option<Crossing>) -> Lookahead {
+        Lookahead { next, ..Lookahead::default() }
+    }
+
+    fn in_doubt(position: f64) -> Lookahead {
+        Lookahead { doubt: Some(position), ..Lookahead::default() }
+    }
+
+    fn ends_near(near: bool) -> Lookahead {
+        Lookahead { near, ..Lookahead::default() }
+    }
+}
+
+/// One atom to look ahead for.
+#[derive(Clone, Copy)]
+pub struct AtomQuery {
+    /// Number of the atom in the rule.
+    pub atom: usize,
+    /// The position from which on the path is searched.
+    pub from: f64,
+    /// The position up to which it is searched.
+    pub limit: f64,
+    /// The sign at `from`: plus or minus.
+    pub sign: Sign,
+    /// The effect of rounding on the difference.
+    pub tolerance: f64,
+    /// The difference was inside the band before, and had come there from outside.
+    pub near: bool,
+    /// A production may follow.
+    pub decides: bool,
+    /// The error of integrated values, relative; 0 if there are none.
+    pub error: f64,
+}
+
+/// A function raised by a constant.
 struct Raised<'f, F>(&'f mut F, f64);
 
 impl<F: Function> Function for Raised<'_, F> {
@@ -61,164 +98,189 @@ impl<F: Function> Function for Raised<'_, F> {
     }
 }
 
-/// NextKind is asked of one atom.
-#[derive(Clone, Copy)]
-pub struct Question {
-    pub atom: usize,
-    pub from: f64,
-    pub limit: f64,
-    /// Plus or minus.
-    pub sign: Sign,
-    /// NextKind rounding makes of the difference.
-    pub tolerance: f64,
-    /// The sides were near each other before, and had come there from outside.
-    pub near: bool,
-    /// A production may follow.
-    pub decides: bool,
-    /// NextKind integrated values may be wrong by, relative; 0 if there are none.
-    pub error: f64,
-}
-
 impl CrossingDetector {
-    /// Looks ahead for an atom of which something is integrated.
-    pub fn look(&mut self, path: &Path, mut question: Question) -> Ahead {
-        let Question { atom, limit, sign, tolerance, .. } = question;
-        let side = sign_of(sign);
-        let start = side * self.difference(path, atom).value(question.from);
-        // Most are far from the band, and need not be told how wide it is.
+    /// Looks ahead for an atom of which some variable is integrated.
+    pub(super) fn look(&mut self, path: &Path, mut query: AtomQuery) -> Lookahead {
+        let AtomQuery { atom, limit, sign, tolerance, .. } = query;
+        let start = sign_of(sign) * self.difference(path, atom).value(query.from);
+        // Most differences are far from the band, whose width then need not be computed.
         let [a, b] = [self.out[2 * atom], self.out[2 * atom + 1]];
         // `x - y` and 0 are small where `x` and `y` are not.
         let size = self.values.iter().fold(a.abs().max(b.abs()), |m, x| m.max(x.abs()));
-        let is_far = start.abs() > FAR * question.error * size;
-        let noise = if is_far { 0.0 } else { self.noise(path, atom, question.from) };
-        // A neighbour's value is known to approach by nothing but the numbers, and these may meet at last by rounding.
-        let around = path.rule.reads_context && !path.state.context.is_empty() && question.decides;
+        let is_far = start.abs() > FAR * query.error * size;
+        let noise = if is_far { 0.0 } else { self.noise(path, atom, query.from) };
+        // The value of a neighbour is approached only numerically, and rounding may make the sides equal at last.
+        let around = path.rule.reads_context && !path.state.context.is_empty() && query.decides;
         let noise = if around { noise.max(BLUR * tolerance) } else { noise };
-        // Equations change where their conditions do, however near that is: only a sign that is wrong already waits.
-        let in_band = start.abs() <= noise && (question.decides || start <= 0.0);
-        if noise > tolerance && in_band {
-            // In the band: which way out?
-            let up = self.leaves(path, question, noise, sign);
-            let down = self.leaves(path, question, noise, opposite(sign));
-            match (up, down) {
-                (None, None) => return Ahead { near: question.near, ..Ahead::default() },
-                (up, Some(down)) if up.is_none_or(|up| down < up) => {
-                    let crossing = |crossings: &mut CrossingDetector| {
-                        let f = &mut crossings.difference(path, atom);
-                        first_root(f, question.from, down, sign, 0.0).map(|root| root.position)
-                    };
-                    let position = if start > 0.0 {
-                        crossing(self).unwrap_or(question.from)
-                    } else if self.heads(path, question, sign) {
-                        // On the wrong side by the error, and on its way to the right one: it crosses when it comes back.
-                        let f = &mut self.difference(path, atom);
-                        let there = first_root(f, question.from, down, opposite(sign), 0.0);
-                        let back = there.and_then(|root| first_root(f, root.position, down, sign, 0.0));
-                        back.map_or(down, |root| root.position)
-                    } else {
-                        question.from
-                    };
-                    let crossing = CrossingDetector::crossing_at(path, position, opposite(sign));
-                    return Ahead { next: Some(crossing), ..Ahead::default() };
-                }
-                (up, _) => {
-                    let out = up.unwrap_or(limit);
-                    if question.near {
-                        return Ahead { doubt: Some(out), ..Ahead::default() };
-                    }
-                    (question.from, question.near) = (out, false);
-                }
-            }
+        // Equations change where their conditions do, however near that is: only a wrong sign waits.
+        let in_band = start.abs() <= noise && (query.decides || start <= 0.0);
+        if noise > tolerance
+            && in_band
+            && let Some(ahead) = self.leave_band(path, &mut query, start, noise)
+        {
+            return ahead;
         }
-        let Question { from, .. } = question;
-        let next = self.root(path, atom, from, limit, sign, tolerance);
+        let next = self.root(path, atom, query.from, limit, sign, tolerance);
         if let Some(Crossing { position, at: Sign::Zero, after, .. }) = next
             && (around && after != opposite(sign))
         {
             let band = BLUR * self.noise(path, atom, position).max(tolerance);
-            if self.leaves(path, Question { from: position, ..question }, band, sign).is_none() {
-                return Ahead { near: true, ..Ahead::default() };
+            if self.leaves(path, AtomQuery { from: position, ..query }, band, sign).is_none() {
+                return Lookahead::ends_near(true);
             }
         }
-        // One that leaves the domain, jumps, or touches to the last digits, is what it is.
+        // A crossing that leaves the domain, jumps, or touches to the last digits is not in doubt.
         let crossing = match next {
             Some(crossing) if crossing.at != Sign::Zero || crossing.after != opposite(sign) => {
-                return Ahead { next, ..Ahead::default() };
+                return Lookahead::crossing(next);
             }
-            _ if !question.decides => return Ahead { next, ..Ahead::default() },
+            _ if !query.decides => return Lookahead::crossing(next),
             Some(crossing) => crossing.position,
             None => limit,
         };
         let noise = self.noise(path, atom, crossing);
         let noise = if around { noise.max(BLUR * tolerance) } else { noise };
-        let free = Ahead { next, ..Ahead::default() };
         if noise <= tolerance {
-            return free;
+            return Lookahead::crossing(next);
         }
-        // Near each other before they meet, or without crossing?
-        let bounds = self.difference(path, atom).bounds(from, crossing);
-        let straight = !bounds.rate.partial && (bounds.rate.lo > 0.0 || bounds.rate.hi < 0.0);
-        if next.is_none() || !straight {
-            let before = Question { from, limit: crossing, ..question };
-            if let Some(enters) = self.falls_below(path, before, noise) {
-                let inside = Question { from: enters, ..before };
-                if let Some(out) = self.leaves(path, inside, noise, sign) {
-                    return Ahead { doubt: Some(out), ..Ahead::default() };
-                }
-                if next.is_none() {
-                    return Ahead { near: true, ..Ahead::default() };
-                }
-            } else if next.is_none() {
-                return free;
-            }
-        }
-        // Does it go on to the other side?
-        if side * self.difference(path, atom).value(limit) < -noise {
-            return free;
-        }
-        let beyond = Question { from: crossing, ..question };
-        let down = self.leaves(path, beyond, noise, opposite(sign));
-        match (down, self.leaves(path, beyond, noise, sign)) {
-            (Some(down), up) if up.is_none_or(|up| down < up) => free,
-            (_, Some(out)) => Ahead { doubt: Some(out), ..Ahead::default() },
-            // The path ends too soon to tell. NextKind passes as fast as it came is not about to stay.
-            _ if self.passes(path, Question { limit: crossing, ..question }, noise) => free,
-            _ => Ahead { near: true, ..Ahead::default() },
+        match self.approach(path, query, next, crossing, noise) {
+            Some(ahead) => ahead,
+            None => self.confirm(path, query, next, crossing, noise),
         }
     }
 
-    /// True if the difference comes from outside the band on this path and crosses zero, at the limit, at a steady speed: what
-    /// only approaches zero is slower the nearer it is.
-    fn passes(&mut self, path: &Path, question: Question, noise: f64) -> bool {
-        let Some(enters) = self.falls_below(path, question, noise) else { return false };
-        let crossing = question.limit;
-        let rate = self.difference(path, question.atom).bounds(enters, crossing).rate;
-        let speed = (-sign_of(question.sign) * rate.lo).min(-sign_of(question.sign) * rate.hi);
+    /// From inside the band: the crossing, the doubt or the stay that follows. None if the difference leaves the band
+    /// on its own side, without doubt; `query` then begins there.
+    fn leave_band(
+        &mut self,
+        path: &Path,
+        query: &mut AtomQuery,
+        start: f64,
+        noise: f64,
+    ) -> Option<Lookahead> {
+        let AtomQuery { sign, limit, .. } = *query;
+        let up = self.leaves(path, *query, noise, sign);
+        let down = self.leaves(path, *query, noise, opposite(sign));
+        match (up, down) {
+            (None, None) => Some(Lookahead::ends_near(query.near)),
+            (up, Some(down)) if up.is_none_or(|up| down < up) => {
+                let position = self.crossing_inside(path, *query, start, down);
+                Some(Lookahead::crossing(Some(Self::crossing_at(path, position, opposite(sign)))))
+            }
+            (up, _) => {
+                let out = up.unwrap_or(limit);
+                if query.near {
+                    return Some(Lookahead::in_doubt(out));
+                }
+                (query.from, query.near) = (out, false);
+                None
+            }
+        }
+    }
+
+    /// The position of the crossing of a difference that starts inside the band and leaves it on the other side at
+    /// `down`.
+    fn crossing_inside(&mut self, path: &Path, query: AtomQuery, start: f64, down: f64) -> f64 {
+        let AtomQuery { atom, from, sign, .. } = query;
+        if start > 0.0 {
+            let f = &mut self.difference(path, atom);
+            first_root(f, from, down, sign, 0.0).map(|root| root.position).unwrap_or(from)
+        } else if self.heads(path, query, sign) {
+            // On the wrong side because of the error, and moving to the right one: it crosses on its way back.
+            let f = &mut self.difference(path, atom);
+            let there = first_root(f, from, down, opposite(sign), 0.0);
+            let back = there.and_then(|root| first_root(f, root.position, down, sign, 0.0));
+            back.map_or(down, |root| root.position)
+        } else {
+            from
+        }
+    }
+
+    /// A doubt before the crossing, or before the limit if there is no crossing: the difference enters the band and
+    /// leaves it again, or stays in it. None if the crossing itself has to be confirmed.
+    fn approach(
+        &mut self,
+        path: &Path,
+        query: AtomQuery,
+        next: Option<Crossing>,
+        crossing: f64,
+        noise: f64,
+    ) -> Option<Lookahead> {
+        let AtomQuery { atom, from, sign, .. } = query;
+        let bounds = self.difference(path, atom).bounds(from, crossing);
+        let monotonic = !bounds.rate.partial && (bounds.rate.lo > 0.0 || bounds.rate.hi < 0.0);
+        if next.is_some() && monotonic {
+            return None;
+        }
+        let before = AtomQuery { limit: crossing, ..query };
+        let Some(enters) = self.falls_below(path, before, noise) else {
+            return next.is_none().then(Lookahead::default);
+        };
+        let inside = AtomQuery { from: enters, ..before };
+        if let Some(out) = self.leaves(path, inside, noise, sign) {
+            return Some(Lookahead::in_doubt(out));
+        }
+        next.is_none().then(|| Lookahead::ends_near(true))
+    }
+
+    /// The crossing, if the difference goes on to the other side of the band; else a doubt, or a stay inside the band.
+    fn confirm(
+        &mut self,
+        path: &Path,
+        query: AtomQuery,
+        next: Option<Crossing>,
+        crossing: f64,
+        noise: f64,
+    ) -> Lookahead {
+        let AtomQuery { atom, limit, sign, .. } = query;
+        if sign_of(sign) * self.difference(path, atom).value(limit) < -noise {
+            return Lookahead::crossing(next);
+        }
+        let beyond = AtomQuery { from: crossing, ..query };
+        let down = self.leaves(path, beyond, noise, opposite(sign));
+        match (down, self.leaves(path, beyond, noise, sign)) {
+            (Some(down), up) if up.is_none_or(|up| down < up) => Lookahead::crossing(next),
+            (_, Some(out)) => Lookahead::in_doubt(out),
+            // The path ends too soon for a decision. A difference that passes as fast as it came does not stay.
+            _ if self.passes(path, AtomQuery { limit: crossing, ..query }, noise) => {
+                Lookahead::crossing(next)
+            }
+            _ => Lookahead::ends_near(true),
+        }
+    }
+
+    /// True if the difference comes from outside the band on this path and crosses zero, at the limit, at a steady
+    /// rate. A difference that only approaches zero is slower the nearer it is.
+    fn passes(&mut self, path: &Path, query: AtomQuery, noise: f64) -> bool {
+        let Some(enters) = self.falls_below(path, query, noise) else { return false };
+        let crossing = query.limit;
+        let rate = self.difference(path, query.atom).bounds(enters, crossing).rate;
+        let speed = (-sign_of(query.sign) * rate.lo).min(-sign_of(query.sign) * rate.hi);
         !rate.partial && speed * (crossing - enters) > STEADY * noise
     }
 
     /// True if the difference moves towards a side at first.
-    fn heads(&mut self, path: &Path, question: Question, towards: Sign) -> bool {
-        let end = (question.from + NEARBY).min(question.limit);
-        let rate = self.difference(path, question.atom).bounds(question.from, end).rate;
+    fn heads(&mut self, path: &Path, query: AtomQuery, towards: Sign) -> bool {
+        let end = (query.from + NEARBY).min(query.limit);
+        let rate = self.difference(path, query.atom).bounds(query.from, end).rate;
         !rate.partial && sign_of(towards) * rate.lo > 0.0 && sign_of(towards) * rate.hi > 0.0
     }
 
-    /// Where the difference, on its side, becomes less than the noise.
-    fn falls_below(&mut self, path: &Path, question: Question, noise: f64) -> Option<f64> {
-        let Question { atom, from, limit, sign, tolerance, .. } = question;
+    /// The position at which the difference, on its side, falls below the noise.
+    fn falls_below(&mut self, path: &Path, query: AtomQuery, noise: f64) -> Option<f64> {
+        let AtomQuery { atom, from, limit, sign, tolerance, .. } = query;
         let f = &mut self.difference(path, atom);
         let root = first_root(&mut Raised(f, -sign_of(sign) * noise), from, limit, sign, tolerance)?;
         (root.after == opposite(sign)).then_some(root.position)
     }
 
-    /// Where the difference leaves the band on a side.
-    fn leaves(&mut self, path: &Path, question: Question, noise: f64, towards: Sign) -> Option<f64> {
-        let Question { atom, from, limit, tolerance, .. } = question;
+    /// The position at which the difference leaves the band on a side.
+    fn leaves(&mut self, path: &Path, query: AtomQuery, noise: f64, towards: Sign) -> Option<f64> {
+        let AtomQuery { atom, from, limit, tolerance, .. } = query;
         let f = &mut self.difference(path, atom);
         let raised = &mut Raised(f, -sign_of(towards) * noise);
         let mut from = from;
-        // Touching the edge of the band is not leaving it.
+        // A touch of the edge of the band does not leave it.
         for _ in 0..8 {
             let root = first_root(raised, from, limit, opposite(towards), tolerance)?;
             if root.after == towards || root.position <= from {
@@ -229,8 +291,9 @@ impl CrossingDetector {
         None
     }
 
-    /// NextKind the errors of integration and rounding make of the difference of two sides. Zero where it jumps.
-    pub fn noise(&mut self, path: &Path, atom: usize, at: f64) -> f64 {
+    /// Half the width of the band: the effect of the errors of integration and rounding on the difference of two sides.
+    /// 0 where the difference jumps.
+    fn noise(&mut self, path: &Path, atom: usize, at: f64) -> f64 {
         path.uncertain(at, &mut self.around);
         let sides = &path.rule.sides;
         self.around_out.resize(sides.outputs(), Interval::EMPTY);
@@ -238,7 +301,8 @@ impl CrossingDetector {
         half_width(self.around_out[2 * atom], self.around_out[2 * atom + 1])
     }
 
-    /// True if the sides of an atom approach each other, and are no further apart than so many errors of integration.
+    /// True if the sides of an atom approach each other over the path, and are at its start no further apart than
+    /// `factor` times the error of integration.
     pub fn is_about_to_meet(&mut self, path: &Path, atom: usize, sign: Sign, factor: f64) -> bool {
         let gap = sign_of(sign) * self.difference(path, atom).value(0.0);
         if gap > FAR * factor * path.error() * (1.0 + gap) || gap > factor * self.noise(path, atom, 0.0) {
@@ -254,8 +318,8 @@ impl CrossingDetector {
         Crossing { position, time, at: Sign::Zero, after, level: None }
     }
 
-    /// How much earlier or later a crossing may be, in units of position, given the errors of integration.
-    pub fn slack(&mut self, path: &Path, atom: usize, position: f64) -> f64 {
+    /// How much earlier or later a crossing may be because of the errors of integration, in units of position.
+    pub(super) fn slack(&mut self, path: &Path, atom: usize, position: f64) -> f64 {
         let noise = self.noise(path, atom, position);
         let (lo, hi) = ((position - NEARBY).max(0.0), (position + NEARBY).min(1.0));
         let Dual { rate, .. } = self.difference(path, atom).bounds(lo, hi);
@@ -263,7 +327,7 @@ impl CrossingDetector {
         if rate.partial || rate.lo.is_nan() || rate.lo * rate.hi <= 0.0 {
             return 0.0;
         }
-        // Not more than a small part of the time in which things change.
+        // Not more than a small part of the time in which the solution changes.
         (noise / speed).min(10.0 * path.error())
     }
 }

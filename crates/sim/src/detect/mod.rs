@@ -1,13 +1,15 @@
 //! Detection: the search of a stretch of time for zero crossings, for doubts about them, and for pulses between stages.
 //!
-//! - [`crossing`]: the next event of a module on a stretch
+//! - [`search`]: the next event of a module on a stretch. Begin here.
+//! - [`crossing`]: the crossings of one atom, by formula or by root isolation
 //! - [`doubt`]: crossings that the error of integration may hide or feign
 //! - [`pulse`]: rates that are large between the stages of a step
-//! - [`signs`]: signs of the differences that conditions compare
+//! - [`signs`]: signs of the differences that conditions compare, and their consequences
 
 pub mod crossing;
 pub mod doubt;
 pub mod pulse;
+pub mod search;
 pub mod signs;
 
 use std::collections::BTreeMap;
@@ -19,20 +21,23 @@ use dlsys_model::Model;
 use dlsys_tree::SimTime;
 use pulse::PulseDetector;
 
-/// The detectors, and the remarks that they have collected.
+/// The detectors, and the remarks collected from their searches.
 #[derive(Clone, Debug, Default)]
 pub struct Detector {
+    /// Detects events of modules.
     pub crossings: CrossingDetector,
+    /// Detects steps that may have overlooked a pulse.
     pub pulses: PulseDetector,
-    /// Rules whose rates could not be bounded, and when first.
+    /// Rules whose rates could not be bounded, by number, with the time at which that first happened.
     pub unbounded: BTreeMap<usize, f64>,
-    /// Atoms of rules, with the number of the rule, whose sides have come nearer each other than the error of integration;
-    /// when first, and the number of modules for which it is still open whether they meet.
+    /// By rule and atom whose sides have come nearer each other than the error of integration: the time at which that
+    /// first happened, and the number of modules for which it is still open whether they meet.
     approached: BTreeMap<(usize, usize), (f64, usize)>,
 }
 
 impl Detector {
-    /// Records the atoms of a search whose sides are nearer each other than the error of integration.
+    /// Records the atoms of a rule whose sides a search has left nearer each other than the error of integration:
+    /// `found`, one bit for each atom, given those of the search before. `at` is the end of the searched stretch.
     #[inline]
     pub fn note_approach(&mut self, rule: usize, found: u64, before: u64, at: SimTime) {
         if found == before {
@@ -42,7 +47,7 @@ impl Detector {
             if found & 1 << atom != 0 {
                 self.approached.entry((rule, atom)).or_insert((at.to_f64(), 0)).1 += 1;
             } else if let Some((_, open)) = self.approached.get_mut(&(rule, atom)) {
-                // They have met, and that was found.
+                // Their crossing has been found.
                 *open -= 1;
                 if *open == 0 {
                     self.approached.remove(&(rule, atom));
@@ -51,9 +56,9 @@ impl Detector {
         }
     }
 
-    /// NextKind there is to say of the run so far: rules whose rates could not be bounded somewhere, so that a rate that is large
-    /// there for a very short time may have been overlooked; and sides of conditions that have come nearer each other than the error
-    /// of integration, so that a production may have been due.
+    /// Warnings about the run so far: rules whose rates could not be bounded somewhere, so that a pulse may have been
+    /// overlooked there; and sides of conditions that have come nearer each other than the error of integration, so
+    /// that a production may have been due.
     pub fn remarks(&self, model: &Model) -> Vec<Diagnostic> {
         let remark = |(&rule, &t): (&usize, &f64)| {
             let rule = &model.rules[rule];

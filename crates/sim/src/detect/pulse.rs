@@ -1,17 +1,18 @@
 //! Pulses: rates that are large for a time so short that no stage of a step falls into it.
 //!
-//! Step control sees a rate where a stage evaluates it and nowhere else. A flash of light of a ten-thousandth of a day
-//! between two stages of a step of a day is not seen by any method. So rates that may have pulses are bounded by interval
-//! arithmetic over pieces of the step, along its dense output, and compared with the rates that were seen: where they
-//! may be much larger, the step is cut.
+//! Step control depends on rates where a stage evaluates them and nowhere else. A rate that is large for a
+//! ten-thousandth of a day, between two stages of a step of a day, is invisible to every method. So rates that may have
+//! pulses are bounded by interval arithmetic over pieces of the step, along its dense output, and compared with the
+//! rates at the stages: where the bounds are much larger, the step is cut.
 //!
-//! Which rates may have pulses is known from the model ([`Solve::has_pulses`](dlsys_model::Solve::has_pulses)): those that are
-//! no polynomials in what moves, and those that read what follows a formula, which a step does not resolve. NextKind moves by
-//! the step itself is resolved by it, to the tolerance, and a polynomial of that has no pulses.
+//! The analysis of the model tells which rates may have pulses ([`Solve::has_pulses`](dlsys_model::Solve::has_pulses)):
+//! those that are not polynomial in the variables that move, and those that read a variable with a closed form, which a
+//! step does not resolve. An integrated variable is resolved by the step to the tolerance, and a polynomial of it has
+//! no pulses.
 //!
-//! In stiff equations bounds over a range of states say nothing: the rates of two states a tolerance apart may
-//! differ by any amount. There the states are taken as they are in the middle of a piece, and only time and formulas vary.
-//! NextKind cannot be bounded is counted, and `run --stats` and `explain` say of what.
+//! In stiff equations bounds over a range of states carry no information: the rates of two states a tolerance apart may
+//! differ by any amount. There the states are held at the middle of a piece, and only time and closed forms vary. Steps
+//! whose rates cannot be bounded are counted; `run --stats` and `explain` report their rules.
 
 use smallvec::SmallVec;
 
@@ -23,42 +24,51 @@ use dlsys_model::{Rule, Solve};
 use dlsys_ode::Dense;
 use dlsys_tree::SimTime;
 
-/// Rates so many times larger than all that were seen are a surprise.
+/// A rate may be overlooked where its bound is this many times larger than all its values at the stages.
 const SURPRISE: f64 = 8.0;
-/// Pieces of a step narrower than this are not halved any more, and no more of them are looked at.
+/// Pieces narrower than this part of a step are not halved any more.
 const NARROW: f64 = 1.0 / 256.0;
+/// Most pieces of a step that are examined.
 const MAX_PIECES: usize = 512;
-/// Most times that a step is cut for want of bounds: a part of 4^-20 of it is as narrow as anything that can be told.
+/// Most times that a step is cut for want of bounds: a part of 4^-20 of it is at the limit of resolution.
 pub const MAX_UNBOUNDED: usize = 20;
 
-/// NextKind bounds say of a step, at the first position where they say anything.
+/// The result of the examination of a step. Positions are parts of the step, from 0 to 1; the first of them counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PulseFinding {
-    /// Nothing has been overlooked.
+    /// No pulse has been overlooked.
     Clear,
-    /// Something may have been, from this position on.
+    /// A pulse may have been overlooked from this position on.
     Overlooked(f64),
-    /// There are no bounds near this position.
+    /// The rates have no bounds near this position.
     Unbounded(f64),
 }
 
-/// A step of a module's equations, to be looked through.
-pub struct Step<'p> {
+/// A step of a module's equations that is to be examined.
+pub struct ExaminedStep<'p> {
+    /// The world before the step, with the solution of the coupled modules.
     pub world: &'p World,
+    /// The module, its rule and its active equations.
     pub state: &'p State,
+    /// See `state`.
     pub rule: &'p Rule,
+    /// See `state`.
     pub solve: &'p Solve,
+    /// The instants between which rates are bounded.
     pub start: SimTime,
+    /// See `start`.
     pub end: SimTime,
-    /// Where in the step the method has evaluated rates.
+    /// The positions in the step at which the method has evaluated rates, from 0 to 1.
     pub nodes: &'p [f64],
-    /// The dense output, if the module is integrated alone.
+    /// The dense output, if the module is integrated alone; else it is that of the coupled modules.
     pub own: Option<&'p Dense>,
+    /// The largest contribution to the values that may be overlooked.
     pub tolerance: f64,
+    /// The equations are stiff: states are held at the middle of each piece.
     pub stiff: bool,
 }
 
-/// Bounds rates along steps.
+/// Bounds rates along steps. The fields are working memory.
 #[derive(Clone, Debug, Default)]
 pub struct PulseDetector {
     values: Vec<f64>,
@@ -71,12 +81,12 @@ pub struct PulseDetector {
 }
 
 impl PulseDetector {
-    /// Looks along a step for what the rates of the module's equations, and its values that are solved for, may be between
-    /// the places where they were evaluated.
-    pub fn look(&mut self, step: &Step) -> PulseFinding {
+    /// Bounds the rates of the module's equations, and its values that are solved for, along a step, and compares them
+    /// with the values at the stages.
+    pub fn examine(&mut self, step: &ExaminedStep) -> PulseFinding {
         let all = step.end.since(step.start);
         let rates = if step.state.numeric_only { &step.solve.rates } else { &step.solve.numeric_rates };
-        self.see(step, rates, all);
+        self.sample(step, rates, all);
         let values = &step.solve.algebraic.values;
         let explicit = values.outputs() > 0 && step.solve.algebraic.explicit.iter().all(|e| *e);
         let mut start = step.start;
@@ -91,14 +101,14 @@ impl PulseDetector {
             }
             let path = Path::of_equations(step.world, step.state, step.rule, (start, h), step.own);
             let (before, part) = (start.since(step.start) / all, h / all);
-            let mut finding = self.along(&path, rates, all * part, part, step);
+            let mut finding = self.compare(&path, rates, all * part, part, step);
             if explicit && finding == PulseFinding::Clear {
-                // NextKind the dense output has of them, against what they may be.
+                // Bounds of the explicit values are compared with the dense output of these values.
                 let rates = std::mem::take(&mut self.seen);
                 let of = step.solve.algebraic.of.iter();
                 self.seen =
                     of.map(|p| path.dense_bounds(*p).map_or(f64::INFINITY, Interval::magnitude)).collect();
-                finding = self.along(&path, values, 1.0, part, step);
+                finding = self.compare(&path, values, 1.0, part, step);
                 self.seen = rates;
             }
             match finding {
@@ -110,8 +120,8 @@ impl PulseDetector {
         PulseFinding::Clear
     }
 
-    /// The rates where the method has seen them.
-    fn see(&mut self, step: &Step, rates: &Program, all: f64) {
+    /// Evaluates the rates at the stages of the method, and keeps the largest size of each.
+    fn sample(&mut self, step: &ExaminedStep, rates: &Program, all: f64) {
         self.seen.clear();
         self.seen.resize(rates.outputs(), 0.0);
         self.out.resize(rates.outputs(), 0.0);
@@ -126,9 +136,16 @@ impl PulseDetector {
         }
     }
 
-    /// Compares bounds of a program along a path, which is a part of the step, with what was seen. NextKind they exceed that
-    /// by matters times `scale`, when it lasts for the whole path.
-    fn along(&mut self, path: &Path, program: &Program, scale: f64, part: f64, step: &Step) -> PulseFinding {
+    /// Compares bounds of a program along a path, which is the part `part` of the step, with its values at the stages.
+    /// A rate that lasts for the whole path contributes `scale` times its size to the values.
+    fn compare(
+        &mut self,
+        path: &Path,
+        program: &Program,
+        scale: f64,
+        part: f64,
+        step: &ExaminedStep,
+    ) -> PulseFinding {
         self.bounds_out.resize(program.outputs(), Interval::EMPTY);
         let mut stack: SmallVec<[(f64, f64); 16]> = SmallVec::new();
         stack.push((0.0, 1.0));

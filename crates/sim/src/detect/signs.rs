@@ -1,4 +1,5 @@
-//! Signs of the differences of a rule's atoms: their numbers, and what follows when some of them change.
+//! Signs of the differences that a rule's atoms compare: at birth, along closed forms, and the consequences of their
+//! changes.
 
 use smallvec::SmallVec;
 
@@ -8,10 +9,10 @@ use dlsys_expr::{Interval, Scratch, Sign};
 use dlsys_model::{Condition, Rule, Solve, Truth};
 use dlsys_tree::SimTime;
 
-/// Two numbers are equal if they differ by no more than this part of the larger.
+/// Two numbers are equal if they differ by no more than this part of the larger one.
 pub const EQUAL: f64 = 8.0 * f64::EPSILON;
 
-/// Sides closer together than this part of the module's size may be equal but for the resolution of time.
+/// Sides closer together than this part of the module's size may differ only by the resolution of time.
 pub const NEAR: f64 = 1e-9;
 
 /// 1, -1, or 0 where there is no sign.
@@ -23,6 +24,7 @@ pub fn sign_of(sign: Sign) -> f64 {
     }
 }
 
+/// The sign of the negated difference. Signs other than plus and minus are their own opposites.
 pub fn opposite(sign: Sign) -> Sign {
     match sign {
         Sign::Plus => Sign::Minus,
@@ -31,8 +33,9 @@ pub fn opposite(sign: Sign) -> Sign {
     }
 }
 
-/// The rate of a parameter where it has a value, as the equation is written; 0 where that is no more than the
-/// rounding of it. `variables` are those of the rule with the switches.
+/// The rate of a parameter where it has the value `value`, computed from the equation as written; 0 where the rate is no
+/// larger than the effect of rounding on it, and for parameters without an equation. `variables` are those of the rule,
+/// followed by the switches.
 pub fn rate_at(
     clause: Option<&Solve>,
     variables: &[f64],
@@ -56,7 +59,7 @@ pub fn rate_at(
     if here.abs() <= (nearby - here).abs() { 0.0 } else { here }
 }
 
-/// Whether a production may follow if an atom's sides meet.
+/// True if a production may follow when the sides of an atom meet.
 pub fn produces(rule: &Rule, signs: &[Sign], atom: usize) -> bool {
     let holds = |at: Sign| {
         let sign = |i: usize| if i == atom { at } else { signs[i] };
@@ -65,13 +68,14 @@ pub fn produces(rule: &Rule, signs: &[Sign], atom: usize) -> bool {
     !holds(signs[atom]) && (holds(Sign::Zero) || holds(opposite(signs[atom])))
 }
 
-/// Whether anything follows from the signs at an instant and just after it.
+/// True if the signs at an instant, or just after it, have a consequence: a production, other equations, or another
+/// switch.
 pub fn matters(rule: &Rule, state: &State, at: &[Sign], after: &[Sign]) -> bool {
     let holds = |condition: &Condition, signs: &[Sign]| condition.judge(|i| signs[i]) == Truth::Yes;
     if rule.produces.iter().any(|p| holds(&p.guard, at) || holds(&p.guard, after)) {
         return true;
     }
-    // The first `solve` that holds is active.
+    // The first `solve` clause whose condition holds is active.
     if rule.solves.iter().position(|s| holds(&s.guard, after)) != state.solve {
         return true;
     }
@@ -80,14 +84,14 @@ pub fn matters(rule: &Rule, state: &State, at: &[Sign], after: &[Sign]) -> bool 
         .any(|(switch, &on)| holds(&switch.condition, after) != on)
 }
 
-/// The sign of an atom of a module that comes from nowhere, by its two sides.
+/// The sign of an atom at the birth of a module, from the values of its two sides.
 pub fn sign_at_birth(a: f64, b: f64) -> Sign {
     let (difference, size) = (a - b, a.abs().max(b.abs()));
     let equal = size.is_finite() && difference.abs() <= EQUAL * size;
     if equal { Sign::Zero } else { Sign::of(difference) }
 }
 
-/// NextKind the errors of values, relative, make of the difference of an atom's sides.
+/// The effect of a relative error of all variables on the difference of an atom's sides; 0 where the difference jumps.
 pub fn noise(rule: &Rule, atom: usize, values: &[f64], error: f64) -> f64 {
     let around = |x: &f64| Interval { lo: x - error * x.abs(), hi: x + error * x.abs(), partial: false };
     let variables: Vec<Interval> = values.iter().map(around).collect();
@@ -96,18 +100,19 @@ pub fn noise(rule: &Rule, atom: usize, values: &[f64], error: f64) -> f64 {
     half_width(out[2 * atom], out[2 * atom + 1])
 }
 
-/// When a variable takes a value.
+/// The time at which a variable takes a level.
 pub enum Reach {
-    /// At an instant: the variable is `t`.
+    /// An instant: the variable is `t`.
     At(SimTime),
-    /// At an age: the variable is `age`.
+    /// An age of the module: the variable is `age`.
     Age(f64),
-    /// So long after its trajectory began.
+    /// A time since the start of the variable's trajectory.
     After(f64),
 }
 
-/// When a variable with a closed form takes a value, if it ever does and moves. `time` is the index of `t`, `start` the
-/// value with which the trajectory begins, and `exact` computes the rate at the value from the equation as written.
+/// The time at which a variable with a closed form takes a level; None if it never does, or does not move. `time` is the
+/// index of `t`, `start` the value at the start of the trajectory, and `exact` computes the rate at the level from the
+/// equation as written.
 pub fn reach(
     variable: usize,
     time: usize,
@@ -127,7 +132,7 @@ pub fn reach(
     }
 }
 
-/// How far the difference of two sides may be from its middle. Zero where a side jumps.
+/// Half the width of the difference of two intervals; 0 where a side jumps or is unbounded.
 pub fn half_width(a: Interval, b: Interval) -> f64 {
     let width = 0.5 * ((a.hi - a.lo) + (b.hi - b.lo));
     if a.partial || b.partial || !width.is_finite() { 0.0 } else { width }

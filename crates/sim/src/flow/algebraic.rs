@@ -3,9 +3,10 @@
 use std::collections::HashMap;
 
 use super::FlowStage;
-use super::coupled::algebra::Fault;
+use super::coupled::algebra::AlgebraicError;
 use super::coupled::equations::Equations;
-use super::coupled::system::{Source, Sum, System};
+use super::coupled::rows::{EquationTable, RowAggregate, VariableSource};
+use super::coupled::system::System;
 use crate::detect::signs::NEAR;
 use crate::error::{Error, Unsolved};
 use crate::world::context::Context;
@@ -40,7 +41,7 @@ fn instant_system(
     lazy: bool,
 ) -> (System, Vec<f64>) {
     let rules = &model.rules;
-    let mut system = System::at(at);
+    let mut table = EquationTable::at(at);
     let mut number: HashMap<(ModuleId, usize), u32> = HashMap::new();
     let (mut y, mut values) = (Vec::new(), Vec::new());
     let mut given: Vec<Vec<u32>> = Vec::new();
@@ -55,7 +56,7 @@ fn instant_system(
         for (place, &parameter) in algebraic.of.iter().enumerate() {
             if algebraic.is_lazy(place) == lazy {
                 number.insert((id, parameter), y.len() as u32);
-                system.places.push((first + parameter, id, parameter));
+                table.places.push((first + parameter, id, parameter));
                 y.push(values[parameter]);
                 places.push(place as u32);
             }
@@ -67,37 +68,36 @@ fn instant_system(
         let state = world.state(id).expect("seen above");
         let (rule, solve) = state.rule.zip(state.solve).expect("seen above");
         let compiled = &rules[rule];
-        let sources_of = |module: ModuleId| -> Vec<Source> {
+        let sources_of = |module: ModuleId| -> Vec<VariableSource> {
             let mut values = Vec::new();
             world.values(module, at, &mut values);
             let source = |(i, x): (usize, &f64)| match number.get(&(module, i)) {
-                Some(component) => Source::State(*component),
-                None => Source::Fixed(*x),
+                Some(component) => VariableSource::State(*component),
+                None => VariableSource::Fixed(*x),
             };
             values.iter().enumerate().map(source).collect()
         };
-        let first_source = system.sources.len();
+        let first_source = table.sources.len();
         for &module in std::iter::once(&id).chain(state.context.context()) {
-            system.sources.extend(sources_of(module));
+            table.sources.extend(sources_of(module));
         }
-        let row = system.rows.len() as u32;
+        let row = table.rows.len() as u32;
         for aggregate in 0..compiled.aggregates.len() {
             let children = state.context.children(aggregate);
-            let first = system.children.len();
-            children.iter().for_each(|child| system.children.extend(sources_of(*child)));
-            system.sums.push(Sum { row, aggregate, first, count: children.len() });
-            system.sources.push(Source::Sum(system.sums.len() as u32 - 1));
+            let first = table.children.len();
+            children.iter().for_each(|child| table.children.extend(sources_of(*child)));
+            table.aggregates.push(RowAggregate { row, aggregate, first, count: children.len() });
+            table.sources.push(VariableSource::Aggregate(table.aggregates.len() as u32 - 1));
         }
-        system.sources.resize(first_source + compiled.variables - 2, Source::Fixed(0.0));
+        table.sources.resize(first_source + compiled.variables - 2, VariableSource::Fixed(0.0));
         let switches = state.switches.iter().map(|&on| f64::from(u8::from(on)));
         let birth = world.tree.birth(id);
         let sources = compiled.variables - 2;
         let shape = (first_source, sources);
-        system.push_instant((rule, solve), shape, switches, (component, given), birth);
+        table.push_algebraic((rule, solve), shape, switches, (component, given), birth);
         component += given.len();
     }
-    system.finish(rules);
-    (system, y)
+    (System::new(table, rules), y)
 }
 
 impl FlowStage<'_, '_> {
@@ -109,7 +109,7 @@ impl FlowStage<'_, '_> {
         if let Err(fault) = Equations::new(&system, rules, None).make_consistent(0.0, &mut values) {
             return Err(self.unsolved(fault, system.owner(fault.component()), self.instant.at));
         }
-        Ok(Solved { places: system.places, before, values })
+        Ok(Solved { places: system.table.places, before, values })
     }
 
     /// Brings the parameters up to date that are computed only on observation, of all modules, at an instant.
@@ -133,14 +133,14 @@ impl FlowStage<'_, '_> {
         if let Err(fault) = answer {
             return Err(self.unsolved(fault, system.owner(fault.component()), at));
         }
-        for (&(place, ..), &value) in system.places.iter().zip(&y) {
+        for (&(place, ..), &value) in system.table.places.iter().zip(&y) {
             self.world.tree.set_value(place, value);
         }
         Ok(())
     }
 
     /// An error of the algebraic parameters of a module.
-    pub fn unsolved(&self, fault: Fault, owner: Option<(ModuleId, usize)>, at: SimTime) -> Error {
+    pub fn unsolved(&self, fault: AlgebraicError, owner: Option<(ModuleId, usize)>, at: SimTime) -> Error {
         let (id, parameter) = owner.unwrap_or_else(|| (self.flows.anyone(self.world), 0));
         let state = self.world.state(id);
         let rule = state.and_then(|s| s.rule).unwrap_or(0);
@@ -156,11 +156,11 @@ impl FlowStage<'_, '_> {
         site.module = describe(self.setup.model, self.world.tree.kind(id), &values);
         let what = compiled.parameters.get(parameter).cloned().unwrap_or_default();
         let fault = match fault {
-            Fault::Singular(_) => Unsolved::Singular,
-            Fault::None(_) => Unsolved::Nothing,
-            Fault::NotFinite(_) => Unsolved::NotFinite,
-            Fault::Fading(_) => Unsolved::Fading,
-            Fault::Rough(_) => Unsolved::Rough,
+            AlgebraicError::Singular(_) => Unsolved::Singular,
+            AlgebraicError::NoSolution(_) => Unsolved::Nothing,
+            AlgebraicError::NotFinite(_) => Unsolved::NotFinite,
+            AlgebraicError::Fading(_) => Unsolved::Fading,
+            AlgebraicError::Rough(_) => Unsolved::Rough,
         };
         Error::Unsolved { site, unknown: Box::new((what, fault)) }
     }

@@ -4,7 +4,7 @@
 //! (`prediction`) and the general way (`start_trajectories`) both use it.
 
 use crate::scratch::Scratch;
-use crate::trajectory::{Driven, Flow, Function, Pace, Riccati, Terms, Trajectory};
+use crate::trajectory::{AutonomousFlow, DrivenSolution, FunctionOfTime, Pace, Riccati, Terms, Trajectory};
 use crate::world::state::State;
 use dlsys_expr::Value;
 use dlsys_model::{Law, Solve};
@@ -62,12 +62,12 @@ fn driven(
         return None;
     }
     let x = scratch.variables[parameter];
-    let flow = Flow::new(law.flow, x, c)?;
+    let flow = AutonomousFlow::new(law.flow, x, c)?;
     let pace = match &law.pace {
         Some(program) => Some(Pace::new(program.clone(), &scratch.variables, time)?),
         None => None,
     };
-    Some(Trajectory::Driven(Box::new(Driven::new(flow, pace))))
+    Some(Trajectory::Driven(Box::new(DrivenSolution::new(flow, pace))))
 }
 
 /// The trajectories of explicit parameters that are formulas, and components for those that are solved for.
@@ -81,7 +81,9 @@ pub fn functions(solve: &Solve, time: usize, scratch: &Scratch, trajectories: &m
         let moves = |v: &usize| *v < trajectories.len() && !matches!(trajectories[*v], Trajectory::Rest);
         let moving =
             program.reads().iter().copied().filter(moves).map(|v| (v, trajectories[v].clone())).collect();
-        let Some(function) = Function::new(program, &scratch.variables, moving, time) else { return false };
+        let Some(function) = FunctionOfTime::new(program, &scratch.variables, moving, time) else {
+            return false;
+        };
         trajectories[parameter] = Trajectory::Function(Box::new(function));
     }
     solved(solve, false, trajectories);

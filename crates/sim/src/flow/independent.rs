@@ -1,23 +1,25 @@
-//! Modules that are integrated alone, each with steps of its own.
+//! Independent modules: those that read no integrated neighbour are integrated alone, each with steps of its own.
 
-use crate::detect::pulse::{self, MAX_UNBOUNDED, PulseFinding};
+use crate::detect::Detector;
+use crate::detect::pulse::{ExaminedStep, MAX_UNBOUNDED, PulseFinding};
 use crate::error::Error;
 use crate::flow::FlowStage;
-use crate::flow::integrator::StepError;
+use crate::flow::integrator::{StepError, StepRequest};
 use crate::trajectory::Trajectory;
 use crate::world::state::{Control, State, Step};
 use crate::world::{World, describe};
 use dlsys_expr::{Program, Scratch};
 use dlsys_model::{Jacobian, Rule};
-use dlsys_ode::Rates;
+use dlsys_ode::{Dense, Rates};
 use dlsys_tree::{ModuleId, SimTime};
 use smallvec::SmallVec;
 
-/// So many steps must bring time on by more than this part of it, or there is a singularity.
+/// The number of steps after which the progress of time is checked.
 const MANY_STEPS: usize = 10_000;
+/// Steps that advance time by no more than this part of it indicate a singularity.
 const CRAWL: f64 = 1e-5;
 
-/// Counts a step; true if time hardly goes on.
+/// Counts a step that ends at `at`. True if the last [`MANY_STEPS`] of them, since `mark`, have hardly advanced time.
 pub fn crawls(mark: &mut SimTime, since_mark: &mut usize, at: SimTime) -> bool {
     *since_mark += 1;
     if *since_mark < MANY_STEPS {
@@ -28,20 +30,23 @@ pub fn crawls(mark: &mut SimTime, since_mark: &mut usize, at: SimTime) -> bool {
     crawls
 }
 
-/// The equations of one module whose neighbours rest or follow formulas that it does not read.
+/// The equations of one module that is integrated alone.
 struct Independent<'a> {
     program: &'a Program,
     jacobian: &'a Jacobian,
     /// Row, column and entry in the clause's Jacobian.
     partials: SmallVec<[(u32, u32, usize); 4]>,
-    /// All variables; those that move are filled in.
+    /// All variables of the rule; those that move are filled in for each evaluation.
     variables: Vec<f64>,
-    /// Where each component stands among the variables.
+    /// The index of each component among the variables.
     numeric: SmallVec<[usize; 4]>,
+    /// The parameters with closed forms: index, trajectory, and value at the start of that.
     formulas: SmallVec<[(usize, &'a Trajectory, f64); 4]>,
-    /// Time since the formulas began, and `t` and `age`, at the start of the step.
+    /// The time from the start of the trajectories to the start of the step.
     offset: f64,
+    /// The index of `t` among the variables; `age` is the next.
     time: usize,
+    /// `t` and `age` at the start of the step.
     t: f64,
     age: f64,
     scratch: Scratch<f64>,
@@ -103,7 +108,7 @@ impl<'a> Independent<'a> {
 }
 
 impl Independent<'_> {
-    /// Fills in the variables that move.
+    /// Fills in the variables that move, at a time since the start of the step.
     fn move_to(&mut self, tau: f64, y: &[f64]) {
         for (&variable, &value) in self.numeric.iter().zip(y) {
             self.variables[variable] = value;
@@ -116,7 +121,7 @@ impl Independent<'_> {
     }
 }
 
-/// Most times that a step is cut because of what it may have overlooked.
+/// Most times that a step is cut because it may have overlooked a pulse.
 const MAX_TRIES: usize = 100;
 
 impl Rates for Independent<'_> {
@@ -146,70 +151,34 @@ impl Rates for Independent<'_> {
     }
 }
 
+/// The first position in a step, from 0 to 1, from which on a pulse may have been overlooked. A rule whose rates cannot
+/// be bounded in steps that have been cut often enough is recorded.
+fn overlooked(detector: &mut Detector, step: &ExaminedStep, rule: usize, tries: usize) -> Option<f64> {
+    match detector.pulses.examine(step) {
+        PulseFinding::Clear => None,
+        PulseFinding::Unbounded(at) if tries > MAX_UNBOUNDED => {
+            let h = step.own.map_or(0.0, |dense| dense.h);
+            detector.unbounded.entry(rule).or_insert(step.start.to_f64() + at * h);
+            None
+        }
+        PulseFinding::Overlooked(at) | PulseFinding::Unbounded(at) => Some(at),
+    }
+}
+
 impl FlowStage<'_, '_> {
     /// Makes a step of a module from its values in the tree; returns its length.
+    ///
+    /// # Errors
+    /// If no step can be made, or steps hardly advance time.
     pub fn step_independent(&mut self, id: ModuleId, from: SimTime) -> Result<f64, Error> {
-        let model = self.setup.model;
         let state = self.world.state(id).expect("a module with a rule");
-        let (index, solve) = (state.rule.expect("has a rule"), state.solve.expect("has equations"));
-        let rule = &model.rules[index];
-        let mut y = std::mem::take(&mut self.flows.y);
-        let variables = std::mem::take(&mut self.scratch.variables);
+        let solve = state.solve.expect("has equations");
         let hint = self.flows.hints[self.world.tree.kind(id).index()][solve];
-        let going_on = state.step.as_ref().filter(|s| s.live);
-        let mut control = going_on.map_or(hint, |s| s.control);
-        // NextKind was learnt elsewhere says nothing of how well this module is known.
-        control.error = state.step.as_ref().map_or(0.0, |s| s.control.error);
-        let step = {
-            let scratch = std::mem::take(&mut self.scratch.registers);
-            let mut system = Independent::new(self.world, state, rule, from, variables, scratch, &mut y);
-            // One that goes on from its own last step need not evaluate its rates again.
-            if going_on.is_some_and(|s| self.flows.independent_last == Some((id, s.dense.end)))
-                && y.len() == self.flows.independent.size()
-            {
-                self.flows.independent.advance(&mut y);
-            } else {
-                self.flows.independent.restart(self.setup.settings.method, y.len());
-            }
-            let fixed = self.setup.settings.method.is_fixed_step();
-            let settings = self.setup.settings.for_clocks(rule.solves[solve].has_hazard_clock);
-            let stiff = control.stiff || self.setup.settings.method.is_implicit();
-            let pulses = rule.solves[solve].has_pulses && !fixed;
-            let mut tries = 0;
-            let step = loop {
-                let stats = &mut self.log.stats;
-                let step =
-                    self.flows.independent.step(&settings, &mut control, &mut system, &y, from, None, stats);
-                let step = step.map(|_| self.flows.independent.dense(&mut system, &y));
-                let Ok(dense) = &step else { break step };
-                tries += 1;
-                let least = 64.0 * from.resolution();
-                if !pulses || tries > MAX_TRIES {
-                    break step;
-                }
-                let (world, solve) = (&self.world, &rule.solves[solve]);
-                let (nodes, tolerance) = (&*self.flows.independent.nodes(), self.setup.settings.tolerance);
-                let (start, end, own) = (from, dense.end, Some(dense));
-                let step_made =
-                    pulse::Step { world, state, rule, solve, start, end, nodes, own, tolerance, stiff };
-                match self.detector.pulses.look(&step_made) {
-                    PulseFinding::Unbounded(at) if tries > MAX_UNBOUNDED => {
-                        self.detector.unbounded.entry(index).or_insert(from.to_f64() + at * dense.h);
-                        break step;
-                    }
-                    PulseFinding::Overlooked(at) | PulseFinding::Unbounded(at) if dense.h > least => {
-                        stats.rejected += 1;
-                        let part = if at > 0.0 { at } else { 0.25 };
-                        control.size = (part * dense.h).max(least);
-                    }
-                    _ => break step,
-                }
-            };
-            (self.scratch.variables, self.scratch.registers) = (system.variables, system.scratch);
-            step
-        };
-        self.flows.y = y;
-        let dense = step.map_err(|error| {
+        let last = state.step.as_ref();
+        let mut control = last.filter(|s| s.live).map_or(hint, |s| s.control);
+        // The experience of other modules tells nothing about the error of this one's values.
+        control.error = last.map_or(0.0, |s| s.control.error);
+        let dense = self.make_own_step(id, from, &mut control).map_err(|error| {
             let own = |component: usize| {
                 let state = self.world.state(id)?;
                 let is_it = |m: &Trajectory| matches!(m, Trajectory::Step(c) if *c as usize == component);
@@ -240,14 +209,73 @@ impl FlowStage<'_, '_> {
         Ok(h)
     }
 
-    /// Learns from an event some time into a module's own step.
+    /// Makes a step of a module that overlooks no pulse; shorter ones are tried until one does.
+    fn make_own_step(
+        &mut self,
+        id: ModuleId,
+        from: SimTime,
+        control: &mut Control,
+    ) -> Result<Dense, StepError> {
+        let state = self.world.state(id).expect("a module with a rule");
+        let (index, solve) = (state.rule.expect("has a rule"), state.solve.expect("has equations"));
+        let rule = &self.setup.model.rules[index];
+        let solve = &rule.solves[solve];
+        let mut y = std::mem::take(&mut self.flows.y);
+        let variables = std::mem::take(&mut self.scratch.variables);
+        let scratch = std::mem::take(&mut self.scratch.registers);
+        let mut system = Independent::new(self.world, state, rule, from, variables, scratch, &mut y);
+        let integrator = &mut self.flows.independent;
+        // A step that begins at the end of the module's last one need not evaluate its rates again.
+        let last = state.step.as_ref().filter(|s| s.live);
+        if last.is_some_and(|s| self.flows.independent_last == Some((id, s.dense.end)))
+            && y.len() == integrator.size()
+        {
+            integrator.advance(&mut y);
+        } else {
+            integrator.restart(self.setup.settings.method, y.len());
+        }
+        let fixed = self.setup.settings.method.is_fixed_step();
+        let settings = self.setup.settings.for_clocks(solve.has_hazard_clock);
+        let stiff = control.stiff || self.setup.settings.method.is_implicit();
+        let pulses = solve.has_pulses && !fixed;
+        let least = 64.0 * from.resolution();
+        let mut tries = 0;
+        let step = loop {
+            let stats = &mut self.log.stats;
+            let request = StepRequest { settings: &settings, y: &y, start: from, limit: None };
+            let step = integrator.step(request, control, &mut system, stats);
+            let step = step.map(|_| integrator.dense(&mut system, &y));
+            let Ok(dense) = &step else { break step };
+            tries += 1;
+            if !pulses || tries > MAX_TRIES {
+                break step;
+            }
+            let (world, tolerance) = (&*self.world, self.setup.settings.tolerance);
+            let (nodes, start, end, own) = (&*integrator.nodes(), from, dense.end, Some(dense));
+            let examined =
+                ExaminedStep { world, state, rule, solve, start, end, nodes, own, tolerance, stiff };
+            match overlooked(self.detector, &examined, index, tries) {
+                Some(at) if dense.h > least => {
+                    stats.rejected += 1;
+                    let part = if at > 0.0 { at } else { 0.25 };
+                    control.size = (part * dense.h).max(least);
+                }
+                _ => break step,
+            }
+        };
+        (self.scratch.variables, self.scratch.registers) = (system.variables, system.scratch);
+        self.flows.y = y;
+        step
+    }
+
+    /// Adapts the step size with which the next module under these equations begins, after an event inside a module's
+    /// own step.
     pub fn learn(&mut self, id: ModuleId) {
         let now = self.instant.at;
         let Some(state) = self.world.state(id) else { return };
         let (Some(solve), Some(step)) = (state.solve, &state.step) else { return };
         let kind = self.world.tree.kind(id).index();
         if step.live {
-            // NextKind comes next begins with what was learnt here.
             let mut control = step.control;
             let (lived, error) = (now.since(step.dense.start), control.last_error);
             control.foresee(error, lived, now.resolution());
@@ -255,7 +283,7 @@ impl FlowStage<'_, '_> {
         }
     }
 
-    /// An error of a step, with the module and parameter that own the component.
+    /// The error of a run for a step that fails. `owner` gives the module and parameter that a component belongs to.
     pub fn step_error(
         &self,
         error: StepError,

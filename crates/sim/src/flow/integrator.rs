@@ -1,7 +1,7 @@
-//! Steps of controlled error, as the simulation makes them: [`dlsys_ode::Stepper`] with the settings and the statistics of a run, and
-//! with unknowns that are solved for along with the parameters.
+//! Steps of controlled error: [`dlsys_ode::Stepper`] with the settings and the statistics of a run, and with algebraic
+//! components that are solved for along with the integrated ones.
 
-use crate::flow::coupled::algebra::Fault;
+use crate::flow::coupled::algebra::AlgebraicError;
 use crate::flow::coupled::equations::Equations;
 use crate::{Settings, Stats};
 use dlsys_ode::{Control, Dense, Method, Nodes, Rates, StepSettings, Stepper};
@@ -9,15 +9,15 @@ use dlsys_tree::SimTime;
 
 pub use dlsys_ode::{CERTAINTY, Error as StepError, next_grid_time};
 
-/// The tolerance of a single step, as a part of the tolerance asked for.
+/// The tolerance of a single step, as a part of the tolerance of the run.
 pub const INNER_TOLERANCE: f64 = Stepper::TOLERANCE_SHARE;
 
-/// A step of so many pieces is long enough.
+/// A step whose dense output takes this many pieces is long enough.
 const MANY_PIECES: f64 = 4.0;
-/// The factor by which the next step is shorter where the unknowns could not be followed.
+/// The factor by which the next step is shorter where the algebraic components could not be followed.
 const SHORTER: f64 = 0.1;
 
-/// Makes the steps of one system of equations after another.
+/// Integrates systems of equations, one after another.
 #[derive(Clone, Default)]
 pub struct Integrator {
     stepper: Stepper,
@@ -26,6 +26,19 @@ pub struct Integrator {
 /// The part of a run's settings that steps depend on.
 fn of_steps(settings: &Settings) -> StepSettings {
     StepSettings { method: settings.method, tolerance: settings.tolerance, step_size: settings.step_size }
+}
+
+/// The start of a step, and its limits.
+#[derive(Clone, Copy)]
+pub struct StepRequest<'r> {
+    /// Method, tolerance and step size.
+    pub settings: &'r Settings,
+    /// The components at the start.
+    pub y: &'r [f64],
+    /// The instant at which the step begins.
+    pub start: SimTime,
+    /// The step goes no further than to this instant.
+    pub limit: Option<SimTime>,
 }
 
 impl Integrator {
@@ -39,8 +52,8 @@ impl Integrator {
         self.stepper.overhead_is_high = true;
     }
 
-    /// Says whether events are searched for inside steps. Frames that fall into unwatched steps are refined
-    /// ([`Integrator::refined`]).
+    /// Declares whether steps are free of searches for events. The dense output of such unwatched steps is refined for
+    /// frames inside them ([`Integrator::refined`]).
     pub fn set_unwatched(&mut self, is_unwatched: bool) {
         self.stepper.is_unwatched = is_unwatched;
     }
@@ -50,7 +63,8 @@ impl Integrator {
         self.stepper.is_unwatched
     }
 
-    /// Where in the step just made rates were evaluated that its error estimate depends on.
+    /// The positions in the step just made, from 0 to 1, at which the rates were evaluated that its error estimate
+    /// depends on.
     pub fn nodes(&self) -> Nodes {
         self.stepper.nodes()
     }
@@ -70,18 +84,15 @@ impl Integrator {
         self.stepper.size()
     }
 
-    /// Makes a step from `y` at `start`, no further than `limit`; returns its end.
-    #[allow(clippy::too_many_arguments)]
+    /// Makes a step and returns its end. `control` is what step control has learnt from the steps before.
     pub fn step(
         &mut self,
-        settings: &Settings,
+        request: StepRequest,
         control: &mut Control,
         system: &mut impl Rates,
-        y: &[f64],
-        start: SimTime,
-        limit: Option<SimTime>,
         stats: &mut Stats,
     ) -> Result<SimTime, StepError> {
+        let StepRequest { settings, y, start, limit } = request;
         let before = self.stepper.counts();
         let end = self.stepper.step(&of_steps(settings), control, system, y, start, limit);
         let after = self.stepper.counts();
@@ -90,8 +101,8 @@ impl Integrator {
         end
     }
 
-    /// The dense output of the step just made from `y`. To be called only where it is needed: a method may have to evaluate rates
-    /// for it.
+    /// The dense output of the step just made from `y`. Some methods evaluate further rates for it, so it is computed
+    /// only on demand.
     pub fn dense(&mut self, system: &mut impl Rates, y: &[f64]) -> Dense {
         self.stepper.dense(system, y)
     }
@@ -101,21 +112,23 @@ impl Integrator {
         self.stepper.refined(system, y, &of_steps(settings))
     }
 
-    /// The dense output of the step just made from `y`, with the unknowns that are solved for along with it. Where these cannot be
-    /// followed, the next step to be tried is shorter.
+    /// The dense output of the step just made from `y`, with its algebraic components.
+    ///
+    /// # Errors
+    /// If these cannot be solved for, or cannot be followed; then the size of the next step to be tried is reduced.
     pub fn blended(
         &mut self,
         equations: &mut Equations,
         y: &[f64],
         settings: &Settings,
         control: &mut Control,
-    ) -> Result<Vec<Dense>, Fault> {
+    ) -> Result<Vec<Dense>, AlgebraicError> {
         let dense = self.dense(equations, y);
         let h = dense.h;
         let blended = equations.blend(&dense, y, INNER_TOLERANCE * settings.tolerance);
         match &blended {
             Ok(pieces) => {
-                // The shape of the unknowns may limit the step more than the rates do.
+                // The shape of the algebraic components may limit the step more than the rates do.
                 control.size = control.size.min(h * (MANY_PIECES / pieces.len() as f64).max(SHORTER));
                 if let Some(last) = pieces.last() {
                     for (c, end) in self.stepper.end_mut().iter_mut().enumerate() {

@@ -12,7 +12,7 @@ pub mod inspect;
 use crate::budget::afford_string;
 use crate::error::Error;
 use crate::kernel::Simulation;
-use crate::trajectory::{Flow, Riccati};
+use crate::trajectory::{AutonomousFlow, Riccati};
 use crate::world::life::LifeClass;
 use crate::world::site_of_axiom;
 use cache::{Column, FrameCache};
@@ -219,7 +219,7 @@ fn driven(
     }
     let mut moved = registers[parameter];
     for (i, x) in moved.iter_mut().enumerate().take(count) {
-        let flow = Flow::new(law.flow, *x, c.map(|c| c[i]));
+        let flow = AutonomousFlow::new(law.flow, *x, c.map(|c| c[i]));
         *x += if tau[i] == 0.0 { 0.0 } else { flow.map_or(f64::NAN, |flow| flow.value(s[i])) };
     }
     moved

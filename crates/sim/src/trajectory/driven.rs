@@ -1,6 +1,7 @@
-//! Motions at a pace: the solution of `dx/ds = q(x)` at `s = H(time)`, H being a formula of time.
+//! Solutions of `dx/dt = h(t) q(x)`: those of `dx/ds = q(x)` at `s = H(t)`, where the *pace* H, the integral of h, is
+//! an explicit function of time.
 //!
-//! See `model/driven.rs` for the equations that are solved so.
+//! The equations of this form are those of [`dlsys_model::Driven`].
 
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -11,34 +12,34 @@ use super::{Growth, Riccati};
 use dlsys_expr::{Dual, Interval, Program, Scratch, Value};
 use dlsys_model as model;
 
-/// A trajectory of one parameter, from one start.
+/// The solution for one parameter, from one start.
 #[derive(Clone, Debug)]
-pub struct Driven {
-    flow: Flow,
+pub struct DrivenSolution {
+    flow: AutonomousFlow,
     pace: Option<Pace>,
 }
 
-/// The trajectory in s.
+/// The solution of `dx/ds = q(x)`, as displacements from the start.
 #[derive(Clone, Debug)]
-pub enum Flow {
-    /// Forward, and backward with the signs of the coefficients turned.
+pub enum AutonomousFlow {
+    /// The solution forward, and the solution backward, whose coefficients have the opposite signs.
     Riccati(Riccati, Riccati),
     Growth(Growth),
 }
 
-/// H, from the start on.
+/// The pace H, from the start of the trajectory on.
 #[derive(Clone, Debug)]
 pub struct Pace {
     program: Arc<Program>,
     /// The variables of the rule at the start.
     variables: SmallVec<[f64; 8]>,
-    /// Which of them is `t`; `age` is the next.
+    /// The index of `t` among the variables; `age` is the next.
     time: usize,
     start: f64,
 }
 
 thread_local! {
-    // A search evaluates a pace some ten times: not with an allocation each time.
+    // A search evaluates a pace some ten times; these avoid an allocation each time.
     static NUMBERS: RefCell<Scratch<f64>> = const { RefCell::new(Vec::new()) };
     static RATES: RefCell<Scratch<Dual<f64>>> = const { RefCell::new(Vec::new()) };
 }
@@ -47,7 +48,7 @@ thread_local! {
 const MOST: usize = 500;
 
 impl Pace {
-    /// None if H has no value at the start.
+    /// None if H or its rate is not finite at the start.
     pub fn new(program: Arc<Program>, variables: &[f64], time: usize) -> Option<Pace> {
         let mut pace = Pace { program, variables: SmallVec::from_slice(variables), time, start: 0.0 };
         pace.start = pace.value(0.0);
@@ -62,7 +63,7 @@ impl Pace {
         out[0]
     }
 
-    /// H from the start to a time.
+    /// The increase of H from the start to a time since the start.
     fn value(&self, tau: f64) -> f64 {
         let times = [0, 1].map(|i| self.variables[self.time + i] + tau);
         NUMBERS.with_borrow_mut(|scratch| self.eval(|x| x, times, scratch)) - self.start
@@ -81,7 +82,7 @@ impl Pace {
         let mut bounds = self.eval(Dual::constant, times, &mut Vec::new());
         bounds.value.lo -= self.start;
         bounds.value.hi -= self.start;
-        // H is smooth enough: what it is the integral of may jump, but is bounded.
+        // H is continuous: its integrand may jump, but is bounded.
         bounds.value.partial = false;
         // The mean value theorem often bounds more tightly.
         let (middle, reach) = (self.value(0.5 * (from + to)), 0.5 * (to - from) * bounds.rate.magnitude());
@@ -92,7 +93,7 @@ impl Pace {
         bounds
     }
 
-    /// The first time at which H, which goes one way only, is `s`.
+    /// The first time at which H, which is monotonic, has increased by `s`.
     fn reach(&self, s: f64) -> Option<f64> {
         let beyond = |value: f64| if s > 0.0 { value >= s } else { value <= s };
         let (mut lo, mut hi) = (0.0, 1.0);
@@ -127,8 +128,8 @@ impl Pace {
         (hi > 0.0).then_some(hi)
     }
 
-    /// A time up to which H surely stays between two values, close to the first at which it does not; None if there is
-    /// no end to it in sight.
+    /// A time up to which H is proven to stay between two values, close to the first at which it does not; None if none
+    /// is found up to 1e15.
     fn leave(&self, below: f64, above: f64) -> Option<f64> {
         let (mut at, mut width) = (0.0, 1.0);
         for _ in 0..MOST {
@@ -150,40 +151,43 @@ impl Pace {
     }
 }
 
-impl Flow {
-    /// The solution from `x` with the coefficients of a form; None where its formula does not hold.
-    pub fn new(form: model::Flow, x: f64, [c, b, a]: [f64; 3]) -> Option<Flow> {
+impl AutonomousFlow {
+    /// The solution from `x` of an equation of the given form with these coefficients; None where its closed form does
+    /// not hold.
+    pub fn new(form: model::Flow, x: f64, [c, b, a]: [f64; 3]) -> Option<AutonomousFlow> {
         Some(match form {
-            model::Flow::Quadratic => Flow::Riccati(Riccati::new(x, c, b, a), Riccati::new(x, -c, -b, -a)),
-            model::Flow::Gompertz => Flow::Growth(Growth::gompertz(x, c, b)?),
-            model::Flow::Bernoulli => Flow::Growth(Growth::bernoulli(x, c, b, a)?),
+            model::Flow::Quadratic => {
+                AutonomousFlow::Riccati(Riccati::new(x, c, b, a), Riccati::new(x, -c, -b, -a))
+            }
+            model::Flow::Gompertz => AutonomousFlow::Growth(Growth::gompertz(x, c, b)?),
+            model::Flow::Bernoulli => AutonomousFlow::Growth(Growth::bernoulli(x, c, b, a)?),
         })
     }
 
     /// The displacement at s.
     pub fn value(&self, s: f64) -> f64 {
         match self {
-            Flow::Riccati(forward, _) if s >= 0.0 => forward.value(s),
-            Flow::Riccati(_, backward) => backward.value(-s),
-            Flow::Growth(growth) => growth.value(s),
+            AutonomousFlow::Riccati(forward, _) if s >= 0.0 => forward.value(s),
+            AutonomousFlow::Riccati(_, backward) => backward.value(-s),
+            AutonomousFlow::Growth(growth) => growth.value(s),
         }
     }
 
     fn rate(&self, u: f64) -> f64 {
         match self {
-            Flow::Riccati(forward, _) => forward.rate(u),
-            Flow::Growth(growth) => growth.rate(u),
+            AutonomousFlow::Riccati(forward, _) => forward.rate(u),
+            AutonomousFlow::Growth(growth) => growth.rate(u),
         }
     }
 
     fn over(&self, from: f64, to: f64) -> Dual<Interval> {
         match self {
-            Flow::Riccati(forward, _) if from >= 0.0 => forward.over(from, to),
-            Flow::Riccati(_, backward) if to <= 0.0 => {
+            AutonomousFlow::Riccati(forward, _) if from >= 0.0 => forward.over(from, to),
+            AutonomousFlow::Riccati(_, backward) if to <= 0.0 => {
                 let bounds = backward.over(-to, -from);
                 Dual { rate: Interval { lo: -bounds.rate.hi, hi: -bounds.rate.lo, ..bounds.rate }, ..bounds }
             }
-            Flow::Riccati(..) => {
+            AutonomousFlow::Riccati(..) => {
                 let hull = |a: Interval, b: Interval| Interval {
                     lo: a.lo.min(b.lo),
                     hi: a.hi.max(b.hi),
@@ -192,46 +196,49 @@ impl Flow {
                 let (a, b) = (self.over(from, 0.0), self.over(0.0, to));
                 Dual { value: hull(a.value, b.value), rate: hull(a.rate, b.rate) }
             }
-            Flow::Growth(growth) => growth.over(from, to),
+            AutonomousFlow::Growth(growth) => growth.over(from, to),
         }
     }
 
     fn reach(&self, u: f64, forward_in_time: bool, exact: impl FnOnce() -> f64) -> Option<f64> {
         let s = match self {
-            Flow::Riccati(forward, _) if forward_in_time => forward.reach(u, exact),
-            Flow::Riccati(_, backward) => backward.reach(u, || -exact()).map(|s| -s),
-            Flow::Growth(growth) => growth.reach(u),
+            AutonomousFlow::Riccati(forward, _) if forward_in_time => forward.reach(u, exact),
+            AutonomousFlow::Riccati(_, backward) => backward.reach(u, || -exact()).map(|s| -s),
+            AutonomousFlow::Growth(growth) => growth.reach(u),
         }?;
         ((s > 0.0) == forward_in_time && s != 0.0).then_some(s)
     }
 
     fn ends(&self) -> (Option<f64>, Option<f64>) {
         match self {
-            Flow::Riccati(forward, backward) => (backward.pole().map(|s| -s), forward.pole()),
-            Flow::Growth(growth) => growth.ends(),
+            AutonomousFlow::Riccati(forward, backward) => (backward.pole().map(|s| -s), forward.pole()),
+            AutonomousFlow::Growth(growth) => growth.ends(),
         }
     }
 }
 
-impl Driven {
-    pub fn new(flow: Flow, pace: Option<Pace>) -> Driven {
-        Driven { flow, pace }
+impl DrivenSolution {
+    /// A flow at a pace; at that of time if there is none.
+    pub fn new(flow: AutonomousFlow, pace: Option<Pace>) -> DrivenSolution {
+        DrivenSolution { flow, pace }
     }
 
     fn s(&self, tau: f64) -> f64 {
         self.pace.as_ref().map_or(tau, |pace| pace.value(tau))
     }
 
-    /// The displacement at a time.
+    /// The displacement at a time since the start.
     pub fn value(&self, tau: f64) -> f64 {
         if tau == 0.0 { 0.0 } else { self.flow.value(self.s(tau)) }
     }
 
+    /// The rate at a time since the start.
     pub fn rate(&self, tau: f64) -> f64 {
         let pace = self.pace.as_ref().map_or(1.0, |pace| pace.rate(tau));
         self.flow.rate(self.value(tau)) * pace
     }
 
+    /// Bounds of displacement and rate from one time since the start to another.
     pub fn over(&self, from: f64, to: f64) -> Dual<Interval> {
         let Some(pace) = &self.pace else { return self.flow.over(from, to) };
         let s = pace.over(from, to);
@@ -247,18 +254,18 @@ impl Driven {
     /// the equation is written.
     pub fn reach(&self, u: f64, rate: impl FnOnce() -> f64) -> Option<f64> {
         let Some(pace) = &self.pace else { return self.flow.reach(u, true, rate) };
-        // Which way s goes is seen where it first moves.
+        // The direction of s is that of its first change.
         let forward = [1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6, 1e9, 1e12]
             .into_iter()
             .map(|tau| pace.value(tau))
             .find(|s| *s != 0.0)
             .is_none_or(|s| s > 0.0);
-        // The equation's own rate there would be that of time, and is not that of s.
+        // The rate of the equation as written is one in time, not one in s.
         let s = self.flow.reach(u, forward, || self.flow.rate(u))?;
         pace.reach(s)
     }
 
-    /// The time from which on there is no value.
+    /// The time at which the solution ends; None if it does not end.
     pub fn end(&self) -> Option<f64> {
         let (before, after) = self.flow.ends();
         match &self.pace {

@@ -1,4 +1,4 @@
-//! A parameter that is a function of time: evaluated, not integrated.
+//! Parameters that are explicit functions of time, and of other parameters with closed forms.
 
 use std::sync::Arc;
 
@@ -6,34 +6,35 @@ use dlsys_expr::{Dual, Interval, Program, Value};
 
 use super::Trajectory;
 
-/// A formula over variables of which some move: time, and parameters that follow formulas themselves.
+/// A program over the variables of a rule, some of which move: time, and parameters with closed forms.
 #[derive(Clone, Debug)]
-pub struct Function {
+pub struct FunctionOfTime {
     program: Arc<Program>,
     /// The variables at the start.
     variables: Vec<f64>,
-    /// Which of them move, and how.
+    /// The variables that move, with their trajectories.
     moving: Vec<(usize, Trajectory)>,
-    /// `t`; `age` is the next.
+    /// The index of `t` among the variables; `age` is the next.
     time: usize,
     /// The value at the start.
     start: f64,
 }
 
-impl Function {
-    /// A function of variables that move from given values on; None if it has no value there.
+impl FunctionOfTime {
+    /// A function of variables that move from given values on; None if its value at the start is not finite.
     pub fn new(
         program: &Arc<Program>,
         variables: &[f64],
         moving: Vec<(usize, Trajectory)>,
         time: usize,
-    ) -> Option<Function> {
+    ) -> Option<FunctionOfTime> {
         let (program, variables) = (program.clone(), variables.to_vec());
-        let mut function = Function { program, variables, moving, time, start: 0.0 };
+        let mut function = FunctionOfTime { program, variables, moving, time, start: 0.0 };
         function.start = function.at(0.0);
         function.start.is_finite().then_some(function)
     }
 
+    /// Evaluates the program, given the values of the variables that move.
     fn evaluate<T: Value>(
         &self,
         mut variables: Vec<T>,
@@ -54,11 +55,12 @@ impl Function {
         self.evaluate(self.variables.clone(), |trajectory, x| x + trajectory.value(tau), time)
     }
 
-    /// The displacement.
+    /// The displacement at a time since the start.
     pub fn value(&self, tau: f64) -> f64 {
         self.at(tau) - self.start
     }
 
+    /// The rate at a time since the start.
     pub fn rate(&self, tau: f64) -> f64 {
         let still = |value: f64| Dual { value, rate: 0.0 };
         let time = [self.time, self.time + 1].map(|v| Dual { value: self.variables[v] + tau, rate: 1.0 });

@@ -1,7 +1,7 @@
 //! Solutions of `x' = x (a + b ln x)` (Gompertz) and `x' = a x + b x^p` (Bernoulli; with p = 2/3 von Bertalanffy, with
 //! p = 1 + shape Richards), with constant coefficients.
 //!
-//! Both are a linear equation in disguise. With `y = ln(x / x(0))`, or `y = (x / x(0))^(1-p) - 1`, it is `y' = f + d y` from
+//! A substitution makes both linear. With `y = ln(x / x(0))`, or `y = (x / x(0))^(1-p) - 1`, it is `y' = f + d y` from
 //! `y = 0`, so that growth from 1e-300 and small displacements keep their digits.
 
 use dlsys_expr::{Dual, Interval};
@@ -22,12 +22,12 @@ pub struct Growth {
 const LARGEST: f64 = 709.782_712_893_384;
 
 impl Growth {
-    /// From `x`; None where the formula does not hold, as for sizes that are not positive.
+    /// The solution of `x' = x (a + b ln x)` from `x`; None where the closed form does not hold, as for `x` ≤ 0.
     pub fn gompertz(x: f64, a: f64, b: f64) -> Option<Growth> {
         Growth { x, f: a + b * x.ln(), d: b, bend: None }.checked()
     }
 
-    /// The same of `x' = a x + b x^p`.
+    /// The solution of `x' = a x + b x^p` from `x`; None where the closed form does not hold, as for `x` ≤ 0 or p = 1.
     pub fn bernoulli(x: f64, a: f64, b: f64, p: f64) -> Option<Growth> {
         let bend = 1.0 - p;
         Growth { x, f: bend * (a + b * x.powf(p - 1.0)), d: bend * a, bend: Some(bend) }.checked()
@@ -42,12 +42,13 @@ impl Growth {
         if self.d == 0.0 { self.f * s } else { self.f * ((self.d * s).exp_m1() / self.d) }
     }
 
-    /// ln(x / x(0)) of a y.
+    /// ln(x / x(0)) as a function of y.
     fn logarithm(&self, y: f64) -> f64 {
         self.bend.map_or(y, |bend| y.ln_1p() / bend)
     }
 
-    /// The displacement at a time, which may be negative. NaN or infinite beyond the end of the solution.
+    /// The displacement at a time since the start, which may be negative. NaN or infinite beyond the end of the
+    /// solution.
     pub fn value(&self, s: f64) -> f64 {
         if self.f == 0.0 || s == 0.0 {
             return 0.0;
@@ -89,7 +90,7 @@ impl Growth {
         self.time_of(self.y_of(u))
     }
 
-    /// The times before and after which there is no value.
+    /// The times, before and after 0, at which the solution ends.
     pub fn ends(&self) -> (Option<f64>, Option<f64>) {
         if self.f == 0.0 {
             return (None, None);
@@ -109,14 +110,14 @@ impl Growth {
         (before, after)
     }
 
-    /// Bounds of displacement and rate: such a solution moves one way only.
+    /// Bounds of displacement and rate from one time since the start to another. The solution is monotonic.
     pub fn over(&self, from: f64, to: f64) -> Dual<Interval> {
         let (a, b) = (self.value(from), self.value(to));
         if !a.is_finite() || !b.is_finite() {
             return Dual { value: Interval::ENTIRE, rate: Interval::ENTIRE };
         }
         let mut rate = Interval::spanned(self.rate(a), self.rate(b));
-        // The rate has one extreme, where ln x' stands still: (f + d y) + d = 0 for Gompertz; for Bernoulli where
+        // The rate has one extreme, where d(ln x')/ds = 0: (f + d y) + d = 0 for Gompertz; for Bernoulli where
         // (1 + y) d = (f + d y)(1 - 1/bend).
         let extreme = match self.bend {
             None => -(self.f + self.d) / self.d,

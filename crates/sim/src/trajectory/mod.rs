@@ -1,7 +1,7 @@
-//! How one parameter of one module moves from an instant on: by a formula, along dense output, or not at all.
+//! Trajectories: the motion of one parameter of one module from an instant on, in closed form or along dense output.
 //!
-//! Time is counted from the start of the trajectory, values as displacements from the value there, so that a module born
-//! at t = 1e9 moves as precisely as one born at 0.
+//! Time is counted from the start of the trajectory, and values are displacements from the value there, so that a module
+//! born at t = 1e9 moves as precisely as one born at 0.
 
 mod driven;
 mod function;
@@ -9,26 +9,30 @@ mod growth;
 mod riccati;
 mod sum;
 
-pub use driven::{Driven, Flow, Pace};
-pub use function::Function;
+pub use driven::{AutonomousFlow, DrivenSolution, Pace};
+pub use function::FunctionOfTime;
 use growth::Growth;
 pub use riccati::Riccati;
-pub use sum::{Sum, Terms};
+pub use sum::{TermSum, Terms};
 
 use dlsys_expr::{Dual, Interval, Value};
 
 /// The trajectory of a parameter.
 #[derive(Clone, Debug, Default)]
 pub enum Trajectory {
-    /// It stays.
+    /// The parameter is constant.
     #[default]
     Rest,
     /// Displacement `c_0 τ + c_1 τ² + c_2 τ³ + c_3 τ⁴`.
     Polynomial([f64; 4]),
+    /// Solution of `x' = c + b x + a x²`.
     Riccati(Riccati),
-    Sum(Box<Sum>),
-    Driven(Box<Driven>),
-    Function(Box<Function>),
+    /// Sum of products of powers, exponentials, sines and cosines of time.
+    Sum(Box<TermSum>),
+    /// Solution of an autonomous equation at a rate that varies with time.
+    Driven(Box<DrivenSolution>),
+    /// Explicit function of time and of parameters with closed forms.
+    Function(Box<FunctionOfTime>),
     /// Dense output of a step of the module itself: the number of the component.
     Step(u32),
     /// Dense output of the coupled modules: the number of the component.
@@ -36,11 +40,12 @@ pub enum Trajectory {
 }
 
 impl Trajectory {
+    /// True for a closed form, which is evaluated and not integrated.
     pub fn is_formula(&self) -> bool {
         !matches!(self, Trajectory::Step(_) | Trajectory::Coupled(_))
     }
 
-    /// The displacement at a time, of a trajectory that is a formula.
+    /// The displacement at a time since the start; NaN for dense output.
     #[inline]
     pub fn value(&self, tau: f64) -> f64 {
         match self {
@@ -54,6 +59,7 @@ impl Trajectory {
         }
     }
 
+    /// The rate at a time since the start; NaN for dense output.
     pub fn rate(&self, tau: f64) -> f64 {
         match self {
             Trajectory::Rest => 0.0,
@@ -66,7 +72,7 @@ impl Trajectory {
         }
     }
 
-    /// Bounds of displacement and rate from one time to another.
+    /// Bounds of displacement and rate from one time since the start to another; unbounded for dense output.
     pub fn over(&self, from: f64, to: f64) -> Dual<Interval> {
         match self {
             Trajectory::Rest => Dual { value: Interval::constant(0.0), rate: Interval::constant(0.0) },
@@ -81,8 +87,8 @@ impl Trajectory {
         }
     }
 
-    /// The first time after 0 at which the displacement is `u`, of a trajectory that goes one way only; `rate` gives the
-    /// rate there.
+    /// The first time after 0 at which the displacement is `u`, for trajectories that are monotonic; None for others.
+    /// `rate` computes the rate there from the equation as written.
     pub fn reach(&self, u: f64, rate: impl FnOnce() -> f64) -> Option<f64> {
         match self {
             Trajectory::Polynomial([c, 0.0, 0.0, 0.0]) => {
@@ -95,7 +101,7 @@ impl Trajectory {
         }
     }
 
-    /// The time from which on there is no value.
+    /// The time at which the solution ends, at a pole for instance; None if it does not end.
     pub fn end(&self) -> Option<f64> {
         match self {
             Trajectory::Riccati(law) => law.pole(),
@@ -104,7 +110,7 @@ impl Trajectory {
         }
     }
 
-    /// The trajectory as an algebraic sum, from the value `x`; None if it is none.
+    /// The trajectory from the value `x` as a sum of terms; None if it has another form.
     pub fn terms(&self, x: f64) -> Option<Terms> {
         match self {
             Trajectory::Rest => Some(Terms::constant(x)),

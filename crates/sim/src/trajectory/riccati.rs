@@ -1,8 +1,8 @@
 //! Solutions of `x' = c + b x + a x²` with constant coefficients.
 //!
 //! Written for the displacement `u = x - x(0)`: `u' = f + d u + a u²`, where f is the rate at the start and
-//! `d = b + 2 a x(0)`. The discriminant `d² - 4 a f = b² - 4 a c` tells the cases apart. All formulas are arranged so
-//! that nothing cancels: a start of 1e-300, a threshold 1e-12 from the limit, and a life of 1e-12 keep their digits.
+//! `d = b + 2 a x(0)`. The discriminant `d² - 4 a f = b² - 4 a c` tells the cases apart. All formulas avoid
+//! cancellation: a start of 1e-300, a threshold 1e-12 from the limit, and a life of 1e-12 keep their digits.
 
 use dlsys_expr::{Dual, Interval};
 
@@ -32,7 +32,7 @@ enum Case {
     Complex,
 }
 
-/// A rate of less than this part of the first has lost digits, if computed from coefficients.
+/// A rate of less than this part of that at the start has lost digits if it is computed from the coefficients.
 const NEARLY_STILL: f64 = 1e-2;
 
 impl Riccati {
@@ -40,7 +40,7 @@ impl Riccati {
     pub fn new(x: f64, c: f64, b: f64, a: f64) -> Riccati {
         let f = c + (b + a * x) * x;
         let d = b + 2.0 * a * x;
-        // Of the original coefficients: b² - 4ac does not change along the solution, and loses fewer digits.
+        // From the original coefficients: b² - 4ac is constant along the solution, and loses fewer digits.
         let discriminant = b * b - 4.0 * a * c;
         let w = 0.5 * discriminant.abs().sqrt();
         let p = w + 0.5 * d.abs();
@@ -58,7 +58,7 @@ impl Riccati {
         if self.w == 0.0 { tau } else { -(-2.0 * self.w * tau).exp_m1() / (2.0 * self.w) }
     }
 
-    /// The displacement at a time. Infinite or NaN from the pole on.
+    /// The displacement at a time since the start. Infinite or NaN from the pole on.
     pub fn value(&self, tau: f64) -> f64 {
         if self.f == 0.0 || tau == 0.0 {
             return 0.0;
@@ -71,7 +71,7 @@ impl Riccati {
                 // Without a pole q is positive, and a sum of positive terms loses nothing.
                 if self.q > 0.0 {
                     let (still, fading) = if self.d >= 0.0 { (self.q, self.p) } else { (self.p, self.q) };
-                    // Not 1 minus what is gone: of that, too little may be left.
+                    // Computed directly: 1 - 2 w g would cancel.
                     let left = (-2.0 * self.w * tau).exp();
                     return self.f * (2.0 * self.w * g) / (still + fading * left);
                 }
@@ -94,16 +94,16 @@ impl Riccati {
         self.f + (self.d + self.a * u) * u
     }
 
-    /// f and d of `x' = f + d (x - x(0))`, if it is that.
+    /// The coefficients f and d, if the equation is `x' = f + d (x - x(0))`.
     pub fn exponential(&self) -> Option<(f64, f64)> {
         (self.case == Case::Exponential).then_some((self.f, self.d))
     }
 
-    /// The time from which on there is no solution.
+    /// The time of the pole, or of overflow; None if the solution exists at all times after 0.
     pub fn pole(&self) -> Option<f64> {
         match self.case {
             _ if self.f == 0.0 => None,
-            // exp(d τ) leaves the range of numbers.
+            // exp(d τ) overflows.
             Case::Exponential => (self.d > 0.0)
                 .then(|| (f64::MAX.ln() - (self.f.abs() / self.d).ln()).min(709.782_712_893_384) / self.d),
             Case::Real => {
@@ -120,15 +120,15 @@ impl Riccati {
         }
     }
 
-    /// The first time, after 0, at which the displacement is `u`. `exact_rate` gives the rate there, from the equation
-    /// as it was written: near an equilibrium that knows more digits than the coefficients do.
+    /// The first time after 0 at which the displacement is `u`. `exact_rate` computes the rate there from the equation
+    /// as written, which near an equilibrium has more correct digits than the coefficients give.
     pub fn reach(&self, u: f64, exact_rate: impl FnOnce() -> f64) -> Option<f64> {
         let ahead = u * self.f > 0.0;
         let mut rate = self.rate(u);
         if ahead && rate.abs() < NEARLY_STILL * self.f.abs() {
             rate = exact_rate();
         }
-        // Between here and there the rate has one sign, or there is no way.
+        // Between the start and `u` the rate has one sign, or `u` is not reached.
         if !ahead || rate.is_nan() || rate * self.f <= 0.0 {
             return None;
         }
@@ -161,7 +161,8 @@ impl Riccati {
         (tau.is_finite() && tau > 0.0).then_some(tau)
     }
 
-    /// Bounds of displacement and rate: the solution of an autonomous equation moves one way only.
+    /// Bounds of displacement and rate from one time since the start to another. The solution of an autonomous equation
+    /// is monotonic.
     pub fn over(&self, from: f64, to: f64) -> Dual<Interval> {
         let (a, b) = (self.value(from), self.value(to));
         if !a.is_finite() || !b.is_finite() {

@@ -1,12 +1,12 @@
 //! Sums of products of powers, exponentials, sines and cosines of time, as numbers and as solutions.
 //!
 //! [`Terms`] is an algebra: a rate is evaluated in it, with time and other solutions as its variables, and
-//! [`Terms::solve`] integrates the result. A solution that cannot be had accurately in this form (too many terms,
-//! near resonance) is refused; then the module is integrated numerically.
+//! [`Terms::solve`] integrates the result. A solution that would be inaccurate in this form (too many terms, or near
+//! resonance) is refused; then the module is integrated numerically.
 
 use dlsys_expr::{Array, Binary, Curve, Dual, Interval, Part, Unary, Value};
 
-/// Re (re + i im) τ^power exp((growth + i frequency) τ)
+/// The term Re (re + i im) τ^power exp((growth + i frequency) τ).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Term {
     re: f64,
@@ -23,11 +23,11 @@ const MAX_TERMS: usize = 16;
 pub struct Terms {
     terms: [Term; MAX_TERMS],
     len: usize,
-    /// It is not such a sum.
+    /// The function is not such a sum, or has too many terms.
     refused: bool,
 }
 
-/// Exponents closer than this part of their size, but not equal, would cost their digits.
+/// Exponents that differ by less than this part of their size, but are not equal, would cancel digits.
 const RESONANCE: f64 = 1e-4;
 
 impl Term {
@@ -62,21 +62,21 @@ impl Terms {
     };
     const REFUSED: Terms = Terms { refused: true, ..Terms::ZERO };
 
-    /// a + b τ
+    /// The sum a + b τ.
     pub fn affine(a: f64, b: f64) -> Terms {
         let mut sum = Terms::constant(a);
         sum.add(Term { re: b, power: 1, ..Term::default() });
         sum
     }
 
-    /// a + b exp(d τ)
+    /// The sum a + b exp(d τ).
     pub fn exponential(a: f64, b: f64, d: f64) -> Terms {
         let mut sum = Terms::constant(a);
         sum.add(Term { re: b, growth: d, ..Term::default() });
         sum
     }
 
-    /// x + c_0 τ + c_1 τ² + …
+    /// The sum x + c_0 τ + c_1 τ² + …
     pub fn polynomial(x: f64, c: &[f64]) -> Terms {
         let mut sum = Terms::constant(x);
         for (power, &re) in (1..).zip(c) {
@@ -119,7 +119,7 @@ impl Terms {
         let mut out = Terms { refused: a.refused || b.refused, ..Terms::ZERO };
         for x in a.terms() {
             for y in b.terms() {
-                // The waving one first; a factor without frequency is real.
+                // The oscillating one first; a factor without frequency is real.
                 let (x, y) = if x.frequency == 0.0 { (y, x) } else { (x, y) };
                 let base = Term { power: x.power + y.power, growth: x.growth + y.growth, ..*x };
                 if y.frequency == 0.0 {
@@ -138,7 +138,7 @@ impl Terms {
         out
     }
 
-    /// The value as a number, if it does not change.
+    /// The value, if it is constant.
     fn as_constant(&self) -> Option<f64> {
         match self.terms() {
             _ if self.refused => None,
@@ -148,7 +148,7 @@ impl Terms {
         }
     }
 
-    /// a and b of a + b τ, if it is that.
+    /// The coefficients a and b, if the sum is a + b τ.
     fn as_affine(&self) -> Option<(f64, f64)> {
         let (mut a, mut b) = (0.0, 0.0);
         for t in self.terms() {
@@ -162,9 +162,9 @@ impl Terms {
         Some((a, b))
     }
 
-    /// The solution of `x' = b x + g` from `x`, g being this sum; None if it is no sum of this kind, or would lose
-    /// too many digits.
-    pub fn solve(&self, x: f64, b: f64) -> Option<Sum> {
+    /// The solution of `x' = b x + g` from `x`, where g is this sum; None if it is no such sum, or would lose too many
+    /// digits.
+    pub fn solve(&self, x: f64, b: f64) -> Option<TermSum> {
         if self.refused {
             return None;
         }
@@ -199,7 +199,7 @@ impl Terms {
         if out.refused || out.terms().iter().any(|t| !t.re.is_finite() || !t.im.is_finite()) {
             return None;
         }
-        Some(Sum::new(out))
+        Some(TermSum::new(out))
     }
 
     fn derivative(&self) -> Terms {
@@ -296,23 +296,23 @@ impl Value for Terms {
     }
 }
 
-/// A solution that is such a sum, with its rate.
+/// A solution that is a sum of terms, with its rate.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Sum {
+pub struct TermSum {
     terms: Vec<Term>,
     rate: Vec<Term>,
-    /// Its value at the start, as it comes out of the terms.
+    /// The value at the start, as computed from the terms.
     start: f64,
 }
 
-impl Sum {
-    fn new(terms: Terms) -> Sum {
+impl TermSum {
+    fn new(terms: Terms) -> TermSum {
         let all: Vec<Term> = terms.terms().to_vec();
         let start = all.iter().map(|t| t.value(0.0)).sum();
-        Sum { terms: all, rate: terms.derivative().terms().to_vec(), start }
+        TermSum { terms: all, rate: terms.derivative().terms().to_vec(), start }
     }
 
-    /// The displacement since the start.
+    /// The displacement at a time since the start.
     pub fn value(&self, tau: f64) -> f64 {
         if tau == 0.0 {
             return 0.0;
@@ -320,10 +320,12 @@ impl Sum {
         self.terms.iter().map(|t| t.value(tau)).sum::<f64>() - self.start
     }
 
+    /// The rate at a time since the start.
     pub fn rate(&self, tau: f64) -> f64 {
         self.rate.iter().map(|t| t.value(tau)).sum()
     }
 
+    /// Bounds of displacement and rate from one time since the start to another.
     pub fn over(&self, from: f64, to: f64) -> Dual<Interval> {
         let tau = Interval::spanned(from, to);
         let total = |terms: &[Term], start: f64| {
@@ -333,7 +335,7 @@ impl Sum {
         Dual { value: total(&self.terms, -self.start), rate: total(&self.rate, 0.0) }
     }
 
-    /// The solution as a function again, for those that depend on it.
+    /// The solution from the value `x` as terms, for equations that depend on it.
     pub fn terms(&self, x: f64) -> Terms {
         let mut out = Terms::constant(x - self.start);
         for t in &self.terms {

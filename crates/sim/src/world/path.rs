@@ -75,31 +75,8 @@ impl<'p> Path<'p> {
     ) {
         out.clear();
         let wanted = |i: usize| self.wanted.get(i).copied().unwrap_or(true);
-        let append = |id: ModuleId, reads: &dyn Fn(usize) -> bool, out: &mut Vec<T>| {
-            let values = self.world.tree.parameters(id);
-            if !(out.len()..out.len() + values.len()).any(reads) {
-                // Any value will do.
-                return out.extend(values.iter().map(|x| rest(*x)));
-            }
-            let Some(state) = self.world.state(id).filter(|s| !s.trajectories.is_empty()) else {
-                return out.extend(values.iter().map(|x| rest(*x)));
-            };
-            let offset = self.start.since(state.since);
-            for (&x, trajectory) in values.iter().zip(&state.trajectories) {
-                let reads = reads(out.len());
-                out.push(match trajectory {
-                    _ if !reads => rest(x),
-                    Trajectory::Rest => rest(x),
-                    Trajectory::Step(_) | Trajectory::Coupled(_) => match self.piece(state, trajectory) {
-                        Some(along) => piece(&along),
-                        None => rest(x),
-                    },
-                    trajectory => formula(trajectory, x, offset),
-                });
-            }
-        };
         for &id in std::iter::once(&self.state.id).chain(self.state.context.context()) {
-            append(id, &wanted, out);
+            self.append(id, wanted, out, &rest, &piece, &formula);
         }
         let times = [time(self.start.to_f64()), time(self.age)];
         if self.rule.aggregates.is_empty() {
@@ -107,8 +84,42 @@ impl<'p> Path<'p> {
             out.extend(times);
             return;
         }
-        let child = |id, out: &mut Vec<T>| append(id, &|_| true, out);
+        let child = |id, out: &mut Vec<T>| self.append(id, |_| true, out, &rest, &piece, &formula);
         gather(self.rule, &self.state.context, times, out, &mut Vec::new(), wanted, child);
+    }
+
+    /// Appends the parameters of one module, of which those are computed whose place in `out` is read.
+    #[inline]
+    fn append<T: Value>(
+        &self,
+        id: ModuleId,
+        reads: impl Fn(usize) -> bool,
+        out: &mut Vec<T>,
+        rest: &impl Fn(f64) -> T,
+        piece: &impl Fn(&DenseComponent) -> T,
+        formula: &impl Fn(&Trajectory, f64, f64) -> T,
+    ) {
+        let values = self.world.tree.parameters(id);
+        if !(out.len()..out.len() + values.len()).any(&reads) {
+            // Any value will do.
+            return out.extend(values.iter().map(|x| rest(*x)));
+        }
+        let Some(state) = self.world.state(id).filter(|s| !s.trajectories.is_empty()) else {
+            return out.extend(values.iter().map(|x| rest(*x)));
+        };
+        let offset = self.start.since(state.since);
+        for (&x, trajectory) in values.iter().zip(&state.trajectories) {
+            let reads = reads(out.len());
+            out.push(match trajectory {
+                _ if !reads => rest(x),
+                Trajectory::Rest => rest(x),
+                Trajectory::Step(_) | Trajectory::Coupled(_) => match self.piece(state, trajectory) {
+                    Some(along) => piece(&along),
+                    None => rest(x),
+                },
+                trajectory => formula(trajectory, x, offset),
+            });
+        }
     }
 
     /// All variables at the start.

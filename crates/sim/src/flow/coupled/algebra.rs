@@ -1,68 +1,71 @@
-//! Algebraic components: what is solved for, along with what is integrated.
+//! Algebraic components, which are solved for along with the integrated ones.
 //!
-//! The equations are differential-algebraic of index 1: wherever the integrated components are known, so are these.
-//! Therefore the integrator sees an ordinary differential equation, in which each evaluation of rates solves for the
-//! algebraic components first (the state space form of Hairer and Wanner 1996, VI.1). Compared with the other way out,
-//! which differentiates the equations and integrates what is solved for, nothing drifts and there is nothing to project
-//! back; and an explicit value costs one evaluation.
+//! The equations are differential-algebraic of index 1: the integrated components determine these. Therefore the
+//! integrator works on an ordinary differential equation, in which each evaluation of rates solves for the algebraic
+//! components first (the state space form of Hairer and Wanner 1996, VI.1). Compared with index reduction, which
+//! differentiates the equations and integrates the algebraic components, nothing drifts and no projection is needed;
+//! and an explicit value costs one evaluation.
 //!
 //! Components that depend on one another in a circle, within a module or along the tree, are solved together by
 //! Newton's method; others one after another, in the order of their dependence (Tarjan's strongly connected components).
 
-use crate::flow::coupled::system::{Row, System};
+use crate::flow::coupled::rows::{EquationRow, EquationTable};
 use dlsys_expr::{Scratch, eliminate};
 use dlsys_model::{Algebraic, Rule};
 use dlsys_ode::Pattern;
 
-/// A component that is solved for.
+/// An algebraic component.
 #[derive(Clone, Copy, Debug)]
 pub struct Unknown {
+    /// Number of the component in the state vector.
     pub component: u32,
     row: u32,
-    /// Among the algebraic parameters of the row's clause.
+    /// Index among the algebraic parameters of the row's clause.
     place: u32,
 }
 
-/// NextKind is solved for, in the order in which that is done.
+/// The algebraic components of a table of equations, in the order in which they are solved for.
 #[derive(Clone, Debug, Default)]
 pub struct Algebra {
+    /// All algebraic components, in string order.
     pub unknowns: Vec<Unknown>,
     blocks: Vec<Block>,
-    /// By component: the unknown that it is.
+    /// By component: the index of the unknown, or [`NONE`].
     number: Vec<u32>,
 }
 
-/// Unknowns that are solved for together.
+/// Unknowns that depend on one another, and are solved for together.
 #[derive(Clone, Debug)]
 struct Block {
     unknowns: Vec<u32>,
-    /// One explicit value that does not depend on itself.
+    /// The block is one explicit value that does not depend on itself.
     explicit: bool,
 }
 
-/// Why there is no solution.
+/// The reason why algebraic components have no solution, with a component that it concerns.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Fault {
-    /// The partial derivatives by what is solved for are singular there; a component.
+pub enum AlgebraicError {
+    /// The partial derivatives by the unknowns are singular at the solution.
     Singular(usize),
-    /// Newton's method finds nothing.
-    None(usize),
-    /// A value on the way is not finite.
+    /// Newton's method does not converge.
+    NoSolution(usize),
+    /// A value in the course of the iteration is not finite.
     NotFinite(usize),
     /// The partial derivatives become singular before long.
     Fading(usize),
-    /// It moves too fast to be followed.
+    /// The component changes too fast for polynomials to follow.
     Rough(usize),
 }
 
-impl Fault {
+impl AlgebraicError {
+    /// The component that the error concerns.
     pub fn component(self) -> usize {
         match self {
-            Fault::Singular(c)
-            | Fault::None(c)
-            | Fault::NotFinite(c)
-            | Fault::Fading(c)
-            | Fault::Rough(c) => c,
+            AlgebraicError::Singular(c)
+            | AlgebraicError::NoSolution(c)
+            | AlgebraicError::NotFinite(c)
+            | AlgebraicError::Fading(c)
+            | AlgebraicError::Rough(c) => c,
         }
     }
 }
@@ -71,22 +74,23 @@ const NONE: u32 = u32::MAX;
 
 /// Most corrections.
 const MAX_CORRECTIONS: usize = 60;
-/// A correction of no more than this part of the unknown is the last: the next one would be its square.
+/// A correction of at most this part of the unknown is the last: the next one would be of the size of its square.
 const SMALL: f64 = 1e-9;
-/// Nor is one that does not help, of no more than this part of the unknown or of 1, as tolerances are.
+/// A correction that does not help is rounding if it is at most this part of the unknown, or of 1.
 const NOISE: f64 = 1e-13;
-/// A pivot of no more than this part of its row is none.
+/// A matrix is singular if a pivot is at most this part of its row.
 const SINGULAR: f64 = 1e-13;
-/// Where steps have become nothing, unknowns that matter so little in their equations, for what else is in them, are why.
+/// Unknowns whose influence on their equations is less than this part of the largest influence explain why steps have
+/// become too small.
 const FADING: f64 = 1e-2;
-/// So few unknowns are eliminated with pivoting.
+/// Up to this many unknowns are eliminated with pivoting.
 const FEW: usize = 48;
-/// No more of them, if elimination without pivoting fails.
+/// Up to this many unknowns are eliminated with pivoting if elimination without pivoting fails.
 const MANY: usize = 1000;
 
-/// Working memory.
+/// Working memory of a solver.
 #[derive(Default)]
-struct Memory {
+struct Workspace {
     variables: Vec<f64>,
     values: Vec<f64>,
     partials: Vec<f64>,
@@ -94,11 +98,11 @@ struct Memory {
 }
 
 impl Algebra {
-    /// The algebraic components of a system of rows.
-    pub fn new(system: &System, rules: &[Rule]) -> Algebra {
+    /// The algebraic components of a table of rows.
+    pub fn new(table: &EquationTable, rules: &[Rule]) -> Algebra {
         let mut algebra = Algebra::default();
-        for (n, row) in system.rows.iter().enumerate().filter(|(_, row)| row.algebraic > 0) {
-            for (component, &place) in (row.first_rate + row.rates..).zip(system.given(row)) {
+        for (n, row) in table.rows.iter().enumerate().filter(|(_, row)| row.algebraic > 0) {
+            for (component, &place) in (row.first_rate + row.rates..).zip(table.given(row)) {
                 let unknown = Unknown { component: component as u32, row: n as u32, place };
                 if algebra.number.len() <= component {
                     algebra.number.resize(component + 1, NONE);
@@ -108,30 +112,31 @@ impl Algebra {
             }
         }
         if !algebra.unknowns.is_empty() {
-            algebra.sort(system, rules);
+            algebra.sort(table, rules);
         }
         algebra
     }
 
+    /// True if no component is algebraic.
     pub fn is_empty(&self) -> bool {
         self.unknowns.is_empty()
     }
 
-    /// True for a component that is solved for.
+    /// True for an algebraic component.
     pub fn is_solved(&self, component: u32) -> bool {
         self.number.get(component as usize).is_some_and(|n| *n != NONE)
     }
 
-    /// Puts the unknowns into the order of their dependence, those on a circle together (Tarjan 1972, with a stack of its
-    /// own: chains may be as long as the world).
-    fn sort(&mut self, system: &System, rules: &[Rule]) {
+    /// Puts the unknowns into the order of their dependence, those on a cycle together (Tarjan 1972; with an explicit
+    /// stack, because chains may be as long as the string).
+    fn sort(&mut self, table: &EquationTable, rules: &[Rule]) {
         let n = self.unknowns.len();
         let mut depends: Vec<Vec<u32>> = vec![Vec::new(); n];
-        for row in system.rows.iter().filter(|row| row.algebraic > 0) {
+        for row in table.rows.iter().filter(|row| row.algebraic > 0) {
             let jacobian = &of(rules, row).jacobian;
-            system.visit_partials(rules, row, jacobian, |partial| {
+            table.visit_partials(rules, row, jacobian, |partial| {
                 let position = jacobian.entries[partial.entry].0 as u32;
-                let own = system.given(row).iter().position(|place| *place == position);
+                let own = table.given(row).iter().position(|place| *place == position);
                 let to = self.number.get(partial.component as usize).copied().unwrap_or(NONE);
                 if let Some(own) = own
                     && to != NONE
@@ -174,11 +179,11 @@ impl Algebra {
                             break;
                         }
                     }
-                    // Along the structure, for elimination from the tips to the root.
+                    // In string order, for elimination from the tips to the root.
                     unknowns.sort_unstable();
                     let alone = unknowns.len() == 1 && !depends[v].contains(&(v as u32));
                     let Unknown { row, place, .. } = self.unknowns[v];
-                    let explicit = alone && of(rules, &system.rows[row as usize]).explicit[place as usize];
+                    let explicit = alone && of(rules, &table.rows[row as usize]).explicit[place as usize];
                     self.blocks.push(Block { unknowns, explicit });
                 }
                 if let Some(&(parent, _)) = calls.last() {
@@ -188,24 +193,25 @@ impl Algebra {
         }
     }
 
-    /// Solves for the algebraic components of a state, from the values that they have there.
+    /// Solves for the algebraic components of the state `y` at a time since the start of the step. The values that they
+    /// have in `y` are the first guess.
     pub fn solve(
         &self,
-        system: &System,
+        table: &EquationTable,
         rules: &[Rule],
         tau: f64,
         inputs: &[f64],
         y: &mut [f64],
-    ) -> Result<(), Fault> {
-        let mut memory = Memory::default();
-        let mut solver = Solver { algebra: self, system, rules, tau, inputs, memory: &mut memory };
+    ) -> Result<(), AlgebraicError> {
+        let mut memory = Workspace::default();
+        let mut solver = Solver { algebra: self, table, rules, tau, inputs, memory: &mut memory };
         for block in &self.blocks {
             match block.explicit {
                 true => {
                     let unknown = self.unknowns[block.unknowns[0] as usize];
                     let value = solver.value(unknown, y);
                     if !value.is_finite() {
-                        return Err(Fault::NotFinite(unknown.component as usize));
+                        return Err(AlgebraicError::NotFinite(unknown.component as usize));
                     }
                     y[unknown.component as usize] = value;
                 }
@@ -217,56 +223,62 @@ impl Algebra {
 }
 
 impl Algebra {
-    /// NextKind has brought the steps to a stop: unknowns whose equations become singular, and which therefore turn ever
-    /// faster.
-    pub fn fading(&self, system: &System, rules: &[Rule], inputs: &[f64], y: &[f64]) -> Option<Fault> {
-        let mut memory = Memory::default();
-        let mut solver = Solver { algebra: self, system, rules, tau: 0.0, inputs, memory: &mut memory };
+    /// The unknowns whose equations become singular, and which therefore change ever faster, if there are any: the
+    /// reason why steps have become too small.
+    pub fn fading(
+        &self,
+        table: &EquationTable,
+        rules: &[Rule],
+        inputs: &[f64],
+        y: &[f64],
+    ) -> Option<AlgebraicError> {
+        let mut memory = Workspace::default();
+        let mut solver = Solver { algebra: self, table, rules, tau: 0.0, inputs, memory: &mut memory };
         let implicit = self.blocks.iter().filter(|block| !block.explicit);
         let mut known = implicit.map(|block| (block, solver.condition(block, y)));
         let (block, _) = known.find(|(_, condition)| *condition < FADING)?;
-        Some(Fault::Fading(self.unknowns[block.unknowns[0] as usize].component as usize))
+        Some(AlgebraicError::Fading(self.unknowns[block.unknowns[0] as usize].component as usize))
     }
 }
 
 /// The algebraic parameters of a row's clause.
-fn of<'r>(rules: &'r [Rule], row: &Row) -> &'r Algebraic {
+fn of<'r>(rules: &'r [Rule], row: &EquationRow) -> &'r Algebraic {
     &rules[row.rule].solves[row.solve].algebraic
 }
 
-/// A solution at one instant.
+/// The equations at one instant, to be solved.
 struct Solver<'s> {
     algebra: &'s Algebra,
-    system: &'s System,
+    table: &'s EquationTable,
     rules: &'s [Rule],
     tau: f64,
     inputs: &'s [f64],
-    memory: &'s mut Memory,
+    memory: &'s mut Workspace,
 }
 
 impl Solver<'_> {
-    fn variables(&mut self, row: &Row, y: &[f64]) {
+    fn variables(&mut self, row: &EquationRow, y: &[f64]) {
         let variables = &mut self.memory.variables;
-        self.system.variables(self.rules, row, self.tau, y, self.inputs, variables);
+        self.table.variables(self.rules, row, self.tau, y, self.inputs, variables);
     }
 
-    /// The value of an explicit component, or what is left of the equation of an implicit one.
+    /// The value of an explicit component, or the residual of the equation of an implicit one.
     fn value(&mut self, unknown: Unknown, y: &[f64]) -> f64 {
-        let row = self.system.rows[unknown.row as usize];
+        let row = self.table.rows[unknown.row as usize];
         self.variables(&row, y);
         let program = &of(self.rules, &row).values;
-        let Memory { variables, values, scratch, .. } = &mut *self.memory;
+        let Workspace { variables, values, scratch, .. } = &mut *self.memory;
         values.resize(program.outputs(), 0.0);
         program.eval(variables, scratch, values);
         values[unknown.place as usize]
     }
 
-    /// NextKind is left of the equations of a block.
+    /// The residuals of the equations of a block.
     fn residuals(&mut self, block: &Block, y: &[f64], out: &mut Vec<f64>) {
         out.clear();
         for &n in &block.unknowns {
             let unknown = self.algebra.unknowns[n as usize];
-            let row = &self.system.rows[unknown.row as usize];
+            let row = &self.table.rows[unknown.row as usize];
             let explicit = of(self.rules, row).explicit[unknown.place as usize];
             let value = self.value(unknown, y);
             out.push(if explicit { y[unknown.component as usize] - value } else { value });
@@ -285,7 +297,7 @@ impl Solver<'_> {
         all
     }
 
-    /// How much the unknowns of a block matter in their equations, as a part of what matters most there.
+    /// The least influence of the unknowns of a block on their equations, as a part of the largest influence there.
     fn condition(&mut self, block: &Block, y: &[f64]) -> f64 {
         const MOMENT: f64 = 1e-6;
         let (mut before, mut after) = (Vec::new(), Vec::new());
@@ -309,19 +321,19 @@ impl Solver<'_> {
         let mut all = Vec::new();
         for (i, &n) in block.unknowns.iter().enumerate() {
             let unknown = self.algebra.unknowns[n as usize];
-            let row = self.system.rows[unknown.row as usize];
+            let row = self.table.rows[unknown.row as usize];
             let algebraic = of(self.rules, &row);
             let jacobian = &algebraic.jacobian;
             self.variables(&row, y);
-            let Memory { variables, partials, scratch, .. } = &mut *self.memory;
+            let Workspace { variables, partials, scratch, .. } = &mut *self.memory;
             partials.resize(jacobian.values.outputs(), 0.0);
             jacobian.values.eval(variables, scratch, partials);
-            let slopes = self.system.slopes(self.rules, &row, variables, self.tau, y, self.inputs);
+            let slopes = self.table.slopes(self.rules, &row, variables, self.tau, y, self.inputs);
             let explicit = algebraic.explicit[unknown.place as usize];
             if explicit {
                 all.push((i as u32, unknown.component, 1.0));
             }
-            self.system.visit_partials(self.rules, &row, jacobian, |partial| {
+            self.table.visit_partials(self.rules, &row, jacobian, |partial| {
                 if jacobian.entries[partial.entry].0 == unknown.place as usize {
                     let value = partial.value(partials, &slopes);
                     all.push((i as u32, partial.component, if explicit { -value } else { value }));
@@ -332,32 +344,32 @@ impl Solver<'_> {
     }
 
     /// Newton's method, damped so that the correction that would follow gets smaller (Deuflhard 2004, 3.3).
-    fn newton(&mut self, block: &Block, y: &mut [f64]) -> Result<(), Fault> {
+    fn newton(&mut self, block: &Block, y: &mut [f64]) -> Result<(), AlgebraicError> {
         let component = |i: usize| self.algebra.unknowns[block.unknowns[i] as usize].component as usize;
         let places: Vec<usize> = (0..block.unknowns.len()).map(component).collect();
         let bad = |r: &[f64]| r.iter().position(|x| !x.is_finite());
         let mut left = Vec::new();
         self.residuals(block, y, &mut left);
         if let Some(i) = bad(&left) {
-            return Err(Fault::NotFinite(places[i]));
+            return Err(AlgebraicError::NotFinite(places[i]));
         }
         let (mut trial, mut last) = (Vec::new(), f64::INFINITY);
         for _ in 0..MAX_CORRECTIONS {
             let matrix = Matrix::new(self.partials(block, y), places.len());
             let Some(correction) = matrix.solve(&left) else {
-                // Where nothing is left to correct it does not matter how.
-                return Err(Fault::Singular(places[0]));
+                return Err(AlgebraicError::Singular(places[0]));
             };
             let start: Vec<f64> = places.iter().map(|p| y[*p]).collect();
-            // One scale for this correction and the next: a solution may be zero, and on the way to it everything is
-            // large for what it is added to.
+            // This correction and the next have one scale: a solution may be zero, and on the way to it every
+            // correction is large relative to the value that it is added to.
             let scale = start.iter().fold(1e-300, |most: f64, x| most.max(x.abs()));
             let length = |c: &[f64]| {
                 let of = |(c, x): (&f64, &f64)| c.abs() / x.abs().max(1e-3 * scale).max(1e-12);
                 c.iter().zip(&start).map(of).fold(0.0, f64::max)
             };
             let whole = length(&correction);
-            // Next to zero, rounding in the equations is all that is left long before it is small for the unknown.
+            // Near zero only rounding in the equations is left long before the correction is small relative to the
+            // unknown.
             let noise = (correction.iter().zip(&start)).all(|(c, x)| c.abs() <= NOISE * x.abs().max(1.0));
             if whole == 0.0 {
                 return Ok(());
@@ -368,7 +380,7 @@ impl Solver<'_> {
                     y[*place] = from - part * c;
                 }
                 self.residuals(block, y, &mut trial);
-                // Rounding is all that is left, or nearly.
+                // Only rounding is left, or nearly so.
                 if part == 1.0 && whole <= SMALL {
                     return Ok(());
                 }
@@ -387,20 +399,20 @@ impl Solver<'_> {
                 part *= 0.5;
                 if part < 1e-6 {
                     return Err(if bad(&trial).is_some() {
-                        Fault::NotFinite(places[0])
+                        AlgebraicError::NotFinite(places[0])
                     } else {
-                        Fault::None(places[0])
+                        AlgebraicError::NoSolution(places[0])
                     });
                 }
             }
             std::mem::swap(&mut left, &mut trial);
             // At a double root corrections only halve.
             if part == 1.0 && whole < 1e-6 && whole > 0.4 * last {
-                return Err(Fault::Singular(places[0]));
+                return Err(AlgebraicError::Singular(places[0]));
             }
             last = whole;
         }
-        Err(Fault::None(places[0]))
+        Err(AlgebraicError::NoSolution(places[0]))
     }
 }
 
@@ -423,7 +435,7 @@ impl Matrix {
                     }
                 }
                 let mut factors = Vec::new();
-                // The matrix itself: no shift, and the sign turned round.
+                // The matrix itself: no shift, and the opposite sign.
                 if pattern.factor(&values, 0.0, -1.0, &mut factors) {
                     return Matrix::Sparse(pattern, values, factors);
                 }
@@ -452,7 +464,7 @@ impl Matrix {
             }
             Matrix::Sparse(pattern, values, factors) => {
                 pattern.solve(factors, &mut x);
-                // Elimination without pivoting: one correction takes back what it lost.
+                // One correction takes back the digits that elimination without pivoting has lost.
                 let mut product = vec![0.0; x.len()];
                 pattern.multiply(values, &x, &mut product);
                 let mut rest: Vec<f64> = right.iter().zip(&product).map(|(b, p)| b - p).collect();

@@ -1,16 +1,16 @@
 //! Dense output of algebraic components: polynomials through points at which they were solved for.
 //!
-//! Between the ends of a step the integrated components are polynomials, and what depends on them is solved for at eight
-//! points (Chebyshev's, ends included) and interpolated. Between the points the interpolant is compared with the solution
-//! itself; where it errs by more than a step may, the stretch is halved. So events on such components are found like all
-//! others, on polynomials with bounds.
+//! Between the ends of a step the integrated components are polynomials. The algebraic components are solved for at
+//! eight Chebyshev points, ends included, and interpolated. Between the points the interpolant is compared with the
+//! solution itself; where it errs by more than a step may, the stretch is halved. So events on algebraic components are
+//! located like all others, on polynomials with bounds.
 //!
-//! A stretch begins exactly where the one before ended: with the value that an event was located on, say. Solving there
-//! again gives another value within the tolerance; the difference dies off within the first stretch.
+//! A stretch begins exactly where the one before ended, for example with the value on which an event was located.
+//! Solving there again gives another value within the tolerance; the difference vanishes within the first stretch.
 
 use std::sync::LazyLock;
 
-use crate::flow::coupled::algebra::Fault;
+use crate::flow::coupled::algebra::AlgebraicError;
 use crate::flow::coupled::equations::Equations;
 use dlsys_expr::eliminate;
 use dlsys_ode::{Dense, MAX_DEGREE};
@@ -18,7 +18,7 @@ use dlsys_ode::{Dense, MAX_DEGREE};
 const POINTS: usize = MAX_DEGREE + 1;
 /// Most stretches of a step.
 const MAX_STRETCHES: usize = 64;
-/// Where the interpolant is compared.
+/// The positions in a stretch at which the interpolant is compared with the solution.
 const BETWEEN: [f64; 3] = [0.02, 0.37, 0.9];
 
 /// The points, and for each coefficient in Bernstein form the weights of the values there.
@@ -45,13 +45,21 @@ static INTERPOLATION: LazyLock<([f64; POINTS], [[f64; POINTS]; POINTS])> = LazyL
 });
 
 impl Equations<'_> {
-    /// The dense output of a step from `start`, with its algebraic components, as one stretch or several.
-    pub fn blend(&mut self, step: &Dense, start: &[f64], tolerance: f64) -> Result<Vec<Dense>, Fault> {
+    /// The dense output of a step from the state `start`, with its algebraic components, as one stretch or several.
+    ///
+    /// # Errors
+    /// If the algebraic components cannot be solved for somewhere, or take too many stretches.
+    pub fn blend(
+        &mut self,
+        step: &Dense,
+        start: &[f64],
+        tolerance: f64,
+    ) -> Result<Vec<Dense>, AlgebraicError> {
         let unknowns: Vec<usize> =
             self.system.algebra.unknowns.iter().map(|unknown| unknown.component as usize).collect();
         let mut stretches: Vec<Dense> = Vec::new();
         let mut last = start.to_vec();
-        // To be done, the next one last.
+        // A stack of the pieces that are left.
         let mut pieces = vec![(0.0, 1.0)];
         while let Some((lo, hi)) = pieces.pop() {
             let (points, weights) = &*INTERPOLATION;
@@ -82,7 +90,7 @@ impl Equations<'_> {
             }
             if !fits {
                 if stretches.len() + pieces.len() + 2 > MAX_STRETCHES {
-                    return Err(Fault::Rough(unknowns.first().copied().unwrap_or(0)));
+                    return Err(AlgebraicError::Rough(unknowns.first().copied().unwrap_or(0)));
                 }
                 let middle = 0.5 * (lo + hi);
                 pieces.extend([(middle, hi), (lo, middle)]);
@@ -97,8 +105,8 @@ impl Equations<'_> {
         Ok(stretches)
     }
 
-    /// Goes to a position in a step, from a state near there.
-    fn follow(&mut self, step: &Dense, position: f64, state: &mut [f64]) -> Result<(), Fault> {
+    /// Moves a state to a nearby position in a step.
+    fn follow(&mut self, step: &Dense, position: f64, state: &mut [f64]) -> Result<(), AlgebraicError> {
         let system = self.system;
         for (component, value) in state.iter_mut().enumerate() {
             if !system.algebra.is_solved(component as u32) {

@@ -1,4 +1,4 @@
-//! Which modules are integrated together: found from those whose equations have begun, before a common step is made.
+//! The modules that are integrated together, determined anew at each event from those whose equations have begun there.
 
 use crate::flow::FlowStage;
 use std::collections::HashSet;
@@ -6,21 +6,24 @@ use std::collections::HashSet;
 use crate::error::Error;
 use dlsys_tree::ModuleId;
 
-/// NextKind an instant means for the coupled modules.
+/// The modules that an instant affects, by its consequence for them.
 #[derive(Clone, Default)]
 pub struct Affected {
     /// Coupled modules whose equations or inputs have changed.
     pub seeds: Vec<ModuleId>,
     /// Of these, those that were not coupled before.
     pub joined: Vec<ModuleId>,
-    /// Modules that need no longer be coupled.
+    /// Modules that are no longer coupled.
     pub freed: Vec<ModuleId>,
-    /// Modules that follow formulas, but watch a neighbour that has changed.
+    /// Modules with closed forms whose conditions read a neighbour that has changed.
     pub dependent: Vec<ModuleId>,
 }
 
 impl FlowStage<'_, '_> {
-    /// Finds out who is coupled now, given the modules that have begun new trajectories, and lets the coupled ones go on.
+    /// Determines the coupled modules, given those that have begun new trajectories, and integrates them from now on.
+    ///
+    /// # Errors
+    /// If no step leads on.
     pub fn couple(&mut self, begun: &[ModuleId]) -> Result<(), Error> {
         let mut affected = std::mem::take(&mut self.flows.coupled.affected);
         self.find_affected(begun, &mut affected);
@@ -29,6 +32,7 @@ impl FlowStage<'_, '_> {
         coupled
     }
 
+    /// Couples, frees and restarts the affected modules.
     fn couple_affected(&mut self, affected: &Affected) -> Result<(), Error> {
         let Affected { seeds, joined, freed, dependent } = affected;
         for &id in dependent {
@@ -56,7 +60,7 @@ impl FlowStage<'_, '_> {
             let now = self.instant.at;
             let state = self.world.state_mut(id).expect("seen above");
             state.pass_changes(now);
-            // Formulas go on as they were, whatever their module reads.
+            // Closed forms continue as they were, whatever their module reads.
             if !state.next.lasting || state.restarted == self.instant.number {
                 state.next = state.next.again();
             }
@@ -76,14 +80,14 @@ impl FlowStage<'_, '_> {
         self.restart_coupled(now)
     }
 
-    /// Looks at the modules that have begun new trajectories, and at their neighbours.
+    /// Classifies the modules that have begun new trajectories, and their neighbours.
     fn find_affected(&mut self, begun: &[ModuleId], affected: &mut Affected) {
         affected.seeds.clear();
         affected.joined.clear();
         affected.freed.clear();
         affected.dependent.clear();
         let mut near = std::mem::take(&mut self.flows.coupled.loosened);
-        // Whose many neighbours are there already.
+        // Modules with many neighbours, whose neighbours have been added already.
         let mut known = HashSet::new();
         for &id in begun {
             near.push(id);
@@ -106,10 +110,10 @@ impl FlowStage<'_, '_> {
         let moved = |id: &ModuleId| self.world.state(*id).is_some_and(|s| s.restarted == self.instant.number);
         for &id in &near {
             let Some(state) = self.world.state(id) else { continue };
-            let wanted = self.is_coupled(id);
+            let coupled = self.is_coupled(id);
             let reads = state.rule.is_some_and(|r| self.setup.model.rules[r].reads_context);
             let new_input = reads && state.context.iter().any(moved);
-            if wanted {
+            if coupled {
                 if !state.coupled {
                     affected.joined.push(id);
                 }
@@ -126,8 +130,9 @@ impl FlowStage<'_, '_> {
         self.flows.coupled.loosened = near;
     }
 
-    /// True if a module must be integrated together with neighbours: because it reads one that is integrated, or reads
-    /// any and is integrated itself, or is integrated and read by one that reads.
+    /// True if a module has to be integrated together with neighbours: it reads one that is integrated, or it is
+    /// integrated itself and reads a neighbour or is read by one; or if it has algebraic components, which only coupled
+    /// equations solve for.
     fn is_coupled(&self, id: ModuleId) -> bool {
         let Some(state) = self.world.state(id) else { return false };
         let Some(rule) = state.rule else { return false };
@@ -137,7 +142,6 @@ impl FlowStage<'_, '_> {
         {
             return true;
         }
-        // NextKind is solved for is solved for here.
         let solved = |s: usize| {
             let algebraic = &self.setup.model.rules[rule].solves[s].algebraic;
             (0..algebraic.of.len()).any(|place| algebraic.is_solved(place, state.numeric_only))

@@ -1,121 +1,197 @@
-//! The right-hand side of the equations of coupled modules, as the integrators ask for it.
+//! The right-hand side of the equations of coupled modules, as the integrators evaluate it.
 
-use crate::flow::coupled::algebra::Fault;
-use crate::flow::coupled::lanes::Readings;
-use crate::flow::coupled::system::{Row, System};
+use crate::flow::coupled::algebra::AlgebraicError;
+use crate::flow::coupled::lanes::EvaluationPoint;
+use crate::flow::coupled::rows::VariableSource;
+use crate::flow::coupled::system::System;
 use crate::world::coupled_solution::CoupledSolution;
-use dlsys_expr::{Lanes, Program, Scratch};
+use dlsys_expr::{LANES, Lanes, Scratch};
 use dlsys_model::Rule;
 use dlsys_ode::Rates;
 
-/// The code of a row's rates.
-pub fn program<'s>(rules: &'s [Rule], row: &Row) -> &'s Program {
-    let solve = &rules[row.rule].solves[row.solve];
-    if row.numeric_only { &solve.rates } else { &solve.numeric_rates }
-}
-
 /// The right-hand side of a [`System`].
 pub struct Equations<'s> {
+    /// The equations.
     pub system: &'s System,
+    /// The rules of the model, by index.
     pub rules: &'s [Rule],
-    /// How the components move that are inputs.
+    /// The trajectories of the components that are inputs.
     solution: Option<&'s CoupledSolution>,
-    pub memory: Memory,
+    /// Working memory of evaluations.
+    pub memory: RateWorkspace,
 }
 
 /// Working memory of evaluations.
 #[derive(Clone, Debug, Default)]
-pub struct Memory {
+pub struct RateWorkspace {
+    /// Values of the inputs at `read_at`.
     pub inputs: Vec<f64>,
-    /// The time that the inputs are of.
+    /// The time at which the inputs were read, since the start of the step.
     read_at: Option<f64>,
     /// Components, then inputs.
     known: Vec<f64>,
     /// Values of the aggregates.
-    pub sums: Vec<f64>,
+    pub aggregates: Vec<f64>,
     /// The state with its algebraic components solved for.
-    settled: Vec<f64>,
+    consistent: Vec<f64>,
     variables: Vec<f64>,
     scratch: Scratch<f64>,
+    /// Vector registers of the programs.
     pub registers: Vec<Lanes>,
 }
 
 impl<'s> Equations<'s> {
+    /// The right-hand side of a system whose inputs follow `solution`; inputs are NaN without one.
     pub fn new(
         system: &'s System,
         rules: &'s [Rule],
         solution: Option<&'s CoupledSolution>,
     ) -> Equations<'s> {
-        Equations::within(Memory::default(), system, rules, solution)
+        Equations::within(RateWorkspace::default(), system, rules, solution)
     }
 
-    /// The same, in the memory of other evaluations.
+    /// The right-hand side, in the workspace of earlier evaluations.
     pub fn within(
-        memory: Memory,
+        memory: RateWorkspace,
         system: &'s System,
         rules: &'s [Rule],
         solution: Option<&'s CoupledSolution>,
     ) -> Equations<'s> {
-        Equations { system, rules, solution, memory: Memory { read_at: None, ..memory } }
+        Equations { system, rules, solution, memory: RateWorkspace { read_at: None, ..memory } }
     }
 
-    /// Reads the inputs.
+    /// Reads the inputs at a time since the start of the step.
     pub fn read_inputs(&mut self, tau: f64) {
-        // The last stages of a step are of one time.
+        // The last stages of a step have the same time.
         if self.memory.read_at != Some(tau) {
-            self.system.read(self.solution, tau, &mut self.memory.inputs);
+            self.system.table.read(self.solution, tau, &mut self.memory.inputs);
             self.memory.read_at = Some(tau);
         }
     }
 
-    /// Puts the state into `settled`, with its algebraic components solved for; and reads the inputs.
-    fn settle(&mut self, tau: f64, y: &[f64]) -> Result<(), Fault> {
+    /// Reads the inputs, and writes the state with its algebraic components solved for into `consistent`.
+    fn complete(&mut self, tau: f64, y: &[f64]) -> Result<(), AlgebraicError> {
         self.read_inputs(tau);
         if self.system.algebra.is_empty() {
             return Ok(());
         }
-        let Memory { settled, inputs, .. } = &mut self.memory;
-        settled.clear();
-        settled.extend_from_slice(y);
-        self.system.algebra.solve(self.system, self.rules, tau, inputs, settled)
+        let RateWorkspace { consistent, inputs, .. } = &mut self.memory;
+        consistent.clear();
+        consistent.extend_from_slice(y);
+        self.system.algebra.solve(&self.system.table, self.rules, tau, inputs, consistent)
     }
 
     /// Solves for the algebraic components of a state.
-    pub fn make_consistent(&mut self, tau: f64, y: &mut [f64]) -> Result<(), Fault> {
-        self.settle(tau, y)?;
+    pub fn make_consistent(&mut self, tau: f64, y: &mut [f64]) -> Result<(), AlgebraicError> {
+        self.complete(tau, y)?;
         if !self.system.algebra.is_empty() {
-            y.copy_from_slice(&self.memory.settled);
+            y.copy_from_slice(&self.memory.consistent);
         }
         Ok(())
+    }
+}
+
+impl Equations<'_> {
+    /// Computes all aggregates. The terms of children of many modules are evaluated together; those of each aggregate
+    /// are added up in string order.
+    pub fn add_up(&mut self, tau: f64, y: &[f64]) {
+        let table = &self.system.table;
+        self.memory.aggregates.clear();
+        if table.aggregates.is_empty() {
+            return;
+        }
+        self.memory.aggregates.resize(table.aggregates.len(), 0.0);
+        let mut begun = vec![false; table.aggregates.len()];
+        for (of, lanes) in &self.system.terms {
+            self.fold(*of, lanes, tau, y, &mut begun);
+        }
+    }
+
+    /// Adds the terms of a batch of children. `begun` tells which aggregates have a value already.
+    fn fold(
+        &mut self,
+        (rule, aggregate): (usize, usize),
+        lanes: &[(u32, u32)],
+        tau: f64,
+        y: &[f64],
+        begun: &mut [bool],
+    ) {
+        let table = &self.system.table;
+        let rule = &self.rules[rule];
+        let aggregate = &rule.aggregates[aggregate];
+        let width = aggregate.pattern.width;
+        let mut registers = std::mem::take(&mut self.memory.registers);
+        registers.resize(registers.len().max(rule.variables + width), [0.0; LANES]);
+        for &v in aggregate.term.reads() {
+            for (lane, &(number, child)) in registers[v].iter_mut().zip(lanes) {
+                let sum = &table.aggregates[number as usize];
+                let row = &table.rows[sum.row as usize];
+                let source = match v.checked_sub(rule.variables) {
+                    Some(of_child) => table.children[sum.first + child as usize * width + of_child],
+                    None if v < row.sources => table.sources[row.first_source + v],
+                    None => VariableSource::Fixed(table.time(row, v - row.sources, tau)),
+                };
+                *lane = table.value(source, tau, y, &self.memory.inputs);
+            }
+        }
+        let output = aggregate.term.eval_rows(&mut registers, lanes.len()).next().unwrap_or(0);
+        for (lane, &(number, _)) in lanes.iter().enumerate() {
+            let number = number as usize;
+            let known = std::mem::replace(&mut begun[number], true).then_some(self.memory.aggregates[number]);
+            self.memory.aggregates[number] = aggregate.fold.add(known, registers[output][lane]);
+        }
+        self.memory.registers = registers;
+    }
+
+    /// The algebraic equations that become singular at the start of a step, if there are any.
+    pub fn fading(&mut self, y: &[f64]) -> Option<AlgebraicError> {
+        self.read_inputs(0.0);
+        self.system.algebra.fading(&self.system.table, self.rules, &self.memory.inputs, y)
+    }
+
+    /// The error of the algebraic components at the end of a step that follows from those of the integrated ones, in
+    /// units of the tolerance.
+    pub fn sensitivity(&mut self, tau: f64, end: &[f64], errors: &[f64], tolerance: f64) -> f64 {
+        let there: Result<Vec<f64>, AlgebraicError> = (|| {
+            let mut there = end.to_vec();
+            self.make_consistent(tau, &mut there)?;
+            Ok(there)
+        })();
+        let mut aside: Vec<f64> = end.iter().zip(errors).map(|(y, e)| y - e).collect();
+        let moved = self.make_consistent(tau, &mut aside);
+        let (Ok(there), Ok(())) = (there, moved) else { return f64::INFINITY };
+        let error = |c: usize| (there[c] - aside[c]).abs() / (tolerance * there[c].abs().max(1.0));
+        let unknowns = self.system.algebra.unknowns.iter();
+        unknowns.map(|unknown| error(unknown.component as usize)).fold(0.0, f64::max)
     }
 }
 
 impl Rates for Equations<'_> {
     fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]) {
         let system = self.system;
-        let solved = self.settle(tau, y);
-        let settled = std::mem::take(&mut self.memory.settled);
-        let y = if system.algebra.is_empty() { y } else { &settled };
+        let solved = self.complete(tau, y);
+        let consistent = std::mem::take(&mut self.memory.consistent);
+        let y = if system.algebra.is_empty() { y } else { &consistent };
         self.add_up(tau, y);
-        let Memory { inputs, known, sums, registers, .. } = &mut self.memory;
+        let RateWorkspace { inputs, known, aggregates, registers, .. } = &mut self.memory;
         known.clear();
         if !inputs.is_empty() {
             known.extend_from_slice(y);
             known.extend_from_slice(inputs);
         }
-        let readings = Readings { tau, y, inputs, known, sums };
-        system.columns.rates(system, self.rules, &readings, registers, out);
+        let point = EvaluationPoint { tau, y, inputs, known, aggregates };
+        system.lanes.rates(&system.table, self.rules, &point, registers, out);
         for unknown in &system.algebra.unknowns {
             out[unknown.component as usize] = 0.0;
         }
-        if let Err(fault) = solved {
-            out[fault.component()] = f64::NAN;
+        if let Err(error) = solved {
+            out[error.component()] = f64::NAN;
         }
-        self.memory.settled = settled;
+        self.memory.consistent = consistent;
     }
 
     fn is_timed(&self) -> bool {
-        self.system.timed
+        self.system.table.timed
     }
 
     fn is_algebraic(&self) -> bool {
@@ -128,7 +204,7 @@ impl Rates for Equations<'_> {
 
     fn couplings(&self) -> Vec<(u32, u32)> {
         let mut all = Vec::new();
-        for row in &self.system.rows {
+        for row in &self.system.table.rows {
             self.system.row_partials(self.rules, row, |rate, partial| all.push((rate, partial.component)));
         }
         all
@@ -139,24 +215,25 @@ impl Rates for Equations<'_> {
         let mut scratch = std::mem::take(&mut self.memory.scratch);
         let mut values = Vec::new();
         out.clear();
-        // Rates that are not finite say so when they are asked for.
-        let _ = self.settle(tau, y);
-        let settled = std::mem::take(&mut self.memory.settled);
-        let y = if self.system.algebra.is_empty() { y } else { &settled };
-        for row in &self.system.rows {
+        // Where the algebraic components have no solution, the rates are not finite, which ends the step.
+        let _ = self.complete(tau, y);
+        let consistent = std::mem::take(&mut self.memory.consistent);
+        let y = if self.system.algebra.is_empty() { y } else { &consistent };
+        for row in &self.system.table.rows {
             let jacobian = &self.rules[row.rule].solves[row.solve].jacobian;
-            self.system.variables(self.rules, row, tau, y, &self.memory.inputs, &mut variables);
+            self.system.table.variables(self.rules, row, tau, y, &self.memory.inputs, &mut variables);
             values.resize(jacobian.values.outputs(), 0.0);
             jacobian.values.eval(&variables, &mut scratch, &mut values);
-            let slopes = self.system.slopes(self.rules, row, &mut variables, tau, y, &self.memory.inputs);
+            let slopes =
+                self.system.table.slopes(self.rules, row, &mut variables, tau, y, &self.memory.inputs);
             self.system.row_partials(self.rules, row, |_, partial| out.push(partial.value(&values, &slopes)));
         }
-        self.memory.settled = settled;
+        self.memory.consistent = consistent;
         self.memory.variables = variables;
         self.memory.scratch = scratch;
     }
 
     fn modules(&self) -> u64 {
-        self.system.rows.len() as u64
+        self.system.table.rows.len() as u64
     }
 }

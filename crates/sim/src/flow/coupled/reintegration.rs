@@ -1,27 +1,27 @@
-//! NextKind an event does to the coupled modules around it, without ending the common step of the others.
+//! Local re-integration: the effect of an event on the coupled modules around it, within the common step of the others.
 //!
-//! After an event at t' within the common step, the modules whose equations or inputs have changed (the *seeds*) and some
-//! rings of neighbours around them are integrated again from t' to the end of the step, with the trajectory of everybody
-//! else as an input. NextKind a ring is: who reads a module is one ring further out, since influence goes to those who read.
+//! After an event at t' within the common step, the modules whose equations or inputs have changed (the *seeds*) and
+//! some rings of neighbours around them are integrated again from t' to the end of the step, with the trajectories of
+//! all other modules as inputs. Ring k + 1 consists of the modules that read one of ring k, since influence passes to
+//! the readers.
 //!
 //! # Why the error stays under the tolerance
 //!
-//! Let ε be the error that a step may have ([`INNER_TOLERANCE`] times the tolerance). The reintegration is integrated with the
-//! step control of any other step. NextKind it leaves out is the change of the modules outside. They read the region only
-//! through its outermost ring, and the change of that ring, old trajectory against new, is measured along the whole
-//! rest of the step: if it is more than ε anywhere, the reintegration is done again with twice as many rings. So what is
-//! left out enters the rates outside as a disturbance of at most ε times the Lipschitz constant L of the coupling, and
-//! over the rest of a step of length h changes their values by at most ε (exp(L h) - 1). Explicit methods keep L h
-//! to a few units (beyond that their stability ends, the equations count as stiff, and every event ends the step), and
-//! steps are reintegrated where events happen: the neglected change is one more local error, and adds up as those do. Where
-//! neighbours' influence is weak (diffusion between cells), it falls by a factor of about L h / k from ring k - 1 to
-//! ring k, and a handful of rings is enough.
+//! Let ε be the error that a step may have ([`INNER_TOLERANCE`] times the tolerance). A re-integration has the step
+//! control of any other step. It neglects the change of the modules outside. These read the region only through its
+//! outermost ring, and the change of that ring, old trajectory against new, is measured along the whole rest of the
+//! step: if it exceeds ε anywhere, the re-integration is repeated with twice as many rings. So the neglected change
+//! enters the rates outside as a disturbance of at most ε times the Lipschitz constant L of the coupling, and over the
+//! rest of a step of length h it changes their values by at most ε (exp(L h) - 1). Explicit methods keep L h to a few
+//! units (beyond that their stability ends, the equations count as stiff, and every event ends the step): the neglected
+//! change is one more local error for each event, and accumulates as those do. Where the influence of neighbours is
+//! weak (diffusion between cells), it falls by a factor of about L h / k from ring k - 1 to ring k, and a handful of
+//! rings is enough.
 
 use crate::flow::FlowStage;
-use crate::flow::coupled::equations::{Equations, Memory};
-use crate::flow::coupled::integrated;
-use crate::flow::coupled::system::System;
-use crate::flow::integrator::{CERTAINTY, INNER_TOLERANCE, Integrator};
+use crate::flow::coupled::equations::{Equations, RateWorkspace};
+use crate::flow::coupled::system::{Membership, System, integrated};
+use crate::flow::integrator::{CERTAINTY, INNER_TOLERANCE, Integrator, StepRequest};
 use crate::schedule::Owner;
 use crate::trajectory::Trajectory;
 use crate::world::coupled_solution::CoupledSolution;
@@ -32,22 +32,22 @@ use dlsys_ode::Nodes;
 use dlsys_tree::{ModuleId, SimTime};
 use smallvec::SmallVec;
 
-/// NextKind reintegrations have learnt, and their memory: nothing is allocated for one but its trajectory.
+/// The experience of re-integrations, and their working memory: one allocates nothing but its trajectory.
 #[derive(Clone)]
 pub struct Reintegration {
     integrator: Integrator,
     control: Control,
-    /// Rings to begin with.
+    /// The number of rings with which the next one begins.
     rings: usize,
-    /// By component: its number in the system of the region.
+    /// By component of the coupled solution: its number in the system of the region, or [`NOT_HERE`].
     numbers: Vec<u32>,
     /// The equations of the region.
     system: System,
-    memory: Memory,
+    memory: RateWorkspace,
     region: Region,
-    trial: Trial,
+    trial: TrialSolution,
     y: Vec<f64>,
-    /// Number of the last visit to modules.
+    /// Id of the last traversal of modules.
     visit: u64,
 }
 
@@ -60,7 +60,7 @@ impl Default for Reintegration {
 }
 
 impl Reintegration {
-    /// Where its steps evaluate rates.
+    /// The positions in the last step, from 0 to 1, at which rates were evaluated.
     pub fn nodes(&self) -> Nodes {
         self.integrator.nodes()
     }
@@ -70,7 +70,7 @@ impl Reintegration {
         self.integrator.evaluations()
     }
 
-    /// A number for a visit to modules that no visit has had.
+    /// The id of a new traversal of modules, which distinguishes the modules that it has visited.
     pub fn begin_visit(&mut self) -> u64 {
         self.visit += 1;
         self.visit
@@ -79,39 +79,39 @@ impl Reintegration {
 
 /// Most rings that are tried.
 const MAX_RINGS: usize = 64;
-/// Most steps of a reintegration.
+/// Most steps of a re-integration.
 const MAX_STEPS: usize = 64;
-/// A region of more than this part of all modules is no region.
+/// A region of more than this part of all coupled modules is replaced by a new common step.
 const MOST: f64 = 0.5;
 
-/// NextKind flows along branches is to be conserved whatever the tolerance: what the edge of a region sends to the outside,
-/// the outside gets only as it was before. In models that add up over branches no more than this may be neglected, for
-/// its size.
+/// The relative change that may be neglected in models with aggregates. A flow along branches has to be conserved
+/// whatever the tolerance, but across the edge of a region the outside still receives the flow that it had before.
 const CONSERVED: f64 = 1e-11;
 
+/// The number of a component outside the region.
 const NOT_HERE: u32 = u32::MAX;
 
 /// Modules that are integrated again, the seeds first, then ring after ring.
 #[derive(Clone, Default)]
 struct Region {
     members: Vec<ModuleId>,
-    /// Where each ring begins.
+    /// The index of the first member of each ring.
     rings: Vec<usize>,
 }
 
-/// The trajectory of a region.
+/// A trajectory of a region that has not been accepted yet.
 #[derive(Clone, Default)]
-struct Trial {
+struct TrialSolution {
     stretches: Vec<Dense>,
     /// Its components, by their number in the stretches.
     components: Vec<u32>,
-    /// Where those of each ring begin.
+    /// The index of the first component of each ring.
     rings: Vec<usize>,
 }
 
 impl FlowStage<'_, '_> {
-    /// Lets some coupled modules, of which some have just joined, go on with new equations; false if that is better
-    /// done by a new common step.
+    /// Integrates some coupled modules, some of which have just joined, and their neighbours again from now on. False
+    /// if a new common step does that better.
     pub fn reintegrate(&mut self, seeds: &[ModuleId], joined: &[ModuleId]) -> bool {
         let Some(solution) = &self.world.coupled else { return false };
         let room = solution.end.since(self.instant.at);
@@ -131,11 +131,11 @@ impl FlowStage<'_, '_> {
     fn reintegrate_within(
         &mut self,
         region: &mut Region,
-        trial: &mut Trial,
+        trial: &mut TrialSolution,
         seeds: &[ModuleId],
         joined: &[ModuleId],
     ) -> bool {
-        // Within a slice of time nobody sees what happens to others.
+        // Within a slice of time no module reads changes of others.
         let sliced = self.setup.settings.is_sliced();
         let mut rings = if sliced { 0 } else { self.flows.coupled.reintegration.rings };
         loop {
@@ -149,11 +149,11 @@ impl FlowStage<'_, '_> {
             let reach = if sliced { 0 } else { self.reach(trial) };
             let closed = region.rings.len() <= rings;
             if reach < region.rings.len() || closed {
-                // One ring beyond the last that changed.
+                // The next re-integration begins with one ring beyond the last that changed.
                 self.flows.coupled.reintegration.rings = (reach + 1).clamp(1, MAX_RINGS);
                 self.flows.coupled.members.extend_from_slice(joined);
-                self.take_over(region, trial);
-                // A common step that begins now finds what has been overlooked.
+                self.accept(region, trial);
+                // A common step that begins now finds the pulses that have been overlooked.
                 return !self.is_overlooked(&region.members);
             }
             rings *= 2;
@@ -165,13 +165,13 @@ impl FlowStage<'_, '_> {
 
     /// Gives components to the parameters of modules that have begun new trajectories.
     fn number_newcomers(&mut self, seeds: &[ModuleId]) {
-        let known = self.flows.coupled.system.places.len();
+        let known = self.flows.coupled.system.table.places.len();
         for &id in seeds {
             let fresh = |s: &State| s.trajectories.iter().any(|m| matches!(m, Trajectory::Step(_)));
             if !self.world.state(id).is_some_and(fresh) {
                 continue;
             }
-            self.settle_values(id);
+            self.store_values(id);
             let state = self.world.state(id).expect("a seed");
             for &parameter in integrated(self.setup.model, state) {
                 let solution = self.world.coupled.as_mut().expect("seen above");
@@ -183,7 +183,7 @@ impl FlowStage<'_, '_> {
     }
 
     /// Makes the present values of a module's integrated parameters those of the tree.
-    fn settle_values(&mut self, id: ModuleId) {
+    fn store_values(&mut self, id: ModuleId) {
         let first = self.world.tree.places(id).start;
         let all = integrated(self.setup.model, self.world.state(id).expect("a seed"));
         let values: SmallVec<[f64; 4]> =
@@ -193,7 +193,7 @@ impl FlowStage<'_, '_> {
         }
     }
 
-    /// Makes a region of the seeds and so many rings around them.
+    /// Makes the region of the seeds and `rings` rings around them.
     fn surround(&mut self, region: &mut Region, seeds: &[ModuleId], rings: usize) {
         let visit = self.flows.coupled.reintegration.begin_visit();
         let Region { members, rings: begins } = region;
@@ -209,11 +209,11 @@ impl FlowStage<'_, '_> {
             begins.push(to);
             for inner in from..to {
                 let seen = members[inner];
-                for &looker in self.neighbours.lookers(seen) {
-                    let Some(state) = self.world.state_mut(looker) else { continue };
+                for &reader in self.neighbours.lookers(seen) {
+                    let Some(state) = self.world.state_mut(reader) else { continue };
                     if state.coupled && state.visited != visit && reads(self.setup.model, state, seen) {
                         state.visited = visit;
-                        members.push(looker);
+                        members.push(reader);
                     }
                 }
             }
@@ -224,10 +224,10 @@ impl FlowStage<'_, '_> {
         }
     }
 
-    /// The trajectory of a region from now to the end of the common step; None if there is none.
-    fn integrate(&mut self, region: &Region, trial: &mut Trial) -> Option<()> {
+    /// Integrates a region from now to the end of the common step; None if the steps do not come that far.
+    fn integrate(&mut self, region: &Region, trial: &mut TrialSolution) -> Option<()> {
         let solution = self.world.coupled.as_ref()?;
-        let Trial { stretches, components, rings } = trial;
+        let TrialSolution { stretches, components, rings } = trial;
         let Reintegration { integrator, control, numbers, system, memory, y, .. } =
             &mut self.flows.coupled.reintegration;
         stretches.clear();
@@ -255,12 +255,13 @@ impl FlowStage<'_, '_> {
         let number = |component: u32| numbers.get(component as usize).copied().filter(|n| *n != NOT_HERE);
         let rules = &self.setup.model.rules;
         let frozen = self.setup.settings.is_sliced();
-        system.rebuild(rules, self.world, &region.members, self.instant.at, number, frozen);
+        let (world, members, start) = (&*self.world, &region.members, self.instant.at);
+        system.rebuild(rules, &Membership { world, members, start, frozen }, number);
         for &component in &*components {
             numbers[component as usize] = NOT_HERE;
         }
         integrator.restart(self.setup.settings.method, y.len());
-        // The edge of the region neglects as much as that.
+        // The neglected change at the edge of the region adds to the error.
         control.error =
             self.flows.coupled.control.error + INNER_TOLERANCE * self.setup.coupled_settings.tolerance;
         let mut from = self.instant.at;
@@ -271,8 +272,9 @@ impl FlowStage<'_, '_> {
             let mut equations = Equations::within(std::mem::take(memory), system, rules, Some(solution));
             let end = Some(solution.end);
             let stats = &mut self.log.stats;
-            let step =
-                integrator.step(&self.setup.coupled_settings, control, &mut equations, y, from, end, stats);
+            let settings = &self.setup.coupled_settings;
+            let request = StepRequest { settings, y, start: from, limit: end };
+            let step = integrator.step(request, control, &mut equations, stats);
             from = step.ok()?;
             if system.algebra.is_empty() {
                 stretches.push(integrator.dense(&mut equations, y));
@@ -290,8 +292,8 @@ impl FlowStage<'_, '_> {
         Some(())
     }
 
-    /// The number of rings that a trial changes by more than may be neglected.
-    fn reach(&self, trial: &Trial) -> usize {
+    /// The number of rings that a trial changes by more than the part that may be neglected.
+    fn reach(&self, trial: &TrialSolution) -> usize {
         let Some(solution) = &self.world.coupled else { return 0 };
         let tolerance = INNER_TOLERANCE * self.setup.coupled_settings.tolerance;
         let tolerance = if self.setup.gathers { tolerance.min(CONSERVED) } else { tolerance };
@@ -310,9 +312,9 @@ impl FlowStage<'_, '_> {
         last.map_or(0, |(number, _)| trial.rings.partition_point(|first| *first <= number))
     }
 
-    /// Makes a trial the trajectory of its region, and finds the region's next events.
-    fn take_over(&mut self, region: &Region, trial: &mut Trial) {
-        let all = self.flows.coupled.system.places.len();
+    /// Makes a trial the trajectory of its region, and finds the next events of the region.
+    fn accept(&mut self, region: &Region, trial: &mut TrialSolution) {
+        let all = self.flows.coupled.system.table.places.len();
         let solution: &mut CoupledSolution = self.world.coupled.as_mut().expect("seen above");
         solution.replace(&mut trial.stretches, &trial.components, all);
         self.flows.coupled.reintegrated = true;

@@ -1,25 +1,26 @@
-//! From the equations of coupled modules to a matrix.
+//! The matrix of the equations of coupled modules, with the closed forms that they read as further unknowns.
 
 use super::{Linear, Problem};
-use crate::flow::coupled::system::{Formula, Source, System};
+use crate::flow::coupled::rows::{FormulaInput, VariableSource};
+use crate::flow::coupled::system::System;
 use crate::trajectory::Trajectory;
 use dlsys_expr::Scratch;
 use dlsys_model::Rule;
 
-/// The unknowns as they are numbered.
+/// The unknowns numbered so far.
 #[derive(Default)]
 struct Unknowns {
     problem: Problem,
-    /// The unknown that stands for each formula; `NONE` as long as there is none.
+    /// By closed form: the unknown that stands for it; [`NONE`] as long as there is none.
     inputs: Vec<u32>,
 }
 
 const NONE: u32 = u32::MAX;
 
 impl Unknowns {
-    /// Makes what a source says an unknown of its own if it is a formula: None if that solves no linear equation.
-    fn number(&mut self, source: &Source, formulas: &[Formula]) -> Option<()> {
-        let Source::Formula(i) = *source else { return Some(()) };
+    /// Makes a source an unknown of its own if it is a closed form; None if that solves no linear equation.
+    fn number(&mut self, source: &VariableSource, formulas: &[FormulaInput]) -> Option<()> {
+        let VariableSource::Formula(i) = *source else { return Some(()) };
         if self.inputs[i as usize] != NONE {
             return Some(());
         }
@@ -41,29 +42,31 @@ impl Unknowns {
 }
 
 impl Linear {
-    /// The equations of coupled modules, if they are linear and so is everything that they read, and if there is a way to
-    /// solve them without steps.
+    /// The solution of the equations of coupled modules, from the state `y`. None if the equations, or those of a
+    /// closed form that they read, are not linear, or no method solves them without steps. `tolerance` is relative to
+    /// max(1, |value|).
     pub fn new(system: &System, rules: &[Rule], y: &[f64], tolerance: f64) -> Option<Linear> {
         if !system.algebra.is_empty() {
             return None;
         }
+        let table = &system.table;
         let mut unknown = vec![NONE; y.len()];
-        let mut all = Unknowns { inputs: vec![NONE; system.formulas.len()], ..Unknowns::default() };
+        let mut all = Unknowns { inputs: vec![NONE; table.formulas.len()], ..Unknowns::default() };
         all.problem.tolerance = tolerance;
-        // Unknowns are numbered in string order: what stands left of a module before it.
-        for row in &system.rows {
+        // Unknowns are numbered in string order: the left context of a module before the module.
+        for row in &table.rows {
             let rule = &rules[row.rule];
             let solve = &rule.solves[row.solve];
             if row.numeric_only {
                 return None;
             }
             let linear = solve.linear.as_ref()?;
-            let sources = &system.sources[row.first_source..row.first_source + row.sources];
+            let sources = &table.sources[row.first_source..row.first_source + row.sources];
             let before = rule.parameters.len() + rule.left.iter().map(|p| p.width).sum::<usize>();
             let read = |v: usize| linear.variables.iter().flatten().any(|r| *r == v);
             for (v, source) in sources.iter().enumerate().take(before) {
                 if read(v) {
-                    all.number(source, &system.formulas)?;
+                    all.number(source, &table.formulas)?;
                 }
             }
             for component in row.first_rate..row.first_rate + solve.numeric.len() {
@@ -73,15 +76,15 @@ impl Linear {
             }
             for (v, source) in sources.iter().enumerate().skip(before) {
                 if read(v) {
-                    all.number(source, &system.formulas)?;
+                    all.number(source, &table.formulas)?;
                 }
             }
         }
         let Unknowns { mut problem, inputs } = all;
         let (mut variables, mut scratch, mut out): (Vec<f64>, Scratch<f64>, Vec<f64>) = Default::default();
-        for row in &system.rows {
+        for row in &table.rows {
             let linear = rules[row.rule].solves[row.solve].linear.as_ref()?;
-            system.variables(rules, row, 0.0, y, &[], &mut variables);
+            table.variables(rules, row, 0.0, y, &[], &mut variables);
             out.resize(linear.coefficients.outputs(), 0.0);
             linear.coefficients.eval(&variables, &mut scratch, &mut out);
             let mut next = out.iter();
@@ -90,19 +93,19 @@ impl Linear {
                 problem.b[n as usize] += next.next()?;
                 for &v in reads {
                     let coefficient = *next.next()?;
-                    match system.sources[row.first_source + v] {
-                        Source::Fixed(x) => problem.b[n as usize] += coefficient * x,
-                        Source::State(component) => {
+                    match table.sources[row.first_source + v] {
+                        VariableSource::Fixed(x) => problem.b[n as usize] += coefficient * x,
+                        VariableSource::State(component) => {
                             problem.entries.push((n, unknown[component as usize], coefficient));
                         }
-                        Source::Formula(input) => {
+                        VariableSource::Formula(input) => {
                             problem.entries.push((n, inputs[input as usize], coefficient));
                         }
-                        Source::Input(_) | Source::Sum(_) => return None,
+                        VariableSource::Input(_) | VariableSource::Aggregate(_) => return None,
                     }
                 }
             }
         }
-        Linear::of(problem, unknown, system.start)
+        Linear::of(problem, unknown, table.start)
     }
 }

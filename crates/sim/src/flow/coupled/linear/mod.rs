@@ -1,17 +1,17 @@
 //! Coupled modules whose equations are linear with constant coefficients: `y' = A y + b`.
 //!
-//! The exact flow is the exponential of a matrix. Where nobody watches the components there are no steps: it is applied
-//! from the start of the phase to each time that is looked at.
+//! The exact flow is the exponential of a matrix. Where no condition has to be searched for events there are no steps:
+//! the exponential is applied from the start of the trajectory to each time that is observed.
 //!
-//! | way | what it needs | its cost |
+//! | method | condition | cost |
 //! |---|---|---|
-//! | [`series`]: uniformisation | neighbours that weigh on each other with one sign | grows with time times the fastest rate |
-//! | [`poles`]: rational approximation | a tree, and real eigenvalues | does not: stiffness costs nothing |
-//! | [`steps`] | nothing | as steps do |
+//! | [`series`]: uniformisation | the influences between two neighbours have one sign | proportional to time times the fastest rate |
+//! | [`poles`]: rational approximation | a tree, and real eigenvalues | independent of time and stiffness |
+//! | [`steps`] | none | that of steps |
 //!
-//! At each time each way has a bound of its error, which is compared with what the values are *then*. The cheapest way
-//! is tried first; one that cannot answer for its error is left, for that time only. So the state at a time depends on
-//! nothing but the time.
+//! At each time each method has a bound of its error, which is compared with the values at that time. The cheapest
+//! method is tried first; one whose bound is too large is rejected for that time only. So the state at a time depends
+//! on nothing but the time.
 
 mod build;
 mod poles;
@@ -27,61 +27,63 @@ use dlsys_ode::Dense;
 use dlsys_tree::SimTime;
 use poles::Poles;
 use series::{Orthant, Series};
-use steps::Steps;
+use steps::LinearSteps;
 
 /// As many products of the matrix and a vector cost about as much as the rational approximation, once.
 const POLES_COST: f64 = 60.0;
-/// The same where the approximation is unproven, and made three times to see how far it can be trusted. NextKind is proven is
-/// worth some more.
+/// The same where the approximation has no bound of its error, so that it is made three times for an estimate, and the
+/// series is preferred for longer.
 const UNPROVEN_POLES_COST: f64 = 2_000.0;
-/// More products than this are dearer than steps.
+/// More products than this cost more than steps.
 const MOST_PRODUCTS: f64 = 30_000.0;
-/// Bounds of errors may be so many tolerances: they are seldom reached, and a hundred are promised.
+/// Bounds of errors may be this many tolerances: they are seldom reached, and the documented limit is a hundred.
 const ALLOWED: f64 = 40.0;
-/// NextKind rounds once is off by this at most, relative to its size.
+/// The largest relative error of one rounding.
 const ROUNDING: f64 = 0.5 * f64::EPSILON;
 
-/// The equations, and the state at the start.
+/// The equations `y' = A y + b`, and the state at the start.
 #[derive(Clone, Debug, Default)]
 pub struct Problem {
-    /// Row, column and value; what stands in one place several times is added up.
+    /// The entries of A: row, column and value; several entries of one place are added up.
     pub entries: Vec<(u32, u32, f64)>,
+    /// The constant term.
     pub b: Vec<f64>,
+    /// The state at the start.
     pub y: Vec<f64>,
-    /// The error that is tolerated, relative to max(1, |value|).
+    /// The tolerated error, relative to max(1, |value|).
     pub tolerance: f64,
 }
 
 impl Problem {
-    /// True if no value can be off by more than is allowed, whatever the values are, given a bound of all errors.
+    /// True if the values are finite and a bound of all their errors is allowed, whatever the values are.
     fn allows_all(&self, y: &[f64], bound: f64) -> bool {
         bound <= ALLOWED * self.tolerance && y.iter().fold(true, |good, y| good & y.is_finite())
     }
 
-    /// True if no value can be off by more than is allowed, given a bound of the error of each.
+    /// True if the values are finite and the bound of the error of each is allowed.
     fn allows(&self, y: &[f64], bound: impl Fn(usize) -> f64) -> bool {
         let allowed = ALLOWED * self.tolerance;
         y.iter().enumerate().all(|(i, y)| y.is_finite() && bound(i) <= allowed * y.abs().max(1.0))
     }
 }
 
-/// A linear system without steps.
+/// The solution of a linear system, evaluated at any time without steps where that is possible.
 #[derive(Clone)]
 pub struct Linear {
     problem: Problem,
-    /// The unknown of each component of the coupled modules.
+    /// By component of the coupled modules: the index of the unknown.
     unknown: Vec<u32>,
     start: SimTime,
     orthant: Orthant,
     series: Option<Series>,
-    /// Of what is larger than every error of the series.
+    /// A series whose values bound the sizes of all terms of `series`.
     majorant: Option<Box<Series>>,
     poles: Option<Poles>,
-    steps: Option<Box<Steps>>,
+    steps: Option<Box<LinearSteps>>,
 }
 
 impl Linear {
-    /// None if neighbours weigh on each other with different signs: they swing.
+    /// None if neighbours influence each other with different signs, so that the solution oscillates.
     fn of(problem: Problem, unknown: Vec<u32>, start: SimTime) -> Option<Linear> {
         let finite = problem.entries.iter().map(|e| &e.2).chain(&problem.b).chain(&problem.y);
         if !finite.into_iter().all(|x| x.is_finite()) {
@@ -92,8 +94,8 @@ impl Linear {
         Some(Linear { problem, unknown, start, orthant, series: None, majorant: None, poles, steps: None })
     }
 
-    /// The components at an instant, as the dense output of a step that stays where it is. Not numbers if there are
-    /// none: growth beyond all bounds. `control` is what is known of steps, should there have to be any.
+    /// The components at an instant, as the dense output of a step of length 0. NaN where the solution exceeds the
+    /// range of numbers. `control` is the experience of step control, in case steps are needed.
     pub fn at(&mut self, at: SimTime, settings: &Settings, control: &Control, stats: &mut Stats) -> Dense {
         let tau = at.since(self.start).max(0.0);
         let mut y = match tau {
@@ -108,14 +110,14 @@ impl Linear {
         Dense::new(at, Some(at), 0.0, 0, components)
     }
 
-    /// The state some time after the start, by the first way that can answer for it.
+    /// The state some time after the start, by the first method without steps whose error is within its bound.
     fn without_steps(&mut self, tau: f64) -> Option<Vec<f64>> {
         let pays_above = match &self.poles {
             Some(poles) if poles.are_proven() => POLES_COST,
             Some(_) => UNPROVEN_POLES_COST,
             None => f64::INFINITY,
         };
-        // To know that does not take the series.
+        // This test does not need the series.
         let surely = self.poles.as_ref().is_some_and(|poles| poles.spare(pays_above, tau));
         let poles_first = surely || self.products(tau) > pays_above;
         if poles_first && let Some(y) = self.by_poles(tau) {
@@ -133,7 +135,7 @@ impl Linear {
         self.series.get_or_insert_with(|| Series::new(&self.problem))
     }
 
-    /// Products of the matrix and a vector that the series takes.
+    /// The number of products of the matrix and a vector that the series takes.
     fn products(&mut self, tau: f64) -> f64 {
         self.series().products(tau)
     }
@@ -146,7 +148,8 @@ impl Linear {
         self.series();
         let Linear { problem, orthant, series: Some(series), majorant, .. } = self else { return None };
         let (y, cut, rounding) = series.at(&problem.y, tau);
-        // NextKind is cut off is known for all unknowns together; what is rounded, relative to the sum of all sizes.
+        // The truncation error is bounded for all unknowns together, the rounding error relative to the sum of all
+        // sizes.
         let largest = series.largest(tau);
         if problem.allows(&y, |i| cut + rounding * if orthant.holds(i) { y[i].abs() } else { largest }) {
             return Some(y);
@@ -168,7 +171,7 @@ impl Linear {
         stats: &mut Stats,
     ) -> Option<Vec<f64>> {
         if self.steps.as_ref().is_none_or(|steps| steps.have_passed(tau)) {
-            self.steps = Some(Box::new(Steps::new(&self.problem, settings, *control)));
+            self.steps = Some(Box::new(LinearSteps::new(&self.problem, settings, *control)));
         }
         self.steps.as_mut()?.at(&self.problem, tau, settings, stats)
     }

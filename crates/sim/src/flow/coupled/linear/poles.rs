@@ -1,41 +1,44 @@
-//! The exponential of a matrix by the best rational approximation on the negative axis (`rational`): every pole costs one
-//! elimination from the tips to the root, and stiffness costs nothing (Trefethen, Weideman and Schmelzer 2006).
+//! The exponential of a matrix by the best rational approximation on the negative axis (`rational`): every pole costs
+//! one elimination from the tips to the root, and stiffness costs nothing (Trefethen, Weideman and Schmelzer 2006).
 //!
-//! The error is bounded on the spectrum only if the matrix is normal in some norm. Neighbours that weigh on each other make
-//! a tree's matrix similar to a symmetric one, by a diagonal matrix of weights: then the error of each unknown is bounded
-//! by its weight, the error of the approximation, and the size of the start, measured with the weights (`proven`). It does not
-//! fall when the values do: what has decayed by twelve decades is not known any more. An influence one way is
-//! as far from normal as can be, though all eigenvalues are real; along a chain of such influences the approximation means
-//! nothing. Then it is made over the whole time, and again over two halves, each with an error of its own.
+//! The error is bounded on the spectrum only if the matrix is normal in some norm. Mutual influences make
+//! a tree's matrix similar to a symmetric one, by a diagonal matrix of weights: then the error of each unknown is
+//! bounded by its weight, the error of the approximation, and the size of the start, measured with the weights
+//! ([`Proof`]). The bound does not decrease with the values: a value that has decayed by twelve decades has no digits
+//! left. An influence in one direction is far from normal, though all eigenvalues are real; along a chain of such
+//! influences the approximation is meaningless. Then it is computed over the whole time, and again over two halves,
+//! each with an error of its own.
 
 use super::rational::{ALPHA_0, POLES, RESIDUES};
 use super::{Problem, ROUNDING};
 use dlsys_ode::{Pattern, Wide};
 
-/// Lanes of an elimination: the seven poles and one that does nothing.
+/// Lanes of an elimination: the seven poles and one that is unused.
 const LANES: usize = 8;
-/// The approximation is no farther than this from the exponential on the negative axis, in f64.
+/// The largest distance of the approximation from the exponential on the negative axis, in f64.
 const ERROR: f64 = 5e-14;
 /// The same of the difference quotients of its error.
 const ERROR_OF_SLOPE: f64 = 2e-11;
-/// NextKind is rounded in an elimination, in units of what the largest entry rounds to.
+/// The rounding error of an elimination, in units of that of the largest entry.
 const ROUNDINGS: f64 = 4.5;
-/// Roundings of the pivots themselves last as disturbances do, and so do those of the state of rest.
+/// The effect of the roundings of the pivots and of the equilibrium, which last as disturbances do, in units of the
+/// memory.
 const MEMORIES: f64 = 8.0;
 /// The largest weight, and the inverse of the smallest, as a logarithm.
 const MOST_WEIGHT: f64 = 200.0;
 /// The difference between the whole and the halves may be as large as this part of the tolerance.
 const AGREEMENT: f64 = 0.5;
 
+/// The rational approximation for one matrix.
 #[derive(Clone, Debug)]
 pub struct Poles {
     pattern: Pattern,
     a: Vec<f64>,
-    /// No eigenvalue is larger; not negative.
+    /// A bound of all eigenvalues; not negative.
     shift: f64,
-    /// NextKind is known of the error. None if influences are one way.
+    /// The bound of the error. None if some influences have one direction only.
     proof: Option<Proof>,
-    /// The largest value of b, and of the state of rest: infinite if there is none.
+    /// The largest value of b, and of the equilibrium: infinite if there is none.
     inflow: f64,
     rest: f64,
     /// The largest entry.
@@ -48,27 +51,28 @@ pub struct Poles {
 #[derive(Clone, Debug)]
 struct Proof {
     weights: Vec<f64>,
-    /// Of each unknown: the part of the forest that it belongs to.
+    /// By unknown: the tree of the forest that it belongs to.
     part: Vec<u32>,
     sizes: Vec<Sizes>,
     /// The largest weight.
     heaviest: f64,
-    /// The memories are known.
+    /// The memories have been computed.
     remembers: bool,
 }
 
-/// Sizes in a part of the forest, in the coordinates in which its matrix is symmetric.
+/// Sizes in a tree of the forest, in the coordinates in which its matrix is symmetric.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sizes {
-    /// Squares of the lengths of the start, of b, and of the state of rest and what the start is away from it.
+    /// Squares of the lengths of the start, of b, of the equilibrium, and of the distance of the start from that.
     y: f64,
     b: f64,
     rest: f64,
     away: f64,
-    /// The largest value of the start, or of the state of rest if that is known; if it is not, what flows in.
+    /// The largest value of the start, or of the equilibrium if there is one; if there is none, of the inflow.
     most: f64,
     inflow: f64,
-    /// A disturbance that lasts is never more than what it adds in so much time; infinite as long as nobody has asked.
+    /// The effect of a lasting disturbance is never larger than its contribution over this time; infinite until it is
+    /// computed.
     memory: f64,
 }
 
@@ -94,8 +98,8 @@ impl Proof {
         Proof { weights, part, sizes, heaviest, remembers: false }
     }
 
-    /// True if the state at a time, `y`, is within what is allowed. `rounding` is what the matrix rounds to, `growth` how
-    /// much larger everything may be than at the start.
+    /// True if the error of the state `y` at a time is allowed. `rounding` is the rounding error of the matrix,
+    /// `growth` a bound of the factor by which values have grown since the start.
     fn holds(&self, problem: &Problem, y: &[f64], tau: f64, growth: f64, rounding: f64) -> bool {
         let bound = |s: &Sizes| {
             let slope = ERROR * s.y.sqrt() + ERROR_OF_SLOPE * tau * s.b.sqrt();
@@ -106,14 +110,14 @@ impl Proof {
         let bounds: Vec<f64> = self.sizes.iter().map(bound).collect();
         let largest =
             self.heaviest * bounds.iter().fold(0.0, |m, b| if *b > m || b.is_nan() { *b } else { m });
-        // Most often no value need be looked at.
+        // In most cases the largest bound is sufficient.
         problem.allows_all(y, largest)
             || problem.allows(y, |i| self.weights[i] * bounds[self.part[i] as usize])
     }
 }
 
 impl Poles {
-    /// None if the couplings are no forest.
+    /// None if the couplings are no forest, or two neighbours influence each other with different signs.
     pub fn new(problem: &Problem) -> Option<Poles> {
         let n = problem.y.len();
         let couplings: Vec<(u32, u32)> = problem.entries.iter().map(|e| (e.0, e.1)).collect();
@@ -163,7 +167,7 @@ impl Poles {
         shift.is_finite().then_some(poles)
     }
 
-    /// Where everything comes to rest: `A x = -b`.
+    /// The equilibrium: `A x = -b`; None if A is singular.
     fn rest(&self, b: impl Iterator<Item = f64>) -> Option<Vec<f64>> {
         let mut factors = Vec::new();
         let mut x: Vec<f64> = b.map(|b| -b).collect();
@@ -172,7 +176,8 @@ impl Poles {
         regular.then_some(x)
     }
 
-    /// Finds out how long a disturbance is remembered, from where one of 1 would lead. False if that is known.
+    /// Computes the memories from the equilibrium under a disturbance of 1. False if they are known or cannot be
+    /// computed.
     fn remember(&mut self) -> bool {
         let Some(proof) = self.proof.as_ref().filter(|proof| !proof.remembers) else { return false };
         let keeps_signs = self.a[proof.weights.len()..].iter().all(|a| *a >= 0.0);
@@ -189,7 +194,7 @@ impl Poles {
         true
     }
 
-    /// True if it takes more products of the matrix and a vector than that to come to a time by a series.
+    /// True if a series takes more than this number of products of the matrix and a vector up to a time.
     pub fn spare(&self, products: f64, tau: f64) -> bool {
         self.largest * tau > products
     }
@@ -214,7 +219,8 @@ impl Poles {
         }
         let half = self.propagate(&problem.y, &problem.b, 0.5 * tau)?;
         let halves = self.propagate(&half, &problem.b, 0.5 * tau)?;
-        // NextKind adds up in unknowns that nothing leaves is off by the same part for the whole and for the halves.
+        // Values that accumulate in unknowns without losses have the same relative error over the whole and over the
+        // halves.
         let flow = self.rest.min(tau * self.inflow);
         let most = problem.y.iter().chain(&halves).fold(flow, |m, y| m.max(y.abs()));
         if !problem.allows(&halves, |_| growth * (rounding * tau + ERROR_OF_SLOPE) * most) {

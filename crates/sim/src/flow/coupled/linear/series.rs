@@ -1,31 +1,33 @@
 //! Uniformisation: the exponential of a matrix as a series without cancellation.
 //!
-//! `exp(τ A) = exp(-q τ) exp(τ (A + q))`. If q is at least as large as every decay, and no unknown is decreased by another,
-//! `A + q` has no negative entry, and neither has any term of the series: what comes out is right to its own digits, down
-//! to where the series is cut off, and never negative (A. Jensen, Scand. Actuar. J. 1953; W. Grassmann, Comput. Oper. Res.
-//! 4 (1977) 47). Equations whose unknowns can be given signs so that they look like that (see [`Orthant`]) are as good.
-//! Nothing is asked of the spectrum: transport one way along a thousand cells is as easy as diffusion. NextKind it costs is
-//! one product of the matrix and a vector for each time that something happens in the fastest unknown.
+//! `exp(τ A) = exp(-q τ) exp(τ (A + q))`. If q is at least as large as every decay, and no unknown is decreased by
+//! another, `A + q` has no negative entry, and neither has any term of the series: the result is right to its own
+//! digits, down to the truncation error, and never negative (A. Jensen, Scand. Actuar. J. 1953; W. Grassmann, Comput.
+//! Oper. Res. 4 (1977) 47). Equations whose unknowns can be given signs so that they take this form (see [`Orthant`])
+//! are as good. The spectrum does not matter: transport in one direction along a thousand cells is as easy as
+//! diffusion. The cost is one product of the matrix and a vector for each mean time between two events of the fastest
+//! unknown.
 //!
 //! Long times are cut into stretches on a grid that observation does not move. States at two grids, a coarse one and a
-//! fine one, are kept, so that many looks do not begin at the start each time.
+//! fine one, are kept, so that repeated evaluations do not begin at the start each time.
 
 use super::{Problem, ROUNDING};
 
 /// Lengths of the stretches, in units of the mean time between two events of the fastest unknown.
 const STRETCHES: [f64; 2] = [256.0, 64.0];
-/// NextKind is cut off of a stretch, as a part of the largest value, and as a part of the tolerance.
+/// The truncation error of a stretch, as a part of the largest value.
 const CUT: f64 = 1.0 / (1u64 << 56) as f64;
+/// The truncation error of a stretch, as a part of the tolerance.
 const CUT_OF_TOLERANCE: f64 = 1e-6;
-/// Couplings as far apart as each other are stored side by side, if there are as many of them as this part of the
-/// unknowns.
+/// Couplings with the same difference of column and row are stored as a band if they occur in at least one of this many
+/// rows.
 const DENSE: usize = 8;
-/// So many terms are added up before somebody looks whether that is enough.
+/// The number of terms that are added up between two tests of the truncation error.
 const STRIDE: usize = 3;
-/// Rows that are worked on together stay in the processor's nearest cache.
+/// The number of rows that are worked on together, so that they stay in the first-level cache.
 const TILE: usize = 512;
 
-/// Signs of the unknowns: no unknown is driven away from its sign by another one.
+/// The signs that unknowns keep: no unknown is driven away from its sign by another one.
 #[derive(Clone, Debug)]
 pub struct Orthant {
     /// 1 or -1: the unknown has that sign, or is zero, at all times; 0: it may change. Empty: all are 1.
@@ -41,7 +43,7 @@ impl Orthant {
         if off().all(|e| e.2 > 0.0) && y.iter().chain(b).all(|x| *x >= 0.0) {
             return Some(Orthant { signs: Vec::new(), everywhere: true });
         }
-        // Of each unknown: another one on the way to the root of its part, and its sign relative to that.
+        // By unknown: another one on the path to the root of its part, and its sign relative to that (union and find).
         let mut above: Vec<(u32, f64)> = (0..y.len() as u32).map(|i| (i, 1.0)).collect();
         for &(row, column, value) in off() {
             let ((i, of_row), (j, of_column)) = (root(&mut above, row), root(&mut above, column));
@@ -52,7 +54,7 @@ impl Orthant {
                 return None;
             }
         }
-        // NextKind the values of each part say of the sign of its root: NaN if they do not agree.
+        // The sign of the root of each part that follows from the values of the part: NaN if they do not agree.
         let mut parts = vec![0.0f64; y.len()];
         for i in 0..y.len() {
             let (part, sign) = root(&mut above, i as u32);
@@ -68,7 +70,7 @@ impl Orthant {
             if known.is_nan() { 0.0 } else { known }
         };
         let signs: Vec<f64> = (0..y.len() as u32).map(sign).collect();
-        // A part that is zero stays so.
+        // A part that is zero stays zero.
         let everywhere = parts.iter().all(|part| !part.is_nan());
         Some(Orthant { signs, everywhere })
     }
@@ -78,6 +80,7 @@ impl Orthant {
         self.everywhere || self.signs[i] != 0.0
     }
 
+    /// True if all unknowns keep their signs.
     pub fn holds_everywhere(&self) -> bool {
         self.everywhere
     }
@@ -88,7 +91,7 @@ impl Orthant {
         self.signs.iter().all(|sign| *sign > 0.0)
     }
 
-    /// Values that an error has led out of the orthant are put where they would leave it.
+    /// Sets values to zero that an error has led out of the orthant.
     pub fn confine(&self, y: &mut [f64]) {
         if self.signs.is_empty() {
             y.iter_mut().for_each(|y| *y = if *y < 0.0 { 0.0 } else { *y });
@@ -104,7 +107,7 @@ fn root(above: &mut [(u32, f64)], i: u32) -> (u32, f64) {
     let (mut at, mut sign) = (i, 1.0);
     while above[at as usize].0 != at {
         let (next, s) = above[at as usize];
-        // Halves the way for whoever comes after.
+        // Path halving: later searches take half as long.
         let (second, t) = above[next as usize];
         if second != next {
             above[at as usize] = (second, s * t);
@@ -123,37 +126,38 @@ pub struct Series {
     /// Couplings by column minus row.
     bands: Vec<(isize, Vec<f64>)>,
     others: Vec<(u32, u32, f64)>,
-    /// Empty if it is zero.
+    /// The constant term; empty if it is zero.
     b: Vec<f64>,
     q: f64,
-    /// No state grows faster by `A + q`, in the largest of all values, with that of the constant that b comes from.
+    /// The norm of `A + q` for the largest of all values, with the constant that stands for b as a further value.
     speed: f64,
     /// The size of that constant.
     constant: f64,
     /// An error grows no faster than this in the largest of all values, and in their sum.
     growth: [f64; 2],
-    /// Roundings of a term.
+    /// The number of roundings of a term.
     roundings: f64,
     /// The largest value at the start, and of b.
     sizes: [f64; 2],
     cut: f64,
-    marks: Option<[Mark; 2]>,
+    marks: Option<[Checkpoint; 2]>,
     memory: [Vec<f64>; 2],
 }
 
-/// A state, and how it was come by.
+/// A state on a grid, and the errors accumulated up to it.
 #[derive(Clone, Debug, Default)]
-struct Mark {
+struct Checkpoint {
     /// Stretches since the start, or since the coarser mark.
     count: f64,
     y: Vec<f64>,
-    /// NextKind was cut off: bounds for the largest of all values, and for their sum.
+    /// The truncation error so far: bounds for the largest of all values, and for their sum.
     cut: [f64; 2],
-    /// Terms that were added up.
+    /// The number of terms that were added up.
     terms: f64,
 }
 
 impl Series {
+    /// The series of a problem whose couplings keep an orthant ([`Orthant::new`]).
     pub fn new(problem: &Problem) -> Series {
         let Problem { entries, b, y, tolerance } = problem;
         let n = y.len();
@@ -173,7 +177,7 @@ impl Series {
             in_column[j] += e.2.abs();
             match offsets.iter().position(|o| o.0 == offset(e)) {
                 Some(known) => offsets[known].1 += 1,
-                // Whoever has so many neighbours has them nowhere in particular.
+                // A matrix with this many different offsets is not banded.
                 None if offsets.len() < 32 => offsets.push((offset(e), 1)),
                 None => {}
             }
@@ -198,7 +202,7 @@ impl Series {
         let matrix = most(&mut rows());
         let largest = |values: &[f64]| values.iter().fold(0.0f64, |m, x| m.max(x.abs()));
         let sizes = [largest(y), largest(b)];
-        // The larger the constant, the less of it comes at once; but the more is asked of the terms that it leaves behind.
+        // The larger the constant, the smaller its share in one product; but the more terms follow from it.
         let scale = if matrix.max(q) > 0.0 { 0.25 * matrix.max(q) } else { 1.0 };
         let constant = sizes[1] / scale;
         let part = |b: &f64| if *b == 0.0 { 0.0 } else { b.abs() / constant };
@@ -224,7 +228,7 @@ impl Series {
         }
     }
 
-    /// The same for sizes: of everything its absolute value.
+    /// The series of the absolute values of all coefficients.
     pub fn majorant(&self) -> Series {
         let mut series = self.clone();
         series.marks = None;
@@ -233,7 +237,7 @@ impl Series {
         series
     }
 
-    /// About how many products of the matrix and a vector it takes from the start to a time.
+    /// The approximate number of products of the matrix and a vector from the start to a time.
     pub fn products(&self, tau: f64) -> f64 {
         let stretch = |theta: f64| theta + 7.0 * theta.sqrt() + 12.0;
         let mut theta = tau * self.speed;
@@ -246,20 +250,20 @@ impl Series {
         products + stretch(theta)
     }
 
-    /// No unknown can be larger at a time, and no sum of sizes that it is made of.
+    /// A bound of all unknowns at a time, and of the sums of sizes that they are made of.
     pub fn largest(&self, tau: f64) -> f64 {
         (self.growth[0] * tau).exp() * (self.sizes[0] + tau * self.sizes[1])
     }
 
-    /// The state some time after the start, which is `y`; a bound of what is cut off of every value; and a bound of what is
-    /// rounded, relative to the sum of the sizes of all that the value is made of.
+    /// The state some time after the start, which is `y`; a bound of the truncation error of every value; and a bound
+    /// of the rounding error, relative to the sum of the sizes of all terms of the value.
     pub fn at(&mut self, y: &[f64], tau: f64) -> (Vec<f64>, f64, f64) {
         let [coarse, fine] = STRETCHES.map(|stretch| stretch / self.speed.max(f64::MIN_POSITIVE));
         let count = (tau / coarse).floor();
         let rest = (tau - count * coarse).max(0.0);
         let small = (rest / fine).floor();
         let rest = (rest - small * fine).max(0.0);
-        let start = || Mark { y: y.to_vec(), ..Mark::default() };
+        let start = || Checkpoint { y: y.to_vec(), ..Checkpoint::default() };
         let [mut far, mut near] = self.marks.take().unwrap_or_else(|| [start(), start()]);
         if far.count != count || near.count > small {
             if far.count > count {
@@ -268,7 +272,7 @@ impl Series {
             while far.count < count {
                 self.advance(&mut far, coarse);
             }
-            near = Mark { count: 0.0, ..far.clone() };
+            near = Checkpoint { count: 0.0, ..far.clone() };
         }
         while near.count < small {
             self.advance(&mut near, fine);
@@ -280,8 +284,8 @@ impl Series {
         (last.y, last.cut[0].min(last.cut[1]), rounding)
     }
 
-    /// A stretch of the series.
-    fn advance(&mut self, mark: &mut Mark, h: f64) {
+    /// Advances a state by one stretch of the series.
+    fn advance(&mut self, mark: &mut Checkpoint, h: f64) {
         let theta = self.speed * h;
         // Half of the damping before and half after, so that nothing leaves the range of numbers in between.
         let damping = (-0.5 * self.q * h).exp();
@@ -304,7 +308,7 @@ impl Series {
                 if cut <= CUT * largest(sum) && cut * damping <= self.cut {
                     break cut * damping;
                 }
-                // Terms can no longer matter, whatever is asked for.
+                // The series does not converge to the required error.
                 if j > most {
                     break f64::INFINITY;
                 }
@@ -337,7 +341,7 @@ impl Series {
                 *out = d * x;
             }
             for (offset, band) in &self.bands {
-                // Rows of the tile whose columns there are.
+                // The rows of the tile whose columns exist.
                 let from = first.max((-*offset).max(0) as usize);
                 let to = end.min(n - (*offset).max(0) as usize);
                 if from < to {

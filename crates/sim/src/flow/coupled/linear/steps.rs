@@ -1,40 +1,42 @@
-//! The equations in steps, where no other way can answer for its error.
+//! The equations in steps, where no method without steps stays within its bound of the error.
 
 use super::Problem;
-use crate::flow::integrator::Integrator;
+use crate::flow::integrator::{Integrator, StepRequest};
 use crate::world::state::Control;
 use crate::{Settings, Stats};
 use dlsys_ode::Dense;
 use dlsys_ode::Rates;
 use dlsys_tree::SimTime;
 
-/// Steps from the start of the phase, whose time is zero here. Nobody's looking has any influence on them.
+/// Steps from the start of the trajectory, whose time is zero here. They do not depend on the times that are observed.
 #[derive(Clone)]
-pub struct Steps {
+pub struct LinearSteps {
     integrator: Integrator,
     control: Control,
-    /// The state at the start of the last step, and where that goes from and to; or, before the first, the start of all.
+    /// The state at the start of the last step, and the ends of that; before the first step, the start of the
+    /// trajectory.
     y: Vec<f64>,
     from: SimTime,
     end: SimTime,
-    /// The last step, if somebody has looked.
+    /// The dense output of the last step, if it has been evaluated.
     dense: Option<Dense>,
 }
 
-impl Steps {
-    pub fn new(problem: &Problem, settings: &Settings, control: Control) -> Steps {
+impl LinearSteps {
+    /// Steps from the start of a problem, beginning with the experience `control`.
+    pub fn new(problem: &Problem, settings: &Settings, control: Control) -> LinearSteps {
         let mut integrator = Integrator::default();
         integrator.restart(settings.method, problem.y.len());
         let (from, end) = (SimTime::ZERO, SimTime::ZERO);
-        Steps { integrator, control, y: problem.y.clone(), from, end, dense: None }
+        LinearSteps { integrator, control, y: problem.y.clone(), from, end, dense: None }
     }
 
-    /// True if a time can only be reached from the start.
+    /// True if a time lies before the last step, so that it can only be reached from the start.
     pub fn have_passed(&self, tau: f64) -> bool {
         SimTime::new(tau).since(self.from) < 0.0
     }
 
-    /// The state at a time that is not before the last step. None if steps do not come that far.
+    /// The state at a time that is not before the last step. None if the steps do not come that far.
     pub fn at(
         &mut self,
         problem: &Problem,
@@ -43,15 +45,16 @@ impl Steps {
         stats: &mut Stats,
     ) -> Option<Vec<f64>> {
         let at = SimTime::new(tau);
-        let Steps { integrator, control, y, from, end, dense } = self;
-        let mut flow = Flow { problem };
+        let LinearSteps { integrator, control, y, from, end, dense } = self;
+        let mut flow = LinearRates { problem };
         while end.since(at) < 0.0 {
             if end.since(SimTime::ZERO) > 0.0 {
                 integrator.advance(y);
             }
             *from = *end;
             *dense = None;
-            *end = integrator.step(settings, control, &mut flow, y, *from, None, stats).ok()?;
+            let request = StepRequest { settings, y, start: *from, limit: None };
+            *end = integrator.step(request, control, &mut flow, stats).ok()?;
         }
         let dense = dense.get_or_insert_with(|| integrator.dense(&mut flow, y));
         let position = dense.position(at);
@@ -59,12 +62,12 @@ impl Steps {
     }
 }
 
-/// The right-hand side.
-struct Flow<'a> {
+/// The right-hand side of a linear system.
+struct LinearRates<'a> {
     problem: &'a Problem,
 }
 
-impl Rates for Flow<'_> {
+impl Rates for LinearRates<'_> {
     fn rates(&mut self, _: f64, y: &[f64], out: &mut [f64]) {
         out.copy_from_slice(&self.problem.b);
         for &(row, column, value) in &self.problem.entries {

@@ -1,4 +1,4 @@
-//! Tests of the ways without steps: random equations of every kind against an exponential with 31 digits, and
+//! Tests of the methods without steps: random equations of every kind against an exponential with 31 digits, and
 //! transport in closed form.
 
 mod oracle;
@@ -40,7 +40,7 @@ impl Random {
     }
 }
 
-/// How neighbours weigh on each other.
+/// The relation of the two influences between neighbours.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Weighing {
     Alike,
@@ -50,7 +50,7 @@ enum Weighing {
     Against,
 }
 
-/// Some unknowns in a tree, with everything that can be asked of them.
+/// A random problem whose unknowns form a tree, and a time.
 fn random(random: &mut Random, weighing: Weighing) -> (Problem, f64) {
     let n = 2 + random.below(9) as u32;
     let rate = random.decades(-3.0, 4.0);
@@ -76,7 +76,7 @@ fn random(random: &mut Random, weighing: Weighing) -> (Problem, f64) {
             Weighing::OneWay => (d, 0.0),
             _ => (d, if random.chance(0.5) { -d } else { d }),
         };
-        // NextKind flows is lost where it comes from, or only seen there.
+        // A flow is lost at its origin, or only measured there.
         let (lost_above, lost_below) = if random.chance(0.5) { (down, up) } else { (up, down) };
         decays[parent as usize] += lost_above.abs();
         decays[k as usize] += lost_below.abs();
@@ -132,7 +132,8 @@ fn linear(problem: &Problem) -> Option<Linear> {
     Linear::of(problem.clone(), unknown, SimTime::ZERO)
 }
 
-/// Errors of whatever is accepted, way by way, over random equations of one kind. There must be as many answers as that.
+/// Checks the errors of the accepted answers of each method over random equations of one kind. There must be at least
+/// `wanted` answers of each.
 fn answers(weighing: Weighing, wanted: [usize; 3]) {
     let (mut counts, mut worst) = ([0; 3], [0.0f64; 3]);
     for seed in 0..1_000 {
@@ -148,7 +149,7 @@ fn answers(weighing: Weighing, wanted: [usize; 3]) {
             let Some(error) = error(&problem, tau, &found) else { continue };
             assert!(error <= 5.0, "{error} tolerances: {what}");
             if way == 0 {
-                // NextKind is added up without cancellation has no need to be put right.
+                // Sums without cancellation need no correction.
                 let before = found.clone();
                 linear.orthant.confine(&mut found);
                 assert_eq!(before, found, "{what}");
@@ -195,10 +196,10 @@ fn neighbours_that_swing_are_left_to_steps() {
     answers(Weighing::Against, [50, 0, 0]);
 }
 
-/// Nothing leaves: what flows in adds up, and every rounding of the matrix lasts. The bound of the error is hardly larger
-/// than the error here.
+/// Without losses the inflow accumulates, and every rounding of the matrix lasts. The bound of the error is hardly
+/// larger than the error here.
 #[test]
-fn what_nothing_leaves() {
+fn flow_without_losses() {
     let mut answers = 0;
     for seed in 0..600 {
         let mut r = Random(seed);
@@ -229,9 +230,9 @@ fn what_nothing_leaves() {
     assert!(answers >= 500, "{answers}");
 }
 
-/// Everything that is offered to the simulation, whichever way it is come by: within the promise, and never beyond zero.
+/// Every answer that the simulation receives, by any method, is within the documented error and has the right sign.
 #[test]
-fn the_promise_is_kept_whatever_way_is_taken() {
+fn errors_are_within_the_limit_by_every_method() {
     let (mut stepped, mut confined) = (0, 0);
     for seed in 10_000..10_400 {
         let mut r = Random(seed);
@@ -252,7 +253,7 @@ fn the_promise_is_kept_whatever_way_is_taken() {
             assert!(!found.iter().any(|x| *x < 0.0), "seed {seed}: {found:?}");
         }
         stepped += usize::from(stats.steps > 0);
-        // To the same bits after other looks, forwards and back.
+        // The same bits follow after evaluations at other times, later and earlier.
         for part in [0.01, 0.5, 0.9, 2.0] {
             if part < 1.0 || stats.steps == 0 {
                 before.at(SimTime::new(part * tau), &settings, &Control::default(), &mut stats);
@@ -296,9 +297,9 @@ fn transport_one_way_is_as_good_as_diffusion() {
     }
 }
 
-/// A large start that decays: what it leaves is known to its own digits.
+/// The remainder of a large start that decays is known to its own digits.
 #[test]
-fn what_is_left_of_much_is_known() {
+fn the_remainder_of_a_large_start_keeps_its_digits() {
     // x' = y - x, y' = -y.
     let entries = vec![(0, 0, -1.0), (0, 1, 1.0), (1, 1, -1.0)];
     let problem = Problem { entries, b: vec![0.0; 2], y: vec![0.0, 3e13], tolerance: 1e-9 };

@@ -1,4 +1,4 @@
-//! The exponential of a small dense matrix with 31 digits: what the ways are measured against.
+//! The exponential of a small dense matrix with 31 digits: the reference for the methods without steps.
 
 use super::super::Problem;
 
@@ -105,7 +105,7 @@ pub fn exact(problem: &Problem, tau: f64) -> Vec<f64> {
     e[..n].iter().map(sum).collect()
 }
 
-/// Against what is known in closed form.
+/// Compares the reference with solutions in closed form.
 #[test]
 fn is_right_itself() {
     let close = |found: f64, expected: f64| {

@@ -1,0 +1,286 @@
+//! The search of a stretch of time for a module's next event.
+//!
+//! The signs of the rule's atoms are known at the start of the stretch. An event is the first instant at which a change
+//! of signs has a consequence: the condition of a production becomes true, the condition of the active equations ends,
+//! or a condition inside them changes. Changes without consequence are recorded on the way.
+//!
+//! ```text
+//! track_atoms ─▶ which atoms may change, and the first crossing or doubt of each   ([`crossing`], [`doubt`])
+//! follow      ─▶ from one crossing to the next, until one has a consequence or none is left
+//! ```
+//!
+//! [`crossing`]: super::crossing
+//! [`doubt`]: super::doubt
+
+use smallvec::SmallVec;
+
+use crate::detect::crossing::{Crossing, CrossingDetector, LocationMethod, is_unreachable, location_method};
+use crate::detect::doubt::{AtomQuery, Lookahead};
+use crate::detect::signs::{matters, produces};
+use crate::world::path::Path;
+use crate::world::state::{Change, Signs};
+use dlsys_expr::Program;
+use dlsys_model::Sign;
+use dlsys_ode::Function;
+
+/// Most changes of a module's signs that are followed within one stretch.
+const MAX_ROUNDS: usize = 50;
+
+/// The outcome of a search.
+#[derive(Clone, Debug, Default)]
+pub struct SearchResult {
+    /// Position of the event on the path, in units of its length, if there is one.
+    pub event: Option<f64>,
+    /// Signs that are zero at the event, the earliest first.
+    pub touched: SmallVec<[Change; 1]>,
+    /// Signs that change without consequence before the event, or before the end of the path.
+    pub changes: Vec<Change>,
+    /// The error of integration does not decide whether the event takes place.
+    pub in_doubt: bool,
+    /// Atoms, one bit each, whose sides are too near each other at the end for their sign to be known; as in
+    /// [`Next`](crate::world::state::Next).
+    pub near: u64,
+}
+
+/// An atom whose sign may change on the path.
+struct TrackedAtom {
+    atom: usize,
+    /// Up to this the difference counts as zero; NaN where the instant is known by a formula.
+    tolerance: f64,
+    ahead: Lookahead,
+}
+
+impl TrackedAtom {
+    fn is_exact(&self) -> bool {
+        self.tolerance.is_nan()
+    }
+}
+
+/// The atoms whose crossings coincide with the first one: the signs at the instant and just after it, and their changes.
+struct Coincidence {
+    at: Signs,
+    after: Signs,
+    group: SmallVec<[Change; 1]>,
+}
+
+/// A search in progress.
+struct Search<'s, 'p> {
+    detector: &'s mut CrossingDetector,
+    path: &'s Path<'p>,
+    /// The position up to which the path is searched.
+    limit: f64,
+    /// The relative error of integrated values; 0 where nothing is integrated, so that all is known to the last digits.
+    error: f64,
+    /// The signs just after the last change.
+    now: Signs,
+    tracked: SmallVec<[TrackedAtom; 4]>,
+    /// Changes that have been followed.
+    rounds: usize,
+}
+
+impl CrossingDetector {
+    /// Searches a path up to the position `limit`, in units of its length.
+    pub fn search(&mut self, path: &Path, limit: f64) -> SearchResult {
+        let (rule, state) = (path.rule, path.state);
+        if rule.atoms.is_empty() {
+            return SearchResult::default();
+        }
+        let mut now = Signs::from_slice(&state.signs);
+        for change in &state.next.changes {
+            now[change.atom] = change.after;
+        }
+        let error = path.error();
+        let mut search =
+            Search { detector: self, path, limit, error, now, tracked: SmallVec::new(), rounds: 0 };
+        search.track_atoms();
+        search.follow()
+    }
+}
+
+impl Search<'_, '_> {
+    fn is_integrated(&self) -> bool {
+        self.error > 0.0
+    }
+
+    /// Finds the atoms whose sign may change, with the first crossing of each.
+    #[inline]
+    fn track_atoms(&mut self) {
+        let (path, rule, state) = (self.path, self.path.rule, self.path.state);
+        let mut measured = false;
+        for (atom, crossing) in rule.watch(state.solve).iter().enumerate() {
+            if is_unreachable(rule, state, atom) {
+                continue;
+            }
+            match location_method(crossing, state) {
+                LocationMethod::Never => {}
+                LocationMethod::Formula(variable, level) => self.track_formula(atom, variable, level),
+                LocationMethod::Search => {
+                    if self.detector.keeps_clear(path, crossing, self.now[atom], self.error) {
+                        continue;
+                    }
+                    if !std::mem::replace(&mut measured, true) {
+                        self.detector.measure(path);
+                    }
+                    if let Some(tolerance) = self.detector.may_change(path, atom, self.now[atom]) {
+                        let near = atom < 64 && state.next.near & 1 << atom != 0;
+                        let decides = self.decides(atom);
+                        let ahead = self.look_ahead(atom, tolerance, 0.0, near, decides);
+                        self.tracked.push(TrackedAtom { atom, tolerance, ahead });
+                    }
+                }
+            }
+        }
+    }
+
+    /// Tracks an atom whose crossing is known by a formula, if it lies on the path.
+    #[inline]
+    fn track_formula(&mut self, atom: usize, variable: usize, level: &Program) {
+        let next = self.detector.meet(self.path, atom, variable, level, self.now[atom]);
+        let next = next.filter(|crossing| crossing.position <= self.limit);
+        if next.is_some() {
+            let ahead = Lookahead { next, ..Lookahead::default() };
+            self.tracked.push(TrackedAtom { atom, tolerance: f64::NAN, ahead });
+        }
+    }
+
+    /// True if a production may depend on an atom that is integrated, so that doubts about it have to be reported.
+    fn decides(&self, atom: usize) -> bool {
+        self.is_integrated() && produces(self.path.rule, &self.now, atom)
+    }
+
+    /// The first crossing or doubt of an atom from a position on.
+    fn look_ahead(&mut self, atom: usize, tolerance: f64, from: f64, near: bool, decides: bool) -> Lookahead {
+        let (limit, sign, error) = (self.limit, self.now[atom], self.error);
+        if self.is_integrated() && matches!(sign, Sign::Plus | Sign::Minus) {
+            let query = AtomQuery { atom, from, limit, sign, tolerance, near, decides, error };
+            return self.detector.look(self.path, query);
+        }
+        let next = self.detector.root(self.path, atom, from, limit, sign, tolerance);
+        Lookahead { next, ..Lookahead::default() }
+    }
+
+    /// Follows the crossings of the tracked atoms one after another, up to the first that has a consequence.
+    fn follow(&mut self) -> SearchResult {
+        let mut result = SearchResult::default();
+        loop {
+            let crossings = self.tracked.iter().filter_map(|t| t.ahead.next);
+            let first = crossings.min_by(|a, b| a.position.total_cmp(&b.position));
+            if let Some((index, position)) = self.first_doubt()
+                && first.is_none_or(|first| position < first.position)
+            {
+                let atom = self.tracked[index].atom;
+                if produces(self.path.rule, &self.now, atom) {
+                    let (time, at) = (self.path.start.after(position * self.path.h), Sign::Zero);
+                    let after = self.now[atom];
+                    result.event = Some(position);
+                    result.touched.push(Change { atom, time, at, after, level: None });
+                    result.in_doubt = true;
+                    return result;
+                }
+                self.pass_doubt(index, position);
+                continue;
+            }
+            let Some(first) = first else { break };
+            self.rounds += 1;
+            let Coincidence { at, after, mut group } = self.coincidence(first);
+            // A condition that oscillates without end is cut into short stretches, each of bounded work.
+            if matters(self.path.rule, self.path.state, &at, &after) || self.rounds > MAX_ROUNDS {
+                result.event = Some(first.position);
+                group.sort_by(|a, b| a.time.since(b.time).total_cmp(&0.0));
+                result.touched = group;
+                return result;
+            }
+            self.now = after;
+            self.pass_changes(&group, first.position);
+            result.changes.extend(group);
+        }
+        for tracked in self.tracked.iter().filter(|t| t.ahead.near && t.atom < 64) {
+            result.near |= 1 << tracked.atom;
+        }
+        result
+    }
+
+    /// The tracked atom with the earliest doubt, by its index, and the position of that.
+    #[inline]
+    fn first_doubt(&self) -> Option<(usize, f64)> {
+        let doubts = self.tracked.iter().enumerate().filter_map(|(i, t)| Some((i, t.ahead.doubt?)));
+        doubts.min_by(|(_, a), (_, b)| a.total_cmp(b))
+    }
+
+    /// Goes on behind a doubt from which nothing follows.
+    fn pass_doubt(&mut self, index: usize, position: f64) {
+        let TrackedAtom { atom, tolerance, .. } = self.tracked[index];
+        self.rounds += 1;
+        self.tracked[index].ahead = match self.rounds > MAX_ROUNDS {
+            true => Lookahead::default(),
+            false => self.look_ahead(atom, tolerance, position, false, true),
+        };
+    }
+
+    /// The changes of sign that belong to the instant of the first crossing.
+    fn coincidence(&mut self, first: Crossing) -> Coincidence {
+        let together = self.last_together(first.position);
+        let (mut at, mut after) = (Signs::from_slice(&self.now), Signs::from_slice(&self.now));
+        let mut group: SmallVec<[Change; 1]> = SmallVec::new();
+        let Search { detector, path, now, tracked, .. } = self;
+        for tracked in &*tracked {
+            let atom = tracked.atom;
+            // The instant of a touch is known only to about the square root of the rounding: a difference that is zero
+            // here touches here.
+            let mut is_zero =
+                || detector.difference(path, atom).value(first.position).abs() <= tracked.tolerance;
+            let here = match &tracked.ahead.next {
+                Some(crossing) if crossing.position <= together => Some(*crossing),
+                _ if tracked.is_exact() => None,
+                Some(crossing) if crossing.after == now[atom] && is_zero() => {
+                    Some(Crossing { at: Sign::Zero, time: first.time, ..*crossing })
+                }
+                None if now[atom] != Sign::Zero && is_zero() => {
+                    Some(Crossing { at: Sign::Zero, after: now[atom], level: None, ..first })
+                }
+                _ => None,
+            };
+            if let Some(crossing) = here {
+                (at[atom], after[atom]) = (crossing.at, crossing.after);
+                let time = if crossing.position <= first.position { first.time } else { crossing.time };
+                let (at, after, level) = (crossing.at, crossing.after, crossing.level);
+                group.push(Change { atom, time, at, after, level });
+            }
+        }
+        Coincidence { at, after, group }
+    }
+
+    /// The last position that is indistinguishable from that of the first crossing, given the resolution of time and
+    /// the error of integration.
+    fn last_together(&mut self, first: f64) -> f64 {
+        let instant = first + self.path.start.after(first * self.path.h).resolution() / self.path.h;
+        let crosses_first = |t: &TrackedAtom| t.ahead.next.is_some_and(|c| c.position == first);
+        let crossing = self.tracked.iter().filter(|t| t.ahead.next.is_some()).count();
+        let first_is_exact = || self.tracked.iter().any(|t| t.is_exact() && crosses_first(t));
+        if !self.is_integrated() || crossing <= 1 || first_is_exact() {
+            return instant;
+        }
+        let atom = self.tracked.iter().find(|t| crosses_first(t)).map(|t| t.atom);
+        let slack = atom.map_or(0.0, |atom| self.detector.slack(self.path, atom, first));
+        instant.max(first + slack)
+    }
+
+    /// Looks ahead again for the atoms that have changed without consequence.
+    fn pass_changes(&mut self, group: &[Change], first: f64) {
+        for i in 0..self.tracked.len() {
+            let TrackedAtom { atom, tolerance, ahead } = &self.tracked[i];
+            let (atom, tolerance) = (*atom, *tolerance);
+            if !group.iter().any(|change| change.atom == atom) {
+                continue;
+            }
+            let from = ahead.next.map_or(first, |crossing| crossing.position.max(first));
+            // A variable that moves monotonically takes its level only once.
+            self.tracked[i].ahead = if self.tracked[i].is_exact() {
+                Lookahead::default()
+            } else {
+                let decides = self.decides(atom);
+                self.look_ahead(atom, tolerance, from, false, decides)
+            };
+        }
+    }
+}

@@ -1,0 +1,422 @@
+//! The common step of the coupled modules: its start, its steps, and the search for the next event of each member.
+
+use crate::detect::crossing::needs_search;
+use crate::detect::pulse::{ExaminedStep, MAX_UNBOUNDED, PulseFinding};
+use crate::error::Error;
+use crate::flow::FlowStage;
+use crate::flow::coupled::Coupled;
+use crate::flow::coupled::equations::Equations;
+use crate::flow::coupled::linear::Linear;
+use crate::flow::coupled::prefetch::prefetch;
+use crate::flow::coupled::system::{Membership, integrated};
+use crate::flow::independent::crawls;
+use crate::flow::integrator::{StepError, StepRequest};
+use crate::schedule::Owner;
+use crate::trajectory::Trajectory;
+use crate::world::World;
+use crate::world::coupled_solution::CoupledSolution;
+use crate::world::path::Path;
+use crate::world::state::NextKind;
+use crate::{Method, Scheduler};
+use dlsys_model::Rule;
+use dlsys_tree::{ModuleId, SimTime, Visit};
+
+/// Most times that a step is tried whose algebraic components cannot be followed, or whose rates may have pulses.
+const MAX_TRIES: usize = 100;
+
+/// A solution without steps begins anew, for all modules, at every event; after this many events steps are made.
+const MAX_CUTS: u32 = 2;
+
+/// A common step: its end, and its dense output if that has been computed.
+type CommonStep = (Result<SimTime, StepError>, Option<CoupledSolution>);
+
+impl FlowStage<'_, '_> {
+    /// Begins the common trajectory of the coupled modules at an instant.
+    pub fn restart_coupled(&mut self, at: SimTime) -> Result<(), Error> {
+        let members = self.gather_members(at);
+        self.schedule.cancel(Owner::Coupled);
+        let frozen = self.setup.settings.is_sliced();
+        let membership = Membership { world: self.world, members: &members, start: at, frozen };
+        self.flows.coupled.system.rebuild(&self.setup.model.rules, &membership, Some);
+        self.flows.coupled.pulsing.clear();
+        if self.setup.has_pulses && !self.setup.settings.method.is_fixed_step() {
+            let pulsing: Vec<ModuleId> = members.iter().copied().filter(|id| self.may_pulse(*id)).collect();
+            self.flows.coupled.pulsing = pulsing;
+        }
+        self.flows.coupled.members = members;
+        (self.flows.coupled.reintegrated, self.flows.coupled.pending) = (false, false);
+        self.choose_method();
+        if self.flows.coupled.members.is_empty() {
+            return Ok(());
+        }
+        if self.flows.coupled.linear.is_some() {
+            self.show_coupled(at);
+            return Ok(());
+        }
+        self.step_coupled(at)
+    }
+
+    /// The coupled modules in string order. Their present values become those of the tree and of the state vector.
+    fn gather_members(&mut self, at: SimTime) -> Vec<ModuleId> {
+        let mut members = std::mem::take(&mut self.flows.coupled.members);
+        members.clear();
+        members.extend(self.world.tree.walk().filter_map(|visit| match visit {
+            Visit::Module(id) if matches!(self.world.states.get(id.slot()), Some(Some(_))) => Some(id),
+            _ => None,
+        }));
+        let solution = self.world.coupled.take();
+        self.flows.coupled.y.clear();
+        let mut count = 0;
+        for n in 0..members.len() {
+            prefetch(self.world, &members, n);
+            let id = members[n];
+            if self.world.state(id).is_none_or(|s| !s.coupled) {
+                continue;
+            }
+            members[count] = id;
+            count += 1;
+            self.gather_member(id, solution.as_ref(), at);
+        }
+        members.truncate(count);
+        members
+    }
+
+    /// Makes the present values of a module's components those of the tree, and appends them to the state vector.
+    #[inline]
+    fn gather_member(&mut self, id: ModuleId, solution: Option<&CoupledSolution>, at: SimTime) {
+        let World { tree, states, .. } = &mut *self.world;
+        let state = states[id.slot()].as_mut().expect("a member");
+        let first = tree.places(id).start;
+        for &parameter in integrated(self.setup.model, state) {
+            let trajectory = &mut state.trajectories[parameter];
+            let value = match *trajectory {
+                Trajectory::Coupled(component) => solution.and_then(|c| c.value(component as usize, at)),
+                Trajectory::Step(component) => state
+                    .step
+                    .as_ref()
+                    .filter(|step| step.live)
+                    .map(|step| step.dense.value(component as usize, step.dense.position(at))),
+                _ => None,
+            };
+            let place = first + parameter;
+            let value = value.unwrap_or(tree.values()[place]);
+            tree.set_value(place, value);
+            *trajectory = Trajectory::Coupled(self.flows.coupled.y.len() as u32);
+            self.flows.coupled.y.push(value);
+        }
+        state.pass_changes(at);
+        if !state.next.lasting {
+            state.next = state.next.again();
+            self.schedule.cancel(Owner::Module(id.slot() as u32));
+        }
+    }
+
+    /// Solves the equations without steps if they are linear and no event can cut their trajectory; else prepares the
+    /// integrator.
+    fn choose_method(&mut self) {
+        let without_steps = self.setup.settings.method == Method::Auto
+            && (self.flows.coupled.control.stiff || self.flows.coupled.cuts < MAX_CUTS)
+            && !self.setup.settings.is_sliced()
+            && !self.searches_coupled();
+        let Coupled { system, y, integrator, linear, tried, pulsing, .. } = &mut self.flows.coupled;
+        let rules = &self.setup.model.rules;
+        *tried = without_steps;
+        *linear = (without_steps)
+            .then(|| Linear::new(system, rules, y, self.setup.coupled_settings.tolerance))
+            .flatten();
+        // After each step all members are searched.
+        integrator.expect_high_overhead();
+        let is_unwatched =
+            rules.iter().all(|rule| rule.atoms.is_empty()) && pulsing.is_empty() && system.algebra.is_empty();
+        integrator.set_unwatched(is_unwatched);
+        integrator.restart(self.setup.settings.method, y.len());
+    }
+
+    /// True if some condition of the coupled modules can only be found by searching their common trajectory.
+    fn searches_coupled(&self) -> bool {
+        self.flows.coupled.members.iter().any(|id| self.has_conditions(*id))
+    }
+
+    fn has_conditions(&self, id: ModuleId) -> bool {
+        let rule = self.world.state(id).and_then(|s| s.rule);
+        rule.is_some_and(|r| !self.setup.model.rules[r].atoms.is_empty())
+    }
+
+    /// Makes the trajectory of the coupled modules available at an instant: the dense output of the common step, or the
+    /// solution without steps.
+    pub fn show_coupled(&mut self, at: SimTime) {
+        let Coupled { system, y, integrator, control, linear, pending, .. } = &mut self.flows.coupled;
+        match linear {
+            Some(linear) => {
+                if self.world.coupled.as_ref().is_none_or(|solution| solution.start() != at) {
+                    let dense = linear.at(at, &self.setup.coupled_settings, control, &mut self.log.stats);
+                    self.world.coupled = Some(CoupledSolution::new(dense));
+                }
+            }
+            None => {
+                if std::mem::take(pending) {
+                    let mut equations = Equations::new(system, &self.setup.model.rules, None);
+                    let stretches = match integrator.is_unwatched() {
+                        true => integrator.refined(&mut equations, y, &self.setup.coupled_settings),
+                        false => vec![integrator.dense(&mut equations, y)],
+                    };
+                    self.world.coupled = Some(CoupledSolution::of(stretches));
+                }
+            }
+        }
+    }
+
+    /// Makes a step of the coupled modules and searches it.
+    fn step_coupled(&mut self, from: SimTime) -> Result<(), Error> {
+        let (step, solution) = self.make_step(from);
+        let end = match step {
+            Ok(end) => end,
+            Err(error) => return self.fail_step(error, from),
+        };
+        self.flows.coupled.pending = solution.is_none();
+        self.world.coupled = solution;
+        let members = std::mem::take(&mut self.flows.coupled.members);
+        for (at, &id) in members.iter().enumerate() {
+            prefetch(self.world, &members, at);
+            self.search_member(id, from);
+        }
+        self.flows.coupled.members = members;
+        self.schedule.schedule(Owner::Coupled, end);
+        Ok(())
+    }
+
+    /// Makes a step that resolves the algebraic components and overlooks no pulse; shorter ones are tried until one
+    /// does.
+    fn make_step(&mut self, from: SimTime) -> CommonStep {
+        let rules = &self.setup.model.rules;
+        let limit = self.setup.settings.slice_end(from);
+        let settings = &self.setup.coupled_settings;
+        let (mut solution, mut tries) = (None, 0);
+        let step = loop {
+            let Coupled { system, y, integrator, control, pulsing, .. } = &mut self.flows.coupled;
+            let mut equations = Equations::new(system, rules, None);
+            let stats = &mut self.log.stats;
+            let request = StepRequest { settings, y, start: from, limit };
+            let step = integrator.step(request, control, &mut equations, stats);
+            if step.is_err() || system.algebra.is_empty() && pulsing.is_empty() {
+                break step;
+            }
+            let stretches = match system.algebra.is_empty() {
+                true => Ok(vec![integrator.dense(&mut equations, y)]),
+                false => integrator.blended(&mut equations, y, settings, control),
+            };
+            match stretches {
+                Ok(stretches) => {
+                    let found = CoupledSolution::of(stretches);
+                    let h = found.end.since(from);
+                    self.world.coupled = Some(found);
+                    let overlooked = self.first_overlooked(from, h, tries);
+                    solution = self.world.coupled.take();
+                    let least = 64.0 * from.resolution();
+                    match overlooked {
+                        Some(at) if h > least && tries < MAX_TRIES => {
+                            tries += 1;
+                            self.log.stats.rejected += 1;
+                            let part = if at > 0.0 { at } else { 0.25 };
+                            self.flows.coupled.control.size = (h * part).max(least);
+                        }
+                        _ => break step,
+                    }
+                }
+                Err(error) => {
+                    tries += 1;
+                    stats.rejected += 1;
+                    if tries > MAX_TRIES || settings.method.is_fixed_step() {
+                        break Err(StepError::ValueNotFinite(error.component()));
+                    }
+                }
+            }
+        };
+        (step, solution)
+    }
+
+    /// The first position in a step of length `h`, from 0 to 1, at which a pulse of some member may have been
+    /// overlooked.
+    fn first_overlooked(&mut self, from: SimTime, h: f64, tries: usize) -> Option<f64> {
+        let Coupled { integrator, control, pulsing, .. } = &self.flows.coupled;
+        let settings = &self.setup.coupled_settings;
+        let stiff = control.stiff || settings.method.is_implicit();
+        let nodes = integrator.nodes();
+        let overlooked = pulsing.iter().filter_map(|id| {
+            let how = (settings.tolerance, stiff);
+            let step = examined_step(self.world, &self.setup.model.rules, *id, from, &nodes, how)?;
+            match self.detector.pulses.examine(&step) {
+                PulseFinding::Clear => None,
+                PulseFinding::Overlooked(at) => Some(at),
+                PulseFinding::Unbounded(at) if tries <= MAX_UNBOUNDED => Some(at),
+                PulseFinding::Unbounded(at) => {
+                    let rule = self.world.state(*id).and_then(|s| s.rule).unwrap_or(0);
+                    self.detector.unbounded.entry(rule).or_insert(from.to_f64() + at * h);
+                    None
+                }
+            }
+        });
+        overlooked.reduce(f64::min)
+    }
+
+    /// Handles a step that fails: a boundary that has been reached there is an event, anything else an error.
+    fn fail_step(&mut self, error: StepError, from: SimTime) -> Result<(), Error> {
+        let Coupled { system, y, .. } = &self.flows.coupled;
+        let mut equations = Equations::new(system, &self.setup.model.rules, None);
+        // Equations without a solution explain more than the failure of a step.
+        let unsolved = equations.make_consistent(0.0, &mut y.clone()).err();
+        if unsolved.is_none() && self.arrest_coupled(error.component(), from) {
+            return Ok(());
+        }
+        Err(match unsolved {
+            Some(unsolved) => {
+                self.unsolved(unsolved, self.flows.coupled.system.owner(unsolved.component()), from)
+            }
+            None => self.coupled_error(error, from),
+        })
+    }
+
+    /// Finds a coupled module's next event before the end of the common step.
+    pub fn search_member(&mut self, id: ModuleId, from: SimTime) {
+        let Some(state) = self.world.state(id) else { return };
+        let Some(rule) = state.rule.map(|r| &self.setup.model.rules[r]) else { return };
+        if rule.atoms.is_empty() || state.next.lasting {
+            return;
+        }
+        if !needs_search(state, rule) {
+            self.look_ahead(id, from).expect("no step is made");
+            return;
+        }
+        self.show_coupled(from);
+        let who = Owner::Module(id.slot() as u32);
+        let mut start = from;
+        loop {
+            let (Some(solution), Some(state)) = (&self.world.coupled, self.world.state(id)) else { return };
+            let Some(rule) = state.rule.map(|r| &self.setup.model.rules[r]) else { return };
+            // Up to the knot every variable that the module reads follows one polynomial.
+            let knot = self.world.knot(state, solution, start);
+            let h = knot.since(start);
+            if h <= 0.0 {
+                return self.schedule.cancel(who);
+            }
+            let path = Path::new(self.world, state, rule, start, h);
+            let found = self.detector.crossings.search(&path, 1.0);
+            let last = knot.since(solution.end) >= 0.0;
+            let state = self.world.state_mut(id).expect("seen above");
+            state.next.changes.extend(found.changes);
+            let (before, index) = (std::mem::replace(&mut state.next.near, found.near), state.rule);
+            self.detector.note_approach(index.unwrap_or(0), found.near, before, knot);
+            let state = self.world.state_mut(id).expect("seen above");
+            if found.event.is_some() {
+                let time = found.touched[0].time;
+                let kind = if found.in_doubt { NextKind::Doubt } else { NextKind::Event };
+                (state.next.kind, state.next.touched) = (kind, found.touched);
+                return self.schedule.schedule(who, time);
+            }
+            if last {
+                return self.schedule.cancel(who);
+            }
+            start = knot;
+        }
+    }
+
+    /// Advances the coupled modules to the end of their common step, and makes the next one.
+    pub fn pass_coupled_step(&mut self, at: SimTime) -> Result<(), Error> {
+        let Coupled { mark, since_mark, .. } = &mut self.flows.coupled;
+        if crawls(mark, since_mark, at) && !self.setup.settings.method.is_fixed_step() {
+            return Err(self.coupled_error(StepError::StepTooSmall(0), at));
+        }
+        let slice_ends = |from| self.setup.settings.slice_end(from).is_some_and(|end| end == at);
+        if self.flows.coupled.reintegrated || slice_ends(self.flows.coupled.system.table.start) {
+            // The values at the end of the step are read from its dense output, which may not have been computed yet.
+            self.show_coupled(at);
+            return self.restart_coupled(at);
+        }
+        let Coupled { members, system, y, integrator, control, .. } = &mut self.flows.coupled;
+        for (n, id) in members.iter().enumerate() {
+            prefetch(self.world, members, n);
+            self.world.state_mut(*id).expect("a member").pass_changes(at);
+        }
+        integrator.advance(y);
+        for (&(place, ..), &value) in system.table.places.iter().zip(y.iter()) {
+            self.world.tree.set_value(place, value);
+        }
+        system.advance(at);
+        let stiff = control.stiff && self.setup.settings.method == Method::Auto;
+        if stiff && !self.flows.coupled.tried && !self.searches_coupled() {
+            return self.restart_coupled(at);
+        }
+        self.step_coupled(at)
+    }
+
+    /// True if an event of one coupled module ends the common step for all.
+    pub fn is_cut_by_events(&self) -> bool {
+        if self.setup.settings.is_sliced() {
+            return false;
+        }
+        self.setup.settings.scheduler == Scheduler::Global
+            || self.setup.settings.method.is_fixed_step()
+            || self.setup.settings.method.is_implicit()
+            || self.flows.coupled.control.stiff
+            || self.flows.coupled.linear.is_some()
+    }
+
+    /// Handles equations that end where no common step leads on: a boundary there, of the module that a component
+    /// belongs to or of one that it reads, has been reached. False if there is none.
+    fn arrest_coupled(&mut self, component: usize, at: SimTime) -> bool {
+        let Some((id, _)) = self.flows.coupled.system.owner(component) else { return false };
+        let context = self.world.state(id).map(|s| s.context.to_vec()).unwrap_or_default();
+        let all = std::iter::once(id).chain(context);
+        let arrested: Vec<()> = all.filter_map(|id| self.arrest(id, at)).collect();
+        !arrested.is_empty()
+    }
+
+    /// True if some rate of a module may have pulses.
+    fn may_pulse(&self, id: ModuleId) -> bool {
+        let clause =
+            self.world.state(id).and_then(|s| Some(&self.setup.model.rules[s.rule?].solves[s.solve?]));
+        clause.is_some_and(|solve| solve.has_pulses)
+    }
+
+    /// True if a pulse of some coupled modules may have been overlooked on their present trajectories, from now on.
+    pub fn is_overlooked(&mut self, members: &[ModuleId]) -> bool {
+        if !self.setup.has_pulses || self.setup.settings.method.is_fixed_step() {
+            return false;
+        }
+        let pulsing: Vec<ModuleId> = members.iter().copied().filter(|id| self.may_pulse(*id)).collect();
+        let how = (self.setup.coupled_settings.tolerance, false);
+        let (world, rules, pulses) = (&self.world, &self.setup.model.rules, &mut self.detector.pulses);
+        let nodes = &*self.flows.coupled.reintegration.nodes();
+        pulsing.into_iter().any(|id| {
+            let step = examined_step(world, rules, id, self.instant.at, nodes, how);
+            step.is_some_and(|step| pulses.examine(&step) != PulseFinding::Clear)
+        })
+    }
+
+    /// The error of a common step that fails.
+    fn coupled_error(&self, error: StepError, at: SimTime) -> Error {
+        let Coupled { system, y, .. } = &self.flows.coupled;
+        let owner = |component: usize| system.owner(component);
+        if matches!(error, StepError::StepTooSmall(_) | StepError::ValueNotFinite(_))
+            && let Some(unsolved) = Equations::new(system, &self.setup.model.rules, None).fading(y)
+        {
+            return self.unsolved(unsolved, owner(unsolved.component()), at);
+        }
+        self.step_error(error, at, owner)
+    }
+}
+
+/// The common step of a coupled module, from an instant to the end of the coupled solution.
+fn examined_step<'p>(
+    world: &'p World,
+    rules: &'p [Rule],
+    id: ModuleId,
+    start: SimTime,
+    nodes: &'p [f64],
+    (tolerance, stiff): (f64, bool),
+) -> Option<ExaminedStep<'p>> {
+    let state = world.state(id)?;
+    let rule = &rules[state.rule?];
+    let (solve, end) = (&rule.solves[state.solve?], world.coupled.as_ref()?.end);
+    Some(ExaminedStep { world, state, rule, solve, start, end, nodes, own: None, tolerance, stiff })
+}
