@@ -217,22 +217,13 @@ pub(super) fn mentions(
     })
 }
 
-/// Global names, each after those it depends on; those on a cycle are reported and left out.
-///
-/// Depth-first search with an explicit stack: chains of declarations may be long.
-fn order(
+/// The global names that the declaration of each one mentions, and where it mentions them.
+fn dependencies(
     document: &Document,
     globals: &[Global],
     index: &HashMap<&str, usize>,
-    scope: &mut Scope,
-) -> Vec<usize> {
-    #[derive(Clone, Copy, PartialEq)]
-    enum Mark {
-        New,
-        Open,
-        Done,
-    }
-    let dependencies: Vec<Vec<(usize, Span)>> = globals
+) -> Vec<Vec<(usize, Span)>> {
+    globals
         .iter()
         .map(|global| {
             let (own, bodies): (&[Name], Vec<Expression>) = match global.kind {
@@ -250,7 +241,25 @@ fn order(
                 .filter_map(|(name, span)| Some((*index.get(&**name)?, span)))
                 .collect()
         })
-        .collect();
+        .collect()
+}
+
+/// Global names, each after those it depends on; those on a cycle are reported and left out.
+///
+/// Depth-first search with an explicit stack: chains of declarations may be long.
+fn order(
+    document: &Document,
+    globals: &[Global],
+    index: &HashMap<&str, usize>,
+    scope: &mut Scope,
+) -> Vec<usize> {
+    #[derive(Clone, Copy, PartialEq)]
+    enum Mark {
+        New,
+        Open,
+        Done,
+    }
+    let dependencies = dependencies(document, globals, index);
     let mut circular = vec![false; globals.len()];
     let mut marks = vec![Mark::New; globals.len()];
     let mut sorted = Vec::with_capacity(globals.len());
@@ -278,30 +287,8 @@ fn order(
                     Mark::Open => {
                         scope.poison(globals[to].name.text.clone());
                         let from = stack.iter().position(|(n, _)| *n == to).unwrap_or(0);
-                        let mut path: Vec<&str> =
-                            stack[from..].iter().map(|(n, _)| &*globals[*n].name.text).collect();
-                        path.push(&globals[to].name.text);
-                        if path.len() > 8 {
-                            path.splice(4..path.len() - 3, ["…"]);
-                        }
-                        let name = &globals[to].name.text;
-                        let (what, help) = match globals[to].kind {
-                            Kind::Def(..) => (
-                                "calls itself",
-                                "write it without itself; what is repeated in time belongs into rules"
-                                    .to_owned(),
-                            ),
-                            _ => (
-                                "depends on itself",
-                                format!("give one of them a number, such as `const {name} = 1`"),
-                            ),
-                        };
-                        scope.diagnostics.push(
-                            Diagnostic::error(format!("`{}` {what}", globals[to].name.text))
-                                .at(span, format!("this closes the circle {}", path.join(" → ")))
-                                .at(globals[to].name.span, "declared here")
-                                .help(help),
-                        );
+                        let path: Vec<&Global> = stack[from..].iter().map(|(n, _)| &globals[*n]).collect();
+                        scope.diagnostics.push(circle(&globals[to], &path, span));
                     }
                     Mark::Done => {}
                 },
@@ -309,4 +296,26 @@ fn order(
         }
     }
     sorted
+}
+
+/// The error for a global that depends on itself by way of `path`, which begins with it; `span` is the mention that
+/// closes the circle.
+fn circle(global: &Global, path: &[&Global], span: Span) -> Diagnostic {
+    let name = &global.name.text;
+    let mut path: Vec<&str> = path.iter().map(|global| &*global.name.text).collect();
+    path.push(name);
+    if path.len() > 8 {
+        path.splice(4..path.len() - 3, ["…"]);
+    }
+    let (what, help) = match global.kind {
+        Kind::Def(..) => (
+            "calls itself",
+            "write it without itself; what is repeated in time belongs into rules".to_owned(),
+        ),
+        _ => ("depends on itself", format!("give one of them a number, such as `const {name} = 1`")),
+    };
+    Diagnostic::error(format!("`{name}` {what}"))
+        .at(span, format!("this closes the circle {}", path.join(" → ")))
+        .at(global.name.span, "declared here")
+        .help(help)
 }

@@ -380,89 +380,105 @@ impl Scanner<'_> {
         }
     }
 
+    /// Advances over one token: recursion that opens or closes, and whether an expression can end after it.
     fn token(&mut self, (token, start, end): (Token, usize, usize)) {
         let in_expression = !self.in_string || self.levels.len() > 1;
         self.weight_next = false;
         let (after_operand, depth) = (self.last == Last::Operand, self.levels.len() - 1);
-        let mut last = Last::Operand;
-        match token {
-            Token::Word => {
-                last = self.keyword(start, end);
-            }
-            Token::Number | Token::Text => {}
+        let last = match token {
+            Token::Word => self.keyword(start, end),
+            Token::Number | Token::Text => Last::Operand,
             Token::Open => {
                 let word = self.text[..start].trim_end().rsplit(|c| !in_name(c)).next().unwrap_or_default();
                 let is_sum = FOLDS.contains(&word);
                 self.levels.push(Level { at: start, is_sum, ..Level::default() });
-                last = Last::Operator;
+                Last::Operator
             }
             Token::Close => {
-                if self.levels.len() > 1 {
-                    let level = self.levels.pop().expect("two levels");
-                    self.pending -= level.right + level.ifs;
-                } else {
-                    self.fault(
-                        Diagnostic::error("this `)` closes nothing")
-                            .at(Span::new(start, end), "there is no `(` before it")
-                            .help("remove it, or write the `(` that it belongs to"),
-                    );
-                }
+                self.close_parenthesis(start, end);
+                Last::Operand
             }
             Token::Comma => {
                 self.forget_pending();
-                last = Last::Operator;
+                Last::Operator
             }
             Token::Colon => {
-                last = Last::Colon;
-                self.level().is_sum = false;
-                let weight = self.in_successor();
-                self.weighted |= weight;
-                if self.levels.len() == 1
-                    && !self.level().matching
-                    && !weight
-                    && let Some(item) = self.items.last_mut()
-                    && item.after_colon.is_none()
-                {
-                    item.after_colon = Some(end);
-                    self.in_string = item.kind.has_string();
-                    self.forget_pending();
-                }
+                self.colon(end);
+                Last::Colon
             }
-            Token::Symbol => {
-                let symbol = &self.text[start..end];
-                let binary = self.last == Last::Operand;
-                last = match symbol {
-                    "<" | ">" => Last::Angle,
-                    // The end of an element, or of an array.
-                    "]" => Last::Operand,
-                    _ => Last::Operator,
-                };
-                if self.is_arrow(start, end)
-                    && self.levels.len() == 1
-                    && self.items.last().is_some_and(|i| i.kind == ItemKind::Step)
-                {
-                    last = Last::Operator;
-                    (self.in_string, self.weighted, self.weight_next) = (true, false, true);
-                    self.forget_pending();
-                } else if in_expression {
-                    let level = self.levels.last_mut().expect("never empty");
-                    if symbol == "^" || !binary {
-                        level.right += 1;
-                        self.pending += 1;
-                    } else {
-                        self.pending -= level.right;
-                        level.right = 0;
-                    }
-                }
-            }
-        }
+            Token::Symbol => self.symbol(start, end, in_expression),
+        };
         self.last = last;
         if let Some(lexemes) = &mut self.lexemes {
             let (in_string, operator) = (!in_expression, last != Last::Operand);
             lexemes.push(Lexeme { token, start, end, in_string, after_operand, operator, depth });
         }
-        let depth = self.levels.len() - 1 + self.pending;
-        if depth > MAX_DEPTH {
+        self.check_depth(start, end);
+    }
+
+    fn close_parenthesis(&mut self, start: usize, end: usize) {
+        if self.levels.len() > 1 {
+            let level = self.levels.pop().expect("two levels");
+            self.pending -= level.right + level.ifs;
+        } else {
+            self.fault(
+                Diagnostic::error("this `)` closes nothing")
+                    .at(Span::new(start, end), "there is no `(` before it")
+                    .help("remove it, or write the `(` that it belongs to"),
+            );
+        }
+    }
+
+    /// Advances over a colon that ends at `end`: that of a head, of a weight, of a `case` or of an aggregate.
+    fn colon(&mut self, end: usize) {
+        self.level().is_sum = false;
+        let weight = self.in_successor();
+        self.weighted |= weight;
+        if self.levels.len() == 1
+            && !self.level().matching
+            && !weight
+            && let Some(item) = self.items.last_mut()
+            && item.after_colon.is_none()
+        {
+            item.after_colon = Some(end);
+            self.in_string = item.kind.has_string();
+            self.forget_pending();
+        }
+    }
+
+    /// Advances over an operator, a bracket or the arrow of a discrete rule.
+    fn symbol(&mut self, start: usize, end: usize, in_expression: bool) -> Last {
+        let symbol = &self.text[start..end];
+        let binary = self.last == Last::Operand;
+        if self.is_arrow(start, end)
+            && self.levels.len() == 1
+            && self.items.last().is_some_and(|i| i.kind == ItemKind::Step)
+        {
+            (self.in_string, self.weighted, self.weight_next) = (true, false, true);
+            self.forget_pending();
+            return Last::Operator;
+        }
+        if in_expression {
+            let level = self.levels.last_mut().expect("never empty");
+            if symbol == "^" || !binary {
+                level.right += 1;
+                self.pending += 1;
+            } else {
+                self.pending -= level.right;
+                level.right = 0;
+            }
+        }
+        match symbol {
+            "<" | ">" => Last::Angle,
+            // The end of an element, or of an array.
+            "]" => Last::Operand,
+            _ => Last::Operator,
+        }
+    }
+
+    /// Reports nesting that is deeper than [`MAX_DEPTH`] after the token at these bytes.
+    fn check_depth(&mut self, start: usize, end: usize) {
+        if self.levels.len() - 1 + self.pending > MAX_DEPTH {
             self.fault(
                 Diagnostic::error(format!("this is nested more than {MAX_DEPTH} deep"))
                     .at(Span::new(start, end), "one level too many")
