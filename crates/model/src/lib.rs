@@ -6,14 +6,14 @@
 //!
 //! - [`Kind`]: a module's name and number of parameters. `F(x)` and `F(x, y)` are two kinds.
 //! - [`Rule`]: what the text writes under one head: context, equations, productions.
-//! - [`Law`], [`ZeroCrossing`]: how much work an equation or a comparison is; found by [`analyse`].
+//! - [`SolutionForm`], [`ZeroCrossing`]: how much work an equation or a comparison is; found by [`analyse`].
 //! - [`Condition`]: the logic of an `if`, over the signs of differences, because the simulation knows
 //!   better than a comparison of two rounded numbers whether two sides have met.
 //!
 //! # Examples
 //!
 //! ```
-//! use dlsys_model::Law;
+//! use dlsys_model::SolutionForm;
 //! use dlsys_session::Session;
 //!
 //! let text = "
@@ -26,7 +26,7 @@
 //! let kind = model.kinds.find("F", 1).expect("it is in the initial string");
 //! let rule = &model.rules[model.kinds.get(kind).rules[0]];
 //! // Growth at a constant relative rate has a formula: nothing is integrated.
-//! assert!(!matches!(rule.solves[0].laws[0], Law::Numeric(_)));
+//! assert!(!matches!(rule.solves[0].solution_forms[0], SolutionForm::Numeric(_)));
 //! ```
 
 #![warn(missing_docs)]
@@ -36,10 +36,10 @@ mod appearance;
 mod chance;
 mod condition;
 mod kind;
-mod law;
 mod measure;
 mod remedy;
 mod rule;
+mod solution_form;
 mod stepping;
 
 pub use algebraic::{Aggregate, Algebraic, Turn};
@@ -52,10 +52,10 @@ pub use dlsys_expr::{Comparison, Fold, Sign, Truth};
 pub use kind::{
     BUILT_IN_SURFACES, COMMAND_SURFACES, CUT, Class, DRAWN_WORDS, Kind, KindId, Kinds, base_of, class_of,
 };
-pub use law::{Driven, Flow, Jacobian, Law, Linear, Numeric, Obstacle, Sum, ZeroCrossing};
 pub use measure::Measure;
 pub use remedy::{Boundary, Remedy};
 pub use rule::{Interpretation, Outcome, Pattern, Produce, Rule, Solve, Successor, Switch};
+pub use solution_form::{Driven, Flow, Jacobian, Linear, Numeric, Obstacle, SolutionForm, Sum, ZeroCrossing};
 pub use stepping::{Read, Stepping};
 
 use std::sync::Arc;
@@ -98,7 +98,10 @@ impl Model {
     /// True if every parameter of every rule follows a formula: nothing is ever integrated numerically.
     pub fn is_closed_form(&self) -> bool {
         let mut solves = self.rules.iter().flat_map(|r| &r.solves);
-        solves.all(|s| s.laws.iter().all(Law::is_closed) && s.algebraic.closed.iter().all(|closed| *closed))
+        solves.all(|s| {
+            s.solution_forms.iter().all(SolutionForm::is_closed)
+                && s.algebraic.closed.iter().all(|closed| *closed)
+        })
     }
 }
 

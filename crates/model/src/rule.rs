@@ -8,7 +8,7 @@
 //! [`Draw`]s of a successor.
 
 use super::{
-    Aggregate, Algebraic, Boundary, Clock, Condition, Draw, Jacobian, KindId, Law, Linear, NewClock,
+    Aggregate, Algebraic, Boundary, Clock, Condition, Draw, Jacobian, KindId, Linear, NewClock, SolutionForm,
     Stepping, Turn, ZeroCrossing,
 };
 use dlsys_diagnostic::Span;
@@ -62,7 +62,7 @@ pub struct Rule {
     /// Rates or conditions read some of them.
     pub reads_context: bool,
     /// How each atom is watched while no clause is active; the clauses say it for themselves.
-    pub watch_at_rest: Vec<ZeroCrossing>,
+    pub zero_crossings_at_rest: Vec<ZeroCrossing>,
 }
 
 impl Rule {
@@ -81,8 +81,8 @@ impl Rule {
     }
 
     /// How each atom is watched under a clause.
-    pub fn watch(&self, solve: Option<usize>) -> &[ZeroCrossing] {
-        solve.map_or(&self.watch_at_rest, |s| &self.solves[s].watch)
+    pub fn zero_crossings(&self, solve: Option<usize>) -> &[ZeroCrossing] {
+        solve.map_or(&self.zero_crossings_at_rest, |s| &self.solves[s].zero_crossings)
     }
 
     /// True if some parameter is given by a value or an equation instead of a rate.
@@ -137,7 +137,7 @@ pub struct Solve {
     /// are zero is invariant: a logistic growth and its own limit. One per atom of the rule.
     pub unreachable: Vec<bool>,
     /// How each equation is solved, in the order of `of`.
-    pub laws: Vec<Law>,
+    pub solution_forms: Vec<SolutionForm>,
     /// Positions in `of` of the equations that are integrated numerically.
     pub numeric: Vec<usize>,
     /// Their rates.
@@ -149,7 +149,7 @@ pub struct Solve {
     /// Parameters with a value or an equation instead of a rate.
     pub algebraic: Algebraic,
     /// How the zero of each atom is found while the clause is active.
-    pub watch: Vec<ZeroCrossing>,
+    pub zero_crossings: Vec<ZeroCrossing>,
     /// Rates depend on time in a way that may be over before a step notices: not as polynomials.
     pub has_pulses: bool,
     /// The clock of an event at a rate runs, and something is integrated numerically.

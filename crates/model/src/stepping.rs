@@ -9,7 +9,7 @@ pub struct Stepping {
     /// The parameters of the module and of its context that a step may read.
     reads: Vec<Read>,
     /// Of each variable of the rule: whether formulas read it when a module takes the equations up.
-    laws_read: Vec<bool>,
+    formulas_read: Vec<bool>,
     /// Rates, or values that are solved for, read `t`.
     timed: bool,
 }
@@ -28,8 +28,13 @@ pub struct Read {
 impl Stepping {
     /// What an analysis has found: the components with formulas and without, the variables that a step reads, of each
     /// variable whether formulas read it, and whether rates or values that are solved for read `t`.
-    pub fn new(components: [Vec<usize>; 2], reads: Vec<Read>, laws_read: Vec<bool>, timed: bool) -> Stepping {
-        Stepping { components, reads, laws_read, timed }
+    pub fn new(
+        components: [Vec<usize>; 2],
+        reads: Vec<Read>,
+        formulas_read: Vec<bool>,
+        timed: bool,
+    ) -> Stepping {
+        Stepping { components, reads, formulas_read, timed }
     }
 
     /// The parameters that are integrated, then those that are solved for, in the order of their components.
@@ -48,7 +53,7 @@ impl Stepping {
     }
 
     /// The variables that formulas read when a module takes the equations up.
-    pub fn laws_read(&self) -> &[bool] {
-        &self.laws_read
+    pub fn formulas_read(&self) -> &[bool] {
+        &self.formulas_read
     }
 }

@@ -1,7 +1,7 @@
 //! The components of a clause's equations, and the variables that its steps read.
 
 use dlsys_expr::Program;
-use dlsys_model::{Algebraic, Jacobian, Law, Linear, Read, Stepping};
+use dlsys_model::{Algebraic, Jacobian, Linear, Read, SolutionForm, Stepping};
 
 use super::ResolvedRule;
 
@@ -32,7 +32,7 @@ impl Layout {
 pub struct StepEquations<'e> {
     pub of: &'e [usize],
     pub rates: &'e Program,
-    pub laws: &'e [Law],
+    pub solution_forms: &'e [SolutionForm],
     pub numeric: &'e [usize],
     pub numeric_rates: &'e Program,
     pub linear: Option<&'e Linear>,
@@ -68,26 +68,28 @@ impl StepEquations<'_> {
             .map(|(variable, (neighbour, parameter))| Read { variable, neighbour, parameter })
             .filter(|one| read[one.variable])
             .collect();
-        let mut laws = Vec::new();
+        let mut formulas = Vec::new();
         let mut few = !layout.aggregates && algebraic.is_empty();
-        for law in self.laws {
-            match law {
-                Law::Polynomial(program) | Law::Quadratic(program) => laws.push(program),
-                Law::Driven(driven) => {
-                    laws.extend([&driven.coefficients].into_iter().chain(driven.pace.as_deref()))
+        for form in self.solution_forms {
+            match form {
+                SolutionForm::Polynomial(program) | SolutionForm::Quadratic(program) => {
+                    formulas.push(program)
                 }
-                Law::Numeric(_) => {}
-                Law::Sum { .. } => few = false,
+                SolutionForm::Driven(driven) => {
+                    formulas.extend([&driven.coefficients].into_iter().chain(driven.pace.as_deref()))
+                }
+                SolutionForm::Numeric(_) => {}
+                SolutionForm::Sum { .. } => few = false,
             }
         }
-        let mut laws_read = read_by(laws.into_iter(), layout.variables);
+        let mut formulas_read = read_by(formulas.into_iter(), layout.variables);
         if !few {
-            laws_read.fill(true);
+            formulas_read.fill(true);
         }
-        laws_read.iter_mut().take(layout.own).for_each(|own| *own = true);
+        formulas_read.iter_mut().take(layout.own).for_each(|own| *own = true);
         let time = layout.variables - 2;
         let timed = [self.rates, &algebraic.values].iter().any(|program| program.reads().contains(&time));
-        Stepping::new(components, reads, laws_read, timed)
+        Stepping::new(components, reads, formulas_read, timed)
     }
 }
 

@@ -88,7 +88,8 @@ pub struct Difference<'w, 'p> {
 impl Function for Difference<'_, '_> {
     fn bounds(&mut self, lo: f64, hi: f64) -> Dual<Interval> {
         // Values that move together may differ by much less than each of them moves.
-        if let ZeroCrossing::Search(Some(sum)) = &self.path.rule.watch(self.path.state.solve)[self.atom]
+        if let ZeroCrossing::Search(Some(sum)) =
+            &self.path.rule.zero_crossings(self.path.state.solve)[self.atom]
             && let Some(bounds) = self.path.sum_over(sum, lo, hi)
         {
             return bounds;
@@ -111,7 +112,7 @@ impl Function for Difference<'_, '_> {
 
 /// True if some atom of a module can only be found by search, so that the stretch must have an end.
 pub fn needs_search(state: &State, rule: &Rule) -> bool {
-    rule.watch(state.solve)
+    rule.zero_crossings(state.solve)
         .iter()
         .enumerate()
         .any(|(atom, watch)| !is_unreachable(rule, state, atom) && matches!(how(watch, state), How::Search))
@@ -157,7 +158,7 @@ impl CrossingDetector {
         let error = path.error();
         let integrated = error > 0.0;
         let near = state.next.near;
-        for (atom, watch) in rule.watch(state.solve).iter().enumerate() {
+        for (atom, watch) in rule.zero_crossings(state.solve).iter().enumerate() {
             if is_unreachable(rule, state, atom) {
                 continue;
             }

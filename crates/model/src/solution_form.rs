@@ -11,7 +11,7 @@ use dlsys_expr::{Curve, Program};
 /// How the equation of a parameter is solved. Coefficients are computed when a module takes the equation up,
 /// from the variables of its rule.
 #[derive(Clone, Debug)]
-pub enum Law {
+pub enum SolutionForm {
     /// `x' = c_0 + c_1 age + … + c_n age^n`; the outputs are the coefficients.
     Polynomial(Program),
     /// `x' = c + b x + a x²`; the outputs are c, b and a. Exponential and logistic growth, and all of their kind.
@@ -84,10 +84,10 @@ pub enum Obstacle {
     Inflow,
 }
 
-impl Law {
+impl SolutionForm {
     /// True if the parameter follows a formula, so that nothing is integrated.
     pub fn is_closed(&self) -> bool {
-        !matches!(self, Law::Numeric(_))
+        !matches!(self, SolutionForm::Numeric(_))
     }
 }
 
