@@ -16,11 +16,11 @@ use dlsys_syntax::suggest::did_you_mean;
 /// What a global name is declared as.
 struct Global<'d> {
     name: &'d Name,
-    kind: Kind<'d>,
+    kind: GlobalKind<'d>,
     library: bool,
 }
 
-enum Kind<'d> {
+enum GlobalKind<'d> {
     Const(Expression),
     Param(Expression, Option<(Expression, Expression)>),
     Def(&'d [Name], Expression),
@@ -49,17 +49,17 @@ pub fn declare(
     for i in order(document, &globals, &index, scope) {
         let Global { name, kind, library } = &globals[i];
         match kind {
-            Kind::Def(formals, body) => {
+            GlobalKind::Def(formals, body) => {
                 scope.define_function(name, formals, &document.expressions, *body, *library);
             }
-            Kind::Array(values) => scope.define_array(name, &document.expressions, values),
-            Kind::Curve(item, span) => scope.define_curve(item, *span, &document.expressions, files),
-            Kind::Number(number) => scope.define_constant(name.text.clone(), Some(*number as f64)),
-            Kind::Const(body) => {
+            GlobalKind::Array(values) => scope.define_array(name, &document.expressions, values),
+            GlobalKind::Curve(item, span) => scope.define_curve(item, *span, &document.expressions, files),
+            GlobalKind::Number(number) => scope.define_constant(name.text.clone(), Some(*number as f64)),
+            GlobalKind::Const(body) => {
                 let value = scope.constant_value(&document.expressions, *body);
                 scope.define_constant(name.text.clone(), value);
             }
-            Kind::Param(body, range) => {
+            GlobalKind::Param(body, range) => {
                 let value = parameter(document, name, *body, *range, settings, scope);
                 scope.define_constant(name.text.clone(), value.as_ref().map(|p| p.value));
                 parameters.extend(value);
@@ -99,16 +99,16 @@ fn collect<'d>(document: &'d Document, scope: &mut Scope) -> Vec<Global<'d>> {
     let mut next_contour = 1;
     let count = |next: &mut usize| {
         *next += 1;
-        Kind::Number(*next - 1)
+        GlobalKind::Number(*next - 1)
     };
     for (i, (item, span)) in document.items.iter().enumerate() {
         let library = document.library.is_some_and(|from| i >= from);
         let (name, kind) = match item {
-            Item::Const { name, value } => (name, Kind::Const(*value)),
-            Item::Array { name, values } => (name, Kind::Array(values)),
-            Item::Curve { name, .. } | Item::Table { name, .. } => (name, Kind::Curve(item, *span)),
-            Item::Param { name, value, range } => (name, Kind::Param(*value, *range)),
-            Item::Def { name, parameters, body } => (name, Kind::Def(parameters, *body)),
+            Item::Const { name, value } => (name, GlobalKind::Const(*value)),
+            Item::Array { name, values } => (name, GlobalKind::Array(values)),
+            Item::Curve { name, .. } | Item::Table { name, .. } => (name, GlobalKind::Curve(item, *span)),
+            Item::Param { name, value, range } => (name, GlobalKind::Param(*value, *range)),
+            Item::Def { name, parameters, body } => (name, GlobalKind::Def(parameters, *body)),
             Item::Color { name, .. } => (name, count(&mut next_color)),
             Item::Gradient { name, .. } => (name, count(&mut next_gradient)),
             Item::Contour { name, .. } => (name, count(&mut next_contour)),
@@ -227,13 +227,13 @@ fn dependencies(
         .iter()
         .map(|global| {
             let (own, bodies): (&[Name], Vec<Expression>) = match global.kind {
-                Kind::Def(formals, body) => (formals, vec![body]),
-                Kind::Const(body) | Kind::Param(body, None) => (&[], vec![body]),
-                Kind::Param(body, Some((from, to))) => (&[], vec![body, from, to]),
-                Kind::Number(_) => (&[], Vec::new()),
-                Kind::Array(values) => (&[], values.to_vec()),
-                Kind::Curve(Item::Curve { points, .. }, _) => (&[], points.concat()),
-                Kind::Curve(..) => (&[], Vec::new()),
+                GlobalKind::Def(formals, body) => (formals, vec![body]),
+                GlobalKind::Const(body) | GlobalKind::Param(body, None) => (&[], vec![body]),
+                GlobalKind::Param(body, Some((from, to))) => (&[], vec![body, from, to]),
+                GlobalKind::Number(_) => (&[], Vec::new()),
+                GlobalKind::Array(values) => (&[], values.to_vec()),
+                GlobalKind::Curve(Item::Curve { points, .. }, _) => (&[], points.concat()),
+                GlobalKind::Curve(..) => (&[], Vec::new()),
             };
             (bodies.into_iter())
                 .flat_map(|e| mentions(document, e))
@@ -308,7 +308,7 @@ fn circle(global: &Global, path: &[&Global], span: Span) -> Diagnostic {
         path.splice(4..path.len() - 3, ["…"]);
     }
     let (what, help) = match global.kind {
-        Kind::Def(..) => (
+        GlobalKind::Def(..) => (
             "calls itself",
             "write it without itself; what is repeated in time belongs into rules".to_owned(),
         ),

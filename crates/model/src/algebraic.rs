@@ -95,7 +95,7 @@ impl Aggregate {
 
 /// A part of a right context: `> [ C(z) ] D(w)`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Turn {
+pub enum ContextPart {
     /// A module: the next one of the right context.
     Module,
     /// A branch begins.

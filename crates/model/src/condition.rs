@@ -9,7 +9,7 @@ use smallvec::SmallVec;
 
 /// One step of a condition in postfix order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Step {
+pub enum ConditionStep {
     /// Compares the sides of the rule's atom of this number.
     Atom(u32, Comparison),
     /// True or false, whatever happens.
@@ -24,7 +24,7 @@ pub enum Step {
 
 /// A condition over the atoms of a rule; empty means always.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
-pub struct Condition(pub Vec<Step>);
+pub struct Condition(pub Vec<ConditionStep>);
 
 impl Condition {
     /// True if there is no condition.
@@ -35,23 +35,23 @@ impl Condition {
     /// Judges the condition, given the sign of each atom.
     pub fn judge(&self, sign: impl Fn(usize) -> Sign) -> Truth {
         // Most conditions are one comparison, or two.
-        if let [Step::Atom(atom, comparison)] = self.0[..] {
+        if let [ConditionStep::Atom(atom, comparison)] = self.0[..] {
             return comparison.judge(sign(atom as usize));
         }
         let mut stack: SmallVec<[Truth; 16]> = SmallVec::new();
         for step in &self.0 {
             let truth = match *step {
-                Step::Atom(atom, comparison) => comparison.judge(sign(atom as usize)),
-                Step::Constant(true) => Truth::Yes,
-                Step::Constant(false) => Truth::No,
-                Step::Not => match stack.pop().expect("well formed") {
+                ConditionStep::Atom(atom, comparison) => comparison.judge(sign(atom as usize)),
+                ConditionStep::Constant(true) => Truth::Yes,
+                ConditionStep::Constant(false) => Truth::No,
+                ConditionStep::Not => match stack.pop().expect("well formed") {
                     Truth::No => Truth::Yes,
                     Truth::Maybe => Truth::Maybe,
                     Truth::Yes => Truth::No,
                 },
-                Step::And | Step::Or => {
+                ConditionStep::And | ConditionStep::Or => {
                     let (b, a) = (stack.pop().expect("well formed"), stack.pop().expect("well formed"));
-                    if *step == Step::And { a.min(b) } else { a.max(b) }
+                    if *step == ConditionStep::And { a.min(b) } else { a.max(b) }
                 }
             };
             stack.push(truth);
@@ -62,7 +62,7 @@ impl Condition {
     /// The atoms it mentions, each with the comparison asked of it.
     pub fn atoms(&self) -> impl Iterator<Item = (usize, Comparison)> + '_ {
         self.0.iter().filter_map(|step| match *step {
-            Step::Atom(atom, comparison) => Some((atom as usize, comparison)),
+            ConditionStep::Atom(atom, comparison) => Some((atom as usize, comparison)),
             _ => None,
         })
     }
@@ -74,8 +74,11 @@ mod tests {
 
     #[test]
     fn kleene_logic_keeps_what_is_certain() {
-        let either =
-            Condition(vec![Step::Atom(0, Comparison::Less), Step::Atom(1, Comparison::Equal), Step::Or]);
+        let either = Condition(vec![
+            ConditionStep::Atom(0, Comparison::Less),
+            ConditionStep::Atom(1, Comparison::Equal),
+            ConditionStep::Or,
+        ]);
         let judge = |a, b| either.judge(|i| [a, b][i]);
         assert_eq!(judge(Sign::Minus, Sign::Any), Truth::Yes);
         assert_eq!(judge(Sign::Plus, Sign::Any), Truth::Maybe);

@@ -42,12 +42,12 @@ mod rule;
 mod solution_form;
 mod stepping;
 
-pub use algebraic::{Aggregate, Algebraic, Turn};
+pub use algebraic::{Aggregate, Algebraic, ContextPart};
 pub use appearance::{
     Appearance, BUILT_IN_COLORS, Contour, Gradient, NamedColor, Net, Rgb, SurfaceShape, Tropism,
 };
 pub use chance::{Clock, Distribution, Draw, NewClock, choose};
-pub use condition::{Condition, Step};
+pub use condition::{Condition, ConditionStep};
 pub use dlsys_expr::{Comparison, Fold, Sign, Truth};
 pub use kind::{
     BUILT_IN_SURFACES, COMMAND_SURFACES, CUT, Class, DRAWN_WORDS, Kind, KindId, Kinds, base_of, class_of,
@@ -55,7 +55,9 @@ pub use kind::{
 pub use measure::Measure;
 pub use remedy::{Boundary, Remedy};
 pub use rule::{Interpretation, Outcome, Pattern, Produce, Rule, Solve, Successor, Switch};
-pub use solution_form::{Driven, Flow, Jacobian, Linear, Numeric, Obstacle, SolutionForm, Sum, ZeroCrossing};
+pub use solution_form::{
+    AffineSum, DrivenGrowth, GrowthLaw, Jacobian, LinearRates, Numeric, Obstacle, SolutionForm, ZeroCrossing,
+};
 pub use stepping::{Read, Stepping};
 
 use std::sync::Arc;

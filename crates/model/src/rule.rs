@@ -8,8 +8,8 @@
 //! [`Draw`]s of a successor.
 
 use super::{
-    Aggregate, Algebraic, Boundary, Clock, Condition, Draw, Jacobian, KindId, Linear, NewClock, SolutionForm,
-    Stepping, Turn, ZeroCrossing,
+    Aggregate, Algebraic, Boundary, Clock, Condition, ContextPart, Draw, Jacobian, KindId, LinearRates,
+    NewClock, SolutionForm, Stepping, ZeroCrossing,
 };
 use dlsys_diagnostic::Span;
 use dlsys_expr::{Program, Scratch, Value};
@@ -34,7 +34,7 @@ pub struct Rule {
     /// Right context in reading order: the first one is the nearest.
     pub right: Vec<Pattern>,
     /// How the right context stands: one after another, or on branches.
-    pub right_shape: Vec<Turn>,
+    pub right_shape: Vec<ContextPart>,
     /// Values of the modules attached to this one.
     pub aggregates: Vec<Aggregate>,
     /// The variable of the first of them. There may be more variables than aggregates; nobody reads those.
@@ -143,7 +143,7 @@ pub struct Solve {
     /// Their rates.
     pub numeric_rates: Program,
     /// Their rates once more, if all are linear.
-    pub linear: Option<Linear>,
+    pub linear: Option<LinearRates>,
     /// Derivatives of all rates.
     pub jacobian: Jacobian,
     /// Parameters with a value or an equation instead of a rate.

@@ -26,17 +26,17 @@ pub enum SolutionForm {
     },
     /// `x' = h(time) q(x)`, with the integral of h known: curves, growth functions of time, and the growth laws of
     /// Gompertz, Richards and von Bertalanffy.
-    Driven(Box<Driven>),
+    Driven(Box<DrivenGrowth>),
     /// Integrated numerically.
     Numeric(Numeric),
 }
 
 /// The growth of one parameter by a formula; `x' = h(time) q(x)`.
 #[derive(Clone, Debug)]
-pub struct Driven {
+pub struct DrivenGrowth {
     /// The form of q.
-    pub flow: Flow,
-    /// Coefficients of q, in the order that [`Flow`] says.
+    pub growth: GrowthLaw,
+    /// Coefficients of q, in the order that [`GrowthLaw`] says.
     pub coefficients: Program,
     /// H, to be taken from the start of the motion on; None for time itself.
     pub pace: Option<Arc<Program>>,
@@ -48,7 +48,7 @@ pub struct Driven {
 
 /// The form of q.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Flow {
+pub enum GrowthLaw {
     /// `c + b x + a x²`: c, b, a.
     Quadratic,
     /// `x (a + b ln x)`: a, b.
@@ -106,12 +106,12 @@ pub enum ZeroCrossing {
     },
     /// The first root of a function of time (formulas or dense output) is searched for. The difference of the sides, if
     /// it is linear.
-    Search(Option<Sum>),
+    Search(Option<AffineSum>),
 }
 
 /// `constant + Σ factor · variable`.
 #[derive(Clone, Debug)]
-pub struct Sum {
+pub struct AffineSum {
     /// The value where all variables are 0.
     pub constant: f64,
     /// Variables and their factors.
@@ -120,7 +120,7 @@ pub struct Sum {
 
 /// Linear equations: `x_k' = constant + Σ coefficient · variable`.
 #[derive(Clone, Debug)]
-pub struct Linear {
+pub struct LinearRates {
     /// Per numeric parameter, in their order: the variables it depends on.
     pub variables: Vec<Vec<usize>>,
     /// Per numeric parameter: the constant, then the coefficients of those variables.

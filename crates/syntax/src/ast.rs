@@ -173,7 +173,7 @@ pub struct HeadModule {
 
 /// A part of a right context: `> [ C(z) ] D(w)`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Turn {
+pub enum ContextPart {
     /// A module; which one, its place among the modules of the context says.
     Module,
     /// `[`: a branch begins.
@@ -192,7 +192,7 @@ pub struct Rule {
     /// The modules of the right context in reading order.
     pub right: Vec<HeadModule>,
     /// How its modules stand: one after another, or on branches.
-    pub right_shape: Vec<Turn>,
+    pub right_shape: Vec<ContextPart>,
     /// The whole head.
     pub head: Span,
     /// `let` lines.

@@ -1,13 +1,13 @@
 //! What a text declares, and where: for those who change texts piece by piece.
 
-use crate::ast::{HeadModule, Item, Rule, Turn};
+use crate::ast::{ContextPart, HeadModule, Item, Rule};
 use crate::declarations::Repeats;
 use crate::parse;
 use dlsys_diagnostic::{Source, Span};
 
 /// A declaration or rule of a text.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Entry {
+pub struct OutlineEntry {
     /// Two entries of one key cannot stand side by side: one takes the place of the other. None where any number can.
     pub key: Option<String>,
     /// What it is called, if it has a name: `r`, `F_a(x, n)`, `frames`.
@@ -21,13 +21,13 @@ pub struct Entry {
 }
 
 /// The declarations and rules of a text that can be read, in the order written.
-pub fn outline(text: &str) -> Vec<Entry> {
+pub fn outline(text: &str) -> Vec<OutlineEntry> {
     let source = Source::new("", text);
     let (document, _) = parse::parse(&source);
     document.items.iter().map(|(item, span)| entry(item, *span, &source)).collect()
 }
 
-fn entry(item: &Item, span: Span, source: &Source) -> Entry {
+fn entry(item: &Item, span: Span, source: &Source) -> OutlineEntry {
     let (key, name) = match item {
         Item::Rule(rule) => (Some(head(rule)), source.slice(rule.head).trim().to_owned()),
         Item::Axiom(_) => (Some("initial string".to_owned()), "initial string".to_owned()),
@@ -39,7 +39,7 @@ fn entry(item: &Item, span: Span, source: &Source) -> Entry {
         item => declared(item),
     };
     let (is_rule, is_axiom) = (matches!(item, Item::Rule(_)), matches!(item, Item::Axiom(_)));
-    Entry { key, name, is_rule, is_axiom, span }
+    OutlineEntry { key, name, is_rule, is_axiom, span }
 }
 
 /// The key of a declaration that is known by its word or its name, and what it is called.
@@ -64,9 +64,9 @@ fn head(rule: &Rule) -> String {
     let mut following = rule.right.iter().map(pattern);
     let right: Vec<String> = (rule.right_shape.iter())
         .filter_map(|turn| match turn {
-            Turn::Module => following.next(),
-            Turn::Open => Some("[".to_owned()),
-            Turn::Close => Some("]".to_owned()),
+            ContextPart::Module => following.next(),
+            ContextPart::Open => Some("[".to_owned()),
+            ContextPart::Close => Some("]".to_owned()),
         })
         .collect();
     format!("{} < {} > {}", all(&rule.left), pattern(&rule.predecessor), right.join(" "))

@@ -4,8 +4,8 @@
 //! Printing works with an explicit stack: a tree may be deeper than the machine's.
 
 use crate::ast::{
-    Action, Alternative, Clause, Document, Equation, Expr, ExprId, Expressions, HeadModule, Module, Name,
-    Operator, Turn,
+    Action, Alternative, Clause, ContextPart, Document, Equation, Expr, ExprId, Expressions, HeadModule,
+    Module, Name, Operator,
 };
 use crate::notation;
 
@@ -218,9 +218,11 @@ pub fn head(rule: &crate::ast::Rule) -> String {
         out += " >";
         for turn in &rule.right_shape {
             out += &match turn {
-                Turn::Open => " [".to_owned(),
-                Turn::Close => " ]".to_owned(),
-                Turn::Module => right.next().map_or_else(String::new, |m| " ".to_owned() + &head_module(m)),
+                ContextPart::Open => " [".to_owned(),
+                ContextPart::Close => " ]".to_owned(),
+                ContextPart::Module => {
+                    right.next().map_or_else(String::new, |m| " ".to_owned() + &head_module(m))
+                }
             };
         }
     }

@@ -2,7 +2,7 @@
 
 use super::plan::Facts;
 use crate::expr::Program;
-use crate::model::{Driven, Flow, Numeric, Obstacle, Rule, SolutionForm, Solve};
+use crate::model::{DrivenGrowth, GrowthLaw, Numeric, Obstacle, Rule, SolutionForm, Solve};
 use crate::sim::brief;
 
 /// The form of a solution that a run may replace by integration.
@@ -104,7 +104,7 @@ fn quadratic(coefficients: &Program) -> (String, &'static str) {
 }
 
 /// The form of the solution of `x' = h(time) q(x)`, and the reason.
-fn driven(rule: &Rule, x: &str, law: &Driven, piecewise: &str) -> (Option<String>, String) {
+fn driven(rule: &Rule, x: &str, law: &DrivenGrowth, piecewise: &str) -> (Option<String>, String) {
     let curves: Vec<String> = law.curves.iter().map(|curve| curve.name.clone()).collect();
     let pace = match (curves.len(), &law.pace) {
         (0, None) => String::new(),
@@ -117,14 +117,14 @@ fn driven(rule: &Rule, x: &str, law: &Driven, piecewise: &str) -> (Option<String
         (1, _) => format!("the curve {}", curves[0]),
         _ => format!("the curves {}", list(&curves)),
     };
-    let name = match law.flow {
-        Flow::Quadratic if [1, 2].iter().all(|i| law.coefficients.constant_output(*i) == Some(0.0)) => {
+    let name = match law.growth {
+        GrowthLaw::Quadratic if [1, 2].iter().all(|i| law.coefficients.constant_output(*i) == Some(0.0)) => {
             let why = format!("its rate is made of {pace}, whose integral is known{piecewise}");
             return (Some(format!("integral of {pace}")), why);
         }
-        Flow::Quadratic => quadratic(&law.coefficients).0,
-        Flow::Gompertz => "Gompertz growth".to_owned(),
-        Flow::Bernoulli => "Bernoulli's equation (Richards, von Bertalanffy)".to_owned(),
+        GrowthLaw::Quadratic => quadratic(&law.coefficients).0,
+        GrowthLaw::Gompertz => "Gompertz growth".to_owned(),
+        GrowthLaw::Bernoulli => "Bernoulli's equation (Richards, von Bertalanffy)".to_owned(),
     };
     if pace.is_empty() {
         return (

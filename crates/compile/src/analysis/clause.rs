@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use dlsys_expr::{Graph, NodeId, Program};
-use dlsys_model::{Algebraic, Jacobian, Linear, SolutionForm, Solve, ZeroCrossing};
+use dlsys_model::{Algebraic, Jacobian, LinearRates, SolutionForm, Solve, ZeroCrossing};
 
 use super::crossings::crossing;
 use super::solution_forms::{classify, jacobian, linear};
-use super::stepping::{Layout, StepEquations};
+use super::stepping::{StepEquations, VariableLayout};
 use super::variability::Constants;
 use crate::declared::{DeclaredSolve, ResolvedRule};
 
@@ -18,7 +18,7 @@ pub struct ClauseAnalysis {
     pub solution_forms: Vec<SolutionForm>,
     numeric: Vec<usize>,
     numeric_rates: Program,
-    linear: Option<Linear>,
+    linear: Option<LinearRates>,
     jacobian: Jacobian,
     algebraic: Algebraic,
     zero_crossings: Vec<ZeroCrossing>,
@@ -27,7 +27,7 @@ pub struct ClauseAnalysis {
 
 impl ClauseAnalysis {
     /// The compiled clause.
-    pub fn compile(self, solve: DeclaredSolve, pulses: bool, layout: &Layout) -> Solve {
+    pub fn compile(self, solve: DeclaredSolve, pulses: bool, layout: &VariableLayout) -> Solve {
         let equations = StepEquations {
             of: &self.of,
             rates: &self.rates,

@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use dlsys_expr::{Binary, Curve, Graph, Integral, Monomial, Node, NodeId, Part, Polynomial, Program, Unary};
-use dlsys_model::{Driven, Flow};
+use dlsys_model::{DrivenGrowth, GrowthLaw};
 
 /// Variables at and above this number stand for parts of a rate; those of functions begin above them.
 const STAND_IN: u32 = 1 << 23;
@@ -25,7 +25,7 @@ const POINTS: usize = 8;
 
 /// A rate taken apart, before it is code.
 pub struct DrivenForm {
-    flow: Flow,
+    growth: GrowthLaw,
     coefficients: Vec<NodeId>,
     pace: Option<NodeId>,
     monotone: bool,
@@ -33,9 +33,9 @@ pub struct DrivenForm {
 }
 
 impl DrivenForm {
-    pub fn compile(self, graph: &Graph, total: usize) -> Driven {
-        Driven {
-            flow: self.flow,
+    pub fn compile(self, graph: &Graph, total: usize) -> DrivenGrowth {
+        DrivenGrowth {
+            growth: self.growth,
             coefficients: Program::compile(graph, &self.coefficients, total),
             pace: self.pace.map(|pace| Arc::new(Program::compile(graph, &[pace], total))),
             monotone: self.monotone,
@@ -147,12 +147,12 @@ pub fn driven_form(
         return None;
     }
     let products = Products::of(&polynomial, age)?;
-    let (flow, order) = flow(parameter, &products.of_x)?;
+    let (growth, order) = growth_law(parameter, &products.of_x)?;
     let driven = products.of_time.iter().flatten().any(|(v, _)| *v >= FIRST_DRIVER);
     // h is the constant 1.
     let trivial = products.of_time.len() == 1 && products.of_time[0].is_empty();
     // Without a driver only a constant h and a flow that has no other formula; x' = age x is integrated.
-    if !driven && (flow == Flow::Quadratic || !trivial) {
+    if !driven && (growth == GrowthLaw::Quadratic || !trivial) {
         return None;
     }
     let (of_q, of_h) = products.factors(graph, time)?;
@@ -160,7 +160,7 @@ pub fn driven_form(
     let zero = graph.constant(0.0);
     let mut coefficients: Vec<NodeId> =
         order.into_iter().map(|place| place.map_or(zero, |i: usize| of_q[i])).collect();
-    if flow == Flow::Bernoulli {
+    if growth == GrowthLaw::Bernoulli {
         coefficients.push(exponent(graph, parameter, &products.of_x, parts.power)?);
     }
     let known: Vec<Option<(Arc<Curve>, Part)>> = parts.drivers.iter().map(|d| curve_of(graph, d)).collect();
@@ -171,7 +171,7 @@ pub fn driven_form(
     let monotone = trivial || products.is_first_driver() && steady;
     let mut curves: Vec<Arc<Curve>> = known.into_iter().flatten().map(|(curve, _)| curve).collect();
     curves.dedup_by(|a, b| Arc::ptr_eq(a, b));
-    Some(DrivenForm { flow, coefficients, pace, monotone, curves })
+    Some(DrivenForm { growth, coefficients, pace, monotone, curves })
 }
 
 /// A rate as a sum of products: a monomial of q, a monomial of h, and a constant coefficient.
@@ -314,17 +314,17 @@ fn scale_of(
 }
 
 /// The form of q with these monomials, and which of them each coefficient belongs to.
-fn flow(x: u32, monomials: &[Monomial]) -> Option<(Flow, Vec<Option<usize>>)> {
+fn growth_law(x: u32, monomials: &[Monomial]) -> Option<(GrowthLaw, Vec<Option<usize>>)> {
     let find = |wanted: Monomial| monomials.iter().position(|m| *m == wanted);
     let power = |n: u32| find(if n == 0 { Monomial::new() } else { vec![(x, n)] });
     let places = [power(0), power(1), power(2)];
     let matched = |places: &[Option<usize>]| places.iter().flatten().count() == monomials.len();
     if matched(&places) {
-        return Some((Flow::Quadratic, places.to_vec()));
+        return Some((GrowthLaw::Quadratic, places.to_vec()));
     }
     let gompertz = [power(1), find(vec![(x, 1), (LOGARITHM, 1)])];
     if matched(&gompertz) {
-        return Some((Flow::Gompertz, gompertz.to_vec()));
+        return Some((GrowthLaw::Gompertz, gompertz.to_vec()));
     }
     let higher = monomials.iter().position(|m| {
         matches!(m[..], [(POWER, 1)])
@@ -332,7 +332,7 @@ fn flow(x: u32, monomials: &[Monomial]) -> Option<(Flow, Vec<Option<usize>>)> {
             || matches!(m[..], [(v, n)] if v == x && n > 1)
     });
     let bernoulli = [power(1), higher];
-    matched(&bernoulli).then(|| (Flow::Bernoulli, bernoulli.to_vec()))
+    matched(&bernoulli).then(|| (GrowthLaw::Bernoulli, bernoulli.to_vec()))
 }
 
 /// p of Bernoulli's equation.

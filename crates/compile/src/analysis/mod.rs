@@ -31,7 +31,7 @@ use crate::declared::ResolvedRule;
 use crate::gather::watched;
 use clause::{ClauseAnalysis, analyse_clause};
 use crossings::crossing;
-use stepping::Layout;
+use stepping::VariableLayout;
 use variability::{Constants, Moving};
 
 pub use driven::{driven_form, outside_of_drivers};
@@ -148,7 +148,7 @@ fn compile_rule(
     moving: Vec<usize>,
     pulses: &[bool],
 ) -> Rule {
-    let layout = Layout::of(&rule);
+    let layout = VariableLayout::of(&rule);
     let ResolvedRule { declared, left, right, .. } = rule;
     let count = declared.variables;
     let sides: Vec<NodeId> = declared.side_nodes().collect();

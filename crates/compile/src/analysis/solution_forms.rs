@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 
 use dlsys_expr::{Binary, Graph, Monomial, Node, NodeId, Polynomial, Program, Unary};
-use dlsys_model::{Jacobian, Linear, Numeric, Obstacle, SolutionForm};
+use dlsys_model::{Jacobian, LinearRates, Numeric, Obstacle, SolutionForm};
 
 use super::driven::driven_form;
 use super::variability::Constants;
@@ -167,7 +167,12 @@ fn affine(graph: &mut Graph, rate: NodeId, constants: &Constants) -> Option<Poly
 }
 
 /// The rates as linear equations, if all are that, with constant coefficients.
-pub fn linear(graph: &mut Graph, rates: &[NodeId], constants: &Constants, total: usize) -> Option<Linear> {
+pub fn linear(
+    graph: &mut Graph,
+    rates: &[NodeId],
+    constants: &Constants,
+    total: usize,
+) -> Option<LinearRates> {
     let zero = graph.constant(0.0);
     let (mut variables, mut roots) = (Vec::new(), Vec::new());
     for &rate in rates {
@@ -182,7 +187,7 @@ pub fn linear(graph: &mut Graph, rates: &[NodeId], constants: &Constants, total:
         }
         variables.push(row);
     }
-    Some(Linear { variables, coefficients: Program::compile(graph, &roots, total) })
+    Some(LinearRates { variables, coefficients: Program::compile(graph, &roots, total) })
 }
 
 /// Partial derivatives of expressions, one row each, by what changes.

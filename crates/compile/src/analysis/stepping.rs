@@ -1,12 +1,12 @@
 //! The components of a clause's equations, and the variables that its steps read.
 
 use dlsys_expr::Program;
-use dlsys_model::{Algebraic, Jacobian, Linear, Read, SolutionForm, Stepping};
+use dlsys_model::{Algebraic, Jacobian, LinearRates, Read, SolutionForm, Stepping};
 
 use super::ResolvedRule;
 
 /// How the variables of a rule are laid out.
-pub struct Layout {
+pub struct VariableLayout {
     /// Number of the module's own parameters.
     own: usize,
     /// Number of the parameters of each module of the context.
@@ -17,9 +17,9 @@ pub struct Layout {
     aggregates: bool,
 }
 
-impl Layout {
-    pub fn of(rule: &ResolvedRule) -> Layout {
-        Layout {
+impl VariableLayout {
+    pub fn of(rule: &ResolvedRule) -> VariableLayout {
+        VariableLayout {
             own: rule.declared.own(),
             context: rule.context().map(|pattern| pattern.width).collect(),
             variables: rule.declared.variables,
@@ -35,14 +35,14 @@ pub struct StepEquations<'e> {
     pub solution_forms: &'e [SolutionForm],
     pub numeric: &'e [usize],
     pub numeric_rates: &'e Program,
-    pub linear: Option<&'e Linear>,
+    pub linear: Option<&'e LinearRates>,
     pub jacobian: &'e Jacobian,
     pub algebraic: &'e Algebraic,
 }
 
 impl StepEquations<'_> {
     /// What the steps of the clause read.
-    pub fn stepping(&self, layout: &Layout) -> Stepping {
+    pub fn stepping(&self, layout: &VariableLayout) -> Stepping {
         let algebraic = self.algebraic;
         let components = [false, true].map(|numeric_only| {
             let numeric = (0..self.of.len()).filter(|i| numeric_only || self.numeric.contains(i));

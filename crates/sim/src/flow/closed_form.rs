@@ -50,7 +50,7 @@ pub fn formulas(solve: &Solve, time: usize, scratch: &mut Scratch, trajectories:
 
 /// The trajectory of a parameter at a pace; None if its formula does not hold for these numbers.
 fn driven(
-    law: &dlsys_model::Driven,
+    law: &dlsys_model::DrivenGrowth,
     parameter: usize,
     time: usize,
     scratch: &mut Scratch,
@@ -62,7 +62,7 @@ fn driven(
         return None;
     }
     let x = scratch.variables[parameter];
-    let flow = Flow::new(law.flow, x, c)?;
+    let flow = Flow::new(law.growth, x, c)?;
     let pace = match &law.pace {
         Some(program) => Some(Pace::new(program.clone(), &scratch.variables, time)?),
         None => None,

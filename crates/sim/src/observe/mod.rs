@@ -17,7 +17,7 @@ use crate::world::life::LifeClass;
 use crate::world::site_of_axiom;
 use cache::{Column, FrameCache};
 use dlsys_expr::{LANES, Lanes, Program};
-use dlsys_model::{Driven, SolutionForm};
+use dlsys_model::{DrivenGrowth, SolutionForm};
 use dlsys_tree::{ModuleId, ModuleString, SimTime, Version, Visit};
 
 impl Simulation<'_> {
@@ -192,7 +192,7 @@ fn is_zero(program: &Program) -> bool {
 
 /// The values that follow a law `x' = h(time) q(x)`, some times after the births whose variables the registers hold.
 fn driven(
-    law: &Driven,
+    law: &DrivenGrowth,
     registers: &mut Vec<Lanes>,
     [parameter, time]: [usize; 2],
     tau: &Lanes,
@@ -219,7 +219,7 @@ fn driven(
     }
     let mut moved = registers[parameter];
     for (i, x) in moved.iter_mut().enumerate().take(count) {
-        let flow = Flow::new(law.flow, *x, c.map(|c| c[i]));
+        let flow = Flow::new(law.growth, *x, c.map(|c| c[i]));
         *x += if tau[i] == 0.0 { 0.0 } else { flow.map_or(f64::NAN, |flow| flow.value(s[i])) };
     }
     moved

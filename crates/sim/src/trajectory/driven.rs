@@ -152,11 +152,13 @@ impl Pace {
 
 impl Flow {
     /// The solution from `x` with the coefficients of a form; None where its formula does not hold.
-    pub fn new(form: model::Flow, x: f64, [c, b, a]: [f64; 3]) -> Option<Flow> {
+    pub fn new(form: model::GrowthLaw, x: f64, [c, b, a]: [f64; 3]) -> Option<Flow> {
         Some(match form {
-            model::Flow::Quadratic => Flow::Riccati(Riccati::new(x, c, b, a), Riccati::new(x, -c, -b, -a)),
-            model::Flow::Gompertz => Flow::Growth(Growth::gompertz(x, c, b)?),
-            model::Flow::Bernoulli => Flow::Growth(Growth::bernoulli(x, c, b, a)?),
+            model::GrowthLaw::Quadratic => {
+                Flow::Riccati(Riccati::new(x, c, b, a), Riccati::new(x, -c, -b, -a))
+            }
+            model::GrowthLaw::Gompertz => Flow::Growth(Growth::gompertz(x, c, b)?),
+            model::GrowthLaw::Bernoulli => Flow::Growth(Growth::bernoulli(x, c, b, a)?),
         })
     }
 

@@ -7,8 +7,8 @@ pub(crate) use super::Pair;
 use super::Rule;
 use crate::ast;
 use crate::ast::{
-    Action, Alternative, Clause, Equation, Expr, ExprId, Expression, Expressions, HeadModule, Item, Module,
-    Name, Text, Turn,
+    Action, Alternative, Clause, ContextPart, Equation, Expr, ExprId, Expression, Expressions, HeadModule,
+    Item, Module, Name, Text,
 };
 use crate::notation;
 use dlsys_diagnostic::{Diagnostic, Span};
@@ -145,11 +145,11 @@ impl Builder<'_> {
                 Rule::right_context | Rule::step_right => {
                     for part in part.into_inner() {
                         right_shape.push(match part.as_rule() {
-                            Rule::bracket_open => Turn::Open,
-                            Rule::bracket_close => Turn::Close,
+                            Rule::bracket_open => ContextPart::Open,
+                            Rule::bracket_close => ContextPart::Close,
                             _ => {
                                 right.push(self.head_module(part));
-                                Turn::Module
+                                ContextPart::Module
                             }
                         });
                     }
