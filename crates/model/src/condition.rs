@@ -1,8 +1,8 @@
-//! Conditions as logic over signs.
+//! Conditions as logic over the signs of differences.
 //!
-//! A comparison `a < b` is the question whether `a - b` is negative. The simulation follows the signs of
-//! these differences along the trajectory; at an event it *knows* that a difference is zero, though the
-//! rounded numbers differ in their last place. So conditions are not evaluated on numbers but on signs.
+//! A comparison `a < b` holds if `a - b` is negative. The simulation follows the signs of these differences along the
+//! trajectory; at an event it *knows* that a difference is zero, though the rounded numbers differ in their last place.
+//! So conditions are evaluated on signs and not on numbers.
 
 use dlsys_expr::{Comparison, Sign, Truth};
 use smallvec::SmallVec;
@@ -12,11 +12,11 @@ use smallvec::SmallVec;
 pub enum ConditionStep {
     /// Compares the sides of the rule's atom of this number.
     Atom(u32, Comparison),
-    /// True or false, whatever happens.
+    /// A constant truth value.
     Constant(bool),
-    /// The conjunction of the two values before it: the lesser of them.
+    /// The conjunction (minimum) of the two values before it.
     And,
-    /// The disjunction of the two values before it: the greater of them.
+    /// The disjunction (maximum) of the two values before it.
     Or,
     /// The negation of the value before it.
     Not,
@@ -32,9 +32,9 @@ impl Condition {
         self.0.is_empty()
     }
 
-    /// Judges the condition, given the sign of each atom.
+    /// The truth value of the condition, given the sign of each atom.
     pub fn judge(&self, sign: impl Fn(usize) -> Sign) -> Truth {
-        // Most conditions are one comparison, or two.
+        // Most conditions have one or two comparisons.
         if let [ConditionStep::Atom(atom, comparison)] = self.0[..] {
             return comparison.judge(sign(atom as usize));
         }
@@ -59,7 +59,7 @@ impl Condition {
         stack.pop().unwrap_or(Truth::Yes)
     }
 
-    /// The atoms it mentions, each with the comparison asked of it.
+    /// The atoms in it, each with its comparison.
     pub fn atoms(&self) -> impl Iterator<Item = (usize, Comparison)> + '_ {
         self.0.iter().filter_map(|step| match *step {
             ConditionStep::Atom(atom, comparison) => Some((atom as usize, comparison)),

@@ -1,46 +1,45 @@
-//! How much work the equations and conditions of a rule are: what the analysis of a model finds out.
+//! Results of the analysis: the solution of each equation and the zero-crossing function of each comparison.
 //!
-//! "Model only what a scene needs": a parameter whose solution is a formula is never stepped, an event whose time
-//! is a formula is never searched for. The classes are facts about the mathematics of a rule; the simulation
-//! looks them up.
+//! A parameter whose solution is a formula needs no steps, and an event whose time is a formula needs no search. These
+//! classes are properties of the equations; `dlsys-compile` determines them once, when the model is loaded.
 
 use std::sync::Arc;
 
 use dlsys_expr::{Curve, Program};
 
-/// How the equation of a parameter is solved. Coefficients are computed when a module takes the equation up,
-/// from the variables of its rule.
+/// The solution method of the equation of a parameter. Coefficients are computed from the variables of the rule when
+/// the clause becomes active for a module.
 #[derive(Clone, Debug)]
 pub enum SolutionForm {
     /// `x' = c_0 + c_1 age + … + c_n age^n`; the outputs are the coefficients.
     Polynomial(Program),
-    /// `x' = c + b x + a x²`; the outputs are c, b and a. Exponential and logistic growth, and all of their kind.
+    /// `x' = c + b x + a x²`; the outputs are c, b and a. Exponential and logistic growth are of this form.
     Quadratic(Program),
-    /// `x' = b x + g(age, t, y, …)`, g made of sums and products of polynomials, exponentials, sines and cosines
-    /// and of other parameters of this class.
+    /// `x' = b x + g(age, t, y, …)` with g a sum of products of polynomials, exponentials, sines and cosines of time, and
+    /// other parameters of this form.
     Sum {
-        /// b
+        /// The coefficient b.
         factor: Program,
-        /// g
+        /// The inflow g.
         inflow: Program,
     },
-    /// `x' = h(time) q(x)`, with the integral of h known: curves, growth functions of time, and the growth laws of
-    /// Gompertz, Richards and von Bertalanffy.
+    /// `x' = h(time) q(x)` with a known integral of h: curves, growth functions of time, and the growth laws of Gompertz,
+    /// Richards and von Bertalanffy.
     Driven(Box<DrivenGrowth>),
     /// Integrated numerically.
     Numeric(Numeric),
 }
 
-/// The growth of one parameter by a formula; `x' = h(time) q(x)`.
+/// The formula of a parameter with `x' = h(time) q(x)`.
 #[derive(Clone, Debug)]
 pub struct DrivenGrowth {
     /// The form of q.
     pub growth: GrowthLaw,
-    /// Coefficients of q, in the order that [`GrowthLaw`] says.
+    /// Coefficients of q, in the order given at [`GrowthLaw`].
     pub coefficients: Program,
-    /// H, to be taken from the start of the motion on; None for time itself.
+    /// The integral H of h; the solution uses its difference from the start of the trajectory. None if h is 1.
     pub pace: Option<Arc<Program>>,
-    /// H goes one way only.
+    /// True if H is monotone.
     pub monotone: bool,
     /// The curves in h.
     pub curves: Vec<Arc<Curve>>,
@@ -57,30 +56,30 @@ pub enum GrowthLaw {
     Bernoulli,
 }
 
-/// Why a parameter is integrated numerically, and how it can be.
+/// A parameter without a formula, which is integrated numerically.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Numeric {
-    /// It reads something of its neighbours that changes.
+    /// True if its rate reads values of neighbours that change.
     pub coupled: bool,
-    /// Its rate is linear, with constant coefficients, in everything that changes.
+    /// True if its rate is linear, with constant coefficients, in all variables that change.
     pub linear: bool,
     /// The reason why there is no formula.
     pub obstacle: Obstacle,
 }
 
-/// What stands in the way of a formula.
+/// The reason why an equation has no formula.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Obstacle {
-    /// The rate reads something of neighbours that changes.
+    /// The rate reads values of neighbours that change.
     Neighbours,
-    /// The rate is no polynomial in the parameter itself.
+    /// The rate is not a polynomial in the parameter.
     NotPolynomial,
-    /// It is one of this degree, greater than 2.
+    /// The rate is a polynomial of this degree, greater than 2.
     Degree(u32),
-    /// The parameter is multiplied by something that changes.
+    /// The factor of the parameter changes.
     Factor,
-    /// What is added to it is no sum of products of polynomials, exponentials, sines and cosines of time, or reads a
-    /// parameter that is none.
+    /// The inflow is not a sum of products of polynomials, exponentials, sines and cosines of time, or reads a parameter
+    /// that is not such a sum.
     Inflow,
 }
 
@@ -91,46 +90,44 @@ impl SolutionForm {
     }
 }
 
-/// How the zero of a difference of two sides is found: the zero-crossing function of a comparison.
+/// The zero-crossing function of a comparison: how the zero of the difference of its two sides is located.
 #[derive(Clone, Debug)]
 pub enum ZeroCrossing {
-    /// Nothing in it changes: its sign stays.
+    /// The difference does not change between events, and neither does its sign.
     Constant,
-    /// The sides meet where one variable that moves one way only takes a value, which the program computes: the instant
-    /// is a formula.
+    /// The difference is zero where one monotone variable reaches a level, so that the instant is a formula.
     Formula {
-        /// The variable that moves.
+        /// The number of the monotone variable.
         variable: usize,
-        /// The value at which the sides meet, a function of the variables that stand still.
+        /// The level, a function of the variables that do not change.
         level: Program,
     },
-    /// The first root of a function of time (formulas or dense output) is searched for. The difference of the sides, if
-    /// it is linear.
+    /// The zero is searched for along the trajectory (formulas or dense output). Contains the difference if it is affine.
     Search(Option<AffineSum>),
 }
 
 /// `constant + Σ factor · variable`.
 #[derive(Clone, Debug)]
 pub struct AffineSum {
-    /// The value where all variables are 0.
+    /// The value at the origin.
     pub constant: f64,
-    /// Variables and their factors.
+    /// Numbers of variables with their factors.
     pub terms: Vec<(usize, f64)>,
 }
 
-/// Linear equations: `x_k' = constant + Σ coefficient · variable`.
+/// Linear equations with constant coefficients: `x_k' = constant + Σ coefficient · variable`.
 #[derive(Clone, Debug)]
 pub struct LinearRates {
-    /// Per numeric parameter, in their order: the variables it depends on.
+    /// By equation, in the order of [`Solve::numeric`](super::Solve::numeric): the variables that it reads.
     pub variables: Vec<Vec<usize>>,
-    /// Per numeric parameter: the constant, then the coefficients of those variables.
+    /// By equation: the constant, then the coefficients of those variables.
     pub coefficients: Program,
 }
 
-/// Partial derivatives of the rates of a clause by what changes.
+/// Partial derivatives of the rates of a clause with respect to the variables that change.
 #[derive(Clone, Debug, Default)]
 pub struct Jacobian {
-    /// Position of the rate in the clause, and number of the variable.
+    /// Index of the rate and number of the variable of each derivative.
     pub entries: Vec<(usize, usize)>,
     /// The derivatives, in the order of the entries.
     pub values: Program,
