@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::syntax::outline::{Entry, outline};
+use crate::syntax::outline::{OutlineEntry, outline};
 
 /// Largest number of texts kept for `undo`.
 const MOST_UNDONE: usize = 100;
@@ -84,12 +84,12 @@ impl Draft {
         let mut added = String::new();
         let mut done = Vec::new();
         // From the last to the first, so that spans stay valid.
-        let mut replaced: Vec<(&Entry, String)> = Vec::new();
+        let mut replaced: Vec<(&OutlineEntry, String)> = Vec::new();
         for (i, entry) in new.iter().enumerate() {
             let begin = if i == 0 { 0 } else { entry.span.range().start };
             let end = new.get(i + 1).map_or(typed.len(), |next| next.span.range().start);
             let piece = typed[begin..end].trim_end();
-            let same = |old: &&Entry| old.key.is_some() && old.key == entry.key;
+            let same = |old: &&OutlineEntry| old.key.is_some() && old.key == entry.key;
             match known.iter().find(same).filter(|old| !replaced.iter().any(|(other, _)| other == old)) {
                 Some(old) => {
                     replaced.push((old, typed[entry.span.range().start..end].trim_end().to_owned()));

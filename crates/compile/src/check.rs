@@ -6,8 +6,8 @@ use crate::advice;
 use crate::appearance::surface_hint;
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{
-    BUILT_IN_SURFACES, COMMAND_SURFACES, Class, Condition, DRAWN_WORDS, KindId, Model, Pattern, Remedy, Rule,
-    Sign, Step, Turn, base_of, class_of,
+    BUILT_IN_SURFACES, COMMAND_SURFACES, Class, Condition, ConditionStep, ContextPart, DRAWN_WORDS, KindId,
+    Model, Pattern, Remedy, Rule, Sign, base_of, class_of,
 };
 use dlsys_syntax::ast;
 use dlsys_syntax::print;
@@ -89,8 +89,8 @@ fn shadowed_rule(model: &Model, index: usize, own: &[KindId], diagnostics: &mut 
             && own.iter().all(|k| model.kinds.get(*k).rules_like(rule).contains(j))
             && before.left.len() <= rule.left.len()
             // What stands on branches is found one way or another.
-            && before.right_shape.iter().all(|turn| *turn == Turn::Module)
-            && rule.right_shape.iter().all(|turn| *turn == Turn::Module)
+            && before.right_shape.iter().all(|turn| *turn == ContextPart::Module)
+            && rule.right_shape.iter().all(|turn| *turn == ContextPart::Module)
             && before.right.len() <= rule.right.len()
             && before.left.iter().rev().zip(rule.left.iter().rev()).all(|(a, b)| wider(a, b))
             && before.right.iter().zip(&rule.right).all(|(a, b)| wider(a, b))
@@ -131,7 +131,7 @@ fn clauses(rule: &Rule, diagnostics: &mut Vec<Diagnostic>) {
     let produces = rule.produces.iter().filter(|p| !p.is_fault).map(|p| (&p.guard, p.span)).collect();
     for (kind, clauses) in [("solve", solves), ("produce", produces)] {
         for (i, (guard, span)) in clauses.iter().enumerate() {
-            if guard.0 == [Step::Constant(false)] {
+            if guard.0 == [ConditionStep::Constant(false)] {
                 diagnostics.push(
                     Diagnostic::error("this clause can never be reached")
                         .at(*span, "its condition is always false")

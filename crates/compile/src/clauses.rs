@@ -9,7 +9,7 @@ use crate::rules::RuleBuilder;
 use crate::scope::Variables;
 use dlsys_diagnostic::Span;
 use dlsys_expr::{Graph, NodeId};
-use dlsys_model::{Clock, Condition, Produce, Switch, Turn};
+use dlsys_model::{Clock, Condition, ContextPart, Produce, Switch};
 use dlsys_syntax::ast::{self, Action, HeadModule};
 use dlsys_syntax::print;
 
@@ -226,10 +226,10 @@ pub fn names_of(rule: &ast::Rule) -> Vec<&str> {
     }
 }
 
-fn turn(part: ast::Turn) -> Turn {
+fn turn(part: ast::ContextPart) -> ContextPart {
     match part {
-        ast::Turn::Module => Turn::Module,
-        ast::Turn::Open => Turn::Open,
-        ast::Turn::Close => Turn::Close,
+        ast::ContextPart::Module => ContextPart::Module,
+        ast::ContextPart::Open => ContextPart::Open,
+        ast::ContextPart::Close => ContextPart::Close,
     }
 }

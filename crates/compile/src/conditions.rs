@@ -6,7 +6,7 @@ use crate::advice;
 use crate::rules::RuleBuilder;
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_expr::{Binary, Node, NodeId, Unary};
-use dlsys_model::{Boundary, Comparison, Condition, Step};
+use dlsys_model::{Boundary, Comparison, Condition, ConditionStep};
 
 /// Longest condition, in comparisons and connectives, after functions are put in.
 const MAX_CONDITION: usize = 10_000;
@@ -25,7 +25,7 @@ impl RuleBuilder<'_> {
     pub(super) fn decompose(&mut self, root: NodeId, span: Span, atoms: &mut Atoms) -> Option<Condition> {
         enum Task {
             Visit(NodeId),
-            Emit(Step),
+            Emit(ConditionStep),
         }
         let mut steps = Vec::new();
         let mut tasks = vec![Task::Visit(root)];
@@ -46,10 +46,10 @@ impl RuleBuilder<'_> {
                 Task::Visit(id) => id,
             };
             match self.scope.graph.node(id) {
-                Node::Const(bits) => steps.push(Step::Constant(f64::from_bits(bits) != 0.0)),
-                Node::Unary(Unary::Not, a) => tasks.extend([Task::Emit(Step::Not), Task::Visit(a)]),
+                Node::Const(bits) => steps.push(ConditionStep::Constant(f64::from_bits(bits) != 0.0)),
+                Node::Unary(Unary::Not, a) => tasks.extend([Task::Emit(ConditionStep::Not), Task::Visit(a)]),
                 Node::Binary(op @ (Binary::And | Binary::Or), a, b) => {
-                    let step = if op == Binary::And { Step::And } else { Step::Or };
+                    let step = if op == Binary::And { ConditionStep::And } else { ConditionStep::Or };
                     tasks.extend([Task::Emit(step), Task::Visit(b), Task::Visit(a)]);
                 }
                 Node::Binary(op, a, b) => {
@@ -89,7 +89,7 @@ impl Atoms {
         comparison: Comparison,
         span: Span,
         sides: Option<&[String; 2]>,
-    ) -> Step {
+    ) -> ConditionStep {
         let (pair, comparison) = if a <= b { ((a, b), comparison) } else { ((b, a), comparison.mirrored()) };
         let atom = *self.index.entry(pair).or_insert_with(|| {
             self.sides.push(pair);
@@ -98,6 +98,6 @@ impl Atoms {
             self.boundaries.push(known.unwrap_or_default());
             self.sides.len() as u32 - 1
         });
-        Step::Atom(atom, comparison)
+        ConditionStep::Atom(atom, comparison)
     }
 }

@@ -10,7 +10,7 @@
 
 use dlsys_diagnostic::Span;
 use dlsys_expr::{Fold, NodeId};
-use dlsys_model::{Boundary, Clock, Condition, Pattern, Produce, Switch, Turn};
+use dlsys_model::{Boundary, Clock, Condition, ContextPart, Pattern, Produce, Switch};
 use dlsys_syntax::ast::HeadModule;
 
 /// Context, equations and productions under one head.
@@ -28,7 +28,7 @@ pub struct DeclaredRule {
     pub context_names: Vec<String>,
     pub left: Vec<DeclaredPattern>,
     pub right: Vec<DeclaredPattern>,
-    pub right_shape: Vec<Turn>,
+    pub right_shape: Vec<ContextPart>,
     pub aggregates: Vec<DeclaredAggregate>,
     /// The variable of the first aggregate.
     pub first_aggregate: usize,

@@ -204,8 +204,8 @@ impl RuleBuilder<'_> {
         true
     }
 
-    /// Finds out which parameter each implicit equation is solved for: first those that are named, then, by augmenting
-    /// paths, one of the parameters that nothing else determines.
+    /// Matches each implicit equation to the parameter that it is solved for: first those that are named, then, by
+    /// augmenting paths, one of the parameters that nothing else determines.
     fn match_unknowns(
         &mut self,
         zeros: Vec<Zero>,
@@ -228,48 +228,12 @@ impl RuleBuilder<'_> {
             .map(|zero| self.scope.graph.variables(&[zero.residual]))
             .map(|all| all.into_iter().filter(|v| *v < own).map(|v| v as usize).collect())
             .collect();
-        let mut unknowns: Vec<usize> = zeros.iter().filter_map(|zero| zero.unknown).collect();
-        let mut free: Vec<usize> = reads.iter().flatten().copied().filter(|p| !named.contains(p)).collect();
-        free.sort_unstable();
-        free.dedup();
-        let missing = zeros.len() - unknowns.len();
-        if missing == 0 {
-            // What else stands in them keeps its value.
-            free.clear();
-        }
-        if free.len() != missing {
-            let name = |p: &usize| format!("`{}`", head.parameters[*p].text);
-            let names: Vec<String> = free.iter().map(name).collect();
-            let first = zeros.iter().find(|zero| zero.unknown.is_none()).expect("one is missing");
-            let error =
-                Diagnostic::error("it is not clear which parameters the equations are to be solved for").at(
-                    first.span,
-                    match free.len() {
-                        0 => "nothing in it is left to be determined".to_owned(),
-                        n => format!("{n} parameters have no equation of their own: {}", names.join(", ")),
-                    },
-                );
-            let example = free.first().map_or("y", |p| &*head.parameters[*p].text);
-            self.error(if free.is_empty() {
-                error.help("a parameter that has a rate or a value has its equation already; an equation that holds between such parameters must be differentiated by hand until it contains the unknown (index 1)")
-            } else {
-                error.help(format!("say so: `0 = … for {example}`"))
-            });
-            return None;
-        }
-        unknowns.extend(free);
-        // Of each unknown: the equation that it belongs to.
-        let mut equation_of: HashMap<usize, usize> = HashMap::new();
+        let unknowns = self.unknowns(&zeros, &reads, named, head)?;
+        // By unknown: the equation that is solved for it.
+        let mut equation_of: HashMap<usize, usize> =
+            (zeros.iter().enumerate()).filter_map(|(i, zero)| Some((zero.unknown?, i))).collect();
         let fixed: Vec<bool> = zeros.iter().map(|zero| zero.unknown.is_some()).collect();
-        for (i, zero) in zeros.iter().enumerate() {
-            if let Some(unknown) = zero.unknown {
-                equation_of.insert(unknown, i);
-            }
-        }
-        for (i, zero) in zeros.iter().enumerate() {
-            if fixed[i] {
-                continue;
-            }
+        for (i, zero) in zeros.iter().enumerate().filter(|(i, _)| !fixed[*i]) {
             if !augment(i, &reads, &unknowns, &fixed, &mut equation_of, &mut Vec::new()) {
                 self.error(
                     Diagnostic::error("these equations cannot determine their parameters")
@@ -288,6 +252,43 @@ impl RuleBuilder<'_> {
             .collect();
         all.sort_by_key(|entry| entry.parameter);
         Some(all)
+    }
+
+    /// The parameters that the implicit equations determine: those that equations name, then those that nothing else
+    /// determines. An error unless there are as many as equations.
+    fn unknowns(
+        &mut self,
+        zeros: &[Zero],
+        reads: &[Vec<usize>],
+        named: &[usize],
+        head: &HeadModule,
+    ) -> Option<Vec<usize>> {
+        let mut unknowns: Vec<usize> = zeros.iter().filter_map(|zero| zero.unknown).collect();
+        // If every equation names its parameter, the others in it keep their values.
+        let Some(first) = zeros.iter().find(|zero| zero.unknown.is_none()) else { return Some(unknowns) };
+        let mut free: Vec<usize> = reads.iter().flatten().copied().filter(|p| !named.contains(p)).collect();
+        free.sort_unstable();
+        free.dedup();
+        if free.len() == zeros.len() - unknowns.len() {
+            unknowns.extend(free);
+            return Some(unknowns);
+        }
+        let name = |p: &usize| format!("`{}`", head.parameters[*p].text);
+        let names: Vec<String> = free.iter().map(name).collect();
+        let label = match free.len() {
+            0 => "nothing in it is left to be determined".to_owned(),
+            n => format!("{n} parameters have no equation of their own: {}", names.join(", ")),
+        };
+        let help = match free.first() {
+            None => "a parameter that has a rate or a value has its equation already; an equation that holds between such parameters must be differentiated by hand until it contains the unknown (index 1)".to_owned(),
+            Some(p) => format!("say so: `0 = … for {}`", head.parameters[*p].text),
+        };
+        self.error(
+            Diagnostic::error("it is not clear which parameters the equations are to be solved for")
+                .at(first.span, label)
+                .help(help),
+        );
+        None
     }
 
     /// False if implicit equations are singular whatever the values are.

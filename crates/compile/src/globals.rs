@@ -16,11 +16,11 @@ use dlsys_syntax::suggest::did_you_mean;
 /// What a global name is declared as.
 struct Global<'d> {
     name: &'d Name,
-    kind: Kind<'d>,
+    kind: GlobalKind<'d>,
     library: bool,
 }
 
-enum Kind<'d> {
+enum GlobalKind<'d> {
     Const(Expression),
     Param(Expression, Option<(Expression, Expression)>),
     Def(&'d [Name], Expression),
@@ -49,17 +49,17 @@ pub fn declare(
     for i in order(document, &globals, &index, scope) {
         let Global { name, kind, library } = &globals[i];
         match kind {
-            Kind::Def(formals, body) => {
+            GlobalKind::Def(formals, body) => {
                 scope.define_function(name, formals, &document.expressions, *body, *library);
             }
-            Kind::Array(values) => scope.define_array(name, &document.expressions, values),
-            Kind::Curve(item, span) => scope.define_curve(item, *span, &document.expressions, files),
-            Kind::Number(number) => scope.define_constant(name.text.clone(), Some(*number as f64)),
-            Kind::Const(body) => {
+            GlobalKind::Array(values) => scope.define_array(name, &document.expressions, values),
+            GlobalKind::Curve(item, span) => scope.define_curve(item, *span, &document.expressions, files),
+            GlobalKind::Number(number) => scope.define_constant(name.text.clone(), Some(*number as f64)),
+            GlobalKind::Const(body) => {
                 let value = scope.constant_value(&document.expressions, *body);
                 scope.define_constant(name.text.clone(), value);
             }
-            Kind::Param(body, range) => {
+            GlobalKind::Param(body, range) => {
                 let value = parameter(document, name, *body, *range, settings, scope);
                 scope.define_constant(name.text.clone(), value.as_ref().map(|p| p.value));
                 parameters.extend(value);
@@ -99,16 +99,16 @@ fn collect<'d>(document: &'d Document, scope: &mut Scope) -> Vec<Global<'d>> {
     let mut next_contour = 1;
     let count = |next: &mut usize| {
         *next += 1;
-        Kind::Number(*next - 1)
+        GlobalKind::Number(*next - 1)
     };
     for (i, (item, span)) in document.items.iter().enumerate() {
         let library = document.library.is_some_and(|from| i >= from);
         let (name, kind) = match item {
-            Item::Const { name, value } => (name, Kind::Const(*value)),
-            Item::Array { name, values } => (name, Kind::Array(values)),
-            Item::Curve { name, .. } | Item::Table { name, .. } => (name, Kind::Curve(item, *span)),
-            Item::Param { name, value, range } => (name, Kind::Param(*value, *range)),
-            Item::Def { name, parameters, body } => (name, Kind::Def(parameters, *body)),
+            Item::Const { name, value } => (name, GlobalKind::Const(*value)),
+            Item::Array { name, values } => (name, GlobalKind::Array(values)),
+            Item::Curve { name, .. } | Item::Table { name, .. } => (name, GlobalKind::Curve(item, *span)),
+            Item::Param { name, value, range } => (name, GlobalKind::Param(*value, *range)),
+            Item::Def { name, parameters, body } => (name, GlobalKind::Def(parameters, *body)),
             Item::Color { name, .. } => (name, count(&mut next_color)),
             Item::Gradient { name, .. } => (name, count(&mut next_gradient)),
             Item::Contour { name, .. } => (name, count(&mut next_contour)),
@@ -217,6 +217,33 @@ pub(super) fn mentions(
     })
 }
 
+/// The global names that the declaration of each one mentions, and where it mentions them.
+fn dependencies(
+    document: &Document,
+    globals: &[Global],
+    index: &HashMap<&str, usize>,
+) -> Vec<Vec<(usize, Span)>> {
+    globals
+        .iter()
+        .map(|global| {
+            let (own, bodies): (&[Name], Vec<Expression>) = match global.kind {
+                GlobalKind::Def(formals, body) => (formals, vec![body]),
+                GlobalKind::Const(body) | GlobalKind::Param(body, None) => (&[], vec![body]),
+                GlobalKind::Param(body, Some((from, to))) => (&[], vec![body, from, to]),
+                GlobalKind::Number(_) => (&[], Vec::new()),
+                GlobalKind::Array(values) => (&[], values.to_vec()),
+                GlobalKind::Curve(Item::Curve { points, .. }, _) => (&[], points.concat()),
+                GlobalKind::Curve(..) => (&[], Vec::new()),
+            };
+            (bodies.into_iter())
+                .flat_map(|e| mentions(document, e))
+                .filter(|(name, _)| !own.iter().any(|formal| formal.text == **name))
+                .filter_map(|(name, span)| Some((*index.get(&**name)?, span)))
+                .collect()
+        })
+        .collect()
+}
+
 /// Global names, each after those it depends on; those on a cycle are reported and left out.
 ///
 /// Depth-first search with an explicit stack: chains of declarations may be long.
@@ -232,25 +259,7 @@ fn order(
         Open,
         Done,
     }
-    let dependencies: Vec<Vec<(usize, Span)>> = globals
-        .iter()
-        .map(|global| {
-            let (own, bodies): (&[Name], Vec<Expression>) = match global.kind {
-                Kind::Def(formals, body) => (formals, vec![body]),
-                Kind::Const(body) | Kind::Param(body, None) => (&[], vec![body]),
-                Kind::Param(body, Some((from, to))) => (&[], vec![body, from, to]),
-                Kind::Number(_) => (&[], Vec::new()),
-                Kind::Array(values) => (&[], values.to_vec()),
-                Kind::Curve(Item::Curve { points, .. }, _) => (&[], points.concat()),
-                Kind::Curve(..) => (&[], Vec::new()),
-            };
-            (bodies.into_iter())
-                .flat_map(|e| mentions(document, e))
-                .filter(|(name, _)| !own.iter().any(|formal| formal.text == **name))
-                .filter_map(|(name, span)| Some((*index.get(&**name)?, span)))
-                .collect()
-        })
-        .collect();
+    let dependencies = dependencies(document, globals, index);
     let mut circular = vec![false; globals.len()];
     let mut marks = vec![Mark::New; globals.len()];
     let mut sorted = Vec::with_capacity(globals.len());
@@ -278,30 +287,8 @@ fn order(
                     Mark::Open => {
                         scope.poison(globals[to].name.text.clone());
                         let from = stack.iter().position(|(n, _)| *n == to).unwrap_or(0);
-                        let mut path: Vec<&str> =
-                            stack[from..].iter().map(|(n, _)| &*globals[*n].name.text).collect();
-                        path.push(&globals[to].name.text);
-                        if path.len() > 8 {
-                            path.splice(4..path.len() - 3, ["…"]);
-                        }
-                        let name = &globals[to].name.text;
-                        let (what, help) = match globals[to].kind {
-                            Kind::Def(..) => (
-                                "calls itself",
-                                "write it without itself; what is repeated in time belongs into rules"
-                                    .to_owned(),
-                            ),
-                            _ => (
-                                "depends on itself",
-                                format!("give one of them a number, such as `const {name} = 1`"),
-                            ),
-                        };
-                        scope.diagnostics.push(
-                            Diagnostic::error(format!("`{}` {what}", globals[to].name.text))
-                                .at(span, format!("this closes the circle {}", path.join(" → ")))
-                                .at(globals[to].name.span, "declared here")
-                                .help(help),
-                        );
+                        let path: Vec<&Global> = stack[from..].iter().map(|(n, _)| &globals[*n]).collect();
+                        scope.diagnostics.push(circle(&globals[to], &path, span));
                     }
                     Mark::Done => {}
                 },
@@ -309,4 +296,26 @@ fn order(
         }
     }
     sorted
+}
+
+/// The error for a global that depends on itself by way of `path`, which begins with it; `span` is the mention that
+/// closes the circle.
+fn circle(global: &Global, path: &[&Global], span: Span) -> Diagnostic {
+    let name = &global.name.text;
+    let mut path: Vec<&str> = path.iter().map(|global| &*global.name.text).collect();
+    path.push(name);
+    if path.len() > 8 {
+        path.splice(4..path.len() - 3, ["…"]);
+    }
+    let (what, help) = match global.kind {
+        GlobalKind::Def(..) => (
+            "calls itself",
+            "write it without itself; what is repeated in time belongs into rules".to_owned(),
+        ),
+        _ => ("depends on itself", format!("give one of them a number, such as `const {name} = 1`")),
+    };
+    Diagnostic::error(format!("`{name}` {what}"))
+        .at(span, format!("this closes the circle {}", path.join(" → ")))
+        .at(global.name.span, "declared here")
+        .help(help)
 }

@@ -13,7 +13,7 @@ const SIZE_LIMIT: u64 = 64 << 20;
 
 /// A row of a table.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Row {
+pub struct TableRow {
     /// In the file, from 1.
     pub line: usize,
     pub point: [f64; 2],
@@ -21,7 +21,7 @@ pub struct Row {
 
 /// What is wrong with a table.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Fault {
+pub struct TableError {
     /// From 1, if one line is to blame.
     pub line: Option<usize>,
     pub what: String,
@@ -30,23 +30,23 @@ pub struct Fault {
     pub of_column: bool,
 }
 
-impl Fault {
-    fn new(line: Option<usize>, what: impl Into<String>, help: impl Into<String>) -> Fault {
-        Fault { line, what: what.into(), help: Some(help.into()), of_column: false }
+impl TableError {
+    fn new(line: Option<usize>, what: impl Into<String>, help: impl Into<String>) -> TableError {
+        TableError { line, what: what.into(), help: Some(help.into()), of_column: false }
     }
 }
 
 /// Reads the first column of a file, and the second, or the one with a name.
-pub fn read(path: &str, column: Option<&str>, files: &dyn Files) -> Result<Vec<Row>, Fault> {
+pub fn read(path: &str, column: Option<&str>, files: &dyn Files) -> Result<Vec<TableRow>, TableError> {
     if !is_inside(path) {
-        return Err(Fault::new(
+        return Err(TableError::new(
             None,
             "the path leaves the model's folder",
             "tables stand in the folder of the model or below it, as in `\"data/temperature.csv\"`",
         ));
     }
     let bytes = files.read(Path::new(path), SIZE_LIMIT).map_err(|why| {
-        Fault::new(
+        TableError::new(
             None,
             why,
             "paths begin at the folder of the model; other folders are searched with `--include-path DIR`",
@@ -55,14 +55,14 @@ pub fn read(path: &str, column: Option<&str>, files: &dyn Files) -> Result<Vec<R
     parse(&String::from_utf8_lossy(&bytes), column)
 }
 
-fn parse(text: &str, column: Option<&str>) -> Result<Vec<Row>, Fault> {
+fn parse(text: &str, column: Option<&str>) -> Result<Vec<TableRow>, TableError> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut lines = (text.lines().enumerate())
         .map(|(i, line)| (i + 1, line.trim()))
         .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
         .peekable();
     let Some(&(first, head)) = lines.peek() else {
-        return Err(Fault::new(None, "the file has no rows", "a row is two numbers, as in `0.5, 12.3`"));
+        return Err(TableError::new(None, "the file has no rows", "a row is two numbers, as in `0.5, 12.3`"));
     };
     let separator = [',', ';', '\t'].into_iter().find(|c| head.contains(*c));
     let cells = |line: &'_ str| -> Vec<String> {
@@ -81,10 +81,10 @@ fn parse(text: &str, column: Option<&str>) -> Result<Vec<Row>, Fault> {
     let mut rows = Vec::new();
     for (line, text) in lines.skip(usize::from(titled)) {
         let cells = cells(text);
-        let number = |i: usize| -> Result<f64, Fault> {
+        let number = |i: usize| -> Result<f64, TableError> {
             let Some(cell) = cells.get(i) else {
                 let what = format!("there is no column {}", i + 1);
-                return Err(Fault::new(Some(line), what, "every row has the columns of the first one"));
+                return Err(TableError::new(Some(line), what, "every row has the columns of the first one"));
             };
             let value: Option<f64> = cell.parse().ok();
             value.filter(|x| x.is_finite()).ok_or_else(|| {
@@ -93,12 +93,12 @@ fn parse(text: &str, column: Option<&str>) -> Result<Vec<Row>, Fault> {
                 } else {
                     "a cell is a number such as `12.3` or `1e-3`; leave out rows without one"
                 };
-                Fault::new(Some(line), format!("expected a number, not `{}`", shown(cell)), help)
+                TableError::new(Some(line), format!("expected a number, not `{}`", shown(cell)), help)
             })
         };
-        rows.push(Row { line, point: [number(0)?, number(which)?] });
+        rows.push(TableRow { line, point: [number(0)?, number(which)?] });
         if rows.len() > MAX_POINTS {
-            return Err(Fault::new(
+            return Err(TableError::new(
                 Some(line),
                 format!("more than {MAX_POINTS} rows"),
                 "leave out every second row",
@@ -106,7 +106,7 @@ fn parse(text: &str, column: Option<&str>) -> Result<Vec<Row>, Fault> {
         }
     }
     if rows.is_empty() {
-        return Err(Fault::new(
+        return Err(TableError::new(
             None,
             "the file has no rows of numbers",
             "a row is two numbers, as in `0.5, 12.3`",
@@ -116,7 +116,7 @@ fn parse(text: &str, column: Option<&str>) -> Result<Vec<Row>, Fault> {
 }
 
 /// The place of a column that is chosen by its name. `first` is the line of the names, if it is `titled`.
-fn column_of(wanted: &str, names: &[String], titled: bool, first: usize) -> Result<usize, Fault> {
+fn column_of(wanted: &str, names: &[String], titled: bool, first: usize) -> Result<usize, TableError> {
     let found = names.iter().position(|name| name == wanted).filter(|_| titled);
     found.ok_or_else(|| {
         let mut fault = if titled {
@@ -127,9 +127,9 @@ fn column_of(wanted: &str, names: &[String], titled: bool, first: usize) -> Resu
                 format!("it has {}", known.join(", "))
             };
             let what = format!("the file has no column \"{}\"", shown(wanted));
-            Fault::new(None, what, near.unwrap_or_else(known))
+            TableError::new(None, what, near.unwrap_or_else(known))
         } else {
-            Fault::new(
+            TableError::new(
                 Some(first),
                 "its columns have no names",
                 "without `column …` the second column is taken; names stand in the first line",

@@ -1,4 +1,5 @@
-//! What is known of a module without integrating it: explicit and implicit parameters, and aggregates of its children.
+//! Values of a module that are computed without integration: explicit and implicit parameters, and aggregates of its
+//! children.
 //!
 //! Together with rates these make differential-algebraic equations of index 1, which section 8 of the paper leaves
 //! open: `dx/dt = f(x, z)`, `0 = g(x, z)`, where g determines z as long as its partial derivatives by z are not
@@ -12,26 +13,26 @@ use dlsys_expr::{Fold, Program, Scratch, Value};
 
 /// The parameters of a `solve` that have a value or an equation instead of a rate.
 ///
-/// The own explicit parameters that an equation reads have been put into it, so that the programs read parameters
-/// with rates, implicit ones, constants, the context and time.
+/// Explicit parameters of the module are substituted into the equations that read them, so the programs read only
+/// parameters with rates, implicit parameters, constants, the context and time.
 #[derive(Clone, Debug, Default)]
 pub struct Algebraic {
-    /// The parameters, explicit ones first. Of an implicit one, the equation of the same place is solved for it.
+    /// The parameters, explicit ones first. The equation at the same index is solved for an implicit one.
     pub of: Vec<usize>,
-    /// `x = f`, not `0 = g`.
+    /// True for `x = f`, false for `0 = g`.
     pub explicit: Vec<bool>,
-    /// A formula of constants, time and parameters that follow formulas.
+    /// True if f reads only constants, time and parameters that follow formulas.
     pub closed: Vec<bool>,
-    /// It is implicit, or some rate, condition or other such parameter reads it. An explicit one that nobody reads is
-    /// computed when somebody looks.
+    /// True if the parameter is implicit, or if a rate, a condition or another such parameter reads it. The value of any
+    /// other is computed only when it is observed.
     pub needed: Vec<bool>,
     /// f of explicit parameters, g of implicit ones.
     pub values: Program,
-    /// Of the formulas alone, one program each, empty for others.
+    /// One program for each parameter that is `closed`; empty for the others.
     pub formulas: Vec<Arc<Program>>,
-    /// Partial derivatives of `values` by what changes.
+    /// Partial derivatives of `values` with respect to the variables that change between events.
     pub jacobian: Jacobian,
-    /// Where each equation is written.
+    /// The place of each equation in the text.
     pub spans: Vec<Span>,
 }
 
@@ -41,40 +42,40 @@ impl Algebraic {
         self.of.is_empty()
     }
 
-    /// True if the place is one whose parameter is solved for along with those that are integrated: `numeric_only` if no
-    /// formulas are used.
+    /// True if the parameter at this index is solved for in each step of the integrator. `numeric_only` is true if all
+    /// equations are integrated, even those with formulas.
     pub fn is_solved(&self, place: usize, numeric_only: bool) -> bool {
         if numeric_only { !self.is_lazy(place) } else { self.needed[place] && !self.closed[place] }
     }
 
-    /// True if the parameter is computed only when somebody looks.
+    /// True if the parameter is computed only when it is observed.
     pub fn is_lazy(&self, place: usize) -> bool {
         !self.needed[place] && !self.closed[place]
     }
 }
 
-/// Something of all modules attached to one: `sum(B(x, c): D*(c - c_0))`. Of no modules it is 0.
+/// A value over all modules attached to one: `sum(B(x, c): D*(c - c_0))`. Without such modules it is 0.
 #[derive(Clone, Debug)]
 pub struct Aggregate {
-    /// How the values of the children are combined.
+    /// The operation that combines the values of the children.
     pub fold: Fold,
-    /// The children that count.
+    /// The kinds of children that are included.
     pub pattern: Pattern,
     /// The value of one child. It reads the variables of the rule, then the parameters of the child.
     pub term: Program,
-    /// Partial derivatives of the term by what changes; the row is 0.
+    /// Partial derivatives of the term with respect to the variables that change; the row is always 0.
     pub jacobian: Jacobian,
-    /// Something in it changes from one event to the next.
+    /// True if its value may change between two events.
     pub moves: bool,
-    /// As it is written, without the term.
+    /// The text of the aggregate without its term.
     pub label: String,
-    /// Where the head of the child is written.
+    /// The place of the head of the child in the text.
     pub span: Span,
 }
 
 impl Aggregate {
-    /// The value, given the variables of the rule, and a function that appends the parameters of one child after
-    /// another and says whether there was one.
+    /// The value, given the variables of the rule. Each call of `next` appends the parameters of one more child; it
+    /// returns false when there is none.
     pub fn evaluate<T: Value>(
         &self,
         variables: &mut Vec<T>,
@@ -95,7 +96,7 @@ impl Aggregate {
 
 /// A part of a right context: `> [ C(z) ] D(w)`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Turn {
+pub enum ContextPart {
     /// A module: the next one of the right context.
     Module,
     /// A branch begins.

@@ -1,13 +1,12 @@
-//! How modules look, as far as a model says: colours, surfaces, contours, tropism.
+//! The appearance of modules: colours, surfaces, contours, tropism.
 //!
-//! Plain data without geometry of its own: `dlsys-compile` fills it in, the turtle makes materials and
-//! meshes of it.
+//! Plain data: `dlsys-compile` fills it in, and the turtle builds materials and meshes from it.
 
 use std::sync::Arc;
 
 use dlsys_diagnostic::Span;
 
-/// What the declarations `color`, `gradient`, `surface`, `contour` and `tropism` say.
+/// The declarations `color`, `gradient`, `surface`, `contour` and `tropism` of a model.
 #[derive(Clone, Debug, Default)]
 pub struct Appearance {
     /// In the order written; colour `i` is number `BUILT_IN_COLORS + 1 + i` of `;(n)`.
@@ -31,9 +30,9 @@ pub type Rgb = u32;
 /// `color name = "#rrggbb"`
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NamedColor {
-    /// The name as declared, or as the material is called in its file.
+    /// The name as declared, or the name of the material in its file.
     pub name: Arc<str>,
-    /// Its colour.
+    /// The colour.
     pub rgb: Rgb,
 }
 
@@ -42,7 +41,7 @@ pub struct NamedColor {
 pub struct Gradient {
     /// The name as declared.
     pub name: Arc<str>,
-    /// Two or more.
+    /// The colours, two or more.
     pub stops: Vec<Rgb>,
 }
 
@@ -58,34 +57,33 @@ pub struct Tropism {
 /// The 16 control points of a bicubic Bézier patch, row by row.
 pub type Net = [[f64; 3]; 16];
 
-/// A surface that was read from a file, in the turtle's axes: along the heading, to the left, up; the
-/// turtle stands at the origin.
+/// A surface from a file, in the turtle's axes (along the heading, to the left, up) with the turtle at the origin.
 #[derive(Clone, Debug, Default)]
 pub struct SurfaceShape {
-    /// With its mark: `@P`.
+    /// The name with its mark: `@P`.
     pub name: String,
-    /// Bicubic patches; their front is where, seen with rows going up, columns go right.
+    /// Bicubic patches. Seen from the front with rows going up, columns go to the right.
     pub patches: Vec<Net>,
     /// Corners of triangles.
     pub vertices: Vec<[f64; 3]>,
-    /// One for each vertex, or none at all if the file has none.
+    /// One normal for each vertex; empty if the file has none.
     pub normals: Vec<[f64; 3]>,
-    /// Numbers of three vertices each, counter-clockwise as seen from the front.
+    /// Indices of three vertices each, counter-clockwise as seen from the front.
     pub triangles: Vec<[u32; 3]>,
-    /// Colours that the file gives, with their names.
+    /// The materials of the file.
     pub materials: Vec<NamedColor>,
-    /// Which of them a triangle has; the list is empty, or there is one for each triangle.
+    /// Index of the material of each triangle; empty if no triangle has one.
     pub painted: Vec<Option<u32>>,
-    /// Where it is declared.
+    /// The place of the declaration in the text.
     pub span: Span,
 }
 
-/// `contour name = (x, y) …`: the cross-section of a stem, through these points, counter-clockwise about
-/// the origin. Lengths are in parts of the stem's radius.
+/// `contour name = (x, y) …`: the cross-section of a stem through these points, counter-clockwise about the origin, in
+/// units of the radius of the stem.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contour {
     /// The name as declared.
     pub name: Arc<str>,
-    /// Three or more.
+    /// The points, three or more.
     pub points: Vec<[f64; 2]>,
 }

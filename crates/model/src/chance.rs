@@ -1,8 +1,8 @@
 //! Random numbers in the parameters of new modules, and choices between successors.
 //!
 //! A draw is the quantile function of its distribution at a number between 0 and 1 that belongs to the module
-//! ([`Seed`](dlsys_tree::Seed)). So it moves smoothly with the distribution's parameters: a plant does not become
-//! another one because a deviation is changed by a little.
+//! (`dlsys_tree::Seed`). So it varies smoothly with the parameters of the distribution: a small change of a
+//! deviation changes a plant slightly instead of replacing it with another one.
 
 use statrs::function::erf::erfc_inv;
 
@@ -27,7 +27,7 @@ pub enum Distribution {
 }
 
 impl Distribution {
-    /// The names of the distributions, with their parameters as people write them.
+    /// Name, distribution and notation of each.
     pub const NAMED: [(&'static str, Distribution, &'static str); 6] = [
         ("uniform", Distribution::Uniform, "uniform(a, b)"),
         ("normal", Distribution::Normal, "normal(mean, sd)"),
@@ -37,7 +37,7 @@ impl Distribution {
         ("choice", Distribution::Choice, "choice(a, b, c)"),
     ];
 
-    /// The distribution of a name.
+    /// The distribution with a name.
     pub fn named(name: &str) -> Option<Distribution> {
         Distribution::NAMED.iter().find(|(n, ..)| *n == name).map(|(_, distribution, _)| *distribution)
     }
@@ -46,17 +46,17 @@ impl Distribution {
         Distribution::NAMED.into_iter().find(|(_, d, _)| *d == self).expect("all are named")
     }
 
-    /// The word of the language for it.
+    /// Its name in the language.
     pub fn name(self) -> &'static str {
         self.entry().0
     }
 
-    /// How it is written.
+    /// Its notation with parameters.
     pub fn usage(self) -> &'static str {
         self.entry().2
     }
 
-    /// What it needs, and what to do.
+    /// The condition on its parameters and the remedy if it fails, as a sentence.
     pub fn demand(self) -> &'static str {
         match self {
             Distribution::Uniform => "uniform(a, b) needs a <= b: put the smaller number first",
@@ -86,7 +86,7 @@ impl Distribution {
         }
     }
 
-    /// What is wrong with its parameters, if anything is. Values that are not finite are wrong.
+    /// The reason why these parameters are invalid, if they are. All of them must be finite.
     pub fn fault(self, p: &[f64]) -> Option<String> {
         if let Some(bad) = p.iter().find(|x| !x.is_finite()) {
             return Some(format!("a parameter of it is {bad}"));
@@ -98,7 +98,7 @@ impl Distribution {
                 if p[0].ceil() > second.floor() {
                     return Some(format!("there is no whole number from {} to {second}", p[0]));
                 }
-                // Beyond, floats are not dense in the whole numbers.
+                // Beyond 2^53, floats do not represent all whole numbers.
                 let large = p.iter().any(|x| x.abs() > (1u64 << 52) as f64);
                 large.then(|| "whole numbers are drawn between -2^52 and 2^52".to_owned())
             }
@@ -110,7 +110,7 @@ impl Distribution {
         }
     }
 
-    /// The value below which a part `u` of the distribution lies; NaN for parameters at fault.
+    /// The quantile at `u` from 0 to 1; NaN for invalid parameters.
     pub fn quantile(self, p: &[f64], u: f64) -> f64 {
         if self.fault(p).is_some() {
             return f64::NAN;
@@ -119,7 +119,7 @@ impl Distribution {
             Distribution::Uniform => p[0] + (p[1] - p[0]) * u,
             Distribution::Normal => p[0] + p[1] * normal(u),
             Distribution::Lognormal => (p[0] + p[1] * normal(u)).exp(),
-            // Of 1 - u the logarithm of u: the same distribution, and small values keep their digits.
+            // The quantile at 1 - u, with the same distribution: ln(1 - u) preserves the digits of small values.
             Distribution::Exponential => -(-u).ln_1p() / p[0],
             Distribution::Integer => {
                 let (low, high) = (p[0].ceil(), p[1].floor());
@@ -135,39 +135,39 @@ fn normal(u: f64) -> f64 {
     -std::f64::consts::SQRT_2 * erfc_inv(2.0 * u)
 }
 
-/// A random number in the parameters of a module of a successor.
+/// A random number that the arguments of a module in a successor read.
 #[derive(Clone, Debug)]
 pub struct Draw {
     /// The family from which the number is drawn.
     pub distribution: Distribution,
     /// Its parameters. They read the variables of the rule, then the draws before this one.
     pub parameters: Program,
-    /// Place in the successor of the module that it belongs to, brackets not counted.
+    /// Index of its module in the successor, brackets not counted.
     pub place: usize,
     /// Its number among the draws of that module.
     pub number: u32,
-    /// It is needed in one branch of an `if` only, so that wrong parameters may not matter.
+    /// True if only one branch of an `if` reads it, so that invalid parameters are an error only where that branch is taken.
     pub conditional: bool,
-    /// Where the draw is written.
+    /// The place of the draw in the text.
     pub span: Span,
 }
 
-/// The clock of an event at a rate that a new module gets: see [`Clock`].
+/// The initial value of a [`Clock`] of a new module.
 #[derive(Clone, Copy, Debug)]
 pub struct NewClock {
-    /// Place in the successor of the module, brackets not counted.
+    /// Index of the module in the successor, brackets not counted.
     pub place: usize,
-    /// Number of arguments before it, clocks not counted.
+    /// Number of arguments of the successor before it, clocks not counted.
     pub after: usize,
-    /// Of the clause: [`key`](dlsys_tree::key).
+    /// The `dlsys_tree::key` of the clause.
     pub key: u64,
 }
 
-/// What makes an event at a rate happen: a hidden parameter of the module.
+/// The clock of an event at a rate (`at rate λ produce …`): a hidden parameter of the module.
 ///
-/// It begins with an exponentially distributed number of mean 1 and runs down at the rate λ while the clause's condition
-/// holds; the event is when it is 0. That is the first event of a Poisson process with the intensity λ, however λ
-/// depends on the state, and there is no time step in it (Davis 1984, piecewise-deterministic Markov processes).
+/// It starts at an exponentially distributed number of mean 1 and decreases at the rate λ while the condition of the
+/// clause holds; the event happens when it reaches 0. That is the first event of a Poisson process with the intensity λ,
+/// for any dependence of λ on the state and without a time step (Davis 1984, piecewise-deterministic Markov processes).
 #[derive(Clone, Copy, Debug)]
 pub struct Clock {
     /// Number of the hidden parameter among the rule's variables.
@@ -176,7 +176,10 @@ pub struct Clock {
     pub produce: usize,
 }
 
-/// The successor that a part `u` of all weights leads to; why there is none.
+/// The index at which the cumulated weights exceed the part `u`, from 0 to 1, of their sum.
+///
+/// # Errors
+/// If a weight is negative or not finite, or if all are 0; the text gives the reason.
 pub fn choose(weights: &[f64], u: f64) -> Result<usize, String> {
     if let Some(bad) = weights.iter().find(|w| !(w.is_finite() && **w >= 0.0)) {
         return Err(format!("a weight is {bad}"));
@@ -192,7 +195,7 @@ pub fn choose(weights: &[f64], u: f64) -> Result<usize, String> {
         }
         left -= weight;
     }
-    // By rounding, nothing may be left for the last that has a weight.
+    // By rounding, `left` may exceed the last positive weight.
     Ok(weights.iter().rposition(|w| *w > 0.0).expect("some weight is positive"))
 }
 

@@ -1,22 +1,22 @@
-//! Conditions as logic over signs.
+//! Conditions as logic over the signs of differences.
 //!
-//! A comparison `a < b` is the question whether `a - b` is negative. The simulation follows the signs of
-//! these differences along the trajectory; at an event it *knows* that a difference is zero, though the
-//! rounded numbers differ in their last place. So conditions are not evaluated on numbers but on signs.
+//! A comparison `a < b` holds if `a - b` is negative. The simulation follows the signs of these differences along the
+//! trajectory; at an event it *knows* that a difference is zero, though the rounded numbers differ in their last place.
+//! So conditions are evaluated on signs and not on numbers.
 
 use dlsys_expr::{Comparison, Sign, Truth};
 use smallvec::SmallVec;
 
 /// One step of a condition in postfix order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Step {
+pub enum ConditionStep {
     /// Compares the sides of the rule's atom of this number.
     Atom(u32, Comparison),
-    /// True or false, whatever happens.
+    /// A constant truth value.
     Constant(bool),
-    /// The conjunction of the two values before it: the lesser of them.
+    /// The conjunction (minimum) of the two values before it.
     And,
-    /// The disjunction of the two values before it: the greater of them.
+    /// The disjunction (maximum) of the two values before it.
     Or,
     /// The negation of the value before it.
     Not,
@@ -24,7 +24,7 @@ pub enum Step {
 
 /// A condition over the atoms of a rule; empty means always.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
-pub struct Condition(pub Vec<Step>);
+pub struct Condition(pub Vec<ConditionStep>);
 
 impl Condition {
     /// True if there is no condition.
@@ -32,26 +32,26 @@ impl Condition {
         self.0.is_empty()
     }
 
-    /// Judges the condition, given the sign of each atom.
+    /// The truth value of the condition, given the sign of each atom.
     pub fn judge(&self, sign: impl Fn(usize) -> Sign) -> Truth {
-        // Most conditions are one comparison, or two.
-        if let [Step::Atom(atom, comparison)] = self.0[..] {
+        // Most conditions have one or two comparisons.
+        if let [ConditionStep::Atom(atom, comparison)] = self.0[..] {
             return comparison.judge(sign(atom as usize));
         }
         let mut stack: SmallVec<[Truth; 16]> = SmallVec::new();
         for step in &self.0 {
             let truth = match *step {
-                Step::Atom(atom, comparison) => comparison.judge(sign(atom as usize)),
-                Step::Constant(true) => Truth::Yes,
-                Step::Constant(false) => Truth::No,
-                Step::Not => match stack.pop().expect("well formed") {
+                ConditionStep::Atom(atom, comparison) => comparison.judge(sign(atom as usize)),
+                ConditionStep::Constant(true) => Truth::Yes,
+                ConditionStep::Constant(false) => Truth::No,
+                ConditionStep::Not => match stack.pop().expect("well formed") {
                     Truth::No => Truth::Yes,
                     Truth::Maybe => Truth::Maybe,
                     Truth::Yes => Truth::No,
                 },
-                Step::And | Step::Or => {
+                ConditionStep::And | ConditionStep::Or => {
                     let (b, a) = (stack.pop().expect("well formed"), stack.pop().expect("well formed"));
-                    if *step == Step::And { a.min(b) } else { a.max(b) }
+                    if *step == ConditionStep::And { a.min(b) } else { a.max(b) }
                 }
             };
             stack.push(truth);
@@ -59,10 +59,10 @@ impl Condition {
         stack.pop().unwrap_or(Truth::Yes)
     }
 
-    /// The atoms it mentions, each with the comparison asked of it.
+    /// The atoms in it, each with its comparison.
     pub fn atoms(&self) -> impl Iterator<Item = (usize, Comparison)> + '_ {
         self.0.iter().filter_map(|step| match *step {
-            Step::Atom(atom, comparison) => Some((atom as usize, comparison)),
+            ConditionStep::Atom(atom, comparison) => Some((atom as usize, comparison)),
             _ => None,
         })
     }
@@ -74,8 +74,11 @@ mod tests {
 
     #[test]
     fn kleene_logic_keeps_what_is_certain() {
-        let either =
-            Condition(vec![Step::Atom(0, Comparison::Less), Step::Atom(1, Comparison::Equal), Step::Or]);
+        let either = Condition(vec![
+            ConditionStep::Atom(0, Comparison::Less),
+            ConditionStep::Atom(1, Comparison::Equal),
+            ConditionStep::Or,
+        ]);
         let judge = |a, b| either.judge(|i| [a, b][i]);
         assert_eq!(judge(Sign::Minus, Sign::Any), Truth::Yes);
         assert_eq!(judge(Sign::Plus, Sign::Any), Truth::Maybe);

@@ -12,18 +12,18 @@ impl KindId {
     /// `]`: a branch ends.
     pub const CLOSE: KindId = KindId(1);
 
-    /// Its place in the table of kinds, from 0.
+    /// Its index in the table of kinds.
     pub fn index(self) -> usize {
         self.0 as usize
     }
 
-    /// True for `[` and `]`, which structure a string and are no modules themselves.
+    /// True for `[` and `]`, which structure a string and are not modules.
     pub fn is_bracket(self) -> bool {
         self == KindId::OPEN || self == KindId::CLOSE
     }
 }
 
-/// How a module's name is written.
+/// The class of a module's name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
     /// `F`, `F_h`, `Apex`
@@ -34,7 +34,7 @@ pub enum Class {
     Symbol,
 }
 
-/// A module's name and number of parameters, and what the model says of it.
+/// A module's name and number of parameters, with its rules and its drawing.
 #[derive(Clone, Debug)]
 pub struct Kind {
     /// The name with its suffix, as in `F_h`, `@L` or `+`.
@@ -44,15 +44,15 @@ pub struct Kind {
     /// Indices into [`Model::rules`](super::Model::rules) of the rules with this strict predecessor, in
     /// the order in which they are written.
     pub rules: Vec<usize>,
-    /// The same of discrete rules, which are in force besides.
+    /// The discrete rules with this strict predecessor, which apply in addition.
     pub steps: Vec<usize>,
     /// Index into [`Model::interpretations`](super::Model::interpretations).
     pub interpretation: Option<usize>,
-    /// Passed over in the search for context (LANGUAGE: symbols and surfaces unless a `consider` names
-    /// them; whatever an `ignore` names).
+    /// True if context matching passes over it: symbols and surfaces unless a `consider` names them, and the modules that
+    /// an `ignore` names.
     pub skipped: bool,
-    /// Hidden parameters, after those that are written: the clocks of events at a rate, by the keys of their clauses.
-    /// Kinds of one base name and number of parameters have the same number of them.
+    /// The hidden parameters, which follow the written ones: the clocks of events at a rate, by the keys of their clauses.
+    /// Kinds with the same base name and number of parameters have the same number of them.
     pub clocks: Vec<u64>,
 }
 
@@ -62,22 +62,22 @@ impl Kind {
         self.arity + self.clocks.len()
     }
 
-    /// Continuous and discrete rules.
+    /// Indices of its continuous and then its discrete rules.
     pub fn all_rules(&self) -> impl Iterator<Item = usize> + '_ {
         self.rules.iter().chain(&self.steps).copied()
     }
 
-    /// True if no rule, continuous or discrete, is for it.
+    /// True if it has no rules, continuous or discrete.
     pub fn has_no_rules(&self) -> bool {
         self.rules.is_empty() && self.steps.is_empty()
     }
 
-    /// The rules that are discrete if this one is.
+    /// Its discrete rules or its continuous ones.
     pub fn rules_like(&self, rule: &super::Rule) -> &[usize] {
         if rule.discrete { &self.steps } else { &self.rules }
     }
 
-    /// How its name is written.
+    /// The class of its name.
     pub fn class(&self) -> Class {
         class_of(&self.name)
     }
@@ -89,23 +89,22 @@ impl Kind {
     }
 }
 
-/// Base names of the words that the turtle draws: a line, a move without one, and one that is no edge of a
-/// polygon either.
+/// Base names of the words that the turtle interprets: a line, a move without a line, and a move that adds no corner
+/// to a polygon.
 pub const DRAWN_WORDS: [&str; 3] = ["F", "f", "g"];
 
 /// The surfaces that are built in: a leaf, a flower, a petal and a bud.
 pub const BUILT_IN_SURFACES: [&str; 4] = ["@L", "@K", "@P", "@B"];
 
-/// What stands behind this on its branch goes, and so does it.
+/// The cut symbol: removes itself and the rest of its branch.
 pub const CUT: &str = "%";
 
-/// What is written as a surface and tells the turtle something else, with the number of parameters that it
-/// needs: a width to taper to, the strength of tropism, the contour of stems, and the beginning, the points
-/// and the drawing of a Bézier patch.
+/// Turtle commands with the notation of surfaces, each with the number of parameters that it needs: a width to taper to,
+/// the strength of tropism, the contour of stems, and the beginning, the points and the drawing of a Bézier patch.
 pub const COMMAND_SURFACES: [(&str, usize); 6] =
     [("@W", 1), ("@T", 1), ("@C", 1), ("@PS", 1), ("@PC", 3), ("@PD", 1)];
 
-/// How a name is written.
+/// The class of a name.
 pub fn class_of(name: &str) -> Class {
     match name.chars().next() {
         Some('@') => Class::Surface,
@@ -122,7 +121,7 @@ pub fn base_of(name: &str) -> &str {
     }
 }
 
-/// All kinds of a model; brackets are the first two.
+/// The table of the kinds of a model; brackets are the first two.
 #[derive(Clone, Debug)]
 pub struct Kinds {
     all: Vec<Kind>,
@@ -139,7 +138,7 @@ impl Default for Kinds {
 }
 
 impl Kinds {
-    /// The kind of this name and number of parameters, made if it is new.
+    /// The kind with this name and number of parameters, added if it is new.
     pub fn intern(&mut self, name: &str, arity: usize) -> KindId {
         if let Some(id) = self.find(name, arity) {
             return id;
@@ -158,17 +157,17 @@ impl Kinds {
         id
     }
 
-    /// The kind of this name and number of parameters, if the model mentions it.
+    /// The kind with this name and number of parameters, if the model mentions it.
     pub fn find(&self, name: &str, arity: usize) -> Option<KindId> {
         self.ids.get(&(name.to_owned(), arity)).copied()
     }
 
-    /// A kind by its number. The number must come from this table.
+    /// A kind by its number, which must come from this table.
     pub fn get(&self, id: KindId) -> &Kind {
         &self.all[id.index()]
     }
 
-    /// A kind by its number, for a compiler that fills in its rules.
+    /// A kind by its number, to fill in its rules.
     pub fn get_mut(&mut self, id: KindId) -> &mut Kind {
         &mut self.all[id.index()]
     }
@@ -178,7 +177,7 @@ impl Kinds {
         self.all.len()
     }
 
-    /// False: a table holds the brackets at least.
+    /// False: a table contains the brackets at least.
     pub fn is_empty(&self) -> bool {
         self.all.is_empty()
     }

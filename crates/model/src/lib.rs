@@ -1,19 +1,18 @@
-//! What a model says: names resolved, expressions compiled, module kinds known.
+//! The compiled model: names resolved, expressions compiled, kinds of modules numbered.
 //!
-//! A [`Model`] is made by `dlsys-compile` from text and read by everything downstream. It knows
-//! nothing of syntax (only [`Span`]s, so that messages can point at the text), and nothing of time: the
-//! growing tree belongs to [`structure`](dlsys_tree), the clock to [`sim`](dlsys_sim).
+//! `dlsys-compile` builds a [`Model`] from text; all later stages read it. It contains no syntax except [`Span`]s, which let
+//! messages point at the text, and no state: the growing tree is in `dlsys-tree`, the clock in `dlsys-sim`.
 //!
 //! - [`Kind`]: a module's name and number of parameters. `F(x)` and `F(x, y)` are two kinds.
-//! - [`Rule`]: what the text writes under one head: context, equations, productions.
-//! - [`Law`], [`ZeroCrossing`]: how much work an equation or a comparison is; found by [`analyse`].
-//! - [`Condition`]: the logic of an `if`, over the signs of differences, because the simulation knows
-//!   better than a comparison of two rounded numbers whether two sides have met.
+//! - [`Rule`]: context, equations and productions under one head.
+//! - [`SolutionForm`], [`ZeroCrossing`]: the solution of an equation and the location of a zero, by formula or numerically.
+//! - [`Condition`]: the logic of an `if` over the signs of differences. The simulation tracks these signs, because a
+//!   comparison of rounded numbers cannot decide whether two sides are equal at an event.
 //!
 //! # Examples
 //!
 //! ```
-//! use dlsys_model::Law;
+//! use dlsys_model::SolutionForm;
 //! use dlsys_session::Session;
 //!
 //! let text = "
@@ -21,12 +20,13 @@
 //!     initial string: F(1) A
 //!     F(x): solve dx/dt = r*x
 //! ";
-//! let model = Session::from_text("stem.dls", text, &[]).expect("a good model").model;
+//! let model = Session::from_text("stem.dls", text, &[])?.model;
 //! assert_eq!((&*model.parameters[0].name, model.parameters[0].value), ("r", 0.5));
 //! let kind = model.kinds.find("F", 1).expect("it is in the initial string");
 //! let rule = &model.rules[model.kinds.get(kind).rules[0]];
-//! // Growth at a constant relative rate has a formula: nothing is integrated.
-//! assert!(!matches!(rule.solves[0].laws[0], Law::Numeric(_)));
+//! // Growth at a constant relative rate has a formula and needs no integration.
+//! assert!(!matches!(rule.solves[0].solution_forms[0], SolutionForm::Numeric(_)));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 #![warn(missing_docs)]
@@ -36,26 +36,28 @@ mod appearance;
 mod chance;
 mod condition;
 mod kind;
-mod law;
 mod measure;
 mod remedy;
 mod rule;
+mod solution_form;
 mod stepping;
 
-pub use algebraic::{Aggregate, Algebraic, Turn};
+pub use algebraic::{Aggregate, Algebraic, ContextPart};
 pub use appearance::{
     Appearance, BUILT_IN_COLORS, Contour, Gradient, NamedColor, Net, Rgb, SurfaceShape, Tropism,
 };
 pub use chance::{Clock, Distribution, Draw, NewClock, choose};
-pub use condition::{Condition, Step};
+pub use condition::{Condition, ConditionStep};
 pub use dlsys_expr::{Comparison, Fold, Sign, Truth};
 pub use kind::{
     BUILT_IN_SURFACES, COMMAND_SURFACES, CUT, Class, DRAWN_WORDS, Kind, KindId, Kinds, base_of, class_of,
 };
-pub use law::{Driven, Flow, Jacobian, Law, Linear, Numeric, Obstacle, Sum, ZeroCrossing};
 pub use measure::Measure;
 pub use remedy::{Boundary, Remedy};
 pub use rule::{Interpretation, Outcome, Pattern, Produce, Rule, Solve, Successor, Switch};
+pub use solution_form::{
+    AffineSum, DrivenGrowth, GrowthLaw, Jacobian, LinearRates, Numeric, Obstacle, SolutionForm, ZeroCrossing,
+};
 pub use stepping::{Read, Stepping};
 
 use std::sync::Arc;
@@ -68,19 +70,19 @@ use dlsys_expr::Curve;
 pub struct Model {
     /// `title "…"`
     pub title: Option<String>,
-    /// Angle of a turn without a parameter, in degrees (`angle`; 90 if not given).
+    /// Angle of a turn without a parameter, in degrees (`angle`; 90 by default).
     pub angle: f64,
     /// Default observation times (`frames`).
     pub frames: Option<Frames>,
-    /// Discrete rules apply at its multiples (`period`; 1 if not given).
+    /// The time between two applications of the discrete rules, which apply at its multiples (`period`; 1 by default).
     pub period: f64,
-    /// What can be set from outside (`param`), with the values in force.
+    /// The constants that can be set from outside (`param`), with the values in force.
     pub parameters: Vec<Parameter>,
     /// All kinds of modules that the model mentions, brackets included.
     pub kinds: Kinds,
-    /// The initial string; its arguments read no variables.
+    /// The axiom (initial string); its arguments read no variables.
     pub axiom: Successor,
-    /// Where it is written.
+    /// The place of the axiom in the text.
     pub axiom_span: Span,
     /// The rules, in the order written; [`Kind::rules`] refers to them by number.
     pub rules: Vec<Rule>,
@@ -88,26 +90,29 @@ pub struct Model {
     pub interpretations: Vec<Interpretation>,
     /// Colours, surfaces, contours and tropism.
     pub appearance: Arc<Appearance>,
-    /// Per kind and parameter: no rule reads it, so that only drawing and output do.
+    /// By kind and parameter: true if no rule reads it, so that only drawings and output do.
     pub drawn_only: Vec<Vec<bool>>,
     /// Curves and tables, in the order of their declarations.
     pub curves: Vec<Arc<Curve>>,
 }
 
 impl Model {
-    /// True if every parameter of every rule follows a formula: nothing is ever integrated numerically.
+    /// True if every parameter of every rule follows a formula, so that the model needs no numerical integration.
     pub fn is_closed_form(&self) -> bool {
         let mut solves = self.rules.iter().flat_map(|r| &r.solves);
-        solves.all(|s| s.laws.iter().all(Law::is_closed) && s.algebraic.closed.iter().all(|closed| *closed))
+        solves.all(|s| {
+            s.solution_forms.iter().all(SolutionForm::is_closed)
+                && s.algebraic.closed.iter().all(|closed| *closed)
+        })
     }
 }
 
 impl Model {
-    /// What a kind's parameters are called: as in its first rule, else by their numbers.
+    /// The names of a kind's parameters: as in its first rule, or else their numbers.
     pub fn parameter_names(&self, kind: KindId) -> Vec<String> {
         let kind = self.kinds.get(kind);
         match kind.all_rules().next() {
-            // Behind those that are written, there may be hidden ones.
+            // Hidden parameters may follow the written ones.
             Some(rule) => self.rules[rule].parameters[..kind.arity].to_vec(),
             None => (1..=kind.arity).map(|i| i.to_string()).collect(),
         }
@@ -135,34 +140,34 @@ impl Default for Model {
     }
 }
 
-/// Equidistant observation times: `from + i * step` while not beyond `to`.
+/// Equidistant observation times: `from + i * step` up to `to`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frames {
     /// The first time, at least 0.
     pub from: f64,
-    /// The last time, unless a whole number of steps misses it.
+    /// The upper bound; the last time, if it is a whole number of steps after the first.
     pub to: f64,
     /// The time between two frames, greater than 0.
     pub step: f64,
 }
 
 impl Frames {
-    /// More frames than this are a mistake, not a wish.
+    /// Maximum number of frames; more are an error.
     pub const LIMIT: usize = 10_000_000;
 
-    /// Number of observation times, both ends included. The last interval may be short of a whole step
-    /// by rounding (a billionth of it): `0 .. 1 step 0.1` has 11 times.
+    /// Number of observation times, both ends included. The last interval may be shorter than a step by rounding (up to a
+    /// billionth of it): `0 .. 1 step 0.1` has 11 times.
     pub fn count(&self) -> usize {
         ((self.to - self.from) / self.step + 1e-9).floor() as usize + 1
     }
 
-    /// The times. Each is computed from its index, so that errors do not add up.
+    /// The times. Each is computed from its index, so that rounding errors do not accumulate.
     pub fn times(&self) -> impl Iterator<Item = f64> + use<> {
         let frames = *self;
         (0..self.count()).map(move |i| frames.time(i))
     }
 
-    /// One of the times. That which is meant where rounding makes a neighbour of it: 0.3 from steps of 0.1, not
+    /// The time of a frame, rounded to 15 digits where only rounding errors are lost: 0.3 from steps of 0.1, and not
     /// 0.30000000000000004.
     pub fn time(&self, index: usize) -> f64 {
         let t = self.from + index as f64 * self.step;
@@ -178,8 +183,8 @@ pub struct Parameter {
     pub name: String,
     /// The value in force: that of the text, or that given from outside.
     pub value: f64,
-    /// The least and the greatest value that it may have, if the text gives them.
+    /// The least and the greatest value allowed, if the text gives them.
     pub range: Option<(f64, f64)>,
-    /// Where its name is declared.
+    /// The place of its name in the declaration.
     pub span: Span,
 }

@@ -1,4 +1,4 @@
-//! A number that is measured of a whole string: a sum over modules.
+//! Measures: numbers computed from a whole string, as sums over its modules.
 
 use dlsys_expr::Program;
 
@@ -7,16 +7,16 @@ use super::KindId;
 /// The sum of an expression over all modules of some kinds.
 #[derive(Clone, Debug)]
 pub struct Measure {
-    /// As it is written.
+    /// The text of the measure.
     pub name: String,
-    /// By kind: it is one of those.
+    /// By index of a kind: true if its modules are included.
     pub kinds: Vec<bool>,
-    /// Of a module's parameters, then `t` and its age.
+    /// The term; it reads the parameters of a module, then `t`, then the age of the module.
     pub program: Program,
 }
 
 impl Measure {
-    /// The sum over some modules: kind, parameters and age of each, at the time `t`.
+    /// The sum over modules, given as kind, parameters and age, at the time `t`.
     pub fn over<'a>(&self, t: f64, modules: impl Iterator<Item = (KindId, &'a [f64], f64)>) -> f64 {
         let (mut variables, mut scratch, mut out) = (Vec::new(), Vec::new(), [0.0]);
         let mut sum = 0.0;

@@ -1,21 +1,21 @@
-//! The clauses that a rule lacks where its domain ends, ready to be put under its head.
+//! Suggested clauses for a rule whose domain ends without a production.
 //!
-//! A module that reaches the boundary of its legal domain needs a production there (section 3.1 of the paper). Which
-//! one, only the author knows; how it is written with the rule's own names, the model does.
+//! A module that reaches the boundary of its legal domain needs a production there (section 3.1 of the paper). Messages
+//! show the notation of such a clause with the names of the rule; its successor is up to the author of the model.
 
 use super::{Class, Comparison, Kinds, Rule, Sign, base_of, class_of};
 
-/// The two sides of a comparison as they are written.
+/// The two sides of a comparison as written.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Boundary {
     left: String,
     right: String,
-    /// The atom has its sides the other way round.
+    /// True if the atom has its sides in the opposite order.
     turned: bool,
 }
 
 impl Boundary {
-    /// The sides as written; `turned` if the atom has them the other way round.
+    /// The sides as written; `turned` if the atom has them in the opposite order.
     pub fn new(left: &str, right: &str, turned: bool) -> Boundary {
         Boundary { left: left.to_owned(), right: right.to_owned(), turned }
     }
@@ -26,31 +26,31 @@ impl Boundary {
         format!("{} {} {}", self.left, comparison.symbol(), self.right)
     }
 
-    /// True if the text is not known.
+    /// True if the text of the sides is unknown.
     pub fn is_empty(&self) -> bool {
         self.left.is_empty()
     }
 }
 
-/// Where the sides meet, as in `x = s`.
+/// Writes the equality of the sides, as in `x = s`.
 impl std::fmt::Display for Boundary {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         if self.is_empty() { Ok(()) } else { f.write_str(&self.compared(Comparison::Equal)) }
     }
 }
 
-/// What can be written for the case that a comparison of a rule's domain fails.
+/// Clauses for the case that a comparison of a rule's domain fails.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Remedy {
-    /// `if x = x_max produce F_end(x)`, if the module's name can have an ending.
+    /// `if x = x_max produce F_end(x)`, if the name of the module is a word.
     pub produce: Option<String>,
     /// `if x >= x_max solve dx/dt = 0`, if the rule has equations.
     pub rest: Option<String>,
 }
 
 impl Remedy {
-    /// The clauses for a comparison that stands in the condition of a `solve` clause and fails with this sign of the
-    /// difference. None if they cannot be written.
+    /// The clauses for a comparison in the condition of a `solve` clause that fails with this sign of the difference. None if
+    /// there is no such clause.
     pub fn new(
         kinds: &Kinds,
         rule: &Rule,
@@ -63,14 +63,14 @@ impl Remedy {
             return None;
         }
         let beyond = boundary.compared(comparison.negated());
-        // At the boundary the paper writes an equation; somewhere behind it only the inequality holds.
+        // The paper's notation at the boundary is an equation; beyond it only the inequality holds.
         let at = match (sign, comparison) {
             (Sign::Zero, Comparison::Less | Comparison::Greater) => boundary.to_string(),
             _ => beyond.clone(),
         };
         let name = kinds.iter().map(|(_, kind)| kind).find(|k| k.all_rules().any(|i| i == rule.index));
         let name = name.map(|kind| kind.name.as_str()).filter(|name| class_of(name) == Class::Word);
-        // Clocks of events at a rate are nothing that can be written.
+        // Clocks of events at a rate have no notation.
         let shown = rule.parameters.len() - rule.hidden;
         let produce = name.map(|name| {
             let ending = ending(kinds, name);
@@ -85,7 +85,7 @@ impl Remedy {
     }
 }
 
-/// A name for what a module becomes, drawn and met in contexts like itself: `F_end` for `F` and `F_v`.
+/// An unused name with the same base, hence the same drawing and contexts: `F_end` for `F` and `F_v`.
 fn ending(kinds: &Kinds, name: &str) -> String {
     let base = base_of(name);
     let taken = |name: &str| kinds.iter().any(|(_, kind)| kind.name == name);

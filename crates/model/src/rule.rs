@@ -1,4 +1,4 @@
-//! Rules: what the text writes under one head.
+//! Rules: context, equations and productions under one head.
 //!
 //! # Variables of a rule
 //!
@@ -8,8 +8,8 @@
 //! [`Draw`]s of a successor.
 
 use super::{
-    Aggregate, Algebraic, Boundary, Clock, Condition, Draw, Jacobian, KindId, Law, Linear, NewClock,
-    Stepping, Turn, ZeroCrossing,
+    Aggregate, Algebraic, Boundary, Clock, Condition, ContextPart, Draw, Jacobian, KindId, LinearRates,
+    NewClock, SolutionForm, Stepping, ZeroCrossing,
 };
 use dlsys_diagnostic::Span;
 use dlsys_expr::{Program, Scratch, Value};
@@ -17,13 +17,13 @@ use dlsys_expr::{Program, Scratch, Value};
 /// Context, equations and productions of one strict predecessor.
 #[derive(Clone, Debug)]
 pub struct Rule {
-    /// Its place among the rules of the model.
+    /// Its index among the rules of the model.
     pub index: usize,
-    /// The head as written.
+    /// The text of the head.
     pub label: String,
-    /// Where the head is written.
+    /// The place of the head in the text.
     pub span: Span,
-    /// It applies at the multiples of the model's period only, has no equations and one production.
+    /// True for a discrete rule, which has one production, applied at the multiples of the model's period, and no equations.
     pub discrete: bool,
     /// Names of the strict predecessor's parameters, hidden ones last.
     pub parameters: Vec<String>,
@@ -33,41 +33,41 @@ pub struct Rule {
     pub left: Vec<Pattern>,
     /// Right context in reading order: the first one is the nearest.
     pub right: Vec<Pattern>,
-    /// How the right context stands: one after another, or on branches.
-    pub right_shape: Vec<Turn>,
-    /// Values of the modules attached to this one.
+    /// The branching of the right context: its modules in order, with the brackets between them.
+    pub right_shape: Vec<ContextPart>,
+    /// Aggregates of the modules attached to this one.
     pub aggregates: Vec<Aggregate>,
-    /// The variable of the first of them. There may be more variables than aggregates; nobody reads those.
+    /// The variable of the first aggregate. There may be more variables than aggregates; the others are unused.
     pub first_aggregate: usize,
     /// Number of variables, switches excluded.
     pub variables: usize,
     /// Both sides of every comparison: `a` of atom i is output 2i, `b` is output 2i + 1.
     pub sides: Program,
-    /// Which variables they read, by themselves or through aggregates.
+    /// By variable: true if a side reads it, directly or through an aggregate.
     pub watched: Vec<bool>,
-    /// Where each atom is written.
+    /// The place of each atom in the text.
     pub atoms: Vec<Span>,
     /// The boundary of each atom, as in `x = s`, for messages.
     pub boundaries: Vec<Boundary>,
-    /// In the order written: of those that hold, the first is active.
+    /// The `solve` clauses in the order written; the first whose condition holds is active.
     pub solves: Vec<Solve>,
-    /// In the order written: of those that hold at one instant, the first wins.
+    /// The `produce` clauses in the order written; of those whose conditions hold at one instant, the first applies.
     pub produces: Vec<Produce>,
-    /// How many of them are hidden.
+    /// Number of hidden parameters of the strict predecessor.
     pub hidden: usize,
-    /// Of events at a rate.
+    /// The clocks of events at a rate.
     pub clocks: Vec<Clock>,
-    /// Variables of the context for which some rule has an equation.
+    /// Variables of the context that change between events, because some rule has an equation for them.
     pub moving_context: Vec<usize>,
-    /// Rates or conditions read some of them.
+    /// True if a rate, a value or a condition reads a variable of the context that changes between events.
     pub reads_context: bool,
-    /// How each atom is watched while no clause is active; the clauses say it for themselves.
-    pub watch_at_rest: Vec<ZeroCrossing>,
+    /// The zero-crossing function of each atom while no `solve` clause is active.
+    pub zero_crossings_at_rest: Vec<ZeroCrossing>,
 }
 
 impl Rule {
-    /// True if modules under this rule do the same from their first instant to their last: no conditions, no
-    /// productions, at most one clause of equations.
+    /// True if the behaviour of a module under this rule never changes: no conditions, no productions, at most one
+    /// unconditional clause of equations without switches.
     pub fn is_plain(&self) -> bool {
         self.atoms.is_empty()
             && self.produces.is_empty()
@@ -75,22 +75,22 @@ impl Rule {
             && self.solves.iter().all(|s| s.guard.is_always() && s.switches.is_empty())
     }
 
-    /// Number of modules that its context consists of.
+    /// Number of modules of its context.
     pub fn context_len(&self) -> usize {
         self.left.len() + self.right.len()
     }
 
-    /// How each atom is watched under a clause.
-    pub fn watch(&self, solve: Option<usize>) -> &[ZeroCrossing] {
-        solve.map_or(&self.watch_at_rest, |s| &self.solves[s].watch)
+    /// The zero-crossing function of each atom while a clause, or None, is active.
+    pub fn zero_crossings(&self, solve: Option<usize>) -> &[ZeroCrossing] {
+        solve.map_or(&self.zero_crossings_at_rest, |s| &self.solves[s].zero_crossings)
     }
 
-    /// True if some parameter is given by a value or an equation instead of a rate.
+    /// True if some clause has a value or an implicit equation.
     pub fn is_algebraic(&self) -> bool {
         self.solves.iter().any(|s| !s.algebraic.is_empty())
     }
 
-    /// True if it looks at neighbours of the module.
+    /// True if the rule has a context or aggregates.
     pub fn looks_around(&self) -> bool {
         !self.left.is_empty() || !self.right.is_empty() || !self.aggregates.is_empty()
     }
@@ -104,11 +104,11 @@ impl Rule {
 /// A module of a context.
 #[derive(Clone, Debug)]
 pub struct Pattern {
-    /// All kinds that match, ascending.
+    /// The kinds that match, in ascending order.
     pub kinds: Vec<KindId>,
-    /// Number of parameters.
+    /// Number of written parameters.
     pub arity: usize,
-    /// With those that are hidden.
+    /// Number of parameters, hidden ones included.
     pub width: usize,
 }
 
@@ -122,44 +122,45 @@ impl Pattern {
 /// A `solve` clause.
 #[derive(Clone, Debug)]
 pub struct Solve {
-    /// The clause is active while this holds.
+    /// The condition under which the clause is active.
     pub guard: Condition,
-    /// Where the clause is written.
+    /// The place of the clause in the text.
     pub span: Span,
-    /// Parameters that have a derivative, in the order of the outputs of `rates`. A parameter that is
-    /// not named, or whose derivative is the constant 0, is not here: it stays as it is.
+    /// Parameters with a derivative, in the order of the outputs of `rates`. Parameters without an equation, or with the
+    /// derivative 0, are not listed; they stay constant.
     pub of: Vec<usize>,
-    /// The derivatives, smooth in all variables while the switches stand.
+    /// The derivatives, smooth in all variables while the switches do not change.
     pub rates: Program,
     /// Conditions inside the equations (`if`, `min`, `max`, `abs`, `sign`).
     pub switches: Vec<Switch>,
-    /// Atoms that the flow of these equations cannot bring to zero, because the surface on which they
-    /// are zero is invariant: a logistic growth and its own limit. One per atom of the rule.
+    /// By atom of the rule: true if the flow of these equations cannot bring its difference to zero, because the surface on
+    /// which it is zero is invariant, as the limit of logistic growth is.
     pub unreachable: Vec<bool>,
-    /// How each equation is solved, in the order of `of`.
-    pub laws: Vec<Law>,
-    /// Positions in `of` of the equations that are integrated numerically.
+    /// The solution form of each equation, in the order of `of`.
+    pub solution_forms: Vec<SolutionForm>,
+    /// Indices in `of` of the equations that are integrated numerically.
     pub numeric: Vec<usize>,
-    /// Their rates.
+    /// The rates of the `numeric` equations.
     pub numeric_rates: Program,
-    /// Their rates once more, if all are linear.
-    pub linear: Option<Linear>,
-    /// Derivatives of all rates.
+    /// The rates of the `numeric` equations as linear equations, if all are linear with constant coefficients.
+    pub linear: Option<LinearRates>,
+    /// Partial derivatives of all rates.
     pub jacobian: Jacobian,
     /// Parameters with a value or an equation instead of a rate.
     pub algebraic: Algebraic,
-    /// How the zero of each atom is found while the clause is active.
-    pub watch: Vec<ZeroCrossing>,
-    /// Rates depend on time in a way that may be over before a step notices: not as polynomials.
+    /// The zero-crossing function of each atom while the clause is active.
+    pub zero_crossings: Vec<ZeroCrossing>,
+    /// True if a rate may have pulses: a dependence on time that is not polynomial and may fall between two stages of a step.
     pub has_pulses: bool,
-    /// The clock of an event at a rate runs, and something is integrated numerically.
+    /// True if the clock of an event at a rate runs under this clause and some of its equations are integrated numerically;
+    /// clocks are integrated to a tolerance of their own.
     pub has_hazard_clock: bool,
     /// The components of the equations, and the variables that a step reads.
     pub stepping: Stepping,
 }
 
-/// A condition inside an equation, replaced there by a variable, so that the equation is smooth between
-/// the instants at which the condition changes.
+/// A condition inside an equation. A variable replaces it there, so that the equation is smooth between the instants at
+/// which the condition changes.
 #[derive(Clone, Debug)]
 pub struct Switch {
     /// The variable is 1 while this holds, and 0 otherwise.
@@ -169,39 +170,39 @@ pub struct Switch {
 /// A `produce` clause.
 #[derive(Clone, Debug)]
 pub struct Produce {
-    /// The production applies at the instant at which this holds.
+    /// The condition: the production applies at the first instant at which it holds.
     pub guard: Condition,
-    /// Where the clause is written.
+    /// The place of the clause in the text.
     pub span: Span,
-    /// Tells the productions of a rule apart: [`key`](dlsys_tree::key).
+    /// Identifies the production: `dlsys_tree::key`.
     pub key: u64,
-    /// No production: the rate of another clause has become negative.
+    /// True if the clause is an error and not a production: it fires where the rate of another clause becomes negative.
     pub is_fault: bool,
-    /// The modules that take the place of this one.
+    /// The possible successors.
     pub outcome: Outcome,
 }
 
-/// What takes a module's place.
+/// The successors of a production, one of which replaces the module.
 #[derive(Clone, Debug, Default)]
 pub struct Outcome {
     /// The weight of each successor, if there are several.
     pub weights: Option<Program>,
-    /// One, or as many as there are weights.
+    /// One successor without weights, otherwise one for each weight.
     pub successors: Vec<Successor>,
 }
 
 impl Outcome {
-    /// True if what takes the place of two modules with the same values may differ.
+    /// True if two modules with the same values may get different successors.
     pub fn is_random(&self) -> bool {
         self.weights.is_some() || self.successors.iter().any(|s| !s.is_certain())
     }
 
-    /// A number that tells the productions of a model apart that can replace one module.
+    /// Identifies a successor among all those that can replace a module.
     pub fn production(key: u64, successor: usize) -> u64 {
         key.wrapping_add(successor as u64)
     }
 
-    /// What it reads.
+    /// The variables that its weights, arguments and draws read; a variable may occur several times.
     pub fn reads(&self) -> impl Iterator<Item = usize> + '_ {
         let draws = self.successors.iter().flat_map(|s| &s.draws).map(|draw| &draw.parameters);
         let arguments = self.successors.iter().map(|s| &s.arguments);
@@ -209,55 +210,55 @@ impl Outcome {
     }
 }
 
-/// A string of modules whose arguments are computed when it is made.
+/// A string of modules whose arguments are computed when a production applies.
 #[derive(Clone, Debug, Default)]
 pub struct Successor {
-    /// In string order, with brackets.
+    /// The modules and brackets in string order.
     pub kinds: Vec<KindId>,
-    /// The arguments of all modules, one after another, clocks left out. They read the draws, too.
+    /// The arguments of all modules in string order, without clocks. They read the variables of the rule, then the draws.
     pub arguments: Program,
     /// The random numbers that the arguments read.
     pub draws: Vec<Draw>,
-    /// In the order of the modules.
+    /// The clocks, in the order of their modules.
     pub clocks: Vec<NewClock>,
-    /// The first modules, brackets left out, and where they stand in the text.
+    /// The first [`PLACES`](Successor::PLACES) modules, brackets left out, and their places in the text.
     pub places: Vec<(KindId, Span)>,
 }
 
 impl Successor {
-    /// Of how many modules the place is kept: as many as a lineage tells apart.
+    /// Maximum number of `places`: as many modules as a lineage distinguishes.
     pub const PLACES: usize = 254;
 
-    /// Where the module at a place stands in the text, if it is of this kind.
+    /// The place in the text of the module at an index, brackets not counted, if it is of this kind.
     pub fn place_of(&self, place: usize, kind: KindId) -> Option<Span> {
         self.places.get(place).filter(|(known, _)| *known == kind).map(|(_, span)| *span)
     }
 
-    /// Number of the parameters of all its modules, hidden ones included.
+    /// Number of parameters of all its modules, hidden ones included.
     pub fn width(&self) -> usize {
         self.arguments.outputs() + self.clocks.len()
     }
 
-    /// Computes the arguments of a string without chance.
+    /// Computes the arguments of a successor without draws.
     pub fn evaluate<T: Value>(&self, variables: &[T], scratch: &mut Scratch<T>, out: &mut Vec<T>) {
         out.clear();
         out.resize(self.arguments.outputs(), T::constant(0.0));
         self.arguments.eval(variables, scratch, out);
     }
 
-    /// True if its arguments follow from the values of the predecessor.
+    /// True if the values of the predecessor determine its arguments: it has no draws and no clocks.
     pub fn is_certain(&self) -> bool {
         self.draws.is_empty() && self.clocks.is_empty()
     }
 }
 
-/// An `interpret` declaration: what the turtle draws in place of a module.
+/// An `interpret` declaration: the modules that the turtle draws in place of one.
 ///
 /// Its expressions read the module's parameters, then `t`, then `age`.
 #[derive(Clone, Debug)]
 pub struct Interpretation {
-    /// Where its head is written.
+    /// The place of its head in the text.
     pub span: Span,
-    /// The modules that are drawn.
+    /// The modules drawn.
     pub drawn: Successor,
 }

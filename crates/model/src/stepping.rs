@@ -1,16 +1,16 @@
 //! The components of a clause's equations and the variables that its steps read.
 
-/// Which parameters of a module are components, and what its equations read.
+/// The parameters of a module that are components of the integrator's state, and the variables that its equations read.
 #[derive(Clone, Debug)]
 pub struct Stepping {
-    /// The parameters that are integrated, then those that are solved for, in the order of their components; where formulas
-    /// are used, and where all equations are integrated.
+    /// The parameters that are integrated, then those that are solved for, in the order of their components: first for the
+    /// case that formulas are used, then for the case that all equations are integrated.
     components: [Vec<usize>; 2],
     /// The parameters of the module and of its context that a step may read.
     reads: Vec<Read>,
-    /// Of each variable of the rule: whether formulas read it when a module takes the equations up.
-    laws_read: Vec<bool>,
-    /// Rates, or values that are solved for, read `t`.
+    /// By variable of the rule: true if a formula reads it when the clause becomes active.
+    formulas_read: Vec<bool>,
+    /// True if rates, or values that are solved for, read `t`.
     timed: bool,
 }
 
@@ -19,20 +19,26 @@ pub struct Stepping {
 pub struct Read {
     /// Number of the variable among those of the rule.
     pub variable: usize,
-    /// Number in the context; None for the module itself.
+    /// Index of the module in the context; None for the module itself.
     pub neighbour: Option<usize>,
-    /// Number of the parameter in its module.
+    /// Index of the parameter in its module.
     pub parameter: usize,
 }
 
 impl Stepping {
-    /// What an analysis has found: the components with formulas and without, the variables that a step reads, of each
-    /// variable whether formulas read it, and whether rates or values that are solved for read `t`.
-    pub fn new(components: [Vec<usize>; 2], reads: Vec<Read>, laws_read: Vec<bool>, timed: bool) -> Stepping {
-        Stepping { components, reads, laws_read, timed }
+    /// The results of an analysis: the components with formulas and without, the parameters that a step reads, by variable
+    /// whether formulas read it, and whether rates or values that are solved for read `t`.
+    pub fn new(
+        components: [Vec<usize>; 2],
+        reads: Vec<Read>,
+        formulas_read: Vec<bool>,
+        timed: bool,
+    ) -> Stepping {
+        Stepping { components, reads, formulas_read, timed }
     }
 
-    /// The parameters that are integrated, then those that are solved for, in the order of their components.
+    /// The parameters that are integrated, then those that are solved for, in the order of their components. `numeric_only`
+    /// is true if all equations are integrated, even those with formulas.
     pub fn components(&self, numeric_only: bool) -> &[usize] {
         &self.components[usize::from(numeric_only)]
     }
@@ -47,8 +53,8 @@ impl Stepping {
         self.timed
     }
 
-    /// The variables that formulas read when a module takes the equations up.
-    pub fn laws_read(&self) -> &[bool] {
-        &self.laws_read
+    /// By variable of the rule: true if a formula reads it when the clause becomes active.
+    pub fn formulas_read(&self) -> &[bool] {
+        &self.formulas_read
     }
 }

@@ -71,24 +71,24 @@ pub enum Expr {
     Compare(ExprId, Vec<(Comparison, ExprId)>),
     /// Condition, then, else.
     If(ExprId, ExprId, ExprId),
-    /// A number, what it is compared with and the value then, and the value otherwise.
+    /// `match n case a: x … else y`: the number, each case with its value, and the value if no case matches.
     Match(ExprId, Vec<(ExprId, ExprId)>, ExprId),
     /// `a[i]`
     Index(Arc<str>, ExprId),
-    /// `(a)`; kept because it groups what is written.
+    /// `(a)`; kept so that printing preserves the parentheses.
     Parenthesis(ExprId),
     /// `sum(B(x, c): D*(c - c_0))`
     Aggregate(Box<Aggregate>),
 }
 
-/// Something of all modules attached to one that match.
+/// An aggregate of the modules attached to one, over those that match a head.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Aggregate {
     /// How the values are combined.
     pub fold: Fold,
     /// The modules that count, with names for their parameters.
     pub head: HeadModule,
-    /// What is added up; its nodes stand before that of the aggregate. None for a number of modules.
+    /// The term of one module; its nodes precede that of the aggregate. None for `count`.
     pub term: Option<Expression>,
 }
 
@@ -100,7 +100,7 @@ pub struct Expressions {
 }
 
 impl Expressions {
-    /// Adds a node whose operands are there already.
+    /// Adds a node whose operands are already in the arena.
     pub fn push(&mut self, node: Expr, span: Span) -> ExprId {
         self.nodes.push(node);
         self.spans.push(span);
@@ -173,8 +173,8 @@ pub struct HeadModule {
 
 /// A part of a right context: `> [ C(z) ] D(w)`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Turn {
-    /// A module; which one, its place among the modules of the context says.
+pub enum ContextPart {
+    /// The next module of the right context.
     Module,
     /// `[`: a branch begins.
     Open,
@@ -192,16 +192,16 @@ pub struct Rule {
     /// The modules of the right context in reading order.
     pub right: Vec<HeadModule>,
     /// How its modules stand: one after another, or on branches.
-    pub right_shape: Vec<Turn>,
+    pub right_shape: Vec<ContextPart>,
     /// The whole head.
     pub head: Span,
     /// `let` lines.
     pub locals: Vec<(Name, Expression)>,
-    /// Written with `->`: applied at the multiples of the period. It has one clause, which produces.
+    /// True if written with `->`: the rule has one production, applied at the multiples of the period.
     pub discrete: bool,
-    /// In the order written; there is one at least.
+    /// The clauses in the order written, at least one.
     pub clauses: Vec<Clause>,
-    /// The expressions of the whole rule: from the first to before the second.
+    /// The expressions of the whole rule: from the first id, included, to the second, excluded.
     pub nodes: (ExprId, ExprId),
 }
 
@@ -218,7 +218,7 @@ pub struct Clause {
     pub span: Span,
 }
 
-/// What a clause does while, or when, its condition holds.
+/// The effect of a clause: equations while its condition holds, or a production when it does.
 #[derive(Clone, Debug)]
 pub enum Action {
     /// Equations that hold while the clause is active.
@@ -253,7 +253,7 @@ pub enum Equation {
         /// Its value at every instant.
         value: Expression,
     },
-    /// `0 = …`, and maybe for which parameter it is to be solved; the place is that of the whole.
+    /// `0 = …`, optionally with the parameter that it is solved for.
     Zero {
         /// The right side, which must be 0.
         residual: Expression,
@@ -265,7 +265,7 @@ pub enum Equation {
 }
 
 impl Equation {
-    /// The one expression of it.
+    /// The expression on its right side.
     pub fn expression(&self) -> Expression {
         match self {
             Equation::Rate { rate: it, .. }
@@ -278,56 +278,136 @@ impl Equation {
 /// A text in quotes, without them, and where it stands.
 #[derive(Clone, Debug)]
 pub struct Text {
-    /// What stands between the quotes.
+    /// The text between the quotes.
     pub text: String,
-    /// With the quotes.
+    /// Its place, quotes included.
     pub span: Span,
 }
 
 /// A declaration or a rule.
 #[derive(Clone, Debug)]
-#[allow(missing_docs)] // Fields are named as in the notation that each variant shows.
 pub enum Item {
-    /// `title "text"`
+    /// `title "text"`: the name of the model, without the quotes.
     Title(String),
-    /// `const name = [values]`
-    Array { name: Name, values: Vec<Expression> },
-    /// `curve sort name = points periodic`
-    Curve { name: Name, sort: Sort, points: Vec<[Expression; 2]>, periodic: bool },
-    /// `table sort name from "file" column "column" periodic`
-    Table { name: Name, sort: Sort, file: Text, column: Option<Text>, periodic: bool },
-    /// `include "file"`
+    /// `const name = [values]`: an array of constants.
+    Array {
+        /// The name by which expressions index it.
+        name: Name,
+        /// The elements, from index 0.
+        values: Vec<Expression>,
+    },
+    /// `curve sort name = points periodic`: a function of one argument through points.
+    Curve {
+        /// The name of the function.
+        name: Name,
+        /// The interpolation; monotone unless the text says otherwise.
+        sort: Sort,
+        /// Argument and value of each point.
+        points: Vec<[Expression; 2]>,
+        /// True if the curve repeats beyond its last point.
+        periodic: bool,
+    },
+    /// `table sort name from "file" column "column" periodic`: a curve whose points are the rows of a file.
+    Table {
+        /// The name of the function.
+        name: Name,
+        /// The interpolation; linear unless the text says otherwise.
+        sort: Sort,
+        /// The path, relative to the folder of the model.
+        file: Text,
+        /// The heading of the column of values; None for the second column.
+        column: Option<Text>,
+        /// True if the curve repeats beyond its last point.
+        periodic: bool,
+    },
+    /// `include "file"`: the path, relative to the folder of the model.
     Include(Text),
-    /// `const name = value`
-    Const { name: Name, value: Expression },
-    /// `param name = value in range`
-    Param { name: Name, value: Expression, range: Option<(Expression, Expression)> },
-    /// `def name(parameters) = body`
-    Def { name: Name, parameters: Vec<Name>, body: Expression },
-    /// `angle value`, in degrees.
+    /// `const name = value`: a constant.
+    Const {
+        /// The name that expressions read.
+        name: Name,
+        /// A value of constants only.
+        value: Expression,
+    },
+    /// `param name = value in low .. high`: a constant that can be set when the model is loaded.
+    Param {
+        /// The name that expressions read and settings give.
+        name: Name,
+        /// The value without a setting.
+        value: Expression,
+        /// The least and the greatest value allowed; None for any number.
+        range: Option<(Expression, Expression)>,
+    },
+    /// `def name(parameters) = body`: a function, expanded where it is called.
+    Def {
+        /// The name of the function.
+        name: Name,
+        /// The formal parameters.
+        parameters: Vec<Name>,
+        /// The value, in terms of the formal parameters and global names.
+        body: Expression,
+    },
+    /// `angle value`: the turn of a symbol without a parameter, in degrees.
     Angle(Expression),
-    /// `period value`, of the discrete rules.
+    /// `period value`: the time between two applications of the discrete rules.
     Period(Expression),
-    /// `frames from .. to step step`
-    Frames { from: Expression, to: Expression, step: Expression },
-    /// `color name = "value"`
-    Color { name: Name, value: Text },
-    /// `gradient name = "stop", "stop"`
-    Gradient { name: Name, stops: Vec<Text> },
-    /// `surface @name from "file"`
-    Surface { name: Name, file: Text },
-    /// `contour name = points`
-    Contour { name: Name, points: Vec<[Expression; 2]> },
-    /// `tropism x, y, z strength strength`
-    Tropism { direction: [Expression; 3], strength: Option<Expression> },
-    /// `ignore names`
+    /// `frames from .. to step step`: the default observation times.
+    Frames {
+        /// The first time.
+        from: Expression,
+        /// The last time.
+        to: Expression,
+        /// The time between two frames.
+        step: Expression,
+    },
+    /// `color name = "value"`: a colour of the model's own.
+    Color {
+        /// The name that expressions read as the number of the colour.
+        name: Name,
+        /// The colour as `#rrggbb` or `#rgb`.
+        value: Text,
+    },
+    /// `gradient name = "stop", "stop"`: colours at equal distances from 0 to 1.
+    Gradient {
+        /// The name that expressions read as the number of the gradient.
+        name: Name,
+        /// The colours as `#rrggbb` or `#rgb`.
+        stops: Vec<Text>,
+    },
+    /// `surface @name from "file"`: patches or a mesh that the module `@name` draws.
+    Surface {
+        /// The name with its mark.
+        name: Name,
+        /// The path, relative to the folder of the model.
+        file: Text,
+    },
+    /// `contour name = points`: the cross-section of stems.
+    Contour {
+        /// The name that expressions read as the number of the contour.
+        name: Name,
+        /// The corners, counter-clockwise, in parts of the radius of the stem.
+        points: Vec<[Expression; 2]>,
+    },
+    /// `tropism x, y, z strength strength`: the direction towards which headings bend.
+    Tropism {
+        /// The direction in scene coordinates, of any length but 0.
+        direction: [Expression; 3],
+        /// Radians per scene unit; None for 0.
+        strength: Option<Expression>,
+    },
+    /// `ignore names`: the modules that context matching passes over.
     Ignore(Vec<Name>),
-    /// `consider names`
+    /// `consider names`: symbols and surfaces that context matching does not pass over.
     Consider(Vec<Name>),
-    /// `initial string: modules`
+    /// `initial string: modules`, or `axiom: modules`.
     Axiom(Vec<Module>),
-    /// `interpret head: drawn`
-    Interpret { head: HeadModule, drawn: Vec<Module> },
+    /// `interpret head: drawn`: the modules that the turtle draws in place of one.
+    Interpret {
+        /// The module, with names for its parameters.
+        head: HeadModule,
+        /// The modules drawn, in terms of those parameters, `t` and `age`.
+        drawn: Vec<Module>,
+    },
     /// `head: clauses`, or `head : condition -> successor`.
     Rule(Rule),
 }
@@ -384,17 +464,17 @@ pub struct Document {
     pub items: Vec<(Item, Span)>,
     /// The arena in which all expressions of the items stand.
     pub expressions: Expressions,
-    /// Names of global declarations that could not be read: whoever uses them is not to blame.
+    /// Names of global declarations that could not be parsed; their uses are not reported as errors.
     pub unread: Vec<Arc<str>>,
-    /// What comments such as `#define K 0.5` would define elsewhere: names, and their meanings.
+    /// Names and values in comments such as `#define K 0.5`, which are definitions in cpfg; for hints.
     pub commented: Vec<(Arc<str>, String)>,
-    /// Items from here on are of the library: names that the model declares itself win over them, and nobody has to
-    /// use them.
+    /// Index of the first item of the library, if it was included. Names that the model declares itself take precedence
+    /// over those of the library, and unused library functions are not reported.
     pub library: Option<usize>,
 }
 
 impl Document {
-    /// The items that somebody wrote for this model.
+    /// The items of the model and of the files that it includes, without the library.
     pub fn own_items(&self) -> &[(Item, Span)] {
         &self.items[..self.library.unwrap_or(self.items.len())]
     }

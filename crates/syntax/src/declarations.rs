@@ -1,4 +1,4 @@
-//! The table of declarations: the one place where a declaration's word, notation and description stand.
+//! The table of declarations: the only definition of each declaration's word, notation and description.
 //!
 //! The first pass over a text, the parser's messages, `dlsys fmt`, the outline of a text, and completion, hints and help
 //! of the interactive session are derived from it. To add a declaration: a row here, its rule in `grammars/dlsys.pest`, a
@@ -13,29 +13,29 @@ use crate::parse::Rule;
 pub struct Declaration {
     /// The word that begins it.
     pub word: &'static str,
-    /// How it goes on after that word, for somebody who types it.
+    /// The notation after that word, for completion and help.
     pub usage: &'static str,
     /// One sentence about its meaning.
     pub summary: &'static str,
     /// The group in which help lists it.
     pub category: Category,
-    /// Whether its word is followed by a name that it declares.
+    /// The name that it declares, behind its word.
     pub named: Named,
-    /// Which other declarations cannot stand beside it.
+    /// The declarations that conflict with it.
     pub repeats: Repeats,
-    /// What follows its head.
+    /// The syntax behind its head.
     pub body: Body,
     /// Words that it may contain.
     pub options: &'static [OptionWord],
-    /// Whether its word may also be the name of a module or parameter.
+    /// The condition under which its word begins a declaration; a name may also have this word.
     pub(crate) begins: Begins,
-    /// An example as a sentence, for mistakes about which nothing better is known.
+    /// An example as a sentence, for errors without a specific hint.
     pub(crate) written: &'static str,
     /// The entry rule of the grammar.
     pub(crate) rule: Rule,
 }
 
-/// Two declarations are the same if the grammar reads them alike: `initial string:` and `axiom:` are.
+/// Two declarations are equal if they have the same grammar rule: `initial string:` and `axiom:` are equal.
 impl PartialEq for Declaration {
     fn eq(&self, other: &Declaration) -> bool {
         self.rule == other.rule
@@ -44,7 +44,7 @@ impl PartialEq for Declaration {
 
 impl Eq for Declaration {}
 
-/// What a declaration is about.
+/// The subject of a declaration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Category {
@@ -54,7 +54,7 @@ pub enum Category {
     Values,
     /// Times at which something happens.
     Time,
-    /// What modules look like.
+    /// The appearance of modules.
     Looks,
     /// Strings of modules.
     Modules,
@@ -77,15 +77,15 @@ impl Category {
     }
 }
 
-/// The name that a declaration makes known.
+/// The position of the name that a declaration introduces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Named {
-    /// It has none.
+    /// It introduces no name.
     No,
     /// A word: `const k = …`.
     Word,
-    /// A word, maybe after one of the options: `curve linear g = …`.
+    /// A word, optionally after one of the options: `curve linear g = …`.
     AfterOption,
     /// The name of a function: `def f(x) = …`.
     Function,
@@ -100,12 +100,12 @@ impl Named {
     }
 }
 
-/// Which declarations replace one another where a text is put together piece by piece; in one text, two of them are an
+/// The rule by which a declaration replaces another in the interactive session. In one text, two such declarations are an
 /// error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Repeats {
-    /// A text has one of them.
+    /// One for each text.
     Once,
     /// One for each name. Declarations with the same word here share their names.
     PerName(&'static str),
@@ -117,7 +117,7 @@ pub enum Repeats {
     Freely,
 }
 
-/// What follows the head of a declaration.
+/// The syntax behind the head of a declaration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Body {
@@ -125,32 +125,32 @@ pub enum Body {
     Line,
     /// Names of modules.
     Names,
-    /// A `:` and a string of modules, in which line breaks mean nothing.
+    /// A `:` and a string of modules, in which line breaks have no meaning.
     String,
     /// The head of a module, a `:` and a string of modules.
     Drawing,
 }
 
-/// When the word of a declaration begins one.
+/// The condition under which the word of a declaration begins one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Begins {
     /// Wherever a declaration may begin: no module has this name.
     Always,
-    /// Where a word or a text follows and no `:` makes it the head of a rule. For words that came later than models in which
-    /// modules are called like them.
+    /// Where a word or a text follows, unless a `:` makes the line the head of a rule. For words added after models had begun
+    /// to use them as names of modules.
     BeforeName,
 }
 
-/// A word inside a declaration that is no name.
+/// A keyword inside a declaration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OptionWord {
     /// The word as it is written.
     pub word: &'static str,
-    /// What must follow it.
+    /// The syntax that must follow it.
     pub follow: Follow,
 }
 
-/// What follows an option.
+/// The syntax that follows an option.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Follow {
@@ -160,7 +160,7 @@ pub enum Follow {
     Text,
     /// An expression; a line break before that ends nothing.
     Value,
-    /// The same, and the word does so in every declaration and rule.
+    /// As `Value`, in every declaration and rule.
     ValueEverywhere,
     /// Nothing: the option ends the declaration.
     Nothing,
@@ -173,7 +173,7 @@ const fn option(word: &'static str, follow: Follow) -> OptionWord {
 const SORTS: [OptionWord; 3] =
     [option("monotone", Follow::Name), option("spline", Follow::Name), option("linear", Follow::Name)];
 
-/// A row with what most declarations have in common.
+/// A row with the values that most declarations share.
 const fn row(word: &'static str, rule: Rule) -> Declaration {
     Declaration {
         word,
@@ -379,7 +379,7 @@ impl Declaration {
         DECLARATIONS.iter().find(|declaration| declaration.word == word)
     }
 
-    /// The declaration that a rule of the grammar reads.
+    /// The declaration of a grammar rule.
     pub(crate) fn of_rule(rule: Rule) -> Option<&'static Declaration> {
         DECLARATIONS.iter().find(|declaration| declaration.rule == rule)
     }
@@ -395,7 +395,7 @@ impl Declaration {
     }
 }
 
-/// All options of all declarations; a word that several have is there several times.
+/// All options of all declarations; a word is listed once for each declaration that has it.
 pub fn options() -> impl Iterator<Item = &'static OptionWord> {
     DECLARATIONS.iter().flat_map(|declaration| declaration.options)
 }

@@ -5,8 +5,8 @@ use std::ops::Deref;
 
 use dlsys_diagnostic::Diagnostic;
 
-/// The errors that keep a text from being read; there is at least one. It dereferences to the diagnostics, which
-/// [`Source`](dlsys_diagnostic::Source) shows with their places.
+/// The errors of a text that cannot be parsed or compiled, at least one. It dereferences to the diagnostics, which
+/// [`Source`](dlsys_diagnostic::Source) renders with the lines that they point at.
 #[derive(Clone, Debug)]
 pub struct Errors(Vec<Diagnostic>);
 
@@ -37,7 +37,7 @@ impl From<Diagnostic> for Errors {
     }
 }
 
-/// The messages, one a line, without their places.
+/// Writes the messages, one a line, without their places.
 impl fmt::Display for Errors {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (i, diagnostic) in self.0.iter().enumerate() {

@@ -1,19 +1,19 @@
 //! The files that a model names: included texts, surfaces and tables.
 //!
-//! The language opens no file itself. The caller passes a [`Files`], which decides what a path may reach.
+//! The language opens no file itself. The caller passes a [`Files`], which decides which paths are accessible.
 
 use std::path::{Component, Path};
 
-/// Where the files that a model names come from.
+/// A source of the files that a model names.
 pub trait Files {
-    /// The bytes of a file, by a path relative to the model's own folder; at most `limit` of them.
+    /// The bytes of a file by its path relative to the folder of the model. A file longer than `limit` is an error.
     ///
     /// # Errors
-    /// Why it cannot be read, as a sentence without its end.
+    /// The reason why it cannot be read, as a sentence without a full stop.
     fn read(&self, path: &Path, limit: u64) -> Result<Vec<u8>, String>;
 }
 
-/// No files: of a text that is not in a file itself.
+/// No files: for a text that is not in a file itself.
 #[derive(Clone, Copy, Debug)]
 pub struct NoFiles;
 
@@ -23,7 +23,7 @@ impl Files for NoFiles {
     }
 }
 
-/// True if a path goes down from where it begins, and never up.
+/// True if a relative path never leaves the folder in which it begins.
 pub fn is_inside(path: &str) -> bool {
     let inside = Path::new(path).components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
     !path.is_empty() && inside && !path.contains('\\')

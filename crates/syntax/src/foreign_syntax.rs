@@ -1,14 +1,13 @@
-//! Words of cpfg and L-Py, which people bring along, and what stands for them here.
+//! Words and functions of cpfg and L-Py, with their counterparts in this language.
 //!
-//! None of them is reserved: what they mean elsewhere is only said where a text cannot be read, or where nothing has
-//! such a name.
+//! None of them is reserved: hints name the counterpart only where a text cannot be parsed or a name is unknown.
 
 use dlsys_diagnostic::{Diagnostic, Span};
 
-/// Where the book says more.
+/// The chapter of the book about them.
 const PAGE: &str = "the book has a page for this: “Coming from cpfg or L-Py”, docs/src/moving.md";
 
-/// Beginnings of lines, as words and signs, and what to do.
+/// Beginnings of lines, as words and signs, each with its remedy.
 const LINES: [(&[&str], &str); 21] = [
     (&["lsystem", ":"], "remove this line: a file is one model, from its first line to its last"),
     (&["endlsystem"], "remove this line: a model ends with its file"),
@@ -56,10 +55,10 @@ const RULES: &str = "remove this line: rules stand among declarations, `A(x): if
 const DRAWINGS: &str = "remove this line: each drawing is a line of its own, `interpret A(x): F(x)`";
 const PARTS: &str = "remove this line: what falls into parts at once has a rule, `A(x): produce F(x) B(x)`";
 
-/// What is said of a line that begins with such words, and stands at this place of the text.
+/// The error for a line that begins with such words. `at` is the byte at which the line begins.
 pub fn line(line: &str, at: usize) -> Option<Diagnostic> {
     let words = beginning(line);
-    // Alone, the words may be names of modules: then something follows that goes with these.
+    // A single word may be the name of a module, unless a colon or another word follows.
     let follows =
         |n: usize| words.get(n).is_none_or(|(w, _)| w.starts_with(|c: char| c == ':' || c.is_alphanumeric()));
     let (known, help) = LINES.iter().find(|(known, _)| {
@@ -82,7 +81,7 @@ pub fn line(line: &str, at: usize) -> Option<Diagnostic> {
     )
 }
 
-/// The first two words or signs of a line, and where each ends.
+/// The first two words or signs of a line, and the byte at which each ends.
 fn beginning(line: &str) -> Vec<(&str, usize)> {
     let in_word = |c: char| c.is_alphanumeric() || c == '_';
     let mut found = Vec::new();
@@ -99,7 +98,7 @@ fn beginning(line: &str) -> Vec<(&str, usize)> {
     found
 }
 
-/// Whether such a word stands on a line alone, where it could be a module.
+/// True for words that stand alone on a line in cpfg or L-Py, where this language would read a module.
 pub fn stands_alone(word: &str) -> bool {
     [
         "endlsystem",
@@ -112,7 +111,7 @@ pub fn stands_alone(word: &str) -> bool {
     .contains(&word)
 }
 
-/// What is written for the call of a function that other programs have, given the texts of its arguments.
+/// The counterpart of a function call of cpfg, L-Py or Python, given the texts of its arguments.
 pub fn function(name: &str, arguments: &[String]) -> Option<String> {
     let argument =
         |i: usize, otherwise: &str| arguments.get(i).cloned().unwrap_or_else(|| otherwise.to_owned());
@@ -144,7 +143,7 @@ pub fn function(name: &str, arguments: &[String]) -> Option<String> {
     Some(format!("write `{call}`"))
 }
 
-/// What lines of a text such as `#define K 0.5` would define if they were no comments: names, and the meanings.
+/// Names and values in lines such as `#define K 0.5`, which are comments in this language.
 pub fn commented_definitions(text: &str) -> impl Iterator<Item = (&str, &str)> {
     text.lines().filter_map(|line| {
         let rest = line.trim_start().strip_prefix("#define")?.trim_start_matches([' ', '\t']);
@@ -153,7 +152,7 @@ pub fn commented_definitions(text: &str) -> impl Iterator<Item = (&str, &str)> {
     })
 }
 
-/// Of a name that such a line was to define.
+/// The hint for an unknown name that such a line mentions.
 pub fn of_definition(name: &str, meaning: &str) -> String {
     match meaning.strip_prefix('(').and_then(|rest| rest.split_once(')')) {
         // `#define F(x) …`, and not `#define K (2*L)`.

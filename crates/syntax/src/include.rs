@@ -1,8 +1,8 @@
 //! Texts that a model includes, and the library of growth functions.
 //!
-//! `include "lib.dls"` puts the declarations and rules of another file in its place. A file is read once, however often it
-//! is named; one that includes itself is an error. Its text goes behind the model's own in the [`Source`], so that
-//! every place in it is a [`Span`] and messages name its file.
+//! `include "lib.dls"` is replaced with the declarations and rules of another file. A file that several texts include is
+//! read once; one that includes itself is an error. Its text follows that of the model in the [`Source`], so that a
+//! [`Span`] identifies a place in any file and messages name the file.
 
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
@@ -13,17 +13,18 @@ use crate::ast::{Document, Expr, Item, Text};
 use crate::parse::Reader;
 use dlsys_diagnostic::{Diagnostic, Source, Span};
 
-/// Deepest chain of files that include one another.
+/// Maximum depth of files that include one another.
 const MAX_DEPTH: usize = 20;
-/// Most files of one model.
+/// Maximum number of files of one model.
 const MAX_FILES: usize = 1000;
 
-/// The library, as a text of the language.
+/// The text of the library.
 const LIBRARY: &str = include_str!("growth.dls");
-/// How its file is called in messages.
+/// The file name of the library in messages.
 const LIBRARY_NAME: &str = "(library of growth functions)";
 
-/// Parses a text with all that it includes. Returns the source in which the spans are places, if it is not the given one.
+/// Parses a text with the files that it includes. The source in the result, if any, contains all texts; spans then refer
+/// to that and not to the given one.
 pub fn read(source: &Source, files: &dyn Files) -> (Option<Source>, Document, Vec<Diagnostic>) {
     let mut reader = Reader::default();
     let items = reader.read(&source.text);
@@ -49,12 +50,12 @@ pub fn read(source: &Source, files: &dyn Files) -> (Option<Source>, Document, Ve
     (whole, document, errors)
 }
 
-/// A text with spaces before it, so that places in it are places in the whole source.
+/// A text with spaces before it, so that its spans are valid in the whole source.
 fn padded(start: usize, text: &str) -> String {
     " ".repeat(start) + text
 }
 
-/// True if an expression calls a name that the library declares and the model does not.
+/// True if an expression calls a function that the library declares and the model does not.
 fn wants_library(document: &Document) -> bool {
     let names: HashSet<&str> = library_names().collect();
     let declared: HashSet<&str> =
@@ -77,14 +78,14 @@ struct Inclusion<'i> {
     reader: &'i mut Reader,
     source: &'i mut Source,
     files: &'i dyn Files,
-    /// Files being read, each with the place that names it.
+    /// The files that are being read, each with the place of its `include`.
     chain: Vec<(Arc<str>, Span)>,
-    /// Files that have been read.
+    /// The files that have been read.
     seen: HashMap<Arc<str>, Span>,
 }
 
 impl Inclusion<'_> {
-    /// Items with those of included files in their places. Recursion is bounded by `MAX_DEPTH`.
+    /// Items with each `include` replaced by the items of its file. Recursion is bounded by `MAX_DEPTH`.
     fn expand(&mut self, items: Items) -> Items {
         let mut all = Vec::with_capacity(items.len());
         for (item, span) in items {
@@ -115,7 +116,7 @@ impl Inclusion<'_> {
         }
     }
 
-    /// The name and the text of a file; None if it has been read before.
+    /// Path and text of a file; None if it has been read before.
     fn open(&self, file: &Text) -> Result<Option<(Arc<str>, String)>, Box<Diagnostic>> {
         let fault =
             |what: &str| Diagnostic::error(format!("`{}` cannot be included", file.text)).at(file.span, what);
@@ -167,7 +168,7 @@ impl Inclusion<'_> {
     }
 }
 
-/// A path without `.` and doubled slashes, so that a file has one name.
+/// A path without `.` and repeated slashes, so that each file has one name.
 fn normal(path: &str) -> String {
     let parts: Vec<&str> = path.split('/').filter(|part| !matches!(*part, "" | ".")).collect();
     parts.join("/")

@@ -1,13 +1,12 @@
-//! First pass over the text: where declarations begin, and which line breaks mean something.
+//! First pass over the text: the boundaries of declarations and the significant line breaks.
 //!
-//! The result has the same bytes at the same places, so every position in it is a position in the
-//! file; comments, and line breaks that end nothing, have become spaces. The text is cut into items
-//! (declarations and rules), so that a mistake in one does not hide those in the others, and so that the
-//! parser's memory is bounded by an item, not by the file. Nesting is bounded here, before anything
-//! recursive sees the text.
+//! Comments and line breaks that end nothing become spaces; all other bytes keep their places, so that every position
+//! in the result is a position in the file. The text is cut into items (declarations and rules), so that a mistake in
+//! one does not hide those in the others, and so that the parser's memory is bounded by an item, not by the file.
+//! Nesting is bounded here, before any recursive pass.
 //!
 //! A line break ends an expression or a condition, except inside parentheses, after an operator or a
-//! comma, or before `then` and `else` (LANGUAGE, "Text"). Inside a string of modules it means nothing.
+//! comma, or before `then` and `else` (LANGUAGE, "Text"). Inside a string of modules it has no meaning.
 
 mod ahead;
 mod keywords;
@@ -21,17 +20,17 @@ use dlsys_diagnostic::{Diagnostic, Span};
 /// Deepest nesting of parentheses, signs, powers and `if` that an expression may have.
 pub const MAX_DEPTH: usize = 100;
 
-/// Greatest size of one declaration or rule, in bytes; the initial string is not bounded by it.
+/// Maximum size of one declaration or rule other than the initial string, in bytes.
 const MAX_ITEM: usize = 1 << 20;
 
-/// The kind of an item, told by its first word, its colon or its arrow.
+/// The kind of an item, determined by its first word, its colon or its arrow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ItemKind {
     Declaration(&'static Declaration),
     Rule,
-    /// A discrete rule, known by its arrow.
+    /// A discrete rule, recognised by its arrow.
     Step,
-    /// A line that begins nothing known.
+    /// A line that begins neither a declaration nor a rule.
     Unknown,
 }
 
@@ -62,7 +61,7 @@ pub struct RawItem {
     pub end: usize,
     /// Byte after the first `:` outside parentheses.
     pub after_colon: Option<usize>,
-    /// It has already been complained about; do not parse it.
+    /// True if an error in it has been reported; the item is not parsed.
     pub broken: bool,
 }
 
@@ -74,19 +73,19 @@ pub struct Layout {
     pub errors: Vec<Diagnostic>,
 }
 
-/// What the last significant token was, as far as line breaks and signs care.
+/// The class of the last significant token, which decides the meaning of line breaks and signs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Last {
-    /// Something that can end an expression.
+    /// A token that can end an expression.
     Operand,
-    /// Something that cannot.
+    /// A token that cannot end an expression.
     Operator,
     /// `<` or `>`: cannot end an expression, and may stand at the end of a line in a rule's head.
     Angle,
     Colon,
 }
 
-/// A parenthesis that is open, and what recursion is pending inside it.
+/// An open parenthesis and the recursion that is pending inside it.
 #[derive(Clone, Copy, Debug, Default)]
 struct Level {
     at: usize,
@@ -94,9 +93,9 @@ struct Level {
     right: usize,
     /// `if` without its `else`.
     ifs: usize,
-    /// A `match` has begun, so that `case` may go on with it.
+    /// True if a `match` has begun, so that `case` may continue it.
     matching: bool,
-    /// Opened by a word over neighbours, `sum(`: a colon belongs to it.
+    /// True if opened by an aggregate such as `sum(`, which contains a colon.
     is_sum: bool,
 }
 
@@ -105,17 +104,17 @@ struct Scanner<'t> {
     out: Vec<u8>,
     items: Vec<RawItem>,
     errors: Vec<Diagnostic>,
-    /// In a string of modules, where line breaks mean nothing.
+    /// True in a string of modules, where line breaks have no meaning.
     in_string: bool,
-    /// In a string of several successors with weights, such as `produce 2: F or 1: G`.
+    /// True in successors with weights, such as `produce 2: F or 1: G`.
     weighted: bool,
-    /// The last token asks for a weight: `produce`, or an `or` between successors.
+    /// True if a weight may follow the last token: `produce`, or an `or` between successors.
     weight_next: bool,
     last: Last,
     levels: Vec<Level>,
-    /// Sum over `levels`.
+    /// Sum of the pending operands and `if`s over `levels`.
     pending: usize,
-    /// Line break that is significant unless the next line begins with `then` or `else`.
+    /// A line break that is significant unless the next line begins with `then` or `else`.
     held_break: Option<usize>,
     /// Start of a run of lines that each end with `<` or `>`.
     run_of_angles: Option<usize>,
@@ -123,9 +122,9 @@ struct Scanner<'t> {
     head_before: Option<(usize, usize)>,
     /// The token after the present one on its line.
     next: Option<Token>,
-    /// The expression before the last line break has a `match`.
+    /// True if the expression before the last line break has a `match`.
     matching: bool,
-    /// All tokens, where somebody wants them.
+    /// All tokens, if requested.
     lexemes: Option<Vec<Lexeme>>,
 }
 
@@ -134,7 +133,7 @@ pub fn layout(text: &str) -> Layout {
     scan(text, None).0
 }
 
-/// Cuts a text into items, and tells all tokens.
+/// Cuts a text into items and lists all tokens.
 pub fn lexemes(text: &str) -> (Layout, Vec<Lexeme>) {
     let (layout, lexemes) = scan(text, Some(Vec::new()));
     (layout, lexemes.unwrap_or_default())
@@ -180,7 +179,7 @@ fn scan(text: &str, lexemes: Option<Vec<Lexeme>>) -> (Layout, Option<Vec<Lexeme>
             );
         }
     }
-    // Only ASCII bytes were put in place of whole characters.
+    // Whole characters have been replaced with ASCII spaces and colons only.
     let text = String::from_utf8(out).expect("whole characters were replaced");
     (Layout { text, items, errors }, lexemes)
 }
@@ -247,7 +246,7 @@ impl Scanner<'_> {
         let colon = !in_sum && self.has_colon(tokens) && !self.goes_on_with_weight(tokens);
         let arrow = self.arrow_outside_parentheses(tokens);
         if arrow == Some(first.1) || arrow.is_some() && self.goes_on() {
-            // What looked like the head of a rule is that of a discrete one, broken over lines.
+            // The item before is the head of a discrete rule, broken over lines.
             self.goes_on_discrete(start, arrow == Some(first.1));
         }
         let in_string = self.in_string && self.levels.len() == 1;
@@ -264,7 +263,7 @@ impl Scanner<'_> {
                 && self.last == Last::Angle
                 && self.levels.len() == 1
             {
-                // The head was broken over lines; take back the lines before.
+                // The head is broken over lines: the item begins on the first of them.
                 from = self.run_of_angles.unwrap_or(from);
             }
             self.close_item(from);
@@ -272,7 +271,7 @@ impl Scanner<'_> {
                 && first.0 == Token::Symbol
                 && let Some(cut) = self.items.last_mut()
             {
-                // It goes on here, wrongly; that is said of this line.
+                // The item before continues here by mistake; the error points at this line only.
                 cut.broken = true;
             }
             self.items.push(RawItem { kind, start: from, end: from, after_colon: None, broken: false });
@@ -282,7 +281,7 @@ impl Scanner<'_> {
         } else if let Some(at) = self.held_break.take()
             && (matches!(word.as_str(), "then" | "else") || word == "case" && self.matching)
         {
-            // `then`, `else` and `case` take back the break before them, and any empty lines.
+            // `then`, `else` and `case` remove the break before them, and any empty lines.
             for byte in &mut self.out[at..start] {
                 if *byte == b'\n' {
                     *byte = b' ';
@@ -302,7 +301,7 @@ impl Scanner<'_> {
         self.line_break(end);
     }
 
-    /// Whether a line begins an item, and which.
+    /// The kind of item that a line begins, if it begins one.
     fn starts_item(
         &self,
         word: &str,
@@ -315,21 +314,21 @@ impl Scanner<'_> {
         let follows = |i: usize| tokens.get(i).map(|t| t.0);
         let plain = !colon && matches!(follows(1), Some(Token::Word | Token::Text));
         if let Some(declared) = declared.filter(|declared| declared.begins == Begins::Always || plain) {
-            // Inside parentheses that somebody forgot to close, a declaration still begins one; but an
-            // identifier that happens to be called `angle` does not.
+            // A declaration begins an item even inside parentheses that were never closed; an
+            // identifier named `angle` does not.
             let next_is_word = matches!(tokens.get(1), Some((Token::Word | Token::Text, ..)));
             if !inside || next_is_word || colon || arrow {
                 return Some(ItemKind::Declaration(declared));
             }
         }
-        // A clause with a colon too many is still a clause.
+        // A clause with an extra colon is still a clause.
         let is_let = word == "let"
             && follows(1) == Some(Token::Word)
             && tokens.get(2).is_some_and(|t| &self.text[t.1..t.2] == "=");
         let case = word == "case" && (self.matching || self.level_matches());
         let clause = matches!(word, "if" | "solve" | "produce") && !self.items.is_empty() || is_let || case;
         let clause = clause || tokens.first().is_some_and(|t| self.is_at_rate(t.1, t.2));
-        // So is one with an arrow; and the head of a discrete rule may have been on the line before.
+        // The same holds for an extra arrow; and the head of a discrete rule may be on the line before.
         let goes_on = self.items.last().is_some_and(|i| i.kind == ItemKind::Step) && !self.in_string;
         if arrow && !clause && !goes_on {
             return Some(ItemKind::Step);
@@ -345,7 +344,7 @@ impl Scanner<'_> {
             return None;
         }
         let continues = match current.kind {
-            // What follows a line that is not understood is not to be complained about again.
+            // Lines after an unknown line yield no further errors.
             ItemKind::Rule | ItemKind::Unknown => clause || matches!(word, "then" | "else"),
             ItemKind::Step => true,
             kind if kind.has_string() => true,
@@ -380,89 +379,105 @@ impl Scanner<'_> {
         }
     }
 
+    /// Advances over one token: updates the nesting, and whether an expression can end here.
     fn token(&mut self, (token, start, end): (Token, usize, usize)) {
         let in_expression = !self.in_string || self.levels.len() > 1;
         self.weight_next = false;
         let (after_operand, depth) = (self.last == Last::Operand, self.levels.len() - 1);
-        let mut last = Last::Operand;
-        match token {
-            Token::Word => {
-                last = self.keyword(start, end);
-            }
-            Token::Number | Token::Text => {}
+        let last = match token {
+            Token::Word => self.keyword(start, end),
+            Token::Number | Token::Text => Last::Operand,
             Token::Open => {
                 let word = self.text[..start].trim_end().rsplit(|c| !in_name(c)).next().unwrap_or_default();
                 let is_sum = FOLDS.contains(&word);
                 self.levels.push(Level { at: start, is_sum, ..Level::default() });
-                last = Last::Operator;
+                Last::Operator
             }
             Token::Close => {
-                if self.levels.len() > 1 {
-                    let level = self.levels.pop().expect("two levels");
-                    self.pending -= level.right + level.ifs;
-                } else {
-                    self.fault(
-                        Diagnostic::error("this `)` closes nothing")
-                            .at(Span::new(start, end), "there is no `(` before it")
-                            .help("remove it, or write the `(` that it belongs to"),
-                    );
-                }
+                self.close_parenthesis(start, end);
+                Last::Operand
             }
             Token::Comma => {
                 self.forget_pending();
-                last = Last::Operator;
+                Last::Operator
             }
             Token::Colon => {
-                last = Last::Colon;
-                self.level().is_sum = false;
-                let weight = self.in_successor();
-                self.weighted |= weight;
-                if self.levels.len() == 1
-                    && !self.level().matching
-                    && !weight
-                    && let Some(item) = self.items.last_mut()
-                    && item.after_colon.is_none()
-                {
-                    item.after_colon = Some(end);
-                    self.in_string = item.kind.has_string();
-                    self.forget_pending();
-                }
+                self.colon(end);
+                Last::Colon
             }
-            Token::Symbol => {
-                let symbol = &self.text[start..end];
-                let binary = self.last == Last::Operand;
-                last = match symbol {
-                    "<" | ">" => Last::Angle,
-                    // The end of an element, or of an array.
-                    "]" => Last::Operand,
-                    _ => Last::Operator,
-                };
-                if self.is_arrow(start, end)
-                    && self.levels.len() == 1
-                    && self.items.last().is_some_and(|i| i.kind == ItemKind::Step)
-                {
-                    last = Last::Operator;
-                    (self.in_string, self.weighted, self.weight_next) = (true, false, true);
-                    self.forget_pending();
-                } else if in_expression {
-                    let level = self.levels.last_mut().expect("never empty");
-                    if symbol == "^" || !binary {
-                        level.right += 1;
-                        self.pending += 1;
-                    } else {
-                        self.pending -= level.right;
-                        level.right = 0;
-                    }
-                }
-            }
-        }
+            Token::Symbol => self.symbol(start, end, in_expression),
+        };
         self.last = last;
         if let Some(lexemes) = &mut self.lexemes {
             let (in_string, operator) = (!in_expression, last != Last::Operand);
             lexemes.push(Lexeme { token, start, end, in_string, after_operand, operator, depth });
         }
-        let depth = self.levels.len() - 1 + self.pending;
-        if depth > MAX_DEPTH {
+        self.check_depth(start, end);
+    }
+
+    fn close_parenthesis(&mut self, start: usize, end: usize) {
+        if self.levels.len() > 1 {
+            let level = self.levels.pop().expect("two levels");
+            self.pending -= level.right + level.ifs;
+        } else {
+            self.fault(
+                Diagnostic::error("this `)` closes nothing")
+                    .at(Span::new(start, end), "there is no `(` before it")
+                    .help("remove it, or write the `(` that it belongs to"),
+            );
+        }
+    }
+
+    /// Advances over a colon that ends at `end`: that of a head, of a weight, of a `case` or of an aggregate.
+    fn colon(&mut self, end: usize) {
+        self.level().is_sum = false;
+        let weight = self.in_successor();
+        self.weighted |= weight;
+        if self.levels.len() == 1
+            && !self.level().matching
+            && !weight
+            && let Some(item) = self.items.last_mut()
+            && item.after_colon.is_none()
+        {
+            item.after_colon = Some(end);
+            self.in_string = item.kind.has_string();
+            self.forget_pending();
+        }
+    }
+
+    /// Advances over an operator, a bracket or the arrow of a discrete rule.
+    fn symbol(&mut self, start: usize, end: usize, in_expression: bool) -> Last {
+        let symbol = &self.text[start..end];
+        let binary = self.last == Last::Operand;
+        if self.is_arrow(start, end)
+            && self.levels.len() == 1
+            && self.items.last().is_some_and(|i| i.kind == ItemKind::Step)
+        {
+            (self.in_string, self.weighted, self.weight_next) = (true, false, true);
+            self.forget_pending();
+            return Last::Operator;
+        }
+        if in_expression {
+            let level = self.levels.last_mut().expect("never empty");
+            if symbol == "^" || !binary {
+                level.right += 1;
+                self.pending += 1;
+            } else {
+                self.pending -= level.right;
+                level.right = 0;
+            }
+        }
+        match symbol {
+            "<" | ">" => Last::Angle,
+            // The end of an element, or of an array.
+            "]" => Last::Operand,
+            _ => Last::Operator,
+        }
+    }
+
+    /// Reports nesting that is deeper than [`MAX_DEPTH`] after the token at these bytes.
+    fn check_depth(&mut self, start: usize, end: usize) {
+        if self.levels.len() - 1 + self.pending > MAX_DEPTH {
             self.fault(
                 Diagnostic::error(format!("this is nested more than {MAX_DEPTH} deep"))
                     .at(Span::new(start, end), "one level too many")

@@ -3,7 +3,7 @@
 
 use pest::unicode::MARK;
 
-/// What a stretch of the text is, as far as its characters tell.
+/// The kind of a token, determined by its characters alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Token {
     Word,
@@ -16,19 +16,19 @@ pub enum Token {
     Symbol,
 }
 
-/// A token and what it stands in, for those who lay a text out anew.
+/// A token and its surroundings, for the formatter.
 #[derive(Clone, Copy, Debug)]
 pub struct Lexeme {
     pub token: Token,
     pub start: usize,
     pub end: usize,
-    /// In a string of modules, outside parentheses.
+    /// True in a string of modules, outside parentheses.
     pub in_string: bool,
-    /// What stands before it can end an expression: a sign here has two sides.
+    /// True if the token before it can end an expression, so that a sign here is a binary operator.
     pub after_operand: bool,
-    /// It cannot end an expression: an operator, or a word that works as one.
+    /// True if it cannot end an expression: an operator, or a word that works as one.
     pub operator: bool,
-    /// Open parentheses around it.
+    /// Number of parentheses that are open around it.
     pub depth: usize,
 }
 
@@ -54,8 +54,8 @@ pub fn number_length(text: &str) -> usize {
     end
 }
 
-/// Whether a name goes on with this character. Marks belong to the letter before them. What the grammar does not let into a
-/// name though it is a digit or letter of sorts, such as `²`, stands nowhere else either.
+/// True if a name continues with this character. Combining marks belong to the letter before them. The grammar excludes
+/// some alphanumeric characters from names, such as `²`; they occur nowhere else in a valid text.
 pub fn in_name(c: char) -> bool {
     c.is_ascii_alphanumeric() || c == '_' || !c.is_ascii() && (c.is_alphanumeric() || MARK(c))
 }
@@ -67,7 +67,7 @@ mod tests {
     use crate::parse::Rule;
     use pest::Parser;
 
-    /// There is one notion of a number, and one of a name.
+    /// The scanner and the grammar agree on the ends of numbers and names.
     #[test]
     fn numbers_and_names_end_where_the_grammar_ends_them() {
         let endings = [

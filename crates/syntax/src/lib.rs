@@ -4,10 +4,9 @@
 //! text ──layout──▶ items ──parse──▶ Document ──print──▶ text
 //! ```
 //!
-//! This crate knows the notation and nothing of its meaning: names are not resolved, and no model is built. That is the
-//! work of `dlsys-compile`. Errors are collected, not thrown: each item that cannot be parsed gives one
-//! [`Diagnostic`](dlsys_diagnostic::Diagnostic), and the others are parsed all the same. Every pass is linear in the text,
-//! and none recurses deeper than a fixed bound.
+//! This crate implements the notation only: `dlsys-compile` resolves names and builds the model. Each item that cannot be
+//! parsed yields one [`Diagnostic`](dlsys_diagnostic::Diagnostic), and the other items are still parsed. Every pass takes
+//! time linear in the text and recurses to a fixed depth at most.
 //!
 //! - [`parse`]: text to [`ast::Document`]; [`read`] also parses the files that a text includes.
 //! - [`print`]: the syntax tree as text.

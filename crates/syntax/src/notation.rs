@@ -1,6 +1,6 @@
 //! The notation of each declaration: from the pairs of the parser to the syntax tree, and from the tree to text.
 //!
-//! Reading and printing stand together so that they agree: what is printed reads back as the same tree.
+//! Reading and printing stand side by side so that they agree: the printed text parses to the same tree.
 
 use crate::ast::{Expression, Expressions, Item, Name, Text};
 use crate::parse::Rule;
@@ -8,11 +8,11 @@ use crate::parse::build::{Builder, Built, Pair, is_punctuation};
 use crate::print;
 use dlsys_expr::Sort;
 
-/// The sort of a curve, and that of a table, if the text does not say it.
+/// The sorts of a curve and of a table if the text names none.
 const CURVE: Sort = Sort::Monotone;
 const TABLE: Sort = Sort::Linear;
 
-/// Reads a declaration; the initial string is read in pieces elsewhere.
+/// Reads a declaration other than the initial string, which is parsed in pieces (`parse/mod.rs`).
 pub(crate) fn read(builder: &mut Builder, pair: Pair) -> Built<Item> {
     let rule = pair.as_rule();
     let pairs: Vec<Pair> = pair.into_inner().filter(|p| !is_punctuation(p.as_rule())).collect();
@@ -125,7 +125,7 @@ pub(crate) fn write(expressions: &Expressions, item: &Item) -> String {
     }
 }
 
-/// The parts of a declaration, in the order written. The grammar has checked that those which must be there are.
+/// The parts of a declaration in the order written. The grammar guarantees the mandatory ones.
 struct Parts<'p, 'd, 'i> {
     builder: &'p mut Builder<'d>,
     pairs: std::vec::IntoIter<Pair<'i>>,
@@ -208,7 +208,7 @@ impl<'i> Parts<'_, '_, 'i> {
     }
 }
 
-/// The word for a sort of curve, which the default does not need.
+/// The word for a sort of curve with a space behind it; empty for the default.
 fn sort_word(sort: Sort, default: Sort) -> &'static str {
     match sort {
         sort if sort == default => "",

@@ -1,33 +1,33 @@
-//! What a text declares, and where: for those who change texts piece by piece.
+//! The declarations of a text and their places, for programs that edit texts piece by piece.
 
-use crate::ast::{HeadModule, Item, Rule, Turn};
+use crate::ast::{ContextPart, HeadModule, Item, Rule};
 use crate::declarations::Repeats;
 use crate::parse;
 use dlsys_diagnostic::{Source, Span};
 
 /// A declaration or rule of a text.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Entry {
-    /// Two entries of one key cannot stand side by side: one takes the place of the other. None where any number can.
+pub struct OutlineEntry {
+    /// Of two entries with the same key, the later one replaces the other. None where a text may have any number.
     pub key: Option<String>,
-    /// What it is called, if it has a name: `r`, `F_a(x, n)`, `frames`.
+    /// Its name, if it has one: `r`, `F_a(x, n)`, `frames`.
     pub name: String,
-    /// It is a rule, continuous or discrete.
+    /// True for a rule, continuous or discrete.
     pub is_rule: bool,
-    /// It is the initial string.
+    /// True for the initial string.
     pub is_axiom: bool,
-    /// The whole of it, without white space at its end.
+    /// Its place, without white space at its end.
     pub span: Span,
 }
 
-/// The declarations and rules of a text that can be read, in the order written.
-pub fn outline(text: &str) -> Vec<Entry> {
+/// The declarations and rules of a text in the order written, without those that cannot be parsed.
+pub fn outline(text: &str) -> Vec<OutlineEntry> {
     let source = Source::new("", text);
     let (document, _) = parse::parse(&source);
     document.items.iter().map(|(item, span)| entry(item, *span, &source)).collect()
 }
 
-fn entry(item: &Item, span: Span, source: &Source) -> Entry {
+fn entry(item: &Item, span: Span, source: &Source) -> OutlineEntry {
     let (key, name) = match item {
         Item::Rule(rule) => (Some(head(rule)), source.slice(rule.head).trim().to_owned()),
         Item::Axiom(_) => (Some("initial string".to_owned()), "initial string".to_owned()),
@@ -39,10 +39,10 @@ fn entry(item: &Item, span: Span, source: &Source) -> Entry {
         item => declared(item),
     };
     let (is_rule, is_axiom) = (matches!(item, Item::Rule(_)), matches!(item, Item::Axiom(_)));
-    Entry { key, name, is_rule, is_axiom, span }
+    OutlineEntry { key, name, is_rule, is_axiom, span }
 }
 
-/// The key of a declaration that is known by its word or its name, and what it is called.
+/// Key and name of a declaration that is identified by its word or by the name that it declares.
 fn declared(item: &Item) -> (Option<String>, String) {
     let Some(declaration) = item.declaration() else { return (None, String::new()) };
     let name = item.name().map_or(declaration.word, |name| &*name.text);
@@ -64,9 +64,9 @@ fn head(rule: &Rule) -> String {
     let mut following = rule.right.iter().map(pattern);
     let right: Vec<String> = (rule.right_shape.iter())
         .filter_map(|turn| match turn {
-            Turn::Module => following.next(),
-            Turn::Open => Some("[".to_owned()),
-            Turn::Close => Some("]".to_owned()),
+            ContextPart::Module => following.next(),
+            ContextPart::Open => Some("[".to_owned()),
+            ContextPart::Close => Some("]".to_owned()),
         })
         .collect();
     format!("{} < {} > {}", all(&rule.left), pattern(&rule.predecessor), right.join(" "))

@@ -1,15 +1,15 @@
 //! From the syntax tree back to text.
 //!
-//! Parentheses are put where the tree needs them, so that what is printed reads back as the same tree.
-//! Printing works with an explicit stack: a tree may be deeper than the machine's.
+//! Parentheses are added where the tree needs them, so that the printed text parses to the same tree. Printing uses an
+//! explicit stack, because a tree may be deeper than the call stack allows.
 
 use crate::ast::{
-    Action, Alternative, Clause, Document, Equation, Expr, ExprId, Expressions, HeadModule, Module, Name,
-    Operator, Turn,
+    Action, Alternative, Clause, ContextPart, Document, Equation, Expr, ExprId, Expressions, HeadModule,
+    Module, Name, Operator,
 };
 use crate::notation;
 
-/// How tightly a node binds; the loosest is 0.
+/// Binding strength of a node; 0 is the weakest.
 fn strength(expr: &Expr) -> u8 {
     match expr {
         Expr::If(..) | Expr::Match(..) => 0,
@@ -79,7 +79,7 @@ pub fn expression(expressions: &Expressions, root: ExprId) -> String {
     out
 }
 
-/// What a node is written as: signs, words, and its operands with the strength that each must have.
+/// The parts of a node in print order: signs, words, and operands with the strength that each needs.
 fn push_parts<'e>(expressions: &'e Expressions, id: ExprId, parts: &mut Vec<Task<'e>>) {
     let node = expressions.get(id);
     let own = strength(node);
@@ -105,7 +105,7 @@ fn push_parts<'e>(expressions: &'e Expressions, id: ExprId, parts: &mut Vec<Task
         Expr::Binary(operator, a, b) => {
             // Equal strength needs no parentheses on the side to which the operator associates.
             let (left, right) = if *operator == Operator::Pow { (own + 1, own) } else { (own, own + 1) };
-            // A sign may open the right operand of a tighter operator, but an `if` reads to the end.
+            // A sign may open the right operand of a tighter operator; an `if` extends to the end of the expression.
             parts.extend([Task::Node(*a, left), Task::Text(operator.symbol()), Task::Node(*b, right)]);
         }
         Expr::Compare(first, links) => {
@@ -123,7 +123,7 @@ fn push_parts<'e>(expressions: &'e Expressions, id: ExprId, parts: &mut Vec<Task
         Expr::Match(subject, cases, otherwise) => {
             parts.extend([Task::Text("match "), Task::Node(*subject, 1)]);
             for (value, then) in cases {
-                // An inner `match` would take the cases that follow.
+                // Without parentheses, an inner `match` would include the cases that follow.
                 parts.extend([Task::Text(" case "), Task::Node(*value, 1), Task::Text(": ")]);
                 parts.push(Task::Node(*then, 1));
             }
@@ -154,7 +154,7 @@ fn push_scaled(expressions: &Expressions, factor: f64, a: ExprId, own: u8, parts
     }
 }
 
-/// The first thing that is written of an expression.
+/// The leftmost operand of an expression, which is printed first.
 fn leftmost(expressions: &Expressions, mut id: ExprId) -> &Expr {
     loop {
         match expressions.get(id) {
@@ -165,7 +165,7 @@ fn leftmost(expressions: &Expressions, mut id: ExprId) -> &Expr {
     }
 }
 
-/// A name that a number before it would swallow: `2e3` is 2000, not 2 times `e3`.
+/// True for a name that would become part of a number before it: `2e3` is 2000, not 2 times `e3`.
 fn exponent_like(expr: &Expr) -> bool {
     matches!(expr, Expr::Name(name) | Expr::Call(name, _) | Expr::Index(name, _) if name.starts_with(['e', 'E']))
 }
@@ -199,7 +199,7 @@ pub fn head_module(module: &HeadModule) -> String {
     }
 }
 
-/// Names with something between them.
+/// Names with a separator between them.
 pub(crate) fn names(names: &[Name], between: &str) -> String {
     let texts: Vec<&str> = names.iter().map(|n| &*n.text).collect();
     texts.join(between)
@@ -218,9 +218,11 @@ pub fn head(rule: &crate::ast::Rule) -> String {
         out += " >";
         for turn in &rule.right_shape {
             out += &match turn {
-                Turn::Open => " [".to_owned(),
-                Turn::Close => " ]".to_owned(),
-                Turn::Module => right.next().map_or_else(String::new, |m| " ".to_owned() + &head_module(m)),
+                ContextPart::Open => " [".to_owned(),
+                ContextPart::Close => " ]".to_owned(),
+                ContextPart::Module => {
+                    right.next().map_or_else(String::new, |m| " ".to_owned() + &head_module(m))
+                }
             };
         }
     }

@@ -22,7 +22,7 @@ pub fn nearest<'c>(name: &str, candidates: impl IntoIterator<Item = &'c str>) ->
             }
             let close = name.len().abs_diff(other.len()) <= allowed;
             let distance = if close { distance(&name, &other) } else { usize::MAX };
-            // One letter for another is no likeness.
+            // Two different letters are not similar.
             (distance <= allowed && distance < name.len().max(other.len())).then_some((distance, c))
         })
         .min_by_key(|(distance, c)| (*distance, *c))
@@ -34,7 +34,7 @@ pub fn did_you_mean<'c>(name: &str, candidates: impl IntoIterator<Item = &'c str
     nearest(name, candidates).map(|c| meant(name, c))
 }
 
-/// That another name is meant, as a sentence.
+/// A sentence that suggests another name.
 pub fn meant(name: &str, other: &str) -> String {
     if looks_like(name, other) {
         return format!(
@@ -44,8 +44,8 @@ pub fn meant(name: &str, other: &str) -> String {
     format!("did you mean `{other}`?")
 }
 
-/// Whether two names differ only in how letters with marks are composed, as far as that can be told without tables:
-/// where one has letters and marks, the other has as many characters beyond ASCII.
+/// True if two names appear to differ only in the composition of letters with marks. Without Unicode tables, the test is
+/// whether one has as many non-ASCII characters as the other has marked letters.
 pub fn looks_like(name: &str, other: &str) -> bool {
     name != other && look_alike(other, &name.chars().collect::<Vec<_>>())
 }
@@ -54,7 +54,7 @@ fn look_alike(other: &str, name: &[char]) -> bool {
     fn is_mark(c: char) -> bool {
         matches!(c, '\u{300}'..='\u{36f}' | '\u{1ab0}'..='\u{1aff}' | '\u{1dc0}'..='\u{1dff}' | '\u{20d0}'..='\u{20ff}')
     }
-    /// Letters, each with the number of its marks.
+    /// The letters, each with the number of its marks.
     fn letters(text: impl Iterator<Item = char>) -> Vec<(char, usize)> {
         let mut letters: Vec<(char, usize)> = Vec::new();
         for c in text {

@@ -4,16 +4,16 @@ pub use crate::declarations::words as declarations;
 use crate::declarations::{Follow, options};
 pub use crate::lexeme::{in_name, number_length};
 
-/// Words that begin a part of a rule. Also those of an expression, which may stand at the beginning of a line.
+/// Words that begin a part of a rule, and `then` and `else`, which may begin a line of an expression.
 pub const CLAUSES: [&str; 8] = ["if", "then", "else", "solve", "produce", "or", "at", "let"];
 
-/// Words for a sum or the like over the modules attached to one: `sum(B(x): x)`.
+/// The aggregates over the modules attached to one: `sum(B(x): x)`.
 pub const FOLDS: [&str; 4] = ["sum", "count", "largest", "smallest"];
 
-/// Words within rules and expressions that mean something in certain places only.
+/// Words within rules and expressions that are keywords in certain places only.
 const WITHIN_RULES: [&str; 4] = ["rate", "for", "match", "case"];
 
-/// Words that mean something in certain places only, with something behind them. Some are there several times.
+/// Words that are keywords in certain places only and never end a declaration; a word may be listed several times.
 pub fn particles() -> impl Iterator<Item = &'static str> {
     let open = options().filter(|option| option.follow != Follow::Nothing);
     open.map(|option| option.word).chain(WITHIN_RULES)

@@ -5,7 +5,9 @@ use serde::Serialize;
 use super::curves::CurvePlan;
 use super::{given, words};
 use crate::diagnostic::Source;
-use crate::model::{Class, Condition, DRAWN_WORDS, Kind, Law, Model, Produce, Rule, Solve, ZeroCrossing};
+use crate::model::{
+    Class, Condition, DRAWN_WORDS, Kind, Model, Produce, Rule, SolutionForm, Solve, ZeroCrossing,
+};
 use crate::session::Session;
 
 /// The explanation of a model. Field names are those of the JSON.
@@ -180,9 +182,9 @@ fn parameter_names(model: &Model, kind: &Kind) -> Vec<String> {
 fn is_numeric(model: &Model, kind: &Kind, parameter: Option<usize>) -> bool {
     let is_meant = |p: usize| parameter.is_none_or(|wanted| wanted == p);
     kind.rules.iter().flat_map(|rule| &model.rules[*rule].solves).any(|solve| {
-        let mut laws = solve.of.iter().zip(&solve.laws);
+        let mut forms = solve.of.iter().zip(&solve.solution_forms);
         let mut given = solve.algebraic.of.iter().enumerate();
-        laws.any(|(p, law)| is_meant(*p) && !law.is_closed())
+        forms.any(|(p, law)| is_meant(*p) && !law.is_closed())
             || given.any(|(place, p)| is_meant(*p) && solve.algebraic.is_solved(place, false))
     })
 }
@@ -289,11 +291,11 @@ impl Facts<'_> {
                     let why = "its rate here is 0".to_owned();
                     return ParameterPlan { name, class: "constant", law: None, why, reads: Vec::new() };
                 };
-                let law = &solve.laws[position];
+                let law = &solve.solution_forms[position];
                 let class = match law {
-                    Law::Numeric(numeric) if coupled && numeric.linear => "coupled and linear",
-                    Law::Numeric(_) if coupled => "coupled",
-                    Law::Numeric(_) => "local",
+                    SolutionForm::Numeric(numeric) if coupled && numeric.linear => "coupled and linear",
+                    SolutionForm::Numeric(_) if coupled => "coupled",
+                    SolutionForm::Numeric(_) => "local",
                     _ => "closed form",
                 };
                 let reads = solve.rates.output_reads(position);
@@ -349,7 +351,7 @@ impl Facts<'_> {
     }
 
     fn watch(&self, rule: &Rule, solve: Option<usize>, atom: usize) -> (&'static str, String) {
-        let watch = &rule.watch(solve)[atom];
+        let watch = &rule.zero_crossings(solve)[atom];
         let solve = solve.map(|s| &rule.solves[s]);
         if matches!(watch, ZeroCrossing::Constant) {
             return ("nothing to find", "nothing in it changes from one event to the next".to_owned());
@@ -391,8 +393,11 @@ impl Facts<'_> {
     pub fn is_integrated(&self, rule: &Rule, solve: Option<&Solve>, variable: usize) -> bool {
         if variable < rule.parameters.len() {
             let Some(solve) = solve else { return false };
-            let by_law =
-                solve.of.iter().position(|p| *p == variable).is_some_and(|i| !solve.laws[i].is_closed());
+            let by_law = solve
+                .of
+                .iter()
+                .position(|p| *p == variable)
+                .is_some_and(|i| !solve.solution_forms[i].is_closed());
             let given = solve.algebraic.of.iter().position(|p| *p == variable);
             return by_law || given.is_some_and(|place| !solve.algebraic.closed[place]);
         }

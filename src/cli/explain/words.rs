@@ -2,7 +2,7 @@
 
 use super::plan::Facts;
 use crate::expr::Program;
-use crate::model::{Driven, Flow, Law, Numeric, Obstacle, Rule, Solve};
+use crate::model::{DrivenGrowth, GrowthLaw, Numeric, Obstacle, Rule, SolutionForm, Solve};
 use crate::sim::brief;
 
 /// The form of a solution that a run may replace by integration.
@@ -46,25 +46,25 @@ pub fn law(
     } else {
         ""
     };
-    match &solve.laws[position] {
-        Law::Polynomial(coefficients) if coefficients.outputs() == 1 => {
+    match &solve.solution_forms[position] {
+        SolutionForm::Polynomial(coefficients) if coefficients.outputs() == 1 => {
             let why = match coefficients.constant_output(0) {
                 Some(rate) => format!("its rate is the number {}", brief(rate, 6)),
                 None => format!("nothing that its rate reads changes{piecewise}"),
             };
             (Some("constant rate".to_owned()), why)
         }
-        Law::Polynomial(coefficients) => {
+        SolutionForm::Polynomial(coefficients) => {
             let degree = coefficients.outputs() - 1;
             let why = format!("its rate is a polynomial of degree {degree} in age{piecewise}");
             (Some(format!("polynomial of degree {} in age", degree + 1)), why)
         }
-        Law::Quadratic(coefficients) => {
+        SolutionForm::Quadratic(coefficients) => {
             let (name, degree) = quadratic(coefficients);
             let why = format!("its rate is {degree} in {x} with constant coefficients{piecewise}");
             (Some(name), why)
         }
-        Law::Sum { inflow, .. } => {
+        SolutionForm::Sum { inflow, .. } => {
             let driven: Vec<String> =
                 inflow.reads().iter().copied().filter_map(|v| variable(rule, v)).collect();
             let own = |name: &&String| rule.parameters.contains(name) || *name == "t" || *name == "age";
@@ -73,8 +73,8 @@ pub fn law(
                 format!("its rate is linear in {x}, driven by {} by a formula{piecewise}", list(&driven));
             (Some(SUM.to_owned()), why)
         }
-        Law::Driven(law) => driven(rule, x, law, piecewise),
-        Law::Numeric(numeric) => (None, obstacle(facts, rule, solve, position, *numeric, coupled)),
+        SolutionForm::Driven(law) => driven(rule, x, law, piecewise),
+        SolutionForm::Numeric(numeric) => (None, obstacle(facts, rule, solve, position, *numeric, coupled)),
     }
 }
 
@@ -104,7 +104,7 @@ fn quadratic(coefficients: &Program) -> (String, &'static str) {
 }
 
 /// The form of the solution of `x' = h(time) q(x)`, and the reason.
-fn driven(rule: &Rule, x: &str, law: &Driven, piecewise: &str) -> (Option<String>, String) {
+fn driven(rule: &Rule, x: &str, law: &DrivenGrowth, piecewise: &str) -> (Option<String>, String) {
     let curves: Vec<String> = law.curves.iter().map(|curve| curve.name.clone()).collect();
     let pace = match (curves.len(), &law.pace) {
         (0, None) => String::new(),
@@ -117,14 +117,14 @@ fn driven(rule: &Rule, x: &str, law: &Driven, piecewise: &str) -> (Option<String
         (1, _) => format!("the curve {}", curves[0]),
         _ => format!("the curves {}", list(&curves)),
     };
-    let name = match law.flow {
-        Flow::Quadratic if [1, 2].iter().all(|i| law.coefficients.constant_output(*i) == Some(0.0)) => {
+    let name = match law.growth {
+        GrowthLaw::Quadratic if [1, 2].iter().all(|i| law.coefficients.constant_output(*i) == Some(0.0)) => {
             let why = format!("its rate is made of {pace}, whose integral is known{piecewise}");
             return (Some(format!("integral of {pace}")), why);
         }
-        Flow::Quadratic => quadratic(&law.coefficients).0,
-        Flow::Gompertz => "Gompertz growth".to_owned(),
-        Flow::Bernoulli => "Bernoulli's equation (Richards, von Bertalanffy)".to_owned(),
+        GrowthLaw::Quadratic => quadratic(&law.coefficients).0,
+        GrowthLaw::Gompertz => "Gompertz growth".to_owned(),
+        GrowthLaw::Bernoulli => "Bernoulli's equation (Richards, von Bertalanffy)".to_owned(),
     };
     if pace.is_empty() {
         return (

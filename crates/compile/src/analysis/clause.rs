@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use dlsys_expr::{Graph, NodeId, Program};
-use dlsys_model::{Algebraic, Jacobian, Law, Linear, Solve, ZeroCrossing};
+use dlsys_model::{Algebraic, Jacobian, LinearRates, SolutionForm, Solve, ZeroCrossing};
 
 use super::crossings::crossing;
-use super::laws::{jacobian, laws, linear};
-use super::stepping::{Layout, StepEquations};
+use super::solution_forms::{classify, jacobian, linear};
+use super::stepping::{StepEquations, VariableLayout};
 use super::variability::Constants;
 use crate::declared::{DeclaredSolve, ResolvedRule};
 
@@ -15,23 +15,23 @@ use crate::declared::{DeclaredSolve, ResolvedRule};
 pub struct ClauseAnalysis {
     of: Vec<usize>,
     rates: Program,
-    pub laws: Vec<Law>,
+    pub solution_forms: Vec<SolutionForm>,
     numeric: Vec<usize>,
     numeric_rates: Program,
-    linear: Option<Linear>,
+    linear: Option<LinearRates>,
     jacobian: Jacobian,
     algebraic: Algebraic,
-    watch: Vec<ZeroCrossing>,
+    zero_crossings: Vec<ZeroCrossing>,
     has_hazard_clock: bool,
 }
 
 impl ClauseAnalysis {
     /// The compiled clause.
-    pub fn compile(self, solve: DeclaredSolve, pulses: bool, layout: &Layout) -> Solve {
+    pub fn compile(self, solve: DeclaredSolve, pulses: bool, layout: &VariableLayout) -> Solve {
         let equations = StepEquations {
             of: &self.of,
             rates: &self.rates,
-            laws: &self.laws,
+            solution_forms: &self.solution_forms,
             numeric: &self.numeric,
             numeric_rates: &self.numeric_rates,
             linear: self.linear.as_ref(),
@@ -46,13 +46,13 @@ impl ClauseAnalysis {
             rates: self.rates,
             switches: solve.switches,
             unreachable: solve.unreachable,
-            laws: self.laws,
+            solution_forms: self.solution_forms,
             numeric: self.numeric,
             numeric_rates: self.numeric_rates,
             linear: self.linear,
             jacobian: self.jacobian,
             algebraic: self.algebraic,
-            watch: self.watch,
+            zero_crossings: self.zero_crossings,
             has_pulses: pulses,
             has_hazard_clock: self.has_hazard_clock,
             stepping,
@@ -71,18 +71,18 @@ pub fn analyse_clause(
     let declared = &rule.declared;
     let rates = &solve.rates;
     let total = declared.variables + solve.switches.len();
-    let laws = laws(graph, rates, constants, total);
+    let solution_forms = classify(graph, rates, constants, total);
     let monotone = |variable: usize| {
         let position = rates.iter().position(|(p, _)| *p == variable);
         let given = solve.algebraic.iter().any(|entry| entry.parameter == variable);
-        !given && position.is_none_or(|i| is_monotone(&laws[i]))
+        !given && position.is_none_or(|i| is_monotone(&solution_forms[i]))
     };
-    let watch = (declared.sides.iter())
+    let zero_crossings = (declared.sides.iter())
         .map(|&sides| crossing(graph, sides, constants, &monotone, declared.variables))
         .collect();
-    let algebraic = algebraic(graph, solve, &laws, constants, total, is_needed);
+    let algebraic = algebraic(graph, solve, &solution_forms, constants, total, is_needed);
     let jacobian = jacobian(graph, rates, constants, total);
-    let numeric: Vec<usize> = (0..rates.len()).filter(|i| !laws[*i].is_closed()).collect();
+    let numeric: Vec<usize> = (0..rates.len()).filter(|i| !solution_forms[*i].is_closed()).collect();
     let roots: Vec<NodeId> = numeric.iter().map(|i| rates[*i].1).collect();
     let numeric_rates = Program::compile(graph, &roots, total);
     let linear = linear(graph, &roots, constants, total);
@@ -92,22 +92,22 @@ pub fn analyse_clause(
         of: rates.iter().map(|(parameter, _)| *parameter).collect(),
         rates: Program::compile(graph, &all, total),
         has_hazard_clock: clocked && !numeric.is_empty(),
-        laws,
+        solution_forms,
         numeric,
         numeric_rates,
         linear,
         jacobian,
         algebraic,
-        watch,
+        zero_crossings,
     }
 }
 
-/// True if a parameter that follows this law moves one way only.
-fn is_monotone(law: &Law) -> bool {
-    match law {
-        Law::Polynomial(coefficients) => coefficients.outputs() == 1,
-        Law::Quadratic(_) => true,
-        Law::Driven(driven) => driven.monotone,
+/// True if a parameter that follows this form moves one way only.
+fn is_monotone(form: &SolutionForm) -> bool {
+    match form {
+        SolutionForm::Polynomial(coefficients) => coefficients.outputs() == 1,
+        SolutionForm::Quadratic(_) => true,
+        SolutionForm::Driven(driven) => driven.monotone,
         _ => false,
     }
 }
@@ -116,7 +116,7 @@ fn is_monotone(law: &Law) -> bool {
 fn algebraic(
     graph: &mut Graph,
     solve: &DeclaredSolve,
-    laws: &[Law],
+    solution_forms: &[SolutionForm],
     constants: &Constants,
     total: usize,
     is_needed: &dyn Fn(usize) -> bool,
@@ -125,8 +125,9 @@ fn algebraic(
     let nodes: Vec<NodeId> = entries.iter().map(|entry| entry.node).collect();
     let follows_formula = |v: u32| {
         let v = v as usize;
-        let by_law = solve.rates.iter().position(|(p, _)| *p == v).is_some_and(|i| laws[i].is_closed());
-        constants.is_constant(v as u32) || v == constants.time || v == constants.time + 1 || by_law
+        let by_formula =
+            solve.rates.iter().position(|(p, _)| *p == v).is_some_and(|i| solution_forms[i].is_closed());
+        constants.is_constant(v as u32) || v == constants.time || v == constants.time + 1 || by_formula
     };
     let closed: Vec<bool> = (entries.iter())
         .map(|entry| entry.explicit && graph.variables(&[entry.node]).into_iter().all(follows_formula))

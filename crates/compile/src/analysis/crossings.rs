@@ -1,7 +1,7 @@
 //! How the instant is found at which the two sides of a comparison meet.
 
 use dlsys_expr::{Binary, Graph, Monomial, NodeId, Polynomial, Program, Unary};
-use dlsys_model::{Sum, ZeroCrossing};
+use dlsys_model::{AffineSum, ZeroCrossing};
 
 use super::variability::Constants;
 
@@ -43,8 +43,8 @@ pub fn crossing(
 }
 
 /// A polynomial as a sum with factors that are known, if it is one.
-fn sum(graph: &Graph, p: &Polynomial) -> Option<Sum> {
-    let mut sum = Sum { constant: 0.0, terms: Vec::new() };
+fn sum(graph: &Graph, p: &Polynomial) -> Option<AffineSum> {
+    let mut sum = AffineSum { constant: 0.0, terms: Vec::new() };
     for (monomial, &factor) in &p.terms {
         let factor = graph.as_constant(factor)?;
         match monomial[..] {

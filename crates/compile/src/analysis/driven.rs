@@ -7,8 +7,8 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use dlsys_expr::{Binary, Curve, Graph, Integral, Monomial, Node, NodeId, Part, Program, Unary};
-use dlsys_model::{Driven, Flow};
+use dlsys_expr::{Binary, Curve, Graph, Integral, Monomial, Node, NodeId, Part, Polynomial, Program, Unary};
+use dlsys_model::{DrivenGrowth, GrowthLaw};
 
 /// Variables at and above this number stand for parts of a rate; those of functions begin above them.
 const STAND_IN: u32 = 1 << 23;
@@ -25,7 +25,7 @@ const POINTS: usize = 8;
 
 /// A rate taken apart, before it is code.
 pub struct DrivenForm {
-    flow: Flow,
+    growth: GrowthLaw,
     coefficients: Vec<NodeId>,
     pace: Option<NodeId>,
     monotone: bool,
@@ -33,9 +33,9 @@ pub struct DrivenForm {
 }
 
 impl DrivenForm {
-    pub fn compile(self, graph: &Graph, total: usize) -> Driven {
-        Driven {
-            flow: self.flow,
+    pub fn compile(self, graph: &Graph, total: usize) -> DrivenGrowth {
+        DrivenGrowth {
+            growth: self.growth,
             coefficients: Program::compile(graph, &self.coefficients, total),
             pace: self.pace.map(|pace| Arc::new(Program::compile(graph, &[pace], total))),
             monotone: self.monotone,
@@ -123,7 +123,7 @@ pub fn outside_of_drivers(
 }
 
 /// The form of a rate, if it is `h(time) q(x)`. `parameter` is the number of x, `time` that of `t`; `age` is the next.
-/// What is solved otherwise anyhow, rates without curves and growth functions that are quadratic, is left to that.
+/// Quadratic rates without curves and growth functions have a formula of their own and are not treated here.
 pub fn driven_form(
     graph: &mut Graph,
     parameter: u32,
@@ -146,73 +146,100 @@ pub fn driven_form(
     if polynomial.terms.is_empty() || !polynomial.terms.values().all(|c| constant(graph, *c)) {
         return None;
     }
-    // The coefficient of each product of a part of q and a part of h.
-    let (mut of_x, mut of_time): (Vec<Monomial>, Vec<Monomial>) = (Vec::new(), Vec::new());
-    let mut table: HashMap<(usize, usize), NodeId> = HashMap::new();
-    let place = |list: &mut Vec<Monomial>, item: Monomial| {
-        list.iter().position(|known| *known == item).unwrap_or_else(|| {
-            list.push(item);
-            list.len() - 1
-        })
-    };
-    for (monomial, coefficient) in &polynomial.terms {
-        let in_time = |v: &u32| *v == age || *v >= FIRST_DRIVER;
-        let (h, q): (Monomial, Monomial) = monomial.iter().copied().partition(|(v, _)| in_time(v));
-        let single = match h[..] {
-            [] => true,
-            [(v, n)] if v == age => n <= MAX_AGE_DEGREE,
-            [(_, n)] => n == 1,
-            _ => false,
-        };
-        if !single {
-            return None;
-        }
-        table.insert((place(&mut of_x, q), place(&mut of_time, h)), *coefficient);
-    }
-    let (flow, order) = flow(parameter, &of_x)?;
-    let driven = of_time.iter().flatten().any(|(v, _)| *v >= FIRST_DRIVER);
-    let one_pace = of_time.len() == 1;
-    // Without a curve only what has no other formula; x' = age x is integrated, as ever.
-    if !driven && (flow == Flow::Quadratic || !(one_pace && of_time[0].is_empty())) {
+    let products = Products::of(&polynomial, age)?;
+    let (growth, order) = growth_law(parameter, &products.of_x)?;
+    let driven = products.of_time.iter().flatten().any(|(v, _)| *v >= FIRST_DRIVER);
+    // h is the constant 1.
+    let trivial = products.of_time.len() == 1 && products.of_time[0].is_empty();
+    // Without a driver only a constant h and a flow that has no other formula; x' = age x is integrated.
+    if !driven && (growth == GrowthLaw::Quadratic || !trivial) {
         return None;
     }
-    let coefficients: Option<Vec<Vec<NodeId>>> =
-        (0..of_x.len()).map(|i| (0..of_time.len()).map(|j| table.get(&(i, j)).copied()).collect()).collect();
-    let one = graph.constant(1.0);
-    let (of_q, of_h): (Vec<NodeId>, Vec<NodeId>) = match (of_x.len(), of_time.len()) {
-        (_, 1) => (coefficients?.into_iter().map(|row| row[0]).collect(), vec![one]),
-        (1, _) => (vec![one], coefficients?.swap_remove(0)),
-        _ => {
-            let rows = coefficients?;
-            if !proportional(graph, &rows, time) {
-                return None;
-            }
-            let h = rows[0].iter().map(|c| graph.binary(Binary::Div, *c, rows[0][0])).collect();
-            (rows.iter().map(|row| row[0]).collect(), h)
-        }
-    };
-    let trivial = one_pace && of_time[0].is_empty();
-    let pace = (!trivial).then(|| pace(graph, &parts, age, &of_time, &of_h));
+    let (of_q, of_h) = products.factors(graph, time)?;
+    let pace = (!trivial).then(|| pace(graph, &parts, age, &products.of_time, &of_h));
     let zero = graph.constant(0.0);
     let mut coefficients: Vec<NodeId> =
         order.into_iter().map(|place| place.map_or(zero, |i: usize| of_q[i])).collect();
-    if flow == Flow::Bernoulli {
-        coefficients.push(exponent(graph, parameter, &of_x, parts.power)?);
+    if growth == GrowthLaw::Bernoulli {
+        coefficients.push(exponent(graph, parameter, &products.of_x, parts.power)?);
     }
-    let curve_of = |driver: &Driver| match graph.node(driver.node) {
-        Node::Curve(curve, part, _) => Some((graph.curve_of(curve).clone(), part)),
-        _ => None,
-    };
-    let known: Vec<Option<(Arc<Curve>, Part)>> = parts.drivers.iter().map(curve_of).collect();
+    let known: Vec<Option<(Arc<Curve>, Part)>> = parts.drivers.iter().map(|d| curve_of(graph, d)).collect();
     let steady = match known.first() {
         Some(Some((curve, part))) => curve.keeps_sign(*part),
         _ => false,
     };
-    let monotone =
-        trivial || one_pace && of_time[0].first().is_some_and(|(v, _)| *v == FIRST_DRIVER) && steady;
+    let monotone = trivial || products.is_first_driver() && steady;
     let mut curves: Vec<Arc<Curve>> = known.into_iter().flatten().map(|(curve, _)| curve).collect();
     curves.dedup_by(|a, b| Arc::ptr_eq(a, b));
-    Some(DrivenForm { flow, coefficients, pace, monotone, curves })
+    Some(DrivenForm { growth, coefficients, pace, monotone, curves })
+}
+
+/// A rate as a sum of products: a monomial of q, a monomial of h, and a constant coefficient.
+struct Products {
+    of_x: Vec<Monomial>,
+    of_time: Vec<Monomial>,
+    /// The coefficient by the places of the two monomials.
+    table: HashMap<(usize, usize), NodeId>,
+}
+
+impl Products {
+    /// Takes a polynomial in x, `age` and the stand-ins apart. None if a monomial of time has no antiderivative that is
+    /// known: a product of drivers, or too high a power of `age`.
+    fn of(polynomial: &Polynomial, age: u32) -> Option<Products> {
+        let mut all = Products { of_x: Vec::new(), of_time: Vec::new(), table: HashMap::new() };
+        let place = |list: &mut Vec<Monomial>, item: Monomial| {
+            list.iter().position(|known| *known == item).unwrap_or_else(|| {
+                list.push(item);
+                list.len() - 1
+            })
+        };
+        for (monomial, coefficient) in &polynomial.terms {
+            let in_time = |v: &u32| *v == age || *v >= FIRST_DRIVER;
+            let (h, q): (Monomial, Monomial) = monomial.iter().copied().partition(|(v, _)| in_time(v));
+            let single = match h[..] {
+                [] => true,
+                [(v, n)] if v == age => n <= MAX_AGE_DEGREE,
+                [(_, n)] => n == 1,
+                _ => false,
+            };
+            if !single {
+                return None;
+            }
+            all.table.insert((place(&mut all.of_x, q), place(&mut all.of_time, h)), *coefficient);
+        }
+        Some(all)
+    }
+
+    /// The coefficients of q and of h, in the order of their monomials. None if the sum is not a product of the two.
+    fn factors(&self, graph: &mut Graph, time: u32) -> Option<(Vec<NodeId>, Vec<NodeId>)> {
+        let one = graph.constant(1.0);
+        let row = |i: usize| (0..self.of_time.len()).map(|j| self.table.get(&(i, j)).copied()).collect();
+        let mut rows: Vec<Vec<NodeId>> = (0..self.of_x.len()).map(row).collect::<Option<_>>()?;
+        match (self.of_x.len(), self.of_time.len()) {
+            (_, 1) => Some((rows.into_iter().map(|row| row[0]).collect(), vec![one])),
+            (1, _) => Some((vec![one], rows.swap_remove(0))),
+            _ => {
+                if !proportional(graph, &rows, time) {
+                    return None;
+                }
+                let h = rows[0].iter().map(|c| graph.binary(Binary::Div, *c, rows[0][0])).collect();
+                Some((rows.iter().map(|row| row[0]).collect(), h))
+            }
+        }
+    }
+
+    /// True if h is a multiple of the first driver.
+    fn is_first_driver(&self) -> bool {
+        self.of_time.len() == 1 && self.of_time[0].first().is_some_and(|(v, _)| *v == FIRST_DRIVER)
+    }
+}
+
+/// The curve that a driver is made of, and whether it is the curve, its derivative or its integral.
+fn curve_of(graph: &Graph, driver: &Driver) -> Option<(Arc<Curve>, Part)> {
+    match graph.node(driver.node) {
+        Node::Curve(curve, part, _) => Some((graph.curve_of(curve).clone(), part)),
+        _ => None,
+    }
 }
 
 /// Lets variables stand in for logarithms and powers of x.
@@ -287,17 +314,17 @@ fn scale_of(
 }
 
 /// The form of q with these monomials, and which of them each coefficient belongs to.
-fn flow(x: u32, monomials: &[Monomial]) -> Option<(Flow, Vec<Option<usize>>)> {
+fn growth_law(x: u32, monomials: &[Monomial]) -> Option<(GrowthLaw, Vec<Option<usize>>)> {
     let find = |wanted: Monomial| monomials.iter().position(|m| *m == wanted);
     let power = |n: u32| find(if n == 0 { Monomial::new() } else { vec![(x, n)] });
     let places = [power(0), power(1), power(2)];
     let matched = |places: &[Option<usize>]| places.iter().flatten().count() == monomials.len();
     if matched(&places) {
-        return Some((Flow::Quadratic, places.to_vec()));
+        return Some((GrowthLaw::Quadratic, places.to_vec()));
     }
     let gompertz = [power(1), find(vec![(x, 1), (LOGARITHM, 1)])];
     if matched(&gompertz) {
-        return Some((Flow::Gompertz, gompertz.to_vec()));
+        return Some((GrowthLaw::Gompertz, gompertz.to_vec()));
     }
     let higher = monomials.iter().position(|m| {
         matches!(m[..], [(POWER, 1)])
@@ -305,7 +332,7 @@ fn flow(x: u32, monomials: &[Monomial]) -> Option<(Flow, Vec<Option<usize>>)> {
             || matches!(m[..], [(v, n)] if v == x && n > 1)
     });
     let bernoulli = [power(1), higher];
-    matched(&bernoulli).then(|| (Flow::Bernoulli, bernoulli.to_vec()))
+    matched(&bernoulli).then(|| (GrowthLaw::Bernoulli, bernoulli.to_vec()))
 }
 
 /// p of Bernoulli's equation.

@@ -20,24 +20,24 @@ const MAX_DEGREE: u32 = 12;
 
 /// A number and a bound of its error.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Known {
+pub struct Bounded {
     pub value: f64,
     pub error: f64,
 }
 
-impl Known {
-    pub fn exactly(value: f64) -> Known {
-        Known { value, error: 0.0 }
+impl Bounded {
+    pub fn exactly(value: f64) -> Bounded {
+        Bounded { value, error: 0.0 }
     }
 
     /// A number as it is written: whole numbers are exact, others rounded.
-    fn written(value: f64) -> Known {
+    fn written(value: f64) -> Bounded {
         let whole = value == value.trunc() && value.abs() < 9e15;
-        Known { value, error: if whole { 0.0 } else { ROUNDING * value.abs() } }
+        Bounded { value, error: if whole { 0.0 } else { ROUNDING * value.abs() } }
     }
 
-    fn rounded(value: f64, error: f64) -> Known {
-        Known { value, error: error + ROUNDING * value.abs() }
+    fn rounded(value: f64, error: f64) -> Bounded {
+        Bounded { value, error: error + ROUNDING * value.abs() }
     }
 
     /// True if it may be zero.
@@ -45,8 +45,8 @@ impl Known {
         self.value.abs() <= 2.0 * self.error
     }
 
-    fn plus(self, other: Known) -> Known {
-        Known::rounded(self.value + other.value, self.error + other.error)
+    fn plus(self, other: Bounded) -> Bounded {
+        Bounded::rounded(self.value + other.value, self.error + other.error)
     }
 
     /// 1 or -1: nothing is rounded by it.
@@ -54,34 +54,34 @@ impl Known {
         self.error == 0.0 && self.value.abs() == 1.0
     }
 
-    fn times(self, other: Known) -> Known {
+    fn times(self, other: Bounded) -> Bounded {
         if self.is_sign() || other.is_sign() {
-            return Known { value: self.value * other.value, error: self.error.max(other.error) };
+            return Bounded { value: self.value * other.value, error: self.error.max(other.error) };
         }
         let error = self.error * other.value.abs() + other.error * (self.value.abs() + self.error);
-        Known::rounded(self.value * other.value, error)
+        Bounded::rounded(self.value * other.value, error)
     }
 
     /// None where the divisor may be zero.
-    fn over(self, other: Known) -> Option<Known> {
+    fn over(self, other: Bounded) -> Option<Bounded> {
         if other.may_be_zero() {
             return None;
         }
         if other.is_sign() {
-            return Some(Known { value: self.value / other.value, ..self });
+            return Some(Bounded { value: self.value / other.value, ..self });
         }
         let value = self.value / other.value;
         let error = (self.error + value.abs() * other.error) / (other.value.abs() - other.error);
-        Some(Known::rounded(value, error))
+        Some(Bounded::rounded(value, error))
     }
 
     /// A function of it, by its values at the ends of what it may be.
-    fn through(self, f: impl Fn(f64) -> f64) -> Known {
+    fn through(self, f: impl Fn(f64) -> f64) -> Bounded {
         let value = f(self.value);
         let spread = [-1.0, 1.0].map(|side| (f(self.value + side * self.error) - value).abs());
         // Where it is not defined on one side only, the other one tells.
         let error = spread.into_iter().filter(|s| !s.is_nan()).fold(0.0, f64::max);
-        Known { value, error: error + 4.0 * ROUNDING * value.abs() }
+        Bounded { value, error: error + 4.0 * ROUNDING * value.abs() }
     }
 }
 
@@ -91,22 +91,22 @@ type Powers = Vec<(u32, u32)>;
 /// A polynomial in indeterminates. Terms that may be zero are left out, but for the constant one.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Form {
-    terms: BTreeMap<Powers, Known>,
+    terms: BTreeMap<Powers, Bounded>,
 }
 
 impl Form {
-    pub fn number(x: Known) -> Form {
+    pub fn number(x: Bounded) -> Form {
         Form { terms: BTreeMap::from([(Powers::new(), x)]) }
     }
 
     fn indeterminate(number: u32) -> Form {
-        Form { terms: BTreeMap::from([(vec![(number, 1)], Known::exactly(1.0))]) }
+        Form { terms: BTreeMap::from([(vec![(number, 1)], Bounded::exactly(1.0))]) }
     }
 
     /// Its value, if it has no indeterminates.
-    pub fn as_number(&self) -> Option<Known> {
+    pub fn as_number(&self) -> Option<Bounded> {
         match self.terms.len() {
-            0 => Some(Known::exactly(0.0)),
+            0 => Some(Bounded::exactly(0.0)),
             1 => self.terms.get(&Powers::new()).copied(),
             _ => None,
         }
@@ -114,7 +114,7 @@ impl Form {
 
     /// True if it is zero whatever the indeterminates are, as far as rounding lets one tell.
     pub fn vanishes(&self) -> bool {
-        self.as_number().is_some_and(Known::may_be_zero)
+        self.as_number().is_some_and(Bounded::may_be_zero)
     }
 
     pub fn is_finite(&self) -> bool {
@@ -122,14 +122,14 @@ impl Form {
     }
 
     /// The coefficient of an indeterminate and the rest, if it occurs only in a term of its own.
-    pub fn solved_for(&self, number: u32) -> Option<(Known, Form)> {
+    pub fn solved_for(&self, number: u32) -> Option<(Bounded, Form)> {
         let mut rest = self.clone();
         let slope = rest.terms.remove(&vec![(number, 1)])?;
         let elsewhere = rest.terms.keys().flatten().any(|(n, _)| *n == number);
         (!elsewhere).then_some((slope, rest))
     }
 
-    fn kept(mut terms: BTreeMap<Powers, Known>) -> Option<Form> {
+    fn kept(mut terms: BTreeMap<Powers, Bounded>) -> Option<Form> {
         terms.retain(|powers, c| powers.is_empty() || !c.may_be_zero());
         let degree = |powers: &Powers| powers.iter().map(|(_, power)| power).sum::<u32>();
         (terms.len() <= MAX_TERMS && terms.keys().all(|p| degree(p) <= MAX_DEGREE)).then_some(Form { terms })
@@ -145,7 +145,7 @@ impl Form {
     }
 
     fn times(&self, other: &Form) -> Option<Form> {
-        let mut terms: BTreeMap<Powers, Known> = BTreeMap::new();
+        let mut terms: BTreeMap<Powers, Bounded> = BTreeMap::new();
         for (m, c) in &self.terms {
             for (n, d) in &other.terms {
                 let mut powers: BTreeMap<u32, u32> = m.iter().copied().collect();
@@ -163,12 +163,12 @@ impl Form {
         Form::kept(terms)
     }
 
-    pub fn scaled(&self, by: Known) -> Option<Form> {
+    pub fn scaled(&self, by: Bounded) -> Option<Form> {
         Form::kept(self.terms.iter().map(|(powers, c)| (powers.clone(), c.times(by))).collect())
     }
 
     /// Divided by a number; None where that may be zero.
-    pub fn over(&self, by: Known) -> Option<Form> {
+    pub fn over(&self, by: Bounded) -> Option<Form> {
         let terms = self.terms.iter().map(|(powers, c)| Some((powers.clone(), c.over(by)?)));
         Form::kept(terms.collect::<Option<_>>()?)
     }
@@ -204,7 +204,7 @@ pub fn forms(
     let mut known: HashMap<NodeId, Form> = HashMap::new();
     for id in graph.reachable(roots) {
         let form = match graph.node(id) {
-            Node::Const(bits) => Form::number(Known::written(f64::from_bits(bits))),
+            Node::Const(bits) => Form::number(Bounded::written(f64::from_bits(bits))),
             Node::Var(v) => match variables(v) {
                 Some(form) => form,
                 None => Form::indeterminate(all.variable(v)),
@@ -232,7 +232,7 @@ pub fn forms(
                 _ => all.of(format!("piece{curve:?}{part:?}{:?}{:?}", known[&index], known[&x])),
             },
             Node::Element(array, index) => match known[&index].as_number() {
-                Some(index) => Form::number(Known::written(graph.array_of(array).element(index.value))),
+                Some(index) => Form::number(Bounded::written(graph.array_of(array).element(index.value))),
                 None => all.of(format!("element{array:?}{:?}", known[&index])),
             },
         };
@@ -243,21 +243,21 @@ pub fn forms(
 
 fn unary(op: Unary, a: &Form, all: &mut Indeterminates) -> Option<Form> {
     match (op, a.as_number()) {
-        (Unary::Neg, _) => a.scaled(Known::exactly(-1.0)),
+        (Unary::Neg, _) => a.scaled(Bounded::exactly(-1.0)),
         (_, Some(x)) => Some(Form::number(x.through(|x| f64::unary(op, x)))),
         _ => Some(all.of(format!("{op:?}{a:?}"))),
     }
 }
 
 fn binary(op: Binary, a: &Form, b: &Form, all: &mut Indeterminates) -> Option<Form> {
-    let power = |x: Known| (0.0..=8.0).contains(&x.value) && x.value == x.value.trunc() && x.error == 0.0;
+    let power = |x: Bounded| (0.0..=8.0).contains(&x.value) && x.value == x.value.trunc() && x.error == 0.0;
     match (op, a.as_number(), b.as_number()) {
         (Binary::Add, ..) => a.plus(b),
-        (Binary::Sub, ..) => a.plus(&b.scaled(Known::exactly(-1.0))?),
+        (Binary::Sub, ..) => a.plus(&b.scaled(Bounded::exactly(-1.0))?),
         (Binary::Mul, ..) => a.times(b),
         (Binary::Div, _, Some(y)) if !y.may_be_zero() => a.over(y),
         (Binary::Pow, None, Some(n)) if power(n) => {
-            let mut product = Form::number(Known::exactly(1.0));
+            let mut product = Form::number(Bounded::exactly(1.0));
             for _ in 0..n.value as u32 {
                 product = product.times(a)?;
             }
@@ -266,7 +266,7 @@ fn binary(op: Binary, a: &Form, b: &Form, all: &mut Indeterminates) -> Option<Fo
         (_, Some(x), Some(y)) => {
             let by_first = x.through(|x| f64::binary(op, x, y.value));
             let by_second = y.through(|y| f64::binary(op, x.value, y));
-            Some(Form::number(Known { error: by_first.error + by_second.error, ..by_first }))
+            Some(Form::number(Bounded { error: by_first.error + by_second.error, ..by_first }))
         }
         // What is zero stays so, whatever it is divided by.
         (Binary::Div, ..) if a.vanishes() => Some(a.clone()),
@@ -291,7 +291,7 @@ mod tests {
         let bx = g.binary(Binary::Mul, b, x);
         let decimal = g.binary(Binary::Sub, a, bx);
         let at = |value: f64, root| {
-            let point = move |_| Some(Form::number(Known::written(value)));
+            let point = move |_| Some(Form::number(Bounded::written(value)));
             forms(&g, &[root], &point, &mut Indeterminates::default()).expect("short")[0].vanishes()
         };
         assert!(!at(1.0 - 1e-8, square) && at(1.0, square));

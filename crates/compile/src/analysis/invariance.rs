@@ -11,7 +11,7 @@
 //! it are so told apart as far as the numbers in the text can be. Only parameters that stand still are given random
 //! values (Schwartz 1980, Zippel 1979): what is zero at all of them is zero. What cannot be shown is not assumed.
 
-use super::form::{Form, Indeterminates, Known, forms};
+use super::form::{Bounded, Form, Indeterminates, forms};
 use dlsys_expr::{Binary, Dual, Graph, NodeId, Program};
 
 /// Points at which the rate is tested, if there are parameters that stand still.
@@ -98,11 +98,11 @@ impl Surface<'_> {
     fn vanishes_at(&self, point: &[f64], still: &[u32]) -> Option<bool> {
         let mut all = Indeterminates::default();
         let number = all.variable(self.pivot);
-        let fixed = |v: u32| still.contains(&v).then(|| Form::number(Known::exactly(point[v as usize])));
+        let fixed = |v: u32| still.contains(&v).then(|| Form::number(Bounded::exactly(point[v as usize])));
         let Some(gap) = forms(self.graph, &[self.gap], &fixed, &mut all) else { return Some(false) };
         // Where the surface is: the parameter in terms of all others, or as a number.
         let linear = gap[0].solved_for(number).filter(|(slope, _)| !slope.may_be_zero());
-        let place = match linear.and_then(|(slope, rest)| rest.over(slope)?.scaled(Known::exactly(-1.0))) {
+        let place = match linear.and_then(|(slope, rest)| rest.over(slope)?.scaled(Bounded::exactly(-1.0))) {
             Some(place) => place,
             None => Form::number(self.root(point, still)?),
         };
@@ -123,7 +123,7 @@ impl Surface<'_> {
 
     /// Where the difference is zero as a function of the one parameter that it reads besides those that stand still
     /// (Newton's method).
-    fn root(&self, point: &[f64], still: &[u32]) -> Option<Known> {
+    fn root(&self, point: &[f64], still: &[u32]) -> Option<Bounded> {
         let read = self.graph.variables(&[self.gap]);
         if !read.iter().all(|v| *v == self.pivot || still.contains(v)) {
             return None;
@@ -144,7 +144,7 @@ impl Surface<'_> {
                 let x = duals[pivot].value - step;
                 duals[pivot].value = x;
                 if step.abs() <= 4.0 * f64::EPSILON * x.abs() {
-                    return Some(Known { value: x, error: 4.0 * f64::EPSILON * x.abs() + step.abs() });
+                    return Some(Bounded { value: x, error: 4.0 * f64::EPSILON * x.abs() + step.abs() });
                 }
             }
         }

@@ -1,4 +1,4 @@
-//! The analysis of a model: how much work each equation and each condition is (see [`Law`] and [`ZeroCrossing`]).
+//! The analysis of a model: how much work each equation and each condition is (see [`SolutionForm`] and [`ZeroCrossing`]).
 //!
 //! It works on the expression graph. Whether a rate is affine, quadratic or polynomial is a property of its
 //! coefficients, so spelling does not matter. Everything that a module's own equation of the moment leaves alone is
@@ -7,7 +7,7 @@
 //! [`analyse`] takes all rules at once, because what a neighbour does is part of the question, and gives compiled rules.
 //!
 //! - `variability`: which variables stand still while a clause is active;
-//! - `laws`: how each equation is solved; `driven`: equations with a known integral;
+//! - `solution_forms`: how each equation is solved; `driven`: equations with a known integral;
 //! - `crossings`: how the zero of each difference is found; `invariance`: differences that are never zero;
 //! - `need`: parameters that nothing reads; `pulses`: rates that a step may overlook;
 //! - `stepping`: the variables of a step; `form`, `rank`: numbers with bounds of their errors, singular equations.
@@ -17,10 +17,10 @@ mod crossings;
 mod driven;
 mod form;
 mod invariance;
-mod laws;
 mod need;
 mod pulses;
 mod rank;
+mod solution_forms;
 mod stepping;
 mod variability;
 
@@ -31,7 +31,7 @@ use crate::declared::ResolvedRule;
 use crate::gather::watched;
 use clause::{ClauseAnalysis, analyse_clause};
 use crossings::crossing;
-use stepping::Layout;
+use stepping::VariableLayout;
 use variability::{Constants, Moving};
 
 pub use driven::{driven_form, outside_of_drivers};
@@ -75,7 +75,7 @@ pub fn analyse(graph: &mut Graph, kinds: &Kinds, rules: Vec<ResolvedRule>) -> An
 
 /// What is found out about one rule by itself.
 pub struct RuleAnalysis {
-    watch_at_rest: Vec<ZeroCrossing>,
+    zero_crossings_at_rest: Vec<ZeroCrossing>,
     reads_context: bool,
     clauses: Vec<ClauseAnalysis>,
 }
@@ -88,7 +88,7 @@ fn analyse_rule(
 ) -> RuleAnalysis {
     let declared = &rule.declared;
     let still = Constants::at_rest(declared, moving);
-    let watch_at_rest: Vec<ZeroCrossing> = (declared.sides.iter())
+    let zero_crossings_at_rest: Vec<ZeroCrossing> = (declared.sides.iter())
         .map(|&sides| crossing(graph, sides, &still, &|_| true, declared.variables))
         .collect();
     let mut reads_context = declared.sides.iter().any(|(a, b)| still.reads_context(graph, &[*a, *b]));
@@ -101,7 +101,7 @@ fn analyse_rule(
         reads_context |= constants.reads_context(graph, &given);
         clauses.push(analyse_clause(graph, rule, solve, &constants, is_needed));
     }
-    RuleAnalysis { watch_at_rest, reads_context, clauses }
+    RuleAnalysis { zero_crossings_at_rest, reads_context, clauses }
 }
 
 /// Compiles the aggregates of a rule, with the derivatives of their terms by what changes.
@@ -148,7 +148,7 @@ fn compile_rule(
     moving: Vec<usize>,
     pulses: &[bool],
 ) -> Rule {
-    let layout = Layout::of(&rule);
+    let layout = VariableLayout::of(&rule);
     let ResolvedRule { declared, left, right, .. } = rule;
     let count = declared.variables;
     let sides: Vec<NodeId> = declared.side_nodes().collect();
@@ -177,6 +177,6 @@ fn compile_rule(
         clocks: declared.clocks,
         moving_context: moving,
         reads_context: found.reads_context,
-        watch_at_rest: found.watch_at_rest,
+        zero_crossings_at_rest: found.zero_crossings_at_rest,
     }
 }

@@ -8,7 +8,7 @@ use dlsys_model::Kinds;
 use crate::declared::ResolvedRule;
 
 /// Kinds with the numbers of their parameters.
-type Read = HashSet<(usize, usize)>;
+type ParameterSet = HashSet<(usize, usize)>;
 
 /// What the variables of rules stand for.
 struct Owners<'r> {
@@ -33,7 +33,7 @@ impl Owners<'_> {
     }
 
     /// Adds the parameters that a variable of a rule stands for.
-    fn add(&self, index: usize, v: usize, read: &mut Read) {
+    fn add(&self, index: usize, v: usize, read: &mut ParameterSet) {
         let rule = &self.rules[index];
         let (own, first_aggregate) = (rule.declared.own(), rule.declared.first_aggregate);
         if v < own {
@@ -70,9 +70,9 @@ fn reads(graph: &Graph, nodes: &[NodeId]) -> Vec<usize> {
 }
 
 /// The parameters that rates and conditions read, by themselves or through algebraic parameters.
-pub fn needed(graph: &Graph, kinds: &Kinds, rules: &[ResolvedRule]) -> Read {
+pub fn needed(graph: &Graph, kinds: &Kinds, rules: &[ResolvedRule]) -> ParameterSet {
     let owners = Owners::new(graph, kinds, rules);
-    let mut read = Read::new();
+    let mut read = ParameterSet::new();
     for (index, ResolvedRule { declared, .. }) in rules.iter().enumerate() {
         // An implicit one is followed from its start: solved for now and then, it might be another solution.
         for entry in declared.algebraic().filter(|entry| !entry.explicit) {
@@ -104,7 +104,7 @@ pub fn needed(graph: &Graph, kinds: &Kinds, rules: &[ResolvedRule]) -> Read {
 /// Per kind and parameter: nothing but the drawing reads it.
 pub fn drawn_only(graph: &Graph, kinds: &Kinds, rules: &[ResolvedRule]) -> Vec<Vec<bool>> {
     let owners = Owners::new(graph, kinds, rules);
-    let mut read = Read::new();
+    let mut read = ParameterSet::new();
     for (index, ResolvedRule { declared, .. }) in rules.iter().enumerate() {
         let sides: Vec<NodeId> = declared.side_nodes().collect();
         let mut variables = reads(graph, &sides);

@@ -6,7 +6,7 @@
 //! enters a rate linearly makes no pulse.
 
 use dlsys_expr::{Graph, NodeId};
-use dlsys_model::{Kinds, Law, Pattern};
+use dlsys_model::{Kinds, Pattern, SolutionForm};
 
 use super::RuleAnalysis;
 use super::variability::Moving;
@@ -38,7 +38,7 @@ pub fn find(
     let clauses: Vec<Vec<Paces>> = (rules.iter().zip(found))
         .map(|(rule, found)| {
             let solves = rule.declared.solves.iter().zip(&found.clauses);
-            solves.map(|(solve, clause)| paces(graph, solve, &clause.laws)).collect()
+            solves.map(|(solve, clause)| paces(graph, solve, &clause.solution_forms)).collect()
         })
         .collect();
     let mut of_kinds: Vec<Vec<Pace>> =
@@ -62,7 +62,9 @@ pub fn find(
         let solves = rule.declared.solves.iter().zip(&found.clauses).zip(&clauses[index]);
         pulses.push(
             solves
-                .map(|((solve, clause), own)| surroundings.has_pulses(graph, solve, &clause.laws, own))
+                .map(|((solve, clause), own)| {
+                    surroundings.has_pulses(graph, solve, &clause.solution_forms, own)
+                })
                 .collect(),
         );
     }
@@ -82,7 +84,13 @@ struct Surroundings<'r> {
 
 impl Surroundings<'_> {
     /// Whether a rate of the clause may have pulses. `paces` are those of the module's own parameters.
-    fn has_pulses(&self, graph: &mut Graph, solve: &DeclaredSolve, laws: &[Law], paces: &Paces) -> bool {
+    fn has_pulses(
+        &self,
+        graph: &mut Graph,
+        solve: &DeclaredSolve,
+        solution_forms: &[SolutionForm],
+        paces: &Paces,
+    ) -> bool {
         let declared = &self.rule.declared;
         let (own, time) = (declared.own(), declared.time());
         let mut nodes: Vec<NodeId> = solve.rates.iter().map(|rate| rate.1).collect();
@@ -108,9 +116,9 @@ impl Surroundings<'_> {
             _ => Pace::default(),
         };
         // What has a formula itself is integrated only where everything is.
-        let rates = solve.rates.iter().zip(laws);
+        let rates = solve.rates.iter().zip(solution_forms);
         let closed: Vec<NodeId> =
-            rates.filter(|(_, law)| law.is_closed()).map(|((_, node), _)| *node).collect();
+            rates.filter(|(_, form)| form.is_closed()).map(|((_, node), _)| *node).collect();
         nodes.iter().any(|&node| {
             let Some(all) = graph.polynomial(node, |v| moved(v as usize)) else { return true };
             let exponential = |powers: &[(u32, u32)]| {
@@ -123,12 +131,12 @@ impl Surroundings<'_> {
     }
 }
 
-fn paces(graph: &mut Graph, solve: &DeclaredSolve, laws: &[Law]) -> Paces {
+fn paces(graph: &mut Graph, solve: &DeclaredSolve, solution_forms: &[SolutionForm]) -> Paces {
     let mut all = Vec::new();
-    for ((parameter, rate), law) in solve.rates.iter().zip(laws) {
-        let pace = match law {
-            Law::Numeric(_) | Law::Polynomial(_) => continue,
-            Law::Quadratic(_) => {
+    for ((parameter, rate), form) in solve.rates.iter().zip(solution_forms) {
+        let pace = match form {
+            SolutionForm::Numeric(_) | SolutionForm::Polynomial(_) => continue,
+            SolutionForm::Quadratic(_) => {
                 let by_self = graph.polynomial(*rate, |v| v as usize == *parameter);
                 if by_self.is_some_and(|p| p.degree() <= 1) { Pace::Exponential } else { Pace::Any }
             }

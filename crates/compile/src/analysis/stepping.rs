@@ -1,12 +1,12 @@
 //! The components of a clause's equations, and the variables that its steps read.
 
 use dlsys_expr::Program;
-use dlsys_model::{Algebraic, Jacobian, Law, Linear, Read, Stepping};
+use dlsys_model::{Algebraic, Jacobian, LinearRates, Read, SolutionForm, Stepping};
 
 use super::ResolvedRule;
 
 /// How the variables of a rule are laid out.
-pub struct Layout {
+pub struct VariableLayout {
     /// Number of the module's own parameters.
     own: usize,
     /// Number of the parameters of each module of the context.
@@ -17,9 +17,9 @@ pub struct Layout {
     aggregates: bool,
 }
 
-impl Layout {
-    pub fn of(rule: &ResolvedRule) -> Layout {
-        Layout {
+impl VariableLayout {
+    pub fn of(rule: &ResolvedRule) -> VariableLayout {
+        VariableLayout {
             own: rule.declared.own(),
             context: rule.context().map(|pattern| pattern.width).collect(),
             variables: rule.declared.variables,
@@ -32,17 +32,17 @@ impl Layout {
 pub struct StepEquations<'e> {
     pub of: &'e [usize],
     pub rates: &'e Program,
-    pub laws: &'e [Law],
+    pub solution_forms: &'e [SolutionForm],
     pub numeric: &'e [usize],
     pub numeric_rates: &'e Program,
-    pub linear: Option<&'e Linear>,
+    pub linear: Option<&'e LinearRates>,
     pub jacobian: &'e Jacobian,
     pub algebraic: &'e Algebraic,
 }
 
 impl StepEquations<'_> {
     /// What the steps of the clause read.
-    pub fn stepping(&self, layout: &Layout) -> Stepping {
+    pub fn stepping(&self, layout: &VariableLayout) -> Stepping {
         let algebraic = self.algebraic;
         let components = [false, true].map(|numeric_only| {
             let numeric = (0..self.of.len()).filter(|i| numeric_only || self.numeric.contains(i));
@@ -68,26 +68,28 @@ impl StepEquations<'_> {
             .map(|(variable, (neighbour, parameter))| Read { variable, neighbour, parameter })
             .filter(|one| read[one.variable])
             .collect();
-        let mut laws = Vec::new();
+        let mut formulas = Vec::new();
         let mut few = !layout.aggregates && algebraic.is_empty();
-        for law in self.laws {
-            match law {
-                Law::Polynomial(program) | Law::Quadratic(program) => laws.push(program),
-                Law::Driven(driven) => {
-                    laws.extend([&driven.coefficients].into_iter().chain(driven.pace.as_deref()))
+        for form in self.solution_forms {
+            match form {
+                SolutionForm::Polynomial(program) | SolutionForm::Quadratic(program) => {
+                    formulas.push(program)
                 }
-                Law::Numeric(_) => {}
-                Law::Sum { .. } => few = false,
+                SolutionForm::Driven(driven) => {
+                    formulas.extend([&driven.coefficients].into_iter().chain(driven.pace.as_deref()))
+                }
+                SolutionForm::Numeric(_) => {}
+                SolutionForm::Sum { .. } => few = false,
             }
         }
-        let mut laws_read = read_by(laws.into_iter(), layout.variables);
+        let mut formulas_read = read_by(formulas.into_iter(), layout.variables);
         if !few {
-            laws_read.fill(true);
+            formulas_read.fill(true);
         }
-        laws_read.iter_mut().take(layout.own).for_each(|own| *own = true);
+        formulas_read.iter_mut().take(layout.own).for_each(|own| *own = true);
         let time = layout.variables - 2;
         let timed = [self.rates, &algebraic.values].iter().any(|program| program.reads().contains(&time));
-        Stepping::new(components, reads, laws_read, timed)
+        Stepping::new(components, reads, formulas_read, timed)
     }
 }
 

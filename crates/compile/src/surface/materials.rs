@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Fault, SIZE_LIMIT};
+use super::{SIZE_LIMIT, SurfaceError};
 use dlsys_model::NamedColor;
 use dlsys_syntax::{Files, is_inside};
 
@@ -17,7 +17,7 @@ pub(super) struct Library {
 
 impl Library {
     /// Reads a library that stands beside the mesh. One that is not there gives no colours: many meshes come without.
-    pub(super) fn add(&mut self, name: &str, mesh: &str, files: &dyn Files) -> Result<(), Fault> {
+    pub(super) fn add(&mut self, name: &str, mesh: &str, files: &dyn Files) -> Result<(), SurfaceError> {
         let folder = Path::new(mesh).parent().unwrap_or(Path::new(""));
         let path = folder.join(name);
         if !path.to_str().is_some_and(is_inside) {
@@ -27,7 +27,7 @@ impl Library {
         self.parse(&String::from_utf8_lossy(&bytes));
         if self.known.len() > LIMIT {
             let what = format!("its material library has more than {LIMIT} materials");
-            return Err(Fault::whole(what).help("leave out those that no face uses"));
+            return Err(SurfaceError::whole(what).help("leave out those that no face uses"));
         }
         Ok(())
     }

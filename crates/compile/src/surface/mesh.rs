@@ -8,7 +8,7 @@
 use std::collections::HashMap;
 
 use super::materials::Library;
-use super::{Fault, PART_LIMIT, number, shown};
+use super::{PART_LIMIT, SurfaceError, number, shown};
 use dlsys_model::SurfaceShape;
 use dlsys_syntax::Files;
 
@@ -16,7 +16,7 @@ use dlsys_syntax::Files;
 type Corner = (u32, Option<u32>);
 
 /// Reads the mesh of a file, and the material libraries beside it.
-pub(super) fn parse(text: &str, path: &str, files: &dyn Files) -> Result<SurfaceShape, Fault> {
+pub(super) fn parse(text: &str, path: &str, files: &dyn Files) -> Result<SurfaceShape, SurfaceError> {
     let mut library = Library::default();
     let mut material = None;
     let (mut points, mut directions): (Vec<[f64; 3]>, Vec<[f64; 3]>) = (Vec::new(), Vec::new());
@@ -51,37 +51,37 @@ pub(super) fn parse(text: &str, path: &str, files: &dyn Files) -> Result<Surface
                     corners.push(corner(word, points.len(), directions.len(), at)?);
                 }
                 if corners.len() < 3 {
-                    return Err(Fault::at(at, "a face has three corners or more"));
+                    return Err(SurfaceError::at(at, "a face has three corners or more"));
                 }
                 for k in 2..corners.len() {
                     faces.push(([corners[0], corners[k - 1], corners[k]], material));
                 }
                 if faces.len() > PART_LIMIT {
-                    return Err(Fault::at(at, format!("more than {PART_LIMIT} triangles")));
+                    return Err(SurfaceError::at(at, format!("more than {PART_LIMIT} triangles")));
                 }
             }
             _ => {}
         }
     }
     if faces.is_empty() {
-        return Err(Fault::whole("the file has no faces").help("faces are lines such as `f 1 2 3`"));
+        return Err(SurfaceError::whole("the file has no faces").help("faces are lines such as `f 1 2 3`"));
     }
     let shape = build(&points, &directions, &faces);
     Ok(SurfaceShape { materials: library.into_colors(), ..shape })
 }
 
 /// Three numbers, turned into the turtle's axes.
-fn turned<'t>(words: &mut impl Iterator<Item = &'t str>, line: usize) -> Result<[f64; 3], Fault> {
+fn turned<'t>(words: &mut impl Iterator<Item = &'t str>, line: usize) -> Result<[f64; 3], SurfaceError> {
     let mut next = || match words.next() {
         Some(word) => number(word, line),
-        None => Err(Fault::at(line, "expected three numbers")),
+        None => Err(SurfaceError::at(line, "expected three numbers")),
     };
     let (x, y, z) = (next()?, next()?, next()?);
     Ok([y, -x, z])
 }
 
 /// `v`, `v/vt`, `v//vn` or `v/vt/vn`; numbers count from 1, negative ones backwards from the last.
-fn corner(word: &str, points: usize, directions: usize, line: usize) -> Result<Corner, Fault> {
+fn corner(word: &str, points: usize, directions: usize, line: usize) -> Result<Corner, SurfaceError> {
     let mut parts = word.split('/');
     let index = |part: &str, count: usize, what: &str| {
         let number: Option<i64> = part.parse().ok();
@@ -92,7 +92,9 @@ fn corner(word: &str, points: usize, directions: usize, line: usize) -> Result<C
         };
         match place {
             Some(place) if (0..count as i64).contains(&place) => Ok(place as u32),
-            _ => Err(Fault::at(line, format!("there is no {what} `{}` before this face", shown(part)))),
+            _ => {
+                Err(SurfaceError::at(line, format!("there is no {what} `{}` before this face", shown(part))))
+            }
         }
     };
     let vertex = index(parts.next().unwrap_or_default(), points, "vertex")?;
@@ -135,7 +137,7 @@ mod tests {
     use super::*;
     use dlsys_syntax::NoFiles;
 
-    fn parse(text: &str) -> Result<SurfaceShape, Fault> {
+    fn parse(text: &str) -> Result<SurfaceShape, SurfaceError> {
         super::parse(text, "mesh.obj", &NoFiles)
     }
 

@@ -21,31 +21,31 @@ const COORDINATE_LIMIT: f64 = 1e30;
 
 /// What is wrong with a surface file.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Fault {
+pub struct SurfaceError {
     /// From 1, if one line is to blame.
     pub line: Option<usize>,
     pub what: String,
     pub help: Option<String>,
 }
 
-impl Fault {
-    fn whole(what: impl Into<String>) -> Fault {
-        Fault { line: None, what: what.into(), help: None }
+impl SurfaceError {
+    fn whole(what: impl Into<String>) -> SurfaceError {
+        SurfaceError { line: None, what: what.into(), help: None }
     }
 
-    fn at(line: usize, what: impl Into<String>) -> Fault {
-        Fault { line: Some(line), what: what.into(), help: None }
+    fn at(line: usize, what: impl Into<String>) -> SurfaceError {
+        SurfaceError { line: Some(line), what: what.into(), help: None }
     }
 
-    fn help(self, help: &str) -> Fault {
-        Fault { help: Some(help.to_owned()), ..self }
+    fn help(self, help: &str) -> SurfaceError {
+        SurfaceError { help: Some(help.to_owned()), ..self }
     }
 }
 
 /// Reads a surface; its name and place are left empty.
-pub fn read(path: &str, files: &dyn Files) -> Result<SurfaceShape, Fault> {
+pub fn read(path: &str, files: &dyn Files) -> Result<SurfaceShape, SurfaceError> {
     if !is_inside(path) {
-        return Err(Fault::whole("the path leaves the model's folder")
+        return Err(SurfaceError::whole("the path leaves the model's folder")
             .help("surfaces stand in the folder of the model or below it, as in `\"surfaces/petal.s\"`"));
     }
     let extension = Path::new(path).extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
@@ -53,23 +53,24 @@ pub fn read(path: &str, files: &dyn Files) -> Result<SurfaceShape, Fault> {
         Some("s") => |text: &str, _: &str, _: &dyn Files| patches::parse(text),
         Some("obj") => mesh::parse,
         _ => {
-            return Err(Fault::whole("this is no kind of surface file")
+            return Err(SurfaceError::whole("this is no kind of surface file")
                 .help("known are `.s` (Bézier patches) and `.obj` (Wavefront meshes)"));
         }
     };
     let bytes = files.read(Path::new(path), SIZE_LIMIT).map_err(|what| {
-        Fault::whole(what).help("put it into the folder of the model's file or below; the path begins there")
+        SurfaceError::whole(what)
+            .help("put it into the folder of the model's file or below; the path begins there")
     })?;
     parse(&String::from_utf8_lossy(&bytes), path, files)
 }
 
 /// A number of a surface file.
-fn number(text: &str, line: usize) -> Result<f64, Fault> {
+fn number(text: &str, line: usize) -> Result<f64, SurfaceError> {
     let value: Option<f64> = text.parse().ok();
     match value {
         Some(x) if x.is_finite() && x.abs() <= COORDINATE_LIMIT => Ok(x),
-        Some(_) => Err(Fault::at(line, format!("`{}` is too large or no number", shown(text)))),
-        None => Err(Fault::at(line, format!("expected a number, not `{}`", shown(text)))),
+        Some(_) => Err(SurfaceError::at(line, format!("`{}` is too large or no number", shown(text)))),
+        None => Err(SurfaceError::at(line, format!("expected a number, not `{}`", shown(text)))),
     }
 }
 

@@ -18,7 +18,7 @@
 //!
 //! A file of stedit begins with `VERSION stedit`. Numbers may be spread over lines as one likes.
 
-use super::{Fault, PART_LIMIT, number, shown};
+use super::{PART_LIMIT, SurfaceError, number, shown};
 use dlsys_model::{Net, SurfaceShape};
 
 /// The words of a file, with their lines.
@@ -42,32 +42,35 @@ impl<'t> Words<'t> {
         self.words.peek().map(|(_, word)| *word)
     }
 
-    fn next(&mut self, wanted: &str) -> Result<&'t str, Fault> {
+    fn next(&mut self, wanted: &str) -> Result<&'t str, SurfaceError> {
         let Some((line, word)) = self.words.next() else {
-            return Err(Fault::at(self.line, format!("the file ends where {wanted} is expected")));
+            return Err(SurfaceError::at(self.line, format!("the file ends where {wanted} is expected")));
         };
         self.line = line;
         Ok(word)
     }
 
     /// Takes words that must stand here.
-    fn expect(&mut self, words: &str) -> Result<(), Fault> {
+    fn expect(&mut self, words: &str) -> Result<(), SurfaceError> {
         for wanted in words.split(' ') {
             let word = self.next(&format!("`{words}`"))?;
             if !word.eq_ignore_ascii_case(wanted) {
-                return Err(Fault::at(self.line, format!("expected `{words}`, not `{}`", shown(word))));
+                return Err(SurfaceError::at(
+                    self.line,
+                    format!("expected `{words}`, not `{}`", shown(word)),
+                ));
             }
         }
         Ok(())
     }
 
-    fn number(&mut self) -> Result<f64, Fault> {
+    fn number(&mut self) -> Result<f64, SurfaceError> {
         let word = self.next("a number")?;
         number(word, self.line)
     }
 
     /// `X: x Y: y Z: z` after the words.
-    fn vector(&mut self, words: &str) -> Result<[f64; 3], Fault> {
+    fn vector(&mut self, words: &str) -> Result<[f64; 3], SurfaceError> {
         self.expect(words)?;
         let mut vector = [0.0; 3];
         for (value, axis) in vector.iter_mut().zip(["X:", "Y:", "Z:"]) {
@@ -92,7 +95,7 @@ fn unit(a: [f64; 3]) -> Option<[f64; 3]> {
 }
 
 /// Reads the patches of a file, in the turtle's axes, at size 1.
-pub(super) fn parse(text: &str) -> Result<SurfaceShape, Fault> {
+pub(super) fn parse(text: &str) -> Result<SurfaceShape, SurfaceError> {
     let mut words = Words::new(text);
     let mut directed = false;
     if words.peek() == Some("VERSION") {
@@ -111,15 +114,15 @@ pub(super) fn parse(text: &str) -> Result<SurfaceShape, Fault> {
     let contact = words.vector("CONTACT POINT")?;
     words.vector("END POINT")?;
     let heading = unit(words.vector("HEADING")?);
-    let heading = heading.ok_or_else(|| Fault::at(words.line, "the heading has no direction"))?;
+    let heading = heading.ok_or_else(|| SurfaceError::at(words.line, "the heading has no direction"))?;
     let up = words.vector("UP")?;
     let across = unit(cross(up, heading));
-    let left = across.ok_or_else(|| Fault::at(words.line, "up must not be along the heading"))?;
+    let left = across.ok_or_else(|| SurfaceError::at(words.line, "up must not be along the heading"))?;
     let up = cross(heading, left);
     words.expect("SIZE:")?;
     let size = words.number()?;
     if size <= 0.0 {
-        return Err(Fault::at(words.line, "the size must be greater than 0"));
+        return Err(SurfaceError::at(words.line, "the size must be greater than 0"));
     }
     let place = |p: [f64; 3]| {
         let from = [p[0] - contact[0], p[1] - contact[1], p[2] - contact[2]];
@@ -128,7 +131,7 @@ pub(super) fn parse(text: &str) -> Result<SurfaceShape, Fault> {
     let mut patches: Vec<Net> = Vec::new();
     while words.peek().is_some() {
         if patches.len() == PART_LIMIT {
-            return Err(Fault::at(words.line, format!("more than {PART_LIMIT} patches")));
+            return Err(SurfaceError::at(words.line, format!("more than {PART_LIMIT} patches")));
         }
         words.next("the name of a patch")?;
         words.expect("TOP COLOR:")?;
@@ -157,7 +160,7 @@ pub(super) fn parse(text: &str) -> Result<SurfaceShape, Fault> {
         patches.push(net);
     }
     if patches.is_empty() {
-        return Err(Fault::at(words.line, "the file has no patches"));
+        return Err(SurfaceError::at(words.line, "the file has no patches"));
     }
     Ok(SurfaceShape { patches, ..SurfaceShape::default() })
 }

@@ -67,7 +67,8 @@ pub struct Difference<'w, 'p> {
 impl Function for Difference<'_, '_> {
     fn bounds(&mut self, lo: f64, hi: f64) -> Dual<Interval> {
         // The difference of values that move together may vary much less than each of them does.
-        if let ZeroCrossing::Search(Some(sum)) = &self.path.rule.watch(self.path.state.solve)[self.atom]
+        if let ZeroCrossing::Search(Some(sum)) =
+            &self.path.rule.zero_crossings(self.path.state.solve)[self.atom]
             && let Some(bounds) = self.path.sum_over(sum, lo, hi)
         {
             return bounds;
@@ -95,7 +96,7 @@ pub fn needs_search(state: &State, rule: &Rule) -> bool {
         !is_unreachable(rule, state, atom)
             && matches!(location_method(crossing, state), LocationMethod::Search)
     };
-    rule.watch(state.solve).iter().enumerate().any(searched)
+    rule.zero_crossings(state.solve).iter().enumerate().any(searched)
 }
 
 /// True if the analysis of the model has proven that an atom keeps its sign under the active equations.

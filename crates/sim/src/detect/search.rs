@@ -107,7 +107,7 @@ impl Search<'_, '_> {
     fn track_atoms(&mut self) {
         let (path, rule, state) = (self.path, self.path.rule, self.path.state);
         let mut measured = false;
-        for (atom, crossing) in rule.watch(state.solve).iter().enumerate() {
+        for (atom, crossing) in rule.zero_crossings(state.solve).iter().enumerate() {
             if is_unreachable(rule, state, atom) {
                 continue;
             }

@@ -7,18 +7,18 @@ use crate::detect::crossing::TOUCH;
 use crate::detect::signs::{EQUAL, NEAR, noise, opposite};
 use crate::world::context::Context;
 use crate::world::state::Signs;
-use dlsys_model::{Pattern, Rule, Sign, Turn};
+use dlsys_model::{ContextPart, Pattern, Rule, Sign};
 use dlsys_tree::ModuleId;
 
 /// The place of the bracket that closes the first one.
-fn closing(shape: &[Turn]) -> usize {
+fn closing(shape: &[ContextPart]) -> usize {
     let mut depth = 0;
     for (i, turn) in shape.iter().enumerate() {
         match turn {
-            Turn::Open => depth += 1,
-            Turn::Close if depth == 1 => return i,
-            Turn::Close => depth -= 1,
-            Turn::Module => {}
+            ContextPart::Open => depth += 1,
+            ContextPart::Close if depth == 1 => return i,
+            ContextPart::Close => depth -= 1,
+            ContextPart::Module => {}
         }
     }
     shape.len()
@@ -49,7 +49,7 @@ impl EventStage<'_, '_> {
             return false;
         }
         at = id;
-        if rule.right_shape.iter().all(|turn| *turn == Turn::Module) {
+        if rule.right_shape.iter().all(|turn| *turn == ContextPart::Module) {
             if !rule.right.iter().all(|pattern| look(&mut at, pattern, false)) {
                 return false;
             }
@@ -86,7 +86,7 @@ impl EventStage<'_, '_> {
         &mut self,
         looker: (ModuleId, bool),
         from: ModuleId,
-        shape: &[Turn],
+        shape: &[ContextPart],
         patterns: &mut std::slice::Iter<Pattern>,
         out: &mut Context,
     ) -> Option<()> {
@@ -95,7 +95,7 @@ impl EventStage<'_, '_> {
         let mut next_branch = 0;
         let mut turns = 0;
         while turns < shape.len() {
-            if shape[turns] == Turn::Module {
+            if shape[turns] == ContextPart::Module {
                 let next = around.last().copied().filter(|_| on_axis)?;
                 let pattern = patterns.next()?;
                 if !pattern.matches(self.world.tree.kind(next)) {

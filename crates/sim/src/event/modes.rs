@@ -12,7 +12,7 @@ use crate::detect::signs::NEAR;
 use crate::error::Error;
 use crate::world::state::{Signs, Switches};
 use dlsys_expr::Dual;
-use dlsys_model::{Condition, Remedy, Rule, Sign, Step, Truth};
+use dlsys_model::{Condition, ConditionStep, Remedy, Rule, Sign, Truth};
 use dlsys_tree::ModuleId;
 
 /// Most times that the equations at one instant are chosen anew before the choice is called chattering.
@@ -288,7 +288,7 @@ impl EventStage<'_, '_> {
         let mut failing = Vec::new();
         for solve in &rule.solves {
             for (atom, comparison) in solve.guard.atoms() {
-                let alone = Condition(vec![Step::Atom(atom as u32, comparison)]);
+                let alone = Condition(vec![ConditionStep::Atom(atom as u32, comparison)]);
                 if alone.judge(|i| missing.signs[i]) == Truth::No
                     && !failing.iter().any(|(s, _)| *s == rule.atoms[atom])
                 {

@@ -95,7 +95,8 @@ impl EventStage<'_, '_> {
             let state = self.world.state(id);
             let rests = |s: &State| {
                 // Sides that are constant until the module's own event are not moved by its neighbours.
-                let watch = s.rule.map_or(&[][..], |rule| self.setup.model.rules[rule].watch(s.solve));
+                let watch =
+                    s.rule.map_or(&[][..], |rule| self.setup.model.rules[rule].zero_crossings(s.solve));
                 let mut atoms = s.signs.iter().zip(watch);
                 atoms.any(|(sign, watch)| *sign == Sign::Zero && !matches!(watch, ZeroCrossing::Constant))
             };

@@ -7,7 +7,7 @@ use crate::scratch::Scratch;
 use crate::trajectory::{AutonomousFlow, DrivenSolution, FunctionOfTime, Pace, Riccati, Terms, Trajectory};
 use crate::world::state::State;
 use dlsys_expr::Value;
-use dlsys_model::{Law, Solve};
+use dlsys_model::{SolutionForm, Solve};
 use dlsys_tree::Tree;
 
 /// The first stretch that is searched on closed forms, in units of time, if their time scale is unknown.
@@ -18,25 +18,25 @@ pub fn formulas(solve: &Solve, time: usize, scratch: &mut Scratch, trajectories:
     let mut out = [0.0; 4];
     // For the algebra: the coefficients f and d of exponential trajectories.
     let mut sums_follow = false;
-    for (law, &parameter) in solve.laws.iter().zip(&solve.of) {
+    for (law, &parameter) in solve.solution_forms.iter().zip(&solve.of) {
         match law {
-            Law::Polynomial(program) => {
+            SolutionForm::Polynomial(program) => {
                 let out = &mut out[..program.outputs()];
                 program.eval(&scratch.variables, &mut scratch.registers, out);
                 trajectories[parameter] =
                     Trajectory::Polynomial(integrated(out, scratch.variables[time + 1]));
             }
-            Law::Quadratic(program) => {
+            SolutionForm::Quadratic(program) => {
                 program.eval(&scratch.variables, &mut scratch.registers, &mut out[..3]);
                 let riccati = Riccati::new(scratch.variables[parameter], out[0], out[1], out[2]);
                 trajectories[parameter] = Trajectory::Riccati(riccati);
             }
-            Law::Sum { .. } => sums_follow = true,
-            Law::Driven(driven) => match self::driven(driven, parameter, time, scratch) {
+            SolutionForm::Sum { .. } => sums_follow = true,
+            SolutionForm::Driven(driven) => match self::driven(driven, parameter, time, scratch) {
                 Some(trajectory) => trajectories[parameter] = trajectory,
                 None => return false,
             },
-            Law::Numeric(_) => {}
+            SolutionForm::Numeric(_) => {}
         }
     }
     if sums_follow && !sums(solve, time, scratch, trajectories) {
@@ -50,7 +50,7 @@ pub fn formulas(solve: &Solve, time: usize, scratch: &mut Scratch, trajectories:
 
 /// The trajectory of a parameter at a pace; None if its formula does not hold for these numbers.
 fn driven(
-    law: &dlsys_model::Driven,
+    law: &dlsys_model::DrivenGrowth,
     parameter: usize,
     time: usize,
     scratch: &mut Scratch,
@@ -62,7 +62,7 @@ fn driven(
         return None;
     }
     let x = scratch.variables[parameter];
-    let flow = AutonomousFlow::new(law.flow, x, c)?;
+    let flow = AutonomousFlow::new(law.growth, x, c)?;
     let pace = match &law.pace {
         Some(program) => Some(Pace::new(program.clone(), &scratch.variables, time)?),
         None => None,
@@ -106,7 +106,8 @@ fn sums(solve: &Solve, time: usize, scratch: &mut Scratch, trajectories: &mut [T
     for v in [time, time + 1] {
         variables[v] = Terms::affine(scratch.variables[v], 1.0);
     }
-    let mut known: Vec<bool> = solve.laws.iter().map(|law| !matches!(law, Law::Sum { .. })).collect();
+    let mut known: Vec<bool> =
+        solve.solution_forms.iter().map(|law| !matches!(law, SolutionForm::Sum { .. })).collect();
     for (i, &parameter) in solve.of.iter().enumerate() {
         if known[i]
             && let Some(terms) = trajectories[parameter].terms(scratch.variables[parameter])
@@ -115,11 +116,13 @@ fn sums(solve: &Solve, time: usize, scratch: &mut Scratch, trajectories: &mut [T
         }
     }
     while let Some(i) = (0..known.len()).find(|&i| {
-        let Law::Sum { inflow, .. } = &solve.laws[i] else { return false };
+        let SolutionForm::Sum { inflow, .. } = &solve.solution_forms[i] else { return false };
         let waits = |v: usize| solve.of.iter().position(|p| *p == v).is_some_and(|j| j != i && !known[j]);
         !known[i] && !inflow.reads().iter().copied().any(waits)
     }) {
-        let Law::Sum { factor, inflow } = &solve.laws[i] else { unreachable!("found as one") };
+        let SolutionForm::Sum { factor, inflow } = &solve.solution_forms[i] else {
+            unreachable!("found as one")
+        };
         let parameter = solve.of[i];
         let mut b = [0.0];
         factor.eval(&scratch.variables, &mut scratch.registers, &mut b);

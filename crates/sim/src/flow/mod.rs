@@ -155,7 +155,7 @@ impl FlowStage<'_, '_> {
             }
             closed_form::solved(solve, true, &mut trajectories);
         } else {
-            let read = (rule, solve.stepping.laws_read());
+            let read = (rule, solve.stepping.formulas_read());
             self.world.variables_read(read, id, &state.context, self.instant.at, &mut self.scratch.variables);
             self.scratch.variables.extend(state.switches.iter().map(|&on| f64::from(u8::from(on))));
             refused = !closed_form::formulas(solve, rule.time_variable(), self.scratch, &mut trajectories)

@@ -15,7 +15,7 @@ use crate::scratch::Scratch;
 use crate::trajectory::Trajectory;
 use crate::world::life::{End, Life, LifeClass};
 use crate::world::state::{Change, Signs};
-use dlsys_model::{Condition, Law, Rule, Sign, Solve, Truth, ZeroCrossing};
+use dlsys_model::{Condition, Rule, Sign, SolutionForm, Solve, Truth, ZeroCrossing};
 use dlsys_tree::SimTime;
 
 /// The life of a module from its birth to its first event.
@@ -84,7 +84,7 @@ impl Prediction {
     /// Finds the sign that becomes zero first, and the production that follows; None if that has no closed form.
     fn find_first_event(&mut self, rule: &Rule, birth: SimTime, scratch: &mut Scratch) -> Option<()> {
         let mut first: Option<Change> = None;
-        for (atom, watch) in rule.watch(self.solve).iter().enumerate() {
+        for (atom, watch) in rule.zero_crossings(self.solve).iter().enumerate() {
             if matches!(watch, ZeroCrossing::Search(_)) {
                 return None;
             }
@@ -161,8 +161,10 @@ fn trajectories(
 ) -> Option<SmallVec<[Trajectory; 2]>> {
     let mut trajectories = SmallVec::new();
     let Some(clause) = clause.filter(|s| !s.of.is_empty()) else { return Some(trajectories) };
-    let simple = |law: &Law| matches!(law, Law::Polynomial(_) | Law::Quadratic(_) | Law::Driven(_));
-    if !clause.switches.is_empty() || !clause.laws.iter().all(simple) {
+    let simple = |law: &SolutionForm| {
+        matches!(law, SolutionForm::Polynomial(_) | SolutionForm::Quadratic(_) | SolutionForm::Driven(_))
+    };
+    if !clause.switches.is_empty() || !clause.solution_forms.iter().all(simple) {
         return None;
     }
     trajectories.resize(rule.parameters.len(), Trajectory::Rest);
@@ -199,7 +201,7 @@ fn crossing(
     birth: SimTime,
     scratch: &mut Scratch,
 ) -> Option<PredictedCrossing> {
-    let ZeroCrossing::Formula { variable, level } = &rule.watch(solve)[atom] else { return None };
+    let ZeroCrossing::Formula { variable, level } = &rule.zero_crossings(solve)[atom] else { return None };
     let (variable, time) = (*variable, rule.time_variable());
     let clause = solve.map(|s| &rule.solves[s]);
     if clause.is_some_and(|s| s.unreachable[atom]) {

@@ -17,7 +17,7 @@ use crate::world::life::LifeClass;
 use crate::world::site_of_axiom;
 use cache::{Column, FrameCache};
 use dlsys_expr::{LANES, Lanes, Program};
-use dlsys_model::{Driven, Law};
+use dlsys_model::{DrivenGrowth, SolutionForm};
 use dlsys_tree::{ModuleId, ModuleString, SimTime, Version, Visit};
 
 impl Simulation<'_> {
@@ -128,15 +128,15 @@ impl Simulation<'_> {
                 registers[time][lane] = row.birth.to_f64();
             }
             registers[time + 1] = [0.0; LANES];
-            for (law, &parameter) in clause.laws.iter().zip(&clause.of) {
+            for (law, &parameter) in clause.solution_forms.iter().zip(&clause.of) {
                 if parameter >= shown {
                     continue;
                 }
                 let moved: Lanes = match law {
                     // A parameter at rest is as it was in the frame before.
-                    Law::Polynomial(program) if again && is_zero(program) => continue,
-                    Law::Polynomial(program) => polynomial(program, registers, parameter, &tau),
-                    Law::Quadratic(program) => {
+                    SolutionForm::Polynomial(program) if again && is_zero(program) => continue,
+                    SolutionForm::Polynomial(program) => polynomial(program, registers, parameter, &tau),
+                    SolutionForm::Quadratic(program) => {
                         let mut c = [[0.0; LANES]; 3];
                         for (power, register) in program.eval_lanes(registers).enumerate() {
                             c[power] = registers[register];
@@ -147,8 +147,8 @@ impl Simulation<'_> {
                         }
                         moved
                     }
-                    Law::Driven(law) => driven(law, registers, [parameter, time], &tau, rows.len()),
-                    Law::Sum { .. } | Law::Numeric(_) => continue,
+                    SolutionForm::Driven(law) => driven(law, registers, [parameter, time], &tau, rows.len()),
+                    SolutionForm::Sum { .. } | SolutionForm::Numeric(_) => continue,
                 };
                 let mut from = begin;
                 for (row, &x) in rows.iter().zip(&moved) {
@@ -192,7 +192,7 @@ fn is_zero(program: &Program) -> bool {
 
 /// The values that follow a law `x' = h(time) q(x)`, some times after the births whose variables the registers hold.
 fn driven(
-    law: &Driven,
+    law: &DrivenGrowth,
     registers: &mut Vec<Lanes>,
     [parameter, time]: [usize; 2],
     tau: &Lanes,
@@ -219,7 +219,7 @@ fn driven(
     }
     let mut moved = registers[parameter];
     for (i, x) in moved.iter_mut().enumerate().take(count) {
-        let flow = AutonomousFlow::new(law.flow, *x, c.map(|c| c[i]));
+        let flow = AutonomousFlow::new(law.growth, *x, c.map(|c| c[i]));
         *x += if tau[i] == 0.0 { 0.0 } else { flow.map_or(f64::NAN, |flow| flow.value(s[i])) };
     }
     moved

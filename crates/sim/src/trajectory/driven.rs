@@ -154,13 +154,13 @@ impl Pace {
 impl AutonomousFlow {
     /// The solution from `x` of an equation of the given form with these coefficients; None where its closed form does
     /// not hold.
-    pub fn new(form: model::Flow, x: f64, [c, b, a]: [f64; 3]) -> Option<AutonomousFlow> {
+    pub fn new(form: model::GrowthLaw, x: f64, [c, b, a]: [f64; 3]) -> Option<AutonomousFlow> {
         Some(match form {
-            model::Flow::Quadratic => {
+            model::GrowthLaw::Quadratic => {
                 AutonomousFlow::Riccati(Riccati::new(x, c, b, a), Riccati::new(x, -c, -b, -a))
             }
-            model::Flow::Gompertz => AutonomousFlow::Growth(Growth::gompertz(x, c, b)?),
-            model::Flow::Bernoulli => AutonomousFlow::Growth(Growth::bernoulli(x, c, b, a)?),
+            model::GrowthLaw::Gompertz => AutonomousFlow::Growth(Growth::gompertz(x, c, b)?),
+            model::GrowthLaw::Bernoulli => AutonomousFlow::Growth(Growth::bernoulli(x, c, b, a)?),
         })
     }
 

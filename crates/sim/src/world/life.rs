@@ -11,7 +11,7 @@ use smallvec::SmallVec;
 use crate::trajectory::Trajectory;
 use crate::world::state::Signs;
 use dlsys_expr::Program;
-use dlsys_model::{Law, Model, Rule, Sign, Solve, ZeroCrossing};
+use dlsys_model::{Model, Rule, Sign, SolutionForm, Solve, ZeroCrossing};
 use dlsys_tree::{NO_LABEL, SimTime};
 
 /// The label of a module that is known not to be lazy.
@@ -235,20 +235,25 @@ impl Lives {
 fn is_timeless(rule: &Rule) -> bool {
     let time = rule.time_variable();
     let blind = |program: &Program| !program.reads().contains(&time);
-    let law_is_blind = |law: &Law| match law {
-        Law::Polynomial(program) | Law::Quadratic(program) => blind(program),
-        Law::Driven(law) => blind(&law.coefficients) && law.pace.as_ref().is_none_or(|pace| blind(pace)),
-        Law::Sum { .. } | Law::Numeric(_) => false,
+    let law_is_blind = |law: &SolutionForm| match law {
+        SolutionForm::Polynomial(program) | SolutionForm::Quadratic(program) => blind(program),
+        SolutionForm::Driven(law) => {
+            blind(&law.coefficients) && law.pace.as_ref().is_none_or(|pace| blind(pace))
+        }
+        SolutionForm::Sum { .. } | SolutionForm::Numeric(_) => false,
     };
     let watch_is_blind = |watch: &ZeroCrossing| match watch {
         ZeroCrossing::Constant => true,
         ZeroCrossing::Formula { variable, level } => *variable != time && blind(level),
         ZeroCrossing::Search(_) => false,
     };
-    let solve_is_blind =
-        |s: &Solve| blind(&s.rates) && s.laws.iter().all(law_is_blind) && s.watch.iter().all(watch_is_blind);
+    let solve_is_blind = |s: &Solve| {
+        blind(&s.rates)
+            && s.solution_forms.iter().all(law_is_blind)
+            && s.zero_crossings.iter().all(watch_is_blind)
+    };
     blind(&rule.sides)
-        && rule.watch_at_rest.iter().all(watch_is_blind)
+        && rule.zero_crossings_at_rest.iter().all(watch_is_blind)
         && rule.solves.iter().all(solve_is_blind)
 }
 

@@ -6,7 +6,7 @@ use crate::trajectory::Trajectory;
 use crate::world::coupled_solution::DenseComponent;
 use crate::world::state::State;
 use dlsys_expr::{Dual, Interval, Value};
-use dlsys_model::{Rule, Sum};
+use dlsys_model::{AffineSum, Rule};
 use dlsys_ode::Dense;
 use dlsys_tree::{ModuleId, SimTime};
 
@@ -195,7 +195,7 @@ impl<'p> Path<'p> {
     }
 
     /// Bounds of a sum of variables, and of its rate, if those that move do so along one dense output.
-    pub fn sum_over(&self, sum: &Sum, lo: f64, hi: f64) -> Option<Dual<Interval>> {
+    pub fn sum_over(&self, sum: &AffineSum, lo: f64, hi: f64) -> Option<Dual<Interval>> {
         let (mut constant, mut moving) = (sum.constant, None);
         for &(variable, factor) in &sum.terms {
             let mut parameter = variable;

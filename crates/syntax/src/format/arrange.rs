@@ -1,20 +1,20 @@
-//! Lines of pieces as text: spaces between pieces, where lines begin, and what stands in columns.
+//! From lines of pieces to text: spaces between pieces, indentation, and columns of actions and comments.
 
 use super::pieces::{Line, Piece, Place};
 use crate::layout::ItemKind;
 use crate::lexeme::Token;
 
-/// Deepest indentation by brackets; deeper trees do not move further to the right.
+/// Maximum number of open brackets that indent a line.
 const DEEPEST: usize = 20;
-/// Guards longer than this, and lines longer than this, stand in no column.
+/// Guards and lines longer than this, in characters, are not aligned in columns.
 const LONG_GUARD: usize = 44;
 const LONG_LINE: usize = 80;
 
-/// A line that is being made.
+/// A line of the output.
 #[derive(Default)]
 struct Made {
     text: String,
-    /// Characters of `text`.
+    /// Number of characters of `text`.
     width: usize,
 }
 
@@ -58,27 +58,27 @@ pub fn arrange(lines: &[Line<'_>]) -> String {
     out
 }
 
-/// What the beginning of a line is.
+/// The kind of beginning of a line, which decides its indentation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Begin {
     /// Empty, or a comment.
     #[default]
     Nothing,
     Item,
-    /// A clause, or what else has a line of its own in a rule.
+    /// A clause, or a `let`.
     Clause,
     /// The action of a guard on an earlier line.
     Action,
     Continuation,
 }
 
-/// What stands on a line.
+/// The clauses and actions on a line.
 #[derive(Clone, Debug, Default)]
 struct Role {
     begin: Begin,
-    /// Pieces that begin a clause or an action.
+    /// Indices of the pieces that begin a clause or an action.
     keywords: Vec<usize>,
-    /// The action of a guard that begins this line.
+    /// Index of the action whose guard begins this line.
     action: Option<usize>,
 }
 
@@ -123,7 +123,7 @@ fn is_body(piece: &Piece<'_>) -> bool {
     piece.kind == ItemKind::Rule && piece.place == Place::Body && piece.depth == 0
 }
 
-/// Whether a piece begins a clause or its action, and not, say, an `if` in an expression.
+/// True if a piece begins a clause or its action, unlike an `if` in an expression.
 fn is_keyword(piece: &Piece<'_>, before: Option<&Piece<'_>>) -> bool {
     // `2if x < 1 then 1 else 0` is a product.
     if before.is_some_and(|b| b.factor) {
@@ -137,7 +137,7 @@ fn is_keyword(piece: &Piece<'_>, before: Option<&Piece<'_>>) -> bool {
     begins && is_body(piece) && piece.operator
 }
 
-/// The columns in which actions stand that share their lines with their guards.
+/// By line: the column of an action that shares the line with its guard.
 fn action_columns(lines: &[Line<'_>], roles: &[Role]) -> Vec<Option<usize>> {
     let mut columns = vec![None; lines.len()];
     let width = |i: usize| {
@@ -162,17 +162,18 @@ fn action_columns(lines: &[Line<'_>], roles: &[Role]) -> Vec<Option<usize>> {
     columns
 }
 
-/// Where the next lines go.
+/// The state that indents the following lines.
 #[derive(Default)]
 struct Cursor {
-    /// The column of what continues.
+    /// The column of continuation lines.
     anchor: usize,
-    /// Brackets that are open in the string, and parentheses.
+    /// Number of open parentheses, and of open brackets in the string.
     open: usize,
-    /// The first column of a declared string, here and in the text; whether the lines that continue it stand below it.
+    /// The first column of a declared string in the output and in the input.
     string: Option<(usize, usize)>,
+    /// True if the lines that continue the string are aligned with its first module; None before the first such line.
     below: Option<bool>,
-    /// Brackets that were open before the lines at the left began.
+    /// Number of brackets that were open before the first line at the left margin.
     base: usize,
 }
 
@@ -210,7 +211,7 @@ impl Cursor {
         made
     }
 
-    /// Keeps count of brackets, and of where a declared string begins.
+    /// Updates the open brackets and the beginning of a declared string.
     fn follow(&mut self, piece: &Piece<'_>, before: Option<&Piece<'_>>, made: &Made) {
         let declared = piece.kind.has_string();
         if declared && before.is_some_and(|before| before.place == Place::Colon) {
@@ -225,14 +226,14 @@ impl Cursor {
         }
     }
 
-    /// The column of a line that continues what was begun before.
+    /// The column of a continuation line.
     fn continuation(&mut self, line: &Line<'_>) -> usize {
         let first = &line.pieces[0];
         let closing = line.pieces.iter().take_while(|piece| matches!(piece.text, "]" | ")")).count();
         let inner = |base: usize| 2 * self.open.saturating_sub(closing + base).min(DEEPEST);
         let mut anchor = self.anchor;
         if let Some((column, written)) = self.string {
-            // The writer may put the lines below the string's first module, or at the left.
+            // The input decides between lines below the string's first module and lines at the left.
             let first_line = self.below.is_none();
             let below = *self.below.get_or_insert(first.column.saturating_sub(inner(0)) > written / 2);
             anchor = if below { column } else { 2 };
@@ -242,14 +243,14 @@ impl Cursor {
         }
         let inner = inner(self.base);
         if first.text == "or" && first.operator {
-            // Below the keyword, so that what it offers stands below the first offer.
+            // Below `produce`, so that the successors are aligned.
             anchor = anchor.saturating_sub(3);
         }
         anchor + inner
     }
 }
 
-/// Adds a piece, with a space before it where one belongs.
+/// Appends a piece, with a space before it if the two pieces need one.
 fn put(made: &mut Made, piece: &Piece<'_>, before: Option<&Piece<'_>>) {
     if before.is_some_and(|before| space(before, piece)) {
         made.push(" ");
@@ -257,12 +258,12 @@ fn put(made: &mut Made, piece: &Piece<'_>, before: Option<&Piece<'_>>) {
     made.push(piece.text);
 }
 
-/// What a symbol asks for on both sides.
+/// The spaces around a symbol.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Sides {
     Spaces,
     Tight,
-    /// Whatever the writer did.
+    /// As in the input.
     Kept,
 }
 
@@ -276,7 +277,7 @@ fn sides(symbol: &Piece<'_>) -> Sides {
     }
 }
 
-/// Whether a space stands between two pieces of a line.
+/// True if a space stands between two pieces of a line.
 fn space(before: &Piece<'_>, after: &Piece<'_>) -> bool {
     let kept = !after.touches;
     let word = |piece: &Piece<'_>| {
@@ -310,16 +311,16 @@ fn space(before: &Piece<'_>, after: &Piece<'_>) -> bool {
         (Sides::Tight, _) | (_, Sides::Tight) => false,
         _ if before.grouped && after.token == Token::Open => false,
         _ if before.grouped || after.grouped => kept,
-        // A sign with one side stands at what it is the sign of.
+        // A unary sign touches its operand.
         _ if before.token == Token::Symbol && matches!(before.text, "+" | "-" | "!") => false,
         _ if before.token == Token::Symbol || after.token == Token::Symbol => kept,
         _ => true,
     }
 }
 
-/// Indents lines that are comments as the code that they stand before, or in.
+/// Indents comment lines like the code that follows or surrounds them.
 fn indent_comments(lines: &[Line<'_>], roles: &[Role], made: &mut [Made]) {
-    // From the last line up: the code below, and whether an empty line stands between.
+    // From the last line up: the code below, and whether an empty line separates it from the comment.
     let (mut below, mut item, mut apart) = (0, true, true);
     for i in (0..lines.len()).rev() {
         let line = &lines[i];
@@ -340,7 +341,7 @@ fn indent_comments(lines: &[Line<'_>], roles: &[Role], made: &mut [Made]) {
     }
 }
 
-/// Puts the comments behind the lines of a paragraph into one column.
+/// Aligns the comments at the ends of the lines of a paragraph in one column.
 fn align_comments(lines: &[Line<'_>], made: &mut [Made]) {
     let code = |i: usize| i < lines.len() && !lines[i].pieces.is_empty();
     let mut start = 0;

@@ -4,15 +4,15 @@
 //! text ──layout──▶ tokens ──pieces──▶ lines of pieces ──arrange──▶ text
 //! ```
 //!
-//! What is written stays, comments and line breaks included; what changes is white space. It works on the tokens of the
-//! first pass and knows no grammar: an operator has spaces or none by its looks, a word that works as an operator is one
-//! that the first pass takes for one. A construct that is new to the language is laid out like its likes.
+//! Only white space changes; comments and line breaks are preserved. The formatter works on the tokens of the first pass
+//! and does not depend on the grammar: the spaces around an operator follow from its characters, and the first pass
+//! decides which words are operators. So new constructs of the language are laid out without changes here.
 //!
-//! - A declaration or rule begins in the first column, a clause is indented by 2, what follows an `if` on lines of their own
-//!   by 4. What continues stands below its beginning, or indented; brackets that are open indent further.
-//! - `+ - < = & |` have spaces around them, `* / ^` none; commas and colons one behind. In strings of modules the writer
-//!   groups: one space, or none.
-//! - Guards and actions that share lines stand in columns, and so do comments behind neighbouring lines.
+//! - A declaration or rule begins in the first column. A clause is indented by 2, an action on a line of its own by 4. A
+//!   continuation line is aligned with the beginning of the construct or indented; open brackets indent further.
+//! - `+ - < = & |` have spaces around them, `* / ^` none; commas and colons have one behind. In strings of modules a gap
+//!   between two modules becomes one space, and no gap stays none.
+//! - Actions that share lines with their guards are aligned in columns, and so are comments at the ends of adjacent lines.
 //! - One empty line at most, none at the ends, no spaces at line ends.
 
 mod arrange;
@@ -24,11 +24,11 @@ use crate::{parse, print};
 use dlsys_diagnostic::{Diagnostic, Source};
 use pieces::lines;
 
-/// The text in its canonical layout, which says the same: the same characters but white space, read as the same
-/// declarations and rules. Both are looked at when the layout is made, and independently of how it is made.
+/// The text in its canonical layout. Two checks that are independent of the formatter run on each result: its characters
+/// other than white space are those of the input, and it parses to the same declarations and rules.
 ///
 /// # Errors
-/// What is wrong with a text that cannot be parsed. Nothing is said about what it means.
+/// The syntax errors of a text that cannot be parsed. Names and types are not checked.
 pub fn format(source: &Source) -> Result<String, Errors> {
     let (document, errors) = parse::parse(source);
     if !errors.is_empty() {
@@ -38,7 +38,7 @@ pub fn format(source: &Source) -> Result<String, Errors> {
     if source.text.contains("\r\n") {
         text = text.replace('\n', "\r\n");
     }
-    // Whatever the language becomes: rather no layout than another model.
+    // A defect of the formatter must not change a model.
     if !kept(&source.text, &text) || !says_the_same(&document, &text) {
         let fault = Diagnostic::error("this text cannot be laid out without changing what it says")
             .help("leave its layout as it is; please report it with the text");
@@ -47,13 +47,13 @@ pub fn format(source: &Source) -> Result<String, Errors> {
     Ok(text)
 }
 
-/// Whether a layout has the characters of the text, in their order. It looks at nothing but characters, so that no
-/// mistake about tokens hides from it. White space may differ, but not in quotes, nor within a comment.
+/// True if a layout has the characters of the text in the same order. White space may differ except in quotes and within
+/// comments. The comparison is by characters, so that it also detects errors in the tokens.
 fn kept(text: &str, layout: &str) -> bool {
     significant(text).eq(significant(layout))
 }
 
-/// What a layout must keep: the characters that are no white space, all of a text in quotes, and comments with their ends.
+/// The characters that a layout must preserve: all but white space, texts in quotes, and comments with their ends.
 fn significant(text: &str) -> impl Iterator<Item = char> + '_ {
     text.split('\n').flat_map(|line| {
         let (mut quoted, mut comment) = (false, false);
@@ -66,7 +66,7 @@ fn significant(text: &str) -> impl Iterator<Item = char> + '_ {
     })
 }
 
-/// Whether a layout reads as the same declarations, rules and expressions, in their order.
+/// True if a layout parses to the same declarations, rules and expressions in the same order.
 fn says_the_same(document: &Document, layout: &str) -> bool {
     let (again, errors) = parse::parse(&Source::new("", layout));
     errors.is_empty() && print::document(&again) == print::document(document)
@@ -140,7 +140,7 @@ mod tests {
         assert_eq!(formatted("axiom:  F\r\n\r\n\r\nangle  4"), "axiom: F\r\n\r\nangle 4\r\n");
         let refused = format(&Source::new("t", "axiom: F(")).expect_err("it never closes");
         assert!(refused[0].message.contains("never closed"));
-        // No tree is so deep that the layout grows out of hand.
+        // The indentation is bounded, so the layout of a deep tree stays linear in its size.
         let deep = format!("axiom: {}{}", "[\n".repeat(5000), "]\n".repeat(5000));
         assert!(formatted(&deep).len() < 100 * deep.len());
     }

@@ -1,4 +1,4 @@
-//! A text as lines of pieces: tokens as the grammar sees them, so that nothing is put between what belongs together.
+//! A text as lines of pieces. A piece is a token of the grammar, so that the formatter never splits one.
 
 use crate::declarations::Body;
 use crate::layout::{ItemKind, RawItem, lexemes};
@@ -12,11 +12,11 @@ const LONG: [&str; 9] = ["-->", "->", "<=", ">=", "!=", "..", "==", "&&", "||"];
 pub struct Piece<'t> {
     pub text: &'t str,
     pub token: Token,
-    /// Characters before it on its line.
+    /// Number of characters before it on its line.
     pub column: usize,
-    /// It follows the piece before it without a space.
+    /// True if it follows the piece before it without a space.
     pub touches: bool,
-    /// In a string of modules, in a list of names or in a rule's head, outside parentheses: the writer groups.
+    /// True outside parentheses in a string of modules, a list of names or a rule's head, where the input decides the spaces.
     pub grouped: bool,
     /// See [`Lexeme`].
     pub in_string: bool,
@@ -25,14 +25,14 @@ pub struct Piece<'t> {
     pub depth: usize,
     pub kind: ItemKind,
     pub place: Place,
-    /// A number that multiplies what stands directly behind it.
+    /// True for a number that multiplies the factor directly behind it.
     pub factor: bool,
 }
 
-/// Where in a declaration or rule a piece stands.
+/// The part of a declaration or rule in which a piece stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
-    /// The first.
+    /// The first piece.
     Start,
     /// Before the colon, or in a declaration that has none.
     Head,
@@ -45,11 +45,11 @@ pub enum Place {
 #[derive(Clone, Debug)]
 pub struct Line<'t> {
     pub pieces: Vec<Piece<'t>>,
-    /// With its `#`, without spaces behind.
+    /// The comment with its `#`, without spaces at its end.
     pub comment: Option<&'t str>,
-    /// Characters before the comment.
+    /// Number of characters before the comment.
     pub comment_column: usize,
-    /// Its end ends an expression.
+    /// True if its line break ends an expression.
     pub ends: bool,
 }
 
@@ -66,7 +66,7 @@ pub fn lines(text: &str) -> Vec<Line<'_>> {
         lines.push(line);
         start = end + 1;
     }
-    // Where the text ends, whatever was begun does.
+    // The end of the text ends every expression.
     if let Some(last) = lines.iter_mut().rfind(|line| !line.pieces.is_empty()) {
         last.ends = true;
     }
@@ -77,7 +77,7 @@ struct Reader<'t, 'l> {
     text: &'t str,
     items: &'l [RawItem],
     lexemes: &'l [Lexeme],
-    /// The next lexeme, and the item that has begun last, from 1.
+    /// Index of the next lexeme, and number of the current item, from 1.
     next: usize,
     item: usize,
 }
@@ -113,7 +113,7 @@ impl<'t> Reader<'t, '_> {
         Line { pieces, comment, comment_column, ends: true }
     }
 
-    /// Where the token of the grammar ends that begins with a lexeme.
+    /// The end, in bytes, of the token of the grammar that begins with a lexeme.
     fn whole(&self, first: Lexeme) -> usize {
         let rest = &self.text[first.start..];
         match first.token {

@@ -1,11 +1,11 @@
-//! Words that begin a string or an expression, what is open behind them, and line breaks, which may end it.
+//! Keywords that begin a string or an expression, the nesting that they open, and line breaks that end an expression.
 
 use super::{ItemKind, Last, Level, Scanner};
 use crate::declarations::{Follow, OptionWord, options};
 use crate::lexeme::Token;
 
 impl Scanner<'_> {
-    /// Keywords that begin a string or an expression; returns what the word counts as.
+    /// Advances over a word; the result says whether an expression can end after it.
     pub(super) fn keyword(&mut self, start: usize, end: usize) -> Last {
         let inside = self.levels.len() > 1;
         let in_expression = !self.in_string || inside;
@@ -69,7 +69,7 @@ impl Scanner<'_> {
         }
     }
 
-    /// Whether a word is an option with a value behind it, so that a line break between them ends nothing.
+    /// True if a word is an option with a value behind it, so that a line break between the two ends nothing.
     fn goes_on_after(&self, word: &str) -> bool {
         let declaration = self.items.last().and_then(|item| item.kind.declaration());
         let is = |option: &OptionWord, follow| option.word == word && option.follow == follow;
@@ -90,7 +90,7 @@ impl Scanner<'_> {
         (level.right, level.ifs, level.matching) = (0, 0, false);
     }
 
-    /// Keeps the line break at `at` if it ends an expression, else blanks it.
+    /// Keeps the line break at `at` if it ends an expression, and replaces it with a space otherwise.
     pub(super) fn line_break(&mut self, at: usize) {
         if at >= self.out.len() {
             return;
@@ -103,7 +103,7 @@ impl Scanner<'_> {
             self.matching = self.level_matches();
         }
         self.forget_pending();
-        // The first break after the expression is the one that `then` or `else` would take back.
+        // A `then` or `else` on a later line removes the first break after the expression.
         self.held_break.get_or_insert(at);
     }
 

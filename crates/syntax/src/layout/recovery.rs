@@ -1,7 +1,7 @@
-//! Lines that would be clear if they were complete: the head of a rule without its colon, and in a string of modules, which
-//! may go on over lines, a line that can be none of it, such as a misspelt declaration.
+//! Error recovery for incomplete lines: the head of a rule without its colon, and, within a string of modules that
+//! continues over lines, a line that cannot belong to the string, such as a misspelt declaration.
 //!
-//! A colon that lacks is complained about once, and put in: so the rule is read, and its other mistakes are found.
+//! A missing colon is reported once and inserted, so that the rule is parsed and its other mistakes are found.
 
 use super::{ItemKind, RawItem, Scanner};
 use crate::declarations::{self, Body};
@@ -13,8 +13,8 @@ use dlsys_diagnostic::{Diagnostic, Span};
 type Lexed = (Token, usize, usize);
 
 impl Scanner<'_> {
-    /// Where the head of a rule begins and ends whose colon has been forgotten: on this line before its first clause or the
-    /// condition of a discrete rule, or on the line before this clause. `starts` is what the line begins otherwise.
+    /// First and last byte of a head without its colon: on this line, before its first clause or the condition of a discrete
+    /// rule, or on the line before this clause. `starts` is the kind of item that the line begins otherwise.
     pub(super) fn head_without_colon(
         &self,
         starts: Option<ItemKind>,
@@ -35,12 +35,12 @@ impl Scanner<'_> {
         match starts {
             Some(ItemKind::Unknown) => {}
             None if current == ItemKind::Unknown => {}
-            // In the successor of a clause, another clause may follow.
+            // Another clause may follow in the successor of a clause.
             None if in_string && (current.has_string() || current == ItemKind::Step) => {}
             _ => return None,
         }
         let clause = self.first_clause(tokens)?;
-        // In a drawing, `if` may be what somebody takes for a condition of it.
+        // In a drawing, `if` may be meant as a condition of the drawing.
         let acts = |t: &Lexed| matches!(self.word(*t), "solve" | "produce");
         if current.body() == Some(Body::Drawing) && !tokens.iter().any(acts) {
             return None;
@@ -52,8 +52,8 @@ impl Scanner<'_> {
         }
     }
 
-    /// A rule without clauses whose colon a discrete rule follows: that goes on here, over a broken line, or it was
-    /// no head, but such a line as L-Py's `production:`.
+    /// Reclassifies a rule without clauses that precedes the arrow of a discrete rule: it is the head of that rule, broken
+    /// over lines, or a line such as L-Py's `production:`.
     pub(super) fn goes_on_discrete(&mut self, line: usize, arrow_first: bool) {
         let Some(item) = self.items.last_mut().filter(|i| i.kind == ItemKind::Rule) else { return };
         let head = self.text[item.start..line].trim_end();
@@ -62,7 +62,7 @@ impl Scanner<'_> {
         self.held_break = None;
     }
 
-    /// Begins the rule whose head stands there, as if it had its colon.
+    /// Reports the missing colon and begins the rule as if the head at these bytes had it.
     pub(super) fn begin_without_colon(&mut self, (from, to): (usize, usize), kind: ItemKind) {
         if self.items.last().is_some_and(|item| item.kind == ItemKind::Unknown && item.start == from) {
             self.items.pop();
@@ -85,7 +85,7 @@ impl Scanner<'_> {
         self.items.push(RawItem { kind, start: from, end: from, after_colon: Some(to + 1), broken: !free });
     }
 
-    /// The line as a head that may lack its colon, for the line after it.
+    /// The bytes of this line if it may be a head without its colon, for the decision on the next line.
     pub(super) fn remembered_head(
         &self,
         starts: Option<ItemKind>,
@@ -97,7 +97,7 @@ impl Scanner<'_> {
         is_head.then(|| (tokens[0].1, tokens[tokens.len() - 1].2))
     }
 
-    /// Whether a line within a string of modules can be no part of it, and begins like a declaration.
+    /// True if a line within a string of modules cannot belong to the string and begins like a declaration.
     pub(super) fn is_no_string(&self, tokens: &[Lexed]) -> bool {
         if !self.in_string || self.levels.len() > 1 || self.weighted || self.weight_next {
             return false;
@@ -115,7 +115,7 @@ impl Scanner<'_> {
         }
         let begins =
             matches!(next.0, Token::Word | Token::Text) || matches!(self.text_of(next), "=" | "@" | "/");
-        // In a clause, signs may compare.
+        // Within a clause, `=` may be a comparison.
         let end = self.first_clause(tokens).unwrap_or(tokens.len());
         let mut depth = 0usize;
         begins
@@ -133,7 +133,7 @@ impl Scanner<'_> {
         &self.text[token.1..token.2]
     }
 
-    /// An `=` that belongs to no longer sign.
+    /// True for an `=` that is not part of `<=`, `>=`, `==` or `!=`.
     fn is_equals(&self, token: Lexed) -> bool {
         let part = |c: char| "<>=!".contains(c);
         self.text_of(token) == "="
@@ -170,7 +170,7 @@ impl Scanner<'_> {
         &tokens[..end]
     }
 
-    /// How many tokens the head of a rule takes at the beginning, with its contexts; 0 if none stands there.
+    /// Number of tokens of the head that the tokens begin with, contexts included; 0 without a head.
     fn head_length(&self, tokens: &[Lexed]) -> usize {
         let left = self.modules(tokens, false);
         let mut at = match tokens.get(left) {
@@ -188,7 +188,7 @@ impl Scanner<'_> {
         at
     }
 
-    /// How many tokens modules with bare names as parameters take.
+    /// Number of tokens of the modules, with bare names as parameters, that the tokens begin with.
     fn modules(&self, tokens: &[Lexed], branches: bool) -> usize {
         let mut at = 0;
         loop {
@@ -200,7 +200,7 @@ impl Scanner<'_> {
         }
     }
 
-    /// How many tokens one module with bare names as parameters takes.
+    /// Number of tokens of the one module, with bare names as parameters, that the tokens begin with.
     fn module(&self, tokens: &[Lexed]) -> usize {
         let Some(&first) = tokens.first() else { return 0 };
         let name = match self.text_of(first) {

@@ -1,9 +1,9 @@
-//! Advice for texts that cannot be parsed: how the declaration at hand is written.
+//! Advice for texts that cannot be parsed: the notation of the declaration at hand.
 
 use super::Rule;
 use crate::declarations::Declaration;
 
-/// Advice for curves, tables, arrays and names within rules, by the text before the place and what was found there.
+/// Advice for curves, tables, arrays and names within rules, given the text before the error and the token there.
 pub fn for_block(item: Rule, before: &str, found: &str) -> Option<&'static str> {
     let previous = before.trim_end().chars().next_back();
     match item {
@@ -30,7 +30,7 @@ pub fn for_block(item: Rule, before: &str, found: &str) -> Option<&'static str> 
     }
 }
 
-/// How a declaration or rule is written, for mistakes about which nothing better is known.
+/// The notation of a declaration or rule, for errors without a specific hint.
 pub fn usage(item: Rule) -> &'static str {
     match item {
         Rule::step_item => "a discrete rule is written `A(x) : x > 3 -> F(x) A(x/2)`",
@@ -41,7 +41,7 @@ pub fn usage(item: Rule) -> &'static str {
     }
 }
 
-/// The initial string as it is to be written, from the line on which it was tried.
+/// The corrected initial string for a line that attempts to declare one.
 pub fn initial_string(line: &str) -> String {
     let line = line.split('#').next().unwrap_or_default();
     let string = match line.split_once(':') {

@@ -7,18 +7,18 @@ pub(crate) use super::Pair;
 use super::Rule;
 use crate::ast;
 use crate::ast::{
-    Action, Alternative, Clause, Equation, Expr, ExprId, Expression, Expressions, HeadModule, Item, Module,
-    Name, Text, Turn,
+    Action, Alternative, Clause, ContextPart, Equation, Expr, ExprId, Expression, Expressions, HeadModule,
+    Item, Module, Name, Text,
 };
 use crate::notation;
 use dlsys_diagnostic::{Diagnostic, Span};
 
-/// Most symbols and names of a weight outside parentheses.
+/// Maximum number of symbols and names of a weight outside parentheses.
 const MAX_WEIGHT: usize = 200;
 
 pub(crate) type Built<T> = Result<T, Box<Diagnostic>>;
 
-/// Keeps one copy of each name.
+/// Stores one copy of each name.
 #[derive(Default)]
 pub struct Interner(HashMap<Box<str>, Arc<str>>);
 
@@ -36,16 +36,16 @@ impl Interner {
 pub struct Builder<'d> {
     pub expressions: &'d mut Expressions,
     pub interner: &'d mut Interner,
-    /// Where the parsed piece begins in the file.
+    /// Byte of the file at which the parsed piece begins.
     pub offset: usize,
-    /// Names of the model's own functions.
+    /// Names of the functions that the model declares.
     pub defined: Option<&'d HashSet<String>>,
 }
 
 impl Builder<'_> {
     pub(super) fn span(&self, pair: &Pair) -> Span {
         let span = pair.as_span();
-        // pest's spans of non-atomic rules may end in white space that was skipped in vain.
+        // pest's spans of non-atomic rules may include trailing white space.
         let len = span.as_str().trim_end().len();
         Span::new(self.offset + span.start(), self.offset + span.start() + len)
     }
@@ -145,11 +145,11 @@ impl Builder<'_> {
                 Rule::right_context | Rule::step_right => {
                     for part in part.into_inner() {
                         right_shape.push(match part.as_rule() {
-                            Rule::bracket_open => Turn::Open,
-                            Rule::bracket_close => Turn::Close,
+                            Rule::bracket_open => ContextPart::Open,
+                            Rule::bracket_close => ContextPart::Close,
                             _ => {
                                 right.push(self.head_module(part));
-                                Turn::Module
+                                ContextPart::Module
                             }
                         });
                     }
@@ -204,7 +204,7 @@ impl Builder<'_> {
             let mut inner = weighted.into_inner().filter(|p| !is_punctuation(p.as_rule()));
             let mut next = || inner.next().expect("the grammar has a part here");
             let weight = next();
-            // The layout bounds nesting in expressions, and takes this for a part of a string.
+            // The layout bounds nesting in expressions only, and treats this as a part of a string.
             let symbols = weight.clone().into_inner().count();
             if symbols > MAX_WEIGHT {
                 return Err(Box::new(
@@ -219,7 +219,7 @@ impl Builder<'_> {
         Ok(all)
     }
 
-    /// A head, and the expression behind its colon.
+    /// A head and the expression behind its colon.
     pub fn measure(&mut self, pair: Pair) -> Built<(HeadModule, Option<Expression>)> {
         let mut inner = pair.into_inner().filter(|p| matches!(p.as_rule(), Rule::head_module | Rule::expr));
         let head = self.head_module(inner.next().expect("the grammar has a head here"));
@@ -279,13 +279,13 @@ impl Builder<'_> {
     }
 }
 
-/// True for signs and words that carry no information once the grammar has read them.
+/// True for signs and words that carry no information after parsing.
 pub(crate) fn is_punctuation(rule: Rule) -> bool {
     matches!(rule, Rule::equals | Rule::colon | Rule::close | Rule::range | Rule::EOI)
         || keyword(rule).is_some()
 }
 
-/// The word in backquotes that a rule of the grammar stands for; those rules are known by their names, `kw_…`.
+/// The keyword of a grammar rule, in backquotes; such rules have names of the form `kw_…`.
 pub(super) fn keyword(rule: Rule) -> Option<&'static str> {
     static WORDS: LazyLock<Vec<Option<String>>> = LazyLock::new(|| {
         let mut words = Vec::new();

@@ -1,4 +1,4 @@
-//! What the parser expected, in the language's own words.
+//! Syntax errors in the terms of the language, from the grammar rules that the parser expected.
 
 use std::collections::BTreeSet;
 
@@ -13,7 +13,7 @@ use crate::foreign_syntax;
 use crate::layout::RawItem;
 use dlsys_diagnostic::{Diagnostic, Span};
 
-/// A grammar rule as a person would call it; `None` for what is never named alone.
+/// The description of a grammar rule in messages; `None` for rules that messages do not mention.
 fn words(rule: Rule) -> Option<&'static str> {
     use Rule::*;
     Some(match rule {
@@ -55,12 +55,12 @@ fn words(rule: Rule) -> Option<&'static str> {
         range => "`..`",
         text | text_body => "a text in quotes",
         EOI => "the end of the line",
-        // The word of the declaration itself is there.
+        // The word that begins the declaration has already been parsed.
         _ => return keyword(rule).filter(|known| Declaration::of_word(known.trim_matches('`')).is_none()),
     })
 }
 
-/// Turns pest's error into a message.
+/// Converts an error of pest to a diagnostic.
 pub fn explain(item: Rule, error: &Error<Rule>, text: &str, offset: usize) -> Diagnostic {
     let at = match error.location {
         InputLocation::Pos(at) | InputLocation::Span((at, _)) => at,
@@ -70,28 +70,28 @@ pub fn explain(item: Rule, error: &Error<Rule>, text: &str, offset: usize) -> Di
     if let ErrorVariant::ParsingError { positives, .. } = &error.variant {
         expected.extend(positives.iter().filter_map(|r| words(*r)));
     }
-    // Wherever an expression can begin, an `if` can: that goes without saying.
+    // An expression may begin with `if` or `match`; listing them adds nothing.
     if expected.contains("an expression") {
         expected.remove("`if`");
         expected.remove("`match`");
     }
-    // A clause is what a rule lacks, and not one more name.
+    // A rule without a clause lacks a clause rather than another `let`.
     if expected.contains("`if`, `solve` or `produce`") {
         expected.remove("`let`");
     }
     let choice = expected.contains("`case`");
-    // What a name is for depends on where it is asked for.
+    // Directly after its word, such a declaration needs a name.
     if is_item_with_name(item)
         && text[..at].split_whitespace().count() <= 1
         && expected.contains("an expression")
     {
         expected = BTreeSet::from(["a name"]);
     }
-    // Before its `:` a rule has names where other places have expressions.
+    // Before the `:` of a rule, names stand in the places of expressions.
     if item == Rule::rule_item && !text[..at].contains(':') && expected.remove("an expression") {
         expected.insert("the name of a parameter");
     }
-    // What stands for a declaration elsewhere, and is read as the head of a rule here.
+    // A line of cpfg or L-Py that is parsed as the head of a rule.
     let behind = text[..at].split_once(':').map_or("", |(_, behind)| behind);
     if item == Rule::rule_item
         && behind.trim().is_empty()
@@ -112,7 +112,7 @@ pub fn explain(item: Rule, error: &Error<Rule>, text: &str, offset: usize) -> Di
         token => format!("`{token}` is not expected here"),
     };
     let end = if found == "\n" { at } else { at + found.len() };
-    // At the end of a line, point at the last thing before it rather than at nothing.
+    // At the end of a line, point at the last character before it.
     let span = if end == at {
         let before = text[..at].trim_end();
         let from = before.char_indices().next_back().map_or(0, |(i, _)| i);
@@ -138,7 +138,7 @@ fn token_at(text: &str, at: usize) -> &str {
     let alike = |c: char| c.is_alphanumeric() || c == '_';
     if alike(first) {
         let end = rest.find(|c| !alike(c)).unwrap_or(rest.len());
-        // Quote no more than a line's worth.
+        // Quote at most a line's worth.
         &rest[..rest.char_indices().map(|(i, _)| i).nth(40).unwrap_or(rest.len()).min(end)]
     } else {
         &rest[..first.len_utf8()]

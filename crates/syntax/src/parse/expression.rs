@@ -11,7 +11,7 @@ use crate::words::FOLDS;
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_expr::{Comparison, Fold};
 
-/// Loosest first (LANGUAGE, "Text").
+/// In order of increasing binding strength (LANGUAGE, "Text").
 static PRATT: LazyLock<PrattParser<Rule>> = LazyLock::new(|| {
     PrattParser::new()
         .op(Op::infix(Rule::or, Assoc::Left))
@@ -26,7 +26,7 @@ static PRATT: LazyLock<PrattParser<Rule>> = LazyLock::new(|| {
         .op(Op::infix(Rule::add, Assoc::Left) | Op::infix(Rule::sub, Assoc::Left))
         .op(Op::infix(Rule::mul, Assoc::Left) | Op::infix(Rule::div, Assoc::Left))
         .op(Op::prefix(Rule::neg))
-        // `2x^2` is 2(x^2), `x/2c` is x/(2c): the number belongs to what it is written against.
+        // `2x^2` is 2(x^2), `x/2c` is x/(2c): a number binds to the factor that it touches.
         .op(Op::prefix(Rule::coefficient))
         .op(Op::infix(Rule::pow, Assoc::Right))
 });
@@ -76,7 +76,7 @@ impl Builder<'_> {
 
     /// A comparison, or one more link of a chain.
     ///
-    /// The chain is built anew after its last operand, so that operands still stand before their users.
+    /// The chain is rebuilt after its last operand, so that operands still precede their users.
     fn compare(&mut self, a: ExprId, op: Rule, b: ExprId, span: Span) -> ExprId {
         let comparison = match op {
             Rule::lt => Comparison::Less,
@@ -87,7 +87,7 @@ impl Builder<'_> {
             _ => Comparison::Greater,
         };
         let chain = match self.expressions.get_mut(a) {
-            // The shorter chain stays behind as a number that nothing reads.
+            // The shorter chain remains in the arena as an unused number.
             Expr::Compare(first, links) => Some((*first, std::mem::take(links))),
             _ => None,
         };
@@ -175,7 +175,7 @@ impl Builder<'_> {
                 }
                 Ok(self.expressions.push(Expr::Match(subject, cases, otherwise), span))
             }
-            // A parenthesis: pest leaves only its inside.
+            // A parenthesis: pest yields only its content.
             Rule::expr => {
                 let inner = self.expr(pair)?;
                 Ok(self.expressions.push(Expr::Parenthesis(inner), span))
@@ -186,7 +186,7 @@ impl Builder<'_> {
 }
 
 impl Builder<'_> {
-    /// Something of all modules attached to one.
+    /// An aggregate of the modules attached to one.
     fn aggregate(&mut self, pair: Pair) -> Built<ExprId> {
         let span = self.span(&pair);
         let mut inner = pair.into_inner().filter(|p| !is_punctuation(p.as_rule()));
@@ -198,7 +198,7 @@ impl Builder<'_> {
             _ => Fold::Count,
         };
         let module = next();
-        // A function of the model's own called `count` is what it was.
+        // A function `count` that the model declares takes precedence.
         if fold == Fold::Count && self.defined.is_none_or(|defined| defined.contains("count")) {
             let argument = self.as_call(module)?;
             let name = self.interner.get("count");
@@ -209,7 +209,7 @@ impl Builder<'_> {
         Ok(self.expressions.push(Expr::Aggregate(Box::new(Aggregate { fold, head, term })), span))
     }
 
-    /// What was read as a module with the names of its parameters, as a name or the call of a function.
+    /// Converts a module with the names of its parameters to a name or a function call.
     fn as_call(&mut self, module: Pair) -> Built<ExprId> {
         let span = self.span(&module);
         let head = self.head_module(module);

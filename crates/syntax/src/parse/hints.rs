@@ -1,4 +1,4 @@
-//! Advice for slips in the notation, by the text around the place and what was found there.
+//! Hints for common errors in the notation, from the text around the error and the token there.
 
 use super::Rule;
 use super::advice;
@@ -6,7 +6,7 @@ use super::expected::is_item_with_name;
 use crate::declarations;
 use crate::suggest::nearest;
 
-/// Advice for mistakes that people make.
+/// The hint for a syntax error, if it is a common one.
 pub(super) fn hint(item: Rule, text: &str, at: usize, found: &str) -> Option<String> {
     let first = text.split_whitespace().next().unwrap_or_default();
     let first = first.trim_end_matches(|c: char| !c.is_alphanumeric());
@@ -25,7 +25,7 @@ pub(super) fn hint(item: Rule, text: &str, at: usize, found: &str) -> Option<Str
     hint_by_symbol(item, text, at, found).or_else(|| hint_by_word(item, text, at, found))
 }
 
-/// Advice for successors with weights and for events at a rate.
+/// Hints for successors with weights and for events at a rate.
 fn hint_of_chance(item: Rule, text: &str, at: usize, found: &str) -> Option<&'static str> {
     const WEIGHTS: &str = "several successors each have a weight before them: `produce 2: F(x) or 1: G(x)`";
     const STEP: &str = "several successors each have a weight before them: `A -> 2: F A or 1: F`";
@@ -64,7 +64,7 @@ fn hint_of_chance(item: Rule, text: &str, at: usize, found: &str) -> Option<&'st
     }
 }
 
-/// Advice that the symbols around the place give.
+/// Hints from the symbols around the error.
 fn hint_by_symbol(item: Rule, text: &str, at: usize, found: &str) -> Option<String> {
     let before = text[..at].trim_end();
     let previous = before.chars().next_back();
@@ -121,7 +121,7 @@ fn hint_by_symbol(item: Rule, text: &str, at: usize, found: &str) -> Option<Stri
         (_, "<" | ">") if item == Rule::interpret_item => {
             "a drawing does not depend on the context of a module"
         }
-        // Numbers that stand apart may be two equations; those that touch are one with a comma.
+        // Numbers with a space between them may be two equations; without one, the comma is a decimal comma.
         (Some(','), _)
             if in_rule
                 && has_decimal_comma(&text[..at])
@@ -167,7 +167,7 @@ const NO_COMMAS: &str = "modules stand one after another, with spaces and no com
 const ROUND: &str = "parameters stand in round parentheses: `A(x)`";
 const ARROW: &str = "in a clause a production is written `if x = 2 produce …`; a discrete rule has its arrow behind the head: `A(x) : x > 3 -> …`";
 
-/// Advice for discrete rules.
+/// Hints for discrete rules.
 fn hint_for_step(text: &str, at: usize, found: &str) -> Option<String> {
     let before = text[..at].trim_end();
     let rest = text[at..].trim_start();
@@ -206,7 +206,7 @@ fn hint_for_step(text: &str, at: usize, found: &str) -> Option<String> {
     Some(advice.to_owned())
 }
 
-/// Advice that the words around the place give.
+/// Hints from the words around the error.
 fn hint_by_word(item: Rule, text: &str, at: usize, found: &str) -> Option<String> {
     let before = text[..at].trim_end();
     let rest = &text[at..];
@@ -214,7 +214,7 @@ fn hint_by_word(item: Rule, text: &str, at: usize, found: &str) -> Option<String
     let has_head = before.contains(':');
     let is_word = found.starts_with(|c: char| c.is_alphabetic());
     let ended = matches!(found, "\n" | "");
-    // The line, up to the place.
+    // The line up to the error.
     let line = before.rsplit('\n').next().unwrap_or(before).trim();
     let last_word = line.rsplit(|c: char| !(c.is_alphanumeric() || c == '_')).next().unwrap_or_default();
     let advice = match found {
@@ -284,22 +284,22 @@ fn hint_by_word(item: Rule, text: &str, at: usize, found: &str) -> Option<String
     Some(advice.to_owned())
 }
 
-/// Signs such as 🌷, which no name, number or operator has.
+/// True for characters such as 🌷, which occur in no name, number or operator.
 fn is_no_letter(found: &str) -> bool {
     found.starts_with(|c: char| !c.is_ascii() && !c.is_alphanumeric() && !c.is_whitespace() && c > '\u{2190}')
 }
 
-/// Whether a text ends with a number and a comma that touches it, as `0,5` does before its second digit.
+/// True if a text ends with a number and a comma that touches it, as `0,5` does before its second digit.
 fn has_decimal_comma(before: &str) -> bool {
     before.strip_suffix(',').is_some_and(|rest| rest.ends_with(|c: char| c.is_ascii_digit()))
 }
 
-/// Whether a module can end with this.
+/// True if a module can end with this character.
 fn is_end_of_module(c: char) -> bool {
     c.is_alphanumeric() || matches!(c, ')' | ']' | '_')
 }
 
-/// Whether a string of modules has begun, and may go on.
+/// True if a string of modules has begun and may continue.
 fn in_string(item: Rule, before: &str) -> bool {
     match item {
         Rule::modules => true,
@@ -309,26 +309,26 @@ fn in_string(item: Rule, before: &str) -> bool {
     }
 }
 
-/// Whether what was found is an argument in the wrong parentheses, as in `A{0}`.
+/// True if the token found is an argument in the wrong brackets, as in `A{0}`.
 fn is_argument(before: &str, found: &str, parenthesis: char) -> bool {
     let name =
         before.strip_suffix(parenthesis).is_some_and(|rest| rest.ends_with(|c: char| c.is_alphanumeric()));
     name && found.starts_with(|c: char| c.is_ascii_digit())
 }
 
-/// Whether a text begins with something like `x'`.
+/// True if a text begins with a derivative in the form `x'`.
 fn is_primed(text: &str) -> bool {
     let end = text.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(text.len());
     end > 0 && text[end..].starts_with(['\'', '′', '’'])
 }
 
-/// The clause keyword that stands last in a text.
+/// The last clause keyword in a text.
 fn last_keyword(text: &str) -> Option<&str> {
     let words = text.rsplit(|c: char| !(c.is_alphanumeric() || c == '_'));
     words.into_iter().find(|word| matches!(*word, "if" | "solve" | "produce"))
 }
 
-/// Whether a line ends inside an `if` that is part of an expression.
+/// True if a line ends inside an `if` that is part of an expression.
 fn has_open_if(line: &str) -> bool {
     let is_word = |c: char| c.is_alphanumeric() || c == '_';
     let Some(at) = ["if ", "if("].iter().filter_map(|word| line.rfind(word)).max() else { return false };
@@ -338,7 +338,7 @@ fn has_open_if(line: &str) -> bool {
     !line[..at].ends_with(is_word) && inside && !line[at..].split(|c| !is_word(c)).any(|word| word == "else")
 }
 
-/// Whether a text begins with something like `dx/dt`.
+/// True if a text begins with a derivative in the form `dx/dt`.
 pub(super) fn is_derivative(text: &str) -> bool {
     let name = text.find(|c: char| !(c.is_alphanumeric() || c == '_')).map_or("", |end| &text[..end]);
     name.starts_with('d')

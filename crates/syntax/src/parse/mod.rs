@@ -4,7 +4,7 @@
 //! text ──layout──▶ items ──pest──▶ pairs ──build──▶ Document
 //! ```
 //!
-//! Each item is parsed alone: its mistakes are reported, the others are read all the same.
+//! Each item is parsed separately, so that an error in one does not affect the others.
 
 mod advice;
 pub(crate) mod build;
@@ -24,7 +24,7 @@ use crate::layout::{ItemKind, RawItem, layout};
 use dlsys_diagnostic::{Diagnostic, Source, Span};
 
 /// The pest parser of `grammars/dlsys.pest`, and its rules.
-#[allow(missing_docs)] // The macro documents nothing.
+#[allow(missing_docs)] // The enum that pest derives has no documentation.
 mod grammar {
     #[derive(pest_derive::Parser)]
     #[grammar = "../grammars/dlsys.pest"]
@@ -35,30 +35,30 @@ pub(crate) use grammar::{Grammar, Rule};
 
 pub(crate) type Pair<'i> = pest::iterators::Pair<'i, Rule>;
 
-/// Most errors that are collected from one text; who wants more can mend these first.
+/// Maximum number of errors that are collected from one text.
 const MAX_ERRORS: usize = 50;
 
-/// Most modules that an initial string can have.
+/// Maximum number of modules of an initial string.
 const MAX_AXIOM: usize = 10_000_000;
 
-/// Reads a model's text. What could be read is returned even if there are errors; of global declarations
-/// that could not be read, the names are in [`Document::unread`].
+/// Parses the text of a model. The document contains every item without errors; [`Document::unread`] has the names of
+/// global declarations with errors.
 ///
-/// Texts that it includes are not read: see [`read`](super::read).
+/// Included texts are not parsed: see [`read`](super::read).
 pub fn parse(source: &Source) -> (Document, Vec<Diagnostic>) {
     let mut reader = Reader::default();
     reader.document.items = reader.read(&source.text);
     (reader.document, reader.errors)
 }
 
-/// Reads texts one after another into one document.
+/// Parses texts one after another into one document.
 #[derive(Default)]
 pub(super) struct Reader {
-    /// The items are for the caller to put together.
+    /// The expressions and names so far; the caller adds the items.
     pub document: Document,
     pub errors: Vec<Diagnostic>,
     interner: build::Interner,
-    /// Functions of the texts so far.
+    /// Names of the functions that the texts so far declare.
     defined: HashSet<String>,
 }
 
@@ -99,7 +99,7 @@ impl Reader {
     }
 }
 
-/// The name that an item declares, or seems to: `const k …`, but also `cosnt k …` and `k = …`.
+/// The name that an item declares or appears to declare: `const k …`, but also `cosnt k …` and `k = …`.
 fn declared_name(text: &str, item: &RawItem) -> Option<std::sync::Arc<str>> {
     Some(declared_word(text, item)?.into())
 }
@@ -121,7 +121,7 @@ fn declared_word<'t>(text: &'t str, item: &RawItem) -> Option<&'t str> {
     Some(name)
 }
 
-/// Reads one expression.
+/// Parses one expression.
 pub fn parse_expression(source: &Source) -> Result<(Document, Expression), Errors> {
     let cut = layout(&format!("const it =\n{}", source.text));
     if !cut.errors.is_empty() {
@@ -141,7 +141,7 @@ pub fn parse_expression(source: &Source) -> Result<(Document, Expression), Error
     Ok((document, expression))
 }
 
-/// Reads what is to be measured: the head of a module, and the expression that is added up, if it is not just counted.
+/// Parses a measure: the head of a module and the expression that is summed; without one, modules are counted.
 pub fn parse_measure(source: &Source) -> Result<(Document, HeadModule, Option<Expression>), Errors> {
     let cut = layout(&format!("const it =\n{}", source.text));
     if !cut.errors.is_empty() {
@@ -160,7 +160,7 @@ pub fn parse_measure(source: &Source) -> Result<(Document, HeadModule, Option<Ex
     Ok((document, head, expression))
 }
 
-/// How a measure is written.
+/// The notation of a measure, for messages.
 pub const MEASURE: &str = "a measure is a module, with names for its parameters, and what is added up over all of them: `F(x): x`; without that they are counted: `F(x)`";
 
 fn trimmed(text: &str, item: &RawItem) -> Span {
@@ -190,7 +190,7 @@ fn read_item(text: &str, item: &RawItem, builder: &mut build::Builder) -> Result
     builder.item(pair)
 }
 
-/// Reads the initial string piece by piece, so that its size costs memory only for its modules.
+/// Parses the initial string piece by piece, so that the parser's memory does not grow with the string.
 fn read_axiom(text: &str, item: &RawItem, builder: &mut build::Builder) -> Result<Item, Box<Diagnostic>> {
     const PIECE: usize = 1 << 16;
     let head = text[item.start..item.end].split(':').next().unwrap_or_default().trim_end();
@@ -243,7 +243,7 @@ fn read_axiom(text: &str, item: &RawItem, builder: &mut build::Builder) -> Resul
     Ok(Item::Axiom(modules))
 }
 
-/// Where to cut a piece of about `size` bytes: at white space outside parentheses.
+/// The end of a piece of about `size` bytes: white space outside parentheses.
 fn piece_end(text: &str, from: usize, size: usize) -> usize {
     let mut depth = 0i64;
     for (i, b) in text.bytes().enumerate().skip(from) {

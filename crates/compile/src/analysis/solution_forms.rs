@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 
 use dlsys_expr::{Binary, Graph, Monomial, Node, NodeId, Polynomial, Program, Unary};
-use dlsys_model::{Jacobian, Law, Linear, Numeric, Obstacle};
+use dlsys_model::{Jacobian, LinearRates, Numeric, Obstacle, SolutionForm};
 
 use super::driven::driven_form;
 use super::variability::Constants;
@@ -12,20 +12,25 @@ use super::variability::Constants;
 const MAX_AGE_DEGREE: u32 = 3;
 
 /// Classifies the equations of a clause. Those that others depend on come first, whatever their order.
-pub fn laws(graph: &mut Graph, rates: &[(usize, NodeId)], constants: &Constants, total: usize) -> Vec<Law> {
-    let mut laws: Vec<Option<Law>> = vec![None; rates.len()];
+pub fn classify(
+    graph: &mut Graph,
+    rates: &[(usize, NodeId)],
+    constants: &Constants,
+    total: usize,
+) -> Vec<SolutionForm> {
+    let mut found: Vec<Option<SolutionForm>> = vec![None; rates.len()];
     // Parameters known to be sums of exponentials and polynomials.
     let mut sums: HashSet<u32> = HashSet::new();
     loop {
         let mut progress = false;
         for (i, &(parameter, rate)) in rates.iter().enumerate() {
-            if laws[i].is_some() {
+            if found[i].is_some() {
                 continue;
             }
-            let law = closed(graph, parameter as u32, rate, constants, &sums, total)
+            let form = closed(graph, parameter as u32, rate, constants, &sums, total)
                 .or_else(|| Some((driven(graph, parameter as u32, rate, constants, total)?, false)));
-            if let Some((law, is_sum)) = law {
-                laws[i] = Some(law);
+            if let Some((form, is_sum)) = form {
+                found[i] = Some(form);
                 if is_sum {
                     sums.insert(parameter as u32);
                 }
@@ -41,9 +46,12 @@ pub fn laws(graph: &mut Graph, rates: &[(usize, NodeId)], constants: &Constants,
         linear: affine(graph, rate, constants).is_some(),
         obstacle: obstacle(graph, parameter as u32, rate, constants),
     };
-    laws.into_iter()
+    found
+        .into_iter()
         .zip(rates)
-        .map(|(law, &(parameter, rate))| law.unwrap_or_else(|| Law::Numeric(numeric(graph, parameter, rate))))
+        .map(|(form, &(parameter, rate))| {
+            form.unwrap_or_else(|| SolutionForm::Numeric(numeric(graph, parameter, rate)))
+        })
         .collect()
 }
 
@@ -61,7 +69,7 @@ fn obstacle(graph: &mut Graph, parameter: u32, rate: NodeId, constants: &Constan
     if constants.all_constant(graph, &factors) { Obstacle::Inflow } else { Obstacle::Factor }
 }
 
-/// The law of a parameter, if it is one with a formula, and whether that is a sum of exponentials and polynomials.
+/// The form of a parameter, if it is one with a formula, and whether that is a sum of exponentials and polynomials.
 fn closed(
     graph: &mut Graph,
     parameter: u32,
@@ -69,7 +77,7 @@ fn closed(
     constants: &Constants,
     sums: &HashSet<u32>,
     total: usize,
-) -> Option<(Law, bool)> {
+) -> Option<(SolutionForm, bool)> {
     let zero = graph.constant(0.0);
     let by_self = graph.polynomial(rate, |v| v == parameter)?;
     if by_self.degree() > 2 {
@@ -80,10 +88,10 @@ fn closed(
     let [inflow, factor, square] = coefficients[..] else { unreachable!("three of them") };
     if constants.all_constant(graph, &coefficients) {
         if by_self.degree() == 0 {
-            return Some((Law::Polynomial(Program::compile(graph, &[inflow], total)), true));
+            return Some((SolutionForm::Polynomial(Program::compile(graph, &[inflow], total)), true));
         }
         let is_sum = by_self.degree() == 1;
-        return Some((Law::Quadratic(Program::compile(graph, &coefficients, total)), is_sum));
+        return Some((SolutionForm::Quadratic(Program::compile(graph, &coefficients, total)), is_sum));
     }
     if square != zero || !constants.all_constant(graph, &[factor]) {
         return None;
@@ -96,26 +104,26 @@ fn closed(
         let powers: Vec<NodeId> =
             (0..=by_age.degree()).map(|power| by_age.coefficient(age, power).unwrap_or(zero)).collect();
         if constants.all_constant(graph, &powers) {
-            return Some((Law::Polynomial(Program::compile(graph, &powers, total)), true));
+            return Some((SolutionForm::Polynomial(Program::compile(graph, &powers, total)), true));
         }
     }
     is_sum(graph, inflow, constants, sums).then(|| {
         let factor = Program::compile(graph, &[factor], total);
-        (Law::Sum { factor, inflow: Program::compile(graph, &[inflow], total) }, true)
+        (SolutionForm::Sum { factor, inflow: Program::compile(graph, &[inflow], total) }, true)
     })
 }
 
-/// The law of a parameter that follows curves, growth functions of time, or a growth law.
+/// The form of a parameter that follows curves, growth functions of time, or a growth form.
 fn driven(
     graph: &mut Graph,
     parameter: u32,
     rate: NodeId,
     constants: &Constants,
     total: usize,
-) -> Option<Law> {
+) -> Option<SolutionForm> {
     let is_constant = |v: u32| constants.is_constant(v);
     let form = driven_form(graph, parameter, rate, &is_constant, constants.time as u32)?;
-    Some(Law::Driven(Box::new(form.compile(graph, total))))
+    Some(SolutionForm::Driven(Box::new(form.compile(graph, total))))
 }
 
 /// True if an expression is made of constants, time, exponentials, sines and cosines of time, and parameters that are
@@ -159,7 +167,12 @@ fn affine(graph: &mut Graph, rate: NodeId, constants: &Constants) -> Option<Poly
 }
 
 /// The rates as linear equations, if all are that, with constant coefficients.
-pub fn linear(graph: &mut Graph, rates: &[NodeId], constants: &Constants, total: usize) -> Option<Linear> {
+pub fn linear(
+    graph: &mut Graph,
+    rates: &[NodeId],
+    constants: &Constants,
+    total: usize,
+) -> Option<LinearRates> {
     let zero = graph.constant(0.0);
     let (mut variables, mut roots) = (Vec::new(), Vec::new());
     for &rate in rates {
@@ -174,7 +187,7 @@ pub fn linear(graph: &mut Graph, rates: &[NodeId], constants: &Constants, total:
         }
         variables.push(row);
     }
-    Some(Linear { variables, coefficients: Program::compile(graph, &roots, total) })
+    Some(LinearRates { variables, coefficients: Program::compile(graph, &roots, total) })
 }
 
 /// Partial derivatives of expressions, one row each, by what changes.
