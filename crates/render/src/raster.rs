@@ -142,6 +142,57 @@ pub(super) fn nearest(
     (numbers, depths)
 }
 
+/// The nearest triangles at sixteen samples of some pixels, as of [`nearest`]. `places` has for each pixel its place in the
+/// answer, of `chosen` pixels; or anything greater.
+pub(super) fn samples(
+    [width, height]: [usize; 2],
+    count: usize,
+    corners: impl Fn(usize) -> [Corner; 3],
+    places: &[u32],
+    chosen: usize,
+) -> Vec<[u32; 16]> {
+    let mut numbers = vec![[0; 16]; chosen];
+    let mut depths = vec![[f32::NEG_INFINITY; 16]; chosen];
+    for number in 0..count {
+        let Some(triangle) = Triangle::new(&SIXTEEN, number, corners(number), width, height) else {
+            continue;
+        };
+        let [least, greatest] = triangle.depths;
+        let [origin, right, down] = triangle.depth;
+        let largest = triangle.at_samples.map(|at| at.iter().copied().max().unwrap_or(0));
+        for row in triangle.rows[0]..=triangle.rows[1] {
+            for column in triangle.columns[0]..=triangle.columns[1] {
+                let place = places[row * width + column] as usize;
+                let (Some(numbers), Some(depths)) = (numbers.get_mut(place), depths.get_mut(place)) else {
+                    continue;
+                };
+                let corner = [0, 1, 2].map(|k| {
+                    let [a, b, c] = triangle.sides[k];
+                    a * (column as i64 * STEPS) + b * (row as i64 * STEPS) + c + triangle.bias[k]
+                });
+                if (0..3).any(|k| corner[k] + largest[k] < 0) {
+                    continue;
+                }
+                for (s, (x, y)) in SIXTEEN.into_iter().enumerate() {
+                    let at = &triangle.at_samples;
+                    if (corner[0] + at[0][s]) | (corner[1] + at[1][s]) | (corner[2] + at[2][s]) < 0 {
+                        continue;
+                    }
+                    let offset = |k: i64| (k as f64 + 8.5) / 16.0;
+                    let depth =
+                        origin + right * (column as f64 + offset(x)) + down * (row as f64 + offset(y));
+                    let depth = depth.clamp(least, greatest) as f32;
+                    if depth + EQUAL >= depths[s] {
+                        depths[s] = depth.max(depths[s]);
+                        numbers[s] = number as u32 + 1;
+                    }
+                }
+            }
+        }
+    }
+    numbers
+}
+
 /// Weights of corners in the middle of pixels, of one triangle after another.
 #[derive(Default)]
 pub(super) struct Weights {

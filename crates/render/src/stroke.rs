@@ -14,8 +14,8 @@ use dlsys_geometry::scene::{Color, Point, Scene, Segment};
 
 /// Stems thinner than this part of the picture's larger side (2.5 pixels of 1000) have one colour.
 const THIN: f64 = 0.0025;
-/// Stems thinner than this part are lines also where surfaces are regions: 1.2 pixels of 1000.
-const HAIR: f64 = 0.0012;
+/// Stems thinner than this part are lines also where surfaces are regions: 2 pixels of 1000.
+const HAIR: f64 = 0.002;
 /// Places across a stem at which its colour is given: its edges are at -1 and 1.
 const PLACES: [f64; 5] = [-1.0, -0.55, 0.0, 0.55, 1.0];
 /// Least cosine of the angle between two pieces of a straight line.

@@ -1,24 +1,26 @@
 //! Outlines of sets of cells: followed along the edges of cells, then simplified.
 
 /// A rectangle of cells, each inside or outside of a set.
-pub struct Mask<'a> {
+pub struct Mask<'a, F> {
     pub width: usize,
     pub height: usize,
     pub inside: &'a [bool],
+    /// The part of a cell that the set covers, from 0 to 1.
+    pub covered: F,
 }
 
 /// A corner of an outline, in cells from the upper left corner of the mask.
 pub type Corner = [f64; 2];
 
-impl Mask<'_> {
+impl<F: Fn(usize) -> f64> Mask<'_, F> {
     fn at(&self, x: i64, y: i64) -> bool {
         (0..self.width as i64).contains(&x)
             && (0..self.height as i64).contains(&y)
             && self.inside[y as usize * self.width + x as usize]
     }
 
-    /// All outlines of the set, those of holes included: through the middles of the edges between cells inside and outside,
-    /// each simplified so that no middle is further than `tolerance` cells from it.
+    /// All outlines of the set, those of holes included: between the centres of cells inside and outside, where the set ends by
+    /// the parts that it covers; each simplified so that no such place is further than `tolerance` cells from it.
     pub fn outlines(&self, tolerance: f64) -> Vec<Vec<Corner>> {
         // An edge below a cell outside and above one inside, by cell: the outline goes to the right there.
         let mut begun = vec![false; self.width * (self.height + 1)];
@@ -36,6 +38,24 @@ impl Mask<'_> {
         outlines
     }
 
+    /// Where the set ends between the centres of the two cells beside an edge, which goes from a lattice point in a direction.
+    fn crossing(&self, [x, y]: [i64; 2], [dx, dy]: [i64; 2]) -> Corner {
+        let cell = |side: i64| {
+            let (cx, cy) = (dx - dy * side, dy + dx * side);
+            [x + (cx - 1).div_euclid(2), y + (cy - 1).div_euclid(2)]
+        };
+        let (inner, outer) = (cell(1), cell(-1));
+        let covered = |[x, y]: [i64; 2]| {
+            let within = (0..self.width as i64).contains(&x) && (0..self.height as i64).contains(&y);
+            if within { (self.covered)(y as usize * self.width + x as usize) } else { 0.0 }
+        };
+        let (a, b) = (covered(inner), covered(outer));
+        // Where both are covered the set ends at a shade.
+        let t = if b > 0.99 { 0.5 } else { (a.max(0.5) - 0.5) / (a.max(0.5) - b.min(0.5)).max(1e-9) };
+        let t = if a.max(0.5) == b.min(0.5) { 0.5 } else { t };
+        [0, 1].map(|k| inner[k] as f64 + 0.5 + t * (outer[k] - inner[k]) as f64)
+    }
+
     /// The middles of the edges of the outline that begins with the upper edge of a cell, the set being on the right.
     fn follow(&self, x: i64, y: i64, begun: &mut [bool]) -> Vec<Corner> {
         let start = (x, y, (1, 0));
@@ -47,7 +67,7 @@ impl Mask<'_> {
             if direction == (1, 0) {
                 begun[y as usize * self.width + x as usize] = true;
             }
-            middles.push([x as f64 + 0.5 * dx as f64, y as f64 + 0.5 * dy as f64]);
+            middles.push(self.crossing([x, y], [dx, dy]));
             (x, y) = (x + dx, y + dy);
             // The two cells ahead, on the left and on the right of the direction.
             let ahead = |side: i64| {
@@ -107,7 +127,8 @@ mod tests {
 
     fn mask(rows: &[&str]) -> Vec<Vec<Corner>> {
         let inside: Vec<bool> = rows.iter().flat_map(|row| row.bytes().map(|b| b == b'#')).collect();
-        Mask { width: rows[0].len(), height: rows.len(), inside: &inside }.outlines(0.4)
+        let covered = |i: usize| f64::from(u8::from(inside[i]));
+        Mask { width: rows[0].len(), height: rows.len(), inside: &inside, covered }.outlines(0.4)
     }
 
     fn area(outline: &[Corner]) -> f64 {
@@ -117,11 +138,11 @@ mod tests {
 
     #[test]
     fn a_square_keeps_its_place_and_its_hole() {
-        let outlines = mask(&["######", "######", "##..##", "##..##", "######", "######"]);
+        let outlines = mask(&["########", "########", "##....##", "##....##", "##....##", "##....##", "########", "########"]);
         assert_eq!(outlines.len(), 2);
         // The corners of a cell are cut.
-        assert!((area(&outlines[0]) - 36.0).abs() <= 1.0, "{outlines:?}");
-        assert!((area(&outlines[1]) + 4.0).abs() <= 1.0, "{outlines:?}");
+        assert!((area(&outlines[0]) - 64.0).abs() <= 1.0, "{outlines:?}");
+        assert!((area(&outlines[1]) + 16.0).abs() <= 1.5, "{outlines:?}");
     }
 
     #[test]
@@ -130,11 +151,21 @@ mod tests {
     }
 
     #[test]
+    fn an_edge_is_where_the_covered_parts_say() {
+        let inside = [true, true, false, true, true, false];
+        let covered = |i: usize| [1.0, 0.75, 0.0][i % 3];
+        let outlines = Mask { width: 3, height: 2, inside: &inside, covered }.outlines(0.1);
+        let right = outlines[0].iter().fold(0.0_f64, |right, p| right.max(p[0]));
+        assert!((right - 1.75).abs() < 0.1, "{outlines:?}");
+    }
+
+    #[test]
     fn a_slanted_edge_is_one_line() {
         let rows: Vec<String> = (0..40).map(|y| "#".repeat(20 + y / 4) + &".".repeat(20 - y / 4)).collect();
         let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
         let inside: Vec<bool> = rows.iter().flat_map(|row| row.bytes().map(|b| b == b'#')).collect();
-        let outlines = Mask { width: 40, height: 40, inside: &inside }.outlines(0.75);
+        let covered = |i: usize| f64::from(u8::from(inside[i]));
+        let outlines = Mask { width: 40, height: 40, inside: &inside, covered }.outlines(0.75);
         assert!(outlines.len() == 1 && outlines[0].len() <= 6, "{outlines:?}");
     }
 }

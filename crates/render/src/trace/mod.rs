@@ -22,8 +22,8 @@ use contour::Corner;
 use dlsys_geometry::scene::{MaterialId, OwnerId, Point, Scene, Segment, Width};
 use regions::{NOTHING, Regions};
 
-/// Cells on the larger side of a picture: two and a half for each of a thousand pixels.
-const CELLS: f64 = 2500.0;
+/// Cells on the larger side of a picture: two for each of a thousand pixels.
+const CELLS: f64 = 2000.0;
 /// Shades between black and a colour as it is.
 const SHADES: f64 = 20.0;
 /// A scene of more triangles has its elements painted one by one.
@@ -78,9 +78,16 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
     order.iter().zip(0..).for_each(|(number, rank)| ranks[*number as usize] = rank);
     labels.iter_mut().filter(|label| **label != NOTHING).for_each(|label| *label = ranks[*label as usize]);
     found.sort_by_key(|(key, ..)| *key);
-    let modules: Vec<(OwnerId, MaterialId)> = found.iter().map(|(key, ..)| (key.0, key.1)).collect();
-    let mut regions = Regions { width: size[0], height: size[1], labels };
-    regions.without_specks(|label| modules.partition_point(|m| *m < modules[label as usize]) as u32);
+    let (items, of_item) = items(&found);
+    let item_of = |number: u32| match (number as usize).checked_sub(1) {
+        Some(n) => of_item.get(&(mesh.faces[n].owner, mesh.faces[n].material)).copied().unwrap_or(NOTHING),
+        None => NOTHING,
+    };
+    let (places, chosen) = edges(size, &numbers, item_of);
+    let samples = raster::samples(size, mesh.faces.len(), |n| lit.corners(n), &places, chosen);
+    let samples = samples.into_iter().map(|samples| samples.map(item_of)).collect();
+    let mut regions = Regions { width: size[0], height: size[1], labels, places, samples, items };
+    regions.without_specks();
     let outlines = regions.outlines(found.len());
 
     let mut page = PageWriter { style, names: named.then(|| Names::new(scene, '-')), out: String::new() };
@@ -100,6 +107,50 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
 
     let visible = Visible { style, depths: &depths, size, placement };
     Some(page.with_strokes(scene, &visible, prefix))
+}
+
+/// The item (module and material) of each region, by number in the order of painting; and the number of each item.
+fn items(found: &[(Key, f64, usize)]) -> (Vec<u32>, HashMap<(OwnerId, MaterialId), u32>) {
+    let mut numbers: HashMap<(OwnerId, MaterialId), u32> = HashMap::new();
+    let items = found
+        .iter()
+        .map(|(key, ..)| {
+            let next = numbers.len() as u32;
+            *numbers.entry((key.0, key.1)).or_insert(next)
+        })
+        .collect();
+    (items, numbers)
+}
+
+/// For each cell beside one of another item its number among these cells, else a number that is greater than any; and their count.
+fn edges([width, height]: [usize; 2], numbers: &[u32], item_of: impl Fn(u32) -> u32) -> (Vec<u32>, usize) {
+    let items: Vec<u32> = {
+        let (mut last, mut item) = (0, item_of(0));
+        let of = |number: &u32| {
+            if *number != last {
+                (last, item) = (*number, item_of(*number));
+            }
+            item
+        };
+        numbers.iter().map(of).collect()
+    };
+    let mut places = vec![u32::MAX; items.len()];
+    let mut count = 0;
+    for row in 0..height {
+        for column in 0..width {
+            let cell = row * width + column;
+            let differs = |other: usize| items[other] != items[cell];
+            let is_edge = column > 0 && differs(cell - 1)
+                || column + 1 < width && differs(cell + 1)
+                || row > 0 && differs(cell - width)
+                || row + 1 < height && differs(cell + width);
+            if is_edge {
+                places[cell] = count as u32;
+                count += 1;
+            }
+        }
+    }
+    (places, count)
 }
 
 /// Writes the elements.

@@ -13,7 +13,7 @@ const MARGIN: usize = 3;
 /// Regions of fewer cells are given to a neighbour.
 const SPECK: usize = 4;
 /// The distance of outlines from the edges of cells, in cells.
-const TOLERANCE: f64 = 0.7;
+const TOLERANCE: f64 = 0.4;
 
 /// No region.
 pub const NOTHING: u32 = u32::MAX;
@@ -24,6 +24,12 @@ pub struct Regions {
     pub height: usize,
     /// By cell; [`NOTHING`] for the background.
     pub labels: Vec<u32>,
+    /// By cell: its place in `samples`, if it is at the edge of an item; or anything greater.
+    pub places: Vec<u32>,
+    /// Items at the samples of cells, in the order of painting.
+    pub samples: Vec<[u32; 16]>,
+    /// By region: its item.
+    pub items: Vec<u32>,
 }
 
 /// The cells that a region may touch: first column and row, and those after the last.
@@ -37,7 +43,7 @@ struct Bounds {
 
 impl Regions {
     /// Gives specks to a neighbour, so that noise of shading makes no outlines.
-    pub fn without_specks(&mut self, of_module: impl Fn(u32) -> u32) {
+    pub fn without_specks(&mut self) {
         let mut seen = vec![false; self.labels.len()];
         let mut stack = Vec::new();
         let mut cells = Vec::new();
@@ -60,7 +66,9 @@ impl Regions {
                             seen[next] = true;
                             stack.push(next);
                         }
-                    } else if cells.len() <= SPECK && other != NOTHING && of_module(other) == of_module(label)
+                    } else if cells.len() <= SPECK
+                        && other != NOTHING
+                        && self.items[other as usize] == self.items[label as usize]
                     {
                         *beside.entry(other).or_default() += 1;
                     }
@@ -113,7 +121,19 @@ impl Regions {
         let later: Vec<bool> = (0..width * height).map(|i| is_later(label_at(i))).collect();
         spread(&mut inside, &later, width);
         fill_holes(&mut inside, &later, width);
-        let mask = Mask { width, height, inside: &inside };
+        // The part of a cell that this item covers, or one that is painted later.
+        let item = self.items[label as usize];
+        let covered = |i: usize| {
+            let cell = (top + i / width) * self.width + left + i % width;
+            match self.samples.get(self.places[cell] as usize) {
+                Some(samples) => {
+                    let count = samples.iter().filter(|other| **other != NOTHING && **other >= item).count();
+                    count as f64 / 16.0
+                }
+                None => f64::from(u8::from(inside[i])),
+            }
+        };
+        let mask = Mask { width, height, inside: &inside, covered };
         let mut outlines = mask.outlines(TOLERANCE);
         for corner in outlines.iter_mut().flatten() {
             *corner = [corner[0] + left as f64, corner[1] + top as f64];
