@@ -11,7 +11,7 @@ use dlsys_syntax::ast::{ExprId, Expressions};
 use dlsys_syntax::print;
 
 impl Scope {
-    /// The value of a `match`: its number, its cases and the value otherwise. `done` gives the parts, already lowered.
+    /// Lowers a `match`: its number, its cases and the default. `done` gives the lowered parts.
     pub(super) fn choice(
         &mut self,
         all: &Expressions,

@@ -1,4 +1,4 @@
-//! Which kinds of modules contexts, aggregates, `ignore` and `consider` name.
+//! Resolution of the names in contexts, aggregates, `ignore` and `consider` to kinds of modules.
 
 use std::collections::{HashMap, HashSet};
 
@@ -9,7 +9,7 @@ use dlsys_diagnostic::Diagnostic;
 use dlsys_model::{Class, KindId, Kinds, Pattern, class_of};
 use dlsys_syntax::ast;
 
-/// Kinds by the names that a context can call them.
+/// Kinds by the names that patterns can use for them.
 struct ByName<'k> {
     exact: HashMap<&'k str, Vec<KindId>>,
     base: HashMap<&'k str, Vec<KindId>>,
@@ -25,7 +25,7 @@ impl<'k> ByName<'k> {
         index
     }
 
-    /// A name without `_` stands for all kinds with that base name, any other for itself.
+    /// The kinds of a name: without `_`, all kinds with that base name; otherwise those with the name itself.
     fn matching(&self, name: &str) -> &[KindId] {
         let exact = class_of(name) != Class::Word || name.contains('_');
         let index = if exact { &self.exact } else { &self.base };
@@ -33,7 +33,7 @@ impl<'k> ByName<'k> {
     }
 }
 
-/// Matches the modules of contexts and aggregates to kinds, and reports those that nothing can match.
+/// Resolves the modules of contexts and aggregates to kinds, and reports those that nothing can match.
 pub fn resolve_all(
     kinds: &Kinds,
     rules: Vec<DeclaredRule>,
@@ -95,7 +95,7 @@ fn resolve(
     pattern
 }
 
-/// `ignore` and `consider`.
+/// Applies `ignore` and `consider` to the kinds.
 pub fn filter(
     kinds: &mut Kinds,
     ignored: &[&ast::Name],

@@ -3,7 +3,7 @@
 //! ```text
 //! xmin xmax  ymin ymax  zmin zmax          the box around the control points; not needed
 //! PRECISION S: 5 T: 5                      optional; not needed
-//! CONTACT POINT X: 0 Y: 0 Z: 0             where the turtle stands
+//! CONTACT POINT X: 0 Y: 0 Z: 0             the position of the turtle
 //! END POINT X: 0 Y: 1 Z: 0                 not needed
 //! HEADING X: 0 Y: 1 Z: 0                   the turtle's axes
 //! UP X: 0 Y: 0 Z: 1
@@ -16,7 +16,7 @@
 //! x y z  x y z  x y z  x y z               four rows of four control points
 //! ```
 //!
-//! A file of stedit begins with `VERSION stedit`. Numbers may be spread over lines as one likes.
+//! A file of stedit begins with `VERSION stedit`. Line breaks between numbers have no meaning.
 
 use super::{PART_LIMIT, SurfaceError, number, shown};
 use dlsys_model::{Net, SurfaceShape};
@@ -24,7 +24,7 @@ use dlsys_model::{Net, SurfaceShape};
 /// The words of a file, with their lines.
 struct Words<'t> {
     words: std::iter::Peekable<Box<dyn Iterator<Item = (usize, &'t str)> + 't>>,
-    /// Of the last word.
+    /// The line of the last word.
     line: usize,
 }
 
@@ -50,7 +50,7 @@ impl<'t> Words<'t> {
         Ok(word)
     }
 
-    /// Takes words that must stand here.
+    /// Consumes the given words; any other word is an error.
     fn expect(&mut self, words: &str) -> Result<(), SurfaceError> {
         for wanted in words.split(' ') {
             let word = self.next(&format!("`{words}`"))?;
