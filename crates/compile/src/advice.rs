@@ -81,7 +81,7 @@ pub fn not_a_parameter(name: &Name, head: &HeadModule, variables: &Variables) ->
     }
     if variables.names.contains_key(&name.text) && !RESERVED.contains(&&*name.text) {
         return error
-            .help("this is a parameter of a neighbour; its equation belongs into the neighbour's rule");
+            .help("this is a parameter of a neighbour; its equation belongs in the neighbour's rule");
     }
     error.help(did_you_mean(&name.text, known).unwrap_or_else(|| {
         let more = head_and(head, &name.text);
@@ -184,7 +184,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn second_names_count_on() {
+    fn numbered_names_count_up() {
         assert_eq!(numbered("k"), "k_2");
         assert_eq!(numbered("x_max"), "x_max_2");
         assert_eq!(numbered("s_2"), "s_3");

@@ -117,7 +117,7 @@ fn surface(
     if COMMAND_SURFACES.iter().any(|(command, _)| *command == &*name.text) {
         scope.diagnostics.push(
             Diagnostic::error(format!("`{}` cannot be a surface", name.text))
-                .at(name.span, "this name tells the turtle something else")
+                .at(name.span, "this name is a command of the turtle")
                 .help("choose another name"),
         );
         return None;
@@ -196,7 +196,7 @@ fn contour(
     } else {
         return Some(values);
     };
-    scope.diagnostics.push(Diagnostic::error("this contour cannot be").at(span, fault).help(help));
+    scope.diagnostics.push(Diagnostic::error("this contour is invalid").at(span, fault).help(help));
     None
 }
 
@@ -230,7 +230,7 @@ fn bend(
 pub fn unused_surfaces(appearance: &Appearance, is_used: impl Fn(&str) -> bool, scope: &mut Scope) {
     for shape in appearance.surfaces.iter().filter(|shape| !is_used(&shape.name)) {
         scope.diagnostics.push(
-            Diagnostic::warning(format!("nobody uses the surface `{}`", shape.name))
+            Diagnostic::warning(format!("the surface `{}` is not used", shape.name))
                 .at(shape.span, "declared here")
                 .help(format!("draw it: `{}` in a string, or remove this line", shape.name)),
         );

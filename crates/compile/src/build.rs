@@ -301,7 +301,7 @@ fn check_frames(&Frames { from, to, step }: &Frames, span: Span, scope: &mut Sco
     } else {
         return;
     };
-    scope.diagnostics.push(Diagnostic::error("these frames cannot be").at(span, fault).help(help));
+    scope.diagnostics.push(Diagnostic::error("these frames are invalid").at(span, fault).help(help));
 }
 
 /// Warns of unused constants and functions.
@@ -336,7 +336,7 @@ fn unused(document: &Document, scope: &mut Scope) {
         let text: &Arc<str> = &name.text;
         if !scope.used.contains(text) {
             scope.diagnostics.push(
-                Diagnostic::warning(format!("nobody uses the {what} `{text}`"))
+                Diagnostic::warning(format!("the {what} `{text}` is not used"))
                     .at(name.span, "declared here")
                     .help(format!("{use_it}, or remove this line")),
             );

@@ -111,7 +111,7 @@ fn shadowed_rule(model: &Model, index: usize, own: &[KindId], diagnostics: &mut 
             }
             diagnostics.push(
                 Diagnostic::error("two rules have the same head")
-                    .at(rule.span, "this one never has its turn")
+                    .at(rule.span, "this one is never reached")
                     .at(before.span, "this one comes first")
                     .help("write all clauses under one head"),
             );
@@ -119,9 +119,9 @@ fn shadowed_rule(model: &Model, index: usize, own: &[KindId], diagnostics: &mut 
         }
         diagnostics.push(
             Diagnostic::warning("this rule can never be reached")
-                .at(rule.span, "whenever its context is there, so is that of the rule before it")
+                .at(rule.span, "whenever its context matches, so does that of the rule before it")
                 .at(before.span, "this rule comes first")
-                .help("of several rules the first whose context is there applies: put the special one first"),
+                .help("of several rules the first whose context matches applies: put the special one first"),
         );
     }
 }
@@ -151,11 +151,11 @@ fn clauses(rule: &Rule, diagnostics: &mut Vec<Diagnostic>) {
                     "this clause can never be reached"
                 };
                 diagnostics.push(
-                    Diagnostic::error(message).at(*span, "this one never has its turn").at(*first, why).help(
+                    Diagnostic::error(message).at(*span, "this one is never reached").at(*first, why).help(
                         if kind == "solve" {
                             "write the equations in one clause, with commas: `solve dx/dt = …, dy/dt = …`"
                         } else {
-                            "of several productions that hold at once, the first written wins"
+                            "of several productions that hold at once, the first one written applies"
                         },
                     ),
                 );
@@ -207,14 +207,14 @@ pub fn period(declared: Option<(f64, Span)>, model: &Model, diagnostics: &mut Ve
     let Some((period, span)) = declared else { return };
     if period <= 0.0 {
         diagnostics.push(
-            Diagnostic::error("this period cannot be")
-                .at(span, format!("it is {period}; steps need time to pass between them"))
+            Diagnostic::error("this period is invalid")
+                .at(span, format!("it is {period}; a period is greater than 0"))
                 .help("discrete rules apply at t = P, 2P, …: `period 1`"),
         );
     } else if model.rules.iter().all(|rule| !rule.discrete) {
         diagnostics.push(
             Diagnostic::warning("no rule has a period")
-                .at(span, "it is that of discrete rules, and there is none")
+                .at(span, "it applies to discrete rules, and the model has none")
                 .help("a discrete rule is written `A(x) : x > 3 -> F(x) A(x/2)`"),
         );
     }
@@ -319,7 +319,9 @@ pub fn inert_modules(model: &Model, occurs: &HashMap<KindId, Span>, diagnostics:
                     diagnostics.push(
                         Diagnostic::warning(format!("module `{name}` does nothing"))
                             .at(first(), "no rule, no drawing, no context mentions it")
-                            .help(format!("if it only marks a place, say so: `interpret {name}: ε`")),
+                            .help(format!(
+                                "a module that only marks a place is declared with `interpret {name}: ε`"
+                            )),
                     );
                 }
             }

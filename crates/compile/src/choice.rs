@@ -28,7 +28,7 @@ impl Scope {
             if let Some(before) = seen.insert(case, value) {
                 self.diagnostics.push(
                     Diagnostic::error("two cases of one `match` are alike")
-                        .at(all.span(value), "this one never has its turn")
+                        .at(all.span(value), "this one is never reached")
                         .at(all.span(before), "this one comes first")
                         .help("take one of them out, or give it another value"),
                 );

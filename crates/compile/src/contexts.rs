@@ -45,7 +45,7 @@ pub fn resolve_all(
     let mut resolved = Vec::with_capacity(rules.len());
     for declared in rules {
         let mut side = |patterns: &[DeclaredPattern]| -> Vec<Pattern> {
-            patterns.iter().map(|pattern| find(pattern, "this context is never there")).collect()
+            patterns.iter().map(|pattern| find(pattern, "this context never matches")).collect()
         };
         let (left, right) = (side(&declared.left), side(&declared.right));
         let never = "nothing of this name is ever attached to a module";
@@ -74,7 +74,7 @@ fn resolve(
                 kind.name,
                 plural(kind.arity, "parameter"),
             ))
-            .at(head.span, "the number of parameters must agree, or the context is never there")
+            .at(head.span, "the number of parameters must agree, or the context never matches")
             .help(format!("name each of them, used or not: `{}`", advice::head_with(head, kind.arity))),
             None => Diagnostic::warning(format!("there is no module `{name}`"))
                 .at(head.span, never)

@@ -37,7 +37,7 @@ impl Scope {
                 self.diagnostics.push(
                     Diagnostic::error(error)
                         .at(name.span, "this one")
-                        .help("numbers in such numbers are a `table` from a file"),
+                        .help("an array of this size is a `table` from a file"),
                 );
             }
             values.len() <= MAX_ELEMENTS
@@ -237,7 +237,7 @@ impl Scope {
                 }
                 let why = match known.periodic {
                     true => "it is periodic: it takes each value again and again",
-                    false => "it does not go one way only: it takes some value more than once",
+                    false => "it is not monotone: it takes some value more than once",
                 };
                 self.diagnostics.push(
                     Diagnostic::error(format!("the curve `{}` has no inverse", known.name))
@@ -340,7 +340,7 @@ impl Scope {
         let near = did_you_mean(name, known.chain(dlsys_syntax::library_names()));
         let error = Diagnostic::error(format!("`{name}` is no curve and no function of this model"));
         let help = near.or_else(|| Some(format!("declare it: `curve {name} = (0, 0) (1, 0.3) (2, 1)`")));
-        self.diagnostics.push(error.at(at, format!("`{what}` is asked of it")).help_opt(help));
+        self.diagnostics.push(error.at(at, format!("`{what}` needs a curve or a function")).help_opt(help));
         None
     }
 

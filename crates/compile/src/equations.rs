@@ -239,7 +239,7 @@ impl RuleBuilder<'_> {
                     Diagnostic::error("these equations cannot determine their parameters")
                         .at(zero.span, "every parameter in this one is needed for another")
                         .at(clause, "in these equations")
-                        .help("some parameter must stand in more of the equations: as it is, they contradict one another, or one of them says nothing new"),
+                        .help("some parameter must stand in more of the equations: as it is, they contradict one another, or one of them follows from the others"),
                 );
                 return None;
             }
@@ -281,7 +281,7 @@ impl RuleBuilder<'_> {
         };
         let help = match free.first() {
             None => "a parameter that has a rate or a value has its equation already; an equation that holds between such parameters must be differentiated by hand until it contains the unknown (index 1)".to_owned(),
-            Some(p) => format!("say so: `0 = … for {}`", head.parameters[*p].text),
+            Some(p) => format!("name the parameter: `0 = … for {}`", head.parameters[*p].text),
         };
         self.error(
             Diagnostic::error("it is not clear which parameters the equations are to be solved for")

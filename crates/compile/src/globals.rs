@@ -308,10 +308,9 @@ fn circle(global: &Global, path: &[&Global], span: Span) -> Diagnostic {
         path.splice(4..path.len() - 3, ["…"]);
     }
     let (what, help) = match global.kind {
-        GlobalKind::Def(..) => (
-            "calls itself",
-            "write it without itself; what is repeated in time belongs into rules".to_owned(),
-        ),
+        GlobalKind::Def(..) => {
+            ("calls itself", "write it without itself; what is repeated in time belongs in rules".to_owned())
+        }
         _ => ("depends on itself", format!("give one of them a number, such as `const {name} = 1`")),
     };
     Diagnostic::error(format!("`{name}` {what}"))

@@ -45,7 +45,7 @@ impl RuleBuilder<'_> {
         for (name, _) in &rule.locals {
             if good && !used(&name.text) {
                 self.scope.diagnostics.push(
-                    Diagnostic::warning(format!("nobody uses the name `{}`", name.text))
+                    Diagnostic::warning(format!("the name `{}` is not used", name.text))
                         .at(name.span, "declared here")
                         .help("use it in a clause of this rule, or leave the line out"),
                 );

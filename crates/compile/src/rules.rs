@@ -141,7 +141,7 @@ impl<'b> RuleBuilder<'b> {
         if let Some(cut) = drawn.iter().find(|module| &*module.name == CUT) {
             self.error(
                 Diagnostic::error("a drawing cuts nothing off")
-                    .at(cut.span, "`%` belongs into the successors of rules")
+                    .at(cut.span, "`%` belongs in the successors of rules")
                     .help("to draw nothing, write `ε`"),
             );
         }
@@ -174,7 +174,7 @@ fn draws_nothing(module: &ast::Module, head: &HeadModule) -> Diagnostic {
     let name = &module.name;
     let arguments = if head.parameters.is_empty() { "" } else { "(…)" };
     Diagnostic::warning(format!("`{name}` draws nothing in its own drawing"))
-        .at(module.span, format!("inside its own drawing a module is what its name says, and `{name}` says nothing to the turtle"))
+        .at(module.span, format!("inside its own drawing a module is drawn by its name, and the turtle draws nothing for `{name}`"))
         .help(format!(
             "drawings do not repeat themselves: let a rule make the parts, `{}: … produce F(1) {name}{arguments}`, or draw a module with another name",
             print::head_module(head)

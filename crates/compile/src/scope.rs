@@ -464,7 +464,7 @@ impl Scope {
             Some(later) => Diagnostic::error(format!("`{name}` is not known yet"))
                 .at(span, "used here")
                 .at(*later, "declared here")
-                .help("a `let` is known to what stands after it: change their order"),
+                .help("a `let` is known only to the lines after it: change their order"),
             None => error,
         };
         self.diagnostics.push(error);

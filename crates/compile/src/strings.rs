@@ -62,7 +62,7 @@ impl RuleBuilder<'_> {
             let mut spans = all.iter().filter_map(of);
             let first = spans.next().unwrap_or_default();
             self.error(
-                Diagnostic::error("these weights cannot be")
+                Diagnostic::error("these weights are invalid")
                     .at(spans.fold(first, |a, b| a.to(b)), why)
                     .help("weights are at least 0, and one of them is greater; they need not add up to 1"),
             );

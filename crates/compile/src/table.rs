@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn spreadsheets_write_many_ways() {
+    fn tables_are_read_in_the_formats_of_spreadsheets() {
         let wanted = [[0.0, 1.5], [1.0, 2.0]];
         assert_eq!(points("0,1.5\n1,2\n", None), wanted);
         assert_eq!(points("\u{feff}day;mass\r\n0; 1.5\r\n1;2\r\n", None), wanted);
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_say_where() {
+    fn errors_have_their_place() {
         let fault = |text: &str, column| parse(text, column).expect_err("a bad table");
         assert_eq!(fault("", None).what, "the file has no rows");
         assert_eq!(fault("0,1\n1,x\n", None).line, Some(2));

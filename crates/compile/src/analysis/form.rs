@@ -280,7 +280,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn zero_is_told_from_small() {
+    fn zero_is_distinguished_from_small_numbers() {
         // (1 - x)^2 at 1 - 1e-8 is small; 1 - x/3 at 3 is zero, and so is 0.3 - 0.1 x.
         let mut g = Graph::default();
         let (x, one, three) = (g.var(0), g.constant(1.0), g.constant(3.0));
@@ -300,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cancels_for_all_arguments_vanishes() {
+    fn terms_that_cancel_for_all_arguments_vanish() {
         let mut g = Graph::default();
         let (x, t) = (g.var(0), g.var(1));
         let (a, b) = (g.unary(Unary::Sin, x), g.unary(Unary::Sin, t));

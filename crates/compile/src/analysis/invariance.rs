@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn the_limit_of_logistic_growth_is_never_reached_but_what_is_below_is() {
+    fn limit_of_logistic_growth_is_unreachable_and_thresholds_below_are_not() {
         let mut g = Graph::default();
         let rate = logistic(&mut g);
         let (x, limit, below) = (g.var(0), g.constant(3.0), g.constant(3.0 * (1.0 - 2f64.powi(-40))));
@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn what_ends_in_finite_time_arrives() {
+    fn solutions_that_end_in_finite_time_reach_the_end() {
         let mut g = Graph::default();
         let (x, zero) = (g.var(0), g.constant(0.0));
         let root = g.unary(dlsys_expr::Unary::Sqrt, x);
@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn growth_that_ends_on_its_threshold_arrives() {
+    fn growth_that_ends_on_its_threshold_reaches_it() {
         // x' = (1 - age) age, which is zero at age 1 but not on the whole surface x = 1/6.
         let mut g = Graph::default();
         let (x, age, one, sixth) = (g.var(0), g.var(2), g.constant(1.0), g.constant(1.0 / 6.0));
@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn a_threshold_short_of_a_limit_is_told_from_the_limit() {
+    fn threshold_just_below_a_limit_is_distinguished_from_it() {
         let mut g = Graph::default();
         let (x, one, t) = (g.var(0), g.constant(1.0), g.var(1));
         let gap = g.binary(Binary::Sub, one, x);

@@ -69,14 +69,14 @@ pub struct Constants<'a> {
     pub own: usize,
     /// Own parameters with an equation.
     of: HashSet<usize>,
-    /// The variables of the context that change.
+    /// By variable of the context, then by aggregate: true if it changes.
     moving: &'a [bool],
     /// Index of `t`; `age` is the next.
     pub time: usize,
 }
 
 impl<'a> Constants<'a> {
-    /// The state without an active clause. `moving` contains the variables of the context that change.
+    /// The state without an active clause. `moving` is true for variables of the context and aggregates that change.
     pub fn at_rest(rule: &DeclaredRule, moving: &'a [bool]) -> Constants<'a> {
         Constants { own: rule.own(), of: HashSet::new(), moving, time: rule.time() }
     }

@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn faces_have_the_colours_of_the_library_beside_the_mesh() {
+    fn faces_have_the_colours_of_the_material_library() {
         let text = "mtllib lost.mtl colours.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n\
                     usemtl red\nf 1 2 3\nusemtl none\nf 1 2 3\nusemtl green\nf 1 2 3\n";
         let library = "newmtl red\nKa 0 0 0\nKd 1 0 0\nnewmtl green\nKd 0 0.5 0\n";
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn polygons_become_triangles_and_negative_numbers_count_back() {
+    fn polygons_become_triangles_and_negative_indices_count_backwards() {
         let text = "# a square\no x\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1 \\\n -1/1\n";
         let shape = parse(text).expect("a mesh");
         assert_eq!(shape.triangles, [[0, 1, 2], [0, 2, 3]]);
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn normals_part_vertices() {
+    fn vertices_with_different_normals_are_separate() {
         let text =
             "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvn 0 0 1\nvn 0 1 0\nf 1//1 2//1 3//1\nf 1//2 4//2 2//2\n";
         let shape = parse(text).expect("a mesh");
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_have_their_line() {
+    fn errors_have_their_line() {
         let fault = |text: &str| parse(text).expect_err("a fault");
         assert_eq!(fault("v 0 0 0\nf 1 2 3").line, Some(2));
         assert_eq!(fault("v 0 0").what, "expected three numbers");

@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn patches_come_in_the_turtles_axes() {
+    fn patches_are_in_the_turtles_axes() {
         let shape = parse(&format!("{HEAD}{PATCH}{}{PATCH}{}", rows(), rows())).expect("a surface");
         assert_eq!(shape.patches.len(), 2);
         // Row 2, column 3: (3, 2, 6), from the contact point (2, 2, 6); heading y, left -x, up z; size 2.
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn stedit_writes_directions_too() {
+    fn directions_written_by_stedit_are_accepted() {
         let patch = PATCH.replace('~', "~ ~");
         let text = format!("VERSION stedit\n{HEAD}{patch}{}", rows());
         assert_eq!(parse(&text).map(|shape| shape.patches.len()), Ok(1));
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_have_their_line() {
+    fn errors_have_their_line() {
         let fault = |text: &str| parse(text).expect_err("a fault");
         assert_eq!(fault("").what, "the file ends where a number is expected");
         assert_eq!(fault(&HEAD.replace("END", "EDN")).line, Some(3));
