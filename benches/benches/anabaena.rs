@@ -1,6 +1,6 @@
 //! The Anabaena listing to t = 575 with criterion: dlsys at an error of 1e-6, and forward Euler at a step of 0.1.
 //!
-//! Forward Euler at that error would run for hours; the `compare` binary extrapolates.
+//! Forward Euler at that error would run for hours; the `compare` binary extrapolates its time.
 
 use std::hint::black_box;
 

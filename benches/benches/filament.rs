@@ -1,6 +1,6 @@
 //! The four filaments with criterion: dlsys and diffsol's best, each at the tolerance that reaches 1e-9.
 //!
-//! For ratios use the `compare` binary, which lets both run in turns.
+//! The `compare` binary measures ratios, with both programs running alternately.
 
 use std::hint::black_box;
 use std::time::Duration;

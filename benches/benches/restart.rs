@@ -1,6 +1,6 @@
-//! Ten thousand restarts with criterion, at errors of 1e-6 and 1e-9 in one life: times are of a whole run.
+//! Ten thousand restarts with criterion, at errors of 1e-6 and 1e-9 in one life. Times are those of a whole run.
 //!
-//! For ratios use the `compare` binary, which lets both run in turns.
+//! The `compare` binary measures ratios, with both programs running alternately.
 
 use std::hint::black_box;
 

@@ -1,6 +1,6 @@
-//! A million modules with criterion: productions, contexts, coupled filaments, frames, reading.
+//! A million modules with criterion: productions, contexts, coupled filaments, frames, parsing.
 //!
-//! For ratios and for their targets use the `scale` binary.
+//! The `scale` binary measures ratios and compares them with their targets.
 
 use std::hint::black_box;
 

@@ -1,7 +1,7 @@
 //! The Anabaena listing up to t = 575, with dlsys's own method and with forward Euler and located events.
 //!
-//! The states that both are compared with are those of the project's tests: one global system, DOP853 at 1e-12, a
-//! root for every event.
+//! The reference states are those of the project's tests: one global system, DOP853 at 1e-12, a root search for every
+//! event.
 
 use dlsys::session::Session;
 use dlsys::sim::{Method, Settings, Stats};
@@ -43,7 +43,7 @@ impl Anabaena {
         Ok(Anabaena { session: solver::session(&read(MODEL)?)?, states })
     }
 
-    /// What is timed: a simulation from its start to `t`.
+    /// The timed run: a simulation from its start to `t`.
     pub fn run(&self, settings: Settings, t: f64) -> Result<(ModuleString, Stats), String> {
         let mut simulation = self.session.simulate(settings).map_err(|e| e.to_string())?;
         let mut string = ModuleString::default();

@@ -1,6 +1,6 @@
-//! A plant written with curves, arrays, `match`, `let` and growth functions, and the same plant simplified by hand: a rule
-//! for each number that an array or a `match` would give, curves as cubic polynomials behind `if`, the growth law as the
-//! polynomial that it is.
+//! A plant written with curves, arrays, `match`, `let` and growth functions, and the same plant simplified by hand, with a
+//! rule for each element of an array and each case of a `match`, piecewise cubic polynomials for curves, and polynomials
+//! for growth laws.
 
 use std::fmt::Write;
 

@@ -1,7 +1,7 @@
 //! The filament with linear diffusion, solved exactly by sine modes.
 //!
 //! c_i' = D (c_{i-1} + c_{i+1} - 2 c_i) - mu c_i for i = 1..N with c_0 = c_{N+1} = w. The steady state is
-//! w cosh((i - (N+1)/2) s) / cosh((N+1) s / 2) with 2 D (cosh s - 1) = mu, and what is missing to it decays in the
+//! w cosh((i - (N+1)/2) s) / cosh((N+1) s / 2) with 2 D (cosh s - 1) = mu, and the difference from it decays in the
 //! modes sin(k pi i/(N+1)) at the rates mu + 4 D sin(k pi/(2 N + 2))^2 (discrete sine transform: any text on the
 //! second difference with fixed ends, for example Strang, Computational Science and Engineering, section 1.5).
 

@@ -125,7 +125,7 @@ impl Filament {
         Candidate { name: format!("{method:?} (LU every {renew} steps)"), prepare: Box::new(prepare) }
     }
 
-    /// What the error is measured against.
+    /// The reference for the error.
     pub fn reference(&self) -> Result<Reference, String> {
         match self.coupling {
             Coupling::Linear => {
@@ -160,7 +160,7 @@ impl Reference {
     }
 }
 
-/// Where the references of the nonlinear filament lie; `src/bin/reference.rs` makes the file.
+/// The file of the references of the nonlinear filament, which `src/bin/reference.rs` writes.
 pub const STORED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/reference/nonlinear.json");
 
 /// Cells of the stored references: every 25th, and the two at the walls.

@@ -1,9 +1,9 @@
-//! What the benchmarks share: the same equations written for dlsys and for diffsol, their exact solutions,
-//! a search for the cheapest tolerance that gives a wanted error, and measurements in turns.
+//! Shared parts of the benchmarks: the same equations written for dlsys and for diffsol, their exact solutions,
+//! a search for the cheapest tolerance that reaches a given error, and alternating measurements.
 //!
-//! Run times say nothing unless both programs are equally wrong. So every comparison first looks, for each
-//! program on its own, for the loosest tolerance that reaches the error asked for, against exact values; only
-//! then are the two timed, alternating, so that noise of the machine hits both.
+//! Run times are comparable only at equal errors. So every comparison first determines, for each program
+//! separately, the loosest tolerance that reaches the given error against exact values, and then times both
+//! programs alternately, so that noise of the machine affects both.
 
 pub mod anabaena;
 pub mod blocks;

@@ -1,4 +1,4 @@
-//! Timing two programs in turns.
+//! Alternating time measurements of two programs.
 
 use std::time::Instant;
 

@@ -1,7 +1,7 @@
 //! The models of the benchmarks at scale, as text: modules of formulas, filaments, branches.
 //!
-//! A large string is made by a cascade at t = 0, so that its text is short and reading it costs nothing; only the
-//! filaments with random cells are written out.
+//! A cascade of productions at t = 0 creates a large string, so that the text is short and its parsing time negligible;
+//! only the filaments with random cells are written out.
 
 use std::fmt::Write;
 

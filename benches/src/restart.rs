@@ -5,7 +5,7 @@
 //! 2.551.3). A shorter life, with fewer steps in it: x' = 2 (1 - x/3) x + sin(x)/10 from 1, back to 1 at x = 2; its
 //! time is a quadrature. In closed form: the logistic apex x' = 2 (1 - x/3) x, 1 to 2; its life is ln 2.
 //!
-//! The error is that of one life in units of time: the time of the last event, less what it should be, divided by
+//! The error is that of one life in units of time: the time of the last event, less its exact value, divided by
 //! the number of events. The lives are all alike, so nothing averages out; at the threshold x grows at about unit
 //! speed in both cases (1.07 and 1.33), so this is about the error in x as well.
 
@@ -108,7 +108,7 @@ impl Life {
     }
 }
 
-/// What is timed of dlsys: a simulation from its start past the last event.
+/// The timed run of dlsys: a simulation from its start past the last event.
 pub fn run_dlsys(session: &Session, life: &Life, method: Method, tolerance: f64) -> Result<u64, String> {
     let settings = Settings { method, tolerance, ..Settings::default() };
     let mut simulation = session.simulate(settings).map_err(|e| e.to_string())?;
@@ -234,7 +234,7 @@ pub struct Best {
     pub run: Loop,
 }
 
-/// The fastest loop that reaches an error; tells of each, with the seconds it takes for an event.
+/// The fastest loop that reaches an error; prints each one with the seconds that it takes for an event.
 pub fn best_loop(life: &Life, target: f64, mut tell: impl FnMut(&Best, f64)) -> Result<Best, String> {
     let mut best: Option<(f64, Best)> = None;
     for variant in variants(*life) {

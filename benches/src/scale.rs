@@ -1,6 +1,6 @@
 //! Measurements at scale: work done between two times, errors against a reference, memory.
 //!
-//! Seconds are processor time of the process, all threads: other programs on the machine count less.
+//! Seconds are processor time of the process over all threads, which other programs on the machine affect less.
 
 use cpu_time::ProcessTime as Clock;
 use dlsys::session::Session;
@@ -11,7 +11,7 @@ use crate::chain::{MU, WALL};
 use crate::filament::{Coupling, D_SLOW, Filament};
 use crate::solver;
 
-/// What a simulation did from one time to another.
+/// The work of a simulation from one time to another.
 #[derive(Clone, Copy, Debug)]
 pub struct Work {
     pub seconds: f64,

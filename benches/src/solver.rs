@@ -1,4 +1,4 @@
-//! One interface to both programs: run to three output times, then show the values.
+//! One interface to both programs: run to three output times, then return the values.
 
 use std::time::{Duration, Instant};
 

@@ -1,7 +1,7 @@
 //! Transport one way along 1,000 cells, for both programs: c_k' = v (c_{k-1} - c_k), c_0 = 1, all empty at first.
 //!
-//! c_k(t) is the part from k on of a Poisson distribution of mean v t. All eigenvalues are -v, but the matrix is as far from
-//! normal as can be: an exponential of it needs another way than diffusion does.
+//! c_k(t) is the tail from k on of a Poisson distribution of mean v t. All eigenvalues are -v, but the matrix is a single
+//! Jordan block, far from normal: its exponential needs another method than that of diffusion.
 
 use diffsol::matrix::MatrixRef;
 use diffsol::{
@@ -82,7 +82,7 @@ fn problem<M: Matrix<T = f64> + 'static>(
         .build()
 }
 
-/// What the error is measured against.
+/// The reference for the error.
 pub fn reference() -> Reference {
     Reference { cells: (0..CELLS).collect(), values: TIMES.map(exact).into() }
 }

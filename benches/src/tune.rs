@@ -75,7 +75,7 @@ pub fn tune(
     Some(Tuned { name: candidate.name.clone(), tolerance, error: reached, solver })
 }
 
-/// Searches for all candidates and keeps the fastest, by the shortest of a few runs; tells of each.
+/// Searches for all candidates and keeps the fastest, by the shortest of a few runs; prints each one.
 pub fn fastest(
     candidates: &[Candidate],
     decades: (i32, i32),

@@ -1,11 +1,11 @@
-//! What is done with an input: each target takes any bytes, and must neither panic nor take for ever.
+//! The fuzz targets: each accepts any bytes, and must neither panic nor hang.
 
 use std::path::Path;
 
-use dlsys::diagnostic::Source;
-use dlsys::render::{Format, FrameWriter, Survey, View};
 use dlsys::compile::Files;
+use dlsys::diagnostic::Source;
 use dlsys::model::Model;
+use dlsys::render::{Format, FrameWriter, Survey, View};
 use dlsys::session::Session;
 use dlsys::sim::{Settings, Simulation};
 use dlsys::tree::ModuleString;
@@ -18,7 +18,7 @@ fn source(bytes: &[u8]) -> Option<Source> {
     Source::from_bytes("input.dls", bytes.to_vec()).ok()
 }
 
-/// Reads a model, and draws every message about it.
+/// Loads a model and renders every message about it.
 pub fn front(bytes: &[u8]) {
     let source = match Source::from_bytes("input.dls", bytes.to_vec()) {
         Ok(source) => source,
@@ -37,7 +37,7 @@ pub fn front(bytes: &[u8]) {
     }
 }
 
-/// Lays a model out; what comes of it stays as it is when it is laid out again.
+/// Formats a model; formatting the result again must not change it.
 pub fn format(bytes: &[u8]) {
     let Some(source) = source(bytes) else { return };
     let Ok(once) = dlsys::syntax::format::format(&source) else { return };
@@ -51,7 +51,7 @@ pub fn simulate(bytes: &[u8]) {
     run(bytes, |_, _| ());
 }
 
-/// Draws what it looks like, in all formats; no file may have a number that is none.
+/// Draws a model in all formats; no file may contain NaN or an infinite number.
 pub fn draw(bytes: &[u8]) {
     run(bytes, |session, string| paint(&session.model, string));
 }
@@ -96,7 +96,8 @@ pub fn files(bytes: &[u8]) {
         let read = loaded.source.as_ref().unwrap_or(&source);
         loaded.diagnostics.iter().for_each(|d| drop(d.render(read, false)));
         let Some(model) = loaded.model else { continue };
-        let settings = Settings { max_modules: 100, max_events: 100, max_seconds: 1.0, ..Settings::default() };
+        let settings =
+            Settings { max_modules: 100, max_events: 100, max_seconds: 1.0, ..Settings::default() };
         let Ok(mut simulation) = Simulation::new(&model, settings) else { continue };
         let mut string = ModuleString::default();
         if simulation.at(0.5, &mut string).is_ok() {

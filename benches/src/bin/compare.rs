@@ -1,7 +1,7 @@
 //! Prints one table: `cargo run --release --bin compare [filament] [transport] [restart] [anabaena]`.
 //!
-//! First both programs are tuned to the error that is asked for; then they run in turns. Times are medians with their
-//! quartiles, ratios are medians of the ratios of each round.
+//! Both programs are tuned to the same error and then run alternately. Times are medians with quartiles, and ratios are
+//! medians of the ratios of each round.
 
 use std::time::{Duration, Instant};
 

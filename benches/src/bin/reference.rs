@@ -1,8 +1,8 @@
-//! Makes the stored references of the nonlinear filament: `cargo run --release --bin reference`.
+//! Computes the stored references of the nonlinear filament: `cargo run --release --bin reference`.
 //!
-//! The stiff filament too is integrated by diffsol's explicit method, whose steps stability keeps far shorter than
-//! accuracy asks for: a million steps, and nothing in common with the implicit methods that are measured against it.
-//! The difference to a second run with another tolerance tells how good the values are.
+//! The stiff filament is also integrated with diffsol's explicit method, in about a million steps, because stability
+//! limits the steps far more than accuracy does. So the reference has nothing in common with the implicit methods that are
+//! compared with it. The difference from a second run with another tolerance estimates the error of the values.
 
 use dlsys_benches::chain::WALL;
 use dlsys_benches::filament::{Coupling, D_SLOW, D_STIFF, Filament, STORED, stored_cells};

@@ -1,7 +1,7 @@
-//! What to write instead: the help of messages, in the words and names of the text that they are about.
+//! Help texts of messages, written with the names of the model.
 //!
-//! A message says what is wrong where it is found; what to do about it often takes more of the text than the place
-//! itself. That part is here, so that the passes stay readable.
+//! A remedy often depends on more of the text than the place of the error. The functions that derive it are collected
+//! here, so that the passes stay readable.
 
 use crate::scope::{RESERVED, Variables};
 use dlsys_diagnostic::Diagnostic;
@@ -10,12 +10,12 @@ use dlsys_syntax::ast::{Expr, ExprId, Expressions, HeadModule, Module, Name};
 use dlsys_syntax::print;
 use dlsys_syntax::suggest::{did_you_mean, meant, nearest};
 
-/// Of something declared twice.
+/// Help for a name that is declared twice.
 pub fn twice(name: &str) -> String {
     format!("keep one of them, or call the second `{}`", numbered(name))
 }
 
-/// `k` becomes `k_2`, `s_2` becomes `s_3`.
+/// The next numbered name: `k_2` for `k`, `s_3` for `s_2`.
 pub fn numbered(name: &str) -> String {
     match name.rsplit_once('_').map(|(base, number)| (base, number.parse::<u32>())) {
         Some((base, Ok(number))) if number < u32::MAX => format!("{base}_{}", number + 1),
@@ -23,7 +23,7 @@ pub fn numbered(name: &str) -> String {
     }
 }
 
-/// Of a value that is infinite or no number.
+/// Help for a value that is infinite or not a number.
 pub fn not_finite(value: f64) -> &'static str {
     if value.is_nan() {
         "a root or logarithm of a negative number, 0/0, an inverse or an element that is not there have no value: change what it is computed from"
@@ -32,7 +32,7 @@ pub fn not_finite(value: f64) -> &'static str {
     }
 }
 
-/// The modules of a model that have names, as `A`, `F` and `Leaf`.
+/// The names of a model's modules that are words, such as `A`, `F` and `Leaf`.
 pub fn known_words(kinds: &Kinds) -> Option<String> {
     const MOST: usize = 8;
     let mut names: Vec<&str> =
@@ -45,7 +45,7 @@ pub fn known_words(kinds: &Kinds) -> Option<String> {
     (!quoted.is_empty()).then(|| quoted.join(", ") + if more { ", …" } else { "" })
 }
 
-/// Of a module that a context, `ignore` or `consider` names and no string has; `nowhere` is a name that is no module.
+/// Help for a module that a context, `ignore` or `consider` names but no string contains.
 pub fn no_such_module(kinds: &Kinds, nowhere: &str) -> String {
     let others = || kinds.iter().map(|(_, k)| k.name.as_str()).filter(|name| *name != nowhere);
     if let Some(near) = nearest(nowhere, others()) {
@@ -59,7 +59,7 @@ pub fn no_such_module(kinds: &Kinds, nowhere: &str) -> String {
     }
 }
 
-/// Of two parameters of one head with the same name.
+/// The error for two parameters of one head with the same name.
 pub fn other_name(name: &str, left: bool, right: bool) -> String {
     let other = match (left, right) {
         (false, false) => numbered(name),
@@ -69,7 +69,7 @@ pub fn other_name(name: &str, left: bool, right: bool) -> String {
     format!("give each a name of its own, such as `{name}` and `{other}`")
 }
 
-/// An equation for something that is no parameter of its module.
+/// The error for an equation whose left side is not a parameter of the module.
 pub fn not_a_parameter(name: &Name, head: &HeadModule, variables: &Variables) -> Diagnostic {
     let known = head.parameters.iter().map(|p| &*p.text);
     let error =
@@ -81,7 +81,7 @@ pub fn not_a_parameter(name: &Name, head: &HeadModule, variables: &Variables) ->
     }
     if variables.names.contains_key(&name.text) && !RESERVED.contains(&&*name.text) {
         return error
-            .help("this is a parameter of a neighbour; its equation belongs into the neighbour's rule");
+            .help("this is a parameter of a neighbour; its equation belongs in the neighbour's rule");
     }
     error.help(did_you_mean(&name.text, known).unwrap_or_else(|| {
         let more = head_and(head, &name.text);
@@ -92,7 +92,7 @@ pub fn not_a_parameter(name: &Name, head: &HeadModule, variables: &Variables) ->
     }))
 }
 
-/// A head with this many names: those it has, and others for those it lacks.
+/// A head with this many parameters: its own names first, then new ones.
 pub fn head_with(head: &HeadModule, wanted: usize) -> String {
     let mut names: Vec<String> = head.parameters.iter().take(wanted).map(|p| p.text.to_string()).collect();
     let mut spare = ('a'..='z').map(String::from).filter(|c| head.parameters.iter().all(|p| *p.text != **c));
@@ -106,13 +106,13 @@ pub fn head_with(head: &HeadModule, wanted: usize) -> String {
     }
 }
 
-/// A head with one more name.
+/// A head with one more parameter.
 pub fn head_and(head: &HeadModule, name: &str) -> String {
     let names = head.parameters.iter().map(|p| &*p.text).chain([name]);
     format!("{}({})", head.name.text, names.collect::<Vec<_>>().join(", "))
 }
 
-/// Of a module whose number of parameters is not that of its rule or drawing.
+/// Help for a module whose number of parameters differs from that of its rule or drawing.
 pub fn wrong_arity(module: &Module, head: &HeadModule, place: &str) -> String {
     let given = module.arguments.len();
     let right = print::head_module(head);
@@ -129,8 +129,8 @@ pub fn wrong_arity(module: &Module, head: &HeadModule, place: &str) -> String {
     format!("{first}; or write {other} for `{}` with {own}", module.name)
 }
 
-/// Arguments as they are meant where the right number of them, and no other, comes of commas for decimal points: `0,5` is two
-/// numbers with nothing but the comma between them.
+/// The arguments with decimal points in place of commas, if there is exactly one reading with the right number of
+/// arguments: `0,5` is two numbers with nothing but the comma between them.
 pub fn decimal_comma(
     all: &Expressions,
     arguments: impl Iterator<Item = ExprId>,
@@ -150,7 +150,7 @@ pub fn decimal_comma(
         });
         match (meant.last_mut(), digits(id)) {
             (Some((before, end)), Some(span)) if end.is_some_and(|end| end + 1 == span.start) => {
-                // The zeros of `0,05` are no part of the number.
+                // The value of the second number does not contain the zeros of `0,05`.
                 let width = (span.end - span.start) as usize;
                 before.push_str(&format!(".{text:0>width$}"));
                 (*end, joined) = (None, true);
@@ -162,7 +162,7 @@ pub fn decimal_comma(
     (joined && texts.len() == wanted).then(|| texts.join(", "))
 }
 
-/// Of `;(rose)` and `@C(square)` where nothing has that name: what to declare is no constant.
+/// Help for an unknown name in `;(rose)` or `@C(square)`: the missing declaration is a colour or a contour.
 pub fn of_look(module: &Module, all: &Expressions, said: &mut [Diagnostic]) {
     let example = match &*module.name {
         ";" => "color NAME = \"#e573a5\"",
@@ -184,7 +184,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn second_names_count_on() {
+    fn numbered_names_count_up() {
         assert_eq!(numbered("k"), "k_2");
         assert_eq!(numbered("x_max"), "x_max_2");
         assert_eq!(numbered("s_2"), "s_3");

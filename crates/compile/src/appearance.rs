@@ -13,7 +13,7 @@ use dlsys_syntax::Files;
 use dlsys_syntax::ast::{Document, Expression, Item, Name, Text};
 use dlsys_syntax::suggest::did_you_mean;
 
-/// Most colours, gradients, surfaces or contours of one model.
+/// Maximum number of colours, of gradients, of surfaces and of contours of one model.
 const MAX_DECLARED: usize = 1000;
 
 /// The number of the first gradient, which follows those of the colours.
@@ -22,7 +22,7 @@ pub fn first_gradient(document: &Document) -> usize {
     BUILT_IN_COLORS + colors + 1
 }
 
-/// Everything that the document says about looks. Faults go to the scope.
+/// Builds the appearance from the declarations of a document. Errors are added to the scope.
 pub fn build(document: &Document, scope: &mut Scope, files: &dyn Files) -> Appearance {
     let mut appearance = Appearance::default();
     let mut tropism: Option<Span> = None;
@@ -117,7 +117,7 @@ fn surface(
     if COMMAND_SURFACES.iter().any(|(command, _)| *command == &*name.text) {
         scope.diagnostics.push(
             Diagnostic::error(format!("`{}` cannot be a surface", name.text))
-                .at(name.span, "this name tells the turtle something else")
+                .at(name.span, "this name is a command of the turtle")
                 .help("choose another name"),
         );
         return None;
@@ -144,7 +144,7 @@ fn surface(
                     "export the file again, or mend the line in a text editor".to_owned()
                 })),
             );
-            // It is declared all the same.
+            // The name counts as declared in spite of the error.
             Some(SurfaceShape { name: name.text.to_string(), span, ..SurfaceShape::default() })
         }
     }
@@ -196,7 +196,7 @@ fn contour(
     } else {
         return Some(values);
     };
-    scope.diagnostics.push(Diagnostic::error("this contour cannot be").at(span, fault).help(help));
+    scope.diagnostics.push(Diagnostic::error("this contour is invalid").at(span, fault).help(help));
     None
 }
 
@@ -220,24 +220,24 @@ fn bend(
         );
         return None;
     }
-    // Scaled first: the square of 1e200 is no number.
+    // Scaled first: the square of 1e200 overflows.
     let scaled = direction_is.map(|c| c / largest);
     let length = scaled.iter().map(|c| c * c).sum::<f64>().sqrt();
     Some(Tropism { direction: scaled.map(|c| c / length), strength: strength? })
 }
 
-/// Surfaces that no string draws.
+/// Warns of surfaces that no string contains.
 pub fn unused_surfaces(appearance: &Appearance, is_used: impl Fn(&str) -> bool, scope: &mut Scope) {
     for shape in appearance.surfaces.iter().filter(|shape| !is_used(&shape.name)) {
         scope.diagnostics.push(
-            Diagnostic::warning(format!("nobody uses the surface `{}`", shape.name))
+            Diagnostic::warning(format!("the surface `{}` is not used", shape.name))
                 .at(shape.span, "declared here")
                 .help(format!("draw it: `{}` in a string, or remove this line", shape.name)),
         );
     }
 }
 
-/// Advice for a surface that is not known.
+/// Help for an unknown surface.
 pub fn surface_hint(name: &str, appearance: &Appearance) -> Option<String> {
     let declared = appearance.surfaces.iter().map(|shape| shape.name.as_str());
     did_you_mean(name, declared).or_else(|| Some(format!("declare it: `surface {name} from \"file.s\"`")))

@@ -1,4 +1,4 @@
-//! From a document to a model: all declarations and rules in turn, then what needs all of them.
+//! From a document to a model: each declaration and rule, then the passes over all of them.
 //!
 //! ```text
 //! globals, appearance ─▶ items ─▶ kinds ─▶ contexts ─▶ analysis ─▶ Model ─▶ checks
@@ -21,11 +21,11 @@ use dlsys_model::{
 use dlsys_syntax::Files;
 use dlsys_syntax::ast::{self, Action, Document, Expression, HeadModule, Item};
 
-/// How the initial string is called where it is given twice or not at all.
+/// The description of the axiom in messages.
 const INITIAL_STRING: &str = "the initial string";
 
-/// Builds the model; errors go to the scope. `unread` tells that parts of the text are missing, so that
-/// nothing is said about what may stand in them.
+/// Builds the model; errors are added to the scope. `unread` is true if items of the text could not be parsed; checks
+/// whose results might depend on these items are then omitted.
 pub fn build(
     document: &Document,
     settings: &[Setting],
@@ -61,7 +61,7 @@ pub fn build(
     Some(parts.model(document, kinds, &clocks, &places, (parameters, appearance), scope))
 }
 
-/// The first place of each kind of module in strings, and in drawings.
+/// The first place of each kind of module in strings and in drawings.
 struct Places {
     occurs: HashMap<KindId, Span>,
     drawn: HashMap<KindId, Span>,
@@ -80,15 +80,15 @@ struct Parts<'d> {
     axiom: Successor,
     axiom_span: Span,
     rules: Vec<DeclaredRule>,
-    /// The rules as written, those with errors too.
+    /// The rules as written, including those with errors.
     written: Vec<&'d ast::Rule>,
     interpretations: Vec<(KindId, Interpretation)>,
     /// The heads of the interpretations.
     heads: Vec<&'d HeadModule>,
-    /// The initial string and all successors; all drawings.
+    /// The axiom and all successors.
     strings: Vec<&'d [ast::Module]>,
     drawings: Vec<&'d [ast::Module]>,
-    /// Something of the strings and rules could not be lowered.
+    /// True if a string or a rule could not be lowered.
     faulty: bool,
 }
 
@@ -121,7 +121,7 @@ impl<'d> Parts<'d> {
                 }
             }
             Item::Rule(rule) => self.rule(rule, builder),
-            // Globals, and what `appearance` has built.
+            // Globals and appearance have been declared before.
             _ => {}
         }
     }
@@ -160,8 +160,8 @@ impl<'d> Parts<'d> {
         }
     }
 
-    /// The heads of drawings that are drawn as they say: in drawings `F(x)` means a line, whatever `F` with other
-    /// parameters is drawn as.
+    /// Checks numbers of parameters in strings and drawings. Heads of words that the turtle interprets are exempt: in a
+    /// drawing, `F(x)` is a line even if `F` with other parameters has a drawing.
     fn check_strings(&self, builder: &mut RuleBuilder, unread: bool) {
         let ruled: Vec<&HeadModule> = self.written.iter().map(|rule| &rule.predecessor).collect();
         builder.check_arities(&ruled, &self.strings, "in its rule");
@@ -173,7 +173,7 @@ impl<'d> Parts<'d> {
         }
     }
 
-    /// The model, compiled and checked.
+    /// Compiles and checks the model.
     fn model(
         self,
         document: &Document,
@@ -225,7 +225,7 @@ impl<'d> Parts<'d> {
     }
 }
 
-/// Gives each kind its drawing.
+/// Assigns to each kind its drawing.
 fn assign_interpretations(
     interpretations: Vec<(KindId, Interpretation)>,
     kinds: &mut Kinds,
@@ -255,7 +255,7 @@ fn check_title(text: &str, span: Span, scope: &mut Scope) {
     }
 }
 
-/// Declarations that a model has once.
+/// Declarations that a model may have only once.
 #[derive(Default)]
 struct Singles(Vec<(&'static str, Span)>);
 
@@ -301,10 +301,10 @@ fn check_frames(&Frames { from, to, step }: &Frames, span: Span, scope: &mut Sco
     } else {
         return;
     };
-    scope.diagnostics.push(Diagnostic::error("these frames cannot be").at(span, fault).help(help));
+    scope.diagnostics.push(Diagnostic::error("these frames are invalid").at(span, fault).help(help));
 }
 
-/// Constants and functions that nothing uses.
+/// Warns of unused constants and functions.
 fn unused(document: &Document, scope: &mut Scope) {
     for (item, _) in document.own_items() {
         let text = |name: &ast::Name| name.text.clone();
@@ -336,7 +336,7 @@ fn unused(document: &Document, scope: &mut Scope) {
         let text: &Arc<str> = &name.text;
         if !scope.used.contains(text) {
             scope.diagnostics.push(
-                Diagnostic::warning(format!("nobody uses the {what} `{text}`"))
+                Diagnostic::warning(format!("the {what} `{text}` is not used"))
                     .at(name.span, "declared here")
                     .help(format!("{use_it}, or remove this line")),
             );

@@ -1,4 +1,4 @@
-//! Calls of functions, those that are built in, those of the library and the model's own, whose bodies are put in.
+//! Calls of functions: built-in ones, and those of the library and of the model, which are expanded.
 
 use std::sync::Arc;
 
@@ -12,10 +12,10 @@ use dlsys_syntax::ast::{ExprId, Expressions};
 use dlsys_syntax::suggest::did_you_mean;
 use dlsys_syntax::{foreign_syntax, print};
 
-/// Most nodes that the functions of a model may expand to.
+/// Maximum number of nodes to which the functions of a model may expand.
 const MAX_WORK: usize = 20_000_000;
-/// Most nodes that one function may have that is called. Functions that call others twice are there at once; what
-/// somebody writes never is.
+/// Maximum number of nodes of a function that is called. Functions that call one another twice reach it after a few
+/// levels; a body written by hand does not.
 const MAX_BODY: usize = 200_000;
 
 impl Scope {
@@ -90,7 +90,7 @@ impl Scope {
         None
     }
 
-    /// Complains about a function that nothing declares, once.
+    /// Reports a function without a declaration, once for each name.
     fn unknown_function(
         &mut self,
         all: &Expressions,
@@ -124,12 +124,12 @@ impl Scope {
         self.diagnostics.push(error);
     }
 
-    /// Advice for a name that only a comment defines.
+    /// Help for a name that only a comment such as `#define` defines.
     pub(super) fn in_a_comment(&self, name: &str) -> Option<String> {
         self.commented.get(name).map(|meaning| foreign_syntax::of_definition(name, meaning))
     }
 
-    /// How a function is called.
+    /// The notation of a call of a function.
     pub(super) fn call_of(&self, name: &str) -> String {
         match self.functions.get(name) {
             Some(function) => format!("{name}({})", function.parameters.join(", ")),
@@ -138,7 +138,7 @@ impl Scope {
         }
     }
 
-    /// A function's body with the arguments in place of its formal parameters.
+    /// The body of a function with the arguments substituted for its formal parameters.
     pub(super) fn inline(
         &mut self,
         function: &Function,

@@ -1,4 +1,4 @@
-//! Chance in a model's text: draws, weights of successors, and the clocks of events at a rate.
+//! Random elements of a model: draws, weights of successors, and the clocks of events at a rate.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -15,14 +15,14 @@ use dlsys_model::{
 use dlsys_syntax::ast::{Action, Clause, Document, HeadModule, Item, Rule};
 use dlsys_tree::key;
 
-/// Variables at and above this number are draws, before they get their places.
+/// Variables from this number on are draws that are not yet assigned to modules.
 pub(super) const DRAW: u32 = 1 << 25;
-/// Most draws of a model, after functions are put in.
+/// Maximum number of draws of a model, after expansion of functions.
 const MAX_DRAWS: usize = 100_000;
-/// A rate is negative below this; above, it may be the error of an integration.
+/// Rates below this are negative; between this and 0 they may be errors of integration.
 const LEAST_RATE: f64 = -1e-9;
 
-/// A draw while the model is read.
+/// A draw before its successor is compiled.
 #[derive(Clone, Debug)]
 pub struct DraftDraw {
     distribution: Distribution,
@@ -34,7 +34,7 @@ pub struct DraftDraw {
 #[derive(Default)]
 pub struct Draws {
     pub all: Vec<DraftDraw>,
-    /// What is being read is computed once, when a module is made.
+    /// True while lowering expressions that are computed once, when a module is created.
     pub allowed: bool,
 }
 
@@ -70,7 +70,7 @@ impl Scope {
             .map(|node| Lowered { node, is_condition: false })
     }
 
-    /// Complains about a draw where nothing is drawn.
+    /// Reports a draw in an expression that cannot contain one.
     pub(super) fn may_draw(&mut self, name: &str, span: Span) -> Option<()> {
         if self.draws.allowed {
             return Some(());
@@ -99,8 +99,8 @@ impl Scope {
         Some(self.graph.var(DRAW + self.draws.all.len() as u32 - 1))
     }
 
-    /// Draws of a function once more, for one call of it; where they stand in the body of the call. `arguments` gives
-    /// what stands for each formal parameter.
+    /// Copies the draws of a function for one call of it. The result maps the draws of the body to the copies; `arguments`
+    /// maps the formal parameters to the arguments.
     pub(super) fn draw_again(
         &mut self,
         draws: Range<u32>,
@@ -121,10 +121,10 @@ impl Scope {
     }
 }
 
-/// The draws of a successor while it is read.
+/// The draws of a successor before it is compiled.
 #[derive(Default)]
 pub(super) struct Drawn {
-    /// Place of the module in the successor, and the numbers of its draws.
+    /// Index of the module in the successor, and the numbers of its draws.
     pub modules: Vec<(usize, Range<u32>)>,
 }
 
@@ -162,7 +162,7 @@ impl Drawn {
     }
 }
 
-/// The draws that are needed whichever way the conditions in some expressions go.
+/// The draws that some expressions read whatever the values of their conditions.
 fn unconditional(graph: &Graph, draws: &[DraftDraw], roots: &[NodeId]) -> Vec<u32> {
     let mut sure = Vec::new();
     let mut seen: std::collections::HashSet<NodeId> = roots.iter().copied().collect();
@@ -181,16 +181,16 @@ fn unconditional(graph: &Graph, draws: &[DraftDraw], roots: &[NodeId]) -> Vec<u3
     sure
 }
 
-/// The clocks that the kinds of a model have.
+/// The clocks of the kinds of a model.
 #[derive(Default)]
 pub struct Clocks {
     /// The keys of the clauses with a rate, by name and number of parameters of the predecessor.
     keys: HashMap<(Arc<str>, usize), Vec<u64>>,
-    /// Most of them in a kind, of those that a context may take for one another.
+    /// The maximum number of clocks over the kinds that one context pattern may match.
     widths: HashMap<(String, usize), usize>,
 }
 
-/// `+`, `-` and `±` share their rules.
+/// The name under which clocks are collected: `+`, `-` and `±` share their rules.
 fn sort(name: &str) -> &str {
     if matches!(name, "+" | "-") { "±" } else { name }
 }
@@ -220,14 +220,14 @@ impl Clocks {
         self.widths.get(&(group(name).to_owned(), arity)).copied().unwrap_or(0)
     }
 
-    /// The hidden parameters of a kind; those that it does not use have a key all the same.
+    /// The keys of the hidden parameters of a kind; 0 for those that it does not use.
     fn of(&self, name: &str, arity: usize) -> Vec<u64> {
         let mut keys = self.keys.get(&(sort(name).into(), arity)).cloned().unwrap_or_default();
         keys.resize(self.width(name, arity), 0);
         keys
     }
 
-    /// The clocks that a new module gets.
+    /// The clocks of a new module.
     pub fn for_new(&self, name: &str, arity: usize, place: usize, after: usize) -> Vec<NewClock> {
         if self.width(name, arity) == 0 {
             return Vec::new();
@@ -235,7 +235,7 @@ impl Clocks {
         self.of(name, arity).into_iter().map(|key| NewClock { place, after, key }).collect()
     }
 
-    /// Tells the kinds.
+    /// Stores the keys of the clocks in the kinds.
     pub fn assign(&self, kinds: &mut Kinds) {
         let all: Vec<_> = kinds.iter().map(|(id, kind)| (id, self.of(&kind.name, kind.arity))).collect();
         for (id, clocks) in all {
@@ -243,7 +243,7 @@ impl Clocks {
         }
     }
 
-    /// Where the clock of a clause stands among the hidden parameters of its kind.
+    /// Index of the clock of a clause among the hidden parameters of its kind.
     fn slot(&self, head: &HeadModule, key: u64) -> usize {
         let keys = self.keys.get(&(sort(&head.name.text).into(), head.parameters.len()));
         keys.and_then(|keys| keys.iter().position(|k| *k == key)).expect("every clause was seen")
@@ -261,7 +261,7 @@ pub(super) fn production_keys(rule: &Rule) -> impl Iterator<Item = (&Clause, u64
     produces.enumerate().map(move |(i, clause)| (clause, key(&head, i)))
 }
 
-/// An event at a rate while its rule is read.
+/// An event at a rate while its rule is lowered.
 pub(super) struct Hazard {
     /// Number of the clock among the rule's variables.
     pub parameter: usize,
@@ -296,7 +296,7 @@ impl RuleBuilder<'_> {
         Some(Hazard { parameter, guard, rate, span })
     }
 
-    /// The rate of a clock under equations whose condition is `active`; None where it stands.
+    /// The rate of a clock under equations whose condition is `active`; None if the clock does not run there.
     pub(super) fn clock_rate(&mut self, hazard: &Hazard, active: Option<NodeId>) -> Option<(usize, NodeId)> {
         let graph = &mut self.scope.graph;
         if graph.as_constant(hazard.rate) == Some(0.0) {
@@ -314,7 +314,7 @@ impl RuleBuilder<'_> {
         Some((hazard.parameter, rate))
     }
 
-    /// The condition that a clock has run down.
+    /// The condition that a clock has reached 0.
     pub(super) fn clock_is_down(&mut self, hazard: &Hazard, atoms: &mut Atoms) -> Option<Condition> {
         let graph = &mut self.scope.graph;
         let (clock, zero) = (graph.var(hazard.parameter as u32), graph.constant(0.0));
@@ -323,7 +323,7 @@ impl RuleBuilder<'_> {
         self.decompose(down, hazard.span, atoms)
     }
 
-    /// A clause that fires where a rate is negative, unless it cannot be.
+    /// A clause that fires where a rate is negative; None if it is never negative.
     pub(super) fn negative_rate(
         &mut self,
         hazard: &Hazard,
@@ -346,7 +346,7 @@ impl RuleBuilder<'_> {
     }
 }
 
-/// The parts of a condition that all must hold.
+/// The terms of a conjunction.
 fn conjuncts(graph: &Graph, condition: NodeId) -> Vec<NodeId> {
     let (mut parts, mut stack) = (Vec::new(), vec![condition]);
     while let Some(id) = stack.pop() {
@@ -358,7 +358,7 @@ fn conjuncts(graph: &Graph, condition: NodeId) -> Vec<NodeId> {
     parts
 }
 
-/// True if a rate is at least 0 whatever the parameters are, as far as interval arithmetic can tell.
+/// True if interval arithmetic shows that a rate is at least 0 for all values of the parameters.
 fn is_never_negative(graph: &Graph, rate: NodeId, count: usize) -> bool {
     let mut variables = vec![Interval::ENTIRE; count];
     for time in &mut variables[count - 2..] {

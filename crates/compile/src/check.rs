@@ -1,4 +1,4 @@
-//! What can be known of a model before it runs.
+//! Checks of a compiled model: errors and warnings that need no simulation.
 
 use std::collections::{HashMap, HashSet};
 
@@ -13,12 +13,12 @@ use dlsys_syntax::ast;
 use dlsys_syntax::print;
 use dlsys_syntax::suggest::{meant, nearest};
 
-/// Most rules that one strict predecessor can have.
+/// Maximum number of rules of one strict predecessor.
 const MAX_RULES: usize = 1000;
-/// Most messages about modules that do nothing.
+/// Maximum number of messages about modules that do nothing.
 const MAX_INERT: usize = 20;
 
-/// Rules and clauses that can never be reached.
+/// Reports rules and clauses that can never apply.
 pub fn reachability(
     model: &Model,
     rules: &[&ast::Rule],
@@ -48,7 +48,7 @@ pub fn reachability(
             diagnostics.extend(never_made(model, rules[i], occurs));
         }
     }
-    // What the initial string can grow into.
+    // The kinds that can develop from the axiom.
     let mut alive: HashSet<KindId> = model.axiom.kinds.iter().copied().collect();
     let mut queue: Vec<KindId> = model.axiom.kinds.clone();
     while let Some(kind) = queue.pop() {
@@ -78,17 +78,17 @@ pub fn reachability(
 
 fn shadowed_rule(model: &Model, index: usize, own: &[KindId], diagnostics: &mut Vec<Diagnostic>) {
     let rule = &model.rules[index];
-    // Of a context that nothing matches something else is said.
+    // A context that nothing matches is reported elsewhere.
     let wider = |a: &Pattern, b: &Pattern| !b.kinds.is_empty() && b.kinds.iter().all(|k| a.matches(*k));
     let own_rules = model.kinds.get(own[0]).rules_like(rule);
     let earlier = own_rules.iter().take(MAX_RULES).take_while(|j| **j < index);
-    // Of discrete rules the first applies whose condition holds, too.
+    // The first discrete rule whose condition also holds applies.
     let holds = |before: &Rule| !rule.discrete || before.produces.iter().all(|p| p.guard.is_always());
     let shadow = earlier.map(|j| (*j, &model.rules[*j])).find(|(j, before)| {
         holds(before)
             && own.iter().all(|k| model.kinds.get(*k).rules_like(rule).contains(j))
             && before.left.len() <= rule.left.len()
-            // What stands on branches is found one way or another.
+            // Contexts with branches may match in several ways.
             && before.right_shape.iter().all(|turn| *turn == ContextPart::Module)
             && rule.right_shape.iter().all(|turn| *turn == ContextPart::Module)
             && before.right.len() <= rule.right.len()
@@ -111,7 +111,7 @@ fn shadowed_rule(model: &Model, index: usize, own: &[KindId], diagnostics: &mut 
             }
             diagnostics.push(
                 Diagnostic::error("two rules have the same head")
-                    .at(rule.span, "this one never has its turn")
+                    .at(rule.span, "this one is never reached")
                     .at(before.span, "this one comes first")
                     .help("write all clauses under one head"),
             );
@@ -119,9 +119,9 @@ fn shadowed_rule(model: &Model, index: usize, own: &[KindId], diagnostics: &mut 
         }
         diagnostics.push(
             Diagnostic::warning("this rule can never be reached")
-                .at(rule.span, "whenever its context is there, so is that of the rule before it")
+                .at(rule.span, "whenever its context matches, so does that of the rule before it")
                 .at(before.span, "this rule comes first")
-                .help("of several rules the first whose context is there applies: put the special one first"),
+                .help("of several rules the first whose context matches applies: put the special one first"),
         );
     }
 }
@@ -151,11 +151,11 @@ fn clauses(rule: &Rule, diagnostics: &mut Vec<Diagnostic>) {
                     "this clause can never be reached"
                 };
                 diagnostics.push(
-                    Diagnostic::error(message).at(*span, "this one never has its turn").at(*first, why).help(
+                    Diagnostic::error(message).at(*span, "this one is never reached").at(*first, why).help(
                         if kind == "solve" {
                             "write the equations in one clause, with commas: `solve dx/dt = …, dy/dt = …`"
                         } else {
-                            "of several productions that hold at once, the first written wins"
+                            "of several productions that hold at once, the first one written applies"
                         },
                     ),
                 );
@@ -164,14 +164,14 @@ fn clauses(rule: &Rule, diagnostics: &mut Vec<Diagnostic>) {
     }
 }
 
-/// What a condition that is never met can be about instead.
+/// Help for a condition that is never met: values that change.
 fn always_false(rule: &Rule) -> String {
     let own: Vec<String> = rule.parameters.iter().map(|name| format!("`{name}`, ")).collect();
     format!("compare something that changes, such as {}`age` or `t`; or remove the clause", own.concat())
 }
 
-/// A rule for a module that no string has. None if something else will be said about it: words with a wrong
-/// number of parameters, and misspelt ones, are reported where they stand.
+/// The error for a rule whose module occurs in no string. None if another check reports it: misspelt words and wrong
+/// numbers of parameters are reported at the module.
 fn never_made(model: &Model, rule: &ast::Rule, occurs: &HashMap<KindId, Span>) -> Option<Diagnostic> {
     let head = &rule.predecessor;
     let name = &*head.name.text;
@@ -202,25 +202,25 @@ fn never_made(model: &Model, rule: &ast::Rule, occurs: &HashMap<KindId, Span>) -
     }))
 }
 
-/// The period of the discrete rules.
+/// Checks the period of the discrete rules.
 pub fn period(declared: Option<(f64, Span)>, model: &Model, diagnostics: &mut Vec<Diagnostic>) {
     let Some((period, span)) = declared else { return };
     if period <= 0.0 {
         diagnostics.push(
-            Diagnostic::error("this period cannot be")
-                .at(span, format!("it is {period}; steps need time to pass between them"))
+            Diagnostic::error("this period is invalid")
+                .at(span, format!("it is {period}; a period is greater than 0"))
                 .help("discrete rules apply at t = P, 2P, …: `period 1`"),
         );
     } else if model.rules.iter().all(|rule| !rule.discrete) {
         diagnostics.push(
             Diagnostic::warning("no rule has a period")
-                .at(span, "it is that of discrete rules, and there is none")
+                .at(span, "it applies to discrete rules, and the model has none")
                 .help("a discrete rule is written `A(x) : x > 3 -> F(x) A(x/2)`"),
         );
     }
 }
 
-/// Domains that can be left without a production.
+/// Warns of domains that a module can leave without a production.
 pub fn coverage(model: &Model, diagnostics: &mut Vec<Diagnostic>) {
     for rule in &model.rules {
         if rule.produces.iter().any(|p| p.guard.is_always()) {
@@ -256,7 +256,7 @@ pub fn coverage(model: &Model, diagnostics: &mut Vec<Diagnostic>) {
     }
 }
 
-/// Modules that mean nothing: no rule, no drawing, no context.
+/// Warns of modules without any effect: no rule, no drawing, no context.
 pub fn inert_modules(model: &Model, occurs: &HashMap<KindId, Span>, diagnostics: &mut Vec<Diagnostic>) {
     let in_context: HashSet<KindId> = model
         .rules
@@ -319,7 +319,9 @@ pub fn inert_modules(model: &Model, occurs: &HashMap<KindId, Span>, diagnostics:
                     diagnostics.push(
                         Diagnostic::warning(format!("module `{name}` does nothing"))
                             .at(first(), "no rule, no drawing, no context mentions it")
-                            .help(format!("if it only marks a place, say so: `interpret {name}: ε`")),
+                            .help(format!(
+                                "a module that only marks a place is declared with `interpret {name}: ε`"
+                            )),
                     );
                 }
             }
@@ -327,7 +329,7 @@ pub fn inert_modules(model: &Model, occurs: &HashMap<KindId, Span>, diagnostics:
     }
 }
 
-/// Modules that tell the turtle something and lack parameters.
+/// Reports turtle commands with too few parameters.
 pub fn commands(model: &Model, diagnostics: &mut Vec<Diagnostic>, places: &HashMap<KindId, Span>) {
     for (id, kind) in model.kinds.iter() {
         let Some((name, needed)) = COMMAND_SURFACES.into_iter().find(|(name, _)| *name == kind.base()) else {
@@ -357,12 +359,12 @@ pub fn commands(model: &Model, diagnostics: &mut Vec<Diagnostic>, places: &HashM
     }
 }
 
-/// A word as a sequence of known names, two or more.
+/// Splits a word into two or more known names.
 fn split<'n>(word: &'n str, names: &HashSet<&str>) -> Option<Vec<&'n str>> {
     if word.len() > 60 || base_of(word) != word {
         return None;
     }
-    // best[i]: a way to write the first i bytes.
+    // best[i]: a split of the first i bytes.
     let mut best: Vec<Option<Vec<&str>>> = vec![None; word.len() + 1];
     best[0] = Some(Vec::new());
     for end in 1..=word.len() {

@@ -11,7 +11,7 @@ use dlsys_syntax::ast::{ExprId, Expressions};
 use dlsys_syntax::print;
 
 impl Scope {
-    /// The value of a `match`: its number, its cases and the value otherwise. `done` gives the parts, already lowered.
+    /// Lowers a `match`: its number, its cases and the default. `done` gives the lowered parts.
     pub(super) fn choice(
         &mut self,
         all: &Expressions,
@@ -28,7 +28,7 @@ impl Scope {
             if let Some(before) = seen.insert(case, value) {
                 self.diagnostics.push(
                     Diagnostic::error("two cases of one `match` are alike")
-                        .at(all.span(value), "this one never has its turn")
+                        .at(all.span(value), "this one is never reached")
                         .at(all.span(before), "this one comes first")
                         .help("take one of them out, or give it another value"),
                 );

@@ -13,7 +13,7 @@ use dlsys_model::{Clock, Condition, ContextPart, Produce, Switch};
 use dlsys_syntax::ast::{self, Action, HeadModule};
 use dlsys_syntax::print;
 
-/// The variables of the rule at hand.
+/// The variables of the current rule.
 struct Frame<'r> {
     rule: &'r ast::Rule,
     variables: Variables,
@@ -23,7 +23,7 @@ struct Frame<'r> {
     count: usize,
 }
 
-/// What a clause is subject to.
+/// The condition of a clause.
 #[derive(Default)]
 struct Guard {
     condition: Condition,
@@ -48,7 +48,7 @@ struct Smooth {
 }
 
 impl RuleBuilder<'_> {
-    /// A rule, which gets this place among those of the model. None if there is an error in it, which has been reported.
+    /// Lowers a rule, which gets this index among those of the model. None if it has errors, which have been reported.
     pub fn rule(&mut self, rule: &ast::Rule, index: usize) -> Option<DeclaredRule> {
         let mut good = self.not_a_bracket(&rule.predecessor, false);
         for context in rule.left.iter().chain(&rule.right) {
@@ -96,7 +96,7 @@ impl RuleBuilder<'_> {
         })
     }
 
-    /// The conditions of all clauses. They come first because all clauses share their atoms.
+    /// Lowers the conditions of all clauses, which share their atoms and therefore come first.
     fn guards(&mut self, frame: &Frame, atoms: &mut Atoms, good: &mut bool) -> Vec<Guard> {
         let mut guards = Vec::with_capacity(frame.rule.clauses.len());
         for clause in &frame.rule.clauses {
@@ -106,7 +106,7 @@ impl RuleBuilder<'_> {
             };
             let node = self.scope.condition(&self.document.expressions, guard, &frame.variables);
             let condition = match (node, &clause.hazard) {
-                // Under a rate it is the clock that says when.
+                // The clock determines the time of an event at a rate.
                 (Some(_), Some(_)) => Some(Condition::default()),
                 (node, _) => node.and_then(|node| self.decompose(node, clause.span, atoms)),
             };
@@ -116,7 +116,7 @@ impl RuleBuilder<'_> {
         guards
     }
 
-    /// The productions, those of events at a rate with their clocks; behind them those that stand for negative rates.
+    /// Lowers the productions, with the clocks of events at a rate; the checks for negative rates follow the productions.
     fn productions(
         &mut self,
         frame: &Frame,
@@ -154,7 +154,7 @@ impl RuleBuilder<'_> {
         Some(all)
     }
 
-    /// The equations of all `solve` clauses, with their conditions taken out.
+    /// Lowers the equations of all `solve` clauses and replaces their conditions with switches.
     fn smooth_clauses(
         &mut self,
         frame: &Frame,
@@ -179,7 +179,7 @@ impl RuleBuilder<'_> {
             all.push(Smooth { guard: guard.condition.clone(), span: clause.span, equations, switches });
         }
         if let (true, true, Some(first)) = (*good, all.is_empty(), productions.clocks.first()) {
-            // Clocks run, though nothing else does.
+            // Clocks run even if the clause has no other equation.
             let span = productions.produces[first.produce].span;
             let rates = hazards.iter().filter_map(|hazard| self.clock_rate(hazard, None)).collect();
             let (rates, switches) = self.smooth(rates, own, count, span, atoms)?;
@@ -189,14 +189,14 @@ impl RuleBuilder<'_> {
         Some(all)
     }
 
-    /// Adds to each clause which atoms its flow cannot reach.
+    /// Determines for each clause the atoms whose zero its flow cannot reach.
     fn declare_solves(&mut self, frame: &Frame, clauses: Vec<Smooth>, atoms: &Atoms) -> Vec<DeclaredSolve> {
         let context = frame.count - frame.own - 2;
         let mut solves = Vec::with_capacity(clauses.len());
         for Smooth { guard, span, equations: Equations { rates, algebraic }, switches } in clauses {
             let total = frame.count + switches.len();
             let graph = &mut self.scope.graph;
-            // A value that has no rate is not known to approach anything.
+            // The analysis applies only to parameters with rates.
             let given = |graph: &Graph, (a, b): (NodeId, NodeId)| {
                 let read = graph.variables(&[a, b]);
                 algebraic.iter().any(|entry| read.contains(&(entry.parameter as u32)))
@@ -218,7 +218,7 @@ impl RuleBuilder<'_> {
     }
 }
 
-/// The names of the modules that a rule is for: `±` stands for both turns.
+/// The names of the modules to which a rule applies: `±` stands for both turns.
 pub fn names_of(rule: &ast::Rule) -> Vec<&str> {
     match &*rule.predecessor.name.text {
         "±" => vec!["+", "-"],

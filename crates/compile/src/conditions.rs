@@ -1,4 +1,4 @@
-//! Conditions: taken apart into comparisons of two sides, which all clauses of a rule share.
+//! Decomposition of conditions into comparisons of two sides (atoms), which all clauses of a rule share.
 
 use std::collections::HashMap;
 
@@ -8,7 +8,7 @@ use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_expr::{Binary, Node, NodeId, Unary};
 use dlsys_model::{Boundary, Comparison, Condition, ConditionStep};
 
-/// Longest condition, in comparisons and connectives, after functions are put in.
+/// Maximum number of comparisons and connectives of a condition, after expansion of functions.
 const MAX_CONDITION: usize = 10_000;
 
 /// The pairs of expressions that the conditions of a rule compare.
@@ -21,7 +21,7 @@ pub struct Atoms {
 }
 
 impl RuleBuilder<'_> {
-    /// Takes a condition apart into comparisons of two sides.
+    /// Decomposes a condition into comparisons of two sides.
     pub(super) fn decompose(&mut self, root: NodeId, span: Span, atoms: &mut Atoms) -> Option<Condition> {
         enum Task {
             Visit(NodeId),
@@ -81,7 +81,7 @@ impl RuleBuilder<'_> {
 }
 
 impl Atoms {
-    /// The step that compares two sides; each pair is kept once, whichever way round it is written.
+    /// The step that compares two sides; each pair is stored once, in either order.
     fn step(
         &mut self,
         a: NodeId,

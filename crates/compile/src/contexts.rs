@@ -1,4 +1,4 @@
-//! Which kinds of modules contexts, aggregates, `ignore` and `consider` name.
+//! Resolution of the names in contexts, aggregates, `ignore` and `consider` to kinds of modules.
 
 use std::collections::{HashMap, HashSet};
 
@@ -9,7 +9,7 @@ use dlsys_diagnostic::Diagnostic;
 use dlsys_model::{Class, KindId, Kinds, Pattern, class_of};
 use dlsys_syntax::ast;
 
-/// Kinds by the names that a context can call them.
+/// Kinds by the names that patterns can use for them.
 struct ByName<'k> {
     exact: HashMap<&'k str, Vec<KindId>>,
     base: HashMap<&'k str, Vec<KindId>>,
@@ -25,7 +25,7 @@ impl<'k> ByName<'k> {
         index
     }
 
-    /// A name without `_` stands for all kinds with that base name, any other for itself.
+    /// The kinds of a name: without `_`, all kinds with that base name; otherwise those with the name itself.
     fn matching(&self, name: &str) -> &[KindId] {
         let exact = class_of(name) != Class::Word || name.contains('_');
         let index = if exact { &self.exact } else { &self.base };
@@ -33,7 +33,7 @@ impl<'k> ByName<'k> {
     }
 }
 
-/// Matches the modules of contexts and aggregates to kinds, and reports those that nothing can match.
+/// Resolves the modules of contexts and aggregates to kinds, and reports those that nothing can match.
 pub fn resolve_all(
     kinds: &Kinds,
     rules: Vec<DeclaredRule>,
@@ -45,7 +45,7 @@ pub fn resolve_all(
     let mut resolved = Vec::with_capacity(rules.len());
     for declared in rules {
         let mut side = |patterns: &[DeclaredPattern]| -> Vec<Pattern> {
-            patterns.iter().map(|pattern| find(pattern, "this context is never there")).collect()
+            patterns.iter().map(|pattern| find(pattern, "this context never matches")).collect()
         };
         let (left, right) = (side(&declared.left), side(&declared.right));
         let never = "nothing of this name is ever attached to a module";
@@ -74,7 +74,7 @@ fn resolve(
                 kind.name,
                 plural(kind.arity, "parameter"),
             ))
-            .at(head.span, "the number of parameters must agree, or the context is never there")
+            .at(head.span, "the number of parameters must agree, or the context never matches")
             .help(format!("name each of them, used or not: `{}`", advice::head_with(head, kind.arity))),
             None => Diagnostic::warning(format!("there is no module `{name}`"))
                 .at(head.span, never)
@@ -95,7 +95,7 @@ fn resolve(
     pattern
 }
 
-/// `ignore` and `consider`.
+/// Applies `ignore` and `consider` to the kinds.
 pub fn filter(
     kinds: &mut Kinds,
     ignored: &[&ast::Name],

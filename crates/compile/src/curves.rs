@@ -1,7 +1,7 @@
-//! Curves, tables and arrays: their declarations, and what expressions say of them.
+//! Curves, tables and arrays: their declarations and their uses in expressions.
 //!
 //! `slope`, `integral`, `inverse` and `length` take the name of a curve, a function or an array as their first argument.
-//! They are no reserved words: a function that the model declares itself wins.
+//! These names are not reserved: a function that the model declares takes precedence.
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -16,7 +16,7 @@ use dlsys_syntax::Files;
 use dlsys_syntax::ast::{Expr, ExprId, Expression, Expressions, Item, Name};
 use dlsys_syntax::suggest::did_you_mean;
 
-/// Functions whose first argument is a name, with how they are written.
+/// Functions whose first argument is a name, with their notation.
 pub const FUNCTIONALS: [(&str, &str); 4] = [
     ("slope", "slope(g, x)"),
     ("integral", "integral(g, a, b)"),
@@ -24,7 +24,7 @@ pub const FUNCTIONALS: [(&str, &str); 4] = [
     ("length", "length(a)"),
 ];
 
-/// Most elements of one array.
+/// Maximum number of elements of one array.
 const MAX_ELEMENTS: usize = 1_000_000;
 
 impl Scope {
@@ -37,7 +37,7 @@ impl Scope {
                 self.diagnostics.push(
                     Diagnostic::error(error)
                         .at(name.span, "this one")
-                        .help("numbers in such numbers are a `table` from a file"),
+                        .help("an array of this size is a `table` from a file"),
                 );
             }
             values.len() <= MAX_ELEMENTS
@@ -49,7 +49,7 @@ impl Scope {
         self.arrays.insert(name.text.clone(), lookup);
     }
 
-    /// A `curve` or a `table`.
+    /// Declares a `curve` or a `table`.
     pub fn define_curve(&mut self, item: &Item, span: Span, all: &Expressions, files: &dyn Files) {
         let (name, curve) = match item {
             Item::Curve { name, sort, points, periodic } => {
@@ -146,14 +146,14 @@ impl Scope {
         None
     }
 
-    /// True if a name is called like `slope`, and the model has no function of that name.
+    /// True for `slope` and its like, unless the model declares a function of that name.
     pub(super) fn is_functional(&self, name: &str) -> bool {
         FUNCTIONALS.iter().any(|(n, _)| *n == name)
             && !self.functions.contains_key(name)
             && !self.curves.contains_key(name)
     }
 
-    /// Names in an expression that stand for themselves, as the first arguments of `slope` and its like.
+    /// The nodes of an expression that are first arguments of `slope` and its like: names and not values.
     pub(super) fn functional_names(&self, all: &Expressions, expression: Expression) -> HashSet<ExprId> {
         (expression.first.0..=expression.root.0)
             .filter_map(|id| match all.get(ExprId(id)) {
@@ -164,7 +164,7 @@ impl Scope {
             .collect()
     }
 
-    /// `slope(g, x)` and its like: `first` is the name, `rest` the other arguments.
+    /// Lowers `slope(g, x)` and its like: `first` is the name, `rest` the other arguments.
     pub(super) fn functional(
         &mut self,
         all: &Expressions,
@@ -237,7 +237,7 @@ impl Scope {
                 }
                 let why = match known.periodic {
                     true => "it is periodic: it takes each value again and again",
-                    false => "it does not go one way only: it takes some value more than once",
+                    false => "it is not monotone: it takes some value more than once",
                 };
                 self.diagnostics.push(
                     Diagnostic::error(format!("the curve `{}` has no inverse", known.name))
@@ -288,7 +288,7 @@ impl Scope {
                 let (slope, whole) =
                     (self.inline(&slope, nodes, span)?, self.inline(&function, nodes, span)?);
                 let integral = Integral { whole: whole.node, argument: nodes[0] };
-                // Where the function jumps or bends, its slope tells nothing of the jump.
+                // The integral of the slope does not contain the jumps of the function.
                 if self.is_smooth(integral.whole) {
                     self.graph.know_integral(slope.node, integral);
                 }
@@ -318,7 +318,7 @@ impl Scope {
         }
     }
 
-    /// True if an expression has no jumps or bends.
+    /// True if an expression has neither jumps nor kinks.
     fn is_smooth(&self, root: NodeId) -> bool {
         use dlsys_expr::Node;
         !self.graph.reachable(&[root]).into_iter().any(|id| match self.graph.node(id) {
@@ -340,11 +340,11 @@ impl Scope {
         let near = did_you_mean(name, known.chain(dlsys_syntax::library_names()));
         let error = Diagnostic::error(format!("`{name}` is no curve and no function of this model"));
         let help = near.or_else(|| Some(format!("declare it: `curve {name} = (0, 0) (1, 0.3) (2, 1)`")));
-        self.diagnostics.push(error.at(at, format!("`{what}` is asked of it")).help_opt(help));
+        self.diagnostics.push(error.at(at, format!("`{what}` needs a curve or a function")).help_opt(help));
         None
     }
 
-    /// The integral of a function of the library, noted where its value is used.
+    /// Notes the integral of a function of the library at a use of its value.
     pub(super) fn know_library_integral(&mut self, name: &str, of: NodeId, nodes: &[NodeId], span: Span) {
         let Some(integral) = self.functions.get(&*format!("{name}_integral")).cloned() else { return };
         if let (Some(whole), Some(&argument)) = (self.inline(&integral, nodes, span), nodes.first()) {
@@ -370,7 +370,7 @@ impl Scope {
         None
     }
 
-    /// `a[i]`
+    /// Lowers `a[i]`.
     pub(super) fn element(&mut self, name: &Arc<str>, index: NodeId, span: Span) -> Option<NodeId> {
         let array = self.known_array(name, span)?;
         let known = self.graph.array_of(array).clone();

@@ -1,8 +1,8 @@
-//! Rules that never do anything, because what their conditions compare never changes and is nowhere such that they hold.
+//! Detection of rules that never apply, because the values in their conditions never change and satisfy none of them.
 //!
-//! A condition over a module's own parameters in a rule without `solve` is decided when the module is made. That is
-//! common and meant; so something is said only if every module of the kind is made with numbers that stand in the text, and
-//! none of them meets any condition of the rule.
+//! In a rule without `solve`, a condition over the module's own parameters is decided when the module is created. That is
+//! common and intended; so a warning is given only if every module of the kind is created with constants, and none of
+//! them satisfies any condition of the rule.
 
 use crate::globals::mentions;
 use dlsys_diagnostic::Diagnostic;
@@ -10,12 +10,12 @@ use dlsys_expr::Scratch;
 use dlsys_model::{Condition, KindId, Model, Rule, Sign, Successor, Truth};
 use dlsys_syntax::ast::{self, Action, Document, Expression, Item};
 
-/// Most modules whose parameters are looked at; of more it is not known what they are.
+/// Maximum number of modules whose parameters are examined; beyond it no warning is given.
 const MOST: usize = 1000;
 
-/// Warns of rules that never apply. `written` are the rules of the model as they stand in the text.
+/// Warns of rules that never apply. `written` contains the rules of the model as parsed.
 pub fn rules(model: &Model, written: &[&ast::Rule], document: &Document, diagnostics: &mut Vec<Diagnostic>) {
-    // Who can be set from outside may have another value in the next run.
+    // A `param` may have another value in the next run.
     let adjustable = document.items.iter().any(|(item, _)| matches!(item, Item::Param { .. }));
     for (index, (rule, text)) in model.rules.iter().zip(written).enumerate() {
         let parameters = compared(rule);
@@ -46,7 +46,7 @@ pub fn rules(model: &Model, written: &[&ast::Rule], document: &Document, diagnos
     }
 }
 
-/// The module's own parameters that the conditions of a rule compare; none if they read anything else, or if the rule has
+/// The module's own parameters that the conditions of a rule read; empty if they read anything else, or if the rule has
 /// equations, clocks or a context.
 fn compared(rule: &Rule) -> Vec<usize> {
     let moves = rule.discrete || !rule.solves.is_empty() || rule.hidden > 0;
@@ -61,7 +61,7 @@ fn compared(rule: &Rule) -> Vec<usize> {
     if conditions && read.iter().all(|v| *v < own) { read } else { Vec::new() }
 }
 
-/// Whether no other rule is for the same modules.
+/// True if no other rule applies to the same modules.
 fn decided_at_birth(model: &Model, index: usize) -> bool {
     model.kinds.iter().all(|(_, kind)| {
         let mut rules = kind.all_rules();
@@ -69,8 +69,7 @@ fn decided_at_birth(model: &Model, index: usize) -> bool {
     })
 }
 
-/// Whether nothing that can be set from outside decides about the rule: neither in its conditions, nor where its modules are
-/// made.
+/// True if the rule does not depend on a `param`, neither in its conditions nor in the arguments of its modules.
 fn is_fixed(rule: &ast::Rule, document: &Document) -> bool {
     let own = |name: &str| rule.predecessor.parameters.iter().any(|p| &*p.text == name);
     let free = |e: Expression, own: &dyn Fn(&str) -> bool| mentions(document, e).all(|(name, _)| own(name));
@@ -92,8 +91,8 @@ fn is_fixed(rule: &ast::Rule, document: &Document) -> bool {
         })
 }
 
-/// The parameters of all modules that the rule is for, where others make them; None if they are not known. What the
-/// rule itself makes does not count: if it applies to none of the others, it makes none.
+/// The parameters of all modules to which the rule applies; None if they are not constant. Modules in successors of the
+/// rule itself are left out: if it applies to none of the others, it never creates any.
 fn births(model: &Model, index: usize) -> Option<Vec<Vec<f64>>> {
     let is_own = |kind: KindId| model.kinds.get(kind).all_rules().any(|r| r == index);
     let others = model.rules.iter().filter(|rule| rule.index != index).flat_map(|rule| &rule.produces);
@@ -121,7 +120,7 @@ fn constant(successor: &Successor, output: usize) -> Option<f64> {
     arguments.constants().map(|all| all[output]).or_else(|| arguments.constant_output(output))
 }
 
-/// Whether a condition may hold for a module with these parameters. Sides that are nearly equal may be so.
+/// True if a condition may hold for a module with these parameters. Sides that are nearly equal count as equal or not.
 fn may_hold(rule: &Rule, condition: &Condition, values: &[f64]) -> bool {
     let mut variables = vec![0.0; rule.variables];
     let own = values.len().min(rule.variables);

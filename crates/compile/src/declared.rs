@@ -1,10 +1,10 @@
-//! Rules as they are declared: names resolved and expressions in the graph, but nothing compiled or analysed.
+//! Declared rules: names resolved and expressions in the graph, but not yet compiled or analysed.
 //!
 //! ```text
 //! ast::Rule ──rules──▶ DeclaredRule ──contexts──▶ ResolvedRule ──analysis──▶ model::Rule
 //! ```
 //!
-//! A [`DeclaredRule`] is made while the text is read, when not all kinds of modules are known yet, so its contexts are
+//! A [`DeclaredRule`] is built while the document is lowered, before all kinds of modules are known, so its contexts are
 //! names. A [`ResolvedRule`] adds the kinds that match them. Variables are numbered as in a compiled rule
 //! ([`dlsys_model::Rule`]).
 
@@ -15,12 +15,12 @@ use dlsys_syntax::ast::HeadModule;
 
 /// Context, equations and productions under one head.
 pub struct DeclaredRule {
-    /// Its place among the rules of the model.
+    /// Its index among the rules of the model.
     pub index: usize,
-    /// The head as written.
+    /// The text of the head.
     pub label: String,
     pub span: Span,
-    /// It applies at the multiples of the model's period only.
+    /// True for a discrete rule, which applies at the multiples of the model's period only.
     pub discrete: bool,
     /// Names of the strict predecessor's parameters, hidden ones last.
     pub parameters: Vec<String>,
@@ -36,7 +36,7 @@ pub struct DeclaredRule {
     pub variables: usize,
     /// Both sides of each comparison (atom).
     pub sides: Vec<(NodeId, NodeId)>,
-    /// Where each atom is written.
+    /// The place of each atom in the text.
     pub atoms: Vec<Span>,
     pub boundaries: Vec<Boundary>,
     pub solves: Vec<DeclaredSolve>,
@@ -77,7 +77,7 @@ impl DeclaredRule {
         self.solves.iter().flat_map(|solve| &solve.rates).copied()
     }
 
-    /// All values and equations that stand instead of rates, of all clauses.
+    /// All values and implicit equations, of all clauses.
     pub fn algebraic(&self) -> impl Iterator<Item = &DeclaredAlgebraic> {
         self.solves.iter().flat_map(|solve| &solve.algebraic)
     }
@@ -107,7 +107,7 @@ pub struct DeclaredSolve {
     /// Parameters with a value or an equation instead of a rate, explicit ones first.
     pub algebraic: Vec<DeclaredAlgebraic>,
     pub switches: Vec<Switch>,
-    /// Per atom: the flow of these equations cannot bring its difference to zero.
+    /// By atom: true if the flow of these equations cannot bring its difference to zero.
     pub unreachable: Vec<bool>,
 }
 
@@ -138,7 +138,7 @@ pub struct ResolvedRule {
     pub declared: DeclaredRule,
     pub left: Vec<Pattern>,
     pub right: Vec<Pattern>,
-    /// Of the aggregates.
+    /// The patterns of the aggregates.
     pub children: Vec<Pattern>,
 }
 

@@ -4,9 +4,9 @@
 //! solve dx/dt = r*x - z, w = sqrt(x), 0 = z^3 + z - x*w
 //! ```
 //!
-//! An explicit parameter (`w`) that another equation reads is put into it, so that it costs nothing there. Each
-//! implicit equation is matched to the parameter that it is solved for; where that cannot be, no numbers will make it
-//! possible, and it is an error here.
+//! The formula of an explicit parameter (`w`) is substituted into the equations that read it, so that it needs no
+//! evaluation of its own. Each implicit equation is matched to the parameter that it is solved for. Without a complete
+//! matching the equations are singular for all values, which is an error here.
 
 use std::collections::HashMap;
 
@@ -19,19 +19,19 @@ use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_expr::{Graph, Node, NodeId};
 use dlsys_syntax::ast::{self, Expression, HeadModule};
 
-/// Most implicit equations of one clause; all of them are solved together, for every module.
+/// Maximum number of implicit equations of one clause; they form one system for each module.
 const MAX_IMPLICIT: usize = 100;
 
-/// What one `solve` says.
+/// The equations of one `solve`.
 #[derive(Default)]
 pub(super) struct Equations {
-    /// By parameter; those that are the constant 0 are left out.
+    /// Parameters with their rates, without those that are the constant 0.
     pub rates: Vec<(usize, NodeId)>,
-    /// Explicit ones first.
+    /// Values and implicit equations; values come first.
     pub algebraic: Vec<DeclaredAlgebraic>,
 }
 
-/// `0 = …`
+/// An implicit equation `0 = …`.
 struct Zero {
     residual: NodeId,
     unknown: Option<usize>,
@@ -39,13 +39,13 @@ struct Zero {
 }
 
 impl Equations {
-    /// All expressions, by parameter.
+    /// All expressions with their parameters.
     pub fn all(&self) -> Vec<(usize, NodeId)> {
         let algebraic = self.algebraic.iter().map(|entry| (entry.parameter, entry.node));
         self.rates.iter().copied().chain(algebraic).collect()
     }
 
-    /// Puts others in their place, in the same order.
+    /// Replaces all expressions, given in the order of `all`.
     pub fn set_all(&mut self, all: Vec<(usize, NodeId)>) {
         let mut all = all.into_iter().map(|(_, node)| node);
         let nodes = self.rates.iter_mut().map(|(_, node)| node);
@@ -57,7 +57,7 @@ impl Equations {
 }
 
 impl RuleBuilder<'_> {
-    /// Reads the equations of a `solve`.
+    /// Lowers the equations of a `solve`.
     pub(super) fn equations(
         &mut self,
         equations: &[ast::Equation],
@@ -79,7 +79,7 @@ impl RuleBuilder<'_> {
             let parameter = match name.map(|name| self.parameter(name, head, variables, equation)) {
                 Some(None) => {
                     good = false;
-                    // What is wrong with the other side is another mistake.
+                    // Errors on the other side are reported as well.
                     self.number(equation.expression(), variables);
                     continue;
                 }
@@ -157,7 +157,7 @@ impl RuleBuilder<'_> {
         known
     }
 
-    /// Puts explicit parameters into the equations that read them, those that others depend on first; false if one
+    /// Substitutes explicit parameters into the equations that read them, in the order of their dependencies; false if one
     /// depends on itself.
     fn put_in(
         &mut self,
@@ -239,7 +239,7 @@ impl RuleBuilder<'_> {
                     Diagnostic::error("these equations cannot determine their parameters")
                         .at(zero.span, "every parameter in this one is needed for another")
                         .at(clause, "in these equations")
-                        .help("some parameter must stand in more of the equations: as it is, they contradict one another, or one of them says nothing new"),
+                        .help("some parameter must stand in more of the equations: as it is, they contradict one another, or one of them follows from the others"),
                 );
                 return None;
             }
@@ -281,7 +281,7 @@ impl RuleBuilder<'_> {
         };
         let help = match free.first() {
             None => "a parameter that has a rate or a value has its equation already; an equation that holds between such parameters must be differentiated by hand until it contains the unknown (index 1)".to_owned(),
-            Some(p) => format!("say so: `0 = … for {}`", head.parameters[*p].text),
+            Some(p) => format!("name the parameter: `0 = … for {}`", head.parameters[*p].text),
         };
         self.error(
             Diagnostic::error("it is not clear which parameters the equations are to be solved for")
@@ -291,7 +291,7 @@ impl RuleBuilder<'_> {
         None
     }
 
-    /// False if implicit equations are singular whatever the values are.
+    /// Reports implicit equations that are singular for all values; false if they are.
     fn check_rank(&mut self, implicit: &[DeclaredAlgebraic], head: &HeadModule, variables: usize) -> bool {
         let own = head.parameters.len();
         let alone = |v: &u32| (*v as usize) < own || *v as usize + 2 >= variables;
@@ -322,8 +322,8 @@ fn substitute(graph: &mut Graph, root: NodeId, known: &HashMap<u32, NodeId>) -> 
     })[0]
 }
 
-/// Gives an equation one of the unknowns in it, and the equation that had it before another. As deep as there are
-/// equations.
+/// Finds an augmenting path: assigns to an equation one of its unknowns, and to the equation that had it before another
+/// one. The recursion is at most as deep as there are equations.
 fn augment(
     equation: usize,
     reads: &[Vec<usize>],

@@ -1,4 +1,4 @@
-//! Aggregates of a rule: what is written as `sum(B(x, c): …)`.
+//! The aggregates of a rule: `sum(B(x, c): …)`.
 
 use crate::declared::DeclaredAggregate;
 use crate::rules::RuleBuilder;
@@ -7,15 +7,15 @@ use dlsys_model::Aggregate;
 use dlsys_syntax::ast::{self, Expr, ExprId};
 
 impl RuleBuilder<'_> {
-    /// How many aggregates a rule has as it is written; each gets a variable.
+    /// Number of aggregates in the text of a rule; each gets a variable.
     pub(super) fn aggregates_in(&self, rule: &ast::Rule) -> u32 {
         let nodes = rule.nodes.0.0..rule.nodes.1.0;
         let is_one = |id: &u32| matches!(self.document.expressions.get(ExprId(*id)), Expr::Aggregate(_));
         nodes.filter(is_one).count() as u32
     }
 
-    /// The aggregates that the rule's expressions have been found to read, one for each of its variables. One that is
-    /// written twice is there once, and then nothing reads the last of the variables.
+    /// The aggregates that the expressions of the rule read, in the order of their variables. An aggregate that is written
+    /// twice is listed once, and the last of the variables is then unused.
     pub(super) fn aggregates(&mut self) -> Vec<DeclaredAggregate> {
         let gathered = std::mem::take(&mut self.scope.gathered);
         gathered
@@ -25,7 +25,8 @@ impl RuleBuilder<'_> {
     }
 }
 
-/// The variables that conditions read, by themselves or through aggregates, which begin with the variable `first`.
+/// By variable: true if a condition reads it, directly or through an aggregate. `first` is the variable of the first
+/// aggregate.
 pub(super) fn watched(sides: &Program, aggregates: &[Aggregate], count: usize, first: usize) -> Vec<bool> {
     let mut watched: Vec<bool> = vec![false; count];
     for &v in sides.reads() {

@@ -1,4 +1,4 @@
-//! Constants, `param`s, functions, and the numbers of colours, in the order in which they depend on one another.
+//! Constants, `param`s, functions, and the numbers of colours, in the order of their dependencies.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use dlsys_syntax::Files;
 use dlsys_syntax::ast::{Document, Expr, ExprId, Expression, Item, Name};
 use dlsys_syntax::suggest::did_you_mean;
 
-/// What a global name is declared as.
+/// A global name with its declaration.
 struct Global<'d> {
     name: &'d Name,
     kind: GlobalKind<'d>,
@@ -24,7 +24,7 @@ enum GlobalKind<'d> {
     Const(Expression),
     Param(Expression, Option<(Expression, Expression)>),
     Def(&'d [Name], Expression),
-    /// A colour, a gradient or a contour: its number.
+    /// The number of a colour, a gradient or a contour.
     Number(usize),
     Array(&'d [Expression]),
     Curve(&'d Item, Span),
@@ -308,10 +308,9 @@ fn circle(global: &Global, path: &[&Global], span: Span) -> Diagnostic {
         path.splice(4..path.len() - 3, ["…"]);
     }
     let (what, help) = match global.kind {
-        GlobalKind::Def(..) => (
-            "calls itself",
-            "write it without itself; what is repeated in time belongs into rules".to_owned(),
-        ),
+        GlobalKind::Def(..) => {
+            ("calls itself", "write it without itself; what is repeated in time belongs in rules".to_owned())
+        }
         _ => ("depends on itself", format!("give one of them a number, such as `const {name} = 1`")),
     };
     Diagnostic::error(format!("`{name}` {what}"))

@@ -4,8 +4,8 @@
 //! text ──layout──▶ items ──parse──▶ Document ──scope, rules──▶ Model ──check──▶ remarks
 //! ```
 //!
-//! [`load`] is the whole of it. Mistakes are collected, not thrown: a text with three mistakes gets three
-//! messages. Every pass is linear in the text, and none recurses deeper than a fixed bound.
+//! The entry point is [`load`]. Errors are collected: a text with three errors yields three messages. Every pass takes
+//! time linear in the text and recurses to a fixed depth at most.
 
 #![warn(missing_docs)]
 
@@ -43,7 +43,7 @@ pub use dlsys_syntax::{Errors, Files, NoFiles};
 pub use measure::measure;
 use scope::Scope;
 
-/// A value for a `param`, given from outside.
+/// A value for a `param`, given when a model is loaded.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
     /// The name of the `param`.
@@ -52,25 +52,25 @@ pub struct Setting {
     pub value: f64,
 }
 
-/// What came of a text: a model unless there are errors, and everything there is to say about it.
+/// The result of loading a text: a model, unless there are errors, and all messages.
 #[derive(Debug)]
 pub struct Loaded {
     /// The compiled model; None if there are errors.
     pub model: Option<Model>,
-    /// The text with all that it includes, if that is more than was given: places in messages are places in it.
+    /// The text with the files that it includes, if there are any; spans in messages then refer to it.
     pub source: Option<Source>,
     /// Errors, then warnings, each in the order of their places.
     pub diagnostics: Vec<Diagnostic>,
-    /// What is wrong with the settings; then there is no model either.
+    /// Errors in the settings; there is no model if it is not empty.
     pub refused_settings: Vec<Diagnostic>,
 }
 
-/// Reads, checks and compiles a model that names no files.
+/// Parses, checks and compiles a model that names no files.
 pub fn load(source: &Source, settings: &[Setting]) -> Loaded {
     load_with(source, settings, &NoFiles)
 }
 
-/// Reads, checks and compiles a model. The surfaces that it names come from `files`.
+/// Parses, checks and compiles a model. Included texts, surfaces and tables are read from `files`.
 pub fn load_with(source: &Source, settings: &[Setting], files: &dyn Files) -> Loaded {
     let (whole, document, mut diagnostics) = dlsys_syntax::read(source, files);
     let unread = !diagnostics.is_empty();

@@ -8,7 +8,7 @@ use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_syntax::ast;
 
 impl RuleBuilder<'_> {
-    /// Makes the names of `let` lines known, each to those after it; false if one is at fault.
+    /// Declares the names of `let` lines, each for those after it; false if one has an error.
     pub(super) fn locals(&mut self, rule: &ast::Rule, variables: &mut Variables) -> bool {
         let mut good = true;
         let mut seen: HashMap<&str, Span> = HashMap::new();
@@ -36,7 +36,7 @@ impl RuleBuilder<'_> {
             } else if let Some(node) = node {
                 variables.names.insert(text.clone(), node);
             } else {
-                // What uses it is not to blame.
+                // Its uses are not reported.
                 self.scope.poison(text.clone());
                 good = false;
             }
@@ -45,7 +45,7 @@ impl RuleBuilder<'_> {
         for (name, _) in &rule.locals {
             if good && !used(&name.text) {
                 self.scope.diagnostics.push(
-                    Diagnostic::warning(format!("nobody uses the name `{}`", name.text))
+                    Diagnostic::warning(format!("the name `{}` is not used", name.text))
                         .at(name.span, "declared here")
                         .help("use it in a clause of this rule, or leave the line out"),
                 );
@@ -55,7 +55,7 @@ impl RuleBuilder<'_> {
     }
 }
 
-/// True if an expression of a rule mentions a name. Expressions of one item stand together in the arena.
+/// True if an expression of a rule mentions a name. The expressions of an item are contiguous in the arena.
 fn mentions_after(all: &ast::Expressions, rule: &ast::Rule, name: &str) -> bool {
     let Some((_, first)) = rule.locals.first() else { return false };
     all.iter_within(first.first, rule.clauses.last().map(|c| c.span))

@@ -1,4 +1,4 @@
-//! What is measured of a model's strings, written like the head of a rule and an expression: `F(x): x`.
+//! Measures of a model's strings, written as the head of a rule and an expression: `F(x): x`.
 
 use crate::chance::Clocks;
 use crate::rules::RuleBuilder;
@@ -10,7 +10,7 @@ use dlsys_model::{Measure, Model};
 use dlsys_syntax::suggest::did_you_mean;
 use dlsys_syntax::{Errors, Files, parse, read};
 
-/// Compiles a measure over the modules of a model, which was read from `model_text` and `files` with these settings.
+/// Compiles a measure over the modules of a model that was loaded from `model_text` and `files` with these settings.
 pub fn measure(
     model_text: &Source,
     files: &dyn Files,
@@ -19,7 +19,7 @@ pub fn measure(
     source: &Source,
 ) -> Result<Measure, Errors> {
     let (document, head, expression) = parse::parse_measure(source)?;
-    // The model was good when it was read; it says nothing new.
+    // The model has been loaded without errors before, so its messages are ignored.
     let mut scope = Scope::default();
     let own = Source::new(&*model_text.name, model_text.own_text());
     globals::declare(&read(&own, files).1, settings, &mut scope, files);

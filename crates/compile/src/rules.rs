@@ -1,4 +1,4 @@
-//! Strings, heads and interpretations: the parts of a model that are made of modules, lowered to the graph.
+//! Lowering of strings, heads and interpretations, the parts of a model that consist of modules.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -13,20 +13,20 @@ use dlsys_model::{CUT, Class, DRAWN_WORDS, Interpretation, KindId, Kinds, base_o
 use dlsys_syntax::ast::{self, Document, Expression, HeadModule};
 use dlsys_syntax::print;
 
-/// Builds the parts of a model that are made of modules.
+/// Builds the parts of a model that consist of modules.
 pub struct RuleBuilder<'b> {
     pub document: &'b Document,
     pub scope: &'b mut Scope,
     pub kinds: &'b mut Kinds,
     pub clocks: Clocks,
-    /// Each kind that stands in a string, with the first place where it does.
+    /// Each kind that occurs in a string, with its first place.
     pub occurs: HashMap<KindId, Span>,
-    /// The same of drawings, where they are not those of the kind itself.
+    /// Each kind that occurs in the drawing of another kind, with its first place.
     pub drawn: HashMap<KindId, Span>,
 }
 
 impl<'b> RuleBuilder<'b> {
-    /// A builder that has seen no strings yet.
+    /// A builder before the first string.
     pub fn new(
         document: &'b Document,
         scope: &'b mut Scope,
@@ -41,7 +41,7 @@ impl<'b> RuleBuilder<'b> {
         self.clocks.width(&module.name.text, module.parameters.len())
     }
 
-    /// A module of a context, whose kinds are found when all are known.
+    /// A module of a context by name; its kinds are resolved later.
     pub(super) fn pattern(&self, head: HeadModule) -> DeclaredPattern {
         DeclaredPattern { width: head.parameters.len() + self.hidden(&head), head }
     }
@@ -50,7 +50,7 @@ impl<'b> RuleBuilder<'b> {
         self.scope.diagnostics.push(error);
     }
 
-    /// The variables of a head, and how many there are with `t` and `age`.
+    /// The variables of a head, and their number, `t` and `age` included.
     pub(super) fn variables(
         &mut self,
         own: &HeadModule,
@@ -64,7 +64,7 @@ impl<'b> RuleBuilder<'b> {
         let mut parameters = Vec::new();
         for module in std::iter::once(own).chain(left).chain(right) {
             parameters.extend(module.parameters.iter().zip(count..));
-            // Behind those that are written, a module has hidden ones.
+            // Hidden parameters follow the written ones.
             let hidden = self.hidden(module);
             count += (module.parameters.len() + hidden) as u32;
         }
@@ -133,22 +133,22 @@ impl<'b> RuleBuilder<'b> {
         if !self.not_a_bracket(head, false) {
             return None;
         }
-        // Who draws or measures a module sees what is written of it, and no clocks.
+        // Drawings and measures read the written parameters only, without clocks.
         let clocks = std::mem::take(&mut self.clocks);
         let (mut variables, count) = self.variables(head, &[], &[], 0);
-        // And one module after another.
+        // They have no aggregates.
         variables.aggregates = None;
         if let Some(cut) = drawn.iter().find(|module| &*module.name == CUT) {
             self.error(
                 Diagnostic::error("a drawing cuts nothing off")
-                    .at(cut.span, "`%` belongs into the successors of rules")
+                    .at(cut.span, "`%` belongs in the successors of rules")
                     .help("to draw nothing, write `ε`"),
             );
         }
         if let Some(again) = drawn.iter().find(|module| is_head(module, head)) {
             self.error(draws_nothing(again, head));
         }
-        // What is only drawn does not develop: it makes no rule reachable.
+        // A module that is only drawn does not develop and makes no rule reachable.
         let before = std::mem::take(&mut self.occurs);
         let drawn = self.string(drawn, &variables, count);
         self.clocks = clocks;
@@ -164,7 +164,7 @@ impl<'b> RuleBuilder<'b> {
     }
 }
 
-/// Whether a module of a drawing is of the kind that is drawn, and says nothing to the turtle by its name.
+/// True if a module of a drawing is of the kind that is drawn, and the turtle does not interpret its name.
 fn is_head(module: &ast::Module, head: &HeadModule) -> bool {
     let same = module.name == head.name.text && module.arguments.len() == head.parameters.len();
     same && class_of(&module.name) == Class::Word && !DRAWN_WORDS.contains(&base_of(&module.name))
@@ -174,7 +174,7 @@ fn draws_nothing(module: &ast::Module, head: &HeadModule) -> Diagnostic {
     let name = &module.name;
     let arguments = if head.parameters.is_empty() { "" } else { "(…)" };
     Diagnostic::warning(format!("`{name}` draws nothing in its own drawing"))
-        .at(module.span, format!("inside its own drawing a module is what its name says, and `{name}` says nothing to the turtle"))
+        .at(module.span, format!("inside its own drawing a module is drawn by its name, and the turtle draws nothing for `{name}`"))
         .help(format!(
             "drawings do not repeat themselves: let a rule make the parts, `{}: … produce F(1) {name}{arguments}`, or draw a module with another name",
             print::head_module(head)

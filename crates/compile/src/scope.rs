@@ -13,10 +13,10 @@ use dlsys_syntax::ast::{Aggregate, Expr, ExprId, Expression, Expressions, HeadMo
 use dlsys_syntax::print;
 use dlsys_syntax::suggest::did_you_mean;
 
-/// Variables at and above this number are parameters of functions.
+/// Variables from this number on are parameters of functions.
 pub(super) const FORMAL: u32 = 1 << 24;
 
-/// Names that mean something everywhere in a rule.
+/// Names with a fixed meaning in every rule.
 pub const RESERVED: [&str; 2] = ["t", "age"];
 const CONSTANTS: [(&str, f64); 2] = [("pi", std::f64::consts::PI), ("e", std::f64::consts::E)];
 
@@ -31,29 +31,29 @@ pub struct Lowered {
 #[derive(Clone, Debug)]
 pub(super) struct Function {
     pub parameters: Vec<Arc<str>>,
-    /// None if its own text is at fault, which has been reported.
+    /// None if it has errors, which have been reported.
     pub body: Option<Lowered>,
     /// The random numbers that its body draws.
     pub draws: Range<u32>,
-    /// Of the library.
+    /// True for a function of the library.
     pub library: bool,
     /// Parts of the body with a known antiderivative.
     pub integrals: Vec<(NodeId, Integral)>,
 }
 
-/// Names that an expression can use besides the global ones.
+/// The names that an expression can use in addition to the global ones.
 #[derive(Default)]
 pub struct Variables {
     pub names: HashMap<Arc<str>, NodeId>,
-    /// What to tell somebody who uses `t` or `age` where they mean nothing; None where they are in `names`.
+    /// Help for `t` or `age` in an expression without them; None if they are in `names`.
     pub no_time: Option<&'static str>,
-    /// Names of the rule's `let` lines, those that are not known yet too, and where they are declared.
+    /// Names and places of all `let` lines of the rule, including those not yet lowered.
     pub lets: HashMap<Arc<str>, Span>,
-    /// In a rule: the number of the variable of its first aggregate, and that of all its variables.
+    /// In a rule: the variable of its first aggregate, and the number of all its variables.
     pub aggregates: Option<(u32, u32)>,
 }
 
-/// An aggregate of the present rule.
+/// An aggregate of the current rule.
 pub struct Gathered {
     pub fold: Fold,
     pub head: HeadModule,
@@ -61,39 +61,39 @@ pub struct Gathered {
     pub term: NodeId,
 }
 
-/// The global names of a model, and the graph that its expressions are built in.
+/// The global names of a model and the graph of its expressions.
 #[derive(Default)]
 pub struct Scope {
     pub graph: Graph,
-    /// Values; None if the declaration is at fault, which has been reported.
+    /// Values; None if the declaration has errors, which have been reported.
     pub(super) constants: HashMap<Arc<str>, Option<f64>>,
     pub(super) functions: HashMap<Arc<str>, Function>,
-    /// None as for constants.
+    /// As for constants, None after an error.
     pub(super) curves: HashMap<Arc<str>, Option<Lookup>>,
     pub(super) arrays: HashMap<Arc<str>, Option<Lookup>>,
     /// Global names that some expression has used.
     pub used: HashSet<Arc<str>>,
     pub(super) poisoned: HashSet<Arc<str>>,
-    /// Names that were already complained about.
+    /// Unknown names that have been reported.
     pub(super) unknown: HashSet<Arc<str>>,
-    /// Where the comparisons of the present rule are written, by their node, and their two sides. Rules number their
-    /// variables alike, so one rule's nodes mean nothing in another.
+    /// Place and text of the comparisons of the current rule, by node. Rules number their variables alike, so that the nodes
+    /// of one rule are not valid in another.
     pub comparisons: HashMap<NodeId, (Span, Arc<[String; 2]>)>,
-    /// The aggregates of the present rule, in the order of their variables.
+    /// The aggregates of the current rule, in the order of their variables.
     pub gathered: Vec<Gathered>,
     /// The same for the bodies of functions.
     pub(super) function_comparisons: HashMap<NodeId, (Span, Arc<[String; 2]>)>,
     pub diagnostics: Vec<Diagnostic>,
-    /// What only comments define: names, and their meanings.
+    /// Names that only comments define, with their values.
     pub(super) commented: HashMap<Arc<str>, String>,
     pub draws: Draws,
-    /// What is wrong with the values given from outside, which is not the text's fault.
+    /// Errors in the settings, as opposed to the text.
     pub refused_settings: Vec<Diagnostic>,
     pub(super) work: usize,
 }
 
 impl Scope {
-    /// True if a name has a meaning that a model cannot change.
+    /// True if a model cannot declare a name, because it is built in.
     pub fn is_built_in(name: &str) -> bool {
         RESERVED.contains(&name)
             || CONSTANTS.iter().any(|(n, _)| *n == name)
@@ -105,18 +105,18 @@ impl Scope {
         self.constants.insert(name, value);
     }
 
-    /// Whether a suggestion is worth its time: it looks at every known name, and after so many errors
-    /// nobody reads it.
+    /// True while suggestions are computed: each compares all known names, so they are omitted after many
+    /// errors.
     pub(super) fn suggests(&self) -> bool {
         self.diagnostics.len() < 50
     }
 
-    /// Makes a name known whose declaration is at fault, which has been reported: no use of it is an error.
+    /// Marks a name whose declaration has errors, which have been reported; its uses are not reported.
     pub fn poison(&mut self, name: Arc<str>) {
         self.poisoned.insert(name);
     }
 
-    /// Lowers the body of a function and makes it known.
+    /// Lowers the body of a function and declares it.
     pub fn define_function(
         &mut self,
         name: &Name,
@@ -146,7 +146,7 @@ impl Scope {
             }
         }
         let first = self.draws.all.len() as u32;
-        // Whether it may draw is asked where it is called.
+        // Calls check whether draws are allowed.
         self.draws.allowed = true;
         let body = self.lower(all, body, &variables);
         self.draws.allowed = false;
@@ -183,7 +183,7 @@ impl Scope {
         self.expect_condition(all, expression.root, lowered)
     }
 
-    /// The value of an expression that may use constants only.
+    /// The value of an expression of constants.
     pub fn constant_value(&mut self, all: &Expressions, expression: Expression) -> Option<f64> {
         let variables = Variables { no_time: Some("only constants can stand here"), ..Variables::default() };
         let node = self.number(all, expression, &variables)?;
@@ -228,15 +228,15 @@ impl Scope {
         None
     }
 
-    /// Lowers an expression. None if it is at fault, which has then been reported.
+    /// Lowers an expression. None if it has errors, which have been reported.
     fn lower(&mut self, all: &Expressions, expression: Expression, variables: &Variables) -> Option<Lowered> {
         let (first, last) = (expression.first.0, expression.root.0);
-        // Operands stand before their users, so this is a loop however deep the expression is.
+        // Operands precede their users, so this is a loop for any depth of the expression.
         let mut done: Vec<Option<Lowered>> = Vec::with_capacity((last - first + 1) as usize);
         let named = self.functional_names(all, expression);
         let inside = terms(all, first, last);
         for id in first..=last {
-            // The term of an aggregate has names of its own: it is lowered with that.
+            // The term of an aggregate has names of its own and is lowered with the aggregate.
             let inside = inside.get((id - first) as usize).is_some_and(|inside| *inside);
             if inside || named.contains(&ExprId(id)) {
                 done.push(None);
@@ -342,7 +342,7 @@ impl Scope {
             let link = self.compare(*comparison, left, right);
             self.comparisons.entry(link).or_insert_with(|| {
                 let sides = [a_id, *operand].map(|id| print::expression(all, id));
-                // A choice binds loosest of all.
+                // A choice has the lowest precedence.
                 let sides = sides.map(|s| if s.starts_with("if ") { format!("({s})") } else { s });
                 (all.span(a_id).to(all.span(*operand)), sides.into())
             });
@@ -380,7 +380,7 @@ impl Scope {
             names.insert(parameter.text.clone(), node);
         }
         let inner = Variables { names, ..Variables::default() };
-        // It is looked at again and again, by whoever reads it: numbers that are drawn once have no place in it.
+        // The term is evaluated repeatedly, so it cannot contain numbers that are drawn once.
         let may_draw = std::mem::take(&mut self.draws.allowed);
         let term = match aggregate.term {
             Some(term) => self.number(all, term, &inner),
@@ -464,7 +464,7 @@ impl Scope {
             Some(later) => Diagnostic::error(format!("`{name}` is not known yet"))
                 .at(span, "used here")
                 .at(*later, "declared here")
-                .help("a `let` is known to what stands after it: change their order"),
+                .help("a `let` is known only to the lines after it: change their order"),
             None => error,
         };
         self.diagnostics.push(error);
@@ -472,7 +472,7 @@ impl Scope {
     }
 }
 
-/// For each node of an expression whether it belongs to the term of an aggregate; empty if there is none.
+/// By node of an expression: true if it belongs to the term of an aggregate; empty without aggregates.
 fn terms(all: &Expressions, first: u32, last: u32) -> Vec<bool> {
     let mut inside = Vec::new();
     for id in first..=last {

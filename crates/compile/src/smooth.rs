@@ -1,7 +1,7 @@
-//! Conditions inside equations, taken out of them.
+//! Replacement of the conditions inside equations with switches.
 //!
-//! Between the instants at which a condition changes an equation is smooth, and a method keeps its order; so each
-//! condition becomes a variable, and its change an event (see [`Switch`]).
+//! An equation is smooth between the instants at which its conditions change, so that an integrator keeps its order there.
+//! Each condition becomes a variable, and its change an event (see [`Switch`]).
 
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -17,8 +17,8 @@ impl RuleBuilder<'_> {
     /// Makes equations smooth: conditions inside them become variables, numbered from `count` on. The first `own` variables
     /// are the module's parameters, the last two `t` and `age`.
     ///
-    /// Curves and growth functions of time with a known integral stay as they are where the whole rate has a formula by
-    /// them. Of other curves the piece is frozen, too, as the conditions are.
+    /// Curves and growth functions of time with a known integral are preserved where they give the whole rate a formula.
+    /// Otherwise the piece of a curve is frozen like a condition.
     #[allow(clippy::type_complexity)]
     pub(super) fn smooth(
         &mut self,
@@ -31,7 +31,7 @@ impl RuleBuilder<'_> {
         let mut frozen = Frozen { conditions: Vec::new(), count };
         let time = count as u32 - 2;
         let solved: Vec<u32> = rates.iter().map(|(parameter, _)| *parameter as u32).collect();
-        // Truth values stand still, and so do own parameters without an equation here.
+        // Truth values and own parameters without an equation in this clause are constant.
         let still = |v: u32| v >= time + 2 || (v as usize) < own && !solved.contains(&v);
         let mut smoothed = Vec::new();
         for &(parameter, rate) in &rates {
@@ -61,7 +61,7 @@ impl RuleBuilder<'_> {
     }
 }
 
-/// True if a rate whose curves were left alone has a formula by them. One without curves needs no such question.
+/// True if a rate with its curves preserved has a formula; false for a rate without curves.
 fn gentle_is_driven(
     graph: &mut Graph,
     parameter: usize,
@@ -75,9 +75,9 @@ fn gentle_is_driven(
         && driven_form(graph, parameter as u32, gentle, still, time).is_some()
 }
 
-/// Smooth equations, where they have a value; elsewhere those as written. A method looks beyond the instant at which a
-/// condition changes, and rounding puts that instant a little too late: `sqrt(max(x, 0))` goes on there as `sqrt(x)`, of
-/// an x that is negative.
+/// The smooth equation where it is finite, and the equation as written elsewhere. Steps extend beyond the instant at which
+/// a condition changes, and rounding may locate that instant too late: `sqrt(max(x, 0))` continues as `sqrt(x)` there, with
+/// a negative x.
 fn where_defined(graph: &mut Graph, smooth: NodeId, written: NodeId, first_flag: u32) -> NodeId {
     let nodes = graph.reachable(&[smooth]);
     let is_partial = |id: &NodeId| match graph.node(*id) {
@@ -94,7 +94,7 @@ fn where_defined(graph: &mut Graph, smooth: NodeId, written: NodeId, first_flag:
     graph.select(finite, smooth, written)
 }
 
-/// True for what is constant but for jumps, as `floor(t)/2` is.
+/// True for a piecewise constant expression such as `floor(t)/2`.
 fn is_step(graph: &Graph, root: NodeId, still: &dyn Fn(u32) -> bool) -> bool {
     let mut steps: HashSet<NodeId> = HashSet::new();
     for id in graph.reachable(&[root]) {
@@ -113,7 +113,7 @@ fn is_step(graph: &Graph, root: NodeId, still: &dyn Fn(u32) -> bool) -> bool {
     steps.contains(&root)
 }
 
-/// Conditions that variables stand for.
+/// Conditions that have been replaced with variables.
 struct Frozen {
     conditions: Vec<NodeId>,
     count: usize,
@@ -129,7 +129,7 @@ impl Frozen {
         graph.var((self.count + at) as u32)
     }
 
-    /// An expression with its conditions taken out. What stands still keeps them; so does all that is not in `outside`.
+    /// Replaces the conditions in an expression with variables, except in parts that are constant or not in `outside`.
     fn take_out(
         &mut self,
         graph: &mut Graph,
@@ -143,7 +143,7 @@ impl Frozen {
             if outside.is_some_and(|outside| !outside.contains(&id)) {
                 return Some(id);
             }
-            // Conditions are asked of the equations as written, so the original operands go into them.
+            // Conditions refer to the equations as written, hence to the original operands.
             let (a, b) = match graph.node(id) {
                 Node::Select(a, ..) | Node::Unary(_, a) | Node::Curve(_, _, a) => (a, a),
                 Node::Binary(_, a, b) => (a, b),
@@ -190,7 +190,7 @@ impl Frozen {
                 let rest = graph.select(above, one, zero);
                 Some(graph.select(below, minus, rest))
             }
-            // It jumps with its argument, and then only.
+            // It changes only when its argument jumps.
             (Node::Unary(Unary::Floor | Unary::Ceil, x), _) if is_step(graph, x, still) => None,
             (Node::Unary(op @ (Unary::Floor | Unary::Ceil), x), Node::Unary(_, a)) => {
                 let up = op == Unary::Ceil;
@@ -213,10 +213,10 @@ impl Frozen {
         }
     }
 
-    /// The whole number below an expression, frozen: a jump at every whole number, where the sine of π x changes sign.
-    /// Between two of them it is the even, or the odd, number next to x - 1/2, however x is rounded at the jump itself.
-    /// If it is `closed`, a whole number where x comes to rest is that number: even where the cosine is positive. Also the
-    /// condition that changes there.
+    /// The floor of an expression x, frozen, and the condition that changes at its jumps. A jump is a sign change of sin(π x).
+    /// Between two jumps the floor is the even or the odd number next to x - 1/2, which does not depend on the rounding of x
+    /// at the jump. If it is `closed`, the floor of an x that rests at a whole number is that number: even if cos(π x) is
+    /// positive.
     fn level(&mut self, graph: &mut Graph, x: NodeId, rebuilt: NodeId, closed: bool) -> (NodeId, NodeId) {
         let [zero, half, one, two] = [0.0, 0.5, 1.0, 2.0].map(|x| graph.constant(x));
         let pi = graph.constant(std::f64::consts::PI);
@@ -231,7 +231,7 @@ impl Frozen {
             is_even = graph.binary(Binary::Or, change, on_even);
         }
         let even = self.flag(graph, is_even);
-        // 2 floor((x + 1/2 - odd) / 2) + odd: x stands in it once, so that bounds of it are as narrow as can be.
+        // 2 floor((x + 1/2 - odd) / 2) + odd: x occurs once, so that interval bounds are as narrow as possible.
         let odd = graph.select(even, zero, one);
         let shift = graph.binary(Binary::Sub, half, odd);
         let shifted = graph.binary(Binary::Add, rebuilt, shift);

@@ -1,5 +1,5 @@
-//! Strings of modules: successors with their weights, initial strings, drawings; and whether their modules have the
-//! parameters that rules and drawings give them.
+//! Strings of modules: successors with their weights, axioms and drawings; checks of the numbers of parameters of their
+//! modules.
 
 use std::collections::{HashMap, HashSet};
 
@@ -14,18 +14,18 @@ use dlsys_syntax::ast::{self, Alternative, HeadModule};
 use dlsys_syntax::print;
 use dlsys_syntax::suggest::{looks_like, meant};
 
-/// What a module is in the balance of brackets.
+/// The effect of a module on the balance of brackets.
 enum Bracket {
-    /// A bracket that matches as far as is known, or none at all.
+    /// A bracket that may match, or another module.
     Good,
     /// A `]` without its `[`.
     Unmatched,
-    /// A bracket with arguments, which is read no further.
+    /// A bracket with arguments, which is an error.
     WithArguments,
 }
 
 impl RuleBuilder<'_> {
-    /// A string of modules that are made, over the given variables.
+    /// Lowers a string of modules in which draws are allowed, over the given variables.
     pub fn successor(
         &mut self,
         modules: &[ast::Module],
@@ -38,7 +38,7 @@ impl RuleBuilder<'_> {
         successor
     }
 
-    /// The successors of a clause, with their weights.
+    /// Lowers the successors of a clause with their weights.
     pub(super) fn outcome(
         &mut self,
         all: &[Alternative],
@@ -62,7 +62,7 @@ impl RuleBuilder<'_> {
             let mut spans = all.iter().filter_map(of);
             let first = spans.next().unwrap_or_default();
             self.error(
-                Diagnostic::error("these weights cannot be")
+                Diagnostic::error("these weights are invalid")
                     .at(spans.fold(first, |a, b| a.to(b)), why)
                     .help("weights are at least 0, and one of them is greater; they need not add up to 1"),
             );
@@ -124,8 +124,8 @@ impl RuleBuilder<'_> {
         Some(Successor { kinds, arguments, draws, clocks, places })
     }
 
-    /// Lowers the arguments of a module; false if one is at fault. `in_rule` tells that the string may end where the head
-    /// of another rule was meant.
+    /// Lowers the arguments of a module; false if one has an error. `in_rule` is true if the module may be meant as the head
+    /// of another rule.
     fn arguments(
         &mut self,
         module: &ast::Module,
@@ -161,7 +161,7 @@ impl RuleBuilder<'_> {
         good
     }
 
-    /// Keeps count of the brackets that are open, and complains about those that cannot stand here.
+    /// Updates the open brackets and reports those without a partner or with arguments.
     fn bracket(&mut self, module: &ast::Module, open: &mut Vec<Span>) -> Bracket {
         match &*module.name {
             "[" | "]" if !module.arguments.is_empty() => {
@@ -193,7 +193,7 @@ impl RuleBuilder<'_> {
         }
     }
 
-    /// A module whose arguments are bare names, as a rule's head has them.
+    /// True for a module whose arguments are bare names, as in the head of a rule.
     fn looks_like_a_head(&self, module: &ast::Module) -> Option<String> {
         let names: Vec<&str> = (module.arguments.iter())
             .map(|argument| match self.document.expressions.get(argument.root) {
@@ -204,8 +204,8 @@ impl RuleBuilder<'_> {
         Some(format!("{}({})", module.name, names.join(", ")))
     }
 
-    /// Wrong numbers of parameters: of words that have rules (or drawings), wherever they stand in a string (or a
-    /// drawing). `place` says where the right number is.
+    /// Reports words in strings (or drawings) whose number of parameters differs from that of their rules (or drawings).
+    /// `place` describes the head with the right number.
     pub fn check_arities(&mut self, heads: &[&HeadModule], strings: &[&[ast::Module]], place: &str) {
         let mut declared: HashMap<&str, Vec<&HeadModule>> = HashMap::new();
         for &head in heads {
@@ -213,7 +213,7 @@ impl RuleBuilder<'_> {
         }
         let mut reported: HashSet<(&str, usize)> = HashSet::new();
         for module in strings.iter().copied().flatten() {
-            // A symbol or surface may leave its parameters to the turtle's defaults.
+            // The turtle has defaults for missing parameters of symbols and surfaces.
             if class_of(&module.name) != Class::Word {
                 continue;
             }
@@ -242,7 +242,7 @@ impl RuleBuilder<'_> {
         }
     }
 
-    /// Drawings of modules that neither the strings nor other drawings ever have.
+    /// Warns of drawings of modules that occur neither in strings nor in other drawings.
     pub fn check_interpretations(&mut self, heads: &[&HeadModule]) {
         for head in heads {
             let name = &*head.name.text;

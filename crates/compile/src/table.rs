@@ -1,32 +1,32 @@
 //! Tables from text files: numbers in columns, as spreadsheets write them (CSV).
 //!
-//! Columns are separated by commas, semicolons or tabs, or else by spaces. A first line that is no numbers has the names
-//! of the columns. Empty lines, and lines that begin with `#`, mean nothing.
+//! Columns are separated by commas, semicolons or tabs, or else by spaces. A first line that does not consist of numbers
+//! contains the names of the columns. Empty lines and lines that begin with `#` are ignored.
 
 use std::path::Path;
 
 use dlsys_expr::MAX_POINTS;
 use dlsys_syntax::{Files, is_inside};
 
-/// Greatest size of a file, in bytes.
+/// Maximum size of a file, in bytes.
 const SIZE_LIMIT: u64 = 64 << 20;
 
 /// A row of a table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TableRow {
-    /// In the file, from 1.
+    /// The line of the file, from 1.
     pub line: usize,
     pub point: [f64; 2],
 }
 
-/// What is wrong with a table.
+/// An error in a table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TableError {
-    /// From 1, if one line is to blame.
+    /// The line with the error, from 1; None if it concerns the whole file.
     pub line: Option<usize>,
     pub what: String,
     pub help: Option<String>,
-    /// The name of the column that was asked for is to blame.
+    /// True if the file has no column with the name in the declaration.
     pub of_column: bool,
 }
 
@@ -36,7 +36,7 @@ impl TableError {
     }
 }
 
-/// Reads the first column of a file, and the second, or the one with a name.
+/// Reads the first column of a file, and the second or a named one.
 pub fn read(path: &str, column: Option<&str>, files: &dyn Files) -> Result<Vec<TableRow>, TableError> {
     if !is_inside(path) {
         return Err(TableError::new(
@@ -115,7 +115,7 @@ fn parse(text: &str, column: Option<&str>) -> Result<Vec<TableRow>, TableError> 
     Ok(rows)
 }
 
-/// The place of a column that is chosen by its name. `first` is the line of the names, if it is `titled`.
+/// The index of a column by its name. `titled` is true if the line `first` contains names.
 fn column_of(wanted: &str, names: &[String], titled: bool, first: usize) -> Result<usize, TableError> {
     let found = names.iter().position(|name| name == wanted).filter(|_| titled);
     found.ok_or_else(|| {
@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn spreadsheets_write_many_ways() {
+    fn tables_are_read_in_the_formats_of_spreadsheets() {
         let wanted = [[0.0, 1.5], [1.0, 2.0]];
         assert_eq!(points("0,1.5\n1,2\n", None), wanted);
         assert_eq!(points("\u{feff}day;mass\r\n0; 1.5\r\n1;2\r\n", None), wanted);
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_say_where() {
+    fn errors_have_their_place() {
         let fault = |text: &str, column| parse(text, column).expect_err("a bad table");
         assert_eq!(fault("", None).what, "the file has no rows");
         assert_eq!(fault("0,1\n1,x\n", None).line, Some(2));

@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn kleene_logic_keeps_what_is_certain() {
+    fn kleene_logic_preserves_certain_results() {
         let either = Condition(vec![
             ConditionStep::Atom(0, Comparison::Less),
             ConditionStep::Atom(1, Comparison::Equal),

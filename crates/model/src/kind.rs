@@ -48,8 +48,8 @@ pub struct Kind {
     pub steps: Vec<usize>,
     /// Index into [`Model::interpretations`](super::Model::interpretations).
     pub interpretation: Option<usize>,
-    /// True if context matching passes over it: symbols and surfaces unless a `consider` names them, and the modules that
-    /// an `ignore` names.
+    /// True if context matching passes over it: a symbol or surface by default, a module that an `ignore` names, and, in a
+    /// model with `consider`, every module that this does not name.
     pub skipped: bool,
     /// The hidden parameters, which follow the written ones: the clocks of events at a rate, by the keys of their clauses.
     /// Kinds with the same base name and number of parameters have the same number of them.

@@ -1,9 +1,8 @@
 //! The elements of an SVG picture, from back to front.
 //!
-//! Stems are strokes with round ends, polygons and the triangles of surfaces are filled paths, in the same light as
-//! everywhere ([`Light`](super::Light)). Thick stems have a gradient across. Everything
-//! is drawn from back to front, by the depth of its middle; a surface is one thing in that order, and its triangles are
-//! in order among themselves. What is equally deep is drawn in string order.
+//! A scene with surfaces in depth is drawn by its visible regions ([`trace`]). In other scenes stems are strokes with round ends, polygons
+//! and the triangles of surfaces are filled paths, in the same light as everywhere ([`Light`](super::Light)). Thick stems have a gradient
+//! across. All elements are drawn from back to front, by the depth of their middles; those that are equally deep in string order.
 //!
 //! In a picture of one frame every element has an id that lasts from frame to frame: the name of its module,
 //! `KIND-LINEAGE`, for the first that a module draws, then `KIND-LINEAGE.2` and so on. Where many frames share a picture,
@@ -40,8 +39,10 @@ pub(super) struct Style<'a> {
 /// The elements of a scene, one a line. Names are those of modules; without them the elements have none, and `prefix`
 /// begins the ids of gradients, which must differ in a document.
 pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -> String {
-    // In a drawing without depth nothing is hidden, and every element keeps its shape.
+    // In a drawing without depth nothing is hidden, and stems and polygons have an order by depth that is good enough: there every
+    // element keeps its exact shape.
     if !style.fit.light.is_flat()
+        && !scene.surfaces.is_empty()
         && let Some(traced) = trace::elements(scene, style, named, prefix)
     {
         return traced;

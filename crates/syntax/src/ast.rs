@@ -397,7 +397,7 @@ pub enum Item {
     },
     /// `ignore names`: the modules that context matching passes over.
     Ignore(Vec<Name>),
-    /// `consider names`: symbols and surfaces that context matching does not pass over.
+    /// `consider names`: the only modules that context matching does not pass over.
     Consider(Vec<Name>),
     /// `initial string: modules`, or `axiom: modules`.
     Axiom(Vec<Module>),

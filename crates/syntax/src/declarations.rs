@@ -201,11 +201,11 @@ pub static DECLARATIONS: [Declaration; 20] = [
     },
     Declaration {
         usage: "\"FILE\"",
-        summary: "takes in the declarations and rules of another file",
+        summary: "includes the declarations and rules of another file",
         category: Category::Text,
         repeats: Repeats::PerFile,
         begins: Begins::BeforeName,
-        written: "other texts are taken in by `include \"organs.dls\"`",
+        written: "other texts are included by `include \"organs.dls\"`",
         ..row("include", Rule::include_item)
     },
     Declaration {

@@ -33,19 +33,19 @@ const LINES: [(&[&str], &str); 21] = [
     (&["seed", ":"], "the seed is no part of the model: `dlsys run MODEL --seed N`"),
     (
         &["import"],
-        "a model is no program: functions are declared with `def`, other texts are taken in by `include \"FILE\"`",
+        "a model is no program: functions are declared with `def`, other texts are included by `include \"FILE\"`",
     ),
     (
         &["from"],
-        "a model is no program: functions are declared with `def`, other texts are taken in by `include \"FILE\"`",
+        "a model is no program: functions are declared with `def`, other texts are included by `include \"FILE\"`",
     ),
     (
         &["for"],
-        "a model is no program: what is to happen again and again are productions: `A(n): if age = 1 & n > 0 produce F(1) A(n - 1)`",
+        "a model is no program: actions that repeat are productions: `A(n): if age = 1 & n > 0 produce F(1) A(n - 1)`",
     ),
     (
         &["while"],
-        "a model is no program: what is to happen again and again are productions: `A(n): if age = 1 & n > 0 produce F(1) A(n - 1)`",
+        "a model is no program: actions that repeat are productions: `A(n): if age = 1 & n > 0 produce F(1) A(n - 1)`",
     ),
     (&["return"], "a model is no program: a function is one expression: `def f(x) = x^2`"),
 ];
@@ -169,7 +169,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_of_other_programs_are_known_and_heads_of_rules_are_not() {
+    fn lines_of_other_programs_are_recognised_and_heads_of_rules_are_not() {
         let said = |text: &str| line(text, 0).map(|d| d.help.concat());
         assert!(said("derivation length: 5").is_some_and(|help| help.contains("`frames 0 .. 5 step 1`")));
         assert!(said("Lsystem: 1").is_some() && said("production:").is_some());

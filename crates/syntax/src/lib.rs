@@ -9,8 +9,8 @@
 //! time linear in the text and recurses to a fixed depth at most.
 //!
 //! - [`parse`]: text to [`ast::Document`]; [`read`] also parses the files that a text includes.
-//! - [`print`]: the syntax tree as text.
-//! - [`format`]: the canonical layout of a text (`dlsys fmt`).
+//! - [`print`](mod@print): the syntax tree as text.
+//! - [`format`](mod@format): the canonical layout of a text (`dlsys fmt`).
 //! - [`declarations`]: the table of declarations: words, notation, descriptions.
 //! - [`words`]: the words of the language, for highlighting and completion.
 //! - [`outline`]: the declarations of a text and their places, for programs that edit texts.

@@ -77,7 +77,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_same_thing_has_the_same_key_however_it_is_spelt() {
+    fn keys_do_not_depend_on_the_notation() {
         let text = "const r = 2\nA(a) < F(x): solve dx/dt = r\n  # a remark\n\nfoo bar\nignore F\n";
         let entries = outline(text);
         let names: Vec<&str> = entries.iter().map(|e| e.name.as_str()).collect();

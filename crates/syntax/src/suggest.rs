@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn names_that_look_alike_are_told_so() {
+    fn similar_looking_names_are_reported() {
         let (composed, with_mark) = ("Bl\u{fc}te", "Blu\u{308}te");
         assert!(looks_like(composed, with_mark) && looks_like(with_mark, composed));
         assert!(!looks_like(with_mark, with_mark) && !looks_like(with_mark, "Blute"));

@@ -1,8 +1,8 @@
-//! Changes models by chance and gives them to a target: `mutate --seconds 60 --seed 1 front` (README).
+//! Mutates models randomly and runs a target on them: `mutate --seconds 60 --seed 1 front` (README).
 //!
-//! The corpus is the models and the error gallery of the repository; for `files`, those in `seeds`. The same seed gives the same
-//! inputs; `--count N` stops after so many. A panic, or an input
-//! that takes longer than ten seconds, is written into the folder `found`, and the exit status is 1.
+//! The corpus consists of the models and the error gallery of the repository; for `files`, of the files in `seeds`. The same
+//! seed gives the same inputs; `--count N` stops after N of them. An input that causes a panic or takes longer than ten
+//! seconds is written into the folder `found`, and the exit status is 1.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use dlsys_fuzz::TARGETS;
 
-/// Longer than this is a hang.
+/// Inputs that take longer than this count as a hang.
 const HANG: Duration = Duration::from_secs(10);
 const NUMBERS: [&str; 14] = [
     "0",
@@ -29,7 +29,7 @@ const NUMBERS: [&str; 14] = [
     "4294967296",
     "1e5",
 ];
-/// Larger inputs are cut: what is wrong shows in small ones, too.
+/// Larger inputs are truncated: small ones suffice to find errors.
 const MOST: usize = 6000;
 
 /// Numbers that are the same everywhere.
@@ -156,8 +156,10 @@ fn main() {
             other => name = other.to_owned(),
         }
     }
-    let (name, target) =
-        *TARGETS.iter().find(|(known, _)| *known == name).expect("a target: front, format, simulate, draw, files");
+    let (name, target) = *TARGETS
+        .iter()
+        .find(|(known, _)| *known == name)
+        .expect("a target: front, format, simulate, draw, files");
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let mut corpus = Vec::new();
     match name {
@@ -170,7 +172,7 @@ fn main() {
     assert!(!corpus.is_empty(), "the corpus is there");
     println!("{name}: seed {seed}, {} texts", corpus.len());
     let begun = Instant::now();
-    // What is under way, for the watchdog.
+    // The current input, for the watchdog.
     let current: Arc<Mutex<(u64, Duration, Vec<u8>)>> = Arc::new(Mutex::new((0, worked(begun), Vec::new())));
     let watched = current.clone();
     std::thread::spawn(move || {

@@ -1,4 +1,4 @@
-//! What the building blocks of the language cost: a plant written with them against the same plant simplified by hand.
+//! The cost of the building blocks of the language: a plant written with them and the same plant simplified by hand.
 
 use cpu_time::ProcessTime as Clock;
 use dlsys::sim::Settings;

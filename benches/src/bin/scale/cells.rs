@@ -1,4 +1,4 @@
-//! What is integrated: the right-hand sides, a busy filament, filaments that grow.
+//! Measurements of numerical integration: right-hand sides, a busy filament, filaments that grow.
 
 use cpu_time::ProcessTime as Clock;
 use dlsys::sim::{Scheduler, Settings};

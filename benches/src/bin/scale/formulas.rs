@@ -1,4 +1,4 @@
-//! What is done by formulas: reading, productions, the dragon curve, branches, frames.
+//! Measurements without numerical integration: parsing, productions, the dragon curve, branches, frames.
 
 use cpu_time::ProcessTime as Clock;
 use dlsys::sim::Settings;

@@ -1,8 +1,8 @@
 //! Prints the table of ratios at scale: `cargo run --release --bin scale [NAME…]`.
 //!
-//! Names: productions, dragon, filament, branches, busy, growing, frames, blocks, parsing, memory, start; all of them without
-//! one. Ratios are of one run on one machine. What is measured in memory or in starting time runs in processes of
-//! its own: this program, with an argument that no user gives.
+//! Names: productions, dragon, filament, branches, busy, growing, frames, blocks, parsing, memory, start; all of them by
+//! default. Ratios are those of one run on one machine. Memory and start-up time are measured in separate processes, which
+//! run this program with an internal argument.
 
 mod blocks;
 mod cells;
@@ -22,7 +22,7 @@ use dlsys_benches::solver;
 const ROUNDS: usize = 5;
 
 type Outcome = Result<(), String>;
-/// What is measured, by name.
+/// The measurements by name.
 type Part = (&'static str, fn() -> Outcome);
 
 const PARTS: [Part; 11] = [
@@ -92,7 +92,7 @@ fn memory() -> Outcome {
     Ok(())
 }
 
-/// Runs what `memory` asks for and prints the peak of resident memory in bytes.
+/// Runs a measurement of `memory` and prints the peak of resident memory in bytes.
 fn peak(arguments: &[String]) -> Outcome {
     let what = arguments.first().map_or("", String::as_str);
     let (text, end) = match what.trim_end_matches("-written") {

@@ -1,4 +1,4 @@
-//! One `solve` clause: its equations classified, compiled and put together.
+//! Analysis of one `solve` clause: classifies and compiles its equations.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use super::stepping::{StepEquations, VariableLayout};
 use super::variability::Constants;
 use crate::declared::{DeclaredSolve, ResolvedRule};
 
-/// What is found out about the equations of a clause.
+/// The results of the analysis of the equations of a clause.
 pub struct ClauseAnalysis {
     of: Vec<usize>,
     rates: Program,
@@ -60,7 +60,7 @@ impl ClauseAnalysis {
     }
 }
 
-/// Classifies the equations of a clause. `is_needed` tells whether something reads a parameter of the module.
+/// Classifies the equations of a clause. `is_needed` is true for parameters of the module that a rule reads.
 pub fn analyse_clause(
     graph: &mut Graph,
     rule: &ResolvedRule,
@@ -102,7 +102,7 @@ pub fn analyse_clause(
     }
 }
 
-/// True if a parameter that follows this form moves one way only.
+/// True if a solution of this form is monotone.
 fn is_monotone(form: &SolutionForm) -> bool {
     match form {
         SolutionForm::Polynomial(coefficients) => coefficients.outputs() == 1,
@@ -112,7 +112,7 @@ fn is_monotone(form: &SolutionForm) -> bool {
     }
 }
 
-/// What is known of the parameters that have a value or an equation instead of a rate.
+/// Compiles the values and implicit equations of a clause.
 fn algebraic(
     graph: &mut Graph,
     solve: &DeclaredSolve,

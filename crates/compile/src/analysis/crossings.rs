@@ -1,11 +1,11 @@
-//! How the instant is found at which the two sides of a comparison meet.
+//! Zero-crossing functions: the method that locates the zero of each difference of two sides.
 
 use dlsys_expr::{Binary, Graph, Monomial, NodeId, Polynomial, Program, Unary};
 use dlsys_model::{AffineSum, ZeroCrossing};
 
 use super::variability::Constants;
 
-/// How the meeting of two sides is found. `monotone` tells of an own parameter that it moves one way only.
+/// The zero-crossing function of two sides. `monotone` is true for own parameters with monotone solutions.
 pub fn crossing(
     graph: &mut Graph,
     (a, b): (NodeId, NodeId),
@@ -42,7 +42,7 @@ pub fn crossing(
     }
 }
 
-/// A polynomial as a sum with factors that are known, if it is one.
+/// A polynomial as an affine sum, if it is linear with constant factors.
 fn sum(graph: &Graph, p: &Polynomial) -> Option<AffineSum> {
     let mut sum = AffineSum { constant: 0.0, terms: Vec::new() };
     for (monomial, &factor) in &p.terms {

@@ -1,4 +1,4 @@
-//! Equations whose solution is a formula of an integral that is known: `x' = h(time) q(x)`.
+//! Equations with a formula in terms of a known integral: `x' = h(time) q(x)`.
 //!
 //! h is a sum of curves and growth functions of time, each with its antiderivative known to the graph; q is one of the
 //! rates with a formula: quadratic, Gompertz's `x (a + b ln x)`, or Bernoulli's `a x + b x^p`, to which the growth laws of
@@ -10,20 +10,20 @@ use std::sync::Arc;
 use dlsys_expr::{Binary, Curve, Graph, Integral, Monomial, Node, NodeId, Part, Polynomial, Program, Unary};
 use dlsys_model::{DrivenGrowth, GrowthLaw};
 
-/// Variables at and above this number stand for parts of a rate; those of functions begin above them.
+/// Variables from this number on stand for parts of a rate; those of functions have higher numbers.
 const STAND_IN: u32 = 1 << 23;
-/// ln x, and x to the power that [`Parts::power`] is.
+/// Stand-ins for ln x, and for x to the power [`Parts::power`].
 const LOGARITHM: u32 = STAND_IN;
 const POWER: u32 = STAND_IN + 1;
-/// Curves and growth functions.
+/// First stand-in for a curve or a growth function.
 const FIRST_DRIVER: u32 = STAND_IN + 2;
 
-/// Highest power of `age` beside them.
+/// Maximum power of `age` in h.
 const MAX_AGE_DEGREE: u32 = 3;
-/// Points at which it is tested whether coefficients are proportional (Schwartz 1980, Zippel 1979).
+/// Number of random points at which coefficients are tested for proportionality (Schwartz 1980, Zippel 1979).
 const POINTS: usize = 8;
 
-/// A rate taken apart, before it is code.
+/// A decomposed rate before compilation.
 pub struct DrivenForm {
     growth: GrowthLaw,
     coefficients: Vec<NodeId>,
@@ -48,12 +48,12 @@ impl DrivenForm {
 #[derive(Clone, Copy)]
 struct Driver {
     node: NodeId,
-    /// d(argument)/dt
+    /// The rate of the argument, d(argument)/dt.
     speed: NodeId,
     integral: Integral,
 }
 
-/// What stands in for what.
+/// The substitution of stand-ins for parts of a rate.
 #[derive(Default)]
 struct Parts {
     drivers: Vec<Driver>,
@@ -61,8 +61,8 @@ struct Parts {
     power: Option<NodeId>,
 }
 
-/// Parts of an expression that have an antiderivative along time: curves and growth functions of `age` or `t`. Expressions
-/// inside of them are not looked at.
+/// The maximal parts of an expression with an antiderivative along time (curves and growth functions of `age` or `t`), and
+/// the nodes outside of them.
 fn drivers(
     graph: &mut Graph,
     root: NodeId,
@@ -95,7 +95,7 @@ fn drivers(
     (found, outside)
 }
 
-/// The rate of an argument that is linear in time, with a constant coefficient.
+/// The rate of an argument that is linear in time with a constant coefficient.
 fn speed(
     graph: &mut Graph,
     argument: NodeId,
@@ -111,8 +111,7 @@ fn speed(
     slopes.into_iter().reduce(|a, b| graph.binary(Binary::Add, a, b))
 }
 
-/// The expressions of a rate that are outside of curves and growth functions of time, and these themselves: for whoever
-/// would change the former only.
+/// The nodes of a rate outside of curves and growth functions of time, as opposed to their operands.
 pub fn outside_of_drivers(
     graph: &mut Graph,
     root: NodeId,
@@ -151,7 +150,7 @@ pub fn driven_form(
     let driven = products.of_time.iter().flatten().any(|(v, _)| *v >= FIRST_DRIVER);
     // h is the constant 1.
     let trivial = products.of_time.len() == 1 && products.of_time[0].is_empty();
-    // Without a driver only a constant h and a flow that has no other formula; x' = age x is integrated.
+    // Without a driver only a constant h and a growth law without another formula; x' = age x is integrated.
     if !driven && (growth == GrowthLaw::Quadratic || !trivial) {
         return None;
     }
@@ -242,7 +241,7 @@ fn curve_of(graph: &Graph, driver: &Driver) -> Option<(Arc<Curve>, Part)> {
     }
 }
 
-/// Lets variables stand in for logarithms and powers of x.
+/// Adds stand-ins for logarithms and powers of x.
 fn growth_terms(
     graph: &mut Graph,
     parameter: u32,
@@ -263,7 +262,7 @@ fn growth_terms(
             }
             _ => continue,
         };
-        // κ x, or κ / x.
+        // The base is κ x or κ / x.
         let (scale, sign) = match scale_of(graph, base, parameter, &still) {
             Some(scale) => (scale, 1.0),
             None => match graph.node(base) {
@@ -295,13 +294,13 @@ fn growth_terms(
     }
 }
 
-/// True for a power that a polynomial in x takes in.
+/// True for a power that a polynomial in x can contain.
 fn is_count(graph: &Graph, base: NodeId, exponent: NodeId) -> bool {
     let whole = graph.as_constant(exponent).is_some_and(|n| n == n.trunc() && (0.0..=8.0).contains(&n));
     whole && !matches!(graph.node(base), Node::Binary(Binary::Div, ..))
 }
 
-/// κ of an expression `κ x`.
+/// The factor κ of an expression `κ x`.
 fn scale_of(
     graph: &mut Graph,
     base: NodeId,
@@ -313,7 +312,7 @@ fn scale_of(
     (polynomial.terms.len() == 1 && still(graph, scale)).then_some(scale)
 }
 
-/// The form of q with these monomials, and which of them each coefficient belongs to.
+/// The growth law q with these monomials, and the index of the monomial of each of its coefficients.
 fn growth_law(x: u32, monomials: &[Monomial]) -> Option<(GrowthLaw, Vec<Option<usize>>)> {
     let find = |wanted: Monomial| monomials.iter().position(|m| *m == wanted);
     let power = |n: u32| find(if n == 0 { Monomial::new() } else { vec![(x, n)] });
@@ -335,7 +334,7 @@ fn growth_law(x: u32, monomials: &[Monomial]) -> Option<(GrowthLaw, Vec<Option<u
     matched(&bernoulli).then(|| (GrowthLaw::Bernoulli, bernoulli.to_vec()))
 }
 
-/// p of Bernoulli's equation.
+/// The exponent p of Bernoulli's equation.
 fn exponent(graph: &mut Graph, x: u32, monomials: &[Monomial], power: Option<NodeId>) -> Option<NodeId> {
     let one = graph.constant(1.0);
     for monomial in monomials {
@@ -349,7 +348,7 @@ fn exponent(graph: &mut Graph, x: u32, monomials: &[Monomial], power: Option<Nod
     None
 }
 
-/// True if all rows are multiples of one.
+/// True if all rows are multiples of the first one.
 fn proportional(graph: &mut Graph, rows: &[Vec<NodeId>], time: u32) -> bool {
     let nodes: Vec<NodeId> = rows.concat();
     let most = graph.variables(&nodes).last().map_or(0, |v| *v + 1).max(time);
@@ -359,7 +358,7 @@ fn proportional(graph: &mut Graph, rows: &[Vec<NodeId>], time: u32) -> bool {
     for _ in 0..4 * POINTS {
         let point: Vec<f64> = (0..most)
             .map(|_| {
-                // Steele, Lea and Flood's mixing (2014), as numbers from 0.2 to 1.7.
+                // SplitMix64 (Steele, Lea and Flood 2014), as numbers from 0.2 to 1.7.
                 seed = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
                 let mut z = (seed ^ (seed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
                 z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -387,7 +386,7 @@ fn proportional(graph: &mut Graph, rows: &[Vec<NodeId>], time: u32) -> bool {
     false
 }
 
-/// H as an expression.
+/// The integral H of h as an expression.
 fn pace(graph: &mut Graph, parts: &Parts, age: u32, of_time: &[Monomial], of_h: &[NodeId]) -> NodeId {
     let age_node = graph.var(age);
     let mut whole: Option<NodeId> = None;

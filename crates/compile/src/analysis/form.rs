@@ -1,20 +1,20 @@
-//! Expressions as polynomials whose coefficients are numbers with bounds of their rounding errors.
+//! Expressions as polynomials whose coefficients carry bounds of their rounding errors.
 //!
-//! A value that is computed as 1e-16 may be zero or may not: that depends on what it was computed from. `(1 - x)^2` at
-//! `x = 1 - 1e-8` is 1e-16 with sixteen digits, `1 - x/3` at 3 is 0 give or take 1e-16. So every number here carries a
-//! bound of its error (running error analysis; Higham 2002, section 3.3), and zero means: within that bound.
+//! Whether a computed value of 1e-16 is zero depends on its computation: `(1 - x)^2` at `x = 1 - 1e-8` is 1e-16 to sixteen
+//! digits, and `1 - x/3` at 3 is 0 with an error of 1e-16. So every number here carries a bound of its error (running error
+//! analysis; Higham 2002, section 3.3), and a number within its bound counts as zero.
 //!
-//! What moves (time, parameters with equations, neighbours) is an indeterminate. Functions of indeterminates are
-//! indeterminates themselves, the same one for the same argument, so that `sin(t) - sin(t)` is zero and
-//! `exp(-(t - 300)^2)` is not, whatever it rounds to where one happens to look.
+//! Variables that change (time, parameters with equations, neighbours) are indeterminates. A function of indeterminates is
+//! another indeterminate, the same one for the same argument, so that `sin(t) - sin(t)` is zero, and `exp(-(t - 300)^2)` is
+//! not zero even at points where it underflows.
 
 use std::collections::{BTreeMap, HashMap};
 
 use dlsys_expr::{Binary, Curve, Graph, Node, NodeId, Unary, Value};
 
-/// Rounding of one operation, relative.
+/// Relative rounding error of one operation.
 const ROUNDING: f64 = 0.5 * f64::EPSILON;
-/// More terms, or a higher degree, than this are not looked into.
+/// Maximum number of terms, and maximum degree.
 const MAX_TERMS: usize = 64;
 const MAX_DEGREE: u32 = 12;
 
@@ -30,7 +30,7 @@ impl Bounded {
         Bounded { value, error: 0.0 }
     }
 
-    /// A number as it is written: whole numbers are exact, others rounded.
+    /// A number in the text: whole numbers are exact, others rounded.
     fn written(value: f64) -> Bounded {
         let whole = value == value.trunc() && value.abs() < 9e15;
         Bounded { value, error: if whole { 0.0 } else { ROUNDING * value.abs() } }
@@ -49,7 +49,7 @@ impl Bounded {
         Bounded::rounded(self.value + other.value, self.error + other.error)
     }
 
-    /// 1 or -1: nothing is rounded by it.
+    /// True for 1 and -1, which multiply without rounding.
     fn is_sign(self) -> bool {
         self.error == 0.0 && self.value.abs() == 1.0
     }
@@ -62,7 +62,7 @@ impl Bounded {
         Bounded::rounded(self.value * other.value, error)
     }
 
-    /// None where the divisor may be zero.
+    /// The quotient; None if the divisor may be zero.
     fn over(self, other: Bounded) -> Option<Bounded> {
         if other.may_be_zero() {
             return None;
@@ -75,20 +75,20 @@ impl Bounded {
         Some(Bounded::rounded(value, error))
     }
 
-    /// A function of it, by its values at the ends of what it may be.
+    /// A function of the number, with a bound from the values at both ends of its range.
     fn through(self, f: impl Fn(f64) -> f64) -> Bounded {
         let value = f(self.value);
         let spread = [-1.0, 1.0].map(|side| (f(self.value + side * self.error) - value).abs());
-        // Where it is not defined on one side only, the other one tells.
+        // If the function is undefined at one end, the other end gives the bound.
         let error = spread.into_iter().filter(|s| !s.is_nan()).fold(0.0, f64::max);
         Bounded { value, error: error + 4.0 * ROUNDING * value.abs() }
     }
 }
 
-/// Powers of indeterminates, ascending by number.
+/// Indeterminates with their powers, in ascending order.
 type Powers = Vec<(u32, u32)>;
 
-/// A polynomial in indeterminates. Terms that may be zero are left out, but for the constant one.
+/// A polynomial in indeterminates. Terms that may be zero are left out, except the constant term.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Form {
     terms: BTreeMap<Powers, Bounded>,
@@ -112,7 +112,7 @@ impl Form {
         }
     }
 
-    /// True if it is zero whatever the indeterminates are, as far as rounding lets one tell.
+    /// True if it is zero, within its bound, for all values of the indeterminates.
     pub fn vanishes(&self) -> bool {
         self.as_number().is_some_and(Bounded::may_be_zero)
     }
@@ -121,7 +121,7 @@ impl Form {
         self.terms.values().all(|c| c.value.is_finite() && c.error.is_finite())
     }
 
-    /// The coefficient of an indeterminate and the rest, if it occurs only in a term of its own.
+    /// The coefficient of an indeterminate and the rest, if the polynomial is linear in it with a constant coefficient.
     pub fn solved_for(&self, number: u32) -> Option<(Bounded, Form)> {
         let mut rest = self.clone();
         let slope = rest.terms.remove(&vec![(number, 1)])?;
@@ -167,14 +167,14 @@ impl Form {
         Form::kept(self.terms.iter().map(|(powers, c)| (powers.clone(), c.times(by))).collect())
     }
 
-    /// Divided by a number; None where that may be zero.
+    /// The quotient by a number; None if that may be zero.
     pub fn over(&self, by: Bounded) -> Option<Form> {
         let terms = self.terms.iter().map(|(powers, c)| Some((powers.clone(), c.over(by)?)));
         Form::kept(terms.collect::<Option<_>>()?)
     }
 }
 
-/// The indeterminates, by what they stand for.
+/// The indeterminates, by variable or expression.
 #[derive(Clone, Debug, Default)]
 pub struct Indeterminates {
     numbers: HashMap<String, u32>,
@@ -186,14 +186,14 @@ impl Indeterminates {
         Form::indeterminate(*self.numbers.entry(key).or_insert(next))
     }
 
-    /// The number of the indeterminate that a variable is.
+    /// The number of the indeterminate for a variable.
     pub fn variable(&mut self, variable: u32) -> u32 {
         let next = self.numbers.len() as u32;
         *self.numbers.entry(format!("v{variable}")).or_insert(next)
     }
 }
 
-/// The forms of expressions, given those of some variables; the other variables are indeterminates. None if one is too
+/// The forms of expressions, given those of some variables; the other variables are indeterminates. None if a form is too
 /// long.
 pub fn forms(
     graph: &Graph,
@@ -268,7 +268,7 @@ fn binary(op: Binary, a: &Form, b: &Form, all: &mut Indeterminates) -> Option<Fo
             let by_second = y.through(|y| f64::binary(op, x.value, y));
             Some(Form::number(Bounded { error: by_first.error + by_second.error, ..by_first }))
         }
-        // What is zero stays so, whatever it is divided by.
+        // Zero divided by any expression is zero.
         (Binary::Div, ..) if a.vanishes() => Some(a.clone()),
         (Binary::Div, ..) => a.times(&all.of(format!("1/{b:?}"))),
         _ => Some(all.of(format!("{op:?}{a:?}{b:?}"))),
@@ -280,7 +280,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn zero_is_told_from_small() {
+    fn zero_is_distinguished_from_small_numbers() {
         // (1 - x)^2 at 1 - 1e-8 is small; 1 - x/3 at 3 is zero, and so is 0.3 - 0.1 x.
         let mut g = Graph::default();
         let (x, one, three) = (g.var(0), g.constant(1.0), g.constant(3.0));
@@ -300,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cancels_for_all_arguments_vanishes() {
+    fn terms_that_cancel_for_all_arguments_vanish() {
         let mut g = Graph::default();
         let (x, t) = (g.var(0), g.var(1));
         let (a, b) = (g.unary(Unary::Sin, x), g.unary(Unary::Sin, t));

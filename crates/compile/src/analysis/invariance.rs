@@ -1,29 +1,29 @@
 //! Surfaces that a flow cannot reach.
 //!
-//! A value that is only approached is never reached (LANGUAGE, "Events"): logistic growth comes as close
-//! to its limit as one likes, and closer than rounded numbers can tell. That the limit is not an event
-//! cannot be seen on the numbers of a trajectory; it is seen on the equations. The surface `a = b` is
-//! invariant if the rate of `a - b` is zero everywhere on it, and by uniqueness of solutions no trajectory
-//! enters an invariant surface.
+//! A limit that is only approached is never reached (LANGUAGE, "Events"): logistic growth comes arbitrarily close to its
+//! limit, closer than rounded numbers can distinguish. The values of a trajectory cannot show that the limit is not an
+//! event; the equations can. The surface `a = b` is invariant if the rate of `a - b` is zero everywhere on it, and by
+//! uniqueness of solutions no trajectory enters an invariant surface.
 //!
-//! The rate is written as a polynomial in all that moves (`form`), with the surface put in for one of the parameters, and
-//! must vanish term by term, within the bounds of rounding of its coefficients. A limit and a threshold just short of
-//! it are so told apart as far as the numbers in the text can be. Only parameters that stand still are given random
-//! values (Schwartz 1980, Zippel 1979): what is zero at all of them is zero. What cannot be shown is not assumed.
+//! The rate is written as a polynomial in all variables that change (`form`), with one parameter eliminated by the equation
+//! of the surface, and must vanish term by term, within the rounding bounds of its coefficients. So a limit and a threshold
+//! just below it are distinguished to the precision of the numbers in the text. Only constant parameters are given random
+//! values (Schwartz 1980, Zippel 1979): a polynomial that is zero at all of these points is zero. Without a proof, a
+//! surface counts as reachable.
 
 use super::form::{Bounded, Form, Indeterminates, forms};
 use dlsys_expr::{Binary, Dual, Graph, NodeId, Program};
 
-/// Points at which the rate is tested, if there are parameters that stand still.
+/// Number of points at which the rate is tested, if there are constant parameters.
 const POINTS: usize = 24;
-/// Fewer defined points than this prove nothing.
+/// Minimum number of points at which the rate must be defined.
 const ENOUGH: usize = 6;
 
 /// True if a flow can never bring `a - b` from another value to zero.
 ///
-/// - `own`: the variables `0..own` are the module's parameters; `rates` gives the derivatives of those that move.
-/// - `context`: the variables `own..own + context` move in ways that are not known here.
-/// - The next two are `t` and `age`, whose rate is 1; any after them are truth values that stand still.
+/// - `own`: the variables `0..own` are the module's parameters; `rates` gives the derivatives of those that change.
+/// - `context`: the variables `own..own + context` change at unknown rates.
+/// - The next two are `t` and `age`, whose rate is 1; any after them are truth values, which are constant.
 pub fn never_reached(
     graph: &mut Graph,
     (a, b): (NodeId, NodeId),
@@ -74,7 +74,7 @@ struct Surface<'g> {
 }
 
 impl Surface<'_> {
-    /// True if the rate is shown to vanish on the surface, whatever the variables are that stand still.
+    /// True if the rate is shown to vanish on the surface for all values of the constant variables.
     fn is_invariant(&self, still: &[u32], first_flag: u32) -> bool {
         let mut random = Random::new();
         let points = if still.is_empty() { 1 } else { POINTS };
@@ -94,13 +94,13 @@ impl Surface<'_> {
         defined >= ENOUGH.min(points)
     }
 
-    /// Whether the rate is zero on the surface, given the variables that stand still; None if nothing is defined there.
+    /// True if the rate is zero on the surface for these values of the constant variables; None if it is undefined there.
     fn vanishes_at(&self, point: &[f64], still: &[u32]) -> Option<bool> {
         let mut all = Indeterminates::default();
         let number = all.variable(self.pivot);
         let fixed = |v: u32| still.contains(&v).then(|| Form::number(Bounded::exactly(point[v as usize])));
         let Some(gap) = forms(self.graph, &[self.gap], &fixed, &mut all) else { return Some(false) };
-        // Where the surface is: the parameter in terms of all others, or as a number.
+        // The equation of the surface: the parameter in terms of all others, or as a number.
         let linear = gap[0].solved_for(number).filter(|(slope, _)| !slope.may_be_zero());
         let place = match linear.and_then(|(slope, rest)| rest.over(slope)?.scaled(Bounded::exactly(-1.0))) {
             Some(place) => place,
@@ -116,13 +116,12 @@ impl Surface<'_> {
         if !rate.is_finite() {
             return None;
         }
-        // Where the difference has a double root, its rate vanishes whatever the flow does. Without a Lipschitz constant
-        // solutions are not unique: x' = -sqrt(x) does arrive at 0.
+        // At a double root of the difference its rate vanishes for every flow. Without a Lipschitz constant solutions are
+        // not unique: x' = -sqrt(x) reaches 0.
         Some(rate.vanishes() && !slope.vanishes() && slope.is_finite() && bend.is_finite())
     }
 
-    /// Where the difference is zero as a function of the one parameter that it reads besides those that stand still
-    /// (Newton's method).
+    /// The zero of the difference as a function of the only parameter in it that changes (Newton's method).
     fn root(&self, point: &[f64], still: &[u32]) -> Option<Bounded> {
         let read = self.graph.variables(&[self.gap]);
         if !read.iter().all(|v| *v == self.pivot || still.contains(v)) {
@@ -190,19 +189,19 @@ mod tests {
     }
 
     #[test]
-    fn the_limit_of_logistic_growth_is_never_reached_but_what_is_below_is() {
+    fn limit_of_logistic_growth_is_unreachable_and_thresholds_below_are_not() {
         let mut g = Graph::default();
         let rate = logistic(&mut g);
         let (x, limit, below) = (g.var(0), g.constant(3.0), g.constant(3.0 * (1.0 - 2f64.powi(-40))));
         assert!(never_reached(&mut g, (x, limit), &[(0, rate)], 1, 0, 3));
         assert!(!never_reached(&mut g, (x, below), &[(0, rate)], 1, 0, 3));
-        // However it is written.
+        // The result does not depend on the notation.
         let (one, third) = (g.constant(1.0), g.binary(Binary::Div, x, limit));
         assert!(never_reached(&mut g, (third, one), &[(0, rate)], 1, 0, 3));
     }
 
     #[test]
-    fn what_ends_in_finite_time_arrives() {
+    fn solutions_that_end_in_finite_time_reach_the_end() {
         let mut g = Graph::default();
         let (x, zero) = (g.var(0), g.constant(0.0));
         let root = g.unary(dlsys_expr::Unary::Sqrt, x);
@@ -211,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn growth_that_ends_on_its_threshold_arrives() {
+    fn growth_that_ends_on_its_threshold_reaches_it() {
         // x' = (1 - age) age, which is zero at age 1 but not on the whole surface x = 1/6.
         let mut g = Graph::default();
         let (x, age, one, sixth) = (g.var(0), g.var(2), g.constant(1.0), g.constant(1.0 / 6.0));
@@ -221,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn a_threshold_short_of_a_limit_is_told_from_the_limit() {
+    fn threshold_just_below_a_limit_is_distinguished_from_it() {
         let mut g = Graph::default();
         let (x, one, t) = (g.var(0), g.constant(1.0), g.var(1));
         let gap = g.binary(Binary::Sub, one, x);
@@ -229,11 +228,11 @@ mod tests {
         for short in [1e-4, 1e-8, 1e-12, 1e-15] {
             let below = g.constant(1.0 - short);
             assert!(!never_reached(&mut g, (x, below), &[(0, gap)], 1, 0, 3), "{short}");
-            // The square of a difference of a few roundings says nothing.
+            // The square of a difference of a few roundings is inconclusive.
             assert!(short < 1e-14 || !never_reached(&mut g, (x, below), &[(0, square)], 1, 0, 3), "{short}");
         }
         assert!(never_reached(&mut g, (x, one), &[(0, square)], 1, 0, 3));
-        // A pulse around t = 300 underflows wherever one looks by chance.
+        // A pulse around t = 300 underflows at random points.
         let far = g.constant(300.0);
         let since = g.binary(Binary::Sub, t, far);
         let square = g.binary(Binary::Mul, since, since);
@@ -241,14 +240,14 @@ mod tests {
         let pulse = g.unary(dlsys_expr::Unary::Exp, minus);
         let driven = g.binary(Binary::Add, gap, pulse);
         assert!(!never_reached(&mut g, (x, one), &[(0, driven)], 1, 0, 3));
-        // Times what vanishes it does not matter.
+        // A factor that vanishes makes it irrelevant.
         let paced = g.binary(Binary::Mul, gap, pulse);
         assert!(never_reached(&mut g, (x, one), &[(0, paced)], 1, 0, 3));
     }
 
     #[test]
     fn a_parameter_may_approach_another_one() {
-        // x' = m - x approaches m, which stands still; y' = 2 (x - y) approaches nothing that moves.
+        // x' = m - x approaches m, which is constant; y' = 2 (x - y) approaches x, which changes.
         let mut g = Graph::default();
         let (x, y, m, two) = (g.var(0), g.var(1), g.var(2), g.constant(2.0));
         let rate = g.binary(Binary::Sub, m, x);
@@ -257,7 +256,7 @@ mod tests {
         let rates = [(0, rate), (1, other)];
         assert!(never_reached(&mut g, (x, m), &rates, 3, 0, 5));
         assert!(!never_reached(&mut g, (x, y), &rates, 3, 0, 5));
-        // Two that follow the same equation never meet.
+        // Two parameters with the same equation never become equal.
         let twin = g.binary(Binary::Sub, m, y);
         assert!(never_reached(&mut g, (x, y), &[(0, rate), (1, twin)], 3, 0, 5));
     }

@@ -1,15 +1,16 @@
-//! The analysis of a model: how much work each equation and each condition is (see [`SolutionForm`] and [`ZeroCrossing`]).
+//! The analysis of a model: the solution of each equation and the location of each zero (see
+//! [`SolutionForm`](dlsys_model::SolutionForm) and [`ZeroCrossing`]).
 //!
-//! It works on the expression graph. Whether a rate is affine, quadratic or polynomial is a property of its
-//! coefficients, so spelling does not matter. Everything that a module's own equation of the moment leaves alone is
-//! a constant, and so is a neighbour's parameter for which no rule has an equation.
+//! It works on the expression graph. Whether a rate is affine, quadratic or polynomial is a property of its coefficients
+//! and does not depend on the notation. Parameters of a module without an equation in the active clause are constant, and
+//! so are parameters of neighbours for which no rule has an equation.
 //!
-//! [`analyse`] takes all rules at once, because what a neighbour does is part of the question, and gives compiled rules.
+//! [`analyse`] takes all rules at once, because the results depend on the rules of neighbours, and returns compiled rules.
 //!
-//! - `variability`: which variables stand still while a clause is active;
-//! - `solution_forms`: how each equation is solved; `driven`: equations with a known integral;
-//! - `crossings`: how the zero of each difference is found; `invariance`: differences that are never zero;
-//! - `need`: parameters that nothing reads; `pulses`: rates that a step may overlook;
+//! - `variability`: the variables that are constant while a clause is active;
+//! - `solution_forms`: the solution of each equation; `driven`: equations with a known integral;
+//! - `crossings`: zero-crossing functions; `invariance`: differences that never become zero;
+//! - `need`: parameters that nothing reads; `pulses`: rates with pulses that a step may miss;
 //! - `stepping`: the variables of a step; `form`, `rank`: numbers with bounds of their errors, singular equations.
 
 mod clause;
@@ -38,10 +39,10 @@ pub use driven::{driven_form, outside_of_drivers};
 pub use invariance::never_reached;
 pub use rank::is_singular;
 
-/// The compiled rules of a model, and what the analysis found out about its kinds.
+/// The compiled rules of a model and the results about its kinds.
 pub struct Analysed {
     pub rules: Vec<Rule>,
-    /// Per kind and parameter: nothing but drawing and output reads it.
+    /// By kind and parameter: true if only drawings and output read it.
     pub drawn_only: Vec<Vec<bool>>,
 }
 
@@ -73,7 +74,7 @@ pub fn analyse(graph: &mut Graph, kinds: &Kinds, rules: Vec<ResolvedRule>) -> An
     Analysed { rules, drawn_only }
 }
 
-/// What is found out about one rule by itself.
+/// The results of the analysis of one rule.
 pub struct RuleAnalysis {
     zero_crossings_at_rest: Vec<ZeroCrossing>,
     reads_context: bool,
@@ -104,7 +105,7 @@ fn analyse_rule(
     RuleAnalysis { zero_crossings_at_rest, reads_context, clauses }
 }
 
-/// Compiles the aggregates of a rule, with the derivatives of their terms by what changes.
+/// Compiles the aggregates of a rule, with the derivatives of their terms with respect to the variables that change.
 fn aggregates(graph: &mut Graph, moving: &Moving, index: usize, rule: &ResolvedRule) -> Vec<Aggregate> {
     let declared = &rule.declared;
     let (own, count, first) = (declared.own(), declared.variables, declared.first_aggregate);
@@ -139,7 +140,7 @@ fn aggregates(graph: &mut Graph, moving: &Moving, index: usize, rule: &ResolvedR
     all
 }
 
-/// Puts together what was declared and what was found out. `moving` are the variables of the context that move.
+/// Combines the declared rule with the results of its analysis. `moving` contains the variables of the context that change.
 fn compile_rule(
     graph: &Graph,
     rule: ResolvedRule,

@@ -1,4 +1,4 @@
-//! Which parameters are read at all: a parameter that no rate, condition or production reads costs nothing.
+//! The parameters that rates, conditions and productions read; others need no computation until they are observed.
 
 use std::collections::HashSet;
 
@@ -7,15 +7,15 @@ use dlsys_model::Kinds;
 
 use crate::declared::ResolvedRule;
 
-/// Kinds with the numbers of their parameters.
+/// Parameters as pairs of the index of a kind and that of the parameter.
 type ParameterSet = HashSet<(usize, usize)>;
 
-/// What the variables of rules stand for.
+/// The parameters for which the variables of rules stand.
 struct Owners<'r> {
     rules: &'r [ResolvedRule],
-    /// Per rule: the kinds that it is for.
+    /// By rule: the kinds to which it applies.
     kinds_of: Vec<Vec<usize>>,
-    /// Per rule: what each aggregate reads.
+    /// By rule: the variables that each aggregate reads.
     terms: Vec<Vec<Vec<usize>>>,
 }
 
@@ -69,12 +69,12 @@ fn reads(graph: &Graph, nodes: &[NodeId]) -> Vec<usize> {
     graph.variables(nodes).into_iter().map(|v| v as usize).collect()
 }
 
-/// The parameters that rates and conditions read, by themselves or through algebraic parameters.
+/// The parameters that rates and conditions read, directly or through algebraic parameters.
 pub fn needed(graph: &Graph, kinds: &Kinds, rules: &[ResolvedRule]) -> ParameterSet {
     let owners = Owners::new(graph, kinds, rules);
     let mut read = ParameterSet::new();
     for (index, ResolvedRule { declared, .. }) in rules.iter().enumerate() {
-        // An implicit one is followed from its start: solved for now and then, it might be another solution.
+        // An implicit parameter is solved for in each step: occasional solves might converge to another solution.
         for entry in declared.algebraic().filter(|entry| !entry.explicit) {
             owners.add(index, entry.parameter, &mut read);
         }
@@ -101,7 +101,7 @@ pub fn needed(graph: &Graph, kinds: &Kinds, rules: &[ResolvedRule]) -> Parameter
     }
 }
 
-/// Per kind and parameter: nothing but the drawing reads it.
+/// By kind and parameter: true if only drawings read it.
 pub fn drawn_only(graph: &Graph, kinds: &Kinds, rules: &[ResolvedRule]) -> Vec<Vec<bool>> {
     let owners = Owners::new(graph, kinds, rules);
     let mut read = ParameterSet::new();

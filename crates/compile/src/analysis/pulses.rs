@@ -1,9 +1,9 @@
-//! Which rates may have pulses: be large for a time too short for a step to notice.
+//! Detection of rates that may have pulses: large values over a time that a step may miss.
 //!
-//! A step resolves what it integrates, and polynomials of that. It does not resolve time, nor what follows a formula: that
-//! may do anything between two stages. So a rate may have pulses if it is no polynomial in what moves, or reads something
-//! that follows a formula. What grows or decays exponentially is fast at its beginning only, where a step begins, too; one that
-//! enters a rate linearly makes no pulse.
+//! A step resolves the parameters that it integrates and polynomials of them, but not time or parameters that follow
+//! formulas, which may vary arbitrarily between two stages. So a rate may have pulses if it is not a polynomial in the
+//! variables that change, or reads a parameter that follows a formula. Exponential growth or decay is fast only at its
+//! beginning, where a step begins as well; a rate that is linear in it has no pulse.
 
 use dlsys_expr::{Graph, NodeId};
 use dlsys_model::{Kinds, Pattern, SolutionForm};
@@ -12,10 +12,10 @@ use super::RuleAnalysis;
 use super::variability::Moving;
 use crate::declared::{DeclaredSolve, ResolvedRule};
 
-/// How a parameter may move between the stages of a step.
+/// The variation of a parameter between the stages of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 enum Pace {
-    /// It rests, is integrated, or is a polynomial of time.
+    /// It is constant, integrated, or a polynomial of time.
     #[default]
     Resolved,
     /// It grows or decays exponentially.
@@ -24,10 +24,10 @@ enum Pace {
     Any,
 }
 
-/// The parameters of a clause that follow formulas which are no polynomials, and how.
+/// The parameters of a clause that follow formulas other than polynomials, with their variation.
 type Paces = Vec<(usize, Pace)>;
 
-/// For each rule and each of its clauses: whether a rate may have pulses.
+/// By rule and clause: true if a rate may have pulses.
 pub fn find(
     graph: &mut Graph,
     kinds: &Kinds,
@@ -71,19 +71,19 @@ pub fn find(
     pulses
 }
 
-/// A rule, and how what stands around its modules moves.
+/// A rule with the variation of its context and children.
 struct Surroundings<'r> {
     rule: &'r ResolvedRule,
-    /// Which variables of the context move.
+    /// By variable of the context: true if it changes.
     moving: &'r [bool],
-    /// How they move.
+    /// The variation of the context.
     context: Vec<Pace>,
-    /// How the parameters of children move that are added up.
+    /// The variation of the parameters of children in aggregates.
     children: Pace,
 }
 
 impl Surroundings<'_> {
-    /// Whether a rate of the clause may have pulses. `paces` are those of the module's own parameters.
+    /// True if a rate of the clause may have pulses. `paces` gives the variation of the module's own parameters.
     fn has_pulses(
         &self,
         graph: &mut Graph,
@@ -95,7 +95,7 @@ impl Surroundings<'_> {
         let (own, time) = (declared.own(), declared.time());
         let mut nodes: Vec<NodeId> = solve.rates.iter().map(|rate| rate.1).collect();
         nodes.extend(solve.algebraic.iter().filter(|entry| entry.explicit).map(|entry| entry.node));
-        // Terms of aggregates count as the rates that they are added up in.
+        // Terms of aggregates count as parts of the rates that read the aggregates.
         let read = graph.variables(&nodes);
         let summed = declared.terms().enumerate();
         nodes.extend(
@@ -106,7 +106,7 @@ impl Surroundings<'_> {
         let moved = |v: usize| match v {
             v if v < own => solve.moves(v),
             v if v < time => self.moving[v - own],
-            // Those of children come after all others.
+            // The parameters of children follow all other variables.
             v => v <= time + 1 || v >= declared.variables,
         };
         let pace = |v: usize| match v {
@@ -115,7 +115,7 @@ impl Surroundings<'_> {
             v if v >= declared.variables => self.children,
             _ => Pace::default(),
         };
-        // What has a formula itself is integrated only where everything is.
+        // A rate with a formula is integrated only if all equations are.
         let rates = solve.rates.iter().zip(solution_forms);
         let closed: Vec<NodeId> =
             rates.filter(|(_, form)| form.is_closed()).map(|((_, node), _)| *node).collect();
@@ -148,7 +148,7 @@ fn paces(graph: &mut Graph, solve: &DeclaredSolve, solution_forms: &[SolutionFor
     all
 }
 
-/// How the variables of the context move, in any kind that matches.
+/// The variation of the variables of the context, over all kinds that match.
 fn context_paces(rule: &ResolvedRule, kinds: &[Vec<Pace>]) -> Vec<Pace> {
     let of = |pattern: &Pattern, p: usize| pattern.kinds.iter().map(|kind| kinds[kind.index()][p]).max();
     let mut all: Vec<Pace> = (rule.context())

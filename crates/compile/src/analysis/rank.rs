@@ -1,20 +1,20 @@
-//! Implicit equations that are singular whatever the values are.
+//! Implicit equations that are singular for all values.
 //!
-//! The determinant of the partial derivatives, as a function of all variables, is zero everywhere if it is zero at many
-//! random points (Schwartz 1980, Zippel 1979).
+//! The determinant of the partial derivatives, as a function of all variables, is zero everywhere, with high probability,
+//! if it is zero at many random points (Schwartz 1980, Zippel 1979).
 
 use super::invariance::Random;
 use crate::declared::DeclaredAlgebraic;
 use dlsys_expr::{Graph, NodeId, Program, eliminate};
 
-/// Points at which the matrix is tested.
+/// Number of points at which the matrix is tested.
 const POINTS: usize = 24;
-/// Fewer defined points than this prove nothing.
+/// Minimum number of points at which the matrix must be defined.
 const ENOUGH: usize = 6;
-/// A pivot of no more than this is one of rounding.
+/// Pivots up to this size are rounding errors.
 const SMALL: f64 = 1e-11;
 
-/// True if equations that read variables below `variables` cannot determine the parameters that they are meant for.
+/// True if equations that read variables below `variables` cannot determine the parameters that they are solved for.
 pub fn is_singular(graph: &mut Graph, equations: &[DeclaredAlgebraic], variables: usize) -> bool {
     let n = equations.len();
     let mut partials: Vec<NodeId> = Vec::new();

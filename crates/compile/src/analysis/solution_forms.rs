@@ -1,4 +1,4 @@
-//! How each equation of a clause is solved: by a formula, or in steps.
+//! Classification of the equations of a clause: by formula or by numerical integration.
 
 use std::collections::HashSet;
 
@@ -8,10 +8,10 @@ use dlsys_model::{Jacobian, LinearRates, Numeric, Obstacle, SolutionForm};
 use super::driven::driven_form;
 use super::variability::Constants;
 
-/// Highest degree in `age` of a rate that is integrated as a polynomial.
+/// Maximum degree in `age` of a rate that is integrated as a polynomial.
 const MAX_AGE_DEGREE: u32 = 3;
 
-/// Classifies the equations of a clause. Those that others depend on come first, whatever their order.
+/// Classifies the equations of a clause, in the order of their dependencies.
 pub fn classify(
     graph: &mut Graph,
     rates: &[(usize, NodeId)],
@@ -55,7 +55,7 @@ pub fn classify(
         .collect()
 }
 
-/// Why [`closed`] finds no formula.
+/// The reason why [`closed`] finds no formula.
 fn obstacle(graph: &mut Graph, parameter: u32, rate: NodeId, constants: &Constants) -> Obstacle {
     if constants.reads_context(graph, &[rate]) {
         return Obstacle::Neighbours;
@@ -65,11 +65,11 @@ fn obstacle(graph: &mut Graph, parameter: u32, rate: NodeId, constants: &Constan
         return Obstacle::Degree(by_self.degree());
     }
     let factors: Vec<NodeId> = (1..3).filter_map(|power| by_self.coefficient(parameter, power)).collect();
-    // A square with a coefficient that stands still has no formula beside an inflow that moves.
+    // A constant coefficient of the square has no formula together with an inflow that changes.
     if constants.all_constant(graph, &factors) { Obstacle::Inflow } else { Obstacle::Factor }
 }
 
-/// The form of a parameter, if it is one with a formula, and whether that is a sum of exponentials and polynomials.
+/// The solution form of a parameter, if it has a formula, and whether that is a sum of exponentials and polynomials.
 fn closed(
     graph: &mut Graph,
     parameter: u32,
@@ -113,7 +113,7 @@ fn closed(
     })
 }
 
-/// The form of a parameter that follows curves, growth functions of time, or a growth form.
+/// The solution form of a parameter that follows curves, growth functions of time, or a growth law.
 fn driven(
     graph: &mut Graph,
     parameter: u32,
@@ -126,8 +126,8 @@ fn driven(
     Some(SolutionForm::Driven(Box::new(form.compile(graph, total))))
 }
 
-/// True if an expression is made of constants, time, exponentials, sines and cosines of time, and parameters that are
-/// such themselves, by addition and multiplication.
+/// True if an expression consists of sums and products of constants, time, exponentials, sines and cosines of time, and
+/// parameters whose solutions are such sums.
 fn is_sum(graph: &mut Graph, root: NodeId, constants: &Constants, sums: &HashSet<u32>) -> bool {
     let is_time = |v: u32| v as usize == constants.time || v as usize == constants.time + 1;
     for id in graph.reachable(&[root]) {
@@ -159,14 +159,14 @@ fn is_sum(graph: &mut Graph, root: NodeId, constants: &Constants, sums: &HashSet
     true
 }
 
-/// A rate as `constant + Σ coefficient · variable`, if it is that, with constant coefficients.
+/// A rate as `constant + Σ coefficient · variable`, if it has this form with constant coefficients.
 fn affine(graph: &mut Graph, rate: NodeId, constants: &Constants) -> Option<Polynomial> {
     let polynomial = graph.polynomial(rate, |v| !constants.is_constant(v))?;
     let time = |m: &Monomial| m.iter().any(|(v, _)| *v as usize >= constants.time);
     (polynomial.degree() <= 1 && !polynomial.terms.keys().any(time)).then_some(polynomial)
 }
 
-/// The rates as linear equations, if all are that, with constant coefficients.
+/// The rates as linear equations, if all are linear with constant coefficients.
 pub fn linear(
     graph: &mut Graph,
     rates: &[NodeId],
@@ -190,7 +190,7 @@ pub fn linear(
     Some(LinearRates { variables, coefficients: Program::compile(graph, &roots, total) })
 }
 
-/// Partial derivatives of expressions, one row each, by what changes.
+/// Partial derivatives of expressions, one row each, with respect to the variables that change.
 pub fn jacobian(
     graph: &mut Graph,
     rates: &[(usize, NodeId)],

@@ -5,7 +5,7 @@ use dlsys_model::{Algebraic, Jacobian, LinearRates, Read, SolutionForm, Stepping
 
 use super::ResolvedRule;
 
-/// How the variables of a rule are laid out.
+/// The layout of the variables of a rule.
 pub struct VariableLayout {
     /// Number of the module's own parameters.
     own: usize,
@@ -13,7 +13,7 @@ pub struct VariableLayout {
     context: Vec<usize>,
     /// Number of all variables.
     variables: usize,
-    /// There are aggregates among them.
+    /// True if there are aggregates among them.
     aggregates: bool,
 }
 
@@ -41,7 +41,7 @@ pub struct StepEquations<'e> {
 }
 
 impl StepEquations<'_> {
-    /// What the steps of the clause read.
+    /// The components of the clause and the variables that its steps read.
     pub fn stepping(&self, layout: &VariableLayout) -> Stepping {
         let algebraic = self.algebraic;
         let components = [false, true].map(|numeric_only| {
@@ -57,7 +57,7 @@ impl StepEquations<'_> {
         {
             read[variable] = true;
         }
-        // What is solved for, and what is added up over children, reads by ways of its own.
+        // Implicit equations and aggregates read variables that are not listed in these programs.
         if !algebraic.is_empty() || layout.aggregates {
             read.fill(true);
         }
@@ -93,7 +93,7 @@ impl StepEquations<'_> {
     }
 }
 
-/// Of each variable: whether some program reads it.
+/// By variable: true if some program reads it.
 fn read_by<'p>(programs: impl Iterator<Item = &'p Program>, variables: usize) -> Vec<bool> {
     let mut all = vec![false; variables];
     for &variable in programs.flat_map(Program::reads) {

@@ -1,4 +1,4 @@
-//! Which variables stand still, and which move.
+//! The variables that are constant between events, and those that change.
 
 use std::collections::HashSet;
 
@@ -7,11 +7,11 @@ use dlsys_model::{Kinds, Pattern};
 
 use crate::declared::{DeclaredRule, DeclaredSolve, ResolvedRule};
 
-/// Which parameters of modules some equation moves.
+/// The parameters of modules for which some rule has an equation.
 pub struct Moving {
-    /// Per kind and parameter.
+    /// By kind and parameter: true if an equation changes it.
     kinds: Vec<Vec<bool>>,
-    /// Per rule: the variables between the module's own and `t`, those of the context and then the aggregates.
+    /// By rule: the variables between the module's own and `t`; those of the context come first, then the aggregates.
     contexts: Vec<Vec<bool>>,
 }
 
@@ -29,12 +29,12 @@ impl Moving {
         moving
     }
 
-    /// True if a parameter moves in some kind that the pattern matches.
+    /// True if a parameter changes in some kind that the pattern matches.
     pub fn in_pattern(&self, pattern: &Pattern, parameter: usize) -> bool {
         pattern.kinds.iter().any(|kind| self.kinds[kind.index()][parameter])
     }
 
-    /// Of a rule: whether each variable of the context, and then each aggregate, moves.
+    /// By variable of the context of a rule, then by aggregate: true if it changes.
     pub fn context(&self, rule: usize) -> &[bool] {
         &self.contexts[rule]
     }
@@ -62,26 +62,26 @@ impl Moving {
     }
 }
 
-/// Which variables of a rule stand still while one clause is active.
+/// The variables of a rule that are constant while one clause is active.
 #[derive(Clone)]
 pub struct Constants<'a> {
     /// Number of the module's own parameters.
     pub own: usize,
     /// Own parameters with an equation.
     of: HashSet<usize>,
-    /// Of the context.
+    /// By variable of the context, then by aggregate: true if it changes.
     moving: &'a [bool],
     /// Index of `t`; `age` is the next.
     pub time: usize,
 }
 
 impl<'a> Constants<'a> {
-    /// While no clause is active. `moving` tells which variables of the context move.
+    /// The state without an active clause. `moving` is true for variables of the context and aggregates that change.
     pub fn at_rest(rule: &DeclaredRule, moving: &'a [bool]) -> Constants<'a> {
         Constants { own: rule.own(), of: HashSet::new(), moving, time: rule.time() }
     }
 
-    /// While this clause is active.
+    /// The state while this clause is active.
     pub fn under(&self, solve: &DeclaredSolve) -> Constants<'a> {
         Constants { of: solve.moved().collect(), ..self.clone() }
     }
@@ -101,7 +101,7 @@ impl<'a> Constants<'a> {
         graph.variables(roots).into_iter().all(|v| self.is_constant(v))
     }
 
-    /// True if some variable of the context that the expressions read moves.
+    /// True if the expressions read a variable of the context that changes.
     pub fn reads_context(&self, graph: &Graph, roots: &[NodeId]) -> bool {
         let context = |v: u32| (v as usize) >= self.own && (v as usize) < self.time;
         graph.variables(roots).into_iter().any(|v| context(v) && !self.is_constant(v))

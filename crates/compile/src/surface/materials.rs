@@ -1,4 +1,4 @@
-//! Colours of a mesh from its material library (Wavefront MTL): `newmtl` and `Kd`; other lines mean nothing here.
+//! Colours of a mesh from its material library (Wavefront MTL): `newmtl` and `Kd`; other lines are ignored.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use super::{SIZE_LIMIT, SurfaceError};
 use dlsys_model::NamedColor;
 use dlsys_syntax::{Files, is_inside};
 
-/// Most materials of one mesh.
+/// Maximum number of materials of one mesh.
 const LIMIT: usize = 1000;
 
 /// The materials that the faces of a mesh name.
@@ -16,7 +16,7 @@ pub(super) struct Library {
 }
 
 impl Library {
-    /// Reads a library that stands beside the mesh. One that is not there gives no colours: many meshes come without.
+    /// Reads a library in the folder of the mesh. A missing file is not an error, as many meshes are distributed without it.
     pub(super) fn add(&mut self, name: &str, mesh: &str, files: &dyn Files) -> Result<(), SurfaceError> {
         let folder = Path::new(mesh).parent().unwrap_or(Path::new(""));
         let path = folder.join(name);
@@ -51,7 +51,7 @@ impl Library {
         }
     }
 
-    /// The number of a material; of several with one name the last counts.
+    /// The index of a material; of several with the same name, that of the last.
     pub(super) fn find(&self, name: &str) -> Option<u32> {
         self.known.iter().rposition(|material| &*material.name == name).map(|i| i as u32)
     }

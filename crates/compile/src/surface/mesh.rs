@@ -1,9 +1,9 @@
 //! Triangle meshes from Wavefront OBJ: `v`, `vn` and `f`, with the colours that `mtllib` and `usemtl` name; other lines
-//! mean nothing here.
+//! are ignored.
 //!
-//! Axes are those of our own OBJ files, so that what was exported reads back as it was drawn: the turtle
-//! stands at the origin and heads along `+Y`, its up is `+Z`, and left is `-X`. Faces with more than three
-//! corners are cut into a fan about their first corner, as is right for convex ones.
+//! The axes are those of exported OBJ files, so that an exported drawing can be used as a surface: the turtle is at the
+//! origin with the heading `+Y`, up `+Z` and left `-X`. Faces with more than three corners are triangulated as a fan about
+//! their first corner, which is valid for convex faces.
 
 use std::collections::HashMap;
 
@@ -26,7 +26,7 @@ pub(super) fn parse(text: &str, path: &str, files: &dyn Files) -> Result<Surface
     let mut joined = String::new();
     while let Some((i, first)) = lines.next() {
         let at = i + 1;
-        // A line may go on after a backslash.
+        // A backslash continues a line.
         let mut line = first;
         if first.ends_with('\\') {
             joined.clear();
@@ -70,7 +70,7 @@ pub(super) fn parse(text: &str, path: &str, files: &dyn Files) -> Result<Surface
     Ok(SurfaceShape { materials: library.into_colors(), ..shape })
 }
 
-/// Three numbers, turned into the turtle's axes.
+/// Three numbers, transformed into the turtle's axes.
 fn turned<'t>(words: &mut impl Iterator<Item = &'t str>, line: usize) -> Result<[f64; 3], SurfaceError> {
     let mut next = || match words.next() {
         Some(word) => number(word, line),
@@ -105,14 +105,14 @@ fn corner(word: &str, points: usize, directions: usize, line: usize) -> Result<C
     Ok((vertex, normal))
 }
 
-/// One vertex for each pair of point and normal that some face has.
+/// One vertex for each pair of point and normal in the faces.
 fn build(points: &[[f64; 3]], directions: &[[f64; 3]], faces: &[([Corner; 3], Option<u32>)]) -> SurfaceShape {
     let smooth = faces.iter().flat_map(|(face, _)| face).any(|(_, normal)| normal.is_none());
     let mut numbers: HashMap<Corner, u32> = HashMap::new();
     let mut shape = SurfaceShape::default();
     for (face, material) in faces {
         let triangle = face.map(|(vertex, normal)| {
-            // Where some corners have no normal, none counts: all are made from the faces.
+            // If a corner has no normal, all normals are computed from the faces.
             let normal = normal.filter(|_| !smooth);
             *numbers.entry((vertex, normal)).or_insert_with(|| {
                 shape.vertices.push(points[vertex as usize]);
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn faces_have_the_colours_of_the_library_beside_the_mesh() {
+    fn faces_have_the_colours_of_the_material_library() {
         let text = "mtllib lost.mtl colours.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n\
                     usemtl red\nf 1 2 3\nusemtl none\nf 1 2 3\nusemtl green\nf 1 2 3\n";
         let library = "newmtl red\nKa 0 0 0\nKd 1 0 0\nnewmtl green\nKd 0 0.5 0\n";
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn polygons_become_triangles_and_negative_numbers_count_back() {
+    fn polygons_become_triangles_and_negative_indices_count_backwards() {
         let text = "# a square\no x\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1 \\\n -1/1\n";
         let shape = parse(text).expect("a mesh");
         assert_eq!(shape.triangles, [[0, 1, 2], [0, 2, 3]]);
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn normals_part_vertices() {
+    fn vertices_with_different_normals_are_separate() {
         let text =
             "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvn 0 0 1\nvn 0 1 0\nf 1//1 2//1 3//1\nf 1//2 4//2 2//2\n";
         let shape = parse(text).expect("a mesh");
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_have_their_line() {
+    fn errors_have_their_line() {
         let fault = |text: &str| parse(text).expect_err("a fault");
         assert_eq!(fault("v 0 0 0\nf 1 2 3").line, Some(2));
         assert_eq!(fault("v 0 0").what, "expected three numbers");

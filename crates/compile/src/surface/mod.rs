@@ -1,7 +1,7 @@
 //! Surfaces from files: Bézier patches as the plant modelling tools of Calgary write them (`*.s`), and
 //! triangle meshes (`*.obj`).
 //!
-//! The language reads no file itself; it asks a [`Files`], which whoever has the model's text provides.
+//! The contents of files come from a [`Files`], which the caller provides.
 
 mod materials;
 mod mesh;
@@ -12,17 +12,17 @@ use std::path::Path;
 use dlsys_model::SurfaceShape;
 use dlsys_syntax::{Files, is_inside};
 
-/// Greatest size of a surface file, in bytes.
+/// Maximum size of a surface file, in bytes.
 pub const SIZE_LIMIT: u64 = 64 << 20;
-/// Most patches, or triangles, of one surface.
+/// Maximum number of patches or triangles of one surface.
 pub const PART_LIMIT: usize = 1_000_000;
-/// Greatest coordinate.
+/// Maximum absolute value of a coordinate.
 const COORDINATE_LIMIT: f64 = 1e30;
 
-/// What is wrong with a surface file.
+/// An error in a surface file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SurfaceError {
-    /// From 1, if one line is to blame.
+    /// The line with the error, from 1; None if it concerns the whole file.
     pub line: Option<usize>,
     pub what: String,
     pub help: Option<String>,
@@ -42,7 +42,7 @@ impl SurfaceError {
     }
 }
 
-/// Reads a surface; its name and place are left empty.
+/// Reads a surface; the caller fills in its name and place.
 pub fn read(path: &str, files: &dyn Files) -> Result<SurfaceShape, SurfaceError> {
     if !is_inside(path) {
         return Err(SurfaceError::whole("the path leaves the model's folder")

@@ -3,7 +3,7 @@
 //! ```text
 //! xmin xmax  ymin ymax  zmin zmax          the box around the control points; not needed
 //! PRECISION S: 5 T: 5                      optional; not needed
-//! CONTACT POINT X: 0 Y: 0 Z: 0             where the turtle stands
+//! CONTACT POINT X: 0 Y: 0 Z: 0             the position of the turtle
 //! END POINT X: 0 Y: 1 Z: 0                 not needed
 //! HEADING X: 0 Y: 1 Z: 0                   the turtle's axes
 //! UP X: 0 Y: 0 Z: 1
@@ -16,7 +16,7 @@
 //! x y z  x y z  x y z  x y z               four rows of four control points
 //! ```
 //!
-//! A file of stedit begins with `VERSION stedit`. Numbers may be spread over lines as one likes.
+//! A file of stedit begins with `VERSION stedit`. Line breaks between numbers have no meaning.
 
 use super::{PART_LIMIT, SurfaceError, number, shown};
 use dlsys_model::{Net, SurfaceShape};
@@ -24,7 +24,7 @@ use dlsys_model::{Net, SurfaceShape};
 /// The words of a file, with their lines.
 struct Words<'t> {
     words: std::iter::Peekable<Box<dyn Iterator<Item = (usize, &'t str)> + 't>>,
-    /// Of the last word.
+    /// The line of the last word.
     line: usize,
 }
 
@@ -50,7 +50,7 @@ impl<'t> Words<'t> {
         Ok(word)
     }
 
-    /// Takes words that must stand here.
+    /// Consumes the given words; any other word is an error.
     fn expect(&mut self, words: &str) -> Result<(), SurfaceError> {
         for wanted in words.split(' ') {
             let word = self.next(&format!("`{words}`"))?;
@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn patches_come_in_the_turtles_axes() {
+    fn patches_are_in_the_turtles_axes() {
         let shape = parse(&format!("{HEAD}{PATCH}{}{PATCH}{}", rows(), rows())).expect("a surface");
         assert_eq!(shape.patches.len(), 2);
         // Row 2, column 3: (3, 2, 6), from the contact point (2, 2, 6); heading y, left -x, up z; size 2.
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn stedit_writes_directions_too() {
+    fn directions_written_by_stedit_are_accepted() {
         let patch = PATCH.replace('~', "~ ~");
         let text = format!("VERSION stedit\n{HEAD}{patch}{}", rows());
         assert_eq!(parse(&text).map(|shape| shape.patches.len()), Ok(1));
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_have_their_line() {
+    fn errors_have_their_line() {
         let fault = |text: &str| parse(text).expect_err("a fault");
         assert_eq!(fault("").what, "the file ends where a number is expected");
         assert_eq!(fault(&HEAD.replace("END", "EDN")).line, Some(3));

@@ -138,7 +138,9 @@ mod tests {
 
     #[test]
     fn a_square_keeps_its_place_and_its_hole() {
-        let outlines = mask(&["########", "########", "##....##", "##....##", "##....##", "##....##", "########", "########"]);
+        let outlines = mask(&[
+            "########", "########", "##....##", "##....##", "##....##", "##....##", "########", "########",
+        ]);
         assert_eq!(outlines.len(), 2);
         // The corners of a cell are cut.
         assert!((area(&outlines[0]) - 64.0).abs() <= 1.0, "{outlines:?}");

@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn spaces_go_where_they_help() {
+    fn spaces_are_canonical() {
         for (wild, tame) in [
             ("const  a=2 * ( 3+4 ) /5 ^ -2", "const a = 2*(3 + 4)/5^-2"),
             ("const a = -2c+ 1e-3*1.5E+2 - -b", "const a = -2c + 1e-3*1.5E+2 - -b"),
@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_go_where_they_belong() {
+    fn indentation_is_canonical() {
         let wild = "\n\n# About.\ntitle \"Bush\"   \n\n\n\ninitial string:\nF(1)\n[ +(30)\nF(2)\n] F(3)\n\n\
             # The apex.\nA(x, y):\n   # grows\n      if x < 1 & y>2 solve dx/dt = 1,\n dy/dt = (1 +\n 2)\n\
             if x = 1 produce F(x)\n   A(0) # new\n  if x > 1\nsolve dx/dt = 0 #still\nif y=0 &\nx = 0\n\n\
@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn guards_and_comments_stand_in_columns() {
+    fn guards_and_comments_are_aligned() {
         let wild = "const a = 1 # one\nconst x = 10*10*10\nconst bcd = 2 # two\n\nconst e = 3 # three\nF(x):\n if x < a solve dx/dt = bcd\n\
             if x = a & t > e produce ε\naxiom: F(0)";
         let tame = "const a = 1    # one\nconst x = 10*10*10\nconst bcd = 2  # two\n\nconst e = 3  # three\nF(x):\n  \
@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn line_ends_of_windows_stay_and_bad_text_is_refused() {
+    fn crlf_is_preserved_and_invalid_text_is_an_error() {
         assert_eq!(formatted("axiom:  F\r\n\r\n\r\nangle  4"), "axiom: F\r\n\r\nangle 4\r\n");
         let refused = format(&Source::new("t", "axiom: F(")).expect_err("it never closes");
         assert!(refused[0].message.contains("never closed"));
