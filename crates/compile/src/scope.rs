@@ -68,7 +68,7 @@ pub struct Scope {
     /// Values; None if the declaration has errors, which have been reported.
     pub(super) constants: HashMap<Arc<str>, Option<f64>>,
     pub(super) functions: HashMap<Arc<str>, Function>,
-    /// As for constants, None after an error.
+    /// None if the declaration has errors, as for constants.
     pub(super) curves: HashMap<Arc<str>, Option<Lookup>>,
     pub(super) arrays: HashMap<Arc<str>, Option<Lookup>>,
     /// Global names that some expression has used.
@@ -81,7 +81,7 @@ pub struct Scope {
     pub comparisons: HashMap<NodeId, (Span, Arc<[String; 2]>)>,
     /// The aggregates of the current rule, in the order of their variables.
     pub gathered: Vec<Gathered>,
-    /// The same for the bodies of functions.
+    /// Place and text of the comparisons in the bodies of functions, by node.
     pub(super) function_comparisons: HashMap<NodeId, (Span, Arc<[String; 2]>)>,
     pub diagnostics: Vec<Diagnostic>,
     /// Names that only comments define, with their values.

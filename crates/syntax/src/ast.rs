@@ -14,7 +14,7 @@ use dlsys_expr::{Comparison, Fold, Sort};
 pub struct Name {
     /// The name as written.
     pub text: Arc<str>,
-    /// Where it is written.
+    /// Its place in the text.
     pub span: Span,
 }
 
@@ -122,7 +122,7 @@ impl Expressions {
         &mut self.nodes[id.0 as usize]
     }
 
-    /// Where a node is written.
+    /// The place of a node in the text.
     pub fn span(&self, id: ExprId) -> Span {
         self.spans[id.0 as usize]
     }
@@ -132,7 +132,7 @@ impl Expressions {
         self.nodes.iter()
     }
 
-    /// Nodes from one on, as long as they stand in the text before an end.
+    /// The nodes from `first` on that begin in the text before the end of `last`, or all of them if that is None.
     pub fn iter_within(&self, first: ExprId, last: Option<Span>) -> impl Iterator<Item = &Expr> {
         let end = last.map_or(u32::MAX, |span| span.end);
         let from = first.0 as usize;
