@@ -104,9 +104,11 @@ fn ids_are_unique_and_last() {
     sorted.dedup();
     assert_eq!(sorted.len(), front.len());
     assert_eq!(front.len(), 6);
+    // From the side the polygon is seen edge on: only what is visible is drawn.
     let mut side = ids(&written(&scene(TWIG), "side", Format::SVG));
     side.sort();
-    assert_eq!(side, sorted);
+    let visible: Vec<String> = sorted.into_iter().filter(|id| !id.starts_with("polygon")).collect();
+    assert_eq!(side, visible);
 }
 
 #[test]
@@ -298,6 +300,9 @@ fn strings() -> impl Strategy<Value = String> {
 }
 
 proptest! {
+    // Each case traces two pictures.
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
     #[test]
     fn whatever_is_drawn_can_be_read(text in strings(), azimuth in -180.0..180.0, elevation in -90.0..90.0) {
         let mut scene = scene(&text);

@@ -16,8 +16,9 @@ use std::fmt::Write;
 use super::formats::png::{Lit, sides};
 use super::name::Names;
 use super::painter::Style;
+use super::raster::cells;
 use super::stroke::{Stroke, Strokes, is_thin};
-use super::{number, raster, triangles};
+use super::{number, triangles};
 use contour::Corner;
 use dlsys_geometry::scene::{MaterialId, OwnerId, Point, Scene, Segment, Width};
 use regions::{NOTHING, Regions};
@@ -46,10 +47,10 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
         return None;
     }
     let lit = Lit::new(&mesh, style.fit, placement);
-    let (numbers, depths) = raster::nearest(size, mesh.faces.len(), |n| lit.corners(n));
+    let (numbers, depths) = cells::nearest(size, mesh.faces.len(), |n| lit.corners(n));
 
     // Regions are numbered as they are found, then by their keys.
-    let mut weights = raster::Weights::default();
+    let mut weights = cells::Weights::default();
     let mut found: Vec<(Key, f64, usize)> = Vec::new();
     let mut known: HashMap<Key, u32> = HashMap::new();
     let mut last: Option<(Key, u32)> = None;
@@ -84,7 +85,7 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
         None => NOTHING,
     };
     let (places, chosen) = edges(size, &numbers, item_of);
-    let samples = raster::samples(size, mesh.faces.len(), |n| lit.corners(n), &places, chosen);
+    let samples = cells::samples(size, mesh.faces.len(), |n| lit.corners(n), &places, chosen);
     let samples = samples.into_iter().map(|samples| samples.map(item_of)).collect();
     let mut regions = Regions { width: size[0], height: size[1], labels, places, samples, items };
     regions.without_specks();

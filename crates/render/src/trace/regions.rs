@@ -4,14 +4,10 @@
 //! by a margin, so that no background shows through where two outlines meet; and through holes, so that an outline within another is
 //! needed once only.
 
-use std::collections::HashMap;
-
 use super::contour::{Corner, Mask};
 
 /// The width of the margin, in cells.
 const MARGIN: usize = 3;
-/// Regions of fewer cells are given to a neighbour.
-const SPECK: usize = 4;
 /// The distance of outlines from the edges of cells, in cells.
 const TOLERANCE: f64 = 0.4;
 
@@ -42,56 +38,22 @@ struct Bounds {
 }
 
 impl Regions {
-    /// Gives specks to a neighbour, so that noise of shading makes no outlines.
+    /// Gives cells that stand alone among others of their item to a neighbour, so that noise of shading makes no outlines.
     pub fn without_specks(&mut self) {
-        let mut seen = vec![false; self.labels.len()];
-        let mut stack = Vec::new();
-        let mut cells = Vec::new();
-        for start in 0..self.labels.len() {
-            let label = self.labels[start];
-            if label == NOTHING || seen[start] {
-                continue;
-            }
-            cells.clear();
-            seen[start] = true;
-            stack.push(start);
-            // Neighbouring regions of the same module, with the number of edges.
-            let mut beside: HashMap<u32, usize> = HashMap::new();
-            while let Some(cell) = stack.pop() {
-                cells.push(cell);
-                for next in self.around(cell) {
-                    let other = self.labels[next];
-                    if other == label {
-                        if !seen[next] {
-                            seen[next] = true;
-                            stack.push(next);
-                        }
-                    } else if cells.len() <= SPECK
-                        && other != NOTHING
-                        && self.items[other as usize] == self.items[label as usize]
-                    {
-                        *beside.entry(other).or_default() += 1;
-                    }
+        let width = self.width;
+        for row in 1..self.height.saturating_sub(1) {
+            for cell in row * width + 1..(row + 1) * width - 1 {
+                let label = self.labels[cell];
+                let around = [cell - 1, cell + 1, cell - width, cell + width].map(|other| self.labels[other]);
+                if label == NOTHING || around.contains(&label) {
+                    continue;
+                }
+                let item = |label: u32| self.items.get(label as usize);
+                if let Some(other) = around.into_iter().find(|other| item(*other) == item(label)) {
+                    self.labels[cell] = other;
                 }
             }
-            if cells.len() < SPECK
-                && let Some((&other, _)) = beside.iter().max_by_key(|(label, edges)| (**edges, **label))
-            {
-                cells.iter().for_each(|cell| self.labels[*cell] = other);
-            }
         }
-    }
-
-    fn around(&self, cell: usize) -> impl Iterator<Item = usize> {
-        let (x, y, width, height) = (cell % self.width, cell / self.width, self.width, self.height);
-        [
-            (x > 0).then(|| cell - 1),
-            (x + 1 < width).then(|| cell + 1),
-            (y > 0).then(|| cell - width),
-            (y + 1 < height).then(|| cell + width),
-        ]
-        .into_iter()
-        .flatten()
     }
 
     /// The outlines of every region, by number, in cells from the upper left corner.
