@@ -263,12 +263,12 @@ mod tests {
         /// Against a sorted list; few different times, so that many meet.
         #[test]
         fn bundles_come_in_order(steps in proptest::collection::vec((0..3u8, 0..40u32), 0..300)) {
-            let mut agenda = CalendarQueue::default();
+            let mut queue = CalendarQueue::default();
             let mut list: Vec<(u32, u32)> = Vec::new();
             for (slot, (what, time)) in (0..).zip(steps) {
                 if what == 0 {
                     let mut out = Vec::new();
-                    agenda.pop(&mut out);
+                    queue.pop(&mut out);
                     let mut found = out;
                     found.sort_unstable();
                     let first = list.iter().map(|e| e.0).min();
@@ -276,10 +276,10 @@ mod tests {
                     prop_assert_eq!(found, wanted);
                     list.retain(|e| Some(e.0) != first);
                 } else {
-                    agenda.push(f64::from(time), slot);
+                    queue.push(f64::from(time), slot);
                     list.push((time, slot));
                 }
-                prop_assert_eq!(agenda.earliest(), list.iter().map(|e| f64::from(e.0)).reduce(f64::min));
+                prop_assert_eq!(queue.earliest(), list.iter().map(|e| f64::from(e.0)).reduce(f64::min));
             }
         }
     }
