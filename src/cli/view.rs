@@ -34,7 +34,8 @@ fn open(args: &ViewArgs) -> Result<(), Failure> {
 #[cfg(feature = "viewer")]
 fn open(args: &ViewArgs) -> Result<(), Failure> {
     use super::common::settings;
-    use crate::player::window::{Error, Options, Trial, open};
+    use crate::player::Error;
+    use crate::player::window::{Options, Trial, open};
     let shared = &args.shared;
     let model = shared.model.clone();
     if !model.is_file() {
@@ -62,7 +63,7 @@ fn open(args: &ViewArgs) -> Result<(), Failure> {
     open(options).map_err(|error| {
         let help = match error {
             Error::Screen(_) => "\n  help: `-o plant.html` writes a page that plays the growth in a browser",
-            Error::Trial(_) => "",
+            _ => "",
         };
         Failure::Model(format!("error: {error}{help}\n"))
     })
