@@ -1,6 +1,6 @@
 //! The elements of an SVG picture, from back to front.
 //!
-//! A scene with surfaces in depth is drawn by its visible regions ([`trace`]). In other scenes stems are strokes with round ends, polygons
+//! An animation with surfaces in depth is drawn by its visible regions ([`trace`]). In others stems are strokes with round ends, polygons
 //! and the triangles of surfaces are filled paths, in the same light as everywhere ([`Light`](super::Light)). Thick stems have a gradient
 //! across. All elements are drawn from back to front, by the depth of their middles; those that are equally deep in string order.
 //!
@@ -13,18 +13,17 @@ use std::fmt::Write;
 use super::name::Names;
 use super::stroke::{Stroke, Strokes};
 use super::{Fit, number, trace, triangulate};
-use dlsys_geometry::scene::{Color, MaterialId, OwnerId, Point, Polygon, Scene, Segment, Surface, Vector};
+use dlsys_geometry::scene::{
+    Color, Face, MaterialId, OwnerId, Point, Polygon, Scene, Segment, Surface, Vector,
+};
 
 /// Decimals of a coordinate. The larger side of a picture is 100 to 1000 units, so the last digit is a
 /// millionth to a hundred-thousandth of it.
 pub(super) const DECIMALS: usize = 3;
 /// Decimals of a corner of a surface: a built-in flower has hundreds, and they are most of a file.
 const SURFACE_DECIMALS: usize = 2;
-/// Steps in which the strength of light is rounded, and on surfaces that are small in the picture.
+/// Steps in which the strength of light is rounded.
 pub(super) const SHADES: f64 = 40.0;
-const COARSE_SHADES: f64 = 8.0;
-/// Surfaces smaller than this part of the picture are small.
-const SMALL: f64 = 0.05;
 
 /// The values that the pictures of several frames share.
 #[derive(Clone, Copy)]
@@ -34,18 +33,16 @@ pub(super) struct Style<'a> {
     pub(super) scale: f64,
     /// Larger side of the whole picture, in picture units.
     pub(super) side: f64,
+    /// Pixels of the page in a scene unit.
+    pub(super) pixels: f64,
 }
 
 /// The elements of a scene, one a line. Names are those of modules; without them the elements have none, and `prefix`
 /// begins the ids of gradients, which must differ in a document.
 pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -> String {
-    // In a drawing without depth nothing is hidden, and stems and polygons have an order by depth that is good enough: there every
-    // element keeps its exact shape.
-    if !style.fit.light.is_flat()
-        && !scene.surfaces.is_empty()
-        && let Some(traced) = trace::elements(scene, style, named, prefix)
-    {
-        return traced;
+    // The look must not change within an animation, so this does not depend on the frame.
+    if style.fit.has_visible_regions() {
+        return trace::elements(scene, style, named, prefix);
     }
     let names = named.then(|| Names::new(scene, '-'));
     let mut painter = Painter {
@@ -152,44 +149,27 @@ impl Painter<'_> {
     fn polygon(&mut self, polygon: &Polygon, id: &str) {
         let corners: Vec<Point> = polygon.vertices.iter().map(|&p| self.project(p)).collect();
         let normal = self.style.fit.camera.direction(triangulate::normal(&polygon.vertices));
-        let fill = self.shade(polygon.material, normal, middle(&corners).z, area(&corners) > 0.0, SHADES);
+        let fill = self.shade(polygon.material, normal, middle(&corners).z, area(&corners) > 0.0);
         let mut outline = String::new();
         add_outline(&mut outline, &corners, DECIMALS);
         self.path(format!(" fill=\"{fill}\""), &outline, id);
     }
 
-    /// A group of paths, one for each run of triangles of one shade. A thin stroke of the same colour closes
-    /// the seams that anti-aliasing would leave between them.
+    /// A group of paths, one for each run of triangles of one colour: a surface of a drawing without depth. A thin stroke of the same
+    /// colour closes the seams that anti-aliasing would leave between them.
     fn surface(&mut self, surface: &Surface, id: &str) {
         let (mesh, placement) = (&surface.mesh, &surface.placement);
         let corners: Vec<Point> = mesh.vertices.iter().map(|&v| self.project(placement.point(v))).collect();
-        let normals: Vec<Vector> =
-            mesh.normals.iter().map(|&n| self.style.fit.camera.direction(placement.direction(n))).collect();
-        let size = placement.scale * self.style.scale;
-        // On a flower of a few pixels fine shades cannot be told apart, and they are most of a file.
-        let shades = if size < SMALL * self.style.side { COARSE_SHADES } else { SHADES };
-        let mut faces: Vec<(f64, Color, [Point; 3])> = mesh
-            .faces
-            .iter()
-            .map(|face| {
-                let places = face.corners.map(|i| corners[i as usize]);
-                let normal: Vector = face.corners.iter().map(|&i| normals[i as usize]).sum();
-                let normal = normal.try_normalize(1e-12).unwrap_or_else(Vector::z);
-                let depth = places.iter().map(|p| p.z).sum::<f64>() / 3.0;
-                let tint = surface.tint.filter(|_| face.takes_tint).unwrap_or(face.material);
-                (depth, self.shade(tint, normal, depth, area(&places) > 0.0, shades), places)
-            })
-            .collect();
-        faces.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let material = |face: &Face| surface.tint.filter(|_| face.takes_tint).unwrap_or(face.material);
         self.end_run();
-        let width = text((0.006 * size).clamp(0.01, 0.4));
+        let width = text((0.006 * placement.scale * self.style.scale).clamp(0.01, 0.4));
         let _ = writeln!(self.out, "<g{id} stroke-width=\"{width}\">");
-        for run in faces.chunk_by(|a, b| a.1 == b.1) {
+        for run in mesh.faces.chunk_by(|a, b| material(a) == material(b)) {
             let mut outline = String::new();
-            for (_, _, corners) in run {
-                add_outline(&mut outline, corners, SURFACE_DECIMALS);
+            for face in run {
+                add_outline(&mut outline, &face.corners.map(|i| corners[i as usize]), SURFACE_DECIMALS);
             }
-            let color = run[0].1;
+            let color = self.scene.palette.get(material(&run[0])).color;
             let _ = writeln!(self.out, "<path fill=\"{color}\" stroke=\"{color}\" d=\"{outline}\"/>");
         }
         self.out.push_str("</g>\n");
@@ -223,11 +203,11 @@ impl Painter<'_> {
 
     /// A material's colour on a surface with this unit normal, in the view's coordinates, at this place. Both sides are
     /// alike: the one that is seen counts, and it is the front if it is `turned` like that.
-    fn shade(&self, material: MaterialId, normal: Vector, z: f64, front: bool, shades: f64) -> Color {
+    fn shade(&self, material: MaterialId, normal: Vector, z: f64, front: bool) -> Color {
         let normal = if front { normal } else { -normal };
         let strength = self.style.fit.light.strength(normal, z / self.style.scale);
         // Few shades, so that neighbours of nearly the same direction become one path.
-        self.scene.palette.get(material).color.lit((strength * shades).round() / shades)
+        self.scene.palette.get(material).color.lit((strength * SHADES).round() / SHADES)
     }
 }
 

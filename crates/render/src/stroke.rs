@@ -26,7 +26,7 @@ const OVERLAP: f64 = 0.0004;
 
 /// True for a stem that is too thin for shades across it, though the scene has depth.
 pub(super) fn is_thin(segment: &Segment, style: Style) -> bool {
-    let Style { fit, scale, side } = style;
+    let Style { fit, scale, side, .. } = style;
     let width = |i: usize, p: Point| {
         segment.widths[i].resolve(fit.default_width)
             * scale
@@ -101,7 +101,7 @@ impl<'a> Strokes<'a> {
 
     /// A stroke; a dot if it is seen end on; a filled outline if its ends differ in width. `None` if it has no width.
     pub(super) fn stroke(&mut self, segment: &Segment, index: usize, as_path: bool) -> Option<Stroke> {
-        let Style { fit, scale, side } = self.style;
+        let Style { fit, scale, side, .. } = self.style;
         let [a, b] = [segment.start, segment.end].map(|p| self.style.project(p));
         let width = |i: usize, z: f64| {
             segment.widths[i].resolve(fit.default_width) * scale * fit.camera.magnification(z / scale)

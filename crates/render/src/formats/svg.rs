@@ -31,7 +31,8 @@ impl Exporter for Svg {
 /// How frames are painted on a page.
 pub(crate) fn style<'a>(fit: &'a Fit, page: &Page) -> Style<'a> {
     let [_, _, width, height] = page.picture.view_box();
-    Style { fit, scale: page.picture.scale, side: width.max(height) }
+    let [pixels, ..] = page.placement();
+    Style { fit, scale: page.picture.scale, side: width.max(height), pixels }
 }
 
 /// The document of a page with these elements, each with its line's end.

@@ -1,67 +1,37 @@
-//! Which triangle is the nearest in each pixel, and at samples of some pixels: for the outlines of visible regions.
+//! Which triangle is the nearest in pixels, at one sample or at several: for the outlines of visible regions.
 
-use super::{Corner, EQUAL, FARTHEST, Pattern, SIXTEEN, STEPS, Triangle};
+use super::{Corner, EQUAL, FARTHEST, Pattern, STEPS, Triangle};
 
-/// The nearest triangle in the middle of each pixel: its number plus 1, or 0, and its depth. Of two at the same depth it is the later.
-pub(crate) fn nearest(
-    [width, height]: [usize; 2],
-    count: usize,
-    corners: impl Fn(usize) -> [Corner; 3],
-) -> (Vec<u32>, Vec<f32>) {
-    const MIDDLE: Pattern<1> = [(0, 0)];
-    let (mut numbers, mut depths) = (vec![0; width * height], vec![f32::NEG_INFINITY; width * height]);
-    for number in 0..count {
-        let Some(triangle) = Triangle::new(&MIDDLE, number, corners(number), width, height) else { continue };
-        let [least, greatest] = triangle.depths;
-        let [origin, right, down] = triangle.depth;
-        for row in triangle.rows[0]..=triangle.rows[1] {
-            for column in triangle.columns[0]..=triangle.columns[1] {
-                let inside = (0..3).all(|k| {
-                    let [a, b, c] = triangle.sides[k];
-                    let corner =
-                        a * (column as i64 * STEPS) + b * (row as i64 * STEPS) + c + triangle.bias[k];
-                    corner + triangle.at_samples[k][0] >= 0
-                });
-                if !inside {
-                    continue;
-                }
-                let depth = origin + right * (column as f64 + 0.5) + down * (row as f64 + 0.5);
-                let depth = depth.clamp(least, greatest) as f32;
-                let held = &mut depths[row * width + column];
-                if depth + EQUAL >= *held {
-                    *held = depth.max(*held);
-                    numbers[row * width + column] = number as u32 + 1;
-                }
-            }
-        }
-    }
-    (numbers, depths)
+/// The pattern of one sample, in the middle of a pixel.
+pub(crate) const MIDDLE: Pattern<1> = [(0, 0)];
+
+/// The nearest triangles at the samples of some pixels, one after another: the number of each plus 1, or 0, and its depth.
+pub(crate) struct Nearest<const N: usize> {
+    pub(crate) numbers: Vec<[u32; N]>,
+    pub(crate) depths: Vec<[f32; N]>,
 }
 
-/// The nearest triangles at sixteen samples of some pixels, as of [`nearest`]. `places` has for each pixel its place in the
-/// answer, of `chosen` pixels; or anything greater.
-pub(crate) fn samples(
+/// Finds the nearest of `count` triangles at each sample of the pixels that have a `place` below `places`. Of two at the same
+/// depth it is the later.
+pub(crate) fn nearest<const N: usize>(
+    pattern: &Pattern<N>,
     [width, height]: [usize; 2],
     count: usize,
     corners: impl Fn(usize) -> [Corner; 3],
-    places: &[u32],
-    chosen: usize,
-) -> Vec<[u32; 16]> {
-    let mut numbers = vec![[0; 16]; chosen];
-    let mut depths = vec![[f32::NEG_INFINITY; 16]; chosen];
+    places: usize,
+    place: impl Fn(usize) -> usize,
+) -> Nearest<N> {
+    let offset = |k: i64| (k as f64 + 8.5) / 16.0;
+    let mut numbers = vec![[0; N]; places];
+    let mut depths = vec![[f32::NEG_INFINITY; N]; places];
     for number in 0..count {
-        let Some(triangle) = Triangle::new(&SIXTEEN, number, corners(number), width, height) else {
-            continue;
-        };
+        let Some(triangle) = Triangle::new(pattern, number, corners(number), width, height) else { continue };
         let [least, greatest] = triangle.depths;
         let [origin, right, down] = triangle.depth;
-        let largest = triangle.at_samples.map(|at| at.iter().copied().max().unwrap_or(0));
+        let at = &triangle.at_samples;
+        let largest = at.map(|at| at.iter().copied().max().unwrap_or(0));
         for row in triangle.rows[0]..=triangle.rows[1] {
             for column in triangle.columns[0]..=triangle.columns[1] {
-                let place = places[row * width + column] as usize;
-                let (Some(numbers), Some(depths)) = (numbers.get_mut(place), depths.get_mut(place)) else {
-                    continue;
-                };
                 let corner = [0, 1, 2].map(|k| {
                     let [a, b, c] = triangle.sides[k];
                     a * (column as i64 * STEPS) + b * (row as i64 * STEPS) + c + triangle.bias[k]
@@ -69,12 +39,14 @@ pub(crate) fn samples(
                 if (0..3).any(|k| corner[k] + largest[k] < 0) {
                     continue;
                 }
-                for (s, (x, y)) in SIXTEEN.into_iter().enumerate() {
-                    let at = &triangle.at_samples;
+                let place = place(row * width + column);
+                let (Some(numbers), Some(depths)) = (numbers.get_mut(place), depths.get_mut(place)) else {
+                    continue;
+                };
+                for (s, &(x, y)) in pattern.iter().enumerate() {
                     if (corner[0] + at[0][s]) | (corner[1] + at[1][s]) | (corner[2] + at[2][s]) < 0 {
                         continue;
                     }
-                    let offset = |k: i64| (k as f64 + 8.5) / 16.0;
                     let depth =
                         origin + right * (column as f64 + offset(x)) + down * (row as f64 + offset(y));
                     let depth = depth.clamp(least, greatest) as f32;
@@ -86,7 +58,7 @@ pub(crate) fn samples(
             }
         }
     }
-    numbers
+    Nearest { numbers, depths }
 }
 
 /// Weights of corners in the middle of pixels, of one triangle after another.
@@ -105,7 +77,7 @@ impl Weights {
     ) -> [f64; 3] {
         if self.triangle.as_ref().is_none_or(|triangle| triangle.number != number) {
             let far = FARTHEST as usize;
-            self.triangle = Triangle::new(&[(0, 0)], number, corners(), far, far);
+            self.triangle = Triangle::new(&MIDDLE, number, corners(), far, far);
         }
         let middle = |at: usize| at as i64 * STEPS + STEPS / 2;
         match &self.triangle {

@@ -2,13 +2,13 @@
 //!
 //! Regions are painted one over the other, in order. Each covers its own cells, and reaches under those that are painted later:
 //! by a margin, so that no background shows through where two outlines meet; and through holes, so that an outline within another is
-//! needed once only.
+//! needed once only. A region is worked on piece by piece (cells that hang together), so the work is bounded by the pieces' sizes.
 
 use super::contour::{Corner, Mask};
 
 /// The width of the margin, in cells.
 const MARGIN: usize = 3;
-/// The distance of outlines from the edges of cells, in cells.
+/// The greatest distance of outlines from the edges of regions, in cells.
 const TOLERANCE: f64 = 0.4;
 
 /// No region.
@@ -28,72 +28,106 @@ pub struct Regions {
     pub items: Vec<u32>,
 }
 
-/// The cells that a region may touch: first column and row, and those after the last.
-#[derive(Clone, Copy)]
-struct Bounds {
-    left: usize,
-    top: usize,
-    right: usize,
-    bottom: usize,
+/// Cells of one region that hang together: one of them, and the rectangle around them, from the upper left corner to the one
+/// after the last.
+struct Piece {
+    cell: usize,
+    low: [usize; 2],
+    high: [usize; 2],
 }
 
 impl Regions {
     /// Gives cells that stand alone among others of their item to a neighbour, so that noise of shading makes no outlines.
     pub fn without_specks(&mut self) {
-        let width = self.width;
-        for row in 1..self.height.saturating_sub(1) {
-            for cell in row * width + 1..(row + 1) * width - 1 {
-                let label = self.labels[cell];
-                let around = [cell - 1, cell + 1, cell - width, cell + width].map(|other| self.labels[other]);
-                if label == NOTHING || around.contains(&label) {
-                    continue;
-                }
-                let item = |label: u32| self.items.get(label as usize);
-                if let Some(other) = around.into_iter().find(|other| item(*other) == item(label)) {
-                    self.labels[cell] = other;
-                }
+        let item = |items: &[u32], label: u32| items.get(label as usize).copied();
+        for cell in 0..self.labels.len() {
+            let label = self.labels[cell];
+            let around = || neighbours(cell, self.width, self.labels.len()).map(|other| self.labels[other]);
+            if label == NOTHING || around().any(|other| other == label) {
+                continue;
+            }
+            let own = item(&self.items, label);
+            if let Some(other) = around().find(|other| item(&self.items, *other) == own) {
+                self.labels[cell] = other;
             }
         }
     }
 
-    /// The outlines of every region, by number, in cells from the upper left corner.
+    /// The outlines of `count` regions, by number, in cells from the upper left corner.
     pub fn outlines(&self, count: usize) -> Vec<Vec<Vec<Corner>>> {
-        let mut bounds: Vec<Option<Bounds>> = vec![None; count];
-        for (cell, &label) in self.labels.iter().enumerate().filter(|(_, label)| **label != NOTHING) {
-            let (x, y) = (cell % self.width, cell / self.width);
-            let own = bounds[label as usize].get_or_insert(Bounds { left: x, top: y, right: x, bottom: y });
-            own.left = own.left.min(x);
-            own.right = own.right.max(x + 1);
-            own.bottom = own.bottom.max(y + 1);
+        let mut outlines = vec![Vec::new(); count];
+        for piece in self.pieces() {
+            outlines[self.labels[piece.cell] as usize].append(&mut self.outlines_of(&piece));
         }
-        let of = |(label, bounds): (usize, &Option<Bounds>)| match bounds {
-            Some(bounds) => self.outlines_of(label as u32, *bounds),
-            None => Vec::new(),
-        };
-        bounds.iter().enumerate().map(of).collect()
+        outlines
     }
 
-    fn outlines_of(&self, label: u32, bounds: Bounds) -> Vec<Vec<Corner>> {
-        let (left, top) = (bounds.left.saturating_sub(MARGIN), bounds.top.saturating_sub(MARGIN));
-        let width = (bounds.right + MARGIN).min(self.width) - left;
-        let height = (bounds.bottom + MARGIN).min(self.height) - top;
-        let label_at = |i: usize| self.labels[(top + i / width) * self.width + left + i % width];
-        let is_later = |other: u32| other != NOTHING && other > label;
-        let mut inside: Vec<bool> = (0..width * height).map(|i| label_at(i) == label).collect();
-        let later: Vec<bool> = (0..width * height).map(|i| is_later(label_at(i))).collect();
-        spread(&mut inside, &later, width);
-        fill_holes(&mut inside, &later, width);
+    /// The pieces of all regions, in the order of their first cells.
+    fn pieces(&self) -> Vec<Piece> {
+        let mut seen = vec![false; self.labels.len()];
+        let mut stack = Vec::new();
+        let mut pieces = Vec::new();
+        for first in 0..self.labels.len() {
+            if seen[first] || self.labels[first] == NOTHING {
+                continue;
+            }
+            let mut piece = Piece { cell: first, low: [self.width, self.height], high: [0, 0] };
+            seen[first] = true;
+            stack.push(first);
+            while let Some(cell) = stack.pop() {
+                for (k, at) in [cell % self.width, cell / self.width].into_iter().enumerate() {
+                    piece.low[k] = piece.low[k].min(at);
+                    piece.high[k] = piece.high[k].max(at + 1);
+                }
+                for other in neighbours(cell, self.width, self.labels.len()) {
+                    if !seen[other] && self.labels[other] == self.labels[first] {
+                        seen[other] = true;
+                        stack.push(other);
+                    }
+                }
+            }
+            pieces.push(piece);
+        }
+        pieces
+    }
+
+    fn outlines_of(&self, piece: &Piece) -> Vec<Vec<Corner>> {
+        let label = self.labels[piece.cell];
+        let [left, top] = piece.low.map(|low| low.saturating_sub(MARGIN));
+        let width = (piece.high[0] + MARGIN).min(self.width) - left;
+        let height = (piece.high[1] + MARGIN).min(self.height) - top;
+        let cell_at = |i: usize| (top + i / width) * self.width + left + i % width;
+        // Other pieces of the region have the same colour, so it does not matter which of the two covers a cell.
+        let free: Vec<bool> = (0..width * height)
+            .map(|i| {
+                let other = self.labels[cell_at(i)];
+                other != NOTHING && other >= label
+            })
+            .collect();
+        let mut inside = vec![false; width * height];
+        let first = (piece.cell / self.width - top) * width + piece.cell % self.width - left;
+        inside[first] = true;
+        let mut edge = vec![first];
+        let mut own = edge.clone();
+        while let Some(cell) = edge.pop() {
+            for other in neighbours(cell, width, inside.len()) {
+                if !inside[other] && self.labels[cell_at(other)] == label {
+                    inside[other] = true;
+                    edge.push(other);
+                    own.push(other);
+                }
+            }
+        }
+        spread(&mut inside, &free, width, own);
+        fill_holes(&mut inside, &free, width);
         // The part of a cell that this item covers, or one that is painted later.
         let item = self.items[label as usize];
-        let covered = |i: usize| {
-            let cell = (top + i / width) * self.width + left + i % width;
-            match self.samples.get(self.places[cell] as usize) {
-                Some(samples) => {
-                    let count = samples.iter().filter(|other| **other != NOTHING && **other >= item).count();
-                    count as f64 / 16.0
-                }
-                None => f64::from(u8::from(inside[i])),
+        let covered = |i: usize| match self.samples.get(self.places[cell_at(i)] as usize) {
+            Some(samples) => {
+                let count = samples.iter().filter(|other| **other != NOTHING && **other >= item).count();
+                count as f64 / samples.len() as f64
             }
+            None => f64::from(u8::from(inside[i])),
         };
         let mask = Mask { width, height, inside: &inside, covered };
         let mut outlines = mask.outlines(TOLERANCE);
@@ -104,9 +138,8 @@ impl Regions {
     }
 }
 
-/// Adds cells near the set, where they are free.
-fn spread(inside: &mut [bool], free: &[bool], width: usize) {
-    let mut edge: Vec<usize> = (0..inside.len()).filter(|i| inside[*i]).collect();
+/// Adds free cells near the set, whose cells are `edge`.
+fn spread(inside: &mut [bool], free: &[bool], width: usize, mut edge: Vec<usize>) {
     for _ in 0..MARGIN {
         let mut next = Vec::new();
         for &cell in &edge {
@@ -152,7 +185,7 @@ fn fill_holes(inside: &mut [bool], free: &[bool], width: usize) {
     }
 }
 
-/// The cells beside, above and below one.
+/// The cells beside, above and below one, of a rectangle of `count` cells.
 fn neighbours(cell: usize, width: usize, count: usize) -> impl Iterator<Item = usize> {
     let x = cell % width;
     [
@@ -163,4 +196,51 @@ fn neighbours(cell: usize, width: usize, count: usize) -> impl Iterator<Item = u
     ]
     .into_iter()
     .flatten()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Regions by their digits; each is an item of its own, and no cell is at an edge.
+    fn regions(rows: &[&str]) -> Regions {
+        let label = |b: u8| if b == b'.' { NOTHING } else { u32::from(b - b'0') };
+        let labels: Vec<u32> = rows.iter().flat_map(|row| row.bytes().map(label)).collect();
+        let places = vec![u32::MAX; labels.len()];
+        let items = (0..10).collect();
+        Regions { width: rows[0].len(), height: rows.len(), labels, places, samples: Vec::new(), items }
+    }
+
+    #[test]
+    fn a_region_reaches_under_those_that_come_later_and_has_no_holes_for_them() {
+        let of =
+            regions(&["0000000000", "0111111110", "0111111110", "0111221110", "0111111110", "0000000000"]);
+        let outlines = of.outlines(3);
+        assert_eq!(outlines.iter().map(Vec::len).collect::<Vec<_>>(), [1, 1, 1], "{outlines:?}");
+        let reach = |outline: &[Corner]| outline.iter().fold(0.0_f64, |reach, p| reach.max(p[0]));
+        assert!(reach(&outlines[0][0]) > 9.0 && (reach(&outlines[1][0]) - 9.0).abs() < 0.6);
+    }
+
+    #[test]
+    fn what_comes_earlier_stays_open() {
+        let outlines = regions(&["11111", "11011", "11011", "11011", "11111"]).outlines(2);
+        assert_eq!(outlines[1].len(), 2, "an outline and its hole: {outlines:?}");
+    }
+
+    #[test]
+    fn pieces_far_apart_are_worked_on_by_themselves() {
+        let wide = format!("0{}0", ".".repeat(60));
+        let of = regions(&[&wide, &wide]);
+        assert!(of.pieces().iter().all(|piece| piece.high[0] - piece.low[0] == 1));
+    }
+
+    #[test]
+    fn a_cell_alone_goes_to_a_neighbour_of_its_item_only() {
+        let mut of = regions(&["000", "010", "000"]);
+        of.without_specks();
+        assert_eq!(of.labels[4], 1, "another item");
+        of.items = vec![0; 10];
+        of.without_specks();
+        assert_eq!(of.labels[4], 0);
+    }
 }

@@ -1,0 +1,124 @@
+//! The region of each cell of a raster: the module, the material and the shade of the nearest triangle there.
+
+use std::collections::HashMap;
+
+use super::regions::{NOTHING, Regions};
+use crate::formats::png::Lit;
+use crate::raster::{SIXTEEN, cells};
+use crate::triangles::Triangles;
+use dlsys_geometry::scene::{MaterialId, OwnerId};
+
+/// Shades between black and a colour as it is.
+const SHADES: f64 = 20.0;
+
+/// A region: cells of one module, one material and one shade.
+pub struct Shade {
+    pub owner: OwnerId,
+    pub material: MaterialId,
+    /// The shade, in steps of 1/[`SHADES`].
+    step: i32,
+    /// The sum of the strengths of light in its cells, and their number.
+    sum: f64,
+    count: usize,
+}
+
+impl Shade {
+    fn key(&self) -> (OwnerId, MaterialId, i32) {
+        (self.owner, self.material, self.step)
+    }
+
+    /// The mean strength of light in its cells.
+    pub fn strength(&self) -> f64 {
+        self.sum / self.count as f64
+    }
+}
+
+/// The raster of regions, their shades by number, and the depth of each cell. Regions are painted in the order of modules,
+/// materials and shades.
+pub fn label(mesh: &Triangles, lit: &Lit, size: [usize; 2]) -> (Regions, Vec<Shade>, Vec<[f32; 1]>) {
+    let [width, height] = size;
+    let count = mesh.faces.len();
+    let corners = |n: usize| lit.corners(n);
+    let seen = cells::nearest(&cells::MIDDLE, size, count, corners, width * height, |cell| cell);
+    let numbers: Vec<u32> = seen.numbers.into_iter().map(|[number]| number).collect();
+
+    // Regions are numbered as they are found, then in the order of painting.
+    let mut weights = cells::Weights::default();
+    let mut shades: Vec<Shade> = Vec::new();
+    let mut known: HashMap<(OwnerId, MaterialId, i32), u32> = HashMap::new();
+    let mut last = None;
+    let mut labels = vec![NOTHING; numbers.len()];
+    for (cell, label) in labels.iter_mut().enumerate() {
+        let Some(n) = (numbers[cell] as usize).checked_sub(1) else { continue };
+        let strength = lit.strength(n, weights.at(n, || corners(n), [cell % width, cell / width]));
+        let (owner, material) = (mesh.faces[n].owner, mesh.faces[n].material);
+        let step = (strength * SHADES).round() as i32;
+        let key = (owner, material, step);
+        let number = match last {
+            Some((same, number)) if same == key => number,
+            _ => *known.entry(key).or_insert_with(|| {
+                shades.push(Shade { owner, material, step, sum: 0.0, count: 0 });
+                shades.len() as u32 - 1
+            }),
+        };
+        last = Some((key, number));
+        let shade = &mut shades[number as usize];
+        (shade.sum, shade.count) = (shade.sum + strength, shade.count + 1);
+        *label = number;
+    }
+    let mut order: Vec<u32> = (0..shades.len() as u32).collect();
+    order.sort_by_key(|number| shades[*number as usize].key());
+    let mut ranks = vec![0; order.len()];
+    order.iter().zip(0..).for_each(|(number, rank)| ranks[*number as usize] = rank);
+    labels.iter_mut().filter(|label| **label != NOTHING).for_each(|label| *label = ranks[*label as usize]);
+    shades.sort_by_key(Shade::key);
+
+    let (items, of_item) = items(&shades);
+    let item_of = |number: u32| {
+        let face = (number as usize).checked_sub(1).map(|n| &mesh.faces[n]);
+        face.and_then(|face| of_item.get(&(face.owner, face.material)).copied()).unwrap_or(NOTHING)
+    };
+    let (places, chosen) = edges(&labels, &items, width);
+    let place = |cell: usize| places[cell] as usize;
+    let samples = cells::nearest(&SIXTEEN, size, count, corners, chosen, place).numbers;
+    let samples = samples.into_iter().map(|samples| samples.map(item_of)).collect();
+    (Regions { width, height, labels, places, samples, items }, shades, seen.depths)
+}
+
+/// The item (module and material) of each region, by number in the order of painting; and the number of each item.
+fn items(shades: &[Shade]) -> (Vec<u32>, HashMap<(OwnerId, MaterialId), u32>) {
+    let mut numbers: HashMap<(OwnerId, MaterialId), u32> = HashMap::new();
+    let number = |shade: &Shade| {
+        let next = numbers.len() as u32;
+        *numbers.entry((shade.owner, shade.material)).or_insert(next)
+    };
+    let items = shades.iter().map(number).collect();
+    (items, numbers)
+}
+
+/// For each cell beside one of another item its number among these cells, else a number that is greater than any; and their
+/// count.
+fn edges(labels: &[u32], items: &[u32], width: usize) -> (Vec<u32>, usize) {
+    let item = |cell: usize| items.get(labels[cell] as usize).copied();
+    let mut places = vec![u32::MAX; labels.len()];
+    let mut mark = |a: usize, b: usize| {
+        // Most neighbours are of one region.
+        if labels[a] != labels[b] && item(a) != item(b) {
+            (places[a], places[b]) = (0, 0);
+        }
+    };
+    for cell in 0..labels.len() {
+        if cell % width > 0 {
+            mark(cell - 1, cell);
+        }
+        if cell >= width {
+            mark(cell - width, cell);
+        }
+    }
+    let mut count = 0;
+    for place in places.iter_mut().filter(|place| **place == 0) {
+        *place = count;
+        count += 1;
+    }
+    (places, count as usize)
+}
