@@ -9,6 +9,7 @@
 //! - [`Polygon`]: a filled outline. [`Surface`]: a [`Mesh`] placed in space; many share one mesh.
 //! - [`Patch`]: a bicubic Bézier patch; [`Scene::tessellated`] makes surfaces of patches.
 //! - [`Owner`]: the module that drew an element. Its name is the same in every frame.
+//! - [`Plant`]: the scene of another model, placed in this one. [`Surroundings`]: light, sky, camera and floor.
 //! - [`Bounds`]: the bounds of a scene, or of all scenes of an animation.
 //!
 //! Lengths are in *scene units*, the units of the model. The axes: `+X` right, `+Y` up, `+Z` towards the
@@ -20,6 +21,7 @@ mod element;
 mod material;
 mod mesh;
 mod patch;
+mod surroundings;
 
 pub use bounds::Bounds;
 pub use degrees::sin_cos_degrees;
@@ -27,6 +29,7 @@ pub use element::{Placement, Polygon, Segment, Surface, Width};
 pub use material::{Color, GRADIENT_STEPS, Material, MaterialId, Palette};
 pub use mesh::{Face, Mesh};
 pub use patch::{Net, Patch, PatchFace, PatchSet};
+pub use surroundings::{Plant, Surroundings, Viewpoint};
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -106,6 +109,10 @@ pub struct Scene {
     pub surfaces: Vec<Surface>,
     /// Bézier patches drawn by `@PD`, in string order.
     pub patches: Vec<Patch>,
+    /// Plants of other models, in string order.
+    pub plants: Vec<Plant>,
+    /// Light, sky, camera and floor.
+    pub surroundings: Surroundings,
     /// Warnings: elements that are drawn, but hardly as they were meant.
     pub warnings: Vec<Diagnostic>,
 }
@@ -118,6 +125,8 @@ impl Scene {
         self.polygons.clear();
         self.surfaces.clear();
         self.patches.clear();
+        self.plants.clear();
+        self.surroundings = Surroundings::default();
         self.warnings.clear();
     }
 
@@ -127,6 +136,7 @@ impl Scene {
             && self.polygons.is_empty()
             && self.surfaces.is_empty()
             && self.patches.is_empty()
+            && self.plants.iter().all(|plant| plant.scene.is_empty())
     }
 
     /// The scene with meshes in place of everything curved, none further than `accuracy` (scene units) from

@@ -1,0 +1,40 @@
+//! What surrounds a plant: light, sky, camera, floor, and other plants.
+
+use std::sync::Arc;
+
+use super::{Color, OwnerId, Placement, Point, Scene, Vector};
+
+/// The surroundings that a model declares, at the time of its scene. What is `None` is not declared.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Surroundings {
+    /// Direction towards the sun, of any length but 0 (`light`).
+    pub sun: Option<Vector>,
+    /// Colours of the zenith and of the horizon (`sky`).
+    pub sky: Option<[Color; 2]>,
+    /// The camera (`camera`).
+    pub camera: Option<Viewpoint>,
+    /// Height of a rigid horizontal floor without end, in scene units (`ground`).
+    pub floor: Option<f64>,
+}
+
+/// A camera in perspective.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Viewpoint {
+    /// The eye, in scene units.
+    pub eye: Point,
+    /// The point in the middle of the picture, different from the eye.
+    pub aim: Point,
+    /// Angle of view across the smaller side of the picture, in degrees, from 1 to 120.
+    pub angle: f64,
+}
+
+/// A plant of another model, placed in a scene.
+#[derive(Clone, Debug)]
+pub struct Plant {
+    /// What the other model draws, in its own colours; shared by all plants that look the same.
+    pub scene: Arc<Scene>,
+    /// Where it is placed: its `+X`, `+Y` and `+Z` turn to these axes.
+    pub placement: Placement,
+    /// The module that drew it.
+    pub owner: OwnerId,
+}
