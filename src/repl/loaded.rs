@@ -35,7 +35,7 @@ pub struct LoadedModel<'m> {
 impl<'m> LoadedModel<'m> {
     /// Starts the model.
     pub fn new(session: &'m Session, state: &SessionState) -> LoadedModel<'m> {
-        let empty = session.model.axiom.kinds.is_empty();
+        let empty = session.model.axiom.is_empty();
         let (replay, error) = match Replay::new(&session.model, state.settings) {
             _ if empty => (None, None),
             Ok(mut replay) => {

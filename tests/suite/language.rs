@@ -59,7 +59,10 @@ fn a_line_break_ends_an_expression() {
     assert_eq!(model.rules.len(), 2);
     // And a rule whose successor ends in a symbol ends there.
     let text = "initial string: F\nF: produce - G +\nG:\n if t = 1\n produce ε";
-    assert_eq!(crate::common::session(text).model.rules[0].produces[0].outcome.successors[0].kinds.len(), 3);
+    assert_eq!(
+        crate::common::session(text).model.rules[0].produces[0].outcome.successors[0].kinds().count(),
+        3
+    );
 }
 
 #[test]

@@ -18,6 +18,7 @@ mod evidence;
 mod export;
 mod files;
 mod gallery;
+mod groups;
 mod inspect;
 mod language;
 mod layout;

@@ -86,8 +86,8 @@ struct Parts<'d> {
     /// The heads of the interpretations.
     heads: Vec<&'d HeadModule>,
     /// The axiom and all successors.
-    strings: Vec<&'d [ast::Module]>,
-    drawings: Vec<&'d [ast::Module]>,
+    strings: Vec<&'d [ast::Part]>,
+    drawings: Vec<&'d [ast::Part]>,
     /// True if a string or a rule could not be lowered.
     faulty: bool,
 }
@@ -135,7 +135,7 @@ impl<'d> Parts<'d> {
         }
     }
 
-    fn axiom(&mut self, modules: &'d [ast::Module], span: Span, builder: &mut RuleBuilder) {
+    fn axiom(&mut self, modules: &'d [ast::Part], span: Span, builder: &mut RuleBuilder) {
         self.singles.once(INITIAL_STRING, span, builder.scope);
         self.strings.push(modules);
         let variables =

@@ -49,14 +49,14 @@ pub fn reachability(
         }
     }
     // The kinds that can develop from the axiom.
-    let mut alive: HashSet<KindId> = model.axiom.kinds.iter().copied().collect();
-    let mut queue: Vec<KindId> = model.axiom.kinds.clone();
+    let mut alive: HashSet<KindId> = model.axiom.kinds().collect();
+    let mut queue: Vec<KindId> = model.axiom.kinds().collect();
     while let Some(kind) = queue.pop() {
         for rule in model.kinds.get(kind).all_rules() {
             let successors = model.rules[rule].produces.iter().flat_map(|p| &p.outcome.successors);
-            for made in successors.flat_map(|s| &s.kinds) {
-                if alive.insert(*made) {
-                    queue.push(*made);
+            for made in successors.flat_map(|s| s.kinds()) {
+                if alive.insert(made) {
+                    queue.push(made);
                 }
             }
         }

@@ -7,8 +7,8 @@
 use crate::globals::mentions;
 use dlsys_diagnostic::Diagnostic;
 use dlsys_expr::Scratch;
-use dlsys_model::{Condition, KindId, Model, Rule, Sign, Successor, Truth};
-use dlsys_syntax::ast::{self, Action, Document, Expression, Item};
+use dlsys_model::{Condition, KindId, Model, Rule, Sign, Stretch, Successor, Truth};
+use dlsys_syntax::ast::{self, Action, Document, Expression, Item, modules_of};
 
 /// Maximum number of modules whose parameters are examined; beyond it no warning is given.
 const MOST: usize = 1000;
@@ -75,8 +75,8 @@ fn is_fixed(rule: &ast::Rule, document: &Document) -> bool {
     let free = |e: Expression, own: &dyn Fn(&str) -> bool| mentions(document, e).all(|(name, _)| own(name));
     let conditions = rule.clauses.iter().filter_map(|clause| clause.guard).all(|guard| free(guard, &own));
     let head = &rule.predecessor.name.text;
-    let made = |modules: &[ast::Module]| {
-        let alike = modules.iter().filter(|module| module.name == *head || &**head == "±");
+    let made = |parts: &[ast::Part]| {
+        let alike = modules_of(parts).filter(|module| module.name == *head || &**head == "±");
         alike.flat_map(|module| &module.arguments).all(|argument| free(*argument, &|_| false))
     };
     conditions
@@ -98,7 +98,7 @@ fn births(model: &Model, index: usize) -> Option<Vec<Vec<f64>>> {
     let others = model.rules.iter().filter(|rule| rule.index != index).flat_map(|rule| &rule.produces);
     let successors = others.flat_map(|p| &p.outcome.successors).chain([&model.axiom]);
     let mut births = Vec::new();
-    for successor in successors {
+    for successor in successors.flat_map(Successor::stretches) {
         let mut next = 0;
         for &kind in &successor.kinds {
             let first = next;
@@ -115,7 +115,7 @@ fn births(model: &Model, index: usize) -> Option<Vec<Vec<f64>>> {
     Some(births)
 }
 
-fn constant(successor: &Successor, output: usize) -> Option<f64> {
+fn constant(successor: &Stretch, output: usize) -> Option<f64> {
     let arguments = &successor.arguments;
     arguments.constants().map(|all| all[output]).or_else(|| arguments.constant_output(output))
 }

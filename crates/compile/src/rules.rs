@@ -10,7 +10,7 @@ use crate::scope::{RESERVED, Scope, Variables};
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_expr::NodeId;
 use dlsys_model::{CUT, Class, DRAWN_WORDS, Interpretation, KindId, Kinds, base_of, class_of};
-use dlsys_syntax::ast::{self, Document, Expression, HeadModule};
+use dlsys_syntax::ast::{self, Document, Expression, HeadModule, modules_of};
 use dlsys_syntax::print;
 
 /// Builds the parts of a model that consist of modules.
@@ -128,7 +128,7 @@ impl<'b> RuleBuilder<'b> {
     pub fn interpretation(
         &mut self,
         head: &HeadModule,
-        drawn: &[ast::Module],
+        drawn: &[ast::Part],
     ) -> Option<(KindId, Interpretation)> {
         if !self.not_a_bracket(head, false) {
             return None;
@@ -138,19 +138,19 @@ impl<'b> RuleBuilder<'b> {
         let (mut variables, count) = self.variables(head, &[], &[], 0);
         // They have no aggregates.
         variables.aggregates = None;
-        if let Some(cut) = drawn.iter().find(|module| &*module.name == CUT) {
+        if let Some(cut) = modules_of(drawn).find(|module| &*module.name == CUT) {
             self.error(
                 Diagnostic::error("a drawing cuts nothing off")
                     .at(cut.span, "`%` belongs in the successors of rules")
                     .help("to draw nothing, write `ε`"),
             );
         }
-        if let Some(again) = drawn.iter().find(|module| is_head(module, head)) {
+        if let Some(again) = modules_of(drawn).find(|module| is_head(module, head)) {
             self.error(draws_nothing(again, head));
         }
         // A module that is only drawn does not develop and makes no rule reachable.
         let before = std::mem::take(&mut self.occurs);
-        let drawn = self.string(drawn, &variables, count);
+        let drawn = self.string(drawn, &variables, count, false);
         self.clocks = clocks;
         let inside = std::mem::replace(&mut self.occurs, before);
         let kind = self.kinds.intern(&head.name.text, head.parameters.len());

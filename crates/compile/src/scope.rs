@@ -42,7 +42,7 @@ pub(super) struct Function {
 }
 
 /// The names that an expression can use in addition to the global ones.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub struct Variables {
     pub names: HashMap<Arc<str>, NodeId>,
     /// Help for `t` or `age` in an expression without them; None if they are in `names`.

@@ -6,11 +6,11 @@ use std::collections::{HashMap, HashSet};
 use crate::advice;
 use crate::chance::Drawn;
 use crate::rules::RuleBuilder;
-use crate::scope::{Variables, plural};
+use crate::scope::{RESERVED, Scope, Variables, plural};
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_expr::{NodeId, Program};
-use dlsys_model::{Class, Outcome, Successor, choose, class_of};
-use dlsys_syntax::ast::{self, Alternative, HeadModule};
+use dlsys_model::{Choice, Class, Outcome, Part, Repeat, Stretch, Successor, choose, class_of};
+use dlsys_syntax::ast::{self, Alternative, HeadModule, modules_of};
 use dlsys_syntax::print;
 use dlsys_syntax::suggest::{looks_like, meant};
 
@@ -28,14 +28,11 @@ impl RuleBuilder<'_> {
     /// Lowers a string of modules in which draws are allowed, over the given variables.
     pub fn successor(
         &mut self,
-        modules: &[ast::Module],
+        parts: &[ast::Part],
         variables: &Variables,
         count: usize,
     ) -> Option<Successor> {
-        self.scope.draws.allowed = true;
-        let successor = self.string(modules, variables, count);
-        self.scope.draws.allowed = false;
-        successor
+        self.string(parts, variables, count, true)
     }
 
     /// Lowers the successors of a clause with their weights.
@@ -72,22 +69,143 @@ impl RuleBuilder<'_> {
         Some(Outcome { weights: (!weights.is_empty()).then_some(program), successors })
     }
 
+    /// Lowers a string of modules over the given variables, with draws or without.
     pub(super) fn string(
         &mut self,
-        modules: &[ast::Module],
+        parts: &[ast::Part],
         variables: &Variables,
         count: usize,
+        draws: bool,
     ) -> Option<Successor> {
+        if parts.iter().all(|part| matches!(part, ast::Part::Module(_))) {
+            let modules: Vec<&ast::Module> = modules_of(parts).collect();
+            let mut open = Vec::new();
+            let stretch = self.stretch(&modules, variables, count, (draws, &mut open));
+            return stretch.filter(|_| self.closed(open)).map(Successor::Plain);
+        }
+        self.parts(parts, variables, count, draws).map(Successor::Parts)
+    }
+
+    /// Lowers a string with repetitions and conditions, or one within them.
+    fn parts(
+        &mut self,
+        parts: &[ast::Part],
+        variables: &Variables,
+        count: usize,
+        draws: bool,
+    ) -> Option<Vec<Part>> {
+        let mut lowered = Vec::new();
+        let mut open = Vec::new();
+        let is_module = |part: &ast::Part| matches!(part, ast::Part::Module(_));
+        for run in parts.chunk_by(|a, b| is_module(a) && is_module(b)) {
+            lowered.push(match &run[0] {
+                ast::Part::Module(_) => {
+                    let modules: Vec<&ast::Module> = modules_of(run).collect();
+                    self.stretch(&modules, variables, count, (draws, &mut open)).map(Part::Stretch)
+                }
+                ast::Part::Repeat(of) => self.repetition(of, variables, count, draws).map(Part::Repeat),
+                ast::Part::If(of) => self.conditional(of, variables, count, draws).map(Part::Choice),
+            });
+        }
+        let lowered: Option<Vec<Part>> = lowered.into_iter().collect();
+        lowered.filter(|_| self.closed(open))
+    }
+
+    fn repetition(
+        &mut self,
+        of: &ast::Repetition,
+        variables: &Variables,
+        count: usize,
+        draws: bool,
+    ) -> Option<Repeat> {
+        let all = &self.document.expressions;
+        let (from, to) =
+            (self.scope.number(all, of.from, variables), self.scope.number(all, of.to, variables));
+        let span = all.span(of.from.root).to(all.span(of.to.root));
+        let name = &of.index.text;
+        if RESERVED.contains(&&**name) || Scope::is_built_in(name) {
+            self.error(
+                Diagnostic::error(format!("`{name}` cannot be the index of a repetition"))
+                    .at(of.index.span, "this name is built in")
+                    .help("choose another name, such as `i`"),
+            );
+            return None;
+        }
+        let mut inner = variables.clone();
+        let index = self.scope.graph.var(count as u32);
+        inner.names.insert(name.clone(), index);
+        let body = self.parts(&of.body, &inner, count + 1, draws);
+        let roots = [from?, to?];
+        let known = |node| self.scope.graph.as_constant(node);
+        for (bound, expression) in roots.into_iter().zip([of.from, of.to]) {
+            if let Some(value) =
+                known(bound).filter(|value| (value - value.round()).abs() > 1e-9 || !value.is_finite())
+            {
+                let error = Diagnostic::error("this bound of a repetition is not a whole number")
+                    .at(all.span(expression.root), format!("it is {value}"))
+                    .help("round it: `floor(x)` or `ceil(x)`");
+                self.error(error);
+                return None;
+            }
+        }
+        Some(Repeat { bounds: Program::compile(&self.scope.graph, &roots, count), body: body?, span })
+    }
+
+    fn conditional(
+        &mut self,
+        of: &ast::Conditional,
+        variables: &Variables,
+        count: usize,
+        draws: bool,
+    ) -> Option<Choice> {
+        let condition = self.scope.condition(&self.document.expressions, of.condition, variables);
+        let then = self.parts(&of.then, variables, count, draws);
+        let otherwise = self.parts(&of.otherwise, variables, count, draws);
+        let condition = Program::compile(&self.scope.graph, &[condition?], count);
+        Some(Choice { condition, then: then?, otherwise: otherwise? })
+    }
+
+    fn stretch(
+        &mut self,
+        modules: &[&ast::Module],
+        variables: &Variables,
+        count: usize,
+        (draws, open): (bool, &mut Vec<Span>),
+    ) -> Option<Stretch> {
+        self.scope.draws.allowed = draws;
+        let stretch = self.modules(modules, variables, count, open);
+        self.scope.draws.allowed = false;
+        stretch
+    }
+
+    /// Reports a bracket that is still open at the end of a string or a group; false if there is one.
+    fn closed(&mut self, mut open: Vec<Span>) -> bool {
+        let Some(bracket) = open.pop() else { return true };
+        self.error(
+            Diagnostic::error("this `[` is never closed")
+                .at(bracket, "expected a `]` for it in this string")
+                .help("brackets must match within each string, and within each repetition and condition"),
+        );
+        false
+    }
+
+    /// Lowers modules; `open` are the brackets that are open before them, then behind them.
+    fn modules(
+        &mut self,
+        modules: &[&ast::Module],
+        variables: &Variables,
+        count: usize,
+        open: &mut Vec<Span>,
+    ) -> Option<Stretch> {
         let mut drawn = Drawn::default();
         let mut clocks = Vec::new();
         let (mut place, mut places) = (0, Vec::new());
         let mut kinds = Vec::with_capacity(modules.len());
         let mut roots = Vec::new();
-        let mut open: Vec<Span> = Vec::new();
         let mut good = true;
         for module in modules {
             let kind = self.kinds.intern(&module.name, module.arguments.len());
-            match self.bracket(module, &mut open) {
+            match self.bracket(module, open) {
                 Bracket::Good => {}
                 Bracket::Unmatched => good = false,
                 Bracket::WithArguments => {
@@ -105,23 +223,15 @@ impl RuleBuilder<'_> {
             }
             clocks.extend(self.clocks.for_new(&module.name, module.arguments.len(), place, roots.len()));
             place += usize::from(!kind.is_bracket());
-            if !kind.is_bracket() && places.len() < Successor::PLACES {
+            if !kind.is_bracket() && places.len() < Stretch::PLACES {
                 places.push((kind, module.span));
             }
-        }
-        if let Some(bracket) = open.pop() {
-            self.error(
-                Diagnostic::error("this `[` is never closed")
-                    .at(bracket, "expected a `]` for it in this string")
-                    .help("brackets must match within each string"),
-            );
-            good = false;
         }
         if !good {
             return None;
         }
         let (arguments, draws) = drawn.compile(self.scope, roots, count);
-        Some(Successor { kinds, arguments, draws, clocks, places })
+        Some(Stretch { kinds, arguments, draws, clocks, places })
     }
 
     /// Lowers the arguments of a module; false if one has an error. `in_rule` is true if the module may be meant as the head
@@ -206,13 +316,13 @@ impl RuleBuilder<'_> {
 
     /// Reports words in strings (or drawings) whose number of parameters differs from that of their rules (or drawings).
     /// `place` describes the head with the right number.
-    pub fn check_arities(&mut self, heads: &[&HeadModule], strings: &[&[ast::Module]], place: &str) {
+    pub fn check_arities(&mut self, heads: &[&HeadModule], strings: &[&[ast::Part]], place: &str) {
         let mut declared: HashMap<&str, Vec<&HeadModule>> = HashMap::new();
         for &head in heads {
             declared.entry(&head.name.text).or_default().push(head);
         }
         let mut reported: HashSet<(&str, usize)> = HashSet::new();
-        for module in strings.iter().copied().flatten() {
+        for module in strings.iter().flat_map(|parts| modules_of(parts)) {
             // The turtle has defaults for missing parameters of symbols and surfaces.
             if class_of(&module.name) != Class::Word {
                 continue;

@@ -41,6 +41,7 @@ mod remedy;
 mod rule;
 mod solution_form;
 mod stepping;
+mod successor;
 
 pub use algebraic::{Aggregate, Algebraic, ContextPart};
 pub use appearance::{
@@ -54,11 +55,12 @@ pub use kind::{
 };
 pub use measure::Measure;
 pub use remedy::{Boundary, Remedy};
-pub use rule::{Interpretation, Outcome, Pattern, Produce, Rule, Solve, Successor, Switch};
+pub use rule::{Interpretation, Outcome, Pattern, Produce, Rule, Solve, Switch};
 pub use solution_form::{
     AffineSum, DrivenGrowth, GrowthLaw, Jacobian, LinearRates, Numeric, Obstacle, SolutionForm, ZeroCrossing,
 };
 pub use stepping::{Read, Stepping};
+pub use successor::{BadBounds, Choice, Part, Repeat, Stretch, Successor};
 
 use std::sync::Arc;
 

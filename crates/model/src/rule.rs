@@ -5,14 +5,14 @@
 //! All expressions of a rule read the same variables, in this order: the parameters of the strict
 //! predecessor, then its hidden ones ([`Kind::clocks`](super::Kind::clocks)); the same of the context modules, left to
 //! right as written; one value for each [`Aggregate`]; `t`; `age`; then one truth value for each [`Switch`], or the
-//! [`Draw`]s of a successor.
+//! [`Draw`](super::Draw)s of a successor.
 
 use super::{
-    Aggregate, Algebraic, Boundary, Clock, Condition, ContextPart, Draw, Jacobian, KindId, LinearRates,
-    NewClock, SolutionForm, Stepping, ZeroCrossing,
+    Aggregate, Algebraic, Boundary, Clock, Condition, ContextPart, Jacobian, KindId, LinearRates,
+    SolutionForm, Stepping, Successor, ZeroCrossing,
 };
 use dlsys_diagnostic::Span;
-use dlsys_expr::{Program, Scratch, Value};
+use dlsys_expr::Program;
 
 /// Context, equations and productions of one strict predecessor.
 #[derive(Clone, Debug)]
@@ -204,51 +204,8 @@ impl Outcome {
 
     /// The variables that its weights, arguments and draws read; a variable may occur several times.
     pub fn reads(&self) -> impl Iterator<Item = usize> + '_ {
-        let draws = self.successors.iter().flat_map(|s| &s.draws).map(|draw| &draw.parameters);
-        let arguments = self.successors.iter().map(|s| &s.arguments);
-        arguments.chain(draws).chain(&self.weights).flat_map(Program::reads).copied()
-    }
-}
-
-/// A string of modules whose arguments are computed when a production applies.
-#[derive(Clone, Debug, Default)]
-pub struct Successor {
-    /// The modules and brackets in string order.
-    pub kinds: Vec<KindId>,
-    /// The arguments of all modules in string order, without clocks. They read the variables of the rule, then the draws.
-    pub arguments: Program,
-    /// The random numbers that the arguments read.
-    pub draws: Vec<Draw>,
-    /// The clocks, in the order of their modules.
-    pub clocks: Vec<NewClock>,
-    /// The first [`PLACES`](Successor::PLACES) modules, brackets left out, and their places in the text.
-    pub places: Vec<(KindId, Span)>,
-}
-
-impl Successor {
-    /// Maximum number of `places`: as many modules as a lineage distinguishes.
-    pub const PLACES: usize = 254;
-
-    /// The place in the text of the module at an index, brackets not counted, if it is of this kind.
-    pub fn place_of(&self, place: usize, kind: KindId) -> Option<Span> {
-        self.places.get(place).filter(|(known, _)| *known == kind).map(|(_, span)| *span)
-    }
-
-    /// Number of parameters of all its modules, hidden ones included.
-    pub fn width(&self) -> usize {
-        self.arguments.outputs() + self.clocks.len()
-    }
-
-    /// Computes the arguments of a successor without draws.
-    pub fn evaluate<T: Value>(&self, variables: &[T], scratch: &mut Scratch<T>, out: &mut Vec<T>) {
-        out.clear();
-        out.resize(self.arguments.outputs(), T::constant(0.0));
-        self.arguments.eval(variables, scratch, out);
-    }
-
-    /// True if the values of the predecessor determine its arguments: it has no draws and no clocks.
-    pub fn is_certain(&self) -> bool {
-        self.draws.is_empty() && self.clocks.is_empty()
+        let strings = self.successors.iter().flat_map(Successor::programs);
+        strings.chain(&self.weights).flat_map(Program::reads).copied()
     }
 }
 

@@ -13,7 +13,7 @@ use crate::memory::{self, Shortage};
 use crate::setup::Setup;
 use crate::world::World;
 use crate::world::state::State;
-use dlsys_model::Successor;
+use dlsys_model::KindId;
 use dlsys_tree::SimTime;
 
 /// Productions and steps after which the pace is looked at: so many at least, and so many for each module.
@@ -176,7 +176,7 @@ pub fn out_of_memory(world: &World, shortage: Shortage, site: Site) -> Error {
     Error::OutOfMemory { modules: world.tree.len(), shortage: Box::new(shortage), site }
 }
 
-/// Makes room for a successor. Where lists must grow for that, they are twice as long afterwards, and everything that is
+/// Makes room for modules of these kinds, with so many parameters. Where lists must grow for that, they are twice as long afterwards, and everything that is
 /// kept of modules grows with them: that is asked for at once.
 ///
 /// # Errors
@@ -186,19 +186,24 @@ pub fn room_for(
     setup: &Setup,
     world: &mut World,
     coupled: usize,
-    successor: &Successor,
+    (kinds, width): (&[KindId], usize),
 ) -> Result<(), Shortage> {
-    match world.tree.has_room(&successor.kinds, successor.width()) {
+    match world.tree.has_room(kinds, width) {
         true => Ok(()),
-        false => grow(setup, world, coupled, successor),
+        false => grow(setup, world, coupled, (kinds, width)),
     }
 }
 
 #[cold]
-fn grow(setup: &Setup, world: &mut World, coupled: usize, successor: &Successor) -> Result<(), Shortage> {
+fn grow(
+    setup: &Setup,
+    world: &mut World,
+    coupled: usize,
+    (kinds, width): (&[KindId], usize),
+) -> Result<(), Shortage> {
     let wanted = 2 * size(setup, world, coupled) as u64 + IN_LISTS * world.tree.slots() as u64;
     memory::ask(wanted, setup.settings.max_memory, world.tree.size() as u64)?;
-    let grown = world.tree.make_room(&successor.kinds, successor.width());
+    let grown = world.tree.make_room(kinds, width);
     grown.map_err(|_| Shortage { wanted, there: None, own_limit: false })
 }
 

@@ -137,6 +137,14 @@ pub enum Error {
         /// The reason, as a message gives it.
         why: String,
     },
+    /// The bounds of a repetition in a string are none.
+    #[error("a repetition in the successor of {} cannot be made at t = {}: {why}", .site.module, .site.when())]
+    BadBounds {
+        /// The module that is replaced, at the bounds.
+        site: Site,
+        /// The reason, as a message gives it.
+        why: String,
+    },
     /// The rate of a random event became negative.
     #[error("the rate of an event of {} is negative at t = {}", .site.module, .site.when())]
     NegativeRate {
@@ -231,6 +239,7 @@ impl Error {
             Error::NotFinite { .. } => "NotFinite",
             Error::BadDraw { .. } => "BadDraw",
             Error::BadWeights { .. } => "BadWeights",
+            Error::BadBounds { .. } => "BadBounds",
             Error::NegativeRate { .. } => "NegativeRate",
             Error::StepTooSmall { .. } => "StepTooSmall",
             Error::InDoubt { .. } => "InDoubt",
@@ -254,6 +263,7 @@ impl Error {
             | Error::NotFinite { site, .. }
             | Error::BadDraw { site, .. }
             | Error::BadWeights { site, .. }
+            | Error::BadBounds { site, .. }
             | Error::NegativeRate { site }
             | Error::StepTooSmall { site }
             | Error::InDoubt { site, .. }
@@ -318,6 +328,9 @@ impl Error {
             Error::BadWeights { .. } => d.help(
                 "weights are at least 0, and one of them is greater; they need not add up to 1. To replace nothing at some values, say so in the clause's condition: `if … produce …`",
             ),
+            Error::BadBounds { .. } => {
+                d.help("bounds are whole numbers, at most a million apart: round them with `floor(…)` or `ceil(…)`")
+            }
             Error::NegativeRate { .. } => {
                 d.help("a rate is at least 0: bound it, as in `at rate max(0, …)`, or say when there is none: `if … at rate … produce …`")
             }
@@ -377,6 +390,7 @@ impl Error {
             Error::NotFinite { .. } => "computed here",
             Error::BadDraw { .. } => "drawn here",
             Error::BadWeights { .. } => "by the weights of this clause",
+            Error::BadBounds { .. } => "from the first to the second",
             Error::NegativeRate { .. } => "the rate of this clause",
             Error::StepTooSmall { .. } => "these equations",
             Error::InDoubt { .. } => "met, or only nearly?",

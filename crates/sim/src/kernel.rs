@@ -22,6 +22,7 @@ use super::schedule::{Entry, NextEvent, Owner, Schedule, is_before};
 use super::scratch::Scratch;
 use super::setup::Setup;
 use super::world::neighbours::Neighbours;
+use super::world::new_modules::{NewModules, kinds_of};
 use super::world::state::NextKind;
 use super::world::{Instant, World, site_of_axiom};
 use super::{Settings, Stats, detect::Detector};
@@ -102,14 +103,15 @@ impl<'m> Simulation<'m> {
     /// Makes the modules of the initial string.
     fn plant_axiom(&mut self) -> Result<(), Error> {
         let site = || site_of_axiom(0.0);
-        let (mut arguments, axiom) = (Vec::new(), &self.setup.model.axiom);
+        let (mut new, axiom) = (NewModules::default(), &self.setup.model.axiom);
         let (mut variables, registers) = (Vec::new(), &mut self.scratch.registers);
-        chance::arguments(self.setup.seed, axiom, Family::AXIOM, &mut variables, registers, &mut arguments)
+        chance::modules(self.setup.seed, axiom, Family::AXIOM, &mut variables, registers, &mut new)
             .map_err(|undrawn| undrawn.error(site()))?;
         let (tree, fresh) = (&mut self.world.tree, &mut self.events.fresh);
-        tree.append(axiom, &arguments, SimTime::ZERO, Family::AXIOM, fresh);
+        let kinds = kinds_of(axiom, &new.kinds);
+        tree.append(kinds, &new.arguments, SimTime::ZERO, Family::AXIOM, fresh);
         if self.setup.hands_on {
-            self.neighbours.hand_on(None, &axiom.kinds, fresh, |kind| self.setup.skips(kind));
+            self.neighbours.hand_on(None, kinds, fresh, |kind| self.setup.skips(kind));
         }
         self.log.stats.peak_modules = tree.len() as u64;
         let limit = self.setup.settings.max_modules;

@@ -160,6 +160,63 @@ pub struct Module {
     pub arguments: Vec<Expression>,
 }
 
+/// A part of a string of modules.
+#[derive(Clone, Debug)]
+pub enum Part {
+    /// A module.
+    Module(Module),
+    /// `for i in A .. B: ( … )`
+    Repeat(Box<Repetition>),
+    /// `if C: ( … ) else ( … )`
+    If(Box<Conditional>),
+}
+
+/// A repeated part of a string: `for i in A .. B: ( … )`.
+#[derive(Clone, Debug)]
+pub struct Repetition {
+    /// The name of the index, in the body only.
+    pub index: Name,
+    /// The first value of the index.
+    pub from: Expression,
+    /// The last value of the index.
+    pub to: Expression,
+    /// The string that is repeated.
+    pub body: Vec<Part>,
+    /// From `for` to the last `)`.
+    pub span: Span,
+}
+
+/// A part of a string under a condition: `if C: ( … ) else ( … )`.
+#[derive(Clone, Debug)]
+pub struct Conditional {
+    /// The condition.
+    pub condition: Expression,
+    /// The string where it holds.
+    pub then: Vec<Part>,
+    /// The string where it does not; empty without an `else`.
+    pub otherwise: Vec<Part>,
+    /// From `if` to the last `)`.
+    pub span: Span,
+}
+
+/// All modules of a string as written, those of repetitions once, those of both branches of a condition.
+pub fn modules_of(parts: &[Part]) -> impl Iterator<Item = &Module> {
+    let mut stack = vec![parts.iter()];
+    std::iter::from_fn(move || {
+        loop {
+            match stack.last_mut()?.next() {
+                None => drop(stack.pop()),
+                Some(Part::Module(module)) => return Some(module),
+                Some(Part::Repeat(repetition)) => stack.push(repetition.body.iter()),
+                Some(Part::If(conditional)) => {
+                    stack.push(conditional.otherwise.iter());
+                    stack.push(conditional.then.iter());
+                }
+            }
+        }
+    })
+}
+
 /// A module of a rule's head: a name and the names of its parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeadModule {
@@ -233,7 +290,7 @@ pub struct Alternative {
     /// `2:` before it.
     pub weight: Option<Expression>,
     /// The string; empty for `ε`.
-    pub modules: Vec<Module>,
+    pub modules: Vec<Part>,
 }
 
 /// An equation of a `solve`.
@@ -400,13 +457,13 @@ pub enum Item {
     /// `consider names`: the only modules that context matching does not pass over.
     Consider(Vec<Name>),
     /// `initial string: modules`, or `axiom: modules`.
-    Axiom(Vec<Module>),
+    Axiom(Vec<Part>),
     /// `interpret head: drawn`: the modules that the turtle draws in place of one.
     Interpret {
         /// The module, with names for its parameters.
         head: HeadModule,
         /// The modules drawn, in terms of those parameters, `t` and `age`.
-        drawn: Vec<Module>,
+        drawn: Vec<Part>,
     },
     /// `head: clauses`, or `head : condition -> successor`.
     Rule(Rule),

@@ -97,6 +97,12 @@ struct Level {
     matching: bool,
     /// True if opened by an aggregate such as `sum(`, which contains a colon.
     is_sum: bool,
+    /// True for the group of a repetition or a condition in a string: its content is a string.
+    is_string: bool,
+    /// True between the `for` or `if` of a string and its colon, where expressions stand.
+    in_header: bool,
+    /// True if the next parenthesis is that of a group.
+    group_next: bool,
 }
 
 struct Scanner<'t> {
@@ -120,6 +126,8 @@ struct Scanner<'t> {
     run_of_angles: Option<usize>,
     /// The line before, if it may be the head of a rule that lacks its colon.
     head_before: Option<(usize, usize)>,
+    /// True if the present token is a parenthesis or a word of a repetition or a condition in a string.
+    group: bool,
     /// The token after the present one on its line.
     next: Option<Token>,
     /// True if the expression before the last line break has a `match`.
@@ -154,6 +162,7 @@ fn scan(text: &str, lexemes: Option<Vec<Lexeme>>) -> (Layout, Option<Vec<Lexeme>
         held_break: None,
         run_of_angles: None,
         head_before: None,
+        group: false,
         next: None,
         matching: false,
         lexemes,
@@ -381,8 +390,8 @@ impl Scanner<'_> {
 
     /// Advances over one token: updates the nesting, and whether an expression can end here.
     fn token(&mut self, (token, start, end): (Token, usize, usize)) {
-        let in_expression = !self.in_string || self.levels.len() > 1;
-        self.weight_next = false;
+        let in_expression = !self.in_modules();
+        (self.weight_next, self.group) = (false, false);
         let (after_operand, depth) = (self.last == Last::Operand, self.levels.len() - 1);
         let last = match token {
             Token::Word => self.keyword(start, end),
@@ -390,7 +399,9 @@ impl Scanner<'_> {
             Token::Open => {
                 let word = self.text[..start].trim_end().rsplit(|c| !in_name(c)).next().unwrap_or_default();
                 let is_sum = FOLDS.contains(&word);
-                self.levels.push(Level { at: start, is_sum, ..Level::default() });
+                let is_string = std::mem::take(&mut self.level().group_next);
+                self.group = is_string;
+                self.levels.push(Level { at: start, is_sum, is_string, ..Level::default() });
                 Last::Operator
             }
             Token::Close => {
@@ -410,15 +421,26 @@ impl Scanner<'_> {
         self.last = last;
         if let Some(lexemes) = &mut self.lexemes {
             let (in_string, operator) = (!in_expression, last != Last::Operand);
-            lexemes.push(Lexeme { token, start, end, in_string, after_operand, operator, depth });
+            let group = self.group;
+            lexemes.push(Lexeme { token, start, end, in_string, after_operand, operator, group, depth });
         }
         self.check_depth(start, end);
+    }
+
+    /// True in a string of modules, outside the parentheses of parameters and the expressions of `for` and `if`.
+    fn in_modules(&self) -> bool {
+        match self.levels.as_slice() {
+            [outermost] => self.in_string && !outermost.in_header,
+            [.., level] => level.is_string && !level.in_header,
+            [] => false,
+        }
     }
 
     fn close_parenthesis(&mut self, start: usize, end: usize) {
         if self.levels.len() > 1 {
             let level = self.levels.pop().expect("two levels");
             self.pending -= level.right + level.ifs;
+            self.group = level.is_string;
         } else {
             self.fault(
                 Diagnostic::error("this `)` closes nothing")
@@ -430,6 +452,11 @@ impl Scanner<'_> {
 
     /// Advances over a colon that ends at `end`: that of a head, of a weight, of a `case` or of an aggregate.
     fn colon(&mut self, end: usize) {
+        if std::mem::take(&mut self.level().in_header) {
+            self.forget_pending();
+            self.level().group_next = true;
+            return;
+        }
         self.level().is_sum = false;
         let weight = self.in_successor();
         self.weighted |= weight;

@@ -28,6 +28,8 @@ pub struct Lexeme {
     pub after_operand: bool,
     /// True if it cannot end an expression: an operator, or a word that works as one.
     pub operator: bool,
+    /// True for the parentheses of a repetition or a condition in a string, and for the words of these.
+    pub group: bool,
     /// Number of parentheses that are open around it.
     pub depth: usize,
 }

@@ -5,7 +5,7 @@
 
 use crate::ast::{
     Action, Alternative, Clause, ContextPart, Document, Equation, Expr, ExprId, Expressions, HeadModule,
-    Module, Name, Operator,
+    Module, Name, Operator, Part,
 };
 use crate::notation;
 
@@ -170,24 +170,43 @@ fn exponent_like(expr: &Expr) -> bool {
     matches!(expr, Expr::Name(name) | Expr::Call(name, _) | Expr::Index(name, _) if name.starts_with(['e', 'E']))
 }
 
-/// Modules as text.
-pub fn modules(expressions: &Expressions, modules: &[Module]) -> String {
-    if modules.is_empty() {
+/// A string of modules as text.
+pub fn modules(expressions: &Expressions, parts: &[Part]) -> String {
+    if parts.is_empty() {
         return "ε".to_owned();
     }
-    let shown: Vec<String> = modules
-        .iter()
-        .map(|module| {
-            let arguments: Vec<String> =
-                module.arguments.iter().map(|a| expression(expressions, a.root)).collect();
-            if arguments.is_empty() {
-                module.name.to_string()
-            } else {
-                format!("{}({})", module.name, arguments.join(", "))
-            }
-        })
-        .collect();
+    let shown: Vec<String> = parts.iter().map(|one| part(expressions, one)).collect();
     shown.join(" ")
+}
+
+/// A part of a string as text. Groups nest no deeper than the layout allows.
+fn part(expressions: &Expressions, part: &Part) -> String {
+    let text = |e: &crate::ast::Expression| expression(expressions, e.root);
+    let group = |parts: &[Part]| format!("( {} )", modules(expressions, parts));
+    match part {
+        Part::Module(module) => self::module(expressions, module),
+        Part::Repeat(of) => {
+            format!("for {} in {} .. {}: {}", of.index.text, text(&of.from), text(&of.to), group(&of.body))
+        }
+        Part::If(of) if of.otherwise.is_empty() => {
+            format!("if {}: {}", text(&of.condition), group(&of.then))
+        }
+        Part::If(of) => {
+            let otherwise = match &of.otherwise[..] {
+                [Part::If(_)] => modules(expressions, &of.otherwise),
+                parts => group(parts),
+            };
+            format!("if {}: {} else {otherwise}", text(&of.condition), group(&of.then))
+        }
+    }
+}
+
+fn module(expressions: &Expressions, module: &Module) -> String {
+    let arguments: Vec<String> = module.arguments.iter().map(|a| expression(expressions, a.root)).collect();
+    match arguments.is_empty() {
+        true => module.name.to_string(),
+        false => format!("{}({})", module.name, arguments.join(", ")),
+    }
 }
 
 /// A module of a head as text.

@@ -13,7 +13,7 @@ use smallvec::SmallVec;
 
 use super::siblings::{NO_GROUP, SiblingGroups};
 use super::{Family, Lineage, SimTime};
-use dlsys_model::{KindId, Successor};
+use dlsys_model::KindId;
 
 /// The branch that holds the main axis.
 pub(super) const TRUNK: u32 = 0;
@@ -331,11 +331,11 @@ impl Tree {
         }
     }
 
-    /// Appends a string at the end of the main axis, in time proportional to its length. The new modules are added to
+    /// Appends a string of modules of these kinds, brackets included, at the end of the main axis, in time proportional to its length. The new modules are added to
     /// `made`.
     pub fn append(
         &mut self,
-        string: &Successor,
+        kinds: &[KindId],
         arguments: &[f64],
         birth: SimTime,
         family: Family,
@@ -346,14 +346,14 @@ impl Tree {
         while next.ended().is_none() {
             (last, next) = (next, self.nodes[next.0 as usize].after);
         }
-        self.insert(last, next, string, arguments, birth, family, made);
+        self.insert(last, next, kinds, arguments, birth, family, made);
     }
 
-    /// Replaces a module by a string.
+    /// Replaces a module by a string of modules of these kinds, brackets included.
     pub fn replace(
         &mut self,
         id: ModuleId,
-        string: &Successor,
+        kinds: &[KindId],
         arguments: &[f64],
         birth: SimTime,
         family: Family,
@@ -361,14 +361,14 @@ impl Tree {
     ) {
         let Node { before, after, group, .. } = *self.node(id);
         self.groups.leave(group);
-        if let [kind] = string.kinds[..]
+        if let [kind] = *kinds
             && kind != KindId::OPEN
         {
             return self.succeed(id, kind, arguments, birth, family, made);
         }
         self.release(id.slot);
         self.modules -= 1;
-        self.insert(before, after, string, arguments, birth, family, made);
+        self.insert(before, after, kinds, arguments, birth, family, made);
     }
 
     /// Puts a single module into the slot of another. The links of its neighbours stay valid, so that their memory is not touched.
@@ -428,7 +428,7 @@ impl Tree {
         &mut self,
         mut before: Link,
         after: Link,
-        string: &Successor,
+        kinds: &[KindId],
         mut arguments: &[f64],
         birth: SimTime,
         family: Family,
@@ -439,7 +439,7 @@ impl Tree {
         let mut place = 0;
         // Of the present group; a very long successor is several.
         let (mut group, mut members) = (NO_GROUP, 0);
-        for &kind in &string.kinds {
+        for &kind in kinds {
             if kind == KindId::CLOSE {
                 let branch = branches.pop().expect("brackets match: the front end saw to it");
                 self.link_forward(before, Link::end_of(branch));

@@ -52,6 +52,12 @@ pub enum ErrorKind {
         /// The points that are missing: `(0, 1), (3, 3)`.
         missing: String,
     },
+    /// The bounds of a repetition in its drawing are none.
+    #[error("a repetition in its drawing cannot be made: {why}")]
+    BadBounds {
+        /// The reason, as a part of a sentence.
+        why: String,
+    },
     /// More patches have been begun than a frame may have.
     #[error("it begins more patches than a frame may have")]
     TooManyPatches,
@@ -74,6 +80,9 @@ impl ErrorKind {
             ErrorKind::NoControlPoint { .. } => "write `@PC(n, row, column)`, row and column from 0 to 3".to_owned(),
             ErrorKind::PatchIncomplete { patch, .. } => {
                 format!("set all 16 points with `@PC({patch}, row, column)` before `@PD({patch})`")
+            }
+            ErrorKind::BadBounds { .. } => {
+                "bounds are whole numbers, at most a million apart: round them with `floor(…)` or `ceil(…)`".to_owned()
             }
             ErrorKind::TooManyPatches => {
                 "use the number of a patch again when it is drawn: `@PS(1)` forgets the patch 1 that was there".to_owned()
@@ -228,7 +237,7 @@ pub(super) fn place(
         return of(&model.axiom).or(known(model.axiom_span));
     }
     let productions = model.rules.iter().flat_map(|rule| &rule.produces);
-    let makes = |p: &&Produce| p.outcome.successors.iter().any(|s| s.kinds.contains(&kind));
+    let makes = |p: &&Produce| p.outcome.successors.iter().any(|s| s.kinds().any(|made| made == kind));
     let mut productions = productions.filter(makes);
     let first = productions.next()?;
     match (&first.outcome.successors[..], productions.next()) {
@@ -239,6 +248,7 @@ pub(super) fn place(
 
 /// The place of the module of this kind in a drawing that has no other.
 fn only_one(drawn: &Successor, kind: KindId) -> Option<Span> {
-    let (_, span) = drawn.places.iter().find(|(known, _)| *known == kind)?;
-    (drawn.kinds.iter().filter(|known| **known == kind).count() == 1).then_some(*span)
+    let mut places = drawn.stretches().flat_map(|stretch| &stretch.places);
+    let (_, span) = places.find(|(known, _)| *known == kind)?;
+    (drawn.kinds().filter(|known| *known == kind).count() == 1).then_some(*span)
 }

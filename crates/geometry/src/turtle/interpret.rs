@@ -1,6 +1,6 @@
 //! Interpretations: what is drawn in place of a module.
 //!
-//! The nesting of interpretations is kept on a stack of its own, and their arguments in one array, so that
+//! The nesting of interpretations is kept on a stack of its own, and their modules and arguments in one array each, so that
 //! depth costs memory by the level and nothing by the module.
 
 use super::command::Command;
@@ -8,15 +8,31 @@ use super::prepare::prepare;
 use super::walk::{DrawnModule, Walk};
 use super::{DEPTH_LIMIT, Error, ErrorKind, MODULE_LIMIT, Pose};
 use crate::scene::Scene;
-use dlsys_model::{KindId, Model};
+use dlsys_expr::Scratch;
+use dlsys_model::{BadBounds, KindId, Model, Stretch};
 use dlsys_tree::{Module, ModuleString};
 
+/// Why the string of an interpretation cannot be made.
+enum Unexpanded {
+    TooMany,
+    Bounds(BadBounds),
+}
+
+impl From<BadBounds> for Unexpanded {
+    fn from(bad: BadBounds) -> Unexpanded {
+        Unexpanded::Bounds(bad)
+    }
+}
+
 /// An interpretation being drawn.
-struct Level<'m> {
+struct Level {
     /// The interpretation.
     index: usize,
-    /// What is still to be drawn.
-    kinds: std::slice::Iter<'m, KindId>,
+    /// Where its modules begin in the array of modules, and the next one.
+    first_kind: usize,
+    next_kind: usize,
+    /// Where the array of modules ends for this level.
+    end: usize,
     /// Where in the array of arguments those of this level begin, and those of its next module.
     first: usize,
     next: usize,
@@ -45,11 +61,11 @@ struct Expander<'a> {
     time: f64,
     /// Modules of the frame so far, those of the string included.
     drawn: usize,
-    levels: Vec<Level<'a>>,
+    levels: Vec<Level>,
+    kinds: Vec<KindId>,
     arguments: Vec<f64>,
     variables: Vec<f64>,
     scratch: Vec<f64>,
-    values: Vec<f64>,
 }
 
 impl<'a> Expander<'a> {
@@ -60,26 +76,30 @@ impl<'a> Expander<'a> {
             time: string.time,
             drawn: string.len(),
             levels: Vec::new(),
+            kinds: Vec::new(),
             arguments: Vec::new(),
             variables: Vec::new(),
             scratch: Vec::new(),
-            values: Vec::new(),
         }
     }
 
     /// Draws a module's interpretation, and what that is interpreted as in turn.
     fn expand(&mut self, index: usize, module: Module<'_>, walk: &mut Walk<'_>) -> Result<(), Error> {
         self.levels.clear();
+        self.kinds.clear();
         self.arguments.clear();
         self.variables.clear();
         self.variables.extend_from_slice(module.parameters);
-        self.enter(index, module.age);
+        self.enter(index, module.age, walk)?;
         while let Some(level) = self.levels.last_mut() {
-            let Some(&kind) = level.kinds.next() else {
+            if level.next_kind == level.end {
                 self.arguments.truncate(level.first);
+                self.kinds.truncate(level.first_kind);
                 self.levels.pop();
                 continue;
-            };
+            }
+            let kind = self.kinds[level.next_kind];
+            level.next_kind += 1;
             let arity = self.model.kinds.get(kind).arity;
             walk.inside = Some((level.index, kind));
             let from = level.next;
@@ -95,7 +115,7 @@ impl<'a> Expander<'a> {
                     }
                     self.variables.clear();
                     self.variables.extend_from_slice(&self.arguments[from..from + arity]);
-                    self.enter(index, module.age);
+                    self.enter(index, module.age, walk)?;
                 }
                 // Inside its own drawing a module is what its name says: `interpret F(x): !(0.1) F(x)`.
                 Command::Interpret(_) => {
@@ -110,12 +130,29 @@ impl<'a> Expander<'a> {
     }
 
     /// Begins an interpretation; `variables` holds the parameters of the module that it stands for.
-    fn enter(&mut self, index: usize, age: f64) {
-        let drawn = &self.model.interpretations[index].drawn;
+    fn enter(&mut self, index: usize, age: f64, walk: &mut Walk<'_>) -> Result<(), Error> {
+        let (first, first_kind) = (self.arguments.len(), self.kinds.len());
+        let (kinds, arguments, drawn) = (&mut self.kinds, &mut self.arguments, self.drawn);
         self.variables.extend([self.time, age]);
-        drawn.evaluate(&self.variables, &mut self.scratch, &mut self.values);
-        let first = self.arguments.len();
-        self.arguments.extend_from_slice(&self.values);
-        self.levels.push(Level { index, kinds: drawn.kinds.iter(), first, next: first });
+        let mut add = |stretch: &Stretch, variables: &mut Vec<f64>, scratch: &mut Scratch<f64>| {
+            if drawn + kinds.len() + stretch.kinds.len() > MODULE_LIMIT {
+                return Err(Unexpanded::TooMany);
+            }
+            kinds.extend_from_slice(&stretch.kinds);
+            stretch.evaluate(variables, scratch, arguments);
+            Ok(())
+        };
+        let drawing = &self.model.interpretations[index].drawn;
+        match drawing.expand(&mut self.variables, &mut self.scratch, &mut add) {
+            Ok(()) => {
+                let (next_kind, end) = (first_kind, self.kinds.len());
+                self.levels.push(Level { index, first_kind, next_kind, end, first, next: first });
+                Ok(())
+            }
+            Err(Unexpanded::TooMany) => Err(walk.error(ErrorKind::TooMany)),
+            Err(Unexpanded::Bounds(BadBounds { span, why })) => {
+                Err(Error { span: Some(span), ..walk.error(ErrorKind::BadBounds { why }) })
+            }
+        }
     }
 }

@@ -4,7 +4,7 @@ use super::*;
 use crate::scene::{MaterialId, Point, Vector, Width};
 use dlsys_diagnostic::Span;
 use dlsys_expr::{Binary, Graph, NodeId, Program};
-use dlsys_model::{Interpretation, Successor};
+use dlsys_model::{Interpretation, Stretch, Successor};
 use dlsys_tree::Lineage;
 
 /// Modules by name and parameters.
@@ -119,7 +119,8 @@ fn interpret(
     let variables = [0, 1, 2].map(|i| graph.var(i));
     let roots = arguments(&mut graph, variables);
     let kinds = modules.iter().map(|&(name, arity)| model.kinds.intern(name, arity)).collect();
-    let drawn = Successor { kinds, arguments: Program::compile(&graph, &roots, 3), ..Successor::default() };
+    let drawn = Stretch { kinds, arguments: Program::compile(&graph, &roots, 3), ..Stretch::default() };
+    let drawn = Successor::Plain(drawn);
     let kind = model.kinds.intern(name, 1);
     model.kinds.get_mut(kind).interpretation = Some(model.interpretations.len());
     model.interpretations.push(Interpretation { span: Span::default(), drawn });

@@ -14,7 +14,8 @@ use crate::scratch::Scratch;
 use crate::world::World;
 use crate::world::context::Context;
 use crate::world::life::{End, LifeClass};
-use dlsys_model::{Comparison, KindId, Model, Rule, Sign, Successor};
+use crate::world::new_modules::kinds_of;
+use dlsys_model::{Comparison, KindId, Model, Rule, Sign};
 use dlsys_tree::{Lineage, ModuleId};
 
 /// The context of a rule without one.
@@ -114,15 +115,15 @@ impl EventStage<'_, '_> {
         self.world.site(self.setup.model, fire.id, fire.rule, span, self.instant.at)
     }
 
-    /// Makes room for a successor.
+    /// Makes room for modules of these kinds, with so many parameters.
     #[inline]
-    pub fn room(&mut self, successor: &Successor, rounds: usize) -> Result<(), Refusal> {
+    pub fn room(&mut self, kinds: &[KindId], width: usize, rounds: usize) -> Result<(), Refusal> {
         let limit = self.setup.settings.max_modules;
-        if self.world.tree.len() + successor.kinds.len() > limit {
+        if self.world.tree.len() + kinds.len() > limit {
             return Err(Refusal::TooManyModules { limit, rounds });
         }
         let coupled = self.flows.coupled.members.len();
-        budget::room_for(self.setup, self.world, coupled, successor).map_err(Refusal::OutOfMemory)
+        budget::room_for(self.setup, self.world, coupled, (kinds, width)).map_err(Refusal::OutOfMemory)
     }
 
     /// Writes a production into the log, if there is one.
@@ -146,9 +147,9 @@ impl EventStage<'_, '_> {
         }
         self.afford_round(firing.len(), firing.first().map(|fire| fire.id))?;
         self.note_predecessors(firing);
-        let mut arguments = std::mem::take(&mut self.events.arguments);
-        let mut ends = std::mem::take(&mut self.events.argument_ends);
-        arguments.clear();
+        let mut new = std::mem::take(&mut self.events.new_modules);
+        let mut ends = std::mem::take(&mut self.events.module_ends);
+        new.clear();
         ends.clear();
         let (mut contexts, model) = (0, self.setup.model);
         let known = self.log.events.as_ref().map_or(0, Vec::len);
@@ -161,12 +162,12 @@ impl EventStage<'_, '_> {
             let residual = if self.log.events.is_some() { self.residual(fire) } else { 0.0 };
             let made = match clause.is_fault {
                 true => Err(Refusal::NegativeRate),
-                false => chance::successor(self.setup.seed, clause, lineage, self.scratch, &mut arguments)
+                false => chance::successor(self.setup.seed, clause, lineage, self.scratch, &mut new)
                     .map_err(Refusal::from),
             };
             match made {
                 Ok((which, family)) => {
-                    ends.push((arguments.len(), which, family));
+                    ends.push(([new.kinds.len(), new.arguments.len()], which, family));
                     let (kind, chosen) =
                         (self.world.tree.kind(fire.id), clause.outcome.weights.is_some().then_some(which));
                     self.record((kind, lineage), (fire.rule, fire.produce), chosen, residual);
@@ -178,24 +179,26 @@ impl EventStage<'_, '_> {
                 }
             }
         }
-        let mut first = 0;
+        let mut first = [0, 0];
         for (fire, &(end, which, family)) in firing.iter().zip(&ends) {
             let successor = &model.rules[fire.rule].produces[fire.produce].outcome.successors[which];
-            if let Err(refusal) = self.room(successor, rounds) {
+            let kinds = kinds_of(successor, &new.kinds[first[0]..end[0]]);
+            let arguments = &new.arguments[first[1]..end[1]];
+            if let Err(refusal) = self.room(kinds, arguments.len(), rounds) {
                 return Err(refusal.error(self.world, self.site(fire)));
             }
             let (kind, now) = (self.world.tree.kind(fire.id), self.instant.at);
             self.flow().forget(fire.id);
             let mut made = std::mem::take(&mut self.events.fresh);
             let known = made.len();
-            self.world.tree.replace(fire.id, successor, &arguments[first..end], now, family, &mut made);
-            self.note_successor(fire.id, successor, &made[known..]);
-            self.hand_on(fire.id, kind, successor, &made[known..]);
+            self.world.tree.replace(fire.id, kinds, arguments, now, family, &mut made);
+            self.note_successor(fire.id, kinds, &made[known..]);
+            self.hand_on(fire.id, kind, kinds, &made[known..]);
             self.events.fresh = made;
             first = end;
         }
-        self.events.arguments = arguments;
-        self.events.argument_ends = ends;
+        self.events.new_modules = new;
+        self.events.module_ends = ends;
         self.world.structure += 1;
         self.events.changed = true;
         let world = &self.world;

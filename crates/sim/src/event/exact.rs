@@ -4,7 +4,7 @@
 //! every other interpreter of L-systems: 0.1 added up eight times is less than 0.8 or it is not. Values of equations have
 //! errors of an integration, and so has time, which is rounded; these are compared with a tolerance.
 
-use dlsys_model::{KindId, Model, Rule};
+use dlsys_model::{KindId, Model, Rule, Successor};
 
 /// For each rule, by atom: both sides are exact. Empty for rules that are not discrete.
 pub fn exact_atoms(model: &Model) -> Vec<Vec<bool>> {
@@ -38,11 +38,12 @@ fn inexact(model: &Model) -> Vec<Vec<bool>> {
     loop {
         let mut news: Vec<(KindId, usize)> = Vec::new();
         for rule in &model.rules {
-            for successor in rule.produces.iter().flat_map(|p| &p.outcome.successors) {
+            let successors = rule.produces.iter().flat_map(|p| &p.outcome.successors);
+            for stretch in successors.flat_map(Successor::stretches) {
                 let mut output = 0;
-                for &kind in &successor.kinds {
+                for &kind in &stretch.kinds {
                     for parameter in 0..model.kinds.get(kind).arity {
-                        let read = successor.arguments.output_reads(output);
+                        let read = stretch.arguments.output_reads(output);
                         output += 1;
                         if !inexact[kind.index()][parameter]
                             && read.iter().any(|v| reads(model, &inexact, rule, *v))

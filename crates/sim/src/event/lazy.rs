@@ -6,6 +6,7 @@ use crate::error::Error;
 use crate::flow::prediction::values_at_event;
 use crate::world::context::Context;
 use crate::world::life::{End, Life, Newborn, REFUSED};
+use crate::world::new_modules::kinds_of;
 use dlsys_model::{KindId, Outcome, Sign};
 use dlsys_tree::{ModuleId, NO_LABEL};
 
@@ -79,7 +80,8 @@ impl EventStage<'_, '_> {
         } else if clause.is_fault {
             possible = Err(Refusal::NegativeRate);
         } else {
-            possible = self.room(&clause.outcome.successors[life.successor], rounds);
+            let kinds = kinds_of(&clause.outcome.successors[life.successor], &life.new.kinds);
+            possible = self.room(kinds, life.new.arguments.len(), rounds);
         }
         if let Err(refusal) = possible {
             self.world.lives.keep(label, life);
@@ -87,7 +89,6 @@ impl EventStage<'_, '_> {
             let site = self.site(&Firing { id, rule, produce });
             return Err(refusal.error(self.world, site));
         }
-        let successor = &clause.outcome.successors[life.successor];
         if self.log.events.is_some() {
             let which = clause.outcome.weights.is_some().then_some(life.successor);
             self.record((kind, lineage), (rule, produce), which, life.residual);
@@ -95,7 +96,8 @@ impl EventStage<'_, '_> {
         let family = lineage.family(Outcome::production(clause.key, life.successor));
         let (tree, made) = (&mut self.world.tree, &mut self.events.made);
         made.clear();
-        tree.replace(id, successor, &life.arguments, self.instant.at, family, made);
+        let kinds = kinds_of(&clause.outcome.successors[life.successor], &life.new.kinds);
+        tree.replace(id, kinds, &life.new.arguments, self.instant.at, family, made);
         for (&id, child) in self.events.made.iter().zip(&life.children) {
             if child.label != NO_LABEL {
                 tree.set_label(id, child.label);
@@ -113,12 +115,12 @@ impl EventStage<'_, '_> {
                 false => self.events.fresh.push(id),
             }
         }
-        self.world.lives.keep(label, life);
         if self.setup.hands_on {
             let made = std::mem::take(&mut self.events.made);
-            self.hand_on(id, kind, successor, &made);
+            self.hand_on(id, kind, kinds, &made);
             self.events.made = made;
         }
+        self.world.lives.keep(label, life);
         self.log.stats.events += 1;
         self.log.stats.peak_modules = self.log.stats.peak_modules.max(self.world.tree.len() as u64);
         Ok(())
@@ -133,7 +135,7 @@ impl EventStage<'_, '_> {
         values_at_event(life, self.instant.at, &mut self.scratch.variables);
         self.scratch.variables.extend([self.instant.at.to_f64(), self.instant.at.since(life.birth)]);
         life.children.clear();
-        life.arguments.clear();
+        life.new.clear();
         (life.replaced, life.lasting) = (Some(self.instant.at), false);
         if clause.is_fault {
             return Ok(());
@@ -146,11 +148,11 @@ impl EventStage<'_, '_> {
             };
             life.residual = residual(compiled, produce, zero, self.scratch);
         }
-        let (which, _) =
-            chance::successor(self.setup.seed, clause, lineage, self.scratch, &mut life.arguments)?;
+        let (which, _) = chance::successor(self.setup.seed, clause, lineage, self.scratch, &mut life.new)?;
         life.successor = which;
-        let mut rest = &life.arguments[..];
-        for &kind in clause.outcome.successors[which].kinds.iter().filter(|kind| !kind.is_bracket()) {
+        let mut rest = &life.new.arguments[..];
+        let kinds = kinds_of(&clause.outcome.successors[which], &life.new.kinds);
+        for &kind in kinds.iter().filter(|kind| !kind.is_bracket()) {
             let (own, others) = rest.split_at(self.setup.model.kinds.get(kind).width());
             rest = others;
             let child = self.child(kind, own);

@@ -9,7 +9,7 @@ use std::collections::HashSet;
 use crate::event::{LONG, clear};
 use crate::world::context::Context;
 use crate::world::state::{Signs, State};
-use dlsys_model::{KindId, Successor};
+use dlsys_model::KindId;
 use dlsys_tree::ModuleId;
 
 impl EventStage<'_, '_> {
@@ -149,16 +149,16 @@ impl EventStage<'_, '_> {
     }
 
     /// Marks the modules that have looked at a module that is replaced, and hands its neighbours on.
-    pub fn hand_on(&mut self, id: ModuleId, kind: KindId, successor: &Successor, made: &[ModuleId]) {
+    pub fn hand_on(&mut self, id: ModuleId, kind: KindId, kinds: &[KindId], made: &[ModuleId]) {
         if !self.setup.hands_on {
             return;
         }
         let skipped = |kind| self.setup.model.kinds.get(kind).skipped;
         self.events.to_look.extend_from_slice(self.neighbours.lookers(id));
         self.neighbours.bury(id);
-        self.neighbours.hand_on(Some(id), &successor.kinds, made, skipped);
+        self.neighbours.hand_on(Some(id), kinds, made, skipped);
         // A skipped module may be replaced by one that stands between others.
         let counts = |kind: &KindId| !kind.is_bracket() && !skipped(*kind);
-        self.events.lost |= skipped(kind) && successor.kinds.iter().any(counts);
+        self.events.lost |= skipped(kind) && kinds.iter().any(counts);
     }
 }

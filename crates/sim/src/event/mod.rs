@@ -37,6 +37,7 @@ use crate::schedule::{NextEvent, Schedule};
 use crate::scratch::Scratch;
 use crate::setup::Setup;
 use crate::world::neighbours::Neighbours;
+use crate::world::new_modules::NewModules;
 use crate::world::{Instant, World};
 use derivation::Steps;
 use dlsys_tree::{Family, ModuleId};
@@ -88,9 +89,9 @@ pub struct Events {
     pub batch: Vec<NextEvent>,
     made: Vec<ModuleId>,
     attached: Vec<ModuleId>,
-    arguments: Vec<f64>,
-    /// Of each production: where its arguments end, which successor it has, and the lineage of that.
-    argument_ends: Vec<(usize, usize, Family)>,
+    new_modules: NewModules,
+    /// Of each production: where its kinds and arguments end, which successor it has, and the lineage of that.
+    module_ends: Vec<([usize; 2], usize, Family)>,
 }
 
 impl Events {

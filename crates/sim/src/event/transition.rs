@@ -10,7 +10,7 @@ use crate::log::{ModuleState, Transition};
 use std::collections::BTreeMap;
 
 use crate::event::Firing;
-use dlsys_model::{BUILT_IN_SURFACES, DRAWN_WORDS, Kind, KindId, Model, Successor};
+use dlsys_model::{BUILT_IN_SURFACES, DRAWN_WORDS, Kind, KindId, Model};
 use dlsys_tree::ModuleId;
 
 /// Productions of the present instant.
@@ -81,13 +81,12 @@ impl EventStage<'_, '_> {
         self.events.recorder = Some(recorder);
     }
 
-    /// Records the successor of a module.
-    pub fn note_successor(&mut self, id: ModuleId, successor: &Successor, made: &[ModuleId]) {
+    /// Records the successor of a module: the kinds of its string, and its modules.
+    pub fn note_successor(&mut self, id: ModuleId, kinds: &[KindId], made: &[ModuleId]) {
         let Some(fired) = self.events.recorder.as_mut().and_then(|r| r.fired.get_mut(&id)) else { return };
         let mut made = made.iter().copied();
-        fired.parts = (successor.kinds.iter())
-            .map(|&kind| (kind, if kind.is_bracket() { None } else { made.next() }))
-            .collect();
+        fired.parts =
+            (kinds.iter()).map(|&kind| (kind, if kind.is_bracket() { None } else { made.next() })).collect();
     }
 
     /// Completes the events of the instant, now that all equations are chosen.
@@ -131,8 +130,8 @@ fn is_drawn(model: &Model, kind: KindId) -> bool {
         |kind: &Kind| DRAWN_WORDS.contains(&kind.base()) || BUILT_IN_SURFACES.contains(&kind.name.as_str());
     let kind = model.kinds.get(kind);
     let Some(index) = kind.interpretation else { return by_name(kind) };
-    model.interpretations[index].drawn.kinds.iter().any(|part| {
-        let part = model.kinds.get(*part);
+    model.interpretations[index].drawn.kinds().any(|part| {
+        let part = model.kinds.get(part);
         by_name(part) || part.interpretation.is_some_and(|other| other != index)
     })
 }

@@ -9,6 +9,7 @@
 use smallvec::SmallVec;
 
 use crate::trajectory::Trajectory;
+use crate::world::new_modules::NewModules;
 use crate::world::state::Signs;
 use dlsys_expr::Program;
 use dlsys_model::{Model, Rule, Sign, SolutionForm, Solve, ZeroCrossing};
@@ -68,8 +69,8 @@ pub struct Life {
     pub level: Option<(usize, f64)>,
     /// When it was replaced, if the successor is known.
     pub replaced: Option<SimTime>,
-    /// Of the successor.
-    pub arguments: Vec<f64>,
+    /// The modules of the successor.
+    pub new: NewModules,
     /// Which of the successors that the production has.
     pub successor: usize,
     pub children: Vec<Newborn>,

@@ -10,6 +10,7 @@ pub mod context;
 pub mod coupled_solution;
 pub mod life;
 pub mod neighbours;
+pub mod new_modules;
 pub mod path;
 pub mod state;
 

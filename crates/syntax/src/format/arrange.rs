@@ -285,6 +285,10 @@ fn space(before: &Piece<'_>, after: &Piece<'_>) -> bool {
             || matches!(piece.text, "if" | "solve" | "produce" | "or" | "at" | "rate") && piece.operator
     };
     let bracket = |piece: &Piece<'_>, symbol: &str| piece.text == symbol && !piece.grouped;
+    // `for i in 0 .. 3: ( A(i) )`
+    if before.group || after.group {
+        return true;
+    }
     // `2c` is a product, and so is `2if x < 1 then 1 else 0`; `@in` is a name.
     if before.factor || before.text == "@" {
         return false;

@@ -102,6 +102,11 @@ mod tests {
             ("axiom:  F (x)[+( 30)A]  -  ![ @L(-1) ]  ;(2 , 3)", "axiom: F(x)[+(30)A] - ![ @L(-1) ] ;(2, 3)"),
             ("A(x)<B( y )>C(z) :solve dy/dt=-x*z", "A(x) < B(y) > C(z): solve dy/dt = -x*z"),
             ("±( α ):solve dα / dt = 1", "±(α): solve dα/dt = 1"),
+            (
+                "axiom: F for i in 0..n-1:([+(10*i)A(i)])if n>2:(B)else(C D)E",
+                "axiom: F for i in 0 .. n - 1: ( [+(10*i)A(i)] ) if n > 2: ( B ) else ( C D ) E",
+            ),
+            ("axiom: for(1) if(x):( for(2) )", "axiom: for(1) if (x): ( for(2) )"),
             ("interpret @L(s) :;(2)F( s )@L(s)", "interpret @L(s): ;(2)F(s)@L(s)"),
         ] {
             if tame.is_empty() {

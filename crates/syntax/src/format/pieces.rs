@@ -25,6 +25,8 @@ pub struct Piece<'t> {
     pub depth: usize,
     pub kind: ItemKind,
     pub place: Place,
+    /// See [`Lexeme`].
+    pub group: bool,
     /// True for a number that multiplies the factor directly behind it.
     pub factor: bool,
 }
@@ -148,13 +150,14 @@ impl<'t> Reader<'t, '_> {
             token: first.token,
             column: 0,
             touches: false,
-            grouped: first.depth == 0 && (first.in_string || names || head),
+            grouped: first.in_string || first.depth == 0 && (names || head),
             in_string: first.in_string,
             after_operand: first.after_operand,
             operator: first.operator,
             depth: first.depth,
             kind,
             place,
+            group: first.group,
             factor: false,
         }
     }

@@ -9,14 +9,77 @@ impl Scanner<'_> {
     /// those ends a weight).
     pub(super) fn has_colon(&self, tokens: &[(Token, usize, usize)]) -> bool {
         let mut depth = 0i64;
-        for &token in tokens {
+        // A head has neither `for NAME in` nor `if`.
+        let mut in_string = self.in_string || self.levels.len() > 1;
+        for (i, &token) in tokens.iter().enumerate() {
             match token.0 {
                 Token::Open => depth += 1,
                 Token::Close => depth -= 1,
                 Token::Colon if depth <= 0 => return true,
+                Token::Word if in_string && self.begins_group(tokens, i) => return false,
+                Token::Word if self.word(token) == "solve" => in_string = false,
                 Token::Word if depth <= 0 && self.word(token) == "produce" => return false,
                 Token::Symbol if depth <= 0 && self.is_arrow(token.1, token.2) => return false,
                 _ => {}
+            }
+        }
+        false
+    }
+
+    /// True if the token begins a repetition or a condition in a string.
+    pub(super) fn begins_group(&self, tokens: &[(Token, usize, usize)], at: usize) -> bool {
+        match self.word(tokens[at]) {
+            "for" => self.is_repetition(tokens[at].2),
+            "if" => self.is_string_condition(tokens[at].2),
+            _ => false,
+        }
+    }
+
+    /// True if `NAME in` stands behind a `for` that ends at this byte.
+    pub(super) fn is_repetition(&self, end: usize) -> bool {
+        let rest = self.text[end..].trim_start_matches([' ', '\t']);
+        let after = rest.trim_start_matches(in_name);
+        let name = &rest[..rest.len() - after.len()];
+        let next = after.trim_start_matches([' ', '\t']);
+        name.starts_with(char::is_alphabetic)
+            && next.len() < after.len()
+            && next.strip_prefix("in").is_some_and(|rest| !rest.starts_with(in_name))
+    }
+
+    /// True if the condition behind an `if` that ends at this byte ends with a colon, so that a string depends on it; that of
+    /// a clause ends with `solve`, `produce` or `at rate`.
+    pub(super) fn is_string_condition(&self, end: usize) -> bool {
+        /// Longer conditions are those of clauses, which bounds the work.
+        const LONGEST: usize = 10_000;
+        let mut depth = 0usize;
+        // True behind a token that can end an expression.
+        let mut ended = false;
+        let mut rest = self.text[end..].char_indices().take_while(|(i, _)| *i < LONGEST).peekable();
+        while let Some((i, c)) = rest.next() {
+            match c {
+                '(' | '[' => depth += 1,
+                ')' | ']' if depth == 0 => return false,
+                ')' | ']' => depth -= 1,
+                ':' if depth == 0 => return true,
+                '"' | ';' | '{' | '}' | '@' => return false,
+                '#' => while rest.next_if(|(_, c)| *c != '\n').is_some() {},
+                '\n' if depth == 0 && ended => {
+                    let next = self.text[end + i..].trim_start();
+                    if !["then", "else", "case", ":"].iter().any(|word| next.starts_with(word)) {
+                        return false;
+                    }
+                }
+                c if c.is_alphabetic() => {
+                    let word: &str = self.text[end + i..].split(|c| !in_name(c)).next().unwrap_or_default();
+                    while rest.next_if(|(j, _)| *j < i + word.len()).is_some() {}
+                    if depth == 0 && matches!(word, "solve" | "produce") {
+                        return false;
+                    }
+                }
+                _ => {}
+            }
+            if !c.is_whitespace() && c != '#' {
+                ended = in_name(c) || matches!(c, ')' | ']');
             }
         }
         false

@@ -8,9 +8,24 @@ impl Scanner<'_> {
     /// Advances over a word; the result says whether an expression can end after it.
     pub(super) fn keyword(&mut self, start: usize, end: usize) -> Last {
         let inside = self.levels.len() > 1;
-        let in_expression = !self.in_string || inside;
+        let in_expression = !self.in_modules();
         let in_rule = self.items.last().is_some_and(|i| i.kind == ItemKind::Rule && i.after_colon.is_some());
         match &self.text[start..end] {
+            "for" if !in_expression && self.is_repetition(end) => {
+                self.group = true;
+                self.level().in_header = true;
+                Last::Operator
+            }
+            "if" if !in_expression && self.is_string_condition(end) => {
+                self.group = true;
+                self.level().in_header = true;
+                Last::Operator
+            }
+            "else" if !in_expression => {
+                self.group = true;
+                self.level().group_next = true;
+                Last::Operator
+            }
             "produce" if in_rule && !inside => {
                 self.forget_pending();
                 (self.in_string, self.weighted, self.weight_next) = (true, false, true);
@@ -64,6 +79,7 @@ impl Scanner<'_> {
                 Last::Operator
             }
             "for" if in_rule && !inside && !self.in_string && self.last == Last::Operand => Last::Operator,
+            "in" if self.level().in_header => Last::Operator,
             word if self.goes_on_after(word) => Last::Operator,
             _ => Last::Operand,
         }

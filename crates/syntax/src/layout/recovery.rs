@@ -40,6 +40,9 @@ impl Scanner<'_> {
             _ => return None,
         }
         let clause = self.first_clause(tokens)?;
+        if in_string && self.begins_group(tokens, clause) {
+            return None;
+        }
         // In a drawing, `if` may be meant as a condition of the drawing.
         let acts = |t: &Lexed| matches!(self.word(*t), "solve" | "produce");
         if current.body() == Some(Body::Drawing) && !tokens.iter().any(acts) {

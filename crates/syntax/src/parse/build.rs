@@ -7,8 +7,8 @@ pub(crate) use super::Pair;
 use super::Rule;
 use crate::ast;
 use crate::ast::{
-    Action, Alternative, Clause, ContextPart, Equation, Expr, ExprId, Expression, Expressions, HeadModule,
-    Item, Module, Name, Text,
+    Action, Alternative, Clause, Conditional, ContextPart, Equation, Expr, ExprId, Expression, Expressions,
+    HeadModule, Item, Module, Name, Part, Repetition, Text,
 };
 use crate::notation;
 use dlsys_diagnostic::{Diagnostic, Span};
@@ -252,8 +252,48 @@ impl Builder<'_> {
         Ok(Equation::Rate { parameter, rate: self.expression(right())? })
     }
 
-    pub(crate) fn successor(&mut self, pair: Pair) -> Built<Vec<Module>> {
-        pair.into_inner().filter(|p| p.as_rule() == Rule::module).map(|p| self.module(p)).collect()
+    /// The parts of a string, of an alternative or of a group.
+    pub(crate) fn successor(&mut self, pair: Pair) -> Built<Vec<Part>> {
+        let mut parts = Vec::new();
+        for pair in pair.into_inner() {
+            parts.extend(self.part(pair)?);
+        }
+        Ok(parts)
+    }
+
+    /// A part of a string; None for signs between parts.
+    pub fn part(&mut self, pair: Pair) -> Built<Option<Part>> {
+        Ok(Some(match pair.as_rule() {
+            Rule::module => Part::Module(self.module(pair)?),
+            Rule::repetition => Part::Repeat(Box::new(self.repetition(pair)?)),
+            Rule::conditional => Part::If(Box::new(self.conditional(pair)?)),
+            _ => return Ok(None),
+        }))
+    }
+
+    fn repetition(&mut self, pair: Pair) -> Built<Repetition> {
+        let span = self.span(&pair);
+        let mut inner = pair.into_inner().filter(|p| !is_punctuation(p.as_rule()));
+        let mut next = || inner.next().expect("the grammar has a part here");
+        let index = self.name(&next());
+        let (from, to) = (self.expression(next())?, self.expression(next())?);
+        Ok(Repetition { index, from, to, body: self.successor(next())?, span })
+    }
+
+    fn conditional(&mut self, pair: Pair) -> Built<Conditional> {
+        let span = self.span(&pair);
+        let mut inner = pair.into_inner().filter(|p| !is_punctuation(p.as_rule()));
+        let mut next = || inner.next().expect("the grammar has a part here");
+        let condition = self.expression(next())?;
+        let then = self.successor(next())?;
+        let otherwise = match inner.next() {
+            Some(other) if other.as_rule() == Rule::conditional => {
+                vec![Part::If(Box::new(self.conditional(other)?))]
+            }
+            Some(other) => self.successor(other)?,
+            None => Vec::new(),
+        };
+        Ok(Conditional { condition, then, otherwise, span })
     }
 
     pub fn module(&mut self, pair: Pair) -> Built<Module> {

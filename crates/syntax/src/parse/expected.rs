@@ -75,6 +75,11 @@ pub fn explain(item: Rule, error: &Error<Rule>, text: &str, offset: usize) -> Di
         expected.remove("`if`");
         expected.remove("`match`");
     }
+    // In a string, `for` and `if` are rarely meant where a module is missing.
+    if expected.contains("a module") {
+        expected.remove("`for` and a parameter");
+        expected.remove("`if`");
+    }
     // A rule without a clause lacks a clause rather than another `let`.
     if expected.contains("`if`, `solve` or `produce`") {
         expected.remove("`let`");

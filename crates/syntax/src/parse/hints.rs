@@ -19,10 +19,47 @@ pub(super) fn hint(item: Rule, text: &str, at: usize, found: &str) -> Option<Str
     if let Some(advice) = advice::for_block(item, &text[..at], found) {
         return Some(advice.to_owned());
     }
+    if let Some(advice) = hint_of_group(item, &text[..at], found) {
+        return Some(advice.to_owned());
+    }
     if let Some(advice) = hint_of_chance(item, text, at, found) {
         return Some(advice.to_owned());
     }
     hint_by_symbol(item, text, at, found).or_else(|| hint_by_word(item, text, at, found))
+}
+
+/// Hints for repetitions and conditions in strings.
+fn hint_of_group(item: Rule, before: &str, found: &str) -> Option<&'static str> {
+    const REPEAT: &str = "a repetition is written `for i in 0 .. 3: ( F(i) )`";
+    const CONDITION: &str = "a condition in a string is written `if x > 1: ( F(x) ) else ( A )`";
+    let strings = matches!(item, Rule::modules | Rule::interpret_item);
+    if !strings && !matches!(item, Rule::rule_item | Rule::step_item) {
+        return None;
+    }
+    if found == "else" && strings {
+        return Some(CONDITION);
+    }
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    // The last word `for` or `if`, and the words behind it.
+    let mut words: Vec<&str> = Vec::new();
+    for word in before.rsplit(|c| !is_word(c)).filter(|word| !word.is_empty()) {
+        match word {
+            // A group that has ended, or begun with a module, is not the place of the mistake.
+            "for" => {
+                let bare = words
+                    .last()
+                    .is_none_or(|_| words.iter().rev().nth(1).is_none_or(|second| *second == "in"));
+                return bare.then_some(REPEAT);
+            }
+            "if" if strings || found == "(" => return Some(CONDITION),
+            "if" | "solve" | "produce" => return None,
+            _ => words.push(word),
+        }
+        if words.len() > 12 {
+            return None;
+        }
+    }
+    None
 }
 
 /// Hints for successors with weights and for events at a rate.

@@ -17,10 +17,11 @@ use std::collections::HashSet;
 use pest::Parser;
 
 use crate::Errors;
-use crate::ast::{Document, Expression, HeadModule, Item, Module};
+use crate::ast::{Document, Expression, HeadModule, Item, Part, modules_of};
 use crate::declarations::{Body, Named};
 use crate::foreign_syntax;
 use crate::layout::{ItemKind, RawItem, layout};
+use crate::lexeme::in_name;
 use dlsys_diagnostic::{Diagnostic, Source, Span};
 
 /// The pest parser of `grammars/dlsys.pest`, and its rules.
@@ -210,7 +211,7 @@ fn read_axiom(text: &str, item: &RawItem, builder: &mut build::Builder) -> Resul
                 .help(advice::initial_string(text[item.start..item.end].lines().next().unwrap_or_default())),
         ));
     };
-    let mut modules: Vec<Module> = Vec::new();
+    let mut modules: Vec<Part> = Vec::new();
     let mut empty = false;
     while at < item.end {
         let end = piece_end(&text[..item.end], at, PIECE);
@@ -221,13 +222,15 @@ fn read_axiom(text: &str, item: &RawItem, builder: &mut build::Builder) -> Resul
         }
         builder.offset = at;
         let pair = pest_parse(Rule::modules, piece, at)?;
-        for module in pair.into_inner().filter(|p| p.as_rule() == Rule::module) {
-            modules.push(builder.module(module)?);
+        for part in pair.into_inner() {
+            modules.extend(builder.part(part)?);
         }
-        if modules.len() > MAX_AXIOM {
+        if modules.len() > MAX_AXIOM
+            && let Some(last) = modules_of(&modules[MAX_AXIOM..]).next()
+        {
             return Err(Box::new(
                 Diagnostic::error(format!("the initial string has more than {MAX_AXIOM} modules"))
-                    .at(modules[MAX_AXIOM].span, "this one is too many")
+                    .at(last.span, "this one is too many")
                     .help("begin with fewer, and let rules make the others"),
             ));
         }
@@ -243,14 +246,29 @@ fn read_axiom(text: &str, item: &RawItem, builder: &mut build::Builder) -> Resul
     Ok(Item::Axiom(modules))
 }
 
-/// The end of a piece of about `size` bytes: white space outside parentheses.
+/// The end of a piece of about `size` bytes: white space outside parentheses, and not within a repetition or a condition.
 fn piece_end(text: &str, from: usize, size: usize) -> usize {
     let mut depth = 0i64;
+    // True from a `for` or `if` to the end of its group, and before an `else`; `in_body` from the `(` of the group.
+    let (mut in_part, mut in_body) = (false, false);
     for (i, b) in text.bytes().enumerate().skip(from) {
         match b {
-            b'(' => depth += 1,
-            b')' => depth -= 1,
-            b' ' | b'\n' | b']' if depth <= 0 && i - from >= size => return i,
+            b'(' => {
+                let before = text[from..i].trim_end();
+                in_body |= depth == 0 && in_part && (before.ends_with(':') || before.ends_with("else"));
+                depth += 1;
+            }
+            b')' => {
+                depth -= 1;
+                if depth <= 0 && std::mem::take(&mut in_body) {
+                    in_part = text[i + 1..].trim_start().starts_with("else");
+                }
+            }
+            b'f' | b'i' if depth <= 0 && !text[..i].ends_with(in_name) => {
+                let word = text[i..].split(|c| !in_name(c)).next();
+                in_part |= matches!(word, Some("for" | "if"));
+            }
+            b' ' | b'\n' | b']' if depth <= 0 && !in_part && i - from >= size => return i,
             _ => {}
         }
     }

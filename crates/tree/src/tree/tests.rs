@@ -2,14 +2,11 @@
 
 use super::*;
 use crate::Visit;
-use dlsys_expr::{Graph, Program};
 use dlsys_model::Kinds;
 
 /// A string of kinds without parameters, written with one letter each.
-pub fn string(kinds: &mut Kinds, text: &str) -> Successor {
-    let ids = text.chars().map(|c| kinds.intern(&c.to_string(), 0)).collect();
-    let arguments = Program::compile(&Graph::default(), &[], 0);
-    Successor { kinds: ids, arguments, ..Successor::default() }
+pub fn string(kinds: &mut Kinds, text: &str) -> Vec<KindId> {
+    text.chars().map(|c| kinds.intern(&c.to_string(), 0)).collect()
 }
 
 pub fn show(kinds: &Kinds, tree: &Tree) -> String {
