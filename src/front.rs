@@ -4,9 +4,9 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use dlsys_compile::Setting;
-use dlsys_geometry::{scene::Scene, turtle};
+use dlsys_geometry::scene::Scene;
 use dlsys_render::{Format, FrameWriter, Survey, View};
-use dlsys_session::{LoadError, Session};
+use dlsys_session::{DrawError, LoadError, Nursery, Session};
 use dlsys_sim::{Settings, Simulation, describe};
 use dlsys_tree::ModuleString;
 
@@ -73,7 +73,7 @@ impl Model {
     /// As of [`Model::run`].
     pub fn run_with(&self, settings: Settings) -> Result<Run<'_>, Error> {
         let simulation = self.session.simulate(settings).map_err(|error| self.failed(error))?;
-        Ok(Run { model: self, simulation, string: ModuleString::default() })
+        Ok(Run { model: self, settings, simulation, string: ModuleString::default() })
     }
 
     fn failed(&self, error: dlsys_sim::Error) -> Error {
@@ -90,6 +90,7 @@ fn settings(parameters: &[(&str, f64)]) -> Vec<Setting> {
 #[derive(Clone)]
 pub struct Run<'m> {
     model: &'m Model,
+    settings: Settings,
     simulation: Simulation<'m>,
     string: ModuleString,
 }
@@ -103,7 +104,7 @@ impl Run<'_> {
     /// call returns the same error.
     pub fn at(&mut self, t: f64) -> Result<Plant<'_>, Error> {
         self.simulation.at(t, &mut self.string).map_err(|error| self.model.failed(error))?;
-        Ok(Plant { model: self.model, string: &self.string })
+        Ok(Plant { model: self.model, settings: self.settings, string: &self.string })
     }
 }
 
@@ -111,6 +112,7 @@ impl Run<'_> {
 #[derive(Clone, Copy)]
 pub struct Plant<'r> {
     model: &'r Model,
+    settings: Settings,
     string: &'r ModuleString,
 }
 
@@ -156,8 +158,9 @@ impl<'r> Plant<'r> {
     /// # Errors
     /// [`Error::Draw`]: a length, an angle or a width is not finite, or the drawing is unbounded.
     pub fn scene(&self) -> Result<Scene, Error> {
-        let mut scene = turtle::blank(&self.model.session.model);
-        turtle::draw(&self.model.session.model, self.string, &mut scene)?;
+        let nursery = Nursery::new(&self.model.session.model, self.settings);
+        let mut scene = nursery.blank();
+        nursery.draw(self.string, &mut scene)?;
         Ok(scene)
     }
 
@@ -213,7 +216,7 @@ pub enum Error {
     },
     /// The plant cannot be drawn.
     #[error(transparent)]
-    Draw(#[from] turtle::Error),
+    Draw(#[from] DrawError),
     /// There is no such format.
     #[error(transparent)]
     Format(#[from] dlsys_render::Error),

@@ -15,10 +15,9 @@ use crate::compile::Setting;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::model::Frames;
 use crate::scene::Scene;
-use crate::session::Session;
+use crate::session::{Nursery, Session};
 use crate::sim::{self, Settings, Simulation, Stats};
 use crate::tree::ModuleString;
-use crate::turtle;
 
 /// Why a command ends without success, which determines the exit status.
 #[derive(Debug)]
@@ -269,12 +268,18 @@ impl ModelRun {
         Failure::Model(error.diagnostic().render(&self.session.source, coloured()))
     }
 
+    /// Draws the strings of a run, with plants of other models.
+    pub fn nursery(&self) -> Nursery<'_> {
+        Nursery::new(&self.session.model, self.settings)
+    }
+
     /// Draws a frame.
     ///
     /// # Errors
     /// An error of the turtle, with its place in the text.
-    pub fn draw(&self, string: &ModuleString, scene: &mut Scene) -> Result<(), Failure> {
-        turtle::draw(&self.session.model, string, scene)
+    pub fn draw(&self, nursery: &Nursery, string: &ModuleString, scene: &mut Scene) -> Result<(), Failure> {
+        nursery
+            .draw(string, scene)
             .map_err(|error| Failure::Model(error.diagnostic().render(&self.session.source, coloured())))
     }
 

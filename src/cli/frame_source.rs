@@ -9,9 +9,9 @@ use super::parallel;
 use crate::diagnostic::Diagnostic;
 use crate::interrupt;
 use crate::scene::Scene;
+use crate::session::Nursery;
 use crate::sim::{Event, Settings, Simulation, Stats};
 use crate::tree::ModuleString;
-use crate::turtle;
 
 /// The string of modules at one observed time.
 pub struct Frame {
@@ -89,7 +89,8 @@ pub fn play<Done: Send>(
     mut take: impl FnMut(Done) -> Result<(), Failure>,
 ) -> Result<Stats, Failure> {
     let mut source = FrameSource::start(run, pass.settings)?;
-    let mut blank = turtle::blank(&run.session.model);
+    let nursery = run.nursery();
+    let mut blank = nursery.blank();
     blank.accuracy = pass.accuracy;
     // Scenes are reused, because they keep their memory; there is at most one for each thread.
     let scenes: Mutex<Vec<Scene>> = Mutex::default();
@@ -105,7 +106,7 @@ pub fn play<Done: Send>(
         let before = Instant::now();
         let pooled = pool().pop();
         let mut scene = pooled.unwrap_or_else(|| blank.clone());
-        let done = draw_frame(run, &mut frame, &mut scene).map(|()| work(&frame, &scene));
+        let done = draw_frame(run, &nursery, &mut frame, &mut scene).map(|()| work(&frame, &scene));
         let warnings = std::mem::take(&mut scene.warnings);
         pool().push(scene);
         (frame.events, warnings, done, before.elapsed())
@@ -126,10 +127,15 @@ pub fn play<Done: Send>(
 }
 
 /// Draws a frame.
-fn draw_frame(run: &ModelRun, frame: &mut Frame, scene: &mut Scene) -> Result<(), Failure> {
+fn draw_frame(
+    run: &ModelRun,
+    nursery: &Nursery,
+    frame: &mut Frame,
+    scene: &mut Scene,
+) -> Result<(), Failure> {
     scene.clear();
     match &mut frame.string {
-        Ok(string) => run.draw(string, scene),
+        Ok(string) => run.draw(nursery, string, scene),
         failed => std::mem::replace(failed, Ok(ModuleString::default())).map(|_| ()),
     }
 }

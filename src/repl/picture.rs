@@ -6,7 +6,7 @@ use super::loaded::{LoadedModel, misused};
 use super::state::{CommandError, SessionState};
 use crate::render::{Fit, Page, Size, Survey, View, pixels};
 use crate::scene::Scene;
-use crate::turtle;
+use crate::session::Nursery;
 
 /// Coverage (of 255) from which a dot is set; stems may be thinner than a dot.
 const COVERED: u8 = 48;
@@ -14,9 +14,10 @@ const COVERED: u8 = 48;
 impl LoadedModel<'_> {
     /// The drawing at present.
     pub fn scene(&mut self, state: &SessionState) -> Result<Scene, CommandError> {
-        let model = &self.session.model;
-        let mut scene = turtle::blank(model);
-        turtle::draw(model, self.string(state)?, &mut scene)
+        let nursery = Nursery::new(&self.session.model, state.settings);
+        let mut scene = nursery.blank();
+        nursery
+            .draw(self.string(state)?, &mut scene)
             .map_err(|error| CommandError::Message(error.diagnostic().render(&self.session.source, false)))?;
         Ok(scene)
     }

@@ -86,7 +86,7 @@ pub fn build(document: &Document, scope: &mut Scope, files: &dyn Files) -> Appea
 }
 
 /// `#rrggbb`, or `#rgb` for short.
-fn color(text: &Text, scope: &mut Scope) -> Option<Rgb> {
+pub fn color(text: &Text, scope: &mut Scope) -> Option<Rgb> {
     let digits = text.text.strip_prefix('#').unwrap_or_default();
     let value = u32::from_str_radix(digits, 16).ok().filter(|_| digits.bytes().all(|b| b != b'+'));
     match (value, digits.len()) {

@@ -12,11 +12,12 @@ use crate::chance::Clocks;
 use crate::clauses::names_of;
 use crate::declared::DeclaredRule;
 use crate::rules::RuleBuilder;
+use crate::scenery::Nesting;
 use crate::scope::{Scope, Variables};
-use crate::{Setting, appearance, check, contexts, dead_rules, globals};
+use crate::{Setting, appearance, check, contexts, dead_rules, globals, scenery};
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{
-    Appearance, DRAWN_WORDS, Frames, Interpretation, KindId, Kinds, Model, Parameter, Successor,
+    Appearance, DRAWN_WORDS, Frames, Interpretation, KindId, Kinds, Model, Parameter, Scenery, Successor,
 };
 use dlsys_syntax::Files;
 use dlsys_syntax::ast::{self, Action, Document, Expression, HeadModule, Item};
@@ -31,10 +32,11 @@ pub fn build(
     settings: &[Setting],
     scope: &mut Scope,
     unread: bool,
-    files: &dyn Files,
+    (files, nesting): (&dyn Files, &Nesting),
 ) -> Option<Model> {
     let parameters = globals::declare(document, settings, scope, files);
     let appearance = appearance::build(document, scope, files);
+    let scenery = scenery::build(document, &appearance, scope, files, nesting);
     let mut kinds = Kinds::default();
     let mut builder = RuleBuilder::new(document, scope, &mut kinds, Clocks::new(document));
     let mut parts = Parts::default();
@@ -53,12 +55,21 @@ pub fn build(
         unused(document, scope);
         let is_used = |name: &str| kinds.iter().any(|(_, kind)| kind.name == name);
         appearance::unused_surfaces(&appearance, is_used, scope);
+        scenery::unused_plants(&scenery, is_used, scope);
     }
     if parts.faulty || unread {
         return None;
     }
     let places = Places { occurs, drawn };
-    Some(parts.model(document, kinds, &clocks, &places, (parameters, appearance), scope))
+    let looks = Looks { parameters, appearance, scenery };
+    Some(parts.model(document, kinds, &clocks, &places, looks, scope))
+}
+
+/// Declarations that were lowered before the rules.
+struct Looks {
+    parameters: Vec<Parameter>,
+    appearance: Appearance,
+    scenery: Scenery,
 }
 
 /// The first place of each kind of module in strings and in drawings.
@@ -180,7 +191,7 @@ impl<'d> Parts<'d> {
         mut kinds: Kinds,
         clocks: &Clocks,
         places: &Places,
-        (parameters, appearance): (Vec<Parameter>, Appearance),
+        looks: Looks,
         scope: &mut Scope,
     ) -> Model {
         let has_axiom = self.singles.seen(INITIAL_STRING);
@@ -202,13 +213,14 @@ impl<'d> Parts<'d> {
             angle: self.angle.unwrap_or(90.0),
             frames: self.frames,
             period: self.period.map_or(1.0, |(period, _)| period),
-            parameters,
+            parameters: looks.parameters,
             kinds,
             axiom: self.axiom,
             axiom_span: self.axiom_span,
             rules,
             interpretations,
-            appearance: Arc::new(appearance),
+            appearance: Arc::new(looks.appearance),
+            scenery: looks.scenery,
             drawn_only,
             curves: scope.graph.curves().to_vec(),
         };
@@ -220,7 +232,9 @@ impl<'d> Parts<'d> {
         check::coverage(&model, diagnostics);
         dead_rules::rules(&model, &self.written, document, diagnostics);
         check::inert_modules(&model, occurs, diagnostics);
-        check::commands(&model, diagnostics, &drawn.iter().chain(occurs).map(|(k, s)| (*k, *s)).collect());
+        let all = drawn.iter().chain(occurs).map(|(k, s)| (*k, *s)).collect();
+        check::ground(&model, &all, diagnostics);
+        check::commands(&model, diagnostics, &all);
         model
     }
 }

@@ -6,8 +6,8 @@ use crate::advice;
 use crate::appearance::surface_hint;
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{
-    BUILT_IN_SURFACES, COMMAND_SURFACES, Class, Condition, ConditionStep, ContextPart, DRAWN_WORDS, KindId,
-    Model, Pattern, Remedy, Rule, Sign, base_of, class_of,
+    BUILT_IN_SURFACES, COMMAND_SURFACES, Class, Condition, ConditionStep, ContextPart, DRAWN_WORDS, GROUND,
+    KindId, Model, Pattern, Remedy, Rule, Sign, base_of, class_of,
 };
 use dlsys_syntax::ast;
 use dlsys_syntax::print;
@@ -290,6 +290,8 @@ pub fn inert_modules(model: &Model, occurs: &HashMap<KindId, Span>, diagnostics:
             Class::Surface
                 if BUILT_IN_SURFACES.contains(&kind.base())
                     || COMMAND_SURFACES.iter().any(|(command, _)| *command == name)
+                    || name == GROUND
+                    || model.scenery.plants.iter().any(|plant| plant.name == name)
                     || model.appearance.surfaces.iter().any(|shape| shape.name == name) => {}
             Class::Surface => diagnostics.push(
                 Diagnostic::warning(format!("there is no surface `{name}`: nothing is drawn for it"))
@@ -325,6 +327,25 @@ pub fn inert_modules(model: &Model, occurs: &HashMap<KindId, Span>, diagnostics:
                     );
                 }
             }
+        }
+    }
+}
+
+/// Reports `@G` in a model without a ground.
+pub fn ground(model: &Model, places: &HashMap<KindId, Span>, diagnostics: &mut Vec<Diagnostic>) {
+    let is_own = |name: &str| model.appearance.surfaces.iter().any(|shape| shape.name == name);
+    let stands =
+        |kind: &dlsys_model::Kind| kind.name == GROUND && kind.interpretation.is_none() && !is_own(GROUND);
+    if model.scenery.ground.is_some() {
+        return;
+    }
+    for (id, _) in model.kinds.iter().filter(|(_, kind)| stands(kind)) {
+        if let Some(span) = places.get(&id) {
+            diagnostics.push(
+                Diagnostic::error("`@G` sets the turtle on the ground, and there is none")
+                    .at(*span, "the model declares no ground")
+                    .help("declare one: `ground 0`"),
+            );
         }
     }
 }

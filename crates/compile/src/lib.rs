@@ -29,6 +29,7 @@ mod globals;
 mod locals;
 mod measure;
 mod rules;
+mod scenery;
 mod scope;
 mod smooth;
 mod strings;
@@ -70,12 +71,22 @@ pub fn load(source: &Source, settings: &[Setting]) -> Loaded {
     load_with(source, settings, &NoFiles)
 }
 
-/// Parses, checks and compiles a model. Included texts, surfaces and tables are read from `files`.
+/// Parses, checks and compiles a model. Included texts, surfaces, tables and plants are read from `files`.
 pub fn load_with(source: &Source, settings: &[Setting], files: &dyn Files) -> Loaded {
+    load_nested(source, settings, files, &scenery::Nesting::default())
+}
+
+/// As [`load_with`], of a model that may be a plant of others.
+fn load_nested(
+    source: &Source,
+    settings: &[Setting],
+    files: &dyn Files,
+    nesting: &scenery::Nesting,
+) -> Loaded {
     let (whole, document, mut diagnostics) = dlsys_syntax::read(source, files);
     let unread = !diagnostics.is_empty();
     let mut scope = Scope::default();
-    let model = build::build(&document, settings, &mut scope, unread, files);
+    let model = build::build(&document, settings, &mut scope, unread, (files, nesting));
     diagnostics.append(&mut scope.diagnostics);
     let failed = diagnostics.iter().any(|d| d.severity == Severity::Error);
     diagnostics.sort_by_key(|d| (d.severity == Severity::Warning, d.labels.first().map(|l| l.0)));

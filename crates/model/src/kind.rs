@@ -96,6 +96,9 @@ pub const DRAWN_WORDS: [&str; 3] = ["F", "f", "g"];
 /// The surfaces that are built in: a leaf, a flower, a petal and a bud.
 pub const BUILT_IN_SURFACES: [&str; 4] = ["@L", "@K", "@P", "@B"];
 
+/// The command that sets the turtle on the ground. A model may declare a surface or a drawing of this name instead.
+pub const GROUND: &str = "@G";
+
 /// The cut symbol: removes itself and the rest of its branch.
 pub const CUT: &str = "%";
 

@@ -39,6 +39,7 @@ mod kind;
 mod measure;
 mod remedy;
 mod rule;
+mod scenery;
 mod solution_form;
 mod stepping;
 mod successor;
@@ -51,11 +52,13 @@ pub use chance::{Clock, Distribution, Draw, NewClock, choose};
 pub use condition::{Condition, ConditionStep};
 pub use dlsys_expr::{Comparison, Fold, Sign, Truth};
 pub use kind::{
-    BUILT_IN_SURFACES, COMMAND_SURFACES, CUT, Class, DRAWN_WORDS, Kind, KindId, Kinds, base_of, class_of,
+    BUILT_IN_SURFACES, COMMAND_SURFACES, CUT, Class, DRAWN_WORDS, GROUND, Kind, KindId, Kinds, base_of,
+    class_of,
 };
 pub use measure::Measure;
 pub use remedy::{Boundary, Remedy};
 pub use rule::{Interpretation, Outcome, Pattern, Produce, Rule, Solve, Switch};
+pub use scenery::{Camera, Plant, Scenery};
 pub use solution_form::{
     AffineSum, DrivenGrowth, GrowthLaw, Jacobian, LinearRates, Numeric, Obstacle, SolutionForm, ZeroCrossing,
 };
@@ -92,6 +95,8 @@ pub struct Model {
     pub interpretations: Vec<Interpretation>,
     /// Colours, surfaces, contours and tropism.
     pub appearance: Arc<Appearance>,
+    /// Plants of other models, light, sky, camera and floor.
+    pub scenery: Scenery,
     /// By kind and parameter: true if no rule reads it, so that only drawings and output do.
     pub drawn_only: Vec<Vec<bool>>,
     /// Curves and tables, in the order of their declarations.
@@ -136,6 +141,7 @@ impl Default for Model {
             rules: Vec::new(),
             interpretations: Vec::new(),
             appearance: Arc::default(),
+            scenery: Scenery::default(),
             drawn_only: Vec::new(),
             curves: Vec::new(),
         }

@@ -14,25 +14,26 @@
 //! when they are compiled.
 //!
 //! ```
-//! use dlsys_geometry::turtle;
 //! use dlsys_player::{Recorder, Stage, page};
 //! use dlsys_render::{Survey, View};
-//! use dlsys_session::Session;
+//! use dlsys_session::{Nursery, Session};
+//! use dlsys_sim::Settings;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let text = "initial string: F(1) [ +(30) F(2) ]";
 //! let session = Session::from_text("stem.dls", text, &[])?;
 //! let mut string = Default::default();
 //! session.simulate(Default::default())?.at(0.0, &mut string)?;
-//! let mut scene = turtle::blank(&session.model);
-//! turtle::draw(&session.model, &string, &mut scene)?;
+//! let nursery = Nursery::new(&session.model, Settings::default());
+//! let mut scene = nursery.blank();
+//! nursery.draw(&string, &mut scene)?;
 //!
 //! let mut survey = Survey::new(View::FRONT);
 //! survey.add(&scene);
 //! let fit = survey.fit();
 //! let mut stage = Stage::default();
 //! stage.set(&scene, fit.default_width);
-//! let mut recorder = Recorder::new(&session.model, text, &fit);
+//! let mut recorder = Recorder::new(&session.model, &scene, text, &fit);
 //! recorder.add(0.0, 2, &stage)?;
 //! assert!(page::document(&recorder.finish()).contains("<html"));
 //! # Ok(())

@@ -7,7 +7,7 @@ use super::forms::Forms;
 use super::history::History;
 use super::stage::{Form, Item, Key, Stage};
 use super::track::Track;
-use dlsys_geometry::scene::{Palette, Point};
+use dlsys_geometry::scene::{Palette, Point, Scene};
 use dlsys_model::{Model, Parameter};
 use dlsys_render::{Fit, Spoke, cross_section};
 
@@ -64,8 +64,8 @@ impl Recorder {
     /// Most numbers that a recording may hold before it is thinned: 300 MB.
     pub const MOST_NUMBERS: usize = 75_000_000;
 
-    /// A recording without frames. `fit` is of all frames that will follow.
-    pub fn new(model: &Model, source: &str, fit: &Fit) -> Recorder {
+    /// A recording without frames. `blank` is a scene with the materials of all frames, `fit` is of all frames that will follow.
+    pub fn new(model: &Model, blank: &Scene, source: &str, fit: &Fit) -> Recorder {
         let bounds = fit.bounds.unwrap_or([Point::new(-0.5, -0.5, -0.5), Point::new(0.5, 0.5, 0.5)]);
         let extent = if fit.extent > 0.0 { fit.extent } else { 1.0 };
         let recording = Recording {
@@ -75,7 +75,7 @@ impl Recorder {
             times: Vec::new(),
             modules: Vec::new(),
             history: History::default(),
-            palette: dlsys_geometry::turtle::blank(model).palette,
+            palette: blank.palette.clone(),
             forms: Forms::default(),
             tracks: Vec::new(),
             bounds,
@@ -83,7 +83,7 @@ impl Recorder {
             extent,
             accuracy: fit.accuracy.max(extent * 1e-9),
             unit: extent / STEPS,
-            contours: model.appearance.contours.iter().map(|contour| contour.points.clone()).collect(),
+            contours: blank.contours.to_vec(),
         };
         Recorder { recording, open: HashMap::new(), numbers: 0 }
     }

@@ -85,6 +85,7 @@ pub struct Stage {
 impl Stage {
     /// Takes the place of what was there before. `default_width` (scene units) is that of lines of default width.
     pub fn set(&mut self, scene: &Scene, default_width: f64) {
+        let scene = &*scene.flattened();
         self.items.clear();
         self.numbers.clear();
         self.counts.clear();

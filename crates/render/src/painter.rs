@@ -40,6 +40,7 @@ pub(super) struct Style<'a> {
 /// The elements of a scene, one a line. Names are those of modules; without them the elements have none, and `prefix`
 /// begins the ids of gradients, which must differ in a document.
 pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -> String {
+    let scene = &*scene.flattened();
     // The look must not change within an animation, so this does not depend on the frame.
     if style.fit.has_visible_regions() {
         return trace::elements(scene, style, named, prefix);

@@ -122,8 +122,8 @@ impl<'s> Tubes<'s> {
             };
             let contour = segments[first].contour;
             let profile = *profiles.entry((contour, sides)).or_insert_with(|| {
-                let points = contour.and_then(|i| scene.prepared_for.as_ref()?.contours.get(i as usize));
-                let spokes = points.map_or_else(|| circle(sides), |contour| curve(&contour.points, sides));
+                let points = contour.and_then(|i| scene.contours.get(i as usize));
+                let spokes = points.map_or_else(|| circle(sides), |points| curve(points, sides));
                 tubes.profiles.push(Profile::new(spokes));
                 tubes.profiles.len() - 1
             });

@@ -20,7 +20,10 @@
 
 #![warn(missing_docs)]
 
+mod nursery;
 pub mod replay;
+
+pub use nursery::{DrawError, Nursery};
 
 use std::cell::RefCell;
 use std::io::Read;

@@ -452,6 +452,30 @@ pub enum Item {
         /// Radians per scene unit; None for 0.
         strength: Option<Expression>,
     },
+    /// `plant @name from "file" with n = 5`: a plant of another model, which the module `@name` draws.
+    Plant {
+        /// The name with its mark.
+        name: Name,
+        /// The path, relative to the folder of the model.
+        file: Text,
+        /// Values for the params of the other model.
+        settings: Vec<(Name, Expression)>,
+    },
+    /// `ground height`: a rigid floor without end.
+    Ground(Expression),
+    /// `light x, y, z`: the direction towards the sun.
+    Light([Expression; 3]),
+    /// `sky "zenith", "horizon"`: colours as `#rrggbb` or `#rgb`.
+    Sky([Text; 2]),
+    /// `camera at x, y, z towards x, y, z angle degrees`
+    Camera {
+        /// The eye.
+        eye: [Expression; 3],
+        /// The point in the middle of the picture.
+        aim: [Expression; 3],
+        /// The angle of view in degrees; None for the default.
+        angle: Option<Expression>,
+    },
     /// `ignore names`: the modules that context matching passes over.
     Ignore(Vec<Name>),
     /// `consider names`: the only modules that context matching does not pass over.
@@ -488,6 +512,11 @@ impl Item {
             Item::Surface { .. } => "surface",
             Item::Contour { .. } => "contour",
             Item::Tropism { .. } => "tropism",
+            Item::Plant { .. } => "plant",
+            Item::Ground(_) => "ground",
+            Item::Light(_) => "light",
+            Item::Sky(_) => "sky",
+            Item::Camera { .. } => "camera",
             Item::Ignore(_) => "ignore",
             Item::Consider(_) => "consider",
             Item::Axiom(_) => "initial",
@@ -508,6 +537,7 @@ impl Item {
             | Item::Color { name, .. }
             | Item::Gradient { name, .. }
             | Item::Surface { name, .. }
+            | Item::Plant { name, .. }
             | Item::Contour { name, .. } => Some(name),
             _ => None,
         }

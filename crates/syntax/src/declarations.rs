@@ -56,14 +56,22 @@ pub enum Category {
     Time,
     /// The appearance of modules.
     Looks,
+    /// The surroundings of a plant.
+    Scene,
     /// Strings of modules.
     Modules,
 }
 
 impl Category {
     /// All categories, in the order in which help lists them.
-    pub const ALL: [Category; 5] =
-        [Category::Text, Category::Values, Category::Time, Category::Looks, Category::Modules];
+    pub const ALL: [Category; 6] = [
+        Category::Text,
+        Category::Values,
+        Category::Time,
+        Category::Looks,
+        Category::Scene,
+        Category::Modules,
+    ];
 
     /// A heading for its declarations.
     pub fn title(self) -> &'static str {
@@ -72,6 +80,7 @@ impl Category {
             Category::Values => "values",
             Category::Time => "time",
             Category::Looks => "looks",
+            Category::Scene => "scene",
             Category::Modules => "modules",
         }
     }
@@ -139,6 +148,8 @@ pub(crate) enum Begins {
     /// Where a word or a text follows, unless a `:` makes the line the head of a rule. For words added after models had begun
     /// to use them as names of modules.
     BeforeName,
+    /// As `BeforeName`, and also where a number, a negative number or the mark of a name follows.
+    BeforeValue,
 }
 
 /// A keyword inside a declaration.
@@ -191,7 +202,7 @@ const fn row(word: &'static str, rule: Rule) -> Declaration {
 }
 
 /// All declarations, in the order in which messages list them.
-pub static DECLARATIONS: [Declaration; 20] = [
+pub static DECLARATIONS: [Declaration; 25] = [
     Declaration {
         usage: "\"…\"",
         summary: "the title of the model, shown above its pictures",
@@ -326,6 +337,50 @@ pub static DECLARATIONS: [Declaration; 20] = [
         options: &[option("strength", Follow::Value)],
         written: "a tropism is written `tropism 0, -1, 0 strength 0.2`",
         ..row("tropism", Rule::tropism_item)
+    },
+    Declaration {
+        usage: "@NAME from \"FILE\" with NAME = VALUE, …",
+        summary: "a plant of another model, drawn by `@NAME(b)` as it is at the age t - b",
+        category: Category::Scene,
+        named: Named::Surface,
+        repeats: Repeats::PerName("surface"),
+        options: &[option("from", Follow::Text), option("with", Follow::Value)],
+        begins: Begins::BeforeValue,
+        written: "a plant of another model is written `plant @Grass from \"barley.dls\"`",
+        ..row("plant", Rule::plant_item)
+    },
+    Declaration {
+        usage: "HEIGHT",
+        summary: "a floor without end, on which shadows fall and `@G` sets the turtle",
+        category: Category::Scene,
+        begins: Begins::BeforeValue,
+        written: "a floor is written `ground 0`",
+        ..row("ground", Rule::ground_item)
+    },
+    Declaration {
+        usage: "X, Y, Z",
+        summary: "the direction towards the sun, which casts shadows; it may depend on t",
+        category: Category::Scene,
+        begins: Begins::BeforeValue,
+        written: "a direction towards the sun is written `light -1, 2, 1`",
+        ..row("light", Rule::light_item)
+    },
+    Declaration {
+        usage: "\"#rrggbb\", \"#rrggbb\"",
+        summary: "the colours of the zenith and of the horizon",
+        category: Category::Scene,
+        begins: Begins::BeforeValue,
+        written: "a sky is written `sky \"#5b8fd0\", \"#e8eef5\"`: zenith, then horizon",
+        ..row("sky", Rule::sky_item)
+    },
+    Declaration {
+        usage: "at X, Y, Z towards X, Y, Z angle DEGREES",
+        summary: "the eye, the point that it looks at, and the angle of view; they may depend on t",
+        category: Category::Scene,
+        options: &[option("towards", Follow::Value), option("angle", Follow::Value)],
+        begins: Begins::BeforeValue,
+        written: "a camera is written `camera at 0, 1, 5 towards 0, 1, 0 angle 40`",
+        ..row("camera", Rule::camera_item)
     },
     Declaration {
         usage: "NAME …",

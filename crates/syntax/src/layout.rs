@@ -322,7 +322,12 @@ impl Scanner<'_> {
         let inside = self.levels.len() > 1;
         let follows = |i: usize| tokens.get(i).map(|t| t.0);
         let plain = !colon && matches!(follows(1), Some(Token::Word | Token::Text));
-        if let Some(declared) = declared.filter(|declared| declared.begins == Begins::Always || plain) {
+        let begins = |declared: &&'static Declaration| match declared.begins {
+            Begins::Always => true,
+            Begins::BeforeName => plain,
+            Begins::BeforeValue => plain || !colon && self.begins_value(tokens),
+        };
+        if let Some(declared) = declared.filter(begins) {
             // A declaration begins an item even inside parentheses that were never closed; an
             // identifier named `angle` does not.
             let next_is_word = matches!(tokens.get(1), Some((Token::Word | Token::Text, ..)));

@@ -56,8 +56,16 @@ pub(crate) fn read(builder: &mut Builder, pair: Pair) -> Built<Item> {
         Rule::surface_item => Item::Surface { name: parts.name(), file: parts.text() },
         Rule::contour_item => Item::Contour { name: parts.name(), points: parts.points()? },
         Rule::tropism_item => {
-            let direction = [parts.expression()?, parts.expression()?, parts.expression()?];
-            Item::Tropism { direction, strength: parts.expression_if_any()? }
+            Item::Tropism { direction: parts.triple()?, strength: parts.expression_if_any()? }
+        }
+        Rule::plant_item => {
+            Item::Plant { name: parts.name(), file: parts.text(), settings: parts.assignments()? }
+        }
+        Rule::ground_item => Item::Ground(parts.expression()?),
+        Rule::light_item => Item::Light(parts.triple()?),
+        Rule::sky_item => Item::Sky([parts.text(), parts.text()]),
+        Rule::camera_item => {
+            Item::Camera { eye: parts.triple()?, aim: parts.triple()?, angle: parts.expression_if_any()? }
         }
         Rule::ignore_item => Item::Ignore(parts.names()),
         Rule::consider_item => Item::Consider(parts.names()),
@@ -111,9 +119,21 @@ pub(crate) fn write(expressions: &Expressions, item: &Item) -> String {
             format!("contour {} = {}", name.text, written_points(expressions, points))
         }
         Item::Tropism { direction, strength } => {
-            let [x, y, z] = direction.each_ref().map(show);
             let strength = strength.as_ref().map(|e| format!(" strength {}", show(e)));
-            format!("tropism {x}, {y}, {z}{}", strength.unwrap_or_default())
+            format!("tropism {}{}", triple(expressions, direction), strength.unwrap_or_default())
+        }
+        Item::Plant { name, file, settings } => {
+            let settings: Vec<String> =
+                settings.iter().map(|(name, value)| format!("{} = {}", name.text, show(value))).collect();
+            let with = if settings.is_empty() { "" } else { " with " };
+            format!("plant {} from \"{}\"{with}{}", name.text, file.text, settings.join(", "))
+        }
+        Item::Ground(height) => format!("ground {}", show(height)),
+        Item::Light(direction) => format!("light {}", triple(expressions, direction)),
+        Item::Sky([zenith, horizon]) => format!("sky \"{}\", \"{}\"", zenith.text, horizon.text),
+        Item::Camera { eye, aim, angle } => {
+            let angle = angle.as_ref().map(|e| format!(" angle {}", show(e))).unwrap_or_default();
+            format!("camera at {} towards {}{angle}", triple(expressions, eye), triple(expressions, aim))
         }
         Item::Ignore(list) => format!("ignore {}", print::names(list, " ")),
         Item::Consider(list) => format!("consider {}", print::names(list, " ")),
@@ -177,6 +197,21 @@ impl<'i> Parts<'_, '_, 'i> {
         self.pair_if(Rule::expr).map(|pair| self.builder.expression(pair)).transpose()
     }
 
+    fn triple(&mut self) -> Built<[Expression; 3]> {
+        Ok([self.expression()?, self.expression()?, self.expression()?])
+    }
+
+    fn assignments(&mut self) -> Built<Vec<(Name, Expression)>> {
+        let mut all = Vec::new();
+        while let Some(pair) = self.pair_if(Rule::assignment) {
+            let mut inner = pair.into_inner().filter(|p| !is_punctuation(p.as_rule()));
+            let mut next = || inner.next().expect("the grammar has a part here");
+            let (name, value) = (next(), next());
+            all.push((self.builder.name(&name), self.builder.expression(value)?));
+        }
+        Ok(all)
+    }
+
     fn points(&mut self) -> Built<Vec<[Expression; 2]>> {
         let mut points = Vec::new();
         while let Some(pair) = self.pair_if(Rule::point) {
@@ -216,6 +251,11 @@ fn sort_word(sort: Sort, default: Sort) -> &'static str {
         Sort::Monotone => "monotone ",
         Sort::Spline => "spline ",
     }
+}
+
+fn triple(expressions: &Expressions, [x, y, z]: &[Expression; 3]) -> String {
+    let show = |x: &Expression| print::expression(expressions, x.root);
+    format!("{}, {}, {}", show(x), show(y), show(z))
 }
 
 fn ending(periodic: bool) -> &'static str {

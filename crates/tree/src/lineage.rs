@@ -65,6 +65,11 @@ impl Lineage {
         (self.trail & 255).checked_sub(1).filter(|place| *place < 254).map(|place| place as usize)
     }
 
+    /// The identity of a module of a plant that stands in another model, at this module of it.
+    pub fn of_plant(self, inner: Lineage) -> Lineage {
+        Lineage { id: mix(self.id, inner.id), ..inner }
+    }
+
     /// A name for files: 13 characters, lower case and digits.
     pub fn name(self) -> String {
         const DIGITS: &[u8; 32] = b"0123456789abcdefghjkmnpqrstvwxyz";

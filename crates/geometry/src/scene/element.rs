@@ -48,7 +48,7 @@ pub struct Segment {
     pub across: Vector,
     /// Widths (diameters) at the start and at the end.
     pub widths: [Width; 2],
-    /// Index of the cross-section among the model's contours; `None` is a circle.
+    /// Index of the cross-section among the [contours of the scene](super::Scene::contours); `None` is a circle.
     pub contour: Option<u32>,
     /// Material of the whole segment.
     pub material: MaterialId,
@@ -101,6 +101,15 @@ impl Placement {
     /// The place of a point of the mesh in the scene.
     pub fn point(&self, p: Point) -> Point {
         self.origin + self.scale * self.direction(p.coords)
+    }
+
+    /// The placement in a scene of a thing that has this placement in a plant, which has the `outer` placement in the scene.
+    pub fn within(&self, outer: &Placement) -> Placement {
+        Placement {
+            origin: outer.point(self.origin),
+            axes: self.axes.map(|axis| outer.direction(axis)),
+            scale: self.scale * outer.scale,
+        }
     }
 
     /// A direction of the mesh in the scene.

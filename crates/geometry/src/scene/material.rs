@@ -93,6 +93,8 @@ pub const GRADIENT_STEPS: usize = 64;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Palette {
     materials: Vec<Material>,
+    /// Where the colours of the model begin: after the built-in ones, and after those of the models around a plant.
+    own: usize,
     /// Colours with a number, those of the model included.
     colors: usize,
     /// Gradients, whose numbers and materials follow those of the colours.
@@ -120,11 +122,15 @@ const DEFAULT: [(&str, u32); 17] = [
     ("colour-12", 0x555555), // grey
 ];
 
+/// Built-in colours with a number.
+const BUILT_IN: usize = DEFAULT.len() - MaterialId::NAMED;
+
 impl Default for Palette {
     fn default() -> Palette {
         let materials =
             DEFAULT.iter().map(|&(name, rgb)| Material { name: name.into(), color: Color::hex(rgb) });
-        Palette { materials: materials.collect(), colors: DEFAULT.len() - MaterialId::NAMED, gradients: 0 }
+        let (own, colors) = (DEFAULT.len(), BUILT_IN);
+        Palette { materials: materials.collect(), own, colors, gradients: 0 }
     }
 }
 
@@ -135,7 +141,18 @@ impl Palette {
         colors: impl IntoIterator<Item = (&'n str, Color)>,
         gradients: impl IntoIterator<Item = (&'n str, Vec<Color>)>,
     ) -> Palette {
-        let mut palette = Palette::default();
+        Palette::default().beside(colors, gradients)
+    }
+
+    /// The palette of a plant that stands in a scene with this palette: the same materials, behind them those of the plant's model,
+    /// whose numbers follow those of the built-in colours.
+    pub fn beside<'n>(
+        &self,
+        colors: impl IntoIterator<Item = (&'n str, Color)>,
+        gradients: impl IntoIterator<Item = (&'n str, Vec<Color>)>,
+    ) -> Palette {
+        let own = self.materials.len();
+        let mut palette = Palette { materials: self.materials.clone(), own, colors: BUILT_IN, gradients: 0 };
         for (name, color) in colors {
             let name = palette.free_name(name);
             palette.materials.push(Material { name: name.into(), color });
@@ -150,6 +167,11 @@ impl Palette {
             palette.gradients += 1;
         }
         palette
+    }
+
+    /// This palette with the materials of another one, which begins with those of this one.
+    pub fn completed(&self, all: &Palette) -> Palette {
+        Palette { materials: all.materials.clone(), ..self.clone() }
     }
 
     /// Adds a material without a number, for example that of a surface.
@@ -199,14 +221,16 @@ impl Palette {
             return None;
         }
         let place = (number - 1.0).rem_euclid((self.colors + self.gradients) as f64) as usize;
-        let offset = if place < self.colors {
-            place
+        let index = if place < BUILT_IN {
+            MaterialId::NAMED + place
+        } else if place < self.colors {
+            self.own + place - BUILT_IN
         } else {
             let value = if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0) };
             let step = (value * (GRADIENT_STEPS - 1) as f64).round() as usize;
-            self.colors + (place - self.colors) * GRADIENT_STEPS + step
+            self.own + self.colors - BUILT_IN + (place - self.colors) * GRADIENT_STEPS + step
         };
-        Some(MaterialId((MaterialId::NAMED + offset) as u32))
+        Some(MaterialId(index as u32))
     }
 
     /// How many colours have a number, and how many gradients have one after them.

@@ -18,6 +18,7 @@
 mod bounds;
 mod degrees;
 mod element;
+mod flat;
 mod material;
 mod mesh;
 mod patch;
@@ -29,7 +30,7 @@ pub use element::{Placement, Polygon, Segment, Surface, Width};
 pub use material::{Color, GRADIENT_STEPS, Material, MaterialId, Palette};
 pub use mesh::{Face, Mesh};
 pub use patch::{Net, Patch, PatchFace, PatchSet};
-pub use surroundings::{Plant, Surroundings, Viewpoint};
+pub use surroundings::{Plant, Seedling, Surroundings, Viewpoint};
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -97,6 +98,10 @@ pub struct Scene {
     pub shapes: Vec<Shape>,
     /// The part of the model from which `shapes` and `palette` were made.
     pub prepared_for: Option<Arc<Appearance>>,
+    /// Cross-sections of stems, those of plants in the scene included; [`Segment::contour`] is an index.
+    pub contours: Arc<[Vec<[f64; 2]>]>,
+    /// Index of the first contour of the model that draws.
+    pub first_contour: u32,
     /// Greatest distance between a curve and the segments drawn for it, in scene units, if that is known when the turtle
     /// draws; 0 if not. Bent segments are drawn in pieces; see [`Fit::accuracy`](dlsys_render::Fit::accuracy).
     pub accuracy: f64,
@@ -109,6 +114,8 @@ pub struct Scene {
     pub surfaces: Vec<Surface>,
     /// Bézier patches drawn by `@PD`, in string order.
     pub patches: Vec<Patch>,
+    /// Plants of other models that are to be drawn, in string order; empty once they are among `plants`.
+    pub seedlings: Vec<Seedling>,
     /// Plants of other models, in string order.
     pub plants: Vec<Plant>,
     /// Light, sky, camera and floor.
@@ -125,6 +132,7 @@ impl Scene {
         self.polygons.clear();
         self.surfaces.clear();
         self.patches.clear();
+        self.seedlings.clear();
         self.plants.clear();
         self.surroundings = Surroundings::default();
         self.warnings.clear();

@@ -28,6 +28,21 @@ pub struct Viewpoint {
     pub angle: f64,
 }
 
+/// A plant of another model that is to be drawn: the turtle does not run models.
+#[derive(Clone, Copy, Debug)]
+pub struct Seedling {
+    /// Its index among the plants that the model declares.
+    pub plant: usize,
+    /// Its age: the time of its own model.
+    pub age: f64,
+    /// Its seed as given, any finite number; `None` for the seed of the scene.
+    pub seed: Option<f64>,
+    /// See [`Plant::placement`].
+    pub placement: Placement,
+    /// The module that draws it.
+    pub owner: OwnerId,
+}
+
 /// A plant of another model, placed in a scene.
 #[derive(Clone, Debug)]
 pub struct Plant {

@@ -50,6 +50,10 @@ pub(super) enum Command {
     Bud,
     /// A surface of the model, by its index among the scene's shapes.
     Surface(usize),
+    /// A plant of another model, by its index among those that the model declares.
+    Plant(usize),
+    /// `@G`: the turtle is set on the ground.
+    Ground,
     /// `@PS(n)`
     BeginPatch,
     /// `@PC(n, row, column)`
@@ -73,6 +77,9 @@ impl Command {
     pub(super) fn plain(kind: &Kind, model: &Model) -> Command {
         if let Some(surface) = model.appearance.surfaces.iter().position(|shape| shape.name == kind.name) {
             return Command::Surface(surface);
+        }
+        if let Some(plant) = model.scenery.plants.iter().position(|plant| plant.name == kind.name) {
+            return Command::Plant(plant);
         }
         match kind.base() {
             "F" => Command::Draw,
@@ -100,6 +107,7 @@ impl Command {
             "@W" => Command::Taper,
             "@T" => Command::Bend,
             "@C" => Command::Contour,
+            "@G" => Command::Ground,
             "@PS" => Command::BeginPatch,
             "@PC" => Command::ControlPoint,
             "@PD" => Command::DrawPatch,
@@ -116,7 +124,7 @@ impl Command {
     pub(super) fn parameters(self) -> usize {
         match self {
             Command::ControlPoint => 3,
-            Command::Color => 2,
+            Command::Color | Command::Plant(_) => 2,
             Command::Draw
             | Command::Move
             | Command::Hop

@@ -52,6 +52,12 @@ pub enum ErrorKind {
         /// The points that are missing: `(0, 1), (3, 3)`.
         missing: String,
     },
+    /// A declaration of light or camera has no meaning at this time.
+    #[error("{why}")]
+    BadSurroundings {
+        /// The reason, as a sentence.
+        why: String,
+    },
     /// The bounds of a repetition in its drawing are none.
     #[error("a repetition in its drawing cannot be made: {why}")]
     BadBounds {
@@ -80,6 +86,9 @@ impl ErrorKind {
             ErrorKind::NoControlPoint { .. } => "write `@PC(n, row, column)`, row and column from 0 to 3".to_owned(),
             ErrorKind::PatchIncomplete { patch, .. } => {
                 format!("set all 16 points with `@PC({patch}, row, column)` before `@PD({patch})`")
+            }
+            ErrorKind::BadSurroundings { .. } => {
+                "look at the values of its expressions at this time: they may read `t`".to_owned()
             }
             ErrorKind::BadBounds { .. } => {
                 "bounds are whole numbers, at most a million apart: round them with `floor(…)` or `ceil(…)`".to_owned()
@@ -117,7 +126,11 @@ impl Error {
             Some(span) => error.at(span, "drawn by this"),
             None => error,
         };
-        error.note(format!("it is drawn for module {}", self.lineage)).help(self.kind.help())
+        let error = match self.kind {
+            ErrorKind::BadSurroundings { .. } => error,
+            _ => error.note(format!("it is drawn for module {}", self.lineage)),
+        };
+        error.help(self.kind.help())
     }
 }
 

@@ -5,6 +5,7 @@
 
 use super::command::Command;
 use super::prepare::prepare;
+use super::surroundings::surroundings;
 use super::walk::{DrawnModule, Walk};
 use super::{DEPTH_LIMIT, Error, ErrorKind, MODULE_LIMIT, Pose};
 use crate::scene::Scene;
@@ -42,6 +43,7 @@ struct Level {
 pub(super) fn trace(model: &Model, string: &ModuleString, scene: &mut Scene) -> Result<Pose, Error> {
     let commands = Command::table(model);
     prepare(model, scene);
+    scene.surroundings = surroundings(model, string.time)?;
     let mut walk = Walk::new(model, scene, string.time);
     let mut expander = Expander::new(model, &commands, string);
     for module in string.iter() {

@@ -22,6 +22,8 @@
 //! | `[` `]` | remember and return to position, orientation, width, colour, cross-section and strength of tropism |
 //! | `{` `.` `}` | begin a filled polygon, make the position a vertex, end it; steps between them make vertices, too, and are not drawn |
 //! | `@L(s)` `@K(s)` `@P(s)` `@B(s)` | a leaf, a flower, a petal, a bud of size `s` (1), or any surface that the model declares; nothing if `s` is not positive |
+//! | `@NAME(b, s)` | a plant of another model, declared by `plant @NAME from …`, as it is at its time t - b; `s` is its seed |
+//! | `@G` | the turtle is set down on the ground; `x`, `z` and its directions stay |
 //! | `@PS(n)` `@PC(n, r, c)` `@PD(n)` | begin Bézier patch `n`; make the position its control point in row `r` and column `c` (0 to 3); draw it, when all 16 are there. Brackets do not matter to them |
 //!
 //! A kind with an interpretation is drawn as that says, in place of its own meaning; what the interpretation
@@ -53,6 +55,7 @@ mod interpret;
 mod patch;
 mod prepare;
 mod shapes;
+mod surroundings;
 mod twofold;
 mod walk;
 
@@ -90,6 +93,12 @@ pub fn blank(model: &Model) -> Scene {
     let mut scene = Scene::default();
     prepare::prepare(model, &mut scene);
     scene
+}
+
+/// Empty scenes of a model and of its plants: the model's own first, then for each plant in the order of the declarations its own and those
+/// of the plants in it. They share their palette and their contours.
+pub fn blanks(model: &Model) -> Vec<Scene> {
+    prepare::prepare_all(model)
 }
 
 /// Draws a string of modules of this model, adding to the scene. Elements that are drawn but hardly meant add to its

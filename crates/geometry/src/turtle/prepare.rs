@@ -12,15 +12,49 @@ pub(super) fn prepare(model: &Model, scene: &mut Scene) {
     if scene.prepared_for.as_ref().is_some_and(|known| Arc::ptr_eq(known, appearance)) {
         return;
     }
-    let mut palette = palette(appearance);
+    dress(appearance, &Palette::default(), &[], scene);
+}
+
+/// Scenes without elements for a model and, in the order of their declarations, for its plants, the plants of these behind each.
+/// They share materials and contours: what a plant draws can stand in the scene of the model as it is.
+pub(super) fn prepare_all(model: &Model) -> Vec<Scene> {
+    let mut scenes: Vec<Scene> = Vec::new();
+    prepare_below(model, &mut scenes);
+    if let Some(last) = scenes.last().cloned() {
+        for scene in &mut scenes {
+            scene.palette = scene.palette.completed(&last.palette);
+            scene.contours = last.contours.clone();
+        }
+    }
+    scenes
+}
+
+/// Recursion is bounded by the depth of plants in plants.
+fn prepare_below(model: &Model, scenes: &mut Vec<Scene>) {
+    let mut scene = Scene::default();
+    let (palette, contours) =
+        scenes.last().map_or_else(Default::default, |last| (last.palette.clone(), last.contours.clone()));
+    dress(&model.appearance, &palette, &contours, &mut scene);
+    scenes.push(scene);
+    for plant in &model.scenery.plants {
+        prepare_below(&plant.model, scenes);
+    }
+}
+
+/// Gives a scene a model's colours, surfaces and contours, behind those that are known already.
+fn dress(appearance: &Arc<Appearance>, known: &Palette, contours: &[Vec<[f64; 2]>], scene: &mut Scene) {
+    let mut palette = palette(appearance, known);
     scene.shapes = appearance.surfaces.iter().map(|surface| shape(surface, &mut palette)).collect();
     scene.palette = palette;
+    scene.first_contour = contours.len() as u32;
+    let own = appearance.contours.iter().map(|contour| &contour.points);
+    scene.contours = contours.iter().chain(own).cloned().collect();
     scene.prepared_for = Some(appearance.clone());
 }
 
-fn palette(appearance: &Appearance) -> Palette {
+fn palette(appearance: &Appearance, known: &Palette) -> Palette {
     let color = |rgb: &Rgb| Color::hex(*rgb);
-    Palette::with(
+    known.beside(
         appearance.colors.iter().map(|c| (&*c.name, color(&c.rgb))),
         appearance.gradients.iter().map(|g| (&*g.name, g.stops.iter().map(color).collect())),
     )

@@ -9,8 +9,8 @@ use super::frame::{Axis, Frame};
 use super::patch::OpenPatches;
 use super::{COORDINATE_LIMIT, Pose, SMALLEST_LENGTH, shapes};
 use crate::scene::{
-    MaterialId, Owner, OwnerId, Patch, Placement, Point, Polygon, Scene, Segment, Shape, Surface, Vector,
-    Width,
+    MaterialId, Owner, OwnerId, Patch, Placement, Point, Polygon, Scene, Seedling, Segment, Shape, Surface,
+    Vector, Width,
 };
 use dlsys_diagnostic::Span;
 use dlsys_model::{KindId, Model};
@@ -207,6 +207,8 @@ impl<'a> Walk<'a> {
                     self.place(&shape, given)?;
                 }
             }
+            Command::Plant(plant) => self.plant(plant, read),
+            Command::Ground => self.set_down(),
             Command::BeginPatch | Command::ControlPoint | Command::DrawPatch => self.patch(command, read)?,
         }
         Ok(())
@@ -241,7 +243,8 @@ impl<'a> Walk<'a> {
         if number != 0.0 && !(1.0..=count as f64).contains(&number) {
             self.remark(Remark::NoContour(number, count));
         }
-        self.state.contour = (1.0..=count as f64).contains(&number).then(|| number as u32 - 1);
+        let first = self.scene.first_contour;
+        self.state.contour = (1.0..=count as f64).contains(&number).then(|| first + number as u32 - 1);
     }
 
     /// Begins a patch, sets a point of it, or draws it.
@@ -429,6 +432,28 @@ impl<'a> Walk<'a> {
             self.scene.surfaces.push(Surface { mesh, patches, placement, tint, owner });
         }
         Ok(())
+    }
+
+    /// Puts a plant of another model, born at the time given first, at the turtle's position. Its axes follow the turtle's.
+    fn plant(&mut self, plant: usize, parameters: &[f64]) {
+        let age = self.time - parameters.first().copied().unwrap_or(0.0);
+        if age < 0.0 {
+            return;
+        }
+        let [heading, left, up] = self.state.frame.vectors();
+        let placement = Placement { origin: self.state.position, axes: [-left, heading, up], scale: 1.0 };
+        let (seed, owner) = (parameters.get(1).copied(), self.owner());
+        self.scene.seedlings.push(Seedling { plant, age, seed, placement, owner });
+    }
+
+    /// Moves to the ground below or above, without a vertex of a polygon.
+    fn set_down(&mut self) {
+        if let Some(height) = self.model.scenery.ground
+            && height != self.state.position.y
+        {
+            (self.state.position.y, self.state.remainder.y) = (height, 0.0);
+            self.state.last = None;
+        }
     }
 
     /// The material of the chosen colour; `None` if things keep their own.

@@ -6,9 +6,8 @@ use std::time::{Duration, Instant};
 use super::look::Space;
 use crate::History;
 use dlsys_geometry::scene::Scene;
-use dlsys_geometry::turtle;
 use dlsys_render::{Survey, View};
-use dlsys_session::Session;
+use dlsys_session::{Nursery, Session};
 use dlsys_sim::{Passed, Settings, Simulation};
 use dlsys_tree::ModuleString;
 
@@ -38,6 +37,7 @@ pub struct Living<'s> {
     simulation: Option<Simulation<'s>>,
     times: Vec<f64>,
     survey: Survey,
+    nursery: Nursery<'s>,
     scene: Scene,
     string: ModuleString,
     life: Life,
@@ -47,6 +47,7 @@ pub struct Living<'s> {
 
 impl<'s> Living<'s> {
     pub fn new(session: &'s Session, settings: Settings, [from, to]: [f64; 2], step: f64) -> Living<'s> {
+        let nursery = Nursery::new(&session.model, settings);
         let frames = if step > 0.0 { ((to - from) / step).round() as usize } else { 0 };
         let pieces = frames.clamp(1, MOST_COUNTED);
         let times = (0..=pieces).map(|i| from + (to - from) * i as f64 / pieces as f64).collect();
@@ -55,7 +56,8 @@ impl<'s> Living<'s> {
             simulation: session.simulate(Settings { log: true, ..settings }).ok(),
             times,
             survey: Survey::new(View::FRONT),
-            scene: turtle::blank(&session.model),
+            scene: nursery.blank(),
+            nursery,
             string: ModuleString::default(),
             life: Life::default(),
             begun: Instant::now(),
@@ -108,7 +110,7 @@ impl<'s> Living<'s> {
         let each = self.times.len().div_ceil(MOST_MEASURED);
         if number.is_multiple_of(each) || number + 1 == self.times.len() {
             self.scene.clear();
-            turtle::draw(&session.model, &self.string, &mut self.scene).ok()?;
+            self.nursery.draw(&self.string, &mut self.scene).ok()?;
             self.survey.add(&self.scene);
         }
         let modules = self.string.iter().filter(|m| !m.kind.is_bracket()).count() as u64;

@@ -15,11 +15,10 @@ use super::life::{Life, Living};
 use super::look::{Space, Viewpoint};
 use dlsys_compile::Setting;
 use dlsys_geometry::scene::Scene;
-use dlsys_geometry::turtle;
 use dlsys_model::{Frames, Parameter};
 use dlsys_render::{self as export, Smoothness};
-use dlsys_session::Session;
 use dlsys_session::replay::{Replay, Stop};
+use dlsys_session::{Nursery, Session};
 
 /// Time between two looks at the files.
 const WATCH: Duration = Duration::from_millis(150);
@@ -234,7 +233,8 @@ impl<Tell: Fn(News)> Service<'_, Tell> {
         replay.stop_when(self.desk.hurry.clone());
         (self.tell)(News::Read(Box::new(Facts { title, parameters: model.parameters.clone(), range, step })));
         let mut living = Living::new(session, self.options.settings, range, step);
-        let mut scene = turtle::blank(model);
+        let nursery = Nursery::new(model, self.options.settings);
+        let mut scene = nursery.blank();
         let mut done = self.order.shot.is_none();
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         let mut watched = Instant::now();
@@ -266,7 +266,7 @@ impl<Tell: Fn(News)> Service<'_, Tell> {
                 }
             }
             if !done {
-                done = self.shoot(&mut replay, &mut scene, threads);
+                done = self.shoot(&mut replay, &nursery, &mut scene, threads);
             } else if living.advance(&self.desk.hurry) {
                 (self.tell)(News::Life(Box::new(living.life())));
             }
@@ -300,7 +300,7 @@ impl<Tell: Fn(News)> Service<'_, Tell> {
     }
 
     /// Makes the picture that is wanted. False if it was interrupted.
-    fn shoot(&self, replay: &mut Replay, scene: &mut Scene, threads: usize) -> bool {
+    fn shoot(&self, replay: &mut Replay, nursery: &Nursery, scene: &mut Scene, threads: usize) -> bool {
         let Some(shot) = &self.order.shot else { return true };
         match replay.seek(shot.time) {
             Ok(Stop::Interrupted) => return false,
@@ -315,7 +315,7 @@ impl<Tell: Fn(News)> Service<'_, Tell> {
         scene.clear();
         scene.accuracy = fit.accuracy;
         let drawn = match replay.string() {
-            Ok(string) => turtle::draw(&self.session.model, string, scene).map_err(|error| error.to_string()),
+            Ok(string) => nursery.draw(string, scene).map_err(|error| error.to_string()),
             Err(error) => Err(error.to_string()),
         };
         if let Err(error) = drawn {

@@ -42,6 +42,7 @@ impl Exporter for Obj {
         Drawing { scene, writer, title }: Drawing<'_>,
         out: &mut (dyn Write + Send),
     ) -> io::Result<()> {
+        let scene = &*scene.flattened();
         let solid = Solid::new(scene, &writer.fit, writer.sides);
         if solid.counts.contains(&u32::MAX) {
             return Err(io::Error::other("a mesh has at most 4e9 points: choose a coarser accuracy"));

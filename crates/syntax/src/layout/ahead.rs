@@ -26,6 +26,25 @@ impl Scanner<'_> {
         false
     }
 
+    /// True if the second token of a line begins the value of a declaration, or the name of one: a number, `-` and what no
+    /// string of modules has behind it, or `@NAME from`.
+    pub(super) fn begins_value(&self, tokens: &[(Token, usize, usize)]) -> bool {
+        let text = |i: usize| tokens.get(i).map_or("", |t| &self.text[t.1..t.2]);
+        match tokens.get(1).map(|t| t.0) {
+            Some(Token::Number) => true,
+            Some(Token::Symbol) if text(1) == "@" => text(3) == "from",
+            Some(Token::Symbol) if text(1) == "-" => {
+                let mut depth = 0i64;
+                let mut commas = tokens.iter().filter(|token| {
+                    depth += i64::from(token.0 == Token::Open) - i64::from(token.0 == Token::Close);
+                    depth == 0 && token.0 == Token::Comma
+                });
+                tokens.get(2).is_some_and(|t| t.0 == Token::Number) || commas.next().is_some()
+            }
+            _ => false,
+        }
+    }
+
     /// True if the token begins a repetition or a condition in a string.
     pub(super) fn begins_group(&self, tokens: &[(Token, usize, usize)], at: usize) -> bool {
         match self.word(tokens[at]) {

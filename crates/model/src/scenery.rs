@@ -1,0 +1,65 @@
+//! The surroundings of a plant: plants of other models, light, sky, camera, floor.
+
+use std::sync::Arc;
+
+use crate::{Model, Rgb};
+use dlsys_diagnostic::{Source, Span};
+use dlsys_expr::Program;
+
+/// The declarations `plant`, `light`, `sky`, `camera` and `ground` of a model.
+#[derive(Clone, Debug, Default)]
+pub struct Scenery {
+    /// In the order written.
+    pub plants: Vec<Arc<Plant>>,
+    /// The direction towards the sun, as three outputs; it reads `t`.
+    pub light: Option<(Program, Span)>,
+    /// The colours of the zenith and of the horizon.
+    pub sky: Option<[Rgb; 2]>,
+    /// The camera.
+    pub camera: Option<Camera>,
+    /// The height of a rigid floor without end, in scene units.
+    pub ground: Option<f64>,
+}
+
+/// `camera at X, Y, Z towards X, Y, Z angle A`
+#[derive(Clone, Debug)]
+pub struct Camera {
+    /// The eye and the point that it looks at, three outputs each, then the angle of view in degrees; it reads `t`.
+    pub program: Program,
+    /// The place of the declaration in the text.
+    pub span: Span,
+}
+
+impl Camera {
+    /// The angle of view if the text gives none, in degrees.
+    pub const ANGLE: f64 = 40.0;
+    /// The least and the greatest angle of view, in degrees.
+    pub const ANGLES: [f64; 2] = [1.0, 120.0];
+}
+
+/// `plant @NAME from "FILE" with …`: another model, drawn by the module `@NAME(b, seed)` as it is at its own time t - b.
+#[derive(Clone, Debug)]
+pub struct Plant {
+    /// The name with its mark: `@Grass`.
+    pub name: String,
+    /// The other model, with the params set.
+    pub model: Model,
+    /// Its text, to which its errors refer.
+    pub source: Source,
+    /// The place of the declaration in the text of this model.
+    pub span: Span,
+    /// True if it draws random numbers, so that plants with other seeds differ.
+    pub is_random: bool,
+}
+
+impl Model {
+    /// True if a run of this model depends on the seed.
+    pub fn is_random(&self) -> bool {
+        !self.axiom.is_certain()
+            || self
+                .rules
+                .iter()
+                .any(|rule| rule.hidden > 0 || rule.produces.iter().any(|p| p.outcome.is_random()))
+            || self.scenery.plants.iter().any(|plant| plant.is_random)
+    }
+}

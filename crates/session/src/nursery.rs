@@ -1,0 +1,256 @@
+//! Plants of other models in a scene: the declaration `plant @NAME from "FILE"`.
+//!
+//! The turtle leaves a [`Seedling`] for each plant; a [`Nursery`] runs the models and puts in their place what they draw at their
+//! ages. Plants of one model and one seed are one simulation, looked at at all their ages; without random numbers the seed does not
+//! matter, so a thousand plants of such a model are one simulation.
+//!
+//! Results do not depend on what was drawn before: a simulation that is kept for the next scene goes on to the same bits as one that
+//! begins anew.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use dlsys_diagnostic::Diagnostic;
+use dlsys_geometry::scene::{Bounds, Plant, Scene, Seedling, Width};
+use dlsys_geometry::turtle;
+use dlsys_model::{self as model, Model};
+use dlsys_sim::{self as sim, Settings, Simulation, brief};
+use dlsys_tree::ModuleString;
+
+/// Most simulations that are kept from one scene to the next.
+const MOST_KEPT: usize = 256;
+/// Most elements (segments, polygons, surfaces, patches) that the plants of one scene hold, those that look the same counted once.
+const MOST_ELEMENTS: usize = 50_000_000;
+/// Most plants in one scene, plants in plants included.
+const MOST_PLANTS: usize = 10_000_000;
+
+/// Why a string cannot be drawn.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DrawError {
+    /// A module of the string cannot be drawn.
+    #[error(transparent)]
+    Turtle(#[from] turtle::Error),
+    /// A plant of another model cannot be drawn.
+    #[error("{}", .0.message)]
+    Plant(Box<Diagnostic>),
+}
+
+impl DrawError {
+    /// The error as a message that quotes the model.
+    pub fn diagnostic(&self) -> Diagnostic {
+        match self {
+            DrawError::Turtle(error) => error.diagnostic(),
+            DrawError::Plant(diagnostic) => (**diagnostic).clone(),
+        }
+    }
+}
+
+/// A simulation that is kept, and the time that it has reached.
+struct Kept<'m> {
+    simulation: Simulation<'m>,
+    time: f64,
+}
+
+/// Simulations by plant and seed.
+type Growing<'m> = HashMap<(usize, u64), Kept<'m>>;
+
+/// Draws strings of a model with the plants of other models that they contain.
+pub struct Nursery<'m> {
+    model: &'m Model,
+    settings: Settings,
+    /// An empty scene of the model, with materials that suit the scene that it stands in.
+    blank: Scene,
+    /// The nurseries of the plants' models, for plants in plants.
+    below: Vec<Nursery<'m>>,
+    /// One set of simulations for each thread that draws.
+    pool: Mutex<Vec<Growing<'m>>>,
+}
+
+impl<'m> Nursery<'m> {
+    /// For a model and its runs with these settings.
+    pub fn new(model: &'m Model, settings: Settings) -> Nursery<'m> {
+        let settings = Settings { log: false, ..settings };
+        Nursery::with_blanks(model, settings, &mut turtle::blanks(model).into_iter())
+    }
+
+    /// The blank scenes are those of the model, of its plants, and of theirs, in the order of [`turtle::blanks`].
+    fn with_blanks(
+        model: &'m Model,
+        settings: Settings,
+        blanks: &mut dyn Iterator<Item = Scene>,
+    ) -> Nursery<'m> {
+        let blank = blanks.next().unwrap_or_default();
+        let plants = model.scenery.plants.iter();
+        let below = plants.map(|plant| Nursery::with_blanks(&plant.model, settings, blanks)).collect();
+        Nursery { model, settings, blank, below, pool: Mutex::default() }
+    }
+
+    /// An empty scene with the materials of the model and of its plants, to be drawn into.
+    pub fn blank(&self) -> Scene {
+        self.blank.clone()
+    }
+
+    /// Draws a string of the model, adding to the scene, with the plants of other models. May be called from several threads.
+    ///
+    /// # Errors
+    /// A module that cannot be drawn, or a plant whose run or drawing fails.
+    pub fn draw(&self, string: &ModuleString, scene: &mut Scene) -> Result<(), DrawError> {
+        self.draw_with(self.settings.seed, string, scene)
+    }
+
+    fn draw_with(&self, seed: u64, string: &ModuleString, scene: &mut Scene) -> Result<(), DrawError> {
+        self.dress(scene);
+        turtle::draw(self.model, string, scene)?;
+        if scene.seedlings.is_empty() {
+            return Ok(());
+        }
+        let pool = || self.pool.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut growing = pool().pop().unwrap_or_default();
+        let grown = self.grow(seed, scene, &mut growing);
+        pool().push(growing);
+        grown
+    }
+
+    /// Gives a scene the materials of the plants, if it has those of the model only.
+    fn dress(&self, scene: &mut Scene) {
+        if scene.palette.materials().len() < self.blank.palette.materials().len()
+            || scene.contours.len() < self.blank.contours.len()
+            || scene.prepared_for.is_none()
+        {
+            let Scene { palette, shapes, prepared_for, contours, first_contour, .. } = self.blank.clone();
+            (scene.palette, scene.shapes, scene.prepared_for) = (palette, shapes, prepared_for);
+            (scene.contours, scene.first_contour) = (contours, first_contour);
+        }
+    }
+
+    /// Puts plants in the place of seedlings.
+    fn grow(&self, seed: u64, scene: &mut Scene, growing: &mut Growing<'m>) -> Result<(), DrawError> {
+        let seedlings = std::mem::take(&mut scene.seedlings);
+        let plants = &self.model.scenery.plants;
+        if scene.plants.len() + seedlings.len() > MOST_PLANTS {
+            return Err(too_many(&plants[seedlings[0].plant], format!("more than {MOST_PLANTS} plants")));
+        }
+        let key = |seedling: &Seedling| {
+            let own = seedling.seed.map_or(seed, number_of);
+            (seedling.plant, if plants[seedling.plant].is_random { own } else { 0 })
+        };
+        let mut order: Vec<usize> = (0..seedlings.len()).collect();
+        order.sort_by(|a, b| {
+            let (a, b) = (&seedlings[*a], &seedlings[*b]);
+            key(a).cmp(&key(b)).then(a.age.total_cmp(&b.age))
+        });
+        let mut drawn: Vec<Option<Arc<Scene>>> = vec![None; seedlings.len()];
+        let mut elements = 0;
+        for group in order.chunk_by(|a, b| key(&seedlings[*a]) == key(&seedlings[*b])) {
+            let first = &seedlings[group[0]];
+            let (key, plant) = (key(first), &plants[first.plant]);
+            let mut kept = match growing.remove(&key).filter(|kept| kept.time <= first.age) {
+                Some(kept) => kept,
+                None => Kept { simulation: self.start(plant, key.1)?, time: 0.0 },
+            };
+            for twins in group.chunk_by(|a, b| seedlings[*a].age == seedlings[*b].age) {
+                let age = seedlings[twins[0]].age;
+                let grown = self.look(first.plant, (key.1, age), &mut kept, scene)?;
+                elements += count(&grown);
+                if elements > MOST_ELEMENTS {
+                    let what = format!("the plants of this scene have more than {MOST_ELEMENTS} pieces");
+                    return Err(too_many(plant, what));
+                }
+                let grown = Arc::new(grown);
+                twins.iter().for_each(|i| drawn[*i] = Some(grown.clone()));
+            }
+            if growing.len() < MOST_KEPT {
+                growing.insert(key, kept);
+            }
+        }
+        for (Seedling { placement, owner, .. }, grown) in seedlings.into_iter().zip(drawn) {
+            let grown = grown.filter(|grown| !grown.is_empty());
+            scene.plants.extend(grown.map(|scene| Plant { scene, placement, owner }));
+        }
+        Ok(())
+    }
+
+    fn start(&self, plant: &'m model::Plant, seed: u64) -> Result<Simulation<'m>, DrawError> {
+        let settings = Settings { seed, ..self.settings };
+        Simulation::new(&plant.model, settings).map_err(|error| fault(plant, 0.0, &error))
+    }
+
+    /// What a plant draws at an age.
+    fn look(
+        &self,
+        number: usize,
+        (seed, age): (u64, f64),
+        kept: &mut Kept<'m>,
+        around: &mut Scene,
+    ) -> Result<Scene, DrawError> {
+        let plant = &self.model.scenery.plants[number];
+        let mut string = ModuleString::default();
+        kept.simulation.at(age, &mut string).map_err(|error| fault(plant, age, &error))?;
+        kept.time = age;
+        let mut scene = self.below[number].blank();
+        scene.accuracy = around.accuracy;
+        if let Err(error) = self.below[number].draw_with(seed, &string, &mut scene) {
+            let inner = error.diagnostic();
+            let message = format!("the plant `{}` cannot be drawn at its age {}", plant.name, brief(age, 6));
+            let error = Diagnostic::error(message).at(plant.span, "this plant").note(inner.message);
+            return Err(DrawError::Plant(Box::new(error)));
+        }
+        if let Some(warning) = scene.warnings.first()
+            && !around.warnings.iter().any(|known| known.labels.first().is_some_and(|l| l.0 == plant.span))
+        {
+            let message = format!("in the plant `{}`: {}", plant.name, warning.message);
+            around.warnings.push(Diagnostic::warning(message).at(plant.span, "this plant"));
+        }
+        scene.warnings.clear();
+        // The surroundings are those of the outermost scene.
+        scene.surroundings = Default::default();
+        set_widths(&mut scene);
+        Ok(scene)
+    }
+}
+
+/// Gives lines of default width the width that suits the plant at its age, so that it does not depend on the scene around it.
+fn set_widths(scene: &mut Scene) {
+    let default = Bounds::of(scene).default_width();
+    for width in scene.segments.iter_mut().flat_map(|segment| &mut segment.widths) {
+        *width = Width::Set(width.resolve(default));
+    }
+}
+
+fn count(scene: &Scene) -> usize {
+    scene.segments.len()
+        + scene.polygons.len()
+        + scene.surfaces.len()
+        + scene.patches.len()
+        + scene.plants.len()
+        + 1
+}
+
+/// A seed as it is given in a string: whole numbers as `--seed` takes them; others by their digits.
+fn number_of(seed: f64) -> u64 {
+    match seed >= 0.0 && seed < 9e15 && seed.fract() == 0.0 {
+        true => seed as u64,
+        false => seed.to_bits(),
+    }
+}
+
+fn fault(plant: &model::Plant, age: f64, error: &sim::Error) -> DrawError {
+    let inner = error.diagnostic();
+    let line = inner.labels.first().map(|(span, _)| {
+        let at = (span.start as usize).min(plant.source.text.len());
+        plant.source.text.as_bytes()[..at].iter().filter(|byte| **byte == b'\n').count() + 1
+    });
+    let place = line.map_or(String::new(), |line| format!("{}:{line}: ", plant.source.name));
+    let message = format!("the plant `{}` cannot grow to the age {}", plant.name, brief(age, 6));
+    let error = Diagnostic::error(message)
+        .at(plant.span, "this plant")
+        .note(format!("{place}{}", inner.message))
+        .help(format!("`dlsys run {} --at {}` shows the whole message", plant.source.name, brief(age, 6)));
+    DrawError::Plant(Box::new(error))
+}
+
+fn too_many(plant: &model::Plant, what: String) -> DrawError {
+    let error = Diagnostic::error("too much is drawn in one scene").at(plant.span, what);
+    DrawError::Plant(Box::new(error.help("draw fewer plants, or plants of fewer modules")))
+}
