@@ -190,7 +190,13 @@ impl Builder<'_> {
                 let plant = Plant { name: name.text.to_string(), model, source, span, is_random };
                 self.scenery.plants.push(Arc::new(plant));
             }
-            Err(error) => self.scope.diagnostics.push(*error),
+            Err(error) => {
+                self.scope.diagnostics.push(*error);
+                // The name counts as declared in spite of the error.
+                let (model, source) = (dlsys_model::Model::default(), Source::new("", ""));
+                let plant = Plant { name: name.text.to_string(), model, source, span, is_random: false };
+                self.scenery.plants.push(Arc::new(plant));
+            }
         }
     }
 

@@ -81,7 +81,9 @@ impl RuleBuilder<'_> {
             let modules: Vec<&ast::Module> = modules_of(parts).collect();
             let mut open = Vec::new();
             let stretch = self.stretch(&modules, variables, count, (draws, &mut open));
-            return stretch.filter(|_| self.closed(open)).map(Successor::Plain);
+            return stretch
+                .filter(|_| self.closed(open, "brackets must match within each string"))
+                .map(Successor::Plain);
         }
         self.parts(parts, variables, count, draws).map(Successor::Parts)
     }
@@ -108,7 +110,8 @@ impl RuleBuilder<'_> {
             });
         }
         let lowered: Option<Vec<Part>> = lowered.into_iter().collect();
-        lowered.filter(|_| self.closed(open))
+        let help = "brackets must match within each string, and within each repetition and condition";
+        lowered.filter(|_| self.closed(open, help))
     }
 
     fn repetition(
@@ -179,12 +182,12 @@ impl RuleBuilder<'_> {
     }
 
     /// Reports a bracket that is still open at the end of a string or a group; false if there is one.
-    fn closed(&mut self, mut open: Vec<Span>) -> bool {
+    fn closed(&mut self, mut open: Vec<Span>, help: &str) -> bool {
         let Some(bracket) = open.pop() else { return true };
         self.error(
             Diagnostic::error("this `[` is never closed")
                 .at(bracket, "expected a `]` for it in this string")
-                .help("brackets must match within each string, and within each repetition and condition"),
+                .help(help),
         );
         false
     }

@@ -138,7 +138,7 @@ pub enum Error {
         why: String,
     },
     /// The bounds of a repetition in a string are none.
-    #[error("a repetition in the successor of {} cannot be made at t = {}: {why}", .site.module, .site.when())]
+    #[error("a repetition cannot be made for {} at t = {}: {why}", .site.module, .site.when())]
     BadBounds {
         /// The module that is replaced, at the bounds.
         site: Site,

@@ -32,7 +32,7 @@ impl Scanner<'_> {
         let text = |i: usize| tokens.get(i).map_or("", |t| &self.text[t.1..t.2]);
         match tokens.get(1).map(|t| t.0) {
             Some(Token::Number) => true,
-            Some(Token::Symbol) if text(1) == "@" => text(3) == "from",
+            Some(Token::Symbol) if text(1) == "@" => matches!(text(3), "from" | "with" | ""),
             Some(Token::Symbol) if text(1) == "-" => {
                 let mut depth = 0i64;
                 let mut commas = tokens.iter().filter(|token| {

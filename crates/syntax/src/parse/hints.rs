@@ -268,7 +268,7 @@ fn hint_by_word(item: Rule, text: &str, at: usize, found: &str) -> Option<String
         "to" if item == Rule::frames_item => "frames are written `frames 0 .. 10 step 0.1`",
         "solve" | "produce" | "if" if in_rule && !has_head => "a rule's head ends with `:`",
         "if" if item == Rule::interpret_item => {
-            "a drawing has no conditions; a choice between numbers goes into an argument: `F(if x > 1 then x else 0)`"
+            "a condition in a drawing is written `if x > 1: ( F(x) ) else ( A )`; a choice between numbers goes into an argument: `F(if x > 1 then x else 0)`"
         }
         "solve" | "produce" if item == Rule::interpret_item => {
             "a drawing has no clauses; its modules stand behind the colon: `interpret A(x): F(x)`"
