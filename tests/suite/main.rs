@@ -35,6 +35,7 @@ mod random;
 mod repl;
 mod replay;
 mod report;
+mod scenes;
 mod schedulers;
 mod semantics;
 mod signals;

@@ -19,6 +19,9 @@ const MAX_DEPTH: usize = 8;
 /// Maximum number of models that one model reads for its plants, and these for theirs.
 const MAX_MODELS: usize = 200;
 
+/// The beginning of messages about models of plants.
+const UNREADABLE: &str = "the plant";
+
 /// The models around the one that is being read: the paths of those that it is a plant of, and the number of models so far.
 #[derive(Default)]
 pub(crate) struct Nesting<'n> {
@@ -209,7 +212,7 @@ impl Builder<'_> {
         nesting: &Nesting,
     ) -> Result<(dlsys_model::Model, Source), Box<Diagnostic>> {
         let fault = |what: String| {
-            Diagnostic::error(format!("the plant `{}` cannot be read", name.text)).at(file.span, what)
+            Diagnostic::error(format!("{UNREADABLE} `{}` cannot be read", name.text)).at(file.span, what)
         };
         if !is_inside(&file.text) {
             return Err(Box::new(fault("the path leaves the model's folder".to_owned()).help(
@@ -249,24 +252,16 @@ impl Builder<'_> {
                     .note(first_line(error, &source))
                     .help(format!("`dlsys check {}` shows all its errors", file.text)),
                 (None, Some(refused)) => {
-                    Diagnostic::error(refused.message.clone()).at(file.span, "a param of this model")
+                    let about = |name: &&(Name, Expression)| refused.message.contains(&*name.0.text);
+                    let span = written.iter().find(about).map_or(file.span, |(name, _)| name.span);
+                    let mut error = Diagnostic::error(format!("`{}` refuses a value", file.text))
+                        .at(span, refused.message.clone());
+                    error.help.clone_from(&refused.help);
+                    error.help("the params of a model are listed by `dlsys explain`")
                 }
                 (None, None) => fault("it has errors".to_owned()),
             }));
         };
-        for (name, _) in written {
-            if !model.parameters.iter().any(|known| known.name == *name.text) {
-                let names: Vec<&str> = model.parameters.iter().map(|known| &*known.name).collect();
-                let known = match names.is_empty() {
-                    true => "it has no params".to_owned(),
-                    false => format!("its params are {}", names.join(", ")),
-                };
-                let error = Diagnostic::error(format!("`{}` has no param `{}`", file.text, name.text))
-                    .at(name.span, known)
-                    .help(format!("declare it there: `param {} = …`", name.text));
-                return Err(Box::new(error));
-            }
-        }
         Ok((model, source))
     }
 }
@@ -277,8 +272,11 @@ fn line_of(error: &Diagnostic, source: &Source) -> usize {
     source.text[..at.min(source.text.len())].matches('\n').count() + 1
 }
 
-/// An error of a plant's model in one line.
+/// An error of a plant's model in one line; the error of a plant in that goes down to its cause.
 fn first_line(error: &Diagnostic, source: &Source) -> String {
+    if let Some(cause) = error.notes.first().filter(|_| error.message.starts_with(UNREADABLE)) {
+        return cause.clone();
+    }
     let label = error.labels.first().map_or(String::new(), |(_, text)| format!(": {text}"));
     format!("{}:{}: {}{label}", source.name, line_of(error, source), error.message)
 }

@@ -1,0 +1,205 @@
+//! Plants of other models in a scene, and the words of scenes: what a plant draws is what its model draws at its age, whatever was drawn
+//! before; names of older models that are words now stay names.
+
+use dlsys::scene::{Scene, Surroundings};
+use dlsys::session::{Nursery, Session};
+use dlsys::sim::Settings;
+use dlsys::tree::ModuleString;
+use std::path::Path;
+
+const STEM: &str = "color sap = \"#123456\"\ncontour flat = (1, 0) (0, 0.1) (-1, 0) (0, -0.1)\nparam r = 1\nangle 30\n\
+    initial string: ;(sap) @C(flat) F(0) + A\nF(x): solve dx/dt = r\nA: if age = 1 produce [ & @L(1) ] F(0) A\n";
+const CHANCE: &str = "initial string: A\nA: at rate 2 produce [ +(uniform(-60, 60)) F(uniform(1, 2)) ] F(1) A\ninterpret A: !(0.1) F(0.3)\n";
+
+fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, text) in files {
+        let path = folder.path().join(name);
+        std::fs::create_dir_all(path.parent().expect("a folder")).expect("made");
+        std::fs::write(path, text).expect("written");
+    }
+    folder
+}
+
+fn open(folder: &Path, name: &str) -> Session {
+    Session::open(&folder.join(name), &[]).unwrap_or_else(|refused| panic!("{refused}"))
+}
+
+fn refusal(folder: &Path, name: &str) -> String {
+    Session::open(&folder.join(name), &[]).expect_err("refused").to_string()
+}
+
+fn string(session: &Session, t: f64, seed: u64) -> ModuleString {
+    let mut string = ModuleString::default();
+    let settings = Settings { seed, ..Settings::default() };
+    session.simulate(settings).and_then(|mut simulation| simulation.at(t, &mut string)).expect("it grows");
+    string
+}
+
+fn drawn(session: &Session, t: f64, seed: u64) -> Scene {
+    let nursery = Nursery::new(&session.model, Settings { seed, ..Settings::default() });
+    let mut scene = nursery.blank();
+    nursery.draw(&string(session, t, seed), &mut scene).expect("drawable");
+    scene
+}
+
+/// Everything that is drawn, plants included, as text.
+fn shown(scene: &Scene) -> Vec<String> {
+    let flat = scene.flattened();
+    let color = |material| flat.palette.get(material).color.to_string();
+    let mut all: Vec<String> = (flat.segments.iter())
+        .map(|s| {
+            let contour = s.contour.map(|i| &flat.contours[i as usize]);
+            format!("{:?} {:?} {:?} {} {contour:?}", s.start, s.end, s.widths, color(s.material))
+        })
+        .collect();
+    all.extend(flat.surfaces.iter().map(|s| {
+        let colors: Vec<String> = s.mesh.faces.iter().map(|face| color(face.material)).collect();
+        format!("{:?} {:?} {}", s.placement, s.tint, colors.concat())
+    }));
+    all
+}
+
+#[test]
+fn a_plant_is_what_its_model_draws_at_its_age() {
+    let main = "color first = \"#abcdef\"\ncontour own = (1, 0) (0, 1) (-1, 0) (0, -1)\nplant @Stem from \"deep/stem.dls\" with r = 0.5\n\
+        initial string: ;(first) @C(own) !(1) F(1) [ f(3) @Stem(1.5) ] -(90) f(2) +(90) @Stem(2.5, 7) @Stem(9)\n";
+    let here = folder(&[("main.dls", main), ("deep/stem.dls", STEM)]);
+    let session = open(here.path(), "main.dls");
+    let scene = drawn(&session, 4.0, 1);
+    assert_eq!(scene.plants.len(), 2, "one is not born yet");
+    for (plant, age) in scene.plants.iter().zip([2.5, 1.5]) {
+        let stem = Session::open(
+            &here.path().join("deep/stem.dls"),
+            &[dlsys::compile::Setting { name: "r".to_owned(), value: 0.5 }],
+        )
+        .expect("a model");
+        let own = drawn(&stem, age, 1);
+        assert_eq!(plant.scene.segments.len(), own.segments.len());
+        let default = dlsys::scene::Bounds::of(&own).default_width();
+        for (ours, theirs) in plant.scene.segments.iter().zip(&own.segments) {
+            assert_eq!((ours.start, ours.end), (theirs.start, theirs.end));
+            assert_eq!(ours.widths.map(|w| w.resolve(0.0)), theirs.widths.map(|w| w.resolve(default)));
+            assert_eq!(scene.palette.get(ours.material).color, own.palette.get(theirs.material).color);
+            let contour = |scene: &Scene, i: Option<u32>| i.map(|i| scene.contours[i as usize].clone());
+            assert_eq!(contour(&scene, ours.contour), contour(&own, theirs.contour));
+        }
+    }
+    let flat = scene.flattened();
+    assert_eq!(flat.segments[1].start, dlsys::scene::Point::new(0.0, 4.0, 0.0), "after 1 and 3");
+    assert!((flat.segments.last().expect("a stem").start.x - 2.0).abs() < 2.0);
+    let names: std::collections::HashSet<u64> = flat.owners().iter().map(|owner| owner.lineage.id).collect();
+    assert_eq!(names.len(), flat.owners().len(), "every module has a name of its own");
+}
+
+#[test]
+fn plants_do_not_depend_on_what_was_drawn_before() {
+    let main = "plant @Stem from \"stem.dls\"\nplant @Chance from \"chance.dls\"\n\
+        initial string: for i in 0 .. 9: ( [ -(90) f(2*i) +(90) @Stem(i/3) @Chance(i/5) @Chance(i/4, i) @Chance(0, 0.5) ] )\n";
+    let here = folder(&[("main.dls", main), ("stem.dls", STEM), ("chance.dls", CHANCE)]);
+    let session = open(here.path(), "main.dls");
+    let nursery = Nursery::new(&session.model, Settings { seed: 3, ..Settings::default() });
+    let look = |t: f64| {
+        let mut scene = nursery.blank();
+        nursery.draw(&string(&session, t, 3), &mut scene).expect("drawable");
+        shown(&scene)
+    };
+    let times = [2.0, 4.0, 1.0, 4.0, 0.0, 3.0];
+    let all: Vec<Vec<String>> = times.iter().map(|t| look(*t)).collect();
+    for (t, ours) in times.iter().zip(&all) {
+        assert_eq!(ours, &shown(&drawn(&session, *t, 3)), "t = {t}");
+    }
+    // From several threads at once.
+    let strings: Vec<ModuleString> = times.iter().map(|t| string(&session, *t, 3)).collect();
+    std::thread::scope(|scope| {
+        let jobs: Vec<_> = (strings.iter().zip(&all))
+            .map(|(string, expected)| {
+                let nursery = &nursery;
+                scope.spawn(move || {
+                    let mut scene = nursery.blank();
+                    nursery.draw(string, &mut scene).expect("drawable");
+                    assert_eq!(&shown(&scene), expected);
+                })
+            })
+            .collect();
+        jobs.into_iter().for_each(|job| job.join().expect("no panic"));
+    });
+}
+
+#[test]
+fn seeds_tell_plants_with_random_numbers_apart_and_no_others() {
+    let main = "plant @Stem from \"stem.dls\"\nplant @Chance from \"chance.dls\"\n\
+        initial string: @Stem(0, 1) @Stem(0, 2) @Chance(0, 1) @Chance(0, 2) @Chance(0, 1) @Chance(0) @Chance(0, 5)\n";
+    let here = folder(&[("main.dls", main), ("stem.dls", STEM), ("chance.dls", CHANCE)]);
+    let session = open(here.path(), "main.dls");
+    let scene = drawn(&session, 3.0, 5);
+    let same = |a: usize, b: usize| std::sync::Arc::ptr_eq(&scene.plants[a].scene, &scene.plants[b].scene);
+    assert!(same(0, 1) && same(2, 4) && !same(2, 3) && same(5, 6));
+    assert_ne!(shown(&scene.plants[2].scene), shown(&scene.plants[3].scene));
+    let own = drawn(&open(here.path(), "chance.dls"), 3.0, 5);
+    assert_eq!(scene.plants[5].scene.segments.len(), own.segments.len(), "the seed of the scene");
+}
+
+#[test]
+fn plants_stand_in_plants_and_never_in_themselves() {
+    let outer = "plant @Tuft from \"tuft/tuft.dls\"\ninitial string: for i in 0 .. 2: ( [ -(90) f(i) +(90) @Tuft(0) ] )\n";
+    let tuft = "plant @Stem from \"stem.dls\"\nground 2\ninitial string: [ @G @Stem(-1) ] f(1) @Stem(-2)\n";
+    let here = folder(&[
+        ("main.dls", outer),
+        ("tuft/tuft.dls", tuft),
+        ("tuft/stem.dls", STEM),
+        ("self.dls", "plant @Me from \"self.dls\"\ninitial string: @Me(0)\n"),
+        ("one.dls", "plant @Two from \"two.dls\"\ninitial string: @Two(0)\n"),
+        ("two.dls", "plant @One from \"one.dls\"\ninitial string: @One(0)\n"),
+        ("wrong.dls", "plant @Bad from \"bad.dls\"\ninitial string: @Bad(0)\n"),
+        ("bad.dls", "initial string: F(1)\n\nF(x): solve dx/dt = y\n"),
+        ("with.dls", "plant @Stem from \"tuft/stem.dls\" with q = 2\ninitial string: @Stem(0)\n"),
+        ("late.dls", "plant @Late from \"limit.dls\"\ninitial string: @Late(0)\n"),
+        ("limit.dls", "initial string: F(0)\nF(x): if x < 1 solve dx/dt = 1\n"),
+    ]);
+    let scene = drawn(&open(here.path(), "main.dls"), 1.0, 1);
+    assert_eq!((scene.plants.len(), scene.plants[0].scene.plants.len()), (3, 2));
+    assert_eq!(scene.surroundings, Surroundings::default(), "those of a plant do not count");
+    let flat = scene.flattened();
+    assert_eq!(flat.plants.len(), 0);
+    assert!(flat.segments.iter().any(|s| s.start.y == 2.0 && s.start.x == 2.0), "@G in the plant");
+    assert!(refusal(here.path(), "self.dls").contains("is a plant of itself"));
+    assert!(refusal(here.path(), "one.dls").contains("is a plant of itself"));
+    let bad = refusal(here.path(), "wrong.dls");
+    assert!(bad.contains("in line 3") && bad.contains("bad.dls:3: unknown name `y`"), "{bad}");
+    let with = refusal(here.path(), "with.dls");
+    assert!(with.contains("refuses a value") && with.contains("no param `q`"), "{with}");
+    let late = open(here.path(), "late.dls");
+    let nursery = Nursery::new(&late.model, Settings::default());
+    let error = nursery.draw(&string(&late, 3.0, 1), &mut nursery.blank()).expect_err("outside its domain");
+    let message = error.diagnostic().render(&late.source, false);
+    assert!(
+        message.contains("the plant `@Late` cannot grow to the age 3") && message.contains("limit.dls:2:"),
+        "{message}"
+    );
+}
+
+#[test]
+fn surroundings_follow_time() {
+    let text = "light cos(t), 1, 0\nsky \"#001122\", \"#fff\"\ncamera at 0, 1, 5 + t towards 0, 1, 0 angle 30\nground -0.5\n\
+        initial string: f(3) @G F(1)\n";
+    let here = folder(&[("main.dls", text)]);
+    let scene = drawn(&open(here.path(), "main.dls"), 2.0, 1);
+    let camera = scene.surroundings.camera.expect("a camera");
+    assert_eq!((camera.eye.z, camera.angle, scene.surroundings.floor), (7.0, 30.0, Some(-0.5)));
+    assert_eq!(scene.surroundings.sun.expect("a sun").x, 2_f64.cos());
+    assert_eq!(scene.surroundings.sky.expect("a sky")[1].to_string(), "#ffffff");
+    assert_eq!(scene.segments[0].start.y, -0.5);
+}
+
+#[test]
+fn words_of_scenes_stay_names_where_a_declaration_cannot_begin() {
+    let text = "const plant = 2\nparam sky = 3\nconst camera = 1\n\
+        initial string: light(1) ground(camera) sky(sky)\n  light(2) ground(plant) camera\n\
+        light(x): if x < 5 solve dx/dt = 1\n if x = 5 produce ground(1) plant\nground(x) < sky(y): solve dy/dt = x\n\
+        camera: if age = 1 produce light(4)\nplant: if age = 1 produce ε\nlight(x) > ground(y): solve dx/dt = 0\ninterpret ground(x): ε\n";
+    let session = crate::common::session(text);
+    assert_eq!(session.model.axiom.kinds().count(), 6);
+    assert_eq!(session.model.rules.len(), 5);
+    assert!(session.model.scenery.light.is_none() && session.model.scenery.ground.is_none());
+}
