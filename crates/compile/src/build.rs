@@ -320,7 +320,9 @@ fn unused(document: &Document, scope: &mut Scope) {
                 ("function", name, format!("call it, as in `{}({})`", text(name), formals.join(", ")))
             }
             Item::Array { name, .. } => ("array", name, format!("use an element, as in `{}[0]`", text(name))),
-            Item::Curve { name, .. } => ("curve", name, format!("use it, as in `{}(age)`", text(name))),
+            Item::Curve { name, .. } | Item::Function { name, .. } => {
+                ("curve", name, format!("use it, as in `{}(age)`", text(name)))
+            }
             Item::Table { name, .. } => ("table", name, format!("use it, as in `{}(t)`", text(name))),
             Item::Color { name, .. } => {
                 ("colour", name, format!("draw with it: `;({})` in a string", text(name)))

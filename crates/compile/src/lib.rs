@@ -24,6 +24,7 @@ mod curves;
 mod dead_rules;
 mod declared;
 mod equations;
+mod functions;
 mod gather;
 mod globals;
 mod locals;

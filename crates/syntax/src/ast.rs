@@ -307,6 +307,15 @@ pub enum Item {
         /// True if the curve repeats beyond its last point.
         periodic: bool,
     },
+    /// `curve name from "file" item "item"`: a function of cpfg or lpfg.
+    Function {
+        /// The name of the function.
+        name: Name,
+        /// The path, relative to the folder of the model.
+        file: Text,
+        /// The name of the function in a file of several; None for that of the curve.
+        item: Option<Text>,
+    },
     /// `table sort name from "file" column "column" periodic`: a curve whose points are the rows of a file.
     Table {
         /// The name of the function.
@@ -421,7 +430,7 @@ impl Item {
             Item::Const { .. } | Item::Array { .. } => "const",
             Item::Param { .. } => "param",
             Item::Def { .. } => "def",
-            Item::Curve { .. } => "curve",
+            Item::Curve { .. } | Item::Function { .. } => "curve",
             Item::Table { .. } => "table",
             Item::Angle(_) => "angle",
             Item::Period(_) => "period",
@@ -447,6 +456,7 @@ impl Item {
             | Item::Param { name, .. }
             | Item::Def { name, .. }
             | Item::Curve { name, .. }
+            | Item::Function { name, .. }
             | Item::Table { name, .. }
             | Item::Color { name, .. }
             | Item::Gradient { name, .. }
