@@ -13,7 +13,7 @@ use crate::clauses::names_of;
 use crate::declared::DeclaredRule;
 use crate::rules::RuleBuilder;
 use crate::scope::{Scope, Variables};
-use crate::{Setting, appearance, check, contexts, dead_rules, globals};
+use crate::{Setting, appearance, check, contexts, dead_rules, globals, porting};
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{
     Appearance, DRAWN_WORDS, Frames, Interpretation, KindId, Kinds, Model, Parameter, Successor,
@@ -42,6 +42,7 @@ pub fn build(
         parts.item(item, *span, &mut builder);
     }
     parts.check_strings(&mut builder, unread);
+    porting::comments(document, &mut builder.scope.diagnostics);
     let RuleBuilder { occurs, drawn, clocks, .. } = builder;
     if !parts.singles.seen(INITIAL_STRING) && !unread {
         scope.diagnostics.push(
@@ -186,7 +187,7 @@ impl<'d> Parts<'d> {
         let has_axiom = self.singles.seen(INITIAL_STRING);
         for (i, rule) in self.written.iter().enumerate() {
             for name in names_of(rule) {
-                let kind = kinds.intern(name, rule.predecessor.parameters.len());
+                let kind = kinds.intern(&name, rule.predecessor.parameters.len());
                 let kind = kinds.get_mut(kind);
                 if rule.discrete { &mut kind.steps } else { &mut kind.rules }.push(i);
             }
@@ -220,6 +221,8 @@ impl<'d> Parts<'d> {
         check::coverage(&model, diagnostics);
         dead_rules::rules(&model, &self.written, document, diagnostics);
         check::inert_modules(&model, occurs, diagnostics);
+        porting::strings(document, &self.written, diagnostics);
+        porting::drawn_words(&model, drawn, diagnostics);
         check::commands(&model, diagnostics, &drawn.iter().chain(occurs).map(|(k, s)| (*k, *s)).collect());
         model
     }

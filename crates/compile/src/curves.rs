@@ -6,8 +6,8 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
-use crate::scope::{FORMAL, Lowered, Scope, plural};
 use crate::functions;
+use crate::scope::{FORMAL, Lowered, Scope, plural};
 use crate::table::{self, TableError};
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_expr::{
@@ -72,7 +72,9 @@ impl Scope {
                 });
                 (name, curve)
             }
-            Item::Function { name, file, item } => (name, self.function_of_cpfg(name, file, item.as_ref(), files)),
+            Item::Function { name, file, item } => {
+                (name, self.function_of_cpfg(name, file, item.as_ref(), files))
+            }
             Item::Table { name, sort, file, column, periodic } => {
                 let read = table::read(&file.text, column.as_ref().map(|c| c.text.as_str()), files);
                 let curve = match read {
@@ -80,10 +82,11 @@ impl Scope {
                         let points: Vec<[f64; 2]> = rows.iter().map(|row| row.point).collect();
                         let lines: Vec<usize> = rows.iter().map(|row| row.line).collect();
                         let made = Curve::new(&*name.text, *sort, &points, *periodic);
-                        self.from_file(name, span, file, &lines, ("table", "row"), made)
+                        self.curve_of_file(name, span, file, &lines, ("table", "row"), made)
                     }
                     Err(fault) => {
-                        let at = if fault.of_column { column.as_ref().unwrap_or(file).span } else { file.span };
+                        let at =
+                            if fault.of_column { column.as_ref().unwrap_or(file).span } else { file.span };
                         self.unreadable(name, (file, at), "table", fault)
                     }
                 };
@@ -108,7 +111,7 @@ impl Scope {
                 let values: Vec<[f64; 2]> = points.iter().map(|row| row.point).collect();
                 let lines: Vec<usize> = points.iter().map(|row| row.line).collect();
                 let made = Curve::new(&*name.text, Sort::Spline, &values, false);
-                self.from_file(name, file.span, file, &lines, ("function", "control point"), made)
+                self.curve_of_file(name, file.span, file, &lines, ("function", "control point"), made)
             }
             Err(fault) => {
                 let at = if fault.of_column { item.unwrap_or(file).span } else { file.span };
@@ -118,7 +121,7 @@ impl Scope {
     }
 
     /// A curve of points from a file; `lines` are their lines there, `words` the words for the whole and for a point.
-    fn from_file(
+    fn curve_of_file(
         &mut self,
         name: &Name,
         span: Span,
@@ -128,9 +131,11 @@ impl Scope {
         made: Result<Curve, CurveError>,
     ) -> Option<Curve> {
         let (line, what, help) = match made {
-            Err(CurveError::NotAscending(i)) => {
-                (lines[i], "its first number is less than the one before", "the first column is the argument, and must ascend")
-            }
+            Err(CurveError::NotAscending(i)) => (
+                lines[i],
+                "its first number is less than the one before",
+                "the first column is the argument, and must ascend",
+            ),
             Err(CurveError::Crowded(i)) => (lines[i], "it is the third with this argument", JUMP),
             Err(CurveError::JumpAtEnd(i)) => (lines[i], "a jump at the end of the curve", END),
             made => return self.curve_or_error(name, span, &|_| file.span, point, made),

@@ -45,7 +45,9 @@ fn choose(mut all: Vec<Function>, curve: &str, item: Option<&str>) -> Result<Vec
         match (known.is_empty(), item) {
             (true, _) => "its functions have no names: leave `item` out".to_owned(),
             (false, Some(_)) => format!("it has {}", known.join(", ")),
-            (false, None) => format!("name one behind the file, as in `item {}`; it has {}", known[0], known.join(", ")),
+            (false, None) => {
+                format!("name one behind the file, as in `item {}`; it has {}", known[0], known.join(", "))
+            }
         }
     };
     let help = item.and_then(|item| did_you_mean(item, names.iter().copied())).unwrap_or_else(known);
@@ -55,9 +57,8 @@ fn choose(mut all: Vec<Function>, curve: &str, item: Option<&str>) -> Result<Vec
 
 fn parse(text: &str) -> Result<Vec<Function>, TableError> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let mut lines = (text.lines().enumerate())
-        .map(|(i, line)| (i + 1, line.trim()))
-        .filter(|(_, line)| !line.is_empty());
+    let mut lines =
+        (text.lines().enumerate()).map(|(i, line)| (i + 1, line.trim())).filter(|(_, line)| !line.is_empty());
     let mut all: Vec<Function> = Vec::new();
     let mut name = None;
     while let Some((line, text)) = lines.next() {

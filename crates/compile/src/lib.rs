@@ -29,6 +29,7 @@ mod gather;
 mod globals;
 mod locals;
 mod measure;
+mod porting;
 mod rules;
 mod scope;
 mod smooth;

@@ -478,6 +478,9 @@ pub struct Document {
     pub unread: Vec<Arc<str>>,
     /// Names and values in comments such as `#define K 0.5`, which are definitions in cpfg; for hints.
     pub commented: Vec<(Arc<str>, String)>,
+    /// Comments such as `#(2)` in strings, which set the width of lines in cpfg: the place, and the text in the
+    /// parentheses.
+    pub commented_widths: Vec<(Span, String)>,
     /// Index of the first item of the library, if it was included. Names that the model declares itself take precedence
     /// over those of the library, and unused library functions are not reported.
     pub library: Option<usize>,

@@ -5,7 +5,7 @@
 //! variant of [`Item`](crate::ast::Item), and how that is read and printed in `notation.rs`; then its meaning, in
 //! `dlsys-compile` and `dlsys-model`.
 
-use crate::parse::Rule;
+use crate::grammar::Rule;
 
 /// A kind of declaration.
 #[derive(Debug)]

@@ -3,8 +3,8 @@
 //! Reading and printing stand side by side so that they agree: the printed text parses to the same tree.
 
 use crate::ast::{Expression, Expressions, Item, Name, Text};
-use crate::parse::Rule;
-use crate::parse::build::{Builder, Built, Pair, is_punctuation};
+use crate::grammar::{Pair, Rule};
+use crate::parse::build::{Builder, Built, is_punctuation};
 use crate::print;
 use dlsys_expr::Sort;
 

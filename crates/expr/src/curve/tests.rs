@@ -75,7 +75,10 @@ fn points_that_make_no_curve() {
     assert_eq!(fault(Sort::Linear, &thrice, false), Some(Error::Crowded(3)));
     let ends = [[0.0, 1.0], [1.0, 1.0], [1.0, 2.0]];
     assert_eq!(fault(Sort::Monotone, &ends, false), Some(Error::JumpAtEnd(2)));
-    assert_eq!(fault(Sort::Linear, &ends.map(|[x, y]| [1.0 - x, y]).into_iter().rev().collect::<Vec<_>>(), false), Some(Error::JumpAtEnd(1)));
+    assert_eq!(
+        fault(Sort::Linear, &ends.map(|[x, y]| [1.0 - x, y]).into_iter().rev().collect::<Vec<_>>(), false),
+        Some(Error::JumpAtEnd(1))
+    );
     assert_eq!(fault(Sort::Spline, &[[1.0, 0.0]; 4], false), Some(Error::TooFew(4)));
     let open = [[0.0, 1.0], [1.0, 2.0], [2.0, 3.0]];
     assert_eq!(fault(Sort::Monotone, &open, true), Some(Error::NotClosed { first: 1.0, last: 3.0 }));
@@ -168,7 +171,10 @@ fn two_points_with_one_x_are_a_jump() {
         assert!(g.jumps(Part::Value) && g.direction().is_none());
         // No continuity over the jump, on every turn of a periodic curve; continuity beside it.
         let over = |lo: f64, hi: f64| g.over(Part::Value, Interval { lo, hi, partial: false }).partial;
-        assert!(over(0.5, 1.5) && over(0.5, 1.0) && !over(1.0, 2.5) && !over(0.2, 0.9) && !over(2.5, 3.5), "{sort:?}");
+        assert!(
+            over(0.5, 1.5) && over(0.5, 1.0) && !over(1.0, 2.5) && !over(0.2, 0.9) && !over(2.5, 3.5),
+            "{sort:?}"
+        );
         assert_eq!(over(3.5, 4.5), periodic);
         assert_eq!(over(-2.5, -1.5), periodic);
     }

@@ -31,11 +31,7 @@ pub fn quantile(a: f64, b: f64, u: f64) -> f64 {
     }
     // The side of 1/2 on which the quantile lies.
     let law = Law { a, b };
-    if law.tails(0.5).0 >= u {
-        law.solve(u, 1.0 - u)
-    } else {
-        1.0 - Law { a: b, b: a }.solve(1.0 - u, u)
-    }
+    if law.tails(0.5).0 >= u { law.solve(u, 1.0 - u) } else { 1.0 - Law { a: b, b: a }.solve(1.0 - u, u) }
 }
 
 /// The expansion of the quantile by the third cumulant and the fourth (Cornish and Fisher 1938).
@@ -77,7 +73,11 @@ impl Law {
             }
             // Far in a tail, whatever underflows says on which side the quantile is.
             let is_low = if step.is_nan() { below < lower } else { step > 0.0 };
-            if is_low { low = x } else { high = x }
+            if is_low {
+                low = x
+            } else {
+                high = x
+            }
             if high <= f64::MIN_POSITIVE {
                 return 0.0;
             }
@@ -219,7 +219,9 @@ mod tests {
 
     #[test]
     fn quantiles_ascend_and_end_at_0_and_1() {
-        for (a, b) in [(0.001, 3.0), (1e-5, 1e-5), (0.7, 0.7), (16.0, 15.9), (1e9, 2e9), (2e9, 3e12), (3.0, 1e15)] {
+        for (a, b) in
+            [(0.001, 3.0), (1e-5, 1e-5), (0.7, 0.7), (16.0, 15.9), (1e9, 2e9), (2e9, 3e12), (3.0, 1e15)]
+        {
             let found: Vec<f64> = (0..=256).map(|i| quantile(a, b, f64::from(i) / 256.0)).collect();
             assert!(found.is_sorted() && found[0] == 0.0 && found[256] == 1.0, "{a}, {b}: {found:?}");
         }

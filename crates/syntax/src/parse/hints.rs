@@ -1,9 +1,10 @@
 //! Hints for common errors in the notation, from the text around the error and the token there.
 
-use super::Rule;
 use super::advice;
 use super::expected::is_item_with_name;
 use crate::declarations;
+use crate::foreign_syntax;
+use crate::grammar::Rule;
 use crate::suggest::nearest;
 
 /// The hint for a syntax error, if it is a common one.
@@ -19,10 +20,20 @@ pub(super) fn hint(item: Rule, text: &str, at: usize, found: &str) -> Option<Str
     if let Some(advice) = advice::for_block(item, &text[..at], found) {
         return Some(advice.to_owned());
     }
+    if let Some(advice) = hint_of_symbol(item, &text[..at], &text[at..]) {
+        return Some(advice);
+    }
     if let Some(advice) = hint_of_chance(item, text, at, found) {
         return Some(advice.to_owned());
     }
     hint_by_symbol(item, text, at, found).or_else(|| hint_by_word(item, text, at, found))
+}
+
+/// Hints for symbols of strings in cpfg and L-Py.
+fn hint_of_symbol(item: Rule, before: &str, rest: &str) -> Option<String> {
+    let in_step = item == Rule::step_item && (before.contains("->") || before.contains('→'));
+    let after_symbol = before.ends_with(|c: char| !(c.is_alphanumeric() || c == ')' || c.is_whitespace()));
+    (in_step || in_string(item, before)).then(|| foreign_syntax::symbol(rest, after_symbol)).flatten()
 }
 
 /// Hints for successors with weights and for events at a rate.
@@ -90,6 +101,9 @@ fn hint_by_symbol(item: Rule, text: &str, at: usize, found: &str) -> Option<Stri
             "in expressions only round parentheses `( )` group"
         }
         (_, "±") => "`±` stands for both turns in the head of a rule only; write `+` or `-`",
+        (_, "_") if before.ends_with(['{', '}', '[', ']', '.', '%']) && touching => {
+            "brackets and points have no subscript; turns have one: `+_l`"
+        }
         (_, "~") => "“not” is written `!`",
         (_, "'") => "a derivative is written `dx/dt`",
         _ if in_rule && is_primed(&text[at..]) => {
