@@ -150,10 +150,10 @@ pub fn symbol(text: &str, after_symbol: bool) -> Option<String> {
             };
             format!("a surface is written with `@` before its name: `@{name}{size}`; {reads}")
         }
-        '_' => format!(
-            "the width of lines is written `!{}`; a symbol has its subscript without a space: `+_l`",
-            arguments().replace("(n)", "(w)")
-        ),
+        '_' if rest.starts_with(|c: char| c.is_alphanumeric()) => {
+            "brackets and points have no subscript; turns have one: `+_l`".to_owned()
+        }
+        '_' => format!("the width of lines is written `!{}`", arguments().replace("(n)", "(w)")),
         ',' if after_symbol || rest.starts_with('(') => {
             format!("a colour is chosen by its number or its name: `;{}`, `;(rose)`", arguments())
         }

@@ -54,7 +54,7 @@ pub fn new(args: &NewArgs) -> Result<(), Failure> {
     let next = [
         (
             format!("render {file} -o {frames}"),
-            format!("draws it; open {folder}/frame-0120.svg in a browser"),
+            format!("draws it; open {folder}/frame-0160.svg in a browser"),
         ),
         (
             format!("render {file} -o {frames} --watch"),
@@ -96,6 +96,7 @@ mod tests {
         assert!(session.warnings.is_empty(), "{:?}", session.warnings);
         assert_eq!(session.model.title.as_deref(), Some("a fern"));
         assert_eq!(format(&Source::new("fern.dls", &*text)).expect("good"), text);
-        assert_eq!(session.model.frames.expect("frames").times().count(), 121);
+        assert_eq!(session.model.frames.expect("frames").times().count(), 161);
+        assert!(text.lines().count() < 40);
     }
 }

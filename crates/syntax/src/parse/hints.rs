@@ -101,9 +101,6 @@ fn hint_by_symbol(item: Rule, text: &str, at: usize, found: &str) -> Option<Stri
             "in expressions only round parentheses `( )` group"
         }
         (_, "±") => "`±` stands for both turns in the head of a rule only; write `+` or `-`",
-        (_, "_") if before.ends_with(['{', '}', '[', ']', '.', '%']) && touching => {
-            "brackets and points have no subscript; turns have one: `+_l`"
-        }
         (_, "~") => "“not” is written `!`",
         (_, "'") => "a derivative is written `dx/dt`",
         _ if in_rule && is_primed(&text[at..]) => {
