@@ -7,6 +7,7 @@ use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{Class, DRAWN_WORDS, KindId, Model, base_of};
 use dlsys_syntax::ast::{self, Action, Document, Item};
 use dlsys_syntax::foreign_syntax;
+use dlsys_syntax::print;
 use dlsys_syntax::suggest::nearest;
 
 /// Warns of `#(w)`, which is a comment.
@@ -27,8 +28,8 @@ pub fn strings(document: &Document, written: &[&ast::Rule], diagnostics: &mut Ve
         Item::Axiom(modules) => Some(modules),
         _ => None,
     });
-    let both: Vec<&&ast::Rule> =
-        written.iter().filter(|rule| rule.predecessor.name.text.starts_with('±')).collect();
+    // A subscript says which turns are meant.
+    let both: Vec<&&ast::Rule> = written.iter().filter(|rule| &*rule.predecessor.name.text == "±").collect();
     for module in axioms.flatten() {
         let applies = |rule: &&&&ast::Rule| {
             rule.predecessor.parameters.len() == module.arguments.len()
@@ -59,13 +60,13 @@ pub fn strings(document: &Document, written: &[&ast::Rule], diagnostics: &mut Ve
 
 fn of_both_turns(module: &ast::Module, rule: &ast::Rule) -> Diagnostic {
     let head = &rule.predecessor;
-    let formals = dlsys_syntax::print::head_module(head).replacen(&*head.name.text, "", 1);
-    let (both, own) = (&head.name.text, &module.name);
-    Diagnostic::warning(format!("the rule for `{both}` applies to this turn of the initial string, too"))
+    let formals = print::head_module(head).replacen('±', "", 1);
+    Diagnostic::warning("the rule for `±` applies to this turn of the initial string, too")
         .at(module.span, "this turn changes with the others")
         .at(head.span, "the rule for both turns")
         .help(format!(
-            "give the turns that change a subscript, `{both}_l{formals}:` for `+_l` and `-_l`; a turn that changes and stands in the initial string is then `{own}_l(…)`"
+            "give the turns that change a subscript, `±_l{formals}:` for `+_l` and `-_l`; a turn of the initial string that is meant to change is then `{}_l(…)`",
+            module.name
         ))
 }
 
