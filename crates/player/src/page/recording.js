@@ -130,7 +130,8 @@ function outermost({ tracks, meshes }) {
     return shape.points();
   });
   // Millions of points say no more than many.
-  const skip = Math.ceil(tracks.reduce((sum, { length, width }) => sum + (length * width) / 3, 0) / 100000);
+  const taken = ({ kind, detail, length, width }) => length * (kind === 1 ? shapes[detail].length : width / 3);
+  const skip = Math.ceil(tracks.reduce((sum, track) => sum + taken(track), 0) / 100000);
   let turn = 0;
   for (const { kind, detail, samples, width, length } of tracks) {
     for (let i = 0; i < length; i++) {
