@@ -379,7 +379,7 @@ pub struct ReportArgs {
     pub settings: Vec<Setting>,
     #[command(flatten)]
     pub include: IncludeArgs,
-    /// Timed runs of each point, of which the median is shown; fewer where they take more than 3 seconds
+    /// Timed runs of each point, of which the median is shown; fewer where they take more than 0.2 seconds
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = runs)]
     pub runs: usize,
     /// Seconds that a run may take; a point that would take longer, judged from the one before, is left out

@@ -213,7 +213,8 @@ fn tables_are_read_and_their_faults_told() {
     expect(&ask("\"../growth.csv\""), &["leaves the model's folder"]);
     expect(&ask("\"data/none.csv\""), &["there is no file ~/data/none.csv"]);
     for (text, parts) in [
-        ("0,1\n1,2\n1,3\n", ["line 3", "must ascend"]),
+        ("0,1\n1,2\n0.5,3\n", ["line 3", "must ascend"]),
+        ("0,1\n1,2\n1,3\n", ["line 3", "a jump at the end"]),
         ("0,1\n1,two\n", ["line 2", "expected a number, not `two`"]),
         ("0,1\n1\n", ["line 2", "there is no column 2"]),
         ("day,mass\n", ["no rows of numbers", "help:"]),

@@ -30,6 +30,7 @@ mod organs;
 mod pages;
 mod pictures;
 mod plants;
+mod ported;
 mod precision;
 mod random;
 mod repl;

@@ -123,7 +123,9 @@ fn build(tree: &Path, target: &Path) -> Result<PathBuf, String> {
 /// All commands for all models, in an order that does not depend on the file system.
 fn cases(root: &Path) -> Vec<Case> {
     let mut models = Vec::new();
-    for folder in ["models", "models/abop", "models/hard", "tests/paper-models", "tests/errors"] {
+    for folder in
+        ["models", "models/abop", "models/ported", "models/hard", "tests/paper-models", "tests/errors"]
+    {
         let entries = fs::read_dir(root.join(folder)).into_iter().flatten();
         models.extend(
             entries

@@ -14,7 +14,7 @@ use crate::declared::DeclaredRule;
 use crate::rules::RuleBuilder;
 use crate::scenery::Nesting;
 use crate::scope::{Scope, Variables};
-use crate::{Setting, appearance, check, contexts, dead_rules, globals, scenery};
+use crate::{Setting, appearance, check, contexts, dead_rules, globals, porting, scenery};
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{
     Appearance, DRAWN_WORDS, Frames, Interpretation, KindId, Kinds, Model, Parameter, Scenery, Successor,
@@ -44,6 +44,7 @@ pub fn build(
         parts.item(item, *span, &mut builder);
     }
     parts.check_strings(&mut builder, unread);
+    porting::comments(document, &mut builder.scope.diagnostics);
     let RuleBuilder { occurs, drawn, clocks, .. } = builder;
     if !parts.singles.seen(INITIAL_STRING) && !unread {
         scope.diagnostics.push(
@@ -197,7 +198,7 @@ impl<'d> Parts<'d> {
         let has_axiom = self.singles.seen(INITIAL_STRING);
         for (i, rule) in self.written.iter().enumerate() {
             for name in names_of(rule) {
-                let kind = kinds.intern(name, rule.predecessor.parameters.len());
+                let kind = kinds.intern(&name, rule.predecessor.parameters.len());
                 let kind = kinds.get_mut(kind);
                 if rule.discrete { &mut kind.steps } else { &mut kind.rules }.push(i);
             }
@@ -232,6 +233,8 @@ impl<'d> Parts<'d> {
         check::coverage(&model, diagnostics);
         dead_rules::rules(&model, &self.written, document, diagnostics);
         check::inert_modules(&model, occurs, diagnostics);
+        porting::strings(document, &self.written, diagnostics);
+        porting::drawn_words(&model, drawn, diagnostics);
         let all = drawn.iter().chain(occurs).map(|(k, s)| (*k, *s)).collect();
         check::ground(&model, &all, diagnostics);
         check::commands(&model, diagnostics, &all);
@@ -334,7 +337,9 @@ fn unused(document: &Document, scope: &mut Scope) {
                 ("function", name, format!("call it, as in `{}({})`", text(name), formals.join(", ")))
             }
             Item::Array { name, .. } => ("array", name, format!("use an element, as in `{}[0]`", text(name))),
-            Item::Curve { name, .. } => ("curve", name, format!("use it, as in `{}(age)`", text(name))),
+            Item::Curve { name, .. } | Item::Function { name, .. } => {
+                ("curve", name, format!("use it, as in `{}(age)`", text(name)))
+            }
             Item::Table { name, .. } => ("table", name, format!("use it, as in `{}(t)`", text(name))),
             Item::Color { name, .. } => {
                 ("colour", name, format!("draw with it: `;({})` in a string", text(name)))

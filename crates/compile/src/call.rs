@@ -18,15 +18,18 @@ const MAX_WORK: usize = 20_000_000;
 /// levels; a body written by hand does not.
 const MAX_BODY: usize = 200_000;
 
+/// A call as it is written, with its lowered arguments.
+pub(super) struct Call<'c> {
+    pub all: &'c Expressions,
+    pub name: &'c Arc<str>,
+    pub span: Span,
+    pub arguments: &'c [(ExprId, Lowered)],
+}
+
 impl Scope {
-    pub(super) fn call(
-        &mut self,
-        all: &Expressions,
-        name: &Arc<str>,
-        span: Span,
-        arguments: &[(ExprId, Lowered)],
-        variables: &Variables,
-    ) -> Option<Lowered> {
+    /// Lowers a call of a function of the model, of the library or of the language.
+    pub(super) fn call(&mut self, call: &Call, variables: &Variables) -> Option<Lowered> {
+        let Call { all, name, span, arguments } = *call;
         let mut nodes = Vec::with_capacity(arguments.len());
         for &(id, lowered) in arguments {
             nodes.push(self.expect_number(all, id, lowered)?);
@@ -86,19 +89,13 @@ impl Scope {
         if let Some(distribution) = Distribution::named(name) {
             return self.draw(distribution, span, nodes);
         }
-        self.unknown_function(all, name, span, arguments, variables);
+        self.unknown_function(call, variables);
         None
     }
 
     /// Reports a function without a declaration, once for each name.
-    fn unknown_function(
-        &mut self,
-        all: &Expressions,
-        name: &Arc<str>,
-        span: Span,
-        arguments: &[(ExprId, Lowered)],
-        variables: &Variables,
-    ) {
+    fn unknown_function(&mut self, call: &Call, variables: &Variables) {
+        let Call { all, name, span, arguments } = *call;
         if self.poisoned.contains(name) || !self.unknown.insert(name.clone()) {
             return;
         }

@@ -1,5 +1,6 @@
 //! Random elements of a model: draws, weights of successors, and the clocks of events at a rate.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -190,13 +191,16 @@ pub struct Clocks {
     widths: HashMap<(String, usize), usize>,
 }
 
-/// The name under which clocks are collected: `+`, `-` and `±` share their rules.
-fn sort(name: &str) -> &str {
-    if matches!(name, "+" | "-") { "±" } else { name }
+/// The name under which clocks are collected: `+`, `-` and `±` share their rules, and so do `+_l`, `-_l` and `±_l`.
+fn sort(name: &str) -> Cow<'_, str> {
+    match name.strip_prefix(['+', '-']) {
+        Some(subscript) => format!("±{subscript}").into(),
+        None => name.into(),
+    }
 }
 
-fn group(name: &str) -> &str {
-    if class_of(name) == Class::Word { base_of(name) } else { sort(name) }
+fn group(name: &str) -> Cow<'_, str> {
+    if class_of(name) == Class::Word { base_of(name).into() } else { sort(name) }
 }
 
 impl Clocks {
@@ -207,9 +211,9 @@ impl Clocks {
             let arity = rule.predecessor.parameters.len();
             let name = &rule.predecessor.name.text;
             let hazards = production_keys(rule).filter(|(clause, _)| clause.hazard.is_some());
-            let keys = clocks.keys.entry((sort(name).into(), arity)).or_default();
+            let keys = clocks.keys.entry((Arc::from(&*sort(name)), arity)).or_default();
             keys.extend(hazards.map(|(_, key)| key));
-            let width = clocks.widths.entry((group(name).to_owned(), arity)).or_default();
+            let width = clocks.widths.entry((group(name).into_owned(), arity)).or_default();
             *width = (*width).max(keys.len());
         }
         clocks
@@ -217,12 +221,12 @@ impl Clocks {
 
     /// Number of hidden parameters of a kind.
     pub fn width(&self, name: &str, arity: usize) -> usize {
-        self.widths.get(&(group(name).to_owned(), arity)).copied().unwrap_or(0)
+        self.widths.get(&(group(name).into_owned(), arity)).copied().unwrap_or(0)
     }
 
     /// The keys of the hidden parameters of a kind; 0 for those that it does not use.
     fn of(&self, name: &str, arity: usize) -> Vec<u64> {
-        let mut keys = self.keys.get(&(sort(name).into(), arity)).cloned().unwrap_or_default();
+        let mut keys = self.keys.get(&(Arc::from(&*sort(name)), arity)).cloned().unwrap_or_default();
         keys.resize(self.width(name, arity), 0);
         keys
     }
@@ -245,7 +249,7 @@ impl Clocks {
 
     /// Index of the clock of a clause among the hidden parameters of its kind.
     fn slot(&self, head: &HeadModule, key: u64) -> usize {
-        let keys = self.keys.get(&(sort(&head.name.text).into(), head.parameters.len()));
+        let keys = self.keys.get(&(Arc::from(&*sort(&head.name.text)), head.parameters.len()));
         keys.and_then(|keys| keys.iter().position(|k| *k == key)).expect("every clause was seen")
     }
 }

@@ -4,12 +4,14 @@ use std::collections::{HashMap, HashSet};
 
 use crate::advice;
 use crate::appearance::surface_hint;
+use crate::clauses::names_of;
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{
     BUILT_IN_SURFACES, COMMAND_SURFACES, Class, Condition, ConditionStep, ContextPart, DRAWN_WORDS, GROUND,
     KindId, Model, Pattern, Remedy, Rule, Sign, base_of, class_of,
 };
 use dlsys_syntax::ast;
+use dlsys_syntax::foreign_syntax;
 use dlsys_syntax::print;
 use dlsys_syntax::suggest::{meant, nearest};
 
@@ -177,9 +179,9 @@ fn never_made(model: &Model, rule: &ast::Rule, occurs: &HashMap<KindId, Span>) -
     let name = &*head.name.text;
     let error = Diagnostic::error("this rule can never be reached")
         .at(head.span, format!("no string has a module `{}`", print::head_module(head)));
-    let names = if name == "±" { vec!["+", "-"] } else { vec![name] };
+    let names = names_of(rule);
     let other = (occurs.iter())
-        .filter(|(id, _)| names.contains(&model.kinds.get(**id).name.as_str()))
+        .filter(|(id, _)| names.iter().any(|name| **name == *model.kinds.get(**id).name))
         .min_by_key(|(_, span)| **span);
     if let Some((id, span)) = other {
         let kind = model.kinds.get(*id);
@@ -296,7 +298,11 @@ pub fn inert_modules(model: &Model, occurs: &HashMap<KindId, Span>, diagnostics:
             Class::Surface => diagnostics.push(
                 Diagnostic::warning(format!("there is no surface `{name}`: nothing is drawn for it"))
                     .at(first(), "built in are @L, a leaf, @K, a flower, @P, a petal, and @B, a bud")
-                    .help_opt(surface_hint(name, &model.appearance)),
+                    .help_opt(
+                        foreign_syntax::module(name)
+                            .map(str::to_owned)
+                            .or_else(|| surface_hint(name, &model.appearance)),
+                    ),
             ),
             Class::Word => {
                 let names: HashSet<&str> = with_rules.iter().copied().chain(DRAWN_WORDS).collect();
@@ -321,6 +327,7 @@ pub fn inert_modules(model: &Model, occurs: &HashMap<KindId, Span>, diagnostics:
                     diagnostics.push(
                         Diagnostic::warning(format!("module `{name}` does nothing"))
                             .at(first(), "no rule, no drawing, no context mentions it")
+                            .help_opt(foreign_syntax::module(name).map(str::to_owned))
                             .help(format!(
                                 "a module that only marks a place is declared with `interpret {name}: ε`"
                             )),

@@ -1,5 +1,7 @@
 //! The clauses of a rule, lowered to the graph: conditions, productions and equations.
 
+use std::borrow::Cow;
+
 use crate::analysis::never_reached;
 use crate::chance::{Hazard, production_keys};
 use crate::conditions::Atoms;
@@ -55,7 +57,7 @@ impl RuleBuilder<'_> {
             good &= self.not_a_bracket(context, true);
         }
         for name in names_of(rule) {
-            self.kinds.intern(name, rule.predecessor.parameters.len());
+            self.kinds.intern(&name, rule.predecessor.parameters.len());
         }
         let written = self.aggregates_in(rule);
         let own = rule.predecessor.parameters.len() + self.hidden(&rule.predecessor);
@@ -218,11 +220,12 @@ impl RuleBuilder<'_> {
     }
 }
 
-/// The names of the modules to which a rule applies: `±` stands for both turns.
-pub fn names_of(rule: &ast::Rule) -> Vec<&str> {
-    match &*rule.predecessor.name.text {
-        "±" => vec!["+", "-"],
-        name => vec![name],
+/// The names of the modules to which a rule applies: `±` stands for both turns, and `±_l` for `+_l` and `-_l`.
+pub fn names_of(rule: &ast::Rule) -> Vec<Cow<'_, str>> {
+    let name = &*rule.predecessor.name.text;
+    match name.strip_prefix('±') {
+        Some(subscript) => vec![format!("+{subscript}").into(), format!("-{subscript}").into()],
+        None => vec![name.into()],
     }
 }
 

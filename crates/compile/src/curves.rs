@@ -6,14 +6,15 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
+use crate::functions;
 use crate::scope::{FORMAL, Lowered, Scope, plural};
-use crate::table;
+use crate::table::{self, TableError};
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_expr::{
-    Array, Binary, Curve, Error as CurveError, Integral, Lookup, MAX_POINTS, NodeId, Part, Unary,
+    Array, Binary, Curve, Error as CurveError, Integral, Lookup, MAX_POINTS, NodeId, Part, Sort, Unary,
 };
 use dlsys_syntax::Files;
-use dlsys_syntax::ast::{Expr, ExprId, Expression, Expressions, Item, Name};
+use dlsys_syntax::ast::{Expr, ExprId, Expression, Expressions, Item, Name, Text};
 use dlsys_syntax::suggest::did_you_mean;
 
 /// Functions whose first argument is a name, with their notation.
@@ -26,6 +27,10 @@ pub const FUNCTIONALS: [(&str, &str); 4] = [
 
 /// Maximum number of elements of one array.
 const MAX_ELEMENTS: usize = 1_000_000;
+
+/// Remedies for jumps of curves.
+const JUMP: &str = "a jump is two points with one x: the value before it, and the value from there on";
+const END: &str = "beyond its ends a curve keeps its value: put another point before or behind the jump";
 
 impl Scope {
     pub fn define_array(&mut self, name: &Name, all: &Expressions, values: &[Expression]) {
@@ -67,40 +72,22 @@ impl Scope {
                 });
                 (name, curve)
             }
+            Item::Function { name, file, item } => {
+                (name, self.function_of_cpfg(name, file, item.as_ref(), files))
+            }
             Item::Table { name, sort, file, column, periodic } => {
                 let read = table::read(&file.text, column.as_ref().map(|c| c.text.as_str()), files);
                 let curve = match read {
                     Ok(rows) => {
                         let points: Vec<[f64; 2]> = rows.iter().map(|row| row.point).collect();
+                        let lines: Vec<usize> = rows.iter().map(|row| row.line).collect();
                         let made = Curve::new(&*name.text, *sort, &points, *periodic);
-                        let line = |i: usize| format!("line {} of the file", rows[i].line);
-                        match made {
-                            Err(CurveError::NotAscending(i)) => {
-                                let what = format!(
-                                    "{}: its first number is not greater than the one before",
-                                    line(i)
-                                );
-                                self.diagnostics.push(
-                                    unreadable(name, file.span, &what)
-                                        .help("the first column is the argument, and must ascend"),
-                                );
-                                None
-                            }
-                            made => self.curve_or_error(name, span, &|_| file.span, "row", made),
-                        }
+                        self.curve_of_file(name, span, file, &lines, ("table", "row"), made)
                     }
                     Err(fault) => {
-                        let place = match fault.line {
-                            Some(line) => format!("{}, line {line}: {}", file.text, fault.what),
-                            None => fault.what,
-                        };
-                        let at = if fault.of_column {
-                            column.as_ref().map_or(file.span, |c| c.span)
-                        } else {
-                            file.span
-                        };
-                        self.diagnostics.push(unreadable(name, at, &place).help_opt(fault.help));
-                        None
+                        let at =
+                            if fault.of_column { column.as_ref().unwrap_or(file).span } else { file.span };
+                        self.unreadable(name, (file, at), "table", fault)
                     }
                 };
                 (name, curve)
@@ -109,6 +96,71 @@ impl Scope {
         };
         let lookup = curve.map(|curve| self.graph.add_curve(Arc::new(curve)));
         self.curves.insert(name.text.clone(), lookup);
+    }
+
+    /// `curve g from "g.func"`
+    fn function_of_cpfg(
+        &mut self,
+        name: &Name,
+        file: &Text,
+        item: Option<&Text>,
+        files: &dyn Files,
+    ) -> Option<Curve> {
+        match functions::read(&file.text, &name.text, item.map(|i| i.text.as_str()), files) {
+            Ok(points) => {
+                let values: Vec<[f64; 2]> = points.iter().map(|row| row.point).collect();
+                let lines: Vec<usize> = points.iter().map(|row| row.line).collect();
+                let made = Curve::new(&*name.text, Sort::Spline, &values, false);
+                self.curve_of_file(name, file.span, file, &lines, ("function", "control point"), made)
+            }
+            Err(fault) => {
+                let at = if fault.of_column { item.unwrap_or(file).span } else { file.span };
+                self.unreadable(name, (file, at), "function", fault)
+            }
+        }
+    }
+
+    /// A curve of points from a file; `lines` are their lines there, `words` the words for the whole and for a point.
+    fn curve_of_file(
+        &mut self,
+        name: &Name,
+        span: Span,
+        file: &Text,
+        lines: &[usize],
+        (whole, point): (&str, &str),
+        made: Result<Curve, CurveError>,
+    ) -> Option<Curve> {
+        let (line, what, help) = match made {
+            Err(CurveError::NotAscending(i)) => (
+                lines[i],
+                "its first number is less than the one before",
+                "the first column is the argument, and must ascend",
+            ),
+            Err(CurveError::Crowded(i)) => (lines[i], "it is the third with this argument", JUMP),
+            Err(CurveError::JumpAtEnd(i)) => (lines[i], "a jump at the end of the curve", END),
+            made => return self.curve_or_error(name, span, &|_| file.span, point, made),
+        };
+        let fault = TableError::new(Some(line), what, help);
+        self.unreadable(name, (file, file.span), whole, fault)
+    }
+
+    fn unreadable(
+        &mut self,
+        name: &Name,
+        (file, at): (&Text, Span),
+        whole: &str,
+        fault: TableError,
+    ) -> Option<Curve> {
+        let place = match fault.line {
+            Some(line) => format!("{}, line {line}: {}", file.text, fault.what),
+            None => fault.what,
+        };
+        self.diagnostics.push(
+            Diagnostic::error(format!("the {whole} `{}` cannot be read", name.text))
+                .at(at, place)
+                .help_opt(fault.help),
+        );
+        None
     }
 
     fn curve_or_error(
@@ -129,9 +181,13 @@ impl Scope {
                 .at(name.span, format!("more than {MAX_POINTS} {what}s"))
                 .help("every tenth will show the same course"),
             Err(CurveError::NotAscending(i)) => error
-                .at(at(i), "its x is not greater than that of the point before")
+                .at(at(i), "its x is less than that of the point before")
                 .at(at(i - 1), "the point before")
-                .help("order the points by x; where a value jumps, put two points close to each other"),
+                .help("order the points by x; two points with the same x are a jump there"),
+            Err(CurveError::Crowded(i)) => {
+                error.at(at(i), "the third point with this x").at(at(i - 2), "the first one").help(JUMP)
+            }
+            Err(CurveError::JumpAtEnd(i)) => error.at(at(i), "a jump at the end of the curve").help(END),
             Err(CurveError::NotClosed { first, last }) => error
                 .at(span, format!("it begins with {first} and ends with {last}"))
                 .help(format!(
@@ -390,8 +446,4 @@ impl Scope {
         let index = self.graph.unary(Unary::Floor, index);
         Some(self.graph.element(array, index))
     }
-}
-
-fn unreadable(name: &Name, at: Span, what: &str) -> Diagnostic {
-    Diagnostic::error(format!("the table `{}` cannot be read", name.text)).at(at, what)
 }

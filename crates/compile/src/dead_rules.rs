@@ -76,7 +76,7 @@ fn is_fixed(rule: &ast::Rule, document: &Document) -> bool {
     let conditions = rule.clauses.iter().filter_map(|clause| clause.guard).all(|guard| free(guard, &own));
     let head = &rule.predecessor.name.text;
     let made = |parts: &[ast::Part]| {
-        let alike = modules_of(parts).filter(|module| module.name == *head || &**head == "±");
+        let alike = modules_of(parts).filter(|module| module.name == *head || head.starts_with('±'));
         alike.flat_map(|module| &module.arguments).all(|argument| free(*argument, &|_| false))
     };
     conditions

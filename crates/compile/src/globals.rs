@@ -106,7 +106,9 @@ fn collect<'d>(document: &'d Document, scope: &mut Scope) -> Vec<Global<'d>> {
         let (name, kind) = match item {
             Item::Const { name, value } => (name, GlobalKind::Const(*value)),
             Item::Array { name, values } => (name, GlobalKind::Array(values)),
-            Item::Curve { name, .. } | Item::Table { name, .. } => (name, GlobalKind::Curve(item, *span)),
+            Item::Curve { name, .. } | Item::Function { name, .. } | Item::Table { name, .. } => {
+                (name, GlobalKind::Curve(item, *span))
+            }
             Item::Param { name, value, range } => (name, GlobalKind::Param(*value, *range)),
             Item::Def { name, parameters, body } => (name, GlobalKind::Def(parameters, *body)),
             Item::Color { name, .. } => (name, count(&mut next_color)),

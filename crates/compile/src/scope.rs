@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use crate::advice;
+use crate::call::Call;
 use crate::chance::Draws;
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_expr::{Binary, Graph, Integral, Lookup, NodeId, Unary};
@@ -180,7 +181,7 @@ impl Scope {
         variables: &Variables,
     ) -> Option<NodeId> {
         let lowered = self.lower(all, expression, variables)?;
-        self.expect_condition(all, expression.root, lowered)
+        self.expect(all, expression.root, lowered, true)
     }
 
     /// The value of an expression of constants.
@@ -205,25 +206,22 @@ impl Scope {
         id: ExprId,
         lowered: Lowered,
     ) -> Option<NodeId> {
-        if !lowered.is_condition {
-            return Some(lowered.node);
-        }
-        self.diagnostics.push(
-            Diagnostic::error("a number is expected here")
-                .at(all.span(id), "this is a condition")
-                .help("a condition becomes a number with `if … then 1 else 0`"),
-        );
-        None
+        self.expect(all, id, lowered, false)
     }
 
-    fn expect_condition(&mut self, all: &Expressions, id: ExprId, lowered: Lowered) -> Option<NodeId> {
-        if lowered.is_condition {
+    /// The node of a condition, or of a number; the other of the two is an error.
+    fn expect(&mut self, all: &Expressions, id: ExprId, lowered: Lowered, condition: bool) -> Option<NodeId> {
+        if lowered.is_condition == condition {
             return Some(lowered.node);
         }
+        let (wanted, given, help) = match condition {
+            true => ("a condition", "a number", "compare it with something, as in `x > 0`"),
+            false => ("a number", "a condition", "a condition becomes a number with `if … then 1 else 0`"),
+        };
         self.diagnostics.push(
-            Diagnostic::error("a condition is expected here")
-                .at(all.span(id), "this is a number")
-                .help("compare it with something, as in `x > 0`"),
+            Diagnostic::error(format!("{wanted} is expected here"))
+                .at(all.span(id), format!("this is {given}"))
+                .help(help),
         );
         None
     }
@@ -269,7 +267,7 @@ impl Scope {
                 }
                 match functional {
                     true => self.functional(all, name, span, arguments.first().copied(), &nodes),
-                    false => self.call(all, name, span, &nodes, variables),
+                    false => self.call(&Call { all, name, span, arguments: &nodes }, variables),
                 }
             }
             Expr::Index(name, index) => {
@@ -286,7 +284,7 @@ impl Scope {
                 number(self.graph.unary(Unary::Neg, a))
             }
             Expr::Not(a) => {
-                let a = self.expect_condition(all, *a, done(*a)?)?;
+                let a = self.expect(all, *a, done(*a)?, true)?;
                 condition(self.graph.unary(Unary::Not, a))
             }
             Expr::Scale(factor, a) => {
@@ -296,8 +294,8 @@ impl Scope {
             }
             Expr::Binary(operator @ (Operator::And | Operator::Or), a, b) => {
                 let (left, right) = (done(*a)?, done(*b)?);
-                let left = self.expect_condition(all, *a, left);
-                let right = self.expect_condition(all, *b, right);
+                let left = self.expect(all, *a, left, true);
+                let right = self.expect(all, *b, right, true);
                 let op = if *operator == Operator::And { Binary::And } else { Binary::Or };
                 condition(self.graph.binary(op, left?, right?))
             }
@@ -317,7 +315,7 @@ impl Scope {
             Expr::Compare(first, links) => condition(self.chain(all, *first, links, done)?),
             Expr::If(c, a, b) => {
                 let (test, then, otherwise) = (done(*c)?, done(*a)?, done(*b)?);
-                let test = self.expect_condition(all, *c, test);
+                let test = self.expect(all, *c, test, true);
                 let then = self.expect_number(all, *a, then);
                 let otherwise = self.expect_number(all, *b, otherwise);
                 number(self.graph.select(test?, then?, otherwise?))

@@ -61,7 +61,8 @@ impl RuleBuilder<'_> {
     }
 }
 
-/// True if a rate with its curves preserved has a formula; false for a rate without curves.
+/// True if a rate with its curves preserved has a formula; false for a rate without curves. A curve with jumps is never
+/// preserved: a method that steps would step over them.
 fn gentle_is_driven(
     graph: &mut Graph,
     parameter: usize,
@@ -70,8 +71,14 @@ fn gentle_is_driven(
     still: &dyn Fn(u32) -> bool,
     time: u32,
 ) -> bool {
+    let nodes = graph.reachable(&[rate]);
+    let jumps = |id: &NodeId| match graph.node(*id) {
+        Node::Curve(curve, ..) => graph.curve_of(curve).jumps(Part::Value),
+        _ => false,
+    };
     let curved = |id: &NodeId| graph.integral_is_known(*id);
-    graph.reachable(&[rate]).iter().any(curved)
+    nodes.iter().any(curved)
+        && !nodes.iter().any(jumps)
         && driven_form(graph, parameter as u32, gentle, still, time).is_some()
 }
 

@@ -31,18 +31,23 @@ pub struct TableError {
 }
 
 impl TableError {
-    fn new(line: Option<usize>, what: impl Into<String>, help: impl Into<String>) -> TableError {
+    pub fn new(line: Option<usize>, what: impl Into<String>, help: impl Into<String>) -> TableError {
         TableError { line, what: what.into(), help: Some(help.into()), of_column: false }
     }
 }
 
 /// Reads the first column of a file, and the second or a named one.
 pub fn read(path: &str, column: Option<&str>, files: &dyn Files) -> Result<Vec<TableRow>, TableError> {
+    parse(&text_of(path, files)?, column)
+}
+
+/// The text of a file of numbers in the folder of the model.
+pub fn text_of(path: &str, files: &dyn Files) -> Result<String, TableError> {
     if !is_inside(path) {
         return Err(TableError::new(
             None,
             "the path leaves the model's folder",
-            "tables stand in the folder of the model or below it, as in `\"data/temperature.csv\"`",
+            "files of numbers stand in the folder of the model or below it, as in `\"data/temperature.csv\"`",
         ));
     }
     let bytes = files.read(Path::new(path), SIZE_LIMIT).map_err(|why| {
@@ -52,7 +57,7 @@ pub fn read(path: &str, column: Option<&str>, files: &dyn Files) -> Result<Vec<T
             "paths begin at the folder of the model; other folders are searched with `--include-path DIR`",
         )
     })?;
-    parse(&String::from_utf8_lossy(&bytes), column)
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
 fn parse(text: &str, column: Option<&str>) -> Result<Vec<TableRow>, TableError> {
@@ -141,7 +146,7 @@ fn column_of(wanted: &str, names: &[String], titled: bool, first: usize) -> Resu
 }
 
 /// The beginning of a cell, for a message.
-fn shown(text: &str) -> String {
+pub fn shown(text: &str) -> String {
     text.chars().filter(|c| !c.is_control()).take(40).collect()
 }
 

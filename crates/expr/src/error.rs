@@ -10,8 +10,12 @@ pub enum Error {
     TooFew(usize),
     /// More than [`MAX_POINTS`].
     TooMany,
-    /// The x of this point is not greater than that of the one before.
+    /// The x of this point is less than that of the one before.
     NotAscending(usize),
+    /// This point is the third with the same x.
+    Crowded(usize),
+    /// This point and the one before are a jump at the first or the last x.
+    JumpAtEnd(usize),
     /// A periodic curve whose last value is not its first.
     NotClosed {
         /// Value of the first point.
@@ -28,7 +32,9 @@ impl std::fmt::Display for Error {
         match self {
             Error::TooFew(least) => write!(f, "a curve of this sort needs {least} points or more"),
             Error::TooMany => write!(f, "a curve has at most {MAX_POINTS} points"),
-            Error::NotAscending(i) => write!(f, "the x of point {i} is not greater than that before"),
+            Error::NotAscending(i) => write!(f, "the x of point {i} is less than that before"),
+            Error::Crowded(i) => write!(f, "point {i} is the third with the same x"),
+            Error::JumpAtEnd(i) => write!(f, "the jump at point {i} has no curve on one of its sides"),
             Error::NotClosed { first, last } => {
                 write!(f, "a periodic curve begins with {first} and ends with {last}")
             }

@@ -124,6 +124,8 @@ impl Graph {
         let Node::Curve(curve, part, argument) = self.node(id) else { return None };
         let whole = match part {
             Part::Value => Part::Integral,
+            // Integrals of derivatives do not contain the jumps.
+            Part::Slope | Part::Second if self.curve_of(curve).jumps(Part::Value) => return None,
             Part::Slope => Part::Value,
             Part::Second => Part::Slope,
             Part::PhaseSlope => Part::Phase,
@@ -134,8 +136,11 @@ impl Graph {
 
     /// True if [`Graph::integral_of`] knows an antiderivative.
     pub fn integral_is_known(&self, id: NodeId) -> bool {
-        let part = |part| matches!(part, Part::Value | Part::Slope | Part::Second | Part::PhaseSlope);
-        self.integrals.contains_key(&id) || matches!(self.node(id), Node::Curve(_, p, _) if part(p))
+        let known = |curve, part| match part {
+            Part::Slope | Part::Second => !self.curve_of(curve).jumps(Part::Value),
+            part => matches!(part, Part::Value | Part::PhaseSlope),
+        };
+        self.integrals.contains_key(&id) || matches!(self.node(id), Node::Curve(c, p, _) if known(c, p))
     }
 
     /// Those of the given expressions for which [`Graph::know_integral`] was called.

@@ -4,6 +4,8 @@
 //! (`dlsys_tree::Seed`). So it varies smoothly with the parameters of the distribution: a small change of a
 //! deviation changes a plant slightly instead of replacing it with another one.
 
+mod beta;
+
 use statrs::function::erf::erfc_inv;
 
 use dlsys_diagnostic::Span;
@@ -20,6 +22,8 @@ pub enum Distribution {
     Lognormal,
     /// `exponential(rate)`: of mean 1/rate.
     Exponential,
+    /// `beta(a, b)`: between 0 and 1, of mean a/(a + b).
+    Beta,
     /// `integer(a, b)`: a whole number from a to b, both ends included.
     Integer,
     /// `choice(a, b, …)`: one of the values, each as likely as the others.
@@ -28,11 +32,12 @@ pub enum Distribution {
 
 impl Distribution {
     /// Name, distribution and notation of each.
-    pub const NAMED: [(&'static str, Distribution, &'static str); 6] = [
+    pub const NAMED: [(&'static str, Distribution, &'static str); 7] = [
         ("uniform", Distribution::Uniform, "uniform(a, b)"),
         ("normal", Distribution::Normal, "normal(mean, sd)"),
         ("lognormal", Distribution::Lognormal, "lognormal(mu, sigma)"),
         ("exponential", Distribution::Exponential, "exponential(rate)"),
+        ("beta", Distribution::Beta, "beta(a, b)"),
         ("integer", Distribution::Integer, "integer(a, b)"),
         ("choice", Distribution::Choice, "choice(a, b, c)"),
     ];
@@ -70,6 +75,7 @@ impl Distribution {
             Distribution::Exponential => {
                 "exponential(rate) needs a rate greater than 0: bound it, as in `max(0.01, …)`"
             }
+            Distribution::Beta => "beta(a, b) needs a > 0 and b > 0: bound them, as in `max(0.01, …)`",
             Distribution::Choice => "choice(a, b, …) needs finite values",
         }
     }
@@ -80,6 +86,7 @@ impl Distribution {
             Distribution::Uniform
             | Distribution::Normal
             | Distribution::Lognormal
+            | Distribution::Beta
             | Distribution::Integer => Some(2),
             Distribution::Exponential => Some(1),
             Distribution::Choice => None,
@@ -105,6 +112,8 @@ impl Distribution {
             Distribution::Normal | Distribution::Lognormal if second < 0.0 => {
                 Some(format!("its deviation is {second}"))
             }
+            Distribution::Beta if p[0] <= 0.0 => Some(format!("its first parameter is {}", p[0])),
+            Distribution::Beta if second <= 0.0 => Some(format!("its second parameter is {second}")),
             Distribution::Exponential if p[0] <= 0.0 => Some(format!("its rate is {}", p[0])),
             _ => None,
         }
@@ -121,6 +130,7 @@ impl Distribution {
             Distribution::Lognormal => (p[0] + p[1] * normal(u)).exp(),
             // The quantile at 1 - u, with the same distribution: ln(1 - u) preserves the digits of small values.
             Distribution::Exponential => -(-u).ln_1p() / p[0],
+            Distribution::Beta => beta::quantile(p[0], p[1], u),
             Distribution::Integer => {
                 let (low, high) = (p[0].ceil(), p[1].floor());
                 (low + (u * (high - low + 1.0)).floor()).min(high)

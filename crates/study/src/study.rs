@@ -21,7 +21,7 @@ pub struct Plan {
     pub slices: Option<Vec<f64>>,
     /// Times to observe, increasing; see [`default_times`].
     pub times: Vec<f64>,
-    /// Timed runs of a point, at least 1; fewer if together they take more than 3 seconds.
+    /// Timed runs of a point, at least 1; fewer if together they take more than 0.2 seconds.
     pub runs: usize,
     /// Allowed wall time of a single run in seconds.
     pub time_limit: f64,
@@ -36,10 +36,10 @@ impl Plan {
     }
 
     /// Step sizes of a study that ends at `end`: ten powers of two, from about 64 steps to about 32,768. A
-    /// method of order 1 gets four more, because it converges slowly.
+    /// method of order 1 gets two more, because it converges slowly.
     pub fn default_step_sizes(end: f64, order: Option<u32>) -> Vec<f64> {
         let largest = if end > 0.0 { (end / 64.0).log2().round() } else { 0.0 };
-        let count = if order == Some(1) { 14 } else { 10 };
+        let count = if order == Some(1) { 12 } else { 10 };
         (0..count).map(|i| (largest - f64::from(i)).exp2()).collect()
     }
 }
@@ -168,8 +168,9 @@ pub struct Study {
     pub series: Vec<Series>,
 }
 
-/// No more timed runs of a point once they have taken so many seconds.
-const LONG: f64 = 3.0;
+/// No more timed runs of a point once they have taken so many seconds. The times of shorter runs vary more, and more of them
+/// are needed for a median; one run of this length is known well enough.
+const LONG: f64 = 0.2;
 
 /// Makes all runs of a study. `watch` is called before each point with a description of it, `done` after each method
 /// with the study so far.

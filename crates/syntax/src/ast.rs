@@ -364,6 +364,15 @@ pub enum Item {
         /// True if the curve repeats beyond its last point.
         periodic: bool,
     },
+    /// `curve name from "file" item "item"`: a function of cpfg or lpfg.
+    Function {
+        /// The name of the function.
+        name: Name,
+        /// The path, relative to the folder of the model.
+        file: Text,
+        /// The name of the function in a file of several; None for that of the curve.
+        item: Option<Text>,
+    },
     /// `table sort name from "file" column "column" periodic`: a curve whose points are the rows of a file.
     Table {
         /// The name of the function.
@@ -502,7 +511,7 @@ impl Item {
             Item::Const { .. } | Item::Array { .. } => "const",
             Item::Param { .. } => "param",
             Item::Def { .. } => "def",
-            Item::Curve { .. } => "curve",
+            Item::Curve { .. } | Item::Function { .. } => "curve",
             Item::Table { .. } => "table",
             Item::Angle(_) => "angle",
             Item::Period(_) => "period",
@@ -533,6 +542,7 @@ impl Item {
             | Item::Param { name, .. }
             | Item::Def { name, .. }
             | Item::Curve { name, .. }
+            | Item::Function { name, .. }
             | Item::Table { name, .. }
             | Item::Color { name, .. }
             | Item::Gradient { name, .. }
@@ -555,6 +565,9 @@ pub struct Document {
     pub unread: Vec<Arc<str>>,
     /// Names and values in comments such as `#define K 0.5`, which are definitions in cpfg; for hints.
     pub commented: Vec<(Arc<str>, String)>,
+    /// Comments such as `#(2)` in strings, which set the width of lines in cpfg: the place, and the text in the
+    /// parentheses.
+    pub commented_widths: Vec<(Span, String)>,
     /// Index of the first item of the library, if it was included. Names that the model declares itself take precedence
     /// over those of the library, and unused library functions are not reported.
     pub library: Option<usize>,

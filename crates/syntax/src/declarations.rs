@@ -5,7 +5,7 @@
 //! variant of [`Item`](crate::ast::Item), and how that is read and printed in `notation.rs`; then its meaning, in
 //! `dlsys-compile` and `dlsys-model`.
 
-use crate::parse::Rule;
+use crate::grammar::Rule;
 
 /// A kind of declaration.
 #[derive(Debug)]
@@ -245,11 +245,18 @@ pub static DECLARATIONS: [Declaration; 25] = [
         ..row("def", Rule::def_item)
     },
     Declaration {
-        usage: "monotone|spline|linear NAME = (x, y) (x, y) … periodic",
-        summary: "a function that goes through these points",
+        usage: "monotone|spline|linear NAME = (x, y) (x, y) … periodic, or NAME from \"FILE.func\"",
+        summary: "a function that goes through these points, or a function file of cpfg",
         named: Named::AfterOption,
         repeats: Repeats::PerName("value"),
-        options: &[SORTS[0], SORTS[1], SORTS[2], option("periodic", Follow::Nothing)],
+        options: &[
+            SORTS[0],
+            SORTS[1],
+            SORTS[2],
+            option("from", Follow::Text),
+            option("item", Follow::Text),
+            option("periodic", Follow::Nothing),
+        ],
         begins: Begins::BeforeName,
         written: "a curve is written `curve g = (0, 0) (1, 0.3) (2, 1)`",
         ..row("curve", Rule::curve_item)

@@ -8,7 +8,7 @@ use dlsys_diagnostic::{Diagnostic, Span};
 const PAGE: &str = "the book has a page for this: “Coming from cpfg or L-Py”, docs/src/moving.md";
 
 /// Beginnings of lines, as words and signs, each with its remedy.
-const LINES: [(&[&str], &str); 21] = [
+const LINES: [(&[&str], &str); 29] = [
     (&["lsystem", ":"], "remove this line: a file is one model, from its first line to its last"),
     (&["endlsystem"], "remove this line: a model ends with its file"),
     (&["axiom", ":"], "small letters: `axiom: …`, or `initial string: …`"),
@@ -30,6 +30,17 @@ const LINES: [(&[&str], &str); 21] = [
     (&["decomposition"], PARTS),
     (&["enddecomposition"], "remove this line: what falls into parts has rules like others"),
     (&["maximum", "depth"], "remove this line: drawings may be nested 100 deep"),
+    (&["nproduce"], PRODUCE),
+    (&["nsproduce"], PRODUCE),
+    (&["start", ":"], STATEMENTS),
+    (&["starteach", ":"], STATEMENTS),
+    (&["end", ":"], STATEMENTS),
+    (&["endeach", ":"], STATEMENTS),
+    (&["endgroup"], "remove this line: rules do not come in groups"),
+    (
+        &["print"],
+        "a model prints nothing: `dlsys run MODEL` prints the string, and `--measure` what is counted in it",
+    ),
     (&["seed", ":"], "the seed is no part of the model: `dlsys run MODEL --seed N`"),
     (
         &["import"],
@@ -52,6 +63,8 @@ const LINES: [(&[&str], &str); 21] = [
 
 const STEPS: &str = "there are no derivation steps; write the times to look at: `frames 0 .. N step 1`. Discrete rules apply at t = 1, 2, …";
 const RULES: &str = "remove this line: rules stand among declarations, `A(x): if x = 1 produce F(x) A(0)`, or discrete `A(x) : x > 3 -> F(x) A(0)`";
+const PRODUCE: &str = "a clause has one successor, and strings are not put together by statements: `if x = 1 produce F(x) A(0)`; modules that repeat are productions of their own";
+const STATEMENTS: &str = "a model is no program: what is to change in time is a parameter with an equation, `A(x): solve dx/dt = 1`";
 const DRAWINGS: &str = "remove this line: each drawing is a line of its own, `interpret A(x): F(x)`";
 const PARTS: &str = "remove this line: what falls into parts at once has a rule, `A(x): produce F(x) B(x)`";
 
@@ -109,6 +122,90 @@ pub fn stands_alone(word: &str) -> bool {
         "enddecomposition",
     ]
     .contains(&word)
+}
+
+/// The counterpart of a symbol of a string in cpfg or L-Py that is none here, given the text from the symbol on and whether
+/// it touches a symbol before it.
+pub fn symbol(text: &str, after_symbol: bool) -> Option<String> {
+    let first = text.chars().next()?;
+    let rest = &text[first.len_utf8()..];
+    let arguments = || {
+        let end = rest.starts_with('(').then(|| rest.find(')')).flatten();
+        end.map_or("(n)", |end| &rest[..=end])
+    };
+    Some(match first {
+        '~' => {
+            let end = rest.find(|c: char| !c.is_alphanumeric()).unwrap_or(rest.len());
+            let (name, behind) = rest.split_at(end);
+            let size = match behind.find(')').filter(|_| behind.starts_with('(')) {
+                Some(close) => &behind[..=close],
+                None => "",
+            };
+            let reads = match name {
+                "" => return Some("a surface is written with `@` before its name: `@L(s)`".to_owned()),
+                "L" | "K" | "P" | "B" => {
+                    "that one is built in, and `surface` reads others from files".to_owned()
+                }
+                _ => format!("`surface @{name} from \"{name}.s\"` reads its file"),
+            };
+            format!("a surface is written with `@` before its name: `@{name}{size}`; {reads}")
+        }
+        '_' if rest.starts_with(|c: char| c.is_alphanumeric()) => {
+            "brackets and points have no subscript; turns have one: `+_l`".to_owned()
+        }
+        '_' => format!("the width of lines is written `!{}`", arguments().replace("(n)", "(w)")),
+        ',' if after_symbol || rest.starts_with('(') => {
+            format!("a colour is chosen by its number or its name: `;{}`, `;(rose)`", arguments())
+        }
+        '\'' => "a colour is chosen by its number or its name: `;(n)`, `;(rose)`; `;` alone is the next one"
+            .to_owned(),
+        '₀'..='₉' if after_symbol => "the subscript of a symbol begins with `_`: `+_1`".to_owned(),
+        _ => return None,
+    })
+}
+
+/// The counterpart of a module that cpfg, lpfg or L-Py draw by its name.
+pub fn module(name: &str) -> Option<&'static str> {
+    const CYLINDERS: &str = "consecutive lines are one smooth stem without further signs; `@W(w)` gives it its width at this place, and `@C(name)` a cross-section";
+    Some(match name {
+        "G" => "a step without a vertex is `g(l)`",
+        "Left" => "a turn to the left is `+(a)`",
+        "Right" => "a turn to the right is `-(a)`",
+        "Up" => "a pitch up is `^(a)`",
+        "Down" => "a pitch down is `&(a)`",
+        "RollL" => "a roll to the left is `\\(a)`",
+        "RollR" => "a roll to the right is `/(a)`",
+        "TurnAround" => "a turn by 180 degrees is `|`",
+        "RollToVert" => "a roll until the left side is horizontal is `$`",
+        "SetWidth" => "the width of lines is `!(w)`, or `@W(w)` for a taper to it",
+        "SetColor" => "a colour is `;(n)`, or `;(rose)`",
+        "SB" => "a branch begins with `[`",
+        "EB" => "a branch ends with `]`",
+        "Cut" => "the rest of a branch is cut off by `%`",
+        "SP" => "a polygon begins with `{`",
+        "PP" => "a vertex of a polygon is `.`",
+        "EP" => "a polygon ends with `}`",
+        "@Gs" | "@Gc" | "@Ge" | "@Gt" => CYLINDERS,
+        "@D" | "@R" | "@V" => "directions are relative: a turn is `+(a)`, `&(a)` or `/(a)`",
+        _ => return None,
+    })
+}
+
+/// The places of `#(w)`, which sets the width of lines in cpfg and begins a comment here: the `#`, and what stands in
+/// the parentheses. A parenthesis in which there is no expression, such as `#(as measured)`, is a comment.
+pub fn commented_widths(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    text.match_indices("#(").filter_map(|(at, _)| {
+        let line = text[..at].rfind('\n').map_or(0, |end| end + 1);
+        let rest = text[at + 2..].lines().next().unwrap_or_default();
+        let inside = &rest[..rest.find(')')?];
+        let spaced = |c: char| c.is_whitespace() || "+-*/^.,".contains(c);
+        let words = inside.split(spaced).filter(|word| !word.is_empty()).count();
+        let signs = inside.chars().filter(|c| "+-*/^.".contains(*c)).count();
+        let is_expression = words > 0
+            && words <= signs + 1
+            && inside.chars().all(|c| c.is_alphanumeric() || c == '_' || spaced(c));
+        (is_expression && !text[line..at].contains(['#', '"'])).then_some((at, inside))
+    })
 }
 
 /// The counterpart of a function call of cpfg, L-Py or Python, given the texts of its arguments.
@@ -186,6 +283,22 @@ mod tests {
         assert_eq!(call("ran", &["10"]), "write `uniform(0, 10)`");
         assert_eq!(call("nran", &[]), "write `normal(mean, deviation)`");
         assert!(function("sin", &[]).is_none());
+    }
+
+    #[test]
+    fn symbols_are_translated_with_their_arguments() {
+        assert!(symbol("~L(2) F", false).is_some_and(|help| help.contains("`@L(2)`; that one is built in")));
+        assert!(symbol("~leaf", false).is_some_and(|help| help.contains("surface @leaf from \"leaf.s\"")));
+        assert!(symbol("_(0.5)F", false).is_some_and(|help| help.contains("`!(0.5)`")));
+        assert!(symbol(",(3)", false).is_some_and(|help| help.contains("`;(3)`")));
+        assert!(symbol(", B", false).is_none() && symbol("F", false).is_none());
+    }
+
+    #[test]
+    fn widths_in_comments_are_found_and_other_comments_are_not() {
+        let text = "F #(0.5) A\n[#(w*0.7)F]\nF  #(as measured)\nF # not #(2)\n#(width)\n#(1";
+        let found: Vec<&str> = commented_widths(text).map(|(_, inside)| inside).collect();
+        assert_eq!(found, ["0.5", "w*0.7", "width"]);
     }
 
     #[test]

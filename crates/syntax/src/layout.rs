@@ -13,7 +13,7 @@ mod keywords;
 mod recovery;
 
 use crate::declarations::{Begins, Body, Declaration};
-use crate::lexeme::{Lexeme, Token, in_name, number_length};
+use crate::lexeme::{Lexeme, SUBSCRIPTED, Token, has_subscript, in_name, number_length};
 use crate::words::FOLDS;
 use dlsys_diagnostic::{Diagnostic, Span};
 
@@ -235,6 +235,10 @@ impl Scanner<'_> {
                 ')' => (Token::Close, i + 1),
                 ',' => (Token::Comma, i + 1),
                 ':' => (Token::Colon, i + 1),
+                // A symbol with a subscript: `+_l`.
+                c if SUBSCRIPTED.contains(c) && has_subscript(&line[i + c.len_utf8()..]) => {
+                    (Token::Symbol, take_while(&in_name))
+                }
                 c => (Token::Symbol, i + c.len_utf8()),
             };
             tokens.push((token, start + i, start + to));

@@ -62,11 +62,18 @@ pub fn in_name(c: char) -> bool {
     c.is_ascii_alphanumeric() || c == '_' || !c.is_ascii() && (c.is_alphanumeric() || MARK(c))
 }
 
+/// The symbols that may have a subscript: `+_l(a)` is a turn with a name of its own.
+pub const SUBSCRIPTED: &str = "±+-&^\\/|$!;";
+
+/// True if the text behind a symbol begins with a subscript.
+pub fn has_subscript(text: &str) -> bool {
+    text.strip_prefix('_').is_some_and(|rest| rest.starts_with(in_name))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parse::Grammar;
-    use crate::parse::Rule;
+    use crate::grammar::{Grammar, Rule};
     use pest::Parser;
 
     /// The scanner and the grammar agree on the ends of numbers and names.

@@ -23,6 +23,7 @@ mod error;
 mod files;
 pub mod foreign_syntax;
 pub mod format;
+mod grammar;
 mod include;
 mod layout;
 mod lexeme;

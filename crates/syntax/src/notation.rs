@@ -3,8 +3,8 @@
 //! Reading and printing stand side by side so that they agree: the printed text parses to the same tree.
 
 use crate::ast::{Expression, Expressions, Item, Name, Text};
-use crate::parse::Rule;
-use crate::parse::build::{Builder, Built, Pair, is_punctuation};
+use crate::grammar::{Pair, Rule};
+use crate::parse::build::{Builder, Built, is_punctuation};
 use crate::print;
 use dlsys_expr::Sort;
 
@@ -26,6 +26,9 @@ pub(crate) fn read(builder: &mut Builder, pair: Pair) -> Built<Item> {
         Rule::const_item => parts.constant()?,
         Rule::curve_item => {
             let (sort, name) = parts.sorted_name(CURVE);
+            if let Some(file) = parts.text_if_any() {
+                return Ok(Item::Function { name, file, item: parts.text_if_any() });
+            }
             Item::Curve { name, sort, points: parts.points()?, periodic: parts.has(Rule::periodic) }
         }
         Rule::table_item => {
@@ -91,6 +94,10 @@ pub(crate) fn write(expressions: &Expressions, item: &Item) -> String {
         Item::Curve { name, sort, points, periodic } => {
             let points = written_points(expressions, points);
             format!("curve {}{} = {points}{}", sort_word(*sort, CURVE), name.text, ending(*periodic))
+        }
+        Item::Function { name, file, item } => {
+            let item = item.as_ref().map(|i| format!(" item \"{}\"", i.text)).unwrap_or_default();
+            format!("curve {} from \"{}\"{item}", name.text, file.text)
         }
         Item::Table { name, sort, file, column, periodic } => {
             let column = column.as_ref().map(|c| format!(" column \"{}\"", c.text)).unwrap_or_default();

@@ -29,7 +29,7 @@ mod ways;
 
 pub use chance::{Purpose, Seed, key};
 pub use dlsys_expr::SimTime;
-pub use lineage::{Family, Lineage};
+pub use lineage::{Family, Lineage, mix};
 pub use string::{Module, ModuleString, Version};
 pub use tree::{ModuleId, ModuleView, NO_LABEL, Tree};
 pub use walk::{Visit, Walk};

@@ -82,8 +82,9 @@ fn trail(before: u64, place: usize) -> u64 {
     before << 8 | (place as u64 + 1).min(255)
 }
 
-/// The finalizer of SplitMix64 (Steele, Lea, Flood 2014) over a running value.
-pub(super) fn mix(state: u64, value: u64) -> u64 {
+/// The finalizer of SplitMix64 (Steele, Lea, Flood 2014) over a running value: 64 bits that look random for any two
+/// numbers, such as a seed and a counter.
+pub fn mix(state: u64, value: u64) -> u64 {
     let mut z =
         state.wrapping_add(0x9e37_79b9_7f4a_7c15).wrapping_add(value.wrapping_mul(0xd6e8_feb8_6659_fd93));
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -50,11 +50,12 @@ pub fn new(args: &NewArgs) -> Result<(), Failure> {
         Failure::Model(format!("error: cannot write {}: {error}\n\n  = help: {help}\n", path.display()))
     })?;
     let (file, frames) = (typed(&path), path.with_extension(""));
-    let (folder, frames) = (frames.display(), typed(&frames));
+    let (page, folder, frames) = (path.with_extension("html"), frames.display(), typed(&frames));
     let next = [
+        (format!("view {file} -o {}", typed(&page)), "a page that plays it: open it in a browser".to_owned()),
         (
-            format!("render {file} -o {frames}"),
-            format!("draws it; open {folder}/frame-0120.svg in a browser"),
+            format!("render {file} -o {frames} --format png"),
+            format!("pictures of all its frames, up to {folder}/frame-0160.png"),
         ),
         (
             format!("render {file} -o {frames} --watch"),
@@ -96,6 +97,7 @@ mod tests {
         assert!(session.warnings.is_empty(), "{:?}", session.warnings);
         assert_eq!(session.model.title.as_deref(), Some("a fern"));
         assert_eq!(format(&Source::new("fern.dls", &*text)).expect("good"), text);
-        assert_eq!(session.model.frames.expect("frames").times().count(), 121);
+        assert_eq!(session.model.frames.expect("frames").times().count(), 161);
+        assert!(text.lines().count() < 40);
     }
 }

@@ -7,6 +7,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use super::invariance::Random;
 use dlsys_expr::{Binary, Curve, Graph, Integral, Monomial, Node, NodeId, Part, Polynomial, Program, Unary};
 use dlsys_model::{DrivenGrowth, GrowthLaw};
 
@@ -353,18 +354,10 @@ fn proportional(graph: &mut Graph, rows: &[Vec<NodeId>], time: u32) -> bool {
     let nodes: Vec<NodeId> = rows.concat();
     let most = graph.variables(&nodes).last().map_or(0, |v| *v + 1).max(time);
     let program = Program::compile(graph, &nodes, most as usize);
-    let mut seed: u64 = 0x5eed;
+    let mut random = Random::new();
     let mut defined = 0;
     for _ in 0..4 * POINTS {
-        let point: Vec<f64> = (0..most)
-            .map(|_| {
-                // SplitMix64 (Steele, Lea and Flood 2014), as numbers from 0.2 to 1.7.
-                seed = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
-                let mut z = (seed ^ (seed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-                z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-                0.2 + 1.5 * ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-            })
-            .collect();
+        let point: Vec<f64> = (0..most).map(|_| 0.2 + 1.5 * random.unit()).collect();
         let mut out = vec![0.0; nodes.len()];
         program.eval(&point, &mut Vec::new(), &mut out);
         let width = rows[0].len();

@@ -13,6 +13,7 @@
 
 use super::form::{Bounded, Form, Indeterminates, forms};
 use dlsys_expr::{Binary, Dual, Graph, NodeId, Program};
+use dlsys_tree::mix;
 
 /// Number of points at which the rate is tested, if there are constant parameters.
 const POINTS: usize = 24;
@@ -151,26 +152,27 @@ impl Surface<'_> {
     }
 }
 
-/// SplitMix64 (Steele, Lea, Flood 2014): the points are the same in every run.
+/// Random numbers, the same in every run: [`mix`] of a counter.
 pub struct Random(u64);
 
 impl Random {
     pub fn new() -> Random {
-        Random(0x5eed)
+        Random(0)
     }
 
     fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        self.0 += 1;
+        mix(0x5eed, self.0)
+    }
+
+    /// A number from 0 up to, but not including, 1.
+    pub fn unit(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
 
     /// A number of either sign, most often positive, between 1/100 and 100.
     pub fn magnitude(&mut self) -> f64 {
-        let unit = (self.next() >> 11) as f64 / (1u64 << 53) as f64;
-        let size = 10f64.powf(4.0 * unit - 2.0);
+        let size = 10f64.powf(4.0 * self.unit() - 2.0);
         if self.next().is_multiple_of(4) { -size } else { size }
     }
 }

@@ -113,8 +113,20 @@ impl Curve {
 
     fn jumps_between(&self, part: Part, first: f64, last: f64) -> bool {
         // Within a curve that is no polygon slopes do not jump, only at its ends.
+        if part == Part::Value {
+            let count = self.pieces.len() as f64;
+            return self.breaks.iter().any(|at| {
+                // The first time that this piece begins beyond `first`.
+                let turns = if self.periodic { ((first - *at as f64) / count).floor() + 1.0 } else { 0.0 };
+                let begins = *at as f64 + turns * count;
+                first < begins && begins <= last
+            });
+        }
         let inside = first >= 0.0 && last < self.pieces.len() as f64;
-        let smooth = part == Part::Slope && self.sort != super::Sort::Linear && (self.periodic || inside);
+        let smooth = part == Part::Slope
+            && self.sort != super::Sort::Linear
+            && self.breaks.is_empty()
+            && (self.periodic || inside);
         self.jumps(part) && !smooth
     }
 
@@ -144,7 +156,7 @@ impl Curve {
     /// Bounds of a part over everything.
     fn whole(&self, part: Part) -> Interval {
         match part {
-            Part::Value => Interval { lo: self.range.0, hi: self.range.1, partial: false },
+            Part::Value => Interval { lo: self.range.0, hi: self.range.1, partial: self.jumps(part) },
             _ if self.pieces.len() > MANY => Interval::ENTIRE,
             _ => {
                 let hull = |a: Interval, b: Interval| Interval {

@@ -8,11 +8,14 @@ use crate::Error;
 pub const MAX_POINTS: usize = 1_000_000;
 
 impl Curve {
-    /// The curve of a sort by points. A periodic one ends on the value with which it begins.
+    /// The curve of a sort by points. A periodic one ends on the value with which it begins. Two points with the same
+    /// argument are a jump, at which the curve has the second value; among the control points of a spline they are a
+    /// corner, and four of them a jump.
     ///
     /// # Errors
     ///
-    /// There are too few points or too many, they do not ascend or do not close, or the numbers are too large.
+    /// There are too few points or too many, they descend or do not close, a jump stands at an end or has more than two
+    /// points, or the numbers are too large.
     pub fn new(
         name: impl Into<String>,
         sort: Sort,
@@ -30,24 +33,23 @@ impl Curve {
         if points.len() > MAX_POINTS {
             return Err(Error::TooMany);
         }
-        if let Some(i) = points.windows(2).position(|pair| pair[1][0] <= pair[0][0]) {
-            return Err(Error::NotAscending(i + 1));
-        }
+        check_order(sort, points)?;
         let (first, last) = (points[0][1], points[points.len() - 1][1]);
         if periodic && first != last {
             return Err(Error::NotClosed { first, last });
         }
-        let pieces = match sort {
-            Sort::Linear => linear(points),
-            Sort::Monotone => monotone(points, periodic),
-            Sort::Spline => spline(points, periodic),
+        let (pieces, breaks) = match sort {
+            Sort::Spline => without_gaps(spline(points, periodic)),
+            _ => through(sort, points, periodic),
         };
-        let mut knots = vec![pieces[0].place(0.0)];
+        let Some(first) = pieces.first() else { return Err(Error::TooFew(least)) };
+        let mut knots = vec![first.place(0.0)];
         let mut sums = vec![0.0];
+        // The points themselves, where the curve goes through them.
+        let mut ends = points.windows(2).filter(|pair| pair[0][0] < pair[1][0]).map(|pair| pair[1][0]);
         for (i, piece) in pieces.iter().enumerate() {
-            // The points themselves, where the curve goes through them.
-            let end = if sort == Sort::Spline { piece.place(1.0) } else { points[i + 1][0] };
-            knots.push(end);
+            let end = ends.next().filter(|_| sort != Sort::Spline);
+            knots.push(end.unwrap_or_else(|| piece.place(1.0)));
             sums.push(sums[i] + piece.area(1.0));
         }
         let sound = sums.iter().all(|x| x.is_finite())
@@ -64,8 +66,59 @@ impl Curve {
         let along = |sign: f64| points.windows(2).all(|pair| (pair[1][1] - pair[0][1]) * sign > 0.0);
         let direction = [1.0, -1.0].into_iter().find(|sign| along(*sign));
         let points = points.len();
-        Ok(Curve { name: name.into(), sort, periodic, points, knots, pieces, sums, range, direction })
+        let name = name.into();
+        Ok(Curve { name, sort, periodic, points, knots, pieces, breaks, sums, range, direction })
     }
+}
+
+/// Checks that the points ascend, and that a jump has two points and stands between others.
+fn check_order(sort: Sort, points: &[[f64; 2]]) -> Result<(), Error> {
+    if let Some(i) = points.windows(2).position(|pair| pair[1][0] < pair[0][0]) {
+        return Err(Error::NotAscending(i + 1));
+    }
+    if sort == Sort::Spline {
+        return Ok(());
+    }
+    let last = points.len() - 1;
+    let jumps: Vec<usize> = (1..=last).filter(|i| points[i - 1][0] == points[*i][0]).collect();
+    if let Some(pair) = jumps.windows(2).find(|pair| pair[0] + 1 == pair[1]) {
+        return Err(Error::Crowded(pair[1]));
+    }
+    match jumps.iter().find(|i| **i == 1 || **i == last) {
+        Some(i) => Err(Error::JumpAtEnd(*i)),
+        None => Ok(()),
+    }
+}
+
+/// The pieces of a curve through its points, and the numbers of those that begin with a jump.
+fn through(sort: Sort, points: &[[f64; 2]], periodic: bool) -> (Vec<Cubic>, Vec<usize>) {
+    let (mut pieces, mut breaks) = (Vec::new(), Vec::new());
+    for run in points.chunk_by(|a, b| a[0] < b[0]) {
+        if !pieces.is_empty() {
+            breaks.push(pieces.len());
+        }
+        pieces.extend(match sort {
+            Sort::Linear => linear(run),
+            // A seam is smooth if the curve has no jump.
+            _ => monotone(run, periodic && run.len() == points.len()),
+        });
+    }
+    (pieces, breaks)
+}
+
+/// The pieces of a spline without those of no width, and the numbers of the pieces before which one was.
+fn without_gaps(all: Vec<Cubic>) -> (Vec<Cubic>, Vec<usize>) {
+    let (mut pieces, mut breaks) = (Vec::with_capacity(all.len()), Vec::new());
+    for piece in all {
+        if piece.place(0.0) < piece.place(1.0) {
+            pieces.push(piece);
+        } else {
+            breaks.push(pieces.len());
+        }
+    }
+    breaks.dedup();
+    breaks.retain(|at| *at > 0 && *at < pieces.len());
+    (pieces, breaks)
 }
 
 fn linear(points: &[[f64; 2]]) -> Vec<Cubic> {

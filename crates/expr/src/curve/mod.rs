@@ -2,7 +2,8 @@
 //!
 //! A [`Curve`] is a list of pieces, each a cubic in a parameter u from 0 to 1; so its integral and its derivatives are
 //! polynomials of each piece, known without approximation. Beyond its ends a curve keeps the value it has there, or it
-//! is periodic. `curve/bounds.rs` has the same for intervals.
+//! is periodic. Between two pieces its value may jump; at the jump it has the second value. `curve/bounds.rs` has the
+//! same for intervals.
 
 mod bounds;
 mod build;
@@ -71,6 +72,8 @@ pub struct Curve {
     /// Where pieces begin, and the last one ends; ascending.
     knots: Vec<f64>,
     pieces: Vec<Cubic>,
+    /// The pieces, by number, at whose beginning the value jumps; ascending.
+    breaks: Vec<usize>,
     /// Integral from the first knot to each.
     sums: Vec<f64>,
     /// Least and greatest value.
@@ -115,9 +118,10 @@ impl Curve {
     /// True if a part jumps at knots.
     pub fn jumps(&self, part: Part) -> bool {
         match part {
-            Part::Value | Part::Integral | Part::Phase | Part::Inverse => false,
+            Part::Value => !self.breaks.is_empty(),
+            Part::Integral | Part::Phase | Part::Inverse => false,
             // At the ends of the others there may be a kink, too.
-            Part::Slope => self.sort == Sort::Linear || !self.periodic,
+            Part::Slope => self.sort == Sort::Linear || !self.periodic || !self.breaks.is_empty(),
             Part::Second | Part::Third | Part::PhaseSlope => true,
         }
     }

@@ -13,6 +13,9 @@ pub struct Cubic {
     pub straight: bool,
 }
 
+/// A speed of x below this part of the width of its piece is 0 but for rounding.
+const VERTICAL: f64 = 1e-13;
+
 pub fn polynomial(c: &[f64], u: f64) -> f64 {
     c.iter().rev().fold(0.0, |sum, c| sum * u + c)
 }
@@ -110,8 +113,12 @@ impl Cubic {
         }
     }
 
-    /// Value and derivatives by x.
+    /// Value and derivatives by x. Where the curve is vertical, as at the end of a spline with two control points at one
+    /// x, the derivatives are given as 0: a continuation beyond the end is flat.
     pub fn taylor(&self, u: f64) -> [f64; 4] {
+        if polynomial(&differentiated(&self.x), u) <= VERTICAL * (self.place(1.0) - self.place(0.0)) {
+            return [self.value(u), 0.0, 0.0, 0.0];
+        }
         let [first, second, third] =
             [Part::Slope, Part::Second, Part::Third].map(|part| self.derivative(part, u));
         [self.value(u), first, second, third]

@@ -69,8 +69,17 @@ fn monotone_curves_do_not_overshoot() {
 fn points_that_make_no_curve() {
     let fault = |sort, points: &[[f64; 2]], periodic| Curve::new("g", sort, points, periodic).err();
     assert_eq!(fault(Sort::Linear, &[[0.0, 1.0]], false), Some(Error::TooFew(2)));
-    let twice = [[0.0, 1.0], [1.0, 1.0], [1.0, 2.0], [2.0, 1.0]];
-    assert_eq!(fault(Sort::Spline, &twice, false), Some(Error::NotAscending(2)));
+    let back = [[0.0, 1.0], [1.0, 1.0], [0.9, 2.0], [2.0, 1.0]];
+    assert_eq!(fault(Sort::Spline, &back, false), Some(Error::NotAscending(2)));
+    let thrice = [[0.0, 1.0], [1.0, 1.0], [1.0, 2.0], [1.0, 1.0], [2.0, 1.0]];
+    assert_eq!(fault(Sort::Linear, &thrice, false), Some(Error::Crowded(3)));
+    let ends = [[0.0, 1.0], [1.0, 1.0], [1.0, 2.0]];
+    assert_eq!(fault(Sort::Monotone, &ends, false), Some(Error::JumpAtEnd(2)));
+    assert_eq!(
+        fault(Sort::Linear, &ends.map(|[x, y]| [1.0 - x, y]).into_iter().rev().collect::<Vec<_>>(), false),
+        Some(Error::JumpAtEnd(1))
+    );
+    assert_eq!(fault(Sort::Spline, &[[1.0, 0.0]; 4], false), Some(Error::TooFew(4)));
     let open = [[0.0, 1.0], [1.0, 2.0], [2.0, 3.0]];
     assert_eq!(fault(Sort::Monotone, &open, true), Some(Error::NotClosed { first: 1.0, last: 3.0 }));
     let huge = [[0.0, -1e308], [1e-300, 1e308]];
@@ -149,4 +158,53 @@ proptest! {
             prop_assert!(g.eval(Part::Inverse, 1e3).is_nan());
         }
     }
+}
+
+#[test]
+fn two_points_with_one_x_are_a_jump() {
+    let points = [[0.0, 0.0], [1.0, 1.0], [1.0, 3.0], [2.0, 3.5], [3.0, 0.0]];
+    for (sort, periodic) in [(Sort::Linear, false), (Sort::Monotone, false), (Sort::Linear, true)] {
+        let g = curve(sort, &points, periodic);
+        let before = f64::from_bits(1f64.to_bits() - 1);
+        assert!((g.eval(Part::Value, before) - 1.0).abs() < 1e-14, "{sort:?}");
+        assert_eq!(g.eval(Part::Value, 1.0), 3.0, "{sort:?}");
+        assert!(g.jumps(Part::Value) && g.direction().is_none());
+        // No continuity over the jump, on every turn of a periodic curve; continuity beside it.
+        let over = |lo: f64, hi: f64| g.over(Part::Value, Interval { lo, hi, partial: false }).partial;
+        assert!(
+            over(0.5, 1.5) && over(0.5, 1.0) && !over(1.0, 2.5) && !over(0.2, 0.9) && !over(2.5, 3.5),
+            "{sort:?}"
+        );
+        assert_eq!(over(3.5, 4.5), periodic);
+        assert_eq!(over(-2.5, -1.5), periodic);
+    }
+    let g = curve(Sort::Linear, &points, false);
+    assert_eq!(g.eval(Part::Integral, 2.0), 0.5 + 3.25);
+    // Each side has its own slope.
+    let slopes = [0.999, 1.001].map(|x| g.eval(Part::Slope, x));
+    assert!((slopes[0] - 1.0).abs() < 1e-12 && (slopes[1] - 0.5).abs() < 1e-12);
+    // A rising curve with a jump has an inverse: the jump, for the values that it passes over.
+    let g = curve(Sort::Linear, &points[..4], false);
+    assert_eq!([1.0, 2.0, 3.0].map(|y| g.eval(Part::Inverse, y)), [1.0; 3]);
+    assert!((g.eval(Part::Inverse, 3.25) - 1.5).abs() < 1e-15);
+}
+
+#[test]
+fn control_points_with_one_x_are_corners() {
+    // As function editors write steps: the Bézier curve of these points rises steeply and has no jump.
+    let g = curve(Sort::Spline, &[[0.0, 0.0], [0.4, 0.0], [0.4, 1.0], [1.0, 1.0]], false);
+    assert!(!g.jumps(Part::Value));
+    // x = 1.2 u (1 - u)^2 + 1.2 u² (1 - u) + u³ and y = 3 u² (1 - u) + u³ at u = 1/2.
+    assert!((g.eval(Part::Value, 0.425) - 0.5).abs() < 1e-15);
+    // Two points at an end: a vertical tangent. The continuation beyond it is finite.
+    let g = curve(Sort::Spline, &[[0.0, 0.0], [0.0, 1.0], [1.0, 1.0], [2.0, 1.0]], false);
+    assert!(g.eval(Part::Value, 1e-6) > 1e-4);
+    assert_eq!(g.continued(Part::Value, 0.0, -0.1), 0.0);
+    // Four points at one place are a jump.
+    let mut points = vec![[0.0, 0.0], [0.1, 0.0], [0.2, 0.0], [0.3, 0.0]];
+    points.extend([[0.5, 0.0], [0.5, 0.0], [0.5, 0.0], [0.5, 1.0], [0.5, 1.0], [0.5, 1.0]]);
+    points.extend([[0.7, 1.0], [0.8, 1.0], [1.0, 1.0]]);
+    let g = curve(Sort::Spline, &points, false);
+    assert!(g.jumps(Part::Value));
+    assert_eq!([0.4999999, 0.5].map(|x| g.eval(Part::Value, x).round()), [0.0, 1.0]);
 }

@@ -3,10 +3,16 @@
 // Half of the field of view in perspective is 15 degrees.
 const SLOPE = Math.tan(Math.PI / 12);
 
+function dot(a, b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
 class Camera {
-  // `size`: sides of the box around everything, whose middle is the origin; in scene units.
-  constructor(size) {
+  // `size`: sides of the box around everything, whose middle is the origin; in scene units. `points`: those that are
+  // outermost in some direction, over the whole recording.
+  constructor(size, points) {
     this.size = size;
+    this.points = points;
     this.radius = Math.hypot(...size) / 2 || 1;
     this.perspective = true;
     this.look(0, 0);
@@ -16,10 +22,20 @@ class Camera {
   look(azimuth, elevation) {
     this.azimuth = azimuth;
     this.elevation = elevation;
-    this.target = [0, 0, 0];
     this.zoom = 1;
     // Kept while the plant is turned, so that it does not change its size then.
-    this.fit = this.axes().map((axis) => this.size.reduce((sum, side, i) => sum + Math.abs(axis[i] * side) / 2, 0));
+    const [right, up, towards] = this.axes();
+    // The middle of what is seen.
+    const middle = [right, up].map((axis) => {
+      const along = this.points.map((point) => dot(axis, point));
+      return along.length ? (Math.min(...along) + Math.max(...along)) / 2 : 0;
+    });
+    this.target = [0, 1, 2].map((i) => right[i] * middle[0] + up[i] * middle[1]);
+    this.fit = this.points.map((point) => [
+      Math.abs(dot(right, point) - middle[0]),
+      Math.abs(dot(up, point) - middle[1]),
+      dot(towards, point),
+    ]);
   }
 
   orbit(right, up) {
@@ -38,10 +54,10 @@ class Camera {
 
   // Half of the height of the plane through the target that is seen, in scene units.
   reach(aspect) {
-    const [right, up, depth] = this.fit;
     // What is nearer than the target is seen larger.
-    const nearer = this.perspective ? depth * SLOPE : 0;
-    return (1.06 * (Math.max(up, right / aspect, this.radius / 50) + nearer)) / this.zoom;
+    const slope = this.perspective ? SLOPE : 0;
+    const needed = this.fit.reduce((most, [right, up, near]) => Math.max(most, Math.max(up, right / aspect) + near * slope), this.radius / 50);
+    return (1.05 * needed) / this.zoom;
   }
 
   // Moves what is seen by parts of the height of the picture.

@@ -26,7 +26,10 @@ class Player {
     this.speed = 1;
     this.elements = Object.fromEntries([...document.querySelectorAll("[id]")].map((element) => [element.id, element]));
     const { extent, size } = recording;
-    this.camera = new Camera(size.map((side) => side * extent));
+    this.camera = new Camera(
+      size.map((side) => side * extent),
+      outermost(recording),
+    );
     this.painter = new Painter(this.elements.plant, recording);
     this.moments = [...new Set(recording.events.map(([time]) => time))];
     this.describe();

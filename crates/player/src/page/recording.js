@@ -97,3 +97,73 @@ function frameOf(times, time) {
   }
   return low + (time - times[low]) / (times[high] - times[low]);
 }
+
+// `count` directions, about evenly spread: a spiral over the sphere.
+function directionsAround(count) {
+  return Array.from({ length: count }, (_, i) => {
+    const y = 1 - (2 * i + 1) / count;
+    const [r, a] = [Math.sqrt(1 - y * y), i * 2.399963];
+    return [r * Math.cos(a), y, r * Math.sin(a)];
+  });
+}
+
+// Keeps of the points that it is given those that are outermost in some direction.
+function outline(count) {
+  const directions = directionsAround(count);
+  const best = directions.map(() => [-Infinity]);
+  const take = (x, y, z, radius = 0) => {
+    directions.forEach((d, n) => {
+      const reach = d[0] * x + d[1] * y + d[2] * z + radius;
+      if (reach > best[n][0]) best[n] = [reach, [x + radius * d[0], y + radius * d[1], z + radius * d[2]]];
+    });
+  };
+  return { take, points: () => best.flatMap(([, point]) => (point ? [point] : [])) };
+}
+
+// The points of a recording that are outermost in some direction, over all its frames: what the camera fits into the
+// page. The box around everything would leave the page half empty.
+function outermost({ tracks, meshes }) {
+  const all = outline(200);
+  const shapes = meshes.map(({ places }) => {
+    const shape = outline(40);
+    for (let i = 0; i < places.length; i += 3) shape.take(places[i], places[i + 1], places[i + 2]);
+    return shape.points();
+  });
+  // Millions of points say no more than many.
+  const taken = ({ kind, detail, length, width }) => length * (kind === 1 ? shapes[detail].length : width / 3);
+  const skip = Math.ceil(tracks.reduce((sum, track) => sum + taken(track), 0) / 100000);
+  let turn = 0;
+  for (const { kind, detail, samples, width, length } of tracks) {
+    for (let i = 0; i < length; i++) {
+      // The last sample of a track is most often its largest.
+      if (turn++ % skip && i < length - 1) continue;
+      const n = samples.subarray(i * width, (i + 1) * width);
+      if (kind === 0) {
+        for (const at of [0, 9]) all.take(n[at], n[at + 1], n[at + 2], Math.hypot(n[at + 3], n[at + 4], n[at + 5]));
+      } else if (kind === 1) {
+        const across = [n[4] * n[8] - n[5] * n[7], n[5] * n[6] - n[3] * n[8], n[3] * n[7] - n[4] * n[6]];
+        const each = 1 / (Math.hypot(n[3], n[4], n[5]) || 1);
+        for (const [x, y, z] of shapes[detail]) {
+          all.take(...[0, 1, 2].map((k) => n[k] + n[3 + k] * x + n[6 + k] * y + across[k] * each * z));
+        }
+      } else {
+        const places = kind === 2 ? onPatch(n) : n;
+        for (let k = 0; k < places.length; k += 3) all.take(places[k], places[k + 1], places[k + 2]);
+      }
+    }
+  }
+  return all.points();
+}
+
+// Points of a Bézier patch at every third of its sides; its control points may lie far outside.
+function onPatch(net) {
+  const weights = [0, 1 / 3, 2 / 3, 1].map((u) => [(1 - u) ** 3, 3 * u * (1 - u) ** 2, 3 * u * u * (1 - u), u ** 3]);
+  const places = new Float32Array(48);
+  for (let at = 0; at < 16; at++) {
+    for (let from = 0; from < 16; from++) {
+      const weight = weights[at >> 2][from >> 2] * weights[at & 3][from & 3];
+      for (let k = 0; k < 3; k++) places[3 * at + k] += weight * net[3 * from + k];
+    }
+  }
+  return places;
+}

@@ -6,7 +6,7 @@
 use super::{ItemKind, RawItem, Scanner};
 use crate::declarations::{self, Body};
 use crate::foreign_syntax;
-use crate::lexeme::Token;
+use crate::lexeme::{SUBSCRIPTED, Token};
 use crate::suggest::nearest;
 use dlsys_diagnostic::{Diagnostic, Span};
 
@@ -209,6 +209,7 @@ impl Scanner<'_> {
         let name = match self.text_of(first) {
             "@" if tokens.get(1).is_some_and(|t| t.0 == Token::Word && t.1 == first.2) => 2,
             "±" | "+" | "-" | "&" | "^" | "\\" | "/" | "|" | "$" | "!" | ";" | "{" | "}" | "." => 1,
+            text if text.starts_with(|c| SUBSCRIPTED.contains(c)) && text.contains('_') => 1,
             _ if first.0 == Token::Word && self.first_clause(tokens) != Some(0) => 1,
             _ => return 0,
         };

@@ -1,12 +1,21 @@
 //! Advice for texts that cannot be parsed: the notation of the declaration at hand.
 
-use super::Rule;
 use crate::declarations::Declaration;
+use crate::grammar::Rule;
 
 /// Advice for curves, tables, arrays and names within rules, given the text before the error and the token there.
 pub fn for_block(item: Rule, before: &str, found: &str) -> Option<&'static str> {
     let previous = before.trim_end().chars().next_back();
     match item {
+        Rule::curve_item if before.contains('"') => Some(
+            "a function of cpfg is written `curve g from \"g.func\"`, or `curve g from \"functions.fset\" item \"NAME\"`",
+        ),
+        Rule::curve_item if before.trim_end().ends_with("from") => {
+            Some("the name of the file is a text in quotes: `curve g from \"g.func\"`")
+        }
+        Rule::curve_item if found == "from" => Some(
+            "a function of cpfg is a B-spline, and `from` stands behind its name: `curve g from \"g.func\"`",
+        ),
         Rule::curve_item if before.contains('=') => {
             Some("a curve is two points or more, of two numbers each: `curve g = (0, 0) (1, 0.3) (2, 1)`")
         }

@@ -3,13 +3,12 @@
 use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, LazyLock};
 
-pub(crate) use super::Pair;
-use super::Rule;
 use crate::ast;
 use crate::ast::{
     Action, Alternative, Clause, Conditional, ContextPart, Equation, Expr, ExprId, Expression, Expressions,
     HeadModule, Item, Module, Name, Part, Repetition, Text,
 };
+use crate::grammar::{Pair, Rule};
 use crate::notation;
 use dlsys_diagnostic::{Diagnostic, Span};
 
@@ -120,15 +119,8 @@ impl Builder<'_> {
 
     pub(crate) fn head_module(&mut self, pair: Pair) -> HeadModule {
         let span = self.span(&pair);
-        let sign = pair.as_rule() == Rule::plus_minus;
         let mut inner = pair.into_inner();
-        let name = if sign {
-            Name {
-                text: self.interner.get("±"), span: Span::new(span.range().start, span.range().start + 2)
-            }
-        } else {
-            self.name(&inner.next().expect("a module has a name"))
-        };
+        let name = self.name(&inner.next().expect("a module has a name"));
         let parameters = inner.next().map(|formals| self.formals(formals)).unwrap_or_default();
         HeadModule { name, parameters, span }
     }

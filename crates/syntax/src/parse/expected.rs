@@ -4,12 +4,12 @@ use std::collections::BTreeSet;
 
 use pest::error::{Error, ErrorVariant, InputLocation};
 
-use super::Rule;
 use super::advice;
 use super::build::keyword;
 use super::hints::{hint, is_derivative, keyword_hint};
 use crate::declarations::{self, Declaration};
 use crate::foreign_syntax;
+use crate::grammar::Rule;
 use crate::layout::RawItem;
 use dlsys_diagnostic::{Diagnostic, Span};
 

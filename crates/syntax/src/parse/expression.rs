@@ -5,8 +5,8 @@ use std::sync::LazyLock;
 use pest::pratt_parser::{Assoc, Op, PrattParser};
 
 use super::build::{Builder, Built, is_punctuation};
-use super::{Pair, Rule};
 use crate::ast::{Aggregate, Expr, ExprId, Expression, Operator};
+use crate::grammar::{Pair, Rule};
 use crate::words::FOLDS;
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_expr::{Comparison, Fold};

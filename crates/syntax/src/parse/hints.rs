@@ -1,9 +1,10 @@
 //! Hints for common errors in the notation, from the text around the error and the token there.
 
-use super::Rule;
 use super::advice;
 use super::expected::is_item_with_name;
 use crate::declarations;
+use crate::foreign_syntax;
+use crate::grammar::Rule;
 use crate::suggest::nearest;
 
 /// The hint for a syntax error, if it is a common one.
@@ -21,6 +22,9 @@ pub(super) fn hint(item: Rule, text: &str, at: usize, found: &str) -> Option<Str
     }
     if let Some(advice) = hint_of_group(item, &text[..at], found) {
         return Some(advice.to_owned());
+    }
+    if let Some(advice) = hint_of_symbol(item, &text[..at], &text[at..]) {
+        return Some(advice);
     }
     if let Some(advice) = hint_of_chance(item, text, at, found) {
         return Some(advice.to_owned());
@@ -60,6 +64,13 @@ fn hint_of_group(item: Rule, before: &str, found: &str) -> Option<&'static str> 
         }
     }
     None
+}
+
+/// Hints for symbols of strings in cpfg and L-Py.
+fn hint_of_symbol(item: Rule, before: &str, rest: &str) -> Option<String> {
+    let in_step = item == Rule::step_item && (before.contains("->") || before.contains('→'));
+    let after_symbol = before.ends_with(|c: char| !(c.is_alphanumeric() || c == ')' || c.is_whitespace()));
+    (in_step || in_string(item, before)).then(|| foreign_syntax::symbol(rest, after_symbol)).flatten()
 }
 
 /// Hints for successors with weights and for events at a rate.

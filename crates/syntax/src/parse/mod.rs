@@ -20,21 +20,10 @@ use crate::Errors;
 use crate::ast::{Document, Expression, HeadModule, Item, Part, modules_of};
 use crate::declarations::{Body, Named};
 use crate::foreign_syntax;
+use crate::grammar::{Grammar, Pair, Rule};
 use crate::layout::{ItemKind, RawItem, layout};
 use crate::lexeme::in_name;
 use dlsys_diagnostic::{Diagnostic, Source, Span};
-
-/// The pest parser of `grammars/dlsys.pest`, and its rules.
-#[allow(missing_docs)] // The enum that pest derives has no documentation.
-mod grammar {
-    #[derive(pest_derive::Parser)]
-    #[grammar = "../grammars/dlsys.pest"]
-    pub struct Grammar;
-}
-
-pub(crate) use grammar::{Grammar, Rule};
-
-pub(crate) type Pair<'i> = pest::iterators::Pair<'i, Rule>;
 
 /// Maximum number of errors that are collected from one text.
 const MAX_ERRORS: usize = 50;
@@ -71,6 +60,15 @@ impl Reader {
         if text.contains("#define") {
             let known = foreign_syntax::commented_definitions(text);
             self.document.commented.extend(known.map(|(name, meaning)| (name.into(), meaning.to_owned())));
+        }
+        for (at, inside) in foreign_syntax::commented_widths(text) {
+            let in_item = cut.items.iter().rfind(|item| item.start < at).is_some_and(|item| {
+                matches!(item.kind, ItemKind::Rule | ItemKind::Step) || item.kind.has_string()
+            });
+            if in_item {
+                let span = Span::new(at, at + inside.len() + 3);
+                self.document.commented_widths.push((span, inside.trim().to_owned()));
+            }
         }
         let functions = cut.items.iter().filter(|item| {
             item.kind.declaration().is_some_and(|declaration| declaration.named == Named::Function)
@@ -124,29 +122,31 @@ fn declared_word<'t>(text: &'t str, item: &RawItem) -> Option<&'t str> {
 
 /// Parses one expression.
 pub fn parse_expression(source: &Source) -> Result<(Document, Expression), Errors> {
-    let cut = layout(&format!("const it =\n{}", source.text));
-    if !cut.errors.is_empty() {
-        return Err(cut.errors.into());
-    }
-    let mut document = Document::default();
-    let mut interner = build::Interner::default();
-    let mut builder = build::Builder {
-        expressions: &mut document.expressions,
-        interner: &mut interner,
-        offset: 0,
-        defined: None,
-    };
-    let pair = pest_parse(Rule::lone_expr, &source.text, 0).map_err(|e| Errors::from(*e))?;
-    let inner = pair.into_inner().next().expect("the grammar has an expression here");
-    let expression = builder.expression(inner).map_err(|e| Errors::from(*e))?;
-    Ok((document, expression))
+    read_alone(source, Rule::lone_expr, Errors::from, |builder, pair| {
+        builder.expression(pair.into_inner().next().expect("the grammar has an expression here"))
+    })
 }
 
 /// Parses a measure: the head of a module and the expression that is summed; without one, modules are counted.
 pub fn parse_measure(source: &Source) -> Result<(Document, HeadModule, Option<Expression>), Errors> {
+    let unread = |_| Errors::from(Diagnostic::error("this cannot be measured").help(MEASURE));
+    let (document, (head, expression)) =
+        read_alone(source, Rule::measure, unread, |builder, pair| builder.measure(pair))?;
+    Ok((document, head, expression))
+}
+
+/// Parses a text that is no model, by an entry rule of the grammar; `unread` makes the error of a text that cannot be
+/// cut into tokens.
+fn read_alone<T>(
+    source: &Source,
+    rule: Rule,
+    unread: impl FnOnce(Vec<Diagnostic>) -> Errors,
+    build: impl FnOnce(&mut build::Builder, Pair) -> build::Built<T>,
+) -> Result<(Document, T), Errors> {
+    // The layout bounds the nesting.
     let cut = layout(&format!("const it =\n{}", source.text));
     if !cut.errors.is_empty() {
-        return Err(Diagnostic::error("this cannot be measured").help(MEASURE).into());
+        return Err(unread(cut.errors));
     }
     let mut document = Document::default();
     let mut interner = build::Interner::default();
@@ -156,9 +156,12 @@ pub fn parse_measure(source: &Source) -> Result<(Document, HeadModule, Option<Ex
         offset: 0,
         defined: None,
     };
-    let pair = pest_parse(Rule::measure, &source.text, 0).map_err(|e| Errors::from((*e).help(MEASURE)))?;
-    let (head, expression) = builder.measure(pair).map_err(|e| Errors::from(*e))?;
-    Ok((document, head, expression))
+    let pair = pest_parse(rule, &source.text, 0).map_err(|error| match rule {
+        Rule::measure => Errors::from((*error).help(MEASURE)),
+        _ => Errors::from(*error),
+    })?;
+    let built = build(&mut builder, pair).map_err(|error| Errors::from(*error))?;
+    Ok((document, built))
 }
 
 /// The notation of a measure, for messages.

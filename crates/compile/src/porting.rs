@@ -1,0 +1,101 @@
+//! Warnings for texts that mean something else in cpfg or L-Py, and for what has no effect here without being an error.
+
+use std::collections::HashMap;
+
+use crate::clauses::names_of;
+use dlsys_diagnostic::{Diagnostic, Span};
+use dlsys_model::{Class, DRAWN_WORDS, KindId, Model, base_of};
+use dlsys_syntax::ast::{self, Action, Document, Item, modules_of};
+use dlsys_syntax::foreign_syntax;
+use dlsys_syntax::print;
+use dlsys_syntax::suggest::nearest;
+
+/// Warns of `#(w)`, which is a comment.
+pub fn comments(document: &Document, diagnostics: &mut Vec<Diagnostic>) {
+    for (span, inside) in &document.commented_widths {
+        diagnostics.push(
+            Diagnostic::warning("the rest of this line is a comment")
+                .at(*span, "`#` begins a comment; in cpfg it sets the width of lines")
+                .help(format!("a width is written `!({inside})`; a comment that begins with a parenthesis has a space before it: `# (…)`")),
+        );
+    }
+}
+
+/// Warns of turns in the initial string to which a rule for `±` applies, and of symbols without a parameter in a model
+/// with discrete rules, where cpfg does something else.
+pub fn strings(document: &Document, written: &[&ast::Rule], diagnostics: &mut Vec<Diagnostic>) {
+    let axioms = document.items.iter().filter_map(|(item, _)| match item {
+        Item::Axiom(modules) => Some(modules),
+        _ => None,
+    });
+    // A subscript says which turns are meant.
+    let both: Vec<&&ast::Rule> = written.iter().filter(|rule| &*rule.predecessor.name.text == "±").collect();
+    for module in axioms.flat_map(|parts| modules_of(parts)) {
+        let applies = |rule: &&&&ast::Rule| {
+            rule.predecessor.parameters.len() == module.arguments.len()
+                && names_of(rule).iter().any(|name| **name == *module.name)
+        };
+        if let Some(rule) = both.iter().find(applies) {
+            diagnostics.push(of_both_turns(module, rule));
+            break;
+        }
+    }
+    if !written.iter().any(|rule| rule.discrete) {
+        return;
+    }
+    let successors =
+        written.iter().flat_map(|rule| &rule.clauses).filter_map(|clause| match &clause.action {
+            Action::Produce(all) => Some(all.iter().flat_map(|alternative| modules_of(&alternative.modules))),
+            Action::Solve(_) => None,
+        });
+    let thinner = successors.flatten().find(|module| &*module.name == "!" && module.arguments.is_empty());
+    if let Some(module) = thinner {
+        diagnostics.push(
+            Diagnostic::warning("`!` without a parameter multiplies the width by 0.7")
+                .at(module.span, "cpfg and L-Py subtract a step from the width here")
+                .help("write the width, `!(w)`, with a parameter that carries it: `A(l, w) -> !(w) F(l) A(l, w - 0.1)`"),
+        );
+    }
+}
+
+fn of_both_turns(module: &ast::Module, rule: &ast::Rule) -> Diagnostic {
+    let head = &rule.predecessor;
+    let formals = print::head_module(head).replacen('±', "", 1);
+    Diagnostic::warning("the rule for `±` applies to this turn of the initial string, too")
+        .at(module.span, "this turn changes with the others")
+        .at(head.span, "the rule for both turns")
+        .help(format!(
+            "give the turns that change a subscript, `±_l{formals}:` for `+_l` and `-_l`; a turn of the initial string that is meant to change is then `{}_l(…)`",
+            module.name
+        ))
+}
+
+/// Warns of words in drawings that mean nothing there. `drawn` are the modules of drawings.
+pub fn drawn_words(model: &Model, drawn: &HashMap<KindId, Span>, diagnostics: &mut Vec<Diagnostic>) {
+    let mut all: Vec<(Span, KindId)> = drawn.iter().map(|(kind, span)| (*span, *kind)).collect();
+    all.sort_unstable();
+    let interpreted = || model.kinds.iter().filter(|(_, k)| k.interpretation.is_some()).map(|(_, k)| k);
+    for (span, id) in all {
+        let kind = model.kinds.get(id);
+        let name = kind.name.as_str();
+        let known = DRAWN_WORDS.contains(&base_of(name)) || interpreted().any(|other| other.name == name);
+        if kind.class() != Class::Word || known || !kind.has_no_rules() {
+            continue;
+        }
+        let candidates = interpreted().map(|kind| kind.name.as_str()).chain(DRAWN_WORDS);
+        let first = Span { end: span.start + name.len() as u32, ..span };
+        let mut warning = Diagnostic::warning(format!("nothing is drawn for `{name}`"))
+            .at(first, "it has no drawing of its own, and the turtle gives the name no meaning");
+        warning = match (foreign_syntax::module(name), nearest(name, candidates)) {
+            (Some(help), _) => warning.help(help),
+            (None, Some(near)) => warning.help(format!("did you mean `{near}`?")),
+            (None, None) => warning
+                .help(format!("write its drawing, `interpret {name}: …`, or `ε` if it is to draw nothing")),
+        };
+        if name.chars().count() > 1 && name.chars().all(|c| DRAWN_WORDS.contains(&c.to_string().as_str())) {
+            let parts: Vec<String> = name.chars().map(String::from).collect();
+            warning = warning.help(format!("two modules have a space between them: `{}`", parts.join(" ")));
+        }
+        diagnostics.push(warning);
+    }
+}
