@@ -220,7 +220,9 @@ impl<'d> Parts<'d> {
         check::coverage(&model, diagnostics);
         dead_rules::rules(&model, &self.written, document, diagnostics);
         check::inert_modules(&model, occurs, diagnostics);
-        check::commands(&model, diagnostics, &drawn.iter().chain(occurs).map(|(k, s)| (*k, *s)).collect());
+        let places = drawn.iter().chain(occurs).map(|(k, s)| (*k, *s)).collect();
+        check::commands(&model, diagnostics, &places);
+        check::surface_sizes(&model, diagnostics, &places);
         model
     }
 }

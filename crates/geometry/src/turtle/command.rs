@@ -48,6 +48,8 @@ pub(super) enum Command {
     Petal,
     /// `@B(s)`
     Bud,
+    /// `@O(d)`
+    Ball,
     /// A surface of the model, by its index among the scene's shapes.
     Surface(usize),
     /// `@PS(n)`
@@ -97,6 +99,7 @@ impl Command {
             "@K" => Command::Flower,
             "@P" => Command::Petal,
             "@B" => Command::Bud,
+            "@O" => Command::Ball,
             "@W" => Command::Taper,
             "@T" => Command::Bend,
             "@C" => Command::Contour,
@@ -115,7 +118,13 @@ impl Command {
     /// How many parameters it reads, at most.
     pub(super) fn parameters(self) -> usize {
         match self {
-            Command::ControlPoint => 3,
+            Command::ControlPoint
+            | Command::Leaf
+            | Command::Flower
+            | Command::Petal
+            | Command::Bud
+            | Command::Ball
+            | Command::Surface(_) => 3,
             Command::Color => 2,
             Command::Draw
             | Command::Move
@@ -125,11 +134,6 @@ impl Command {
             | Command::Taper
             | Command::Bend
             | Command::Contour
-            | Command::Leaf
-            | Command::Flower
-            | Command::Petal
-            | Command::Bud
-            | Command::Surface(_)
             | Command::BeginPatch
             | Command::DrawPatch => 1,
             _ => 0,

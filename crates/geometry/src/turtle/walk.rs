@@ -42,6 +42,8 @@ struct State {
     strength: f64,
     /// The last segment on this axis, if the turtle still stands at its end.
     last: Option<usize>,
+    /// The segment at whose end this branch begins, if the turtle still stands there.
+    parent: Option<usize>,
     /// Number of segments on this axis since the width was set.
     run: usize,
 }
@@ -92,6 +94,7 @@ impl<'a> Walk<'a> {
                 contour: None,
                 strength: tropism.map_or(0.0, |tropism| tropism.strength),
                 last: None,
+                parent: None,
                 run: 0,
             },
             stack: Vec::new(),
@@ -183,7 +186,7 @@ impl<'a> Walk<'a> {
             }
             Command::Push => {
                 self.stack.push(self.state.clone());
-                self.state.last = None;
+                self.state.parent = self.state.last.take().or(self.state.parent);
                 self.state.run = 0;
             }
             Command::Pop => {
@@ -198,13 +201,14 @@ impl<'a> Walk<'a> {
             }
             Command::Vertex => self.record_vertex(),
             Command::EndPolygon => self.end_polygon(),
-            Command::Leaf => self.place(&shapes::LEAF, given)?,
-            Command::Flower => self.place(&shapes::FLOWER, given)?,
-            Command::Petal => self.place(&shapes::PETAL, given)?,
-            Command::Bud => self.place(&shapes::BUD, given)?,
+            Command::Leaf => self.place(&shapes::LEAF, read)?,
+            Command::Flower => self.place(&shapes::FLOWER, read)?,
+            Command::Petal => self.place(&shapes::PETAL, read)?,
+            Command::Bud => self.place(&shapes::BUD, read)?,
+            Command::Ball => self.place(&shapes::BALL, read)?,
             Command::Surface(index) => {
                 if let Some(shape) = self.scene.shapes.get(index).cloned() {
-                    self.place(&shape, given)?;
+                    self.place(&shape, read)?;
                 }
             }
             Command::BeginPatch | Command::ControlPoint | Command::DrawPatch => self.patch(command, read)?,
@@ -310,7 +314,7 @@ impl<'a> Walk<'a> {
         if end == start {
             return Ok(());
         }
-        let follows = self.state.last.take();
+        let (follows, grows_from) = (self.state.last.take(), self.state.parent.take());
         if draw && self.polygons.is_empty() {
             let segment = Segment {
                 start,
@@ -322,6 +326,7 @@ impl<'a> Walk<'a> {
                 material: self.chosen().unwrap_or(MaterialId::STEM),
                 owner: self.owner(),
                 follows,
+                grows_from,
             };
             self.state.run = if follows.is_some() { self.state.run + 1 } else { 1 };
             self.state.last = Some(self.scene.segments.len());
@@ -418,12 +423,20 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Puts a surface of this size (1) at the turtle's position.
-    fn place(&mut self, shape: &Shape, scale: Option<f64>) -> Result<(), Error> {
-        let scale = self.in_range(scale.unwrap_or(1.0))?;
-        if scale > 0.0 {
+    /// Puts a surface at the turtle's position: of one size (1), or of a width, a length and a height, which is
+    /// the length if it is missing.
+    fn place(&mut self, shape: &Shape, sizes: &[f64]) -> Result<(), Error> {
+        let [width, length, height] = match *sizes {
+            [] => [1.0; 3],
+            [size] => [size; 3],
+            [width, length] => [width, length, length],
+            [width, length, height, ..] => [width, length, height],
+        };
+        // The axes are heading, left, up.
+        let scales = [self.in_range(length)?, self.in_range(width)?, self.in_range(height)?];
+        if scales.iter().all(|scale| *scale > 0.0) {
             let placement =
-                Placement { origin: self.state.position, axes: self.state.frame.vectors(), scale };
+                Placement { origin: self.state.position, axes: self.state.frame.vectors(), scales };
             let (tint, owner) = (self.chosen(), self.owner());
             let Shape { mesh, patches } = shape.clone();
             self.scene.surfaces.push(Surface { mesh, patches, placement, tint, owner });
