@@ -212,18 +212,19 @@ impl<'s> Tubes<'s> {
 
     /// Adds a piece and numbers what it is made of; `begin` for the first of a tube.
     fn push(&mut self, part: Part, profile: usize, collar: Option<usize>, begin: Option<Begin>, last: bool) {
-        let here = &self.segments[part.segment];
-        let radii = part.radii;
-        let length = (here.end - here.start).norm() * (part.ends[1] - part.ends[0]);
-        let slope = (radii[1] - radii[0]) / length;
+        let Part { radii, direction, .. } = part;
+        let slope = (radii[1] - radii[0]) / (part.centres[1] - part.centres[0]).norm();
         let (section, begins) = match (begin, self.pieces.last()) {
             (None, Some(before)) => {
-                let section = before.section.carried(here.direction, slope);
+                let section = before.section.carried(direction, slope);
                 let radius = before.part.radii[1];
                 let steps = (radii[0] - radius).abs() > 1e-9 * radius.max(radii[0]);
                 (section, if steps { Begin::Shoulder } else { Begin::Joint })
             }
-            (begin, _) => (Section::new(here.direction, here.across, slope), begin.unwrap_or(Begin::Dome)),
+            (begin, _) => (
+                Section::new(direction, self.segments[part.segment].across, slope),
+                begin.unwrap_or(Begin::Dome),
+            ),
         };
         let shape = &self.profiles[profile];
         let start = begins.counts(shape, radii[0]);
@@ -244,16 +245,6 @@ impl<'s> Tubes<'s> {
         &self.segments[self.pieces[piece].part.segment]
     }
 
-    /// The middle of the start (0) or of the end (1) of a piece.
-    fn centre(&self, piece: &Piece, end: usize) -> Point {
-        let segment = &self.segments[piece.part.segment];
-        match piece.part.ends[end] {
-            0.0 => segment.start,
-            1.0 => segment.end,
-            part => segment.start + (segment.end - segment.start) * part,
-        }
-    }
-
     fn collar(&self, piece: &Piece) -> Option<&Collar> {
         piece.collar.map(|i| &self.collars[i])
     }
@@ -263,14 +254,14 @@ impl<'s> Tubes<'s> {
         let piece = &self.pieces[i];
         let (begin, end) = (piece.begins, self.end(i));
         let radius = piece.part.radii[0];
-        let across = || CrossSection::across(self.centre(piece, 0), &piece.section, radius);
+        let across = || CrossSection::across(piece.part.centres[0], &piece.section, radius);
         let start = match begin {
             Begin::Dome => across(),
             Begin::Flat => across().widened(self.collar(piece)),
             Begin::Joint => self.end(i - 1),
             Begin::Shoulder => {
                 let before = &self.pieces[i - 1];
-                CrossSection::between(self.centre(before, 1), &before.section, &piece.section, radius)
+                CrossSection::between(before.part.centres[1], &before.section, &piece.section, radius)
             }
         };
         let length = |ends, caps| Length { segment: piece.part.segment, ends, caps };
@@ -287,7 +278,7 @@ impl<'s> Tubes<'s> {
     /// The cross-section at the end of a piece.
     fn end(&self, i: usize) -> CrossSection {
         let piece = &self.pieces[i];
-        let (centre, radius) = (self.centre(piece, 1), piece.part.radii[1]);
+        let (centre, radius) = (piece.part.centres[1], piece.part.radii[1]);
         let section = if piece.last {
             CrossSection::across(centre, &piece.section, radius)
         } else {
@@ -304,9 +295,9 @@ impl<'s> Tubes<'s> {
             let stem = Plain { profile: &self.profiles[piece.profile], collar: self.collar(piece) };
             let [start, end] = piece.part.radii;
             match piece.begins {
-                Begin::Dome => stem.dome(self.centre(piece, 0), start, section, -1.0, out),
+                Begin::Dome => stem.dome(piece.part.centres[0], start, section, -1.0, out),
                 Begin::Flat => {
-                    let centre = self.centre(piece, 0);
+                    let centre = piece.part.centres[0];
                     stem.joint(centre, start, [section; 2], [section; 2], out);
                     out.vertex(|| centre);
                     out.normal(|| -section.along);
@@ -314,12 +305,12 @@ impl<'s> Tubes<'s> {
                 Begin::Joint => {}
                 Begin::Shoulder => {
                     let before = &self.pieces[i - 1];
-                    stem.joint(self.centre(before, 1), start, [&before.section, section], [section; 2], out);
+                    stem.joint(before.part.centres[1], start, [&before.section, section], [section; 2], out);
                     let wider = start > before.part.radii[1];
                     out.normal(|| if wider { -section.along } else { section.along });
                 }
             }
-            let centre = self.centre(piece, 1);
+            let centre = piece.part.centres[1];
             if piece.last {
                 stem.dome(centre, end, section, 1.0, out);
             } else {

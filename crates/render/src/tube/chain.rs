@@ -1,24 +1,32 @@
 //! Segments that continue one another, cut into parts: where the width steps, the thinner stem widens smoothly
-//! towards the thicker one, and collars need corners of their own.
+//! towards the thicker one; bends are round; and collars need cross-sections of their own.
 //!
-//! A blend depends on places along the stem alone, so it is the same however the stem is divided into segments.
+//! Blends and bends depend on places along the stem alone, so they are the same however the stem is divided into segments.
 
 use super::collar::Collar;
-use dlsys_geometry::scene::Segment;
+use dlsys_geometry::scene::{Point, Segment, Vector};
 
 /// Widths that differ by less than this part do not make a step.
 const EQUAL: f64 = 1e-9;
-/// Length of a blend in parts of its height.
+/// Length of a blend in parts of its height, and in parts of the thinner radius where that is more.
 const LENGTH: f64 = 2.5;
+const LEAST: f64 = 1.2;
 /// Most that a blend adds to the thinner radius, in parts of it; beyond that there is a flat shoulder.
 const MOST: f64 = 1.0;
+
+/// Segments are straight on from one another if the sine of their angle is less.
+const STRAIGHT: f64 = 1e-6;
+/// Radius of a bend, in parts of the stem's radius.
+const ROUNDING: f64 = 2.5;
 
 /// A part of a segment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Part {
     pub(super) segment: usize,
-    /// Its ends in parts of the segment.
-    pub(super) ends: [f64; 2],
+    /// The middle of its ends.
+    pub(super) centres: [Point; 2],
+    /// The unit vector from one to the other.
+    pub(super) direction: Vector,
     pub(super) radii: [f64; 2],
     /// Whether it is within the collar of its stem.
     pub(super) in_collar: bool,
@@ -47,6 +55,34 @@ struct Blend {
     smooth: f64,
 }
 
+/// A place where a stem turns, rounded by a parabola (a quadratic Bézier curve) that begins and ends on its segments.
+struct Bend {
+    /// Where it is, as a length along the chain, and how far from there it begins and ends.
+    at: f64,
+    reach: f64,
+    point: Point,
+    directions: [Vector; 2],
+    /// Number of pieces on either side.
+    pieces: f64,
+}
+
+impl Bend {
+    /// The middle of the stem at a length along the chain; `None` where it is on its segment.
+    fn place(&self, at: f64) -> Option<Point> {
+        let u = 0.5 + 0.5 * (at - self.at) / self.reach;
+        if !(u > 0.0 && u < 1.0) {
+            return None;
+        }
+        let [before, after] = self.directions;
+        Some(self.point + (after * (u * u) - before * ((1.0 - u) * (1.0 - u))) * self.reach)
+    }
+
+    fn stations(&self) -> impl Iterator<Item = f64> + use<> {
+        let (at, step, pieces) = (self.at, self.reach / self.pieces, self.pieces as i32);
+        (-pieces..=pieces).filter(|k| *k != 0).map(move |k| at + step * f64::from(k))
+    }
+}
+
 impl Blend {
     /// What it adds to the radius of a member at a length along the chain.
     fn height(&self, member: usize, at: f64) -> f64 {
@@ -60,69 +96,138 @@ impl Blend {
 }
 
 impl Chain<'_> {
-    /// Cuts the chain; plain ones into their segments as they are. `grown`: with blends.
+    /// Cuts the chain; plain ones into their segments as they are. `grown`: with blends and round bends.
     pub(super) fn parts(&self, grown: bool, collar: Option<&Collar>, out: &mut Vec<Part>) {
-        let radii = |i: usize| self.radii[self.members[i]];
         let count = self.members.len();
-        let steps = |i: &usize| {
-            let (a, b) = (radii(i - 1)[1], radii(*i)[0]);
-            (a - b).abs() > EQUAL * a.max(b)
-        };
-        let steps: Vec<usize> = if grown { (1..count).filter(steps).collect() } else { Vec::new() };
-        if steps.is_empty() && collar.is_none() {
-            out.extend(self.members.iter().map(|&segment| Part {
-                segment,
-                ends: [0.0, 1.0],
-                radii: self.radii[segment],
-                in_collar: false,
+        let steps: Vec<usize> = (1..count).filter(|&i| grown && self.steps(i)).collect();
+        let bends = grown && self.accuracy > 0.0 && (1..count).any(|i| self.needs_rounding(i));
+        if steps.is_empty() && collar.is_none() && !bends {
+            out.extend(self.members.iter().map(|&i| {
+                let Segment { start, end, direction, .. } = self.segments[i];
+                let radii = self.radii[i];
+                Part { segment: i, centres: [start, end], direction, radii, in_collar: false }
             }));
             return;
         }
-        let lengths: Vec<f64> =
-            self.members.iter().map(|&i| (self.segments[i].end - self.segments[i].start).norm()).collect();
         let mut arcs = vec![0.0];
-        arcs.extend(lengths.iter().scan(0.0, |sum, length| {
-            *sum += length;
+        arcs.extend(self.members.iter().scan(0.0, |sum, &i| {
+            *sum += (self.segments[i].end - self.segments[i].start).norm();
             Some(*sum)
         }));
         let blends = self.blends(&steps, &arcs);
+        let bends = if bends { self.bends(&steps, &blends, &arcs) } else { Vec::new() };
         let mut stations: Vec<f64> = blends.iter().flat_map(|blend| self.stations(blend)).collect();
+        stations.extend(bends.iter().flat_map(Bend::stations));
         if let Some(collar) = collar {
             stations.extend(collar.stations(self.accuracy));
         }
         stations.sort_by(f64::total_cmp);
         let reach = collar.map_or(0.0, Collar::reach);
-        let mut stations = stations.into_iter().peekable();
+        let (mut near, mut stations) = (0, stations.into_iter().peekable());
         for (member, &segment) in self.members.iter().enumerate() {
-            let (start, length) = (arcs[member], lengths[member]);
+            let Segment { start, end, direction, .. } = self.segments[segment];
+            let (first, length) = (arcs[member], arcs[member + 1] - arcs[member]);
             let radius = |part: f64| {
                 let [a, b] = self.radii[segment];
-                let at = start + length * part;
                 let plain = if part == 1.0 { b } else { a + (b - a) * part };
-                plain + blends.iter().map(|blend| blend.height(member, at)).sum::<f64>()
+                let at = first + length * part;
+                // Blends do not overlap; of one place the rounding of lengths may count either neighbour as next.
+                let next = blends.partition_point(|blend| blend.at <= at);
+                let near = &blends[next.saturating_sub(2)..blends.len().min(next + 2)];
+                plain + near.iter().map(|blend| blend.height(member, at)).sum::<f64>()
             };
-            let mut from = 0.0;
-            loop {
-                // Corners that fall together are one.
+            let mut centre = |part: f64| {
+                let at = first + length * part;
+                while bends.get(near).is_some_and(|bend| bend.at + bend.reach <= at) {
+                    near += 1;
+                }
+                let straight = match part {
+                    0.0 => start,
+                    1.0 => end,
+                    part => start + (end - start) * part,
+                };
+                bends.get(near).and_then(|bend| bend.place(at)).map_or((straight, false), |p| (p, true))
+            };
+            let (mut from, mut begin) = (0.0, centre(0.0));
+            while from < 1.0 {
+                // Cross-sections that fall together are one.
                 let next =
-                    stations.next_if(|&at| at < arcs[member + 1]).map_or(1.0, |at| (at - start) / length);
+                    stations.next_if(|&at| at < arcs[member + 1]).map_or(1.0, |at| (at - first) / length);
                 let to = if 1.0 - next < 1e-6 { 1.0 } else { next };
-                if to - from > 1e-6 || to == 1.0 {
-                    out.push(Part {
-                        segment,
-                        ends: [from, to],
-                        radii: [radius(from), radius(to)],
-                        in_collar: start + length * from < reach,
-                    });
-                    from = to;
+                if to - from < 1e-6 {
+                    continue;
                 }
-                if to == 1.0 {
-                    break;
-                }
+                let finish = centre(to);
+                let chord = || (finish.0 - begin.0).try_normalize(0.0).unwrap_or(direction);
+                out.push(Part {
+                    segment,
+                    centres: [begin.0, finish.0],
+                    direction: if begin.1 || finish.1 { chord() } else { direction },
+                    radii: [radius(from), radius(to)],
+                    in_collar: first + length * from < reach,
+                });
+                (from, begin) = (to, finish);
             }
             // Those that fell upon its end.
             while stations.next_if(|&at| at < arcs[member + 1]).is_some() {}
         }
+    }
+
+    /// Whether the width steps between a member and the one before.
+    fn steps(&self, i: usize) -> bool {
+        let (a, b) = self.radii_at(i);
+        (a - b).abs() > EQUAL * a.max(b)
+    }
+
+    fn radii_at(&self, i: usize) -> (f64, f64) {
+        (self.radii[self.members[i - 1]][1], self.radii[self.members[i]][0])
+    }
+
+    fn directions_at(&self, i: usize) -> [Vector; 2] {
+        [i - 1, i].map(|i| self.segments[self.members[i]].direction)
+    }
+
+    /// Whether the ring in which two members meet stands out by more than the accuracy.
+    fn needs_rounding(&self, i: usize) -> bool {
+        let [before, after] = self.directions_at(i);
+        let (a, b) = self.radii_at(i);
+        // 1 / cos(θ/2) - 1, without a loss of digits for a small θ.
+        let sine = (before - after).norm() / 2.0;
+        let cosine = (1.0 - sine * sine).max(1e-6).sqrt();
+        a.max(b) * sine * sine / (cosine * (1.0 + cosine)) > self.accuracy
+    }
+
+    /// The bends that are rounded, in order.
+    fn bends(&self, steps: &[usize], blends: &[Blend], arcs: &[f64]) -> Vec<Bend> {
+        // Where the stem is not straight.
+        let turns = |i: &usize| {
+            let [before, after] = self.directions_at(*i);
+            before.cross(&after).norm() > STRAIGHT
+        };
+        let turns: Vec<usize> = (1..self.members.len()).filter(turns).collect();
+        let bound = |k: Option<usize>, end: usize| arcs[k.map_or(end, |k| turns[k])];
+        let mut bends = Vec::new();
+        for (k, &i) in turns.iter().enumerate() {
+            let (a, b) = self.radii_at(i);
+            // A shoulder stays as it is.
+            let blend = blends.binary_search_by_key(&i, |blend| blend.member);
+            let blended = blend.is_ok_and(|at| blends[at].height >= (a - b).abs());
+            let shoulder = steps.binary_search(&i).is_ok() && !blended;
+            if shoulder || !self.needs_rounding(i) {
+                continue;
+            }
+            let back = arcs[i] - bound(k.checked_sub(1), 0);
+            let on = bound(Some(k + 1).filter(|k| *k < turns.len()), self.members.len()) - arcs[i];
+            let directions = self.directions_at(i);
+            let half = (directions[0] - directions[1]).norm() / 2.0;
+            let tangent = half / (1.0 - half * half).max(1e-6).sqrt();
+            let reach = (ROUNDING * a.max(b) * tangent).min(0.5 * back).min(0.5 * on);
+            let point = self.segments[self.members[i]].start;
+            // A piece turns by 8 degrees at most.
+            let pieces = (half.asin().to_degrees() / 8.0).ceil().max(1.0);
+            bends.push(Bend { at: arcs[i], reach, point, directions, pieces });
+        }
+        bends
     }
 
     fn blends(&self, steps: &[usize], arcs: &[f64]) -> Vec<Blend> {
@@ -139,7 +244,7 @@ impl Chain<'_> {
                 true => arcs[steps.get(k + 1).copied().unwrap_or(count)] - arcs[member],
                 false => arcs[member] - arcs[if k > 0 { steps[k - 1] } else { 0 }],
             };
-            let length = (LENGTH * height).min(0.5 * bound);
+            let length = (LENGTH * height).max(LEAST * thin).min(0.5 * bound);
             let smooth = (2.0 - (thick - thin) / (MOST * thin)).clamp(0.0, 1.0);
             Blend { at: arcs[member], member, forwards, height, length, smooth }
         };

@@ -3,7 +3,7 @@
 //! A point of the stem's plain surface moves out along its normal n by
 //!
 //! ```text
-//! height (1 - n·m) (1 - d / length)³      for 0 ≤ d ≤ length
+//! height (1 - n·m) (1 - d / length)³      for d ≤ length
 //! ```
 //!
 //! where d is its distance from the parent's surface and m the parent's normal there: most in an acute angle, not at all
@@ -15,6 +15,9 @@ use dlsys_geometry::scene::{Point, Vector};
 /// Height of a collar at a right angle, in parts of the branch's radius, and its length, in parts of the height.
 const HEIGHT: f64 = 0.5;
 const LENGTH: f64 = 3.2;
+/// Where inside the parent the profile is greatest and where it ends: 1 - d / length.
+const MOST: f64 = 1.12;
+const DEEPEST: f64 = 1.4;
 /// Sines of the angle to the parent from which a collar appears, and from which it has its height: a branch that leaves
 /// along its parent comes out of it slowly.
 const FROM: f64 = 0.17;
@@ -93,7 +96,7 @@ impl Collar {
     pub(super) fn stations(&self, accuracy: f64) -> impl Iterator<Item = f64> + use<> {
         let pieces = match accuracy {
             0.0 => 4.0,
-            _ => (1.5 * (self.height / accuracy).sqrt()).ceil().clamp(3.0, 8.0),
+            _ => (1.5 * (self.height / accuracy).sqrt()).ceil().clamp(3.0, 12.0),
         };
         let [from, to] = self.between;
         (0..=pieces as usize).map(move |k| from + (to - from) * k as f64 / pieces)
@@ -133,10 +136,15 @@ impl Collar {
 
     /// The factor of the height at a distance from the parent, and its derivative.
     fn profile(&self, distance: f64) -> (f64, f64) {
-        if distance <= 0.0 {
-            return (1.0, 0.0);
+        // It goes on inside the parent for a while, so that cross-sections next to the edge see no kink.
+        let rest = 1.0 - distance / self.length;
+        if rest > MOST {
+            // Deeper it vanishes, so that nothing comes out on the other side.
+            let (most, slope) = (MOST * MOST * MOST, MOST * MOST * MOST / (DEEPEST - MOST));
+            let part = (most - slope * (rest - MOST)).max(0.0);
+            return (part, if part > 0.0 { slope / self.length } else { 0.0 });
         }
-        let rest = (1.0 - distance / self.length).max(0.0);
+        let rest = rest.max(0.0);
         (rest * rest * rest, -3.0 * rest * rest / self.length)
     }
 
@@ -193,7 +201,8 @@ mod tests {
                     (at, normal, collar.place(at, normal))
                 };
                 let (at, normal, place) = moved(turn, far);
-                if collar.parent(at).0.abs() < 1e-3 {
+                let rest = 1.0 - collar.parent(at).0 / collar.length;
+                if [MOST, DEEPEST].iter().any(|edge| (rest - edge).abs() < 1e-3) {
                     continue;
                 }
                 let e = 1e-6;
