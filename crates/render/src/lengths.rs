@@ -36,10 +36,13 @@ impl CrossSection {
 
     /// As wide as a collar makes it, as far as an ellipse can be: exact at (1, 0), (0, 1) and opposite to them, but for
     /// what they differ in.
-    pub(super) fn widened(self, collar: Option<&Collar>) -> CrossSection {
+    pub(super) fn widened(self, collar: Option<&Collar>, along: Vector, drape: f64) -> CrossSection {
         let Some(collar) = collar else { return self };
         let moved = |side: Vector| match side.try_normalize(0.0) {
-            Some(normal) => collar.place(self.centre + side, normal).coords,
+            Some(normal) => {
+                let droop = collar.droop(self.centre, along, normal, drape);
+                collar.place(self.centre + side + along * droop, normal).coords
+            }
             None => self.centre.coords,
         };
         let [east, west, north, south] = [self.u, -self.u, self.v, -self.v].map(moved);

@@ -257,7 +257,7 @@ impl<'s> Tubes<'s> {
         let across = || CrossSection::across(piece.part.centres[0], &piece.section, radius);
         let start = match begin {
             Begin::Dome => across(),
-            Begin::Flat => across().widened(self.collar(piece)),
+            Begin::Flat => across().widened(self.collar(piece), piece.section.along, 0.0),
             Begin::Joint => self.end(i - 1),
             Begin::Shoulder => {
                 let before = &self.pieces[i - 1];
@@ -284,7 +284,7 @@ impl<'s> Tubes<'s> {
         } else {
             CrossSection::between(centre, &piece.section, &self.pieces[i + 1].section, radius)
         };
-        section.widened(self.collar(piece))
+        section.widened(self.collar(piece), piece.section.along, piece.part.drape)
     }
 
     /// Makes the vertices and normals of some pieces, in the order of their numbers.
@@ -292,7 +292,8 @@ impl<'s> Tubes<'s> {
         for i in pieces {
             let piece = &self.pieces[i];
             let section = &piece.section;
-            let stem = Plain { profile: &self.profiles[piece.profile], collar: self.collar(piece) };
+            let stem =
+                Plain { profile: &self.profiles[piece.profile], collar: self.collar(piece), drape: 0.0 };
             let [start, end] = piece.part.radii;
             match piece.begins {
                 Begin::Dome => stem.dome(piece.part.centres[0], start, section, -1.0, out),
@@ -316,6 +317,7 @@ impl<'s> Tubes<'s> {
             } else {
                 let after = &self.pieces[i + 1];
                 let meeting = if after.begins == Begin::Shoulder { section } else { &after.section };
+                let stem = Plain { drape: piece.part.drape, ..stem };
                 stem.joint(centre, end, [section, &after.section], [section, meeting], out);
             }
         }
@@ -396,6 +398,8 @@ fn can_join(a: &Segment, b: &Segment, radii: [f64; 2]) -> bool {
 struct Plain<'a> {
     profile: &'a Profile,
     collar: Option<&'a Collar>,
+    /// See [`Part::drape`].
+    drape: f64,
 }
 
 impl Plain<'_> {
@@ -424,7 +428,10 @@ impl Plain<'_> {
                 let outward = before.outward(at);
                 // Along the side of the tube up to the plane.
                 let slide = outward.dot(&plane) / lean;
-                centre + (outward - before.along * slide) * radius
+                let place = centre + (outward - before.along * slide) * radius;
+                let Some(collar) = self.collar.filter(|_| self.drape > 0.0) else { return place };
+                let droop = collar.droop(centre, before.along, outward, self.drape);
+                place + (before.along + outward * before.slope) * droop
             };
             let normal = || match one {
                 true => sides[0].normal(at),

@@ -3,7 +3,7 @@
 //!
 //! Blends and bends depend on places along the stem alone, so they are the same however the stem is divided into segments.
 
-use super::collar::Collar;
+use super::collar::{Collar, Station};
 use dlsys_geometry::scene::{Point, Segment, Vector};
 
 /// Widths that differ by less than this part do not make a step.
@@ -28,8 +28,10 @@ pub(super) struct Part {
     /// The unit vector from one to the other.
     pub(super) direction: Vector,
     pub(super) radii: [f64; 2],
-    /// Whether it is within the collar of its stem.
+    /// Whether it is within the collar of its stem, and how far its end [follows](Station::drape)
+    /// the collar's edge.
     pub(super) in_collar: bool,
+    pub(super) drape: f64,
 }
 
 /// Stems that continue one another.
@@ -105,7 +107,7 @@ impl Chain<'_> {
             out.extend(self.members.iter().map(|&i| {
                 let Segment { start, end, direction, .. } = self.segments[i];
                 let radii = self.radii[i];
-                Part { segment: i, centres: [start, end], direction, radii, in_collar: false }
+                Part { segment: i, centres: [start, end], direction, radii, in_collar: false, drape: 0.0 }
             }));
             return;
         }
@@ -116,12 +118,15 @@ impl Chain<'_> {
         }));
         let blends = self.blends(&steps, &arcs);
         let bends = if bends { self.bends(&steps, &blends, &arcs) } else { Vec::new() };
-        let mut stations: Vec<f64> = blends.iter().flat_map(|blend| self.stations(blend)).collect();
-        stations.extend(bends.iter().flat_map(Bend::stations));
+        let plain = |at| Station { at, drape: 0.0 };
+        let mut stations: Vec<Station> =
+            blends.iter().flat_map(|blend| self.stations(blend)).map(plain).collect();
+        stations.extend(bends.iter().flat_map(Bend::stations).map(plain));
         if let Some(collar) = collar {
-            stations.extend(collar.stations(self.accuracy));
+            let free = (1..count).find(|&i| steps.first() == Some(&i) || self.turns(i)).unwrap_or(count);
+            stations.extend(collar.stations(self.accuracy, arcs[free]));
         }
-        stations.sort_by(f64::total_cmp);
+        stations.sort_by(|a, b| a.at.total_cmp(&b.at));
         let reach = collar.map_or(0.0, Collar::reach);
         let (mut near, mut stations) = (0, stations.into_iter().peekable());
         for (member, &segment) in self.members.iter().enumerate() {
@@ -151,8 +156,8 @@ impl Chain<'_> {
             let (mut from, mut begin) = (0.0, centre(0.0));
             while from < 1.0 {
                 // Cross-sections that fall together are one.
-                let next =
-                    stations.next_if(|&at| at < arcs[member + 1]).map_or(1.0, |at| (at - first) / length);
+                let next = stations.next_if(|station| station.at < arcs[member + 1]);
+                let (next, drape) = next.map_or((1.0, 0.0), |next| ((next.at - first) / length, next.drape));
                 let to = if 1.0 - next < 1e-6 { 1.0 } else { next };
                 if to - from < 1e-6 {
                     continue;
@@ -165,11 +170,12 @@ impl Chain<'_> {
                     direction: if begin.1 || finish.1 { chord() } else { direction },
                     radii: [radius(from), radius(to)],
                     in_collar: first + length * from < reach,
+                    drape,
                 });
                 (from, begin) = (to, finish);
             }
             // Those that fell upon its end.
-            while stations.next_if(|&at| at < arcs[member + 1]).is_some() {}
+            while stations.next_if(|station| station.at < arcs[member + 1]).is_some() {}
         }
     }
 
@@ -187,6 +193,12 @@ impl Chain<'_> {
         [i - 1, i].map(|i| self.segments[self.members[i]].direction)
     }
 
+    /// Whether the stem turns between a member and the one before.
+    fn turns(&self, i: usize) -> bool {
+        let [before, after] = self.directions_at(i);
+        before.cross(&after).norm() > STRAIGHT
+    }
+
     /// Whether the ring in which two members meet stands out by more than the accuracy.
     fn needs_rounding(&self, i: usize) -> bool {
         let [before, after] = self.directions_at(i);
@@ -199,12 +211,7 @@ impl Chain<'_> {
 
     /// The bends that are rounded, in order.
     fn bends(&self, steps: &[usize], blends: &[Blend], arcs: &[f64]) -> Vec<Bend> {
-        // Where the stem is not straight.
-        let turns = |i: &usize| {
-            let [before, after] = self.directions_at(*i);
-            before.cross(&after).norm() > STRAIGHT
-        };
-        let turns: Vec<usize> = (1..self.members.len()).filter(turns).collect();
+        let turns: Vec<usize> = (1..self.members.len()).filter(|&i| self.turns(i)).collect();
         let bound = |k: Option<usize>, end: usize| arcs[k.map_or(end, |k| turns[k])];
         let mut bends = Vec::new();
         for (k, &i) in turns.iter().enumerate() {

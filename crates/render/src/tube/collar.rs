@@ -3,7 +3,7 @@
 //! A point of the stem's plain surface moves out along its normal n by
 //!
 //! ```text
-//! height (1 - n·m) (1 - d / length)³      for d ≤ length
+//! height (1 - n·m) (1 - d / length)³      for 0 ≤ d ≤ length
 //! ```
 //!
 //! where d is its distance from the parent's surface and m the parent's normal there: most in an acute angle, not at all
@@ -15,9 +15,6 @@ use dlsys_geometry::scene::{Point, Vector};
 /// Height of a collar at a right angle, in parts of the branch's radius, and its length, in parts of the height.
 const HEIGHT: f64 = 0.5;
 const LENGTH: f64 = 3.2;
-/// Where inside the parent the profile is greatest and where it ends: 1 - d / length.
-const MOST: f64 = 1.12;
-const DEEPEST: f64 = 1.4;
 /// Sines of the angle to the parent from which a collar appears, and from which it has its height: a branch that leaves
 /// along its parent comes out of it slowly.
 const FROM: f64 = 0.17;
@@ -43,6 +40,38 @@ pub(crate) struct Collar {
     length: f64,
     /// Lengths along the stem between which it comes out of its parent and out of the collar.
     between: [f64; 2],
+    edge: Option<Edge>,
+}
+
+/// Where the plain surface of a branch comes out of its parent, each of its lines at a length of its own.
+#[derive(Clone, Copy, Debug)]
+struct Edge {
+    /// Unit vectors across the branch: away from the parent's direction as far as it can be, and across the parent, too.
+    away: Vector,
+    across: Vector,
+    sin: f64,
+    cos: f64,
+    /// Radius of the parent.
+    wide: f64,
+    /// The middle of those lengths.
+    middle: f64,
+}
+
+impl Edge {
+    /// By how much the line on this side (a unit vector) comes out later than the middle.
+    fn later(&self, outward: Vector, radius: f64) -> f64 {
+        let (a, b) = (radius * outward.dot(&self.away), radius * outward.dot(&self.across));
+        ((self.wide * self.wide - b * b).max(0.0).sqrt() - a * self.cos) / self.sin - self.middle
+    }
+}
+
+/// A cross-section that a collar needs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Station {
+    /// Its length along the stem.
+    pub(super) at: f64,
+    /// How far it follows the edge at which the branch comes out of its parent: from 0, flat, to 1.
+    pub(super) drape: f64,
 }
 
 impl Collar {
@@ -57,22 +86,28 @@ impl Collar {
         let (back, thickness) = parent;
         // The one of both directions on whose side the branch is.
         let (along, wide) = ahead.filter(|(ahead, _)| direction.dot(ahead) > 0.0).unwrap_or(parent);
-        let (sin, cos) = (direction.cross(&along).norm(), direction.dot(&along).abs());
+        let (sin, cos) = (direction.cross(&along).norm(), direction.dot(&along));
         let part = ((sin - FROM) / (FULL - FROM)).clamp(0.0, 1.0);
         let height = HEIGHT * radius.min(wide) * part * part * (3.0 - 2.0 * part);
         if height <= accuracy {
             return None;
         }
         let length = LENGTH * height;
-        let inner = ((wide * wide - radius * radius).max(0.0).sqrt() - radius * cos) / sin;
-        let outer = (wide.max(thickness) + radius * cos + length) / sin;
+        let inside = (wide * wide - radius * radius).max(0.0).sqrt();
+        let middle = 0.5 * (wide + inside) / sin;
+        // Lines come out no more than this before and after the middle.
+        let spread = (0.5 * (wide - inside) + radius * cos.abs()) / sin;
+        let reach = middle + (spread + length / sin).max(1.3 * spread);
+        let away = (direction * cos - along) / sin;
+        let edge = Edge { away, across: direction.cross(&away), sin, cos, wide, middle };
         Some(Collar {
             parent: Parent::Stem { back, radius: thickness, ahead },
             joint: Point::from(joint),
             radius,
             height,
             length,
-            between: [inner.max(0.0), outer],
+            between: [(middle - spread).max(0.0), reach],
+            edge: Some(edge),
         })
     }
 
@@ -83,7 +118,7 @@ impl Collar {
         let sin = direction.y.max(0.5);
         let (low, cos) = (ground - joint.y, (1.0 - sin * sin).max(0.0).sqrt());
         let between = [(low - radius * cos) / sin, (low + length + radius * cos) / sin].map(|s| s.max(0.0));
-        Collar { parent: Parent::Ground(ground), joint, radius, height, length, between }
+        Collar { parent: Parent::Ground(ground), joint, radius, height, length, between, edge: None }
     }
 
     /// Length along the stem from which on it is plain.
@@ -91,15 +126,32 @@ impl Collar {
         self.between[1]
     }
 
-    /// Lengths along the stem at which it needs corners, to be no further than about `accuracy` (0: not known) from its
-    /// shape.
-    pub(super) fn stations(&self, accuracy: f64) -> impl Iterator<Item = f64> + use<> {
+    /// Where along the stem it needs cross-sections, to be no further than about `accuracy` (0: not known) from its
+    /// shape. The stem goes on straight and evenly for the length `free`.
+    pub(super) fn stations(&self, accuracy: f64, free: f64) -> Vec<Station> {
         let pieces = match accuracy {
             0.0 => 4.0,
             _ => (1.5 * (self.height / accuracy).sqrt()).ceil().clamp(3.0, 12.0),
         };
         let [from, to] = self.between;
-        (0..=pieces as usize).map(move |k| from + (to - from) * k as f64 / pieces)
+        let parts = (0..=pieces as usize).map(|k| k as f64 / pieces);
+        let Some(edge) = self.edge.filter(|_| to <= free) else {
+            return parts.map(|part| Station { at: from + (to - from) * part, drape: 0.0 }).collect();
+        };
+        // One inside the parent, one at the edge, others closer to it than to the end.
+        let inside = (edge.middle - 0.4 * self.length).max(0.4 * edge.middle);
+        let span = to - edge.middle;
+        let outside = parts.map(|part| part.powf(1.4));
+        let outside = outside.map(|part| Station { at: edge.middle + span * part, drape: 1.0 - part });
+        std::iter::once(Station { at: inside, drape: 1.0 }).chain(outside).collect()
+    }
+
+    /// By how much the line of the stem on this side is longer, up to a cross-section with its middle here, than that
+    /// middle.
+    pub(crate) fn droop(&self, centre: Point, along: Vector, outward: Vector, drape: f64) -> f64 {
+        let Some(edge) = self.edge.filter(|_| drape > 0.0) else { return 0.0 };
+        // No line begins before the joint.
+        (drape * edge.later(outward, self.radius)).max(-(centre - self.joint).dot(&along))
     }
 
     /// Distance of a point from the parent's surface, the unit normal there, and how fast that turns on the way along
@@ -136,15 +188,10 @@ impl Collar {
 
     /// The factor of the height at a distance from the parent, and its derivative.
     fn profile(&self, distance: f64) -> (f64, f64) {
-        // It goes on inside the parent for a while, so that cross-sections next to the edge see no kink.
-        let rest = 1.0 - distance / self.length;
-        if rest > MOST {
-            // Deeper it vanishes, so that nothing comes out on the other side.
-            let (most, slope) = (MOST * MOST * MOST, MOST * MOST * MOST / (DEEPEST - MOST));
-            let part = (most - slope * (rest - MOST)).max(0.0);
-            return (part, if part > 0.0 { slope / self.length } else { 0.0 });
+        if distance <= 0.0 {
+            return (1.0, 0.0);
         }
-        let rest = rest.max(0.0);
+        let rest = (1.0 - distance / self.length).max(0.0);
         (rest * rest * rest, -3.0 * rest * rest / self.length)
     }
 
@@ -201,8 +248,7 @@ mod tests {
                     (at, normal, collar.place(at, normal))
                 };
                 let (at, normal, place) = moved(turn, far);
-                let rest = 1.0 - collar.parent(at).0 / collar.length;
-                if [MOST, DEEPEST].iter().any(|edge| (rest - edge).abs() < 1e-3) {
+                if collar.parent(at).0.abs() < 1e-3 {
                     continue;
                 }
                 let e = 1e-6;

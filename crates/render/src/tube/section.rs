@@ -92,7 +92,7 @@ pub(crate) struct Section {
     pub(crate) u: Vector,
     pub(crate) v: Vector,
     /// Growth of the radius along the segment.
-    slope: f64,
+    pub(super) slope: f64,
 }
 
 impl Section {
