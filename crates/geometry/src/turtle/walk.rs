@@ -46,6 +46,10 @@ struct State {
     parent: Option<usize>,
     /// Number of segments on this axis since the width was set.
     run: usize,
+    /// The interpretation and the module that set the width with `!`.
+    set_by: Option<(Option<(usize, KindId)>, DrawnModule)>,
+    /// A branch or an organ stands where the turtle is.
+    node: bool,
 }
 
 /// A polygon that is open.
@@ -96,6 +100,8 @@ impl<'a> Walk<'a> {
                 last: None,
                 parent: None,
                 run: 0,
+                set_by: None,
+                node: false,
             },
             stack: Vec::new(),
             polygons: Vec::new(),
@@ -171,7 +177,7 @@ impl<'a> Walk<'a> {
                 let width = Width::Set(self.in_range(given.unwrap_or(0.0).max(0.0))?);
                 self.taper(width);
                 self.state.width = width;
-                self.state.run = 0;
+                (self.state.run, self.state.set_by) = (0, None);
             }
             Command::Bend => self.state.strength = self.in_range(given.unwrap_or(0.0))?,
             Command::Contour => self.set_contour(given.unwrap_or(0.0).round()),
@@ -193,6 +199,7 @@ impl<'a> Walk<'a> {
                 // Brackets match, by the rules of the language; a stray one changes nothing.
                 if let Some(state) = self.stack.pop() {
                     self.state = state;
+                    self.state.node = true;
                 }
             }
             Command::BeginPolygon => {
@@ -235,8 +242,28 @@ impl<'a> Walk<'a> {
                 Width::Default(factor) => Width::Default(self.in_range(factor)?),
             },
         };
-        self.state.run = 0;
+        (self.state.run, self.state.set_by) = (0, Some((self.inside, self.drawn)));
         Ok(())
+    }
+
+    /// Warns if the segment that begins here continues one of another width, at a place where nothing else is drawn, and if
+    /// that can be seen.
+    fn check_step(&mut self, before: usize, material: MaterialId) {
+        /// Ratio of widths, and step in units of the accuracy (two pixels of a thousand), from which a step is noticed.
+        const RATIO: f64 = 1.15;
+        const VISIBLE: f64 = 4.0;
+        let segment = &self.scene.segments[before];
+        let (Width::Set(from), Width::Set(to)) = (segment.widths[1], self.state.width) else { return };
+        let (thin, thick) = (from.min(to), from.max(to));
+        let accuracy = self.scene.accuracy;
+        let seen = accuracy > 0.0 && thick - thin > VISIBLE * accuracy && thin > 0.0 && thick > RATIO * thin;
+        if let Some((inside, drawn)) = self.state.set_by.filter(|_| seen && segment.material == material)
+            && self.remarks.steps_are_new(inside, drawn.kind)
+        {
+            let span = error::place(self.model, drawn.kind, drawn.lineage, inside);
+            let remark = Remark::Step(from, to);
+            self.scene.warnings.extend(self.remarks.add(remark, self.model, span, self.time));
+        }
     }
 
     /// Sets the cross-section of stems; 0, and the number of no contour, is a circle.
@@ -315,7 +342,12 @@ impl<'a> Walk<'a> {
             return Ok(());
         }
         let (follows, grows_from) = (self.state.last.take(), self.state.parent.take());
+        let node = std::mem::replace(&mut self.state.node, false);
         if draw && self.polygons.is_empty() {
+            let material = self.chosen().unwrap_or(MaterialId::STEM);
+            if let Some(before) = follows.filter(|_| !node) {
+                self.check_step(before, material);
+            }
             let segment = Segment {
                 start,
                 end,
@@ -323,7 +355,7 @@ impl<'a> Walk<'a> {
                 across,
                 widths: [self.state.width; 2],
                 contour: self.state.contour,
-                material: self.chosen().unwrap_or(MaterialId::STEM),
+                material,
                 owner: self.owner(),
                 follows,
                 grows_from,
@@ -432,6 +464,7 @@ impl<'a> Walk<'a> {
             [width, length] => [width, length, length],
             [width, length, height, ..] => [width, length, height],
         };
+        self.state.node = true;
         // The axes are heading, left, up.
         let scales = [self.in_range(length)?, self.in_range(width)?, self.in_range(height)?];
         if scales.iter().all(|scale| *scale > 0.0) {
