@@ -257,7 +257,14 @@ impl<'a> Walk<'a> {
         let (thin, thick) = (from.min(to), from.max(to));
         let accuracy = self.scene.accuracy;
         let seen = accuracy > 0.0 && thick - thin > VISIBLE * accuracy && thin > 0.0 && thick > RATIO * thin;
+        // A drawing that sets the width more than once is a shape with steps.
+        let shaped = |inside: Option<(usize, KindId)>| {
+            let Some((index, _)) = inside else { return false };
+            let sets = |kind: &&KindId| self.model.kinds.get(**kind).base() == "!";
+            self.model.interpretations[index].drawn.kinds.iter().filter(sets).count() > 1
+        };
         if let Some((inside, drawn)) = self.state.set_by.filter(|_| seen && segment.material == material)
+            && !shaped(inside)
             && self.remarks.steps_are_new(inside, drawn.kind)
         {
             let span = error::place(self.model, drawn.kind, drawn.lineage, inside);
