@@ -14,6 +14,8 @@
 mod chain;
 mod collar;
 mod section;
+#[cfg(test)]
+mod tests;
 
 use std::collections::HashMap;
 use std::ops::Range;
