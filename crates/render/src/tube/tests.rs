@@ -135,8 +135,9 @@ fn a_collar_stays_on_its_side() {
             for face in mesh.faces.iter().filter(|face| face.owner == owner) {
                 for (vertex, _) in face.corners {
                     let at = mesh.vertices[vertex as usize];
-                    let inside = at.x.hypot(at.z) < 0.5 * 1.01;
-                    assert!(at.x > -0.01 || inside, "{angle} {width}: {at}");
+                    // Beside the branch, surfaces run alongside.
+                    let beyond = at.x < -0.25;
+                    assert!(!beyond || at.x.hypot(at.z) < 0.505, "{angle} {width}: {at}");
                 }
             }
         }
@@ -154,7 +155,8 @@ fn feet_are_flat_and_flare_on_a_floor() {
         let wide = mesh.vertices.iter().filter(|p| p.y < 1e-3).map(|p| p.x.hypot(p.z)).fold(0.0, f64::max);
         (low, wide)
     };
-    assert_eq!(foot(None), (0.0, 0.5));
+    let (low, wide) = foot(None);
+    assert!(low.abs() < 1e-12 && (wide - 0.5).abs() < 1e-12, "{low} {wide}");
     let (low, wide) = foot(Some(0.0));
     assert!(low.abs() < 1e-9 && (0.65..0.95).contains(&wide), "{low} {wide}");
 }
