@@ -198,7 +198,7 @@ fn is_what_the_turtle_draws(path: &str) {
         simulation.at(times[frame], &mut string).expect("it runs");
         scene.clear();
         turtle::draw(&session.model, &string, &mut scene).expect("drawable");
-        stage.set(&scene, fit.default_width);
+        stage.set(&scene, &fit);
         let now = frame as u64;
         let mut there: Vec<&Track> = tracks.iter().filter(|t| (t.first..=t.last).contains(&now)).collect();
         assert_eq!(there.len(), stage.items.len(), "{path}: things in frame {frame}");

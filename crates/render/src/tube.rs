@@ -269,7 +269,10 @@ impl<'s> Tubes<'s> {
         let length = |ends, caps| Length { segment: piece.part.segment, ends, caps };
         let cut = match begin {
             Begin::Shoulder => Some(self.end(i - 1)),
-            Begin::Flat => Some(CrossSection { u: Vector::zeros(), v: Vector::zeros(), ..start }),
+            // That of a branch is within its parent.
+            Begin::Flat if self.segments[piece.part.segment].grows_from.is_none() => {
+                Some(CrossSection { u: Vector::zeros(), v: Vector::zeros(), ..start })
+            }
             _ => None,
         };
         let cut = cut.map(|from| length([from, start], [false; 2]));

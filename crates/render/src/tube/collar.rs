@@ -130,7 +130,7 @@ impl Collar {
     /// shape. The stem goes on straight and evenly for the length `free`.
     pub(super) fn stations(&self, accuracy: f64, free: f64) -> Vec<Station> {
         let pieces = match accuracy {
-            0.0 => 4.0,
+            0.0 => 3.0,
             _ => (1.5 * (self.height / accuracy).sqrt()).ceil().clamp(3.0, 12.0),
         };
         let [from, to] = self.between;
@@ -143,7 +143,9 @@ impl Collar {
         let span = to - edge.middle;
         let outside = parts.map(|part| part.powf(1.4));
         let outside = outside.map(|part| Station { at: edge.middle + span * part, drape: 1.0 - part });
-        std::iter::once(Station { at: inside, drape: 1.0 }).chain(outside).collect()
+        // Lengths do without the first: a little of it may be seen at the edge.
+        let inside = Station { at: inside, drape: 1.0 };
+        (accuracy > 0.0).then_some(inside).into_iter().chain(outside).collect()
     }
 
     /// By how much the line of the stem on this side is longer, up to a cross-section with its middle here, than that
