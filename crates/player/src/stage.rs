@@ -94,6 +94,8 @@ impl Stage {
         self.counts.clear();
         // Lengths come stem by stem; a module's are counted in its own order, which lasts.
         let mut stems = lengths(scene, fit);
+        // The last of a segment first: where a joint gets a cross-section more, those towards its parent change places.
+        stems.reverse();
         stems.sort_by_key(|length| length.segment);
         for length in &stems {
             let segment = &scene.segments[length.segment];

@@ -118,7 +118,7 @@ impl Fit {
     /// How stems become tubes. Without depth they are lines of a diagram, and their joints keep their shape.
     pub(super) fn tubes(&self) -> TubeStyle {
         let Fit { default_width, accuracy, .. } = *self;
-        TubeStyle { default_width, sides: 0, accuracy, grown: !self.light.is_flat() }
+        TubeStyle { default_width, sides: 0, accuracy, grown: !self.light.is_flat(), steady: false }
     }
 
     /// Left, bottom, right and top of a survey as this camera sees it; `None` if it is empty.

@@ -65,7 +65,7 @@ pub struct Length {
 /// All stems of a scene, by segment within a stem.
 pub fn lengths(scene: &Scene, fit: &Fit) -> Vec<Length> {
     // Sides do not matter, as no corners are made. Joints have the same number of lengths in all frames.
-    let tubes = Tubes::new(scene, TubeStyle { sides: 3, accuracy: 0.0, ..fit.tubes() });
+    let tubes = Tubes::new(scene, TubeStyle { sides: 3, steady: true, ..fit.tubes() });
     (0..tubes.len()).flat_map(|i| tubes.lengths(i).collect::<Vec<_>>()).collect()
 }
 

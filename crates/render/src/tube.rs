@@ -40,10 +40,13 @@ pub(super) struct TubeStyle {
     pub(super) default_width: f64,
     /// Number of sides (at least 3); 0: as many as make tubes no further from round ones than `accuracy`.
     pub(super) sides: usize,
-    /// Greatest distance from the curved shape, in scene units; 0 if it is not known.
+    /// Greatest distance from the curved shape, in scene units.
     pub(super) accuracy: f64,
     /// Whether joints look grown.
     pub(super) grown: bool,
+    /// Whether joints have as many cross-sections in all frames, and bends none, for pieces that are followed from frame to
+    /// frame.
+    pub(super) steady: bool,
 }
 
 /// All stems of a scene as tubes: how they are cut and how their vertices and normals are numbered. Each piece can
@@ -199,7 +202,8 @@ impl<'s> Tubes<'s> {
                 false => (Begin::Dome, None),
             };
             let radii = &structure.radii;
-            let chain = Chain { segments, radii, members: &members, accuracy: style.accuracy };
+            let TubeStyle { accuracy, steady, .. } = style;
+            let chain = Chain { segments, radii, members: &members, accuracy, steady };
             parts.clear();
             chain.parts(style.grown, collar.as_ref(), &mut parts);
             tubes.collars.extend(collar);

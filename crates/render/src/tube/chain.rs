@@ -40,8 +40,9 @@ pub(super) struct Chain<'a> {
     pub(super) radii: &'a [[f64; 2]],
     /// Its segments in order.
     pub(super) members: &'a [usize],
-    /// See [`Tubes::new`](super::Tubes::new); 0 if it is not known.
+    /// See [`TubeStyle`](super::TubeStyle).
     pub(super) accuracy: f64,
+    pub(super) steady: bool,
 }
 
 /// The widening of a stem towards a thicker one that it continues, or that continues it.
@@ -102,7 +103,7 @@ impl Chain<'_> {
     pub(super) fn parts(&self, grown: bool, collar: Option<&Collar>, out: &mut Vec<Part>) {
         let count = self.members.len();
         let steps: Vec<usize> = (1..count).filter(|&i| grown && self.steps(i)).collect();
-        let bends = grown && self.accuracy > 0.0 && (1..count).any(|i| self.needs_rounding(i));
+        let bends = grown && !self.steady && (1..count).any(|i| self.needs_rounding(i));
         if steps.is_empty() && collar.is_none() && !bends {
             out.extend(self.members.iter().map(|&i| {
                 let Segment { start, end, direction, .. } = self.segments[i];
@@ -124,7 +125,7 @@ impl Chain<'_> {
         stations.extend(bends.iter().flat_map(Bend::stations).map(plain));
         if let Some(collar) = collar {
             let free = (1..count).find(|&i| steps.first() == Some(&i) || self.turns(i)).unwrap_or(count);
-            stations.extend(collar.stations(self.accuracy, arcs[free]));
+            stations.extend(collar.stations((!self.steady).then_some(self.accuracy), arcs[free]));
         }
         stations.sort_by(|a, b| a.at.total_cmp(&b.at));
         let reach = collar.map_or(0.0, Collar::reach);
@@ -264,13 +265,8 @@ impl Chain<'_> {
     /// Where a blend needs cross-sections.
     fn stations(&self, blend: &Blend) -> impl Iterator<Item = f64> + use<> {
         // A chord over 1/n of a curve with the second derivative 6 is 6/8 of 1/n² away from it.
-        let pieces = match self.accuracy {
-            0.0 => 4,
-            accuracy => [2, 4, 8]
-                .into_iter()
-                .find(|&n| 0.75 * blend.height <= accuracy * f64::from(n * n))
-                .unwrap_or(8),
-        };
+        let enough = |n: &i32| 0.75 * blend.height <= self.accuracy * f64::from(n * n);
+        let pieces = if self.steady { 4 } else { [2, 4, 8].into_iter().find(enough).unwrap_or(8) };
         let sign = if blend.forwards { 1.0 } else { -1.0 };
         let (at, step) = (blend.at, sign * blend.length / f64::from(pieces));
         (1..=pieces).map(move |k| at + step * f64::from(k))

@@ -126,12 +126,12 @@ impl Collar {
         self.between[1]
     }
 
-    /// Where along the stem it needs cross-sections, to be no further than about `accuracy` (0: not known) from its
-    /// shape. The stem goes on straight and evenly for the length `free`.
-    pub(super) fn stations(&self, accuracy: f64, free: f64) -> Vec<Station> {
+    /// Where along the stem it needs cross-sections, to be no further than about `accuracy` from its
+    /// shape; `None`: as many in all frames. The stem goes on straight and evenly for the length `free`.
+    pub(super) fn stations(&self, accuracy: Option<f64>, free: f64) -> Vec<Station> {
         let pieces = match accuracy {
-            0.0 => 3.0,
-            _ => (1.5 * (self.height / accuracy).sqrt()).ceil().clamp(3.0, 12.0),
+            None => 3.0,
+            Some(accuracy) => (1.5 * (self.height / accuracy).sqrt()).ceil().clamp(3.0, 12.0),
         };
         let [from, to] = self.between;
         let parts = (0..=pieces as usize).map(|k| k as f64 / pieces);
@@ -145,7 +145,7 @@ impl Collar {
         let outside = outside.map(|part| Station { at: edge.middle + span * part, drape: 1.0 - part });
         // Lengths do without the first: a little of it may be seen at the edge.
         let inside = Station { at: inside, drape: 1.0 };
-        (accuracy > 0.0).then_some(inside).into_iter().chain(outside).collect()
+        accuracy.map(|_| inside).into_iter().chain(outside).collect()
     }
 
     /// By how much the line of the stem on this side is longer, up to a cross-section with its middle here, than that
