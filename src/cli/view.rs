@@ -143,7 +143,7 @@ fn record(run: &ModelRun, accuracy: Option<f64>) -> Result<Recording, Failure> {
     let mut progress = Progress::new("recording", run.times.len());
     let staged = |frame: &Frame, scene: &Scene| {
         let mut stage = Stage::default();
-        stage.set(scene, fit.default_width);
+        stage.set(scene, &fit);
         (frame.time, frame.modules() as u64, frame.events().to_vec(), stage)
     };
     play(run, pass, threads, &mut clock, None, staged, |(time, modules, events, stage)| {

@@ -99,7 +99,7 @@ fn tracks(page: &str) -> Vec<Track> {
         .collect();
     let mut tracks = Vec::new();
     for [kind, detail, first, span, log2, length] in heads {
-        let width = [18, 9, 48].get(kind as usize).copied().unwrap_or(3 * detail as usize);
+        let width = [18, 9, 48, 3 * detail as usize, 12][kind as usize];
         let mut samples = vec![vec![0.0; width]; length as usize];
         let mut firsts = vec![0_i64; width];
         for number in 0..width {
@@ -107,7 +107,8 @@ fn tracks(page: &str) -> Vec<Track> {
                 let n = natural();
                 (n >> 1) as i64 ^ -((n & 1) as i64)
             };
-            let mut now = integer() + if kind > 1 && number >= 3 { firsts[number - 3] } else { 0 };
+            let mut now =
+                integer() + if [2, 3].contains(&kind) && number >= 3 { firsts[number - 3] } else { 0 };
             let mut rate = 0;
             firsts[number] = now;
             samples[0][number] = now as f64;
@@ -198,7 +199,7 @@ fn is_what_the_turtle_draws(path: &str) {
         simulation.at(times[frame], &mut string).expect("it runs");
         scene.clear();
         turtle::draw(&session.model, &string, &mut scene).expect("drawable");
-        stage.set(&scene, fit.default_width);
+        stage.set(&scene, &fit);
         let now = frame as u64;
         let mut there: Vec<&Track> = tracks.iter().filter(|t| (t.first..=t.last).contains(&now)).collect();
         assert_eq!(there.len(), stage.items.len(), "{path}: things in frame {frame}");
@@ -208,9 +209,10 @@ fn is_what_the_turtle_draws(path: &str) {
                 Form::Mesh(_) => 1,
                 Form::Patch => 2,
                 Form::Polygon(_) => 3,
+                Form::Stretched(_) => 4,
             };
             let numbers: Vec<f64> = stage.numbers_of(item).to_vec();
-            let is_point = |i: usize| kind > 1 || i % 9 < 3;
+            let is_point = |i: usize| [2, 3].contains(&kind) || (if kind == 4 { i } else { i % 9 }) < 3;
             let off = |track: &Track| -> f64 {
                 let shown = track.at(now).into_iter().enumerate();
                 let placed = shown.map(|(i, x)| x * unit + if is_point(i) { centre[i % 3] } else { 0.0 });

@@ -238,6 +238,7 @@ impl<'d> Parts<'d> {
         let all = drawn.iter().chain(occurs).map(|(k, s)| (*k, *s)).collect();
         check::ground(&model, &all, diagnostics);
         check::commands(&model, diagnostics, &all);
+        check::surface_sizes(&model, diagnostics, &all);
         model
     }
 }

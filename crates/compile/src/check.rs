@@ -8,7 +8,7 @@ use crate::clauses::names_of;
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{
     BUILT_IN_SURFACES, COMMAND_SURFACES, Class, Condition, ConditionStep, ContextPart, DRAWN_WORDS, GROUND,
-    KindId, Model, Pattern, Remedy, Rule, Sign, base_of, class_of,
+    KindId, Model, Pattern, Remedy, Rule, SURFACE_SIZES, Sign, base_of, class_of,
 };
 use dlsys_syntax::ast;
 use dlsys_syntax::foreign_syntax;
@@ -297,7 +297,10 @@ pub fn inert_modules(model: &Model, occurs: &HashMap<KindId, Span>, diagnostics:
                     || model.appearance.surfaces.iter().any(|shape| shape.name == name) => {}
             Class::Surface => diagnostics.push(
                 Diagnostic::warning(format!("there is no surface `{name}`: nothing is drawn for it"))
-                    .at(first(), "built in are @L, a leaf, @K, a flower, @P, a petal, and @B, a bud")
+                    .at(
+                        first(),
+                        "built in are @L, a leaf, @K, a flower, @P, a petal, @B, a bud, and @O, a ball",
+                    )
                     .help_opt(
                         foreign_syntax::module(name)
                             .map(str::to_owned)
@@ -383,6 +386,34 @@ pub fn commands(model: &Model, diagnostics: &mut Vec<Diagnostic>, places: &HashM
             ))
             .at(*span, format!("{} here", crate::scope::plural(kind.arity, "parameter")))
             .help(format!("write {usage}")),
+        );
+    }
+}
+
+/// Reports surfaces with more parameters than sizes.
+pub fn surface_sizes(model: &Model, diagnostics: &mut Vec<Diagnostic>, places: &HashMap<KindId, Span>) {
+    for (id, kind) in model.kinds.iter() {
+        let name = kind.name.as_str();
+        let declared = model.appearance.surfaces.iter().any(|shape| shape.name == name);
+        if kind.arity <= SURFACE_SIZES || !(declared || BUILT_IN_SURFACES.contains(&name)) {
+            continue;
+        }
+        let Some(span) = places.get(&id).filter(|_| kind.interpretation.is_none()) else { continue };
+        let parameters: Vec<String> = (1..=kind.arity).map(|i| format!("x{i}")).collect();
+        diagnostics.push(
+            Diagnostic::error(format!(
+                "`{name}` has at most {}, not {}",
+                crate::scope::plural(SURFACE_SIZES, "size"),
+                kind.arity
+            ))
+            .at(*span, format!("{} here", crate::scope::plural(kind.arity, "parameter")))
+            .help(format!(
+                "write `{name}(s)`, or `{name}(w, l, h)`: width, length and height in parts of the surface's own"
+            ))
+            .help(format!(
+                "a module with other parameters needs a drawing: `interpret {name}({}): {name}(x1)`",
+                parameters.join(", ")
+            )),
         );
     }
 }

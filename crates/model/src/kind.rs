@@ -93,8 +93,11 @@ impl Kind {
 /// to a polygon.
 pub const DRAWN_WORDS: [&str; 3] = ["F", "f", "g"];
 
-/// The surfaces that are built in: a leaf, a flower, a petal and a bud.
-pub const BUILT_IN_SURFACES: [&str; 4] = ["@L", "@K", "@P", "@B"];
+/// The surfaces that are built in: a leaf, a flower, a petal, a bud and a ball.
+pub const BUILT_IN_SURFACES: [&str; 5] = ["@L", "@K", "@P", "@B", "@O"];
+
+/// Most sizes of a surface: width, length, height.
+pub const SURFACE_SIZES: usize = 3;
 
 /// The command that sets the turtle on the ground. A model may declare a surface or a drawing of this name instead.
 pub const GROUND: &str = "@G";

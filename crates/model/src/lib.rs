@@ -52,8 +52,8 @@ pub use chance::{Clock, Distribution, Draw, NewClock, choose};
 pub use condition::{Condition, ConditionStep};
 pub use dlsys_expr::{Comparison, Fold, Sign, Truth};
 pub use kind::{
-    BUILT_IN_SURFACES, COMMAND_SURFACES, CUT, Class, DRAWN_WORDS, GROUND, Kind, KindId, Kinds, base_of,
-    class_of,
+    BUILT_IN_SURFACES, COMMAND_SURFACES, CUT, Class, DRAWN_WORDS, GROUND, Kind, KindId, Kinds, SURFACE_SIZES,
+    base_of, class_of,
 };
 pub use measure::Measure;
 pub use remedy::{Boundary, Remedy};

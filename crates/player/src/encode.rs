@@ -8,7 +8,7 @@
 //! finishes, and for each: frames since the one before, material + 1 or 0, variant
 //! ```
 //!
-//! (kind 0 is a stem, 1 a mesh, 2 a patch, 3 a polygon), then of every track, number by number, its samples: the first
+//! (kind 0 is a stem, 1 a mesh, 2 a patch, 3 a polygon, 4 a mesh scaled by axis), then of every track, number by number, its samples: the first
 //! as difference from the point before it, the second from the first, others from the line through the two before. Growth
 //! is smooth, so most of that is small. All of it is compressed (zlib, RFC 1950).
 
@@ -38,6 +38,7 @@ pub(super) fn tracks(recording: &Recording) -> (Vec<u8>, Vec<Vec<Spoke>>) {
                 (0, number as u64)
             }
             Form::Mesh(number) => (1, u64::from(number)),
+            Form::Stretched(number) => (4, u64::from(number)),
             Form::Patch => (2, 0),
             Form::Polygon(corners) => (3, u64::from(corners)),
         };

@@ -63,7 +63,7 @@ impl Forms {
     /// The number of a surface's mesh.
     pub(super) fn mesh(&mut self, surface: &Surface) -> u32 {
         self.take_mesh(match &surface.patches {
-            Some(patches) => MeshSource::Patches(patches.clone(), surface.placement.scale),
+            Some(patches) => MeshSource::Patches(patches.clone(), surface.placement.largest()),
             None => MeshSource::Mesh(surface.mesh.clone()),
         })
     }
@@ -107,7 +107,7 @@ impl Forms {
         let mut cuts = vec![None; theirs.cuts.len()];
         for item in &stage.items {
             match item.key.form {
-                Form::Mesh(number) => {
+                Form::Mesh(number) | Form::Stretched(number) => {
                     let source = &theirs.meshes[number as usize];
                     meshes[number as usize].get_or_insert_with(|| self.take_mesh(source.clone()));
                 }

@@ -32,7 +32,7 @@
 //! survey.add(&scene);
 //! let fit = survey.fit();
 //! let mut stage = Stage::default();
-//! stage.set(&scene, fit.default_width);
+//! stage.set(&scene, &fit);
 //! let mut recorder = Recorder::new(&session.model, &scene, text, &fit);
 //! recorder.add(0.0, 2, &stage)?;
 //! assert!(page::document(&recorder.finish()).contains("<html"));

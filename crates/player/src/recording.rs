@@ -107,7 +107,7 @@ impl Recorder {
         for item in &stage.items {
             let Item { mut key, mut finish, .. } = *item;
             match &mut key.form {
-                Form::Mesh(number) => *number = meshes[*number as usize],
+                Form::Mesh(number) | Form::Stretched(number) => *number = meshes[*number as usize],
                 Form::Polygon(_) => finish.variant = cuts[finish.variant as usize],
                 Form::Stem(_) | Form::Patch => {}
             }
@@ -163,6 +163,7 @@ impl Recorder {
 pub(super) fn is_point(form: Form, number: usize) -> bool {
     match form {
         Form::Stem(_) | Form::Mesh(_) => number % 9 < 3,
+        Form::Stretched(_) => number < 3,
         Form::Patch | Form::Polygon(_) => true,
     }
 }

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | a length of a stem | two cross-sections: centre, u, v |
 //! | a surface | where its origin, its first and its second axis (of its size) come to lie; the third is their product |
+//! | a surface scaled by axis | where its origin and its three axes (of its sizes) come to lie |
 //! | a patch | 16 control points, row by row |
 //! | a polygon | its corners |
 
@@ -11,7 +12,7 @@ use std::collections::HashMap;
 
 use super::forms::Forms;
 use dlsys_geometry::scene::{MaterialId, OwnerId, Point, Scene};
-use dlsys_render::{CrossSection, lengths};
+use dlsys_render::{CrossSection, Fit, lengths};
 
 /// What is placed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -20,6 +21,8 @@ pub enum Form {
     Stem(Option<u32>),
     /// A mesh, by its number among the [`Forms`].
     Mesh(u32),
+    /// The same, with a scale for each axis.
+    Stretched(u32),
     /// A bicubic Bézier patch: its 16 control points.
     Patch,
     /// A polygon of so many corners.
@@ -32,6 +35,7 @@ impl Form {
         match self {
             Form::Stem(_) => 18,
             Form::Mesh(_) => 9,
+            Form::Stretched(_) => 12,
             Form::Patch => 48,
             Form::Polygon(corners) => 3 * corners as usize,
         }
@@ -83,14 +87,16 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// Takes the place of what was there before. `default_width` (scene units) is that of lines of default width.
-    pub fn set(&mut self, scene: &Scene, default_width: f64) {
+    /// Takes the place of what was there before; `fit` is that of the animation.
+    pub fn set(&mut self, scene: &Scene, fit: &Fit) {
         let scene = &*scene.flattened();
         self.items.clear();
         self.numbers.clear();
         self.counts.clear();
         // Lengths come stem by stem; a module's are counted in its own order, which lasts.
-        let mut stems = lengths(scene, default_width);
+        let mut stems = lengths(scene, fit);
+        // The last of a segment first: where a joint gets a cross-section more, those towards its parent change places.
+        stems.reverse();
         stems.sort_by_key(|length| length.segment);
         for length in &stems {
             let segment = &scene.segments[length.segment];
@@ -111,11 +117,13 @@ impl Stage {
         }
         for surface in &scene.surfaces {
             let placement = &surface.placement;
-            let form = Form::Mesh(self.forms.mesh(surface));
+            let number = self.forms.mesh(surface);
+            let (form, axes) =
+                if placement.is_uniform() { (Form::Mesh(number), 2) } else { (Form::Stretched(number), 3) };
             self.begin(scene, surface.owner, form, Finish { material: surface.tint, variant: 0 });
             self.numbers.extend(placement.origin.iter());
-            for axis in &placement.axes[..2] {
-                self.numbers.extend((axis * placement.scale).iter());
+            for (axis, scale) in placement.axes.iter().zip(placement.scales).take(axes) {
+                self.numbers.extend((axis * scale).iter());
             }
         }
         for patch in &scene.patches {

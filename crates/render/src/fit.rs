@@ -3,6 +3,7 @@
 use super::camera::Camera;
 use super::extent::Extent;
 use super::light::Light;
+use super::tube::TubeStyle;
 use super::{View, number, painter};
 use dlsys_geometry::scene::{Bounds, Point, Scene};
 
@@ -112,6 +113,12 @@ impl Fit {
     /// is hidden; stems and polygons alone have an order by depth that is good enough. There every element keeps its exact shape.
     pub(super) fn has_visible_regions(&self) -> bool {
         self.has_surfaces && !self.light.is_flat()
+    }
+
+    /// How stems become tubes. Without depth they are lines of a diagram, and their joints keep their shape.
+    pub(super) fn tubes(&self) -> TubeStyle {
+        let Fit { default_width, accuracy, .. } = *self;
+        TubeStyle { default_width, sides: 0, accuracy, grown: !self.light.is_flat(), steady: false }
     }
 
     /// Left, bottom, right and top of a survey as this camera sees it; `None` if it is empty.

@@ -3,7 +3,8 @@
 //!
 //! These are the tubes of the OBJ format: lengths that continue one another share the cross-section in which they meet.
 
-use super::tube::{Section, Spoke, Tubes, circle, curve, sides_for};
+use super::Fit;
+use super::tube::{Collar, Section, Spoke, TubeStyle, Tubes, circle, curve, sides_for};
 use dlsys_geometry::scene::{Point, Scene, Vector};
 
 /// A cross-section of a stem: the corner at (x, y) of its outline, in parts of the radius, is at
@@ -32,6 +33,22 @@ impl CrossSection {
         let [u, v] = [before.u, before.v].map(|w| (w - before.along * (w.dot(&plane) / lean)) * radius);
         CrossSection { centre, u, v }
     }
+
+    /// As wide as a collar makes it, as far as an ellipse can be: exact at (1, 0), (0, 1) and opposite to them, but for
+    /// what they differ in.
+    pub(super) fn widened(self, collar: Option<&Collar>, along: Vector, drape: f64) -> CrossSection {
+        let Some(collar) = collar else { return self };
+        let moved = |side: Vector| match side.try_normalize(0.0) {
+            Some(normal) => {
+                let droop = collar.droop(self.centre, along, normal, drape);
+                collar.place(self.centre + side + along * droop, normal).coords
+            }
+            None => self.centre.coords,
+        };
+        let [east, west, north, south] = [self.u, -self.u, self.v, -self.v].map(moved);
+        let centre = Point::from((east + west + north + south) / 4.0);
+        CrossSection { centre, u: (east - west) / 2.0, v: (north - south) / 2.0 }
+    }
 }
 
 /// The part of a stem between two cross-sections.
@@ -45,10 +62,10 @@ pub struct Length {
     pub caps: [bool; 2],
 }
 
-/// All stems of a scene, by segment within a stem; `default_width` is in scene units.
-pub fn lengths(scene: &Scene, default_width: f64) -> Vec<Length> {
-    // Sides do not matter: nobody makes the corners here.
-    let tubes = Tubes::new(scene, default_width, 3, 0.0);
+/// All stems of a scene, by segment within a stem.
+pub fn lengths(scene: &Scene, fit: &Fit) -> Vec<Length> {
+    // Sides do not matter, as no corners are made. Joints have the same number of lengths in all frames.
+    let tubes = Tubes::new(scene, TubeStyle { sides: 3, steady: true, ..fit.tubes() });
     (0..tubes.len()).flat_map(|i| tubes.lengths(i).collect::<Vec<_>>()).collect()
 }
 
@@ -62,6 +79,7 @@ pub fn cross_section(contour: Option<&[[f64; 2]]>, radius: f64, accuracy: f64) -
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{Survey, View};
     use dlsys_geometry::scene::{MaterialId, Owner, Segment, Width};
     use dlsys_tree::Lineage;
 
@@ -83,13 +101,16 @@ mod tests {
                 material,
                 owner,
                 follows,
+                grows_from: None,
             });
             end
         };
         let bend = add(Point::origin(), Vector::y(), [0.2, 0.2], None);
         let step = add(bend, Vector::new(0.6, 0.8, 0.0), [0.2, 0.2], Some(0));
         add(step, Vector::new(0.6, 0.8, 0.0), [0.1, 0.0], Some(1));
-        let all = lengths(&scene, 1.0);
+        let mut survey = Survey::new(View::FRONT);
+        survey.add(&scene);
+        let all = lengths(&scene, &survey.fit());
         let [low, high, shoulder, tip] = &all[..] else { panic!("{all:?}") };
         assert_eq!(low.ends[1], high.ends[0]);
         assert_eq!(

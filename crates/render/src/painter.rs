@@ -163,7 +163,7 @@ impl Painter<'_> {
         let corners: Vec<Point> = mesh.vertices.iter().map(|&v| self.project(placement.point(v))).collect();
         let material = |face: &Face| surface.tint.filter(|_| face.takes_tint).unwrap_or(face.material);
         self.end_run();
-        let width = text((0.006 * placement.scale * self.style.scale).clamp(0.01, 0.4));
+        let width = text((0.006 * placement.largest() * self.style.scale).clamp(0.01, 0.4));
         let _ = writeln!(self.out, "<g{id} stroke-width=\"{width}\">");
         for run in mesh.faces.chunk_by(|a, b| material(a) == material(b)) {
             let mut outline = String::new();

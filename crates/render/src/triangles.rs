@@ -9,7 +9,7 @@
 
 use std::ops::Range;
 
-use super::tube::Tubes;
+use super::tube::{TubeStyle, Tubes};
 use super::{Fit, triangulate};
 use dlsys_geometry::scene::{MaterialId, OwnerId, Point, Scene, Segment, Vector};
 
@@ -96,7 +96,7 @@ pub(super) struct Solid<'s> {
 impl<'s> Solid<'s> {
     /// Of everything in a scene; stems are tubes with so many sides, 0: as many as it takes.
     pub(super) fn new(scene: &'s Scene, fit: &Fit, sides: usize) -> Solid<'s> {
-        let tubes = Tubes::new(scene, fit.default_width, sides, fit.accuracy);
+        let tubes = Tubes::new(scene, TubeStyle { sides, ..fit.tubes() });
         let mut counts = tubes.counts;
         let mut number = |vertices: usize, normals: usize| {
             let first = counts;
@@ -183,7 +183,7 @@ impl<'s> Solid<'s> {
                         out.vertex(|| surface.placement.point(v));
                     }
                     for &n in &surface.mesh.normals {
-                        out.normal(|| surface.placement.direction(n));
+                        out.normal(|| surface.placement.normal(n));
                     }
                 }
             }

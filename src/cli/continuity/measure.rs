@@ -159,7 +159,8 @@ impl<'m> DrawingProbe<'m> {
             let next = |i: usize| &corners[(i + 1) % corners.len()];
             corners.iter().enumerate().map(|(i, p)| (next(i) - p).norm()).sum::<f64>()
         });
-        let surfaces = self.scene.surfaces.iter().map(|surface| surface.placement.scale);
+        let surfaces =
+            self.scene.surfaces.iter().map(|surface| surface.placement.scales.iter().sum::<f64>() / 3.0);
         let patches = self.scene.patches.iter().map(Patch::length);
         let length =
             lines.sum::<f64>() + outlines.sum::<f64>() + surfaces.sum::<f64>() + patches.sum::<f64>();

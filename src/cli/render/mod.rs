@@ -220,6 +220,7 @@ impl Render<'_> {
                 Ok(())
             },
         )?;
+        self.run.warn();
         let names = match &manifest.frames[..] {
             [] => self.out.display().to_string(),
             [only] => self.out.join(&only.file).display().to_string(),
@@ -265,6 +266,7 @@ impl Render<'_> {
                 assembly.add(part).map_err(refuse)
             },
         )?;
+        self.run.warn();
         let title = match &times[..] {
             [] => self.title().to_owned(),
             [only] => format!("{}, t = {only}", self.title()),

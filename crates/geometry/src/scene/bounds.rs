@@ -136,6 +136,7 @@ mod tests {
             material: MaterialId::STEM,
             owner,
             follows: None,
+            grows_from: None,
         });
     }
 

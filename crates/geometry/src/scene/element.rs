@@ -57,6 +57,8 @@ pub struct Segment {
     /// Index of the segment that this one continues: it precedes this one on the same axis and ends exactly
     /// where this one starts. No two segments continue the same one.
     pub follows: Option<usize>,
+    /// Index of the segment at whose end the branch begins of which this is the first one.
+    pub grows_from: Option<usize>,
 }
 
 /// A filled outline, of at least three distinct vertices. It need not be flat or convex.
@@ -93,27 +95,77 @@ pub struct Placement {
     pub origin: Point,
     /// Unit vectors that the mesh's first, second and third axis turn to.
     pub axes: [Vector; 3],
-    /// Length of one unit of the mesh, in scene units.
-    pub scale: f64,
+    /// Lengths of one unit of the mesh along its first, second and third axis, in scene units; positive.
+    pub scales: [f64; 3],
 }
 
 impl Placement {
-    /// The place of a point of the mesh in the scene.
-    pub fn point(&self, p: Point) -> Point {
-        self.origin + self.scale * self.direction(p.coords)
+    /// A placement with one scale for all axes.
+    pub fn uniform(origin: Point, axes: [Vector; 3], scale: f64) -> Placement {
+        Placement { origin, axes, scales: [scale; 3] }
     }
 
-    /// The placement in a scene of a thing that has this placement in a plant, which has the `outer` placement in the scene.
+    /// True if all axes have the same scale.
+    pub fn is_uniform(&self) -> bool {
+        self.scales.iter().all(|scale| *scale == self.scales[0])
+    }
+
+    /// The largest of the scales: no length of the mesh is enlarged more.
+    pub fn largest(&self) -> f64 {
+        self.scales.into_iter().fold(0.0, f64::max)
+    }
+
+    /// The place of a point of the mesh in the scene.
+    pub fn point(&self, p: Point) -> Point {
+        let [x, y, z] = self.scales;
+        if self.is_uniform() {
+            return self.origin + x * self.turned(p.coords);
+        }
+        self.origin + self.turned(Vector::new(x * p.x, y * p.y, z * p.z))
+    }
+
+    /// A unit normal of the mesh as a unit normal in the scene. Normals transform by the inverse of the scales.
+    pub fn normal(&self, n: Vector) -> Vector {
+        if self.is_uniform() {
+            return self.turned(n);
+        }
+        let largest = self.largest();
+        let [x, y, z] = self.scales.map(|scale| scale / largest);
+        let scaled = Vector::new(n.x * y * z, n.y * x * z, n.z * x * y);
+        self.turned(scaled.try_normalize(1e-300).unwrap_or(n))
+    }
+
+    /// The placement in a scene of a thing that has this placement in a plant; the plant has the `outer` placement in the scene, with
+    /// the same scale along all axes.
     pub fn within(&self, outer: &Placement) -> Placement {
         Placement {
             origin: outer.point(self.origin),
-            axes: self.axes.map(|axis| outer.direction(axis)),
-            scale: self.scale * outer.scale,
+            axes: self.axes.map(|axis| outer.turned(axis)),
+            scales: self.scales.map(|scale| scale * outer.largest()),
         }
     }
 
-    /// A direction of the mesh in the scene.
-    pub fn direction(&self, v: Vector) -> Vector {
+    /// A direction of the mesh in the scene, of the same length.
+    pub fn turned(&self, v: Vector) -> Vector {
         self.axes[0] * v.x + self.axes[1] * v.y + self.axes[2] * v.z
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The normal of a plane stays at a right angle to it when the plane is stretched.
+    #[test]
+    fn normals_transform_by_the_inverse() {
+        let axes = [Vector::y(), -Vector::x(), Vector::z()];
+        let place = Placement { origin: Point::new(1.0, 2.0, 3.0), axes, scales: [4.0, 0.5, 3.0] };
+        let (u, v) = (Vector::new(1.0, 2.0, -1.0), Vector::new(0.5, -1.0, 3.0));
+        let normal = place.normal(u.cross(&v).normalize());
+        let moved = |w: Vector| place.point(Point::from(w)) - place.origin;
+        assert!((normal.norm() - 1.0).abs() < 1e-12);
+        assert!(normal.dot(&moved(u)).abs() < 1e-12 && normal.dot(&moved(v)).abs() < 1e-12);
+        assert!(normal.dot(&moved(u).cross(&moved(v))) > 0.0, "it stays on the same side");
+        assert_eq!((place.largest(), place.is_uniform()), (4.0, false));
     }
 }

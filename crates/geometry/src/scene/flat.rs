@@ -30,17 +30,18 @@ impl Scene {
         }
         let offset = self.segments.len();
         let width = |width: Width| match width {
-            Width::Set(width) => Width::Set(width * at.scale),
+            Width::Set(width) => Width::Set(width * at.largest()),
             default => default,
         };
         self.segments.extend(plant.segments.iter().map(|segment| Segment {
             start: at.point(segment.start),
             end: at.point(segment.end),
-            direction: at.direction(segment.direction),
-            across: at.direction(segment.across),
+            direction: at.turned(segment.direction),
+            across: at.turned(segment.across),
             widths: segment.widths.map(width),
             owner: own(segment.owner),
             follows: segment.follows.map(|before| before + offset),
+            grows_from: segment.grows_from.map(|parent| parent + offset),
             ..segment.clone()
         }));
         self.polygons.extend(plant.polygons.iter().map(|polygon| Polygon {

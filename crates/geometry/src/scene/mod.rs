@@ -7,7 +7,7 @@
 //!
 //! - [`Segment`]: a straight piece of a stem. Segments that continue one another form tubes.
 //! - [`Polygon`]: a filled outline. [`Surface`]: a [`Mesh`] placed in space; many share one mesh.
-//! - [`Patch`]: a bicubic Bézier patch; [`Scene::tessellated`] makes surfaces of patches.
+//! - [`Patch`]: a bicubic Bézier patch. [`PatchSet`]: a surface of patches, or a ball. [`Scene::tessellated`] makes meshes of them.
 //! - [`Owner`]: the module that drew an element. Its name is the same in every frame.
 //! - [`Plant`]: the scene of another model, placed in this one. [`Surroundings`]: light, sky, camera and floor.
 //! - [`Bounds`]: the bounds of a scene, or of all scenes of an animation.
@@ -15,6 +15,7 @@
 //! Lengths are in *scene units*, the units of the model. The axes: `+X` right, `+Y` up, `+Z` towards the
 //! viewer of the front view.
 
+mod ball;
 mod bounds;
 mod degrees;
 mod element;
@@ -81,9 +82,17 @@ impl Shape {
 
     /// Of patches, about 1 in size.
     pub fn of_patches(faces: Vec<PatchFace>) -> Shape {
+        Shape::curved(PatchSet::new(faces))
+    }
+
+    /// A ball of diameter 1 around the origin.
+    pub fn ball(material: MaterialId) -> Shape {
+        Shape::curved(PatchSet::ball(material))
+    }
+
+    fn curved(patches: PatchSet) -> Shape {
         /// Accuracy of the preview.
         const PREVIEW: f64 = 1.0 / 256.0;
-        let patches = PatchSet::new(faces);
         Shape { mesh: patches.mesh(PREVIEW), patches: Some(Arc::new(patches)) }
     }
 }
@@ -156,7 +165,7 @@ impl Scene {
         let mut scene = self.clone();
         for surface in &mut scene.surfaces {
             if let Some(patches) = surface.patches.take() {
-                surface.mesh = patches.mesh(accuracy / surface.placement.scale);
+                surface.mesh = patches.mesh(accuracy / surface.placement.largest());
             }
         }
         scene.surfaces.extend(scene.patches.drain(..).map(|patch| patch.surface(accuracy)));

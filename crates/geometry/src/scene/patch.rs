@@ -9,7 +9,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
-use super::{MaterialId, Mesh, OwnerId, Placement, Point, Surface, Vector};
+use super::{MaterialId, Mesh, OwnerId, Placement, Point, Surface, Vector, ball};
 
 /// Control points by row and column. Seen with rows going up and columns going right, the front is towards
 /// the viewer.
@@ -52,7 +52,7 @@ impl Patch {
         let unit = self.net.map(|row| row.map(|p| Point::from((p - origin) / scale)));
         let mut mesh = Mesh::new();
         tessellate(&unit, accuracy / scale, self.material, false, &mut mesh);
-        let placement = Placement { origin, axes: [Vector::x(), Vector::y(), Vector::z()], scale };
+        let placement = Placement::uniform(origin, [Vector::x(), Vector::y(), Vector::z()], scale);
         Surface { mesh: Arc::new(mesh), patches: None, placement, tint: None, owner: self.owner }
     }
 }
@@ -68,18 +68,29 @@ pub struct PatchFace {
     pub takes_tint: bool,
 }
 
-/// Patches of a surface in coordinates of its own; drawn many times, at any size.
-#[derive(Debug, Default)]
+/// A curved surface in coordinates of its own, drawn many times, at any size: patches, or a ball.
+#[derive(Debug)]
 pub struct PatchSet {
-    faces: Vec<PatchFace>,
+    shape: Curved,
     /// Meshes that were asked for, by the exponent of their accuracy.
     meshes: Mutex<BTreeMap<i32, Arc<Mesh>>>,
+}
+
+#[derive(Debug)]
+enum Curved {
+    Patches(Vec<PatchFace>),
+    Ball(MaterialId),
 }
 
 impl PatchSet {
     /// The surface made of these patches.
     pub fn new(faces: Vec<PatchFace>) -> PatchSet {
-        PatchSet { faces, meshes: Mutex::default() }
+        PatchSet { shape: Curved::Patches(faces), meshes: Mutex::default() }
+    }
+
+    /// A ball of diameter 1 around the origin; a colour replaces its material.
+    pub fn ball(material: MaterialId) -> PatchSet {
+        PatchSet { shape: Curved::Ball(material), meshes: Mutex::default() }
     }
 
     /// The surface as triangles that deviate from it by no more than `accuracy`, in its own units. Meshes
@@ -88,9 +99,15 @@ impl PatchSet {
         // With 64 pieces an edge is as fine as it gets; coarser than a surface of unit size makes no sense.
         let exponent = (accuracy.log2() / 2.0).floor().clamp(-20.0, 0.0) as i32;
         let make = || {
+            let accuracy = 4_f64.powi(exponent);
             let mut mesh = Mesh::new();
-            for face in &self.faces {
-                tessellate(&face.net, 4_f64.powi(exponent), face.material, face.takes_tint, &mut mesh);
+            match &self.shape {
+                Curved::Patches(faces) => {
+                    for face in faces {
+                        tessellate(&face.net, accuracy, face.material, face.takes_tint, &mut mesh);
+                    }
+                }
+                Curved::Ball(material) => mesh = ball::mesh(accuracy, FINEST, *material),
             }
             Arc::new(mesh)
         };

@@ -48,6 +48,8 @@ pub(super) enum Command {
     Petal,
     /// `@B(s)`
     Bud,
+    /// `@O(d)`
+    Ball,
     /// A surface of the model, by its index among the scene's shapes.
     Surface(usize),
     /// A plant of another model, by its index among those that the model declares.
@@ -104,6 +106,7 @@ impl Command {
             "@K" => Command::Flower,
             "@P" => Command::Petal,
             "@B" => Command::Bud,
+            "@O" => Command::Ball,
             "@W" => Command::Taper,
             "@T" => Command::Bend,
             "@C" => Command::Contour,
@@ -123,7 +126,13 @@ impl Command {
     /// How many parameters it reads, at most.
     pub(super) fn parameters(self) -> usize {
         match self {
-            Command::ControlPoint => 3,
+            Command::ControlPoint
+            | Command::Leaf
+            | Command::Flower
+            | Command::Petal
+            | Command::Bud
+            | Command::Ball
+            | Command::Surface(_) => 3,
             Command::Color | Command::Plant(_) => 2,
             Command::Draw
             | Command::Move
@@ -133,11 +142,6 @@ impl Command {
             | Command::Taper
             | Command::Bend
             | Command::Contour
-            | Command::Leaf
-            | Command::Flower
-            | Command::Petal
-            | Command::Bud
-            | Command::Surface(_)
             | Command::BeginPatch
             | Command::DrawPatch => 1,
             _ => 0,

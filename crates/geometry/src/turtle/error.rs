@@ -147,13 +147,29 @@ pub(super) enum Remark {
     FewVertices(usize),
     PolygonNotOpen,
     PolygonNotClosed,
+    /// Widths of two segments of one axis that meet.
+    Step(f64, f64),
 }
 
 /// The warnings of a frame, each once for each place.
 #[derive(Default)]
-pub(super) struct Remarks(Vec<(std::mem::Discriminant<Remark>, Option<Span>)>);
+pub(super) struct Remarks {
+    added: Vec<(std::mem::Discriminant<Remark>, Option<Span>)>,
+    /// The interpretations and kinds whose steps were looked at.
+    steps: Vec<(Option<(usize, KindId)>, KindId)>,
+}
 
 impl Remarks {
+    /// Whether no step of the width was found before that these set.
+    pub(super) fn steps_are_new(&mut self, inside: Option<(usize, KindId)>, kind: KindId) -> bool {
+        let key = (inside, if inside.is_some() { KindId::OPEN } else { kind });
+        let new = self.steps.len() < MAX_WARNINGS && !self.steps.contains(&key);
+        if new {
+            self.steps.push(key);
+        }
+        new
+    }
+
     /// The warning, unless it has been said.
     pub(super) fn add(
         &mut self,
@@ -163,10 +179,10 @@ impl Remarks {
         time: f64,
     ) -> Option<Diagnostic> {
         let key = (std::mem::discriminant(&remark), span);
-        if self.0.len() >= MAX_WARNINGS || self.0.contains(&key) {
+        if self.added.len() >= MAX_WARNINGS || self.added.contains(&key) {
             return None;
         }
-        self.0.push(key);
+        self.added.push(key);
         Some(warning(remark, model, span, time))
     }
 }
@@ -220,6 +236,11 @@ fn warning(remark: Remark, model: &Model, span: Option<Span>, time: f64) -> Diag
             "a `{` is never closed, and its polygon is not drawn".to_owned(),
             format!("no `}}` follows at t = {time}; what comes behind it makes vertices, and no lines"),
             "write the `}` that ends it".to_owned(),
+        ),
+        Remark::Step(from, to) => (
+            "the width of a stem changes at once".to_owned(),
+            format!("from {} to {} at t = {time}", short(from), short(to)),
+            "write `@W(w)` in place of `!(w)`: the stem before it tapers to that width".to_owned(),
         ),
     };
     let warning = Diagnostic::warning(message);

@@ -22,6 +22,8 @@
 //! | `[` `]` | remember and return to position, orientation, width, colour, cross-section and strength of tropism |
 //! | `{` `.` `}` | begin a filled polygon, make the position a vertex, end it; steps between them make vertices, too, and are not drawn |
 //! | `@L(s)` `@K(s)` `@P(s)` `@B(s)` | a leaf, a flower, a petal, a bud of size `s` (1), or any surface that the model declares; nothing if `s` is not positive |
+//! | `@O(d)` | a ball of diameter `d` (1) around the turtle |
+//! | `@L(w, l, h)` | the same for each surface: its width (to the left), length (along the heading) and height (up) in parts of its own; `@L(w, l)` is `@L(w, l, l)` |
 //! | `@NAME(b, s)` | a plant of another model, declared by `plant @NAME from …`, as it is at its time t - b; `s` is its seed |
 //! | `@G` | the turtle is set down on the ground; `x`, `z` and its directions stay |
 //! | `@PS(n)` `@PC(n, r, c)` `@PD(n)` | begin Bézier patch `n`; make the position its control point in row `r` and column `c` (0 to 3); draw it, when all 16 are there. Brackets do not matter to them |

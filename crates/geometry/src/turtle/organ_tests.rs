@@ -166,6 +166,77 @@ fn stems_taper_between_widths() {
     assert_eq!(run(&[("!", &[0.4]), ("F", &[1.0]), ("!", &[0.2]), ("F", &[1.0])]), [[0.4, 0.4], [0.2, 0.2]]);
 }
 
+/// Warnings of a string drawn with a known accuracy.
+fn warnings(modules: &[(&str, &[f64])]) -> Vec<String> {
+    let mut model = Model::default();
+    let string = string(&mut model, modules);
+    let mut scene = Scene::default();
+    scene.accuracy = 1e-3;
+    draw(&model, &string, &mut scene).expect("drawable");
+    scene.warnings.iter().map(|warning| warning.message.clone()).collect()
+}
+
+#[test]
+fn a_step_of_the_width_is_reported_where_nothing_hides_it() {
+    let step: [(&str, &[f64]); 4] = [("!", &[0.4]), ("F", &[1.0]), ("!", &[0.2]), ("F", &[1.0])];
+    assert_eq!(warnings(&step), ["the width of a stem changes at once"]);
+    let silent: [&[(&str, &[f64])]; 6] = [
+        // Too little, or too small to be seen.
+        &[("!", &[0.4]), ("F", &[1.0]), ("!", &[0.36]), ("F", &[1.0])],
+        &[("!", &[0.004]), ("F", &[1.0]), ("!", &[0.002]), ("F", &[1.0])],
+        // It tapers; a branch or an organ stands there; it is another organ; it begins anew.
+        &[("!", &[0.4]), ("F", &[1.0]), ("@W", &[0.2]), ("F", &[1.0])],
+        &[("!", &[0.4]), ("F", &[1.0]), ("[", &[]), ("@L", &[]), ("]", &[]), ("!", &[0.2]), ("F", &[1.0])],
+        &[("!", &[0.4]), ("F", &[1.0]), (";", &[3.0]), ("!", &[0.2]), ("F", &[1.0])],
+        &[("!", &[0.4]), ("F", &[1.0]), ("f", &[1.0]), ("!", &[0.2]), ("F", &[1.0])],
+    ];
+    for modules in silent {
+        assert!(warnings(modules).is_empty(), "{modules:?}");
+    }
+}
+
+#[test]
+fn surfaces_are_scaled_by_width_length_and_height() {
+    let scales = |sizes: &[f64]| drawn(&[("@L", sizes)]).surfaces.first().map(|s| s.placement.scales);
+    // In the order of the axes: heading, left, up.
+    assert_eq!(scales(&[]), Some([1.0; 3]));
+    assert_eq!(scales(&[2.0]), Some([2.0; 3]));
+    assert_eq!(scales(&[2.0, 3.0]), Some([3.0, 2.0, 3.0]));
+    assert_eq!(scales(&[2.0, 3.0, 0.5]), Some([3.0, 2.0, 0.5]));
+    assert_eq!(scales(&[2.0, 3.0, 0.0]), None);
+    let ball = drawn(&[("F", &[3.0]), ("@O", &[2.0, 4.0, 6.0])]);
+    let mut box_: [f64; 3] = [0.0; 3];
+    for vertex in &ball.surfaces[0].mesh.vertices {
+        let apart = ball.surfaces[0].placement.point(*vertex) - Point::new(0.0, 3.0, 0.0);
+        (0..3).for_each(|i| box_[i] = box_[i].max(apart[i].abs()));
+    }
+    // The turtle heads up; left is -x.
+    for (found, expected) in box_.iter().zip([1.0, 2.0, 3.0]) {
+        assert!((found - expected).abs() < 0.03 * expected, "{box_:?}");
+    }
+}
+
+#[test]
+fn a_branch_knows_the_stem_that_it_grows_from() {
+    let scene = drawn(&[
+        ("F", &[1.0]),
+        ("[", &[]),
+        ("[", &[]),
+        ("+", &[40.0]),
+        ("F", &[0.0]),
+        ("F", &[1.0]),
+        ("F", &[1.0]),
+        ("]", &[]),
+        ("f", &[1.0]),
+        ("F", &[1.0]),
+        ("]", &[]),
+        ("F", &[1.0]),
+    ]);
+    let from: Vec<_> = scene.segments.iter().map(|s| (s.grows_from, s.follows)).collect();
+    // The stem, the branch and its second segment, one that begins elsewhere, and the stem again.
+    assert_eq!(from, [(None, None), (Some(0), None), (None, Some(1)), (None, None), (None, Some(0))]);
+}
+
 #[test]
 fn a_polygon_may_be_made_in_branches() {
     // A rectangle whose corners are set from its middle line: `g` makes no vertex.

@@ -1,4 +1,4 @@
-//! The built-in surfaces: a leaf, a flower, a petal and a bud, of unit size, in the turtle's axes.
+//! The built-in surfaces: a leaf, a flower, a petal, a bud and a ball, of unit size, in the turtle's axes.
 //!
 //! Coordinates are along the heading, to the left and up. Outlines are `s^a (1 - s)^b`, with `s` from base
 //! to tip: round where the exponent is near one half, pointed where it is 1.
@@ -18,6 +18,9 @@ pub(super) static PETAL: LazyLock<Shape> = LazyLock::new(|| Shape::of_patches(ma
 
 /// A closed bud, 1 long, 0.5 thick, pointed: four patches around the heading.
 pub(super) static BUD: LazyLock<Shape> = LazyLock::new(|| Shape::of_patches(make_bud()));
+
+/// A ball of diameter 1 around the turtle.
+pub(super) static BALL: LazyLock<Shape> = LazyLock::new(|| Shape::ball(MaterialId::STEM));
 
 /// Positions from 0 to 1 that lie closer near the ends, where outlines turn most.
 fn stations(count: usize) -> impl Iterator<Item = f64> {

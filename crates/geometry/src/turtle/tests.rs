@@ -92,7 +92,7 @@ fn surfaces_stand_where_the_turtle_is() {
     let scene = drawn(&[("F", &[3.0]), ("@L", &[2.0]), ("@K", &[]), ("@L", &[0.0]), ("@Q", &[])]);
     assert_eq!(scene.surfaces.len(), 2);
     let leaf = &scene.surfaces[0].placement;
-    assert_eq!((leaf.origin, leaf.scale), (Point::new(0.0, 3.0, 0.0), 2.0));
+    assert_eq!((leaf.origin, leaf.scales), (Point::new(0.0, 3.0, 0.0), [2.0; 3]));
     assert_eq!(leaf.point(Point::new(1.0, 0.0, 0.0)), Point::new(0.0, 5.0, 0.0));
 }
 

@@ -1,5 +1,7 @@
 //! The turtle: its state, and the effect of each command on it and on the scene.
 
+mod width;
+
 use std::sync::Arc;
 
 use super::bend::Bend;
@@ -42,8 +44,14 @@ struct State {
     strength: f64,
     /// The last segment on this axis, if the turtle still stands at its end.
     last: Option<usize>,
+    /// The segment at whose end this branch begins, if the turtle still stands there.
+    parent: Option<usize>,
     /// Number of segments on this axis since the width was set.
     run: usize,
+    /// The interpretation and the module that set the width with `!`.
+    set_by: Option<(Option<(usize, KindId)>, DrawnModule)>,
+    /// A branch or an organ stands where the turtle is.
+    node: bool,
 }
 
 /// A polygon that is open.
@@ -92,7 +100,10 @@ impl<'a> Walk<'a> {
                 contour: None,
                 strength: tropism.map_or(0.0, |tropism| tropism.strength),
                 last: None,
+                parent: None,
                 run: 0,
+                set_by: None,
+                node: false,
             },
             stack: Vec::new(),
             polygons: Vec::new(),
@@ -168,7 +179,7 @@ impl<'a> Walk<'a> {
                 let width = Width::Set(self.in_range(given.unwrap_or(0.0).max(0.0))?);
                 self.taper(width);
                 self.state.width = width;
-                self.state.run = 0;
+                (self.state.run, self.state.set_by) = (0, None);
             }
             Command::Bend => self.state.strength = self.in_range(given.unwrap_or(0.0))?,
             Command::Contour => self.set_contour(given.unwrap_or(0.0).round()),
@@ -183,13 +194,14 @@ impl<'a> Walk<'a> {
             }
             Command::Push => {
                 self.stack.push(self.state.clone());
-                self.state.last = None;
+                self.state.parent = self.state.last.take().or(self.state.parent);
                 self.state.run = 0;
             }
             Command::Pop => {
                 // Brackets match, by the rules of the language; a stray one changes nothing.
                 if let Some(state) = self.stack.pop() {
                     self.state = state;
+                    self.state.node = true;
                 }
             }
             Command::BeginPolygon => {
@@ -198,13 +210,14 @@ impl<'a> Walk<'a> {
             }
             Command::Vertex => self.record_vertex(),
             Command::EndPolygon => self.end_polygon(),
-            Command::Leaf => self.place(&shapes::LEAF, given)?,
-            Command::Flower => self.place(&shapes::FLOWER, given)?,
-            Command::Petal => self.place(&shapes::PETAL, given)?,
-            Command::Bud => self.place(&shapes::BUD, given)?,
+            Command::Leaf => self.place(&shapes::LEAF, read)?,
+            Command::Flower => self.place(&shapes::FLOWER, read)?,
+            Command::Petal => self.place(&shapes::PETAL, read)?,
+            Command::Bud => self.place(&shapes::BUD, read)?,
+            Command::Ball => self.place(&shapes::BALL, read)?,
             Command::Surface(index) => {
                 if let Some(shape) = self.scene.shapes.get(index).cloned() {
-                    self.place(&shape, given)?;
+                    self.place(&shape, read)?;
                 }
             }
             Command::Plant(plant) => self.plant(plant, read),
@@ -233,7 +246,7 @@ impl<'a> Walk<'a> {
                 Width::Default(factor) => Width::Default(self.in_range(factor)?),
             },
         };
-        self.state.run = 0;
+        (self.state.run, self.state.set_by) = (0, Some((self.inside, self.drawn)));
         Ok(())
     }
 
@@ -313,8 +326,13 @@ impl<'a> Walk<'a> {
         if end == start {
             return Ok(());
         }
-        let follows = self.state.last.take();
+        let (follows, grows_from) = (self.state.last.take(), self.state.parent.take());
+        let node = std::mem::replace(&mut self.state.node, false);
         if draw && self.polygons.is_empty() {
+            let material = self.chosen().unwrap_or(MaterialId::STEM);
+            if let Some(before) = follows.filter(|_| !node) {
+                self.check_step(before, material);
+            }
             let segment = Segment {
                 start,
                 end,
@@ -322,39 +340,16 @@ impl<'a> Walk<'a> {
                 across,
                 widths: [self.state.width; 2],
                 contour: self.state.contour,
-                material: self.chosen().unwrap_or(MaterialId::STEM),
+                material,
                 owner: self.owner(),
                 follows,
+                grows_from,
             };
             self.state.run = if follows.is_some() { self.state.run + 1 } else { 1 };
             self.state.last = Some(self.scene.segments.len());
             self.scene.segments.push(segment);
         }
         Ok(())
-    }
-
-    /// Lets the segments drawn since the last width run evenly from that width to this one. The
-    /// default width is not known before the whole animation is, and stays.
-    fn taper(&mut self, to: Width) {
-        let (Width::Set(from), Width::Set(to)) = (self.state.width, to) else { return };
-        let chain = |scene: &Scene, last: Option<usize>| {
-            let mut next = last;
-            let mut found = Vec::new();
-            for _ in 0..self.state.run {
-                let Some(i) = next else { break };
-                found.push((i, (scene.segments[i].end - scene.segments[i].start).norm()));
-                next = scene.segments[i].follows;
-            }
-            found
-        };
-        let run = chain(self.scene, self.state.last);
-        let whole: f64 = run.iter().map(|(_, length)| length).sum();
-        let mut rest = 0.0;
-        for (i, length) in run {
-            let width = |behind: f64| Width::Set(to + (from - to) * (behind / whole).min(1.0));
-            self.scene.segments[i].widths = [width(rest + length), width(rest)];
-            rest += length;
-        }
     }
 
     /// Moves, with compensated summation (Neumaier 1974).
@@ -421,12 +416,21 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Puts a surface of this size (1) at the turtle's position.
-    fn place(&mut self, shape: &Shape, scale: Option<f64>) -> Result<(), Error> {
-        let scale = self.in_range(scale.unwrap_or(1.0))?;
-        if scale > 0.0 {
+    /// Puts a surface at the turtle's position: of one size (1), or of a width, a length and a height, which is
+    /// the length if it is missing.
+    fn place(&mut self, shape: &Shape, sizes: &[f64]) -> Result<(), Error> {
+        let [width, length, height] = match *sizes {
+            [] => [1.0; 3],
+            [size] => [size; 3],
+            [width, length] => [width, length, length],
+            [width, length, height, ..] => [width, length, height],
+        };
+        self.state.node = true;
+        // The axes are heading, left, up.
+        let scales = [self.in_range(length)?, self.in_range(width)?, self.in_range(height)?];
+        if scales.iter().all(|scale| *scale > 0.0) {
             let placement =
-                Placement { origin: self.state.position, axes: self.state.frame.vectors(), scale };
+                Placement { origin: self.state.position, axes: self.state.frame.vectors(), scales };
             let (tint, owner) = (self.chosen(), self.owner());
             let Shape { mesh, patches } = shape.clone();
             self.scene.surfaces.push(Surface { mesh, patches, placement, tint, owner });
@@ -441,7 +445,7 @@ impl<'a> Walk<'a> {
             return;
         }
         let [heading, left, up] = self.state.frame.vectors();
-        let placement = Placement { origin: self.state.position, axes: [-left, heading, up], scale: 1.0 };
+        let placement = Placement::uniform(self.state.position, [-left, heading, up], 1.0);
         let (seed, owner) = (parameters.get(1).copied(), self.owner());
         self.scene.seedlings.push(Seedling { plant, age, seed, placement, owner });
     }

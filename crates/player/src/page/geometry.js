@@ -45,6 +45,7 @@ class Geometry {
       if (track.kind === 0) this.addStem(this.outlines[track.detail], look.variant, color);
       else if (track.kind === 1) this.addMesh(this.meshes[track.detail], color, look.material < 0);
       else if (track.kind === 2) this.addPatch(color);
+      else if (track.kind === 4) this.addMesh(this.meshes[track.detail], color, look.material < 0, true);
       else this.addPolygon(track.detail, this.cuts[look.variant], color);
     }
   }
@@ -137,15 +138,22 @@ class Geometry {
     }
   }
 
-  addMesh({ places, normals, colors, tinted, triangles }, color, plain) {
+  // Its third axis is the product of the others, unless it has a size of its own.
+  addMesh({ places, normals, colors, tinted, triangles }, color, plain, stretched = false) {
     const [ox, oy, oz, ax, ay, az, bx, by, bz] = this.net;
-    const scale = Math.hypot(ax, ay, az);
-    const each = scale > 0 ? 1 / scale : 0;
-    const [cx, cy, cz] = [(ay * bz - az * by) * each, (az * bx - ax * bz) * each, (ax * by - ay * bx) * each];
+    const inverse = (x, y, z) => 1 / (x * x + y * y + z * z || Infinity);
+    const each = Math.sqrt(inverse(ax, ay, az));
+    const [cx, cy, cz] = stretched
+      ? this.net.subarray(9, 12)
+      : [(ay * bz - az * by) * each, (az * bx - ax * bz) * each, (ax * by - ay * bx) * each];
+    // Normals follow the inverse of the scales.
+    const [ea, eb, ec] = stretched
+      ? [inverse(ax, ay, az), inverse(bx, by, bz), inverse(cx, cy, cz)]
+      : [each, each, each];
     let at = this.begin(colors.length, triangles);
     for (let i = 0; i < colors.length; i++, at += CORNER) {
       const [x, y, z] = [places[3 * i], places[3 * i + 1], places[3 * i + 2]];
-      const [p, q, r] = [normals[3 * i] * each, normals[3 * i + 1] * each, normals[3 * i + 2] * each];
+      const [p, q, r] = [normals[3 * i] * ea, normals[3 * i + 1] * eb, normals[3 * i + 2] * ec];
       this.put(
         at,
         ox + ax * x + bx * y + cx * z,

@@ -1,7 +1,7 @@
 // The recording: tracks out of their bytes, and what is to be seen at any time.
 
-// Numbers that place a thing, by kind: stem, mesh, patch; a polygon has three for each corner.
-const WIDTHS = [18, 9, 48];
+// Numbers that place a thing, by kind: stem, mesh, patch, polygon (three for each corner), mesh scaled by axis.
+const WIDTHS = [18, 9, 48, undefined, 12];
 
 async function inflated(text) {
   const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
@@ -48,7 +48,7 @@ function decodeTracks(bytes, unit) {
     const samples = (track.samples = new Float32Array(width * length));
     const firsts = new Array(width).fill(0);
     for (let number = 0; number < width; number++) {
-      const near = number >= 3 && kind > 1 ? firsts[number - 3] : 0;
+      const near = number >= 3 && (kind === 2 || kind === 3) ? firsts[number - 3] : 0;
       let before = near + integer(), rate = 0;
       firsts[number] = before;
       samples[number] = before * unit;

@@ -1,0 +1,274 @@
+//! Segments that continue one another, cut into parts: where the width steps, the thinner stem widens smoothly
+//! towards the thicker one; bends are round; and collars need cross-sections of their own.
+//!
+//! Blends and bends depend on places along the stem alone, so they are the same however the stem is divided into segments.
+
+use super::collar::{Collar, Station};
+use dlsys_geometry::scene::{Point, Segment, Vector};
+
+/// Widths that differ by less than this part do not make a step.
+const EQUAL: f64 = 1e-9;
+/// Length of a blend in parts of its height, and in parts of the thinner radius where that is more.
+const LENGTH: f64 = 2.5;
+const LEAST: f64 = 1.2;
+/// Most that a blend adds to the thinner radius, in parts of it; beyond that there is a flat shoulder.
+const MOST: f64 = 1.0;
+
+/// Segments are straight on from one another if the sine of their angle is less.
+const STRAIGHT: f64 = 1e-6;
+/// Radius of a bend, in parts of the stem's radius.
+const ROUNDING: f64 = 2.5;
+
+/// A part of a segment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Part {
+    pub(super) segment: usize,
+    /// The middle of its ends.
+    pub(super) centres: [Point; 2],
+    /// The unit vector from one to the other.
+    pub(super) direction: Vector,
+    pub(super) radii: [f64; 2],
+    /// Whether it is within the collar of its stem, and how far its end [follows](Station::drape)
+    /// the collar's edge.
+    pub(super) in_collar: bool,
+    pub(super) drape: f64,
+}
+
+/// Stems that continue one another.
+pub(super) struct Chain<'a> {
+    pub(super) segments: &'a [Segment],
+    pub(super) radii: &'a [[f64; 2]],
+    /// Its segments in order.
+    pub(super) members: &'a [usize],
+    /// See [`TubeStyle`](super::TubeStyle).
+    pub(super) accuracy: f64,
+    pub(super) steady: bool,
+}
+
+/// The widening of a stem towards a thicker one that it continues, or that continues it.
+struct Blend {
+    /// Where both meet, as a length along the chain.
+    at: f64,
+    /// On the members from this one on, or on those before it.
+    member: usize,
+    forwards: bool,
+    height: f64,
+    length: f64,
+    /// From 0, a fillet at the thinner stem only, to 1, without an edge at the thicker one either.
+    smooth: f64,
+}
+
+/// A place where a stem turns, rounded by a parabola (a quadratic Bézier curve) that begins and ends on its segments.
+struct Bend {
+    /// Where it is, as a length along the chain, and how far from there it begins and ends.
+    at: f64,
+    reach: f64,
+    point: Point,
+    directions: [Vector; 2],
+    /// Number of pieces on either side.
+    pieces: f64,
+}
+
+impl Bend {
+    /// The middle of the stem at a length along the chain; `None` where it is on its segment.
+    fn place(&self, at: f64) -> Option<Point> {
+        let u = 0.5 + 0.5 * (at - self.at) / self.reach;
+        if !(u > 0.0 && u < 1.0) {
+            return None;
+        }
+        let [before, after] = self.directions;
+        Some(self.point + (after * (u * u) - before * ((1.0 - u) * (1.0 - u))) * self.reach)
+    }
+
+    fn stations(&self) -> impl Iterator<Item = f64> + use<> {
+        let (at, step, pieces) = (self.at, self.reach / self.pieces, self.pieces as i32);
+        (-pieces..=pieces).filter(|k| *k != 0).map(move |k| at + step * f64::from(k))
+    }
+}
+
+impl Blend {
+    /// What it adds to the radius of a member at a length along the chain.
+    fn height(&self, member: usize, at: f64) -> f64 {
+        let away = if self.forwards { at - self.at } else { self.at - at };
+        if (member >= self.member) != self.forwards || away >= self.length {
+            return 0.0;
+        }
+        let u = (away / self.length).max(0.0);
+        self.height * (1.0 - u) * (1.0 - u) * (1.0 + 2.0 * u * self.smooth)
+    }
+}
+
+impl Chain<'_> {
+    /// Cuts the chain; plain ones into their segments as they are. `grown`: with blends and round bends.
+    pub(super) fn parts(&self, grown: bool, collar: Option<&Collar>, out: &mut Vec<Part>) {
+        let count = self.members.len();
+        let steps: Vec<usize> = (1..count).filter(|&i| grown && self.steps(i)).collect();
+        let bends = grown && !self.steady && (1..count).any(|i| self.needs_rounding(i));
+        if steps.is_empty() && collar.is_none() && !bends {
+            out.extend(self.members.iter().map(|&i| {
+                let Segment { start, end, direction, .. } = self.segments[i];
+                let radii = self.radii[i];
+                Part { segment: i, centres: [start, end], direction, radii, in_collar: false, drape: 0.0 }
+            }));
+            return;
+        }
+        let mut arcs = vec![0.0];
+        arcs.extend(self.members.iter().scan(0.0, |sum, &i| {
+            *sum += (self.segments[i].end - self.segments[i].start).norm();
+            Some(*sum)
+        }));
+        let blends = self.blends(&steps, &arcs);
+        let bends = if bends { self.bends(&steps, &blends, &arcs) } else { Vec::new() };
+        let plain = |at| Station { at, drape: 0.0 };
+        let mut stations: Vec<Station> =
+            blends.iter().flat_map(|blend| self.stations(blend)).map(plain).collect();
+        stations.extend(bends.iter().flat_map(Bend::stations).map(plain));
+        if let Some(collar) = collar {
+            let free = (1..count).find(|&i| steps.first() == Some(&i) || self.turns(i)).unwrap_or(count);
+            stations.extend(collar.stations((!self.steady).then_some(self.accuracy), arcs[free]));
+        }
+        stations.sort_by(|a, b| a.at.total_cmp(&b.at));
+        let reach = collar.map_or(0.0, Collar::reach);
+        let (mut near, mut stations) = (0, stations.into_iter().peekable());
+        for (member, &segment) in self.members.iter().enumerate() {
+            let Segment { start, end, direction, .. } = self.segments[segment];
+            let (first, length) = (arcs[member], arcs[member + 1] - arcs[member]);
+            let radius = |part: f64| {
+                let [a, b] = self.radii[segment];
+                let plain = if part == 1.0 { b } else { a + (b - a) * part };
+                let at = first + length * part;
+                // Blends do not overlap; of one place the rounding of lengths may count either neighbour as next.
+                let next = blends.partition_point(|blend| blend.at <= at);
+                let near = &blends[next.saturating_sub(2)..blends.len().min(next + 2)];
+                plain + near.iter().map(|blend| blend.height(member, at)).sum::<f64>()
+            };
+            let mut centre = |part: f64| {
+                let at = first + length * part;
+                while bends.get(near).is_some_and(|bend| bend.at + bend.reach <= at) {
+                    near += 1;
+                }
+                let straight = match part {
+                    0.0 => start,
+                    1.0 => end,
+                    part => start + (end - start) * part,
+                };
+                bends.get(near).and_then(|bend| bend.place(at)).map_or((straight, false), |p| (p, true))
+            };
+            let (mut from, mut begin) = (0.0, centre(0.0));
+            while from < 1.0 {
+                // Cross-sections that fall together are one.
+                let next = stations.next_if(|station| station.at < arcs[member + 1]);
+                let (next, drape) = next.map_or((1.0, 0.0), |next| ((next.at - first) / length, next.drape));
+                let to = if 1.0 - next < 1e-6 { 1.0 } else { next };
+                if to - from < 1e-6 {
+                    continue;
+                }
+                let finish = centre(to);
+                let chord = || (finish.0 - begin.0).try_normalize(0.0).unwrap_or(direction);
+                out.push(Part {
+                    segment,
+                    centres: [begin.0, finish.0],
+                    direction: if begin.1 || finish.1 { chord() } else { direction },
+                    radii: [radius(from), radius(to)],
+                    in_collar: first + length * from < reach,
+                    drape,
+                });
+                (from, begin) = (to, finish);
+            }
+            // Those that fell upon its end.
+            while stations.next_if(|station| station.at < arcs[member + 1]).is_some() {}
+        }
+    }
+
+    /// Whether the width steps between a member and the one before.
+    fn steps(&self, i: usize) -> bool {
+        let (a, b) = self.radii_at(i);
+        (a - b).abs() > EQUAL * a.max(b)
+    }
+
+    fn radii_at(&self, i: usize) -> (f64, f64) {
+        (self.radii[self.members[i - 1]][1], self.radii[self.members[i]][0])
+    }
+
+    fn directions_at(&self, i: usize) -> [Vector; 2] {
+        [i - 1, i].map(|i| self.segments[self.members[i]].direction)
+    }
+
+    /// Whether the stem turns between a member and the one before.
+    fn turns(&self, i: usize) -> bool {
+        let [before, after] = self.directions_at(i);
+        before.cross(&after).norm() > STRAIGHT
+    }
+
+    /// Whether the ring in which two members meet stands out by more than the accuracy.
+    fn needs_rounding(&self, i: usize) -> bool {
+        let [before, after] = self.directions_at(i);
+        let (a, b) = self.radii_at(i);
+        // 1 / cos(θ/2) - 1, without a loss of digits for a small θ.
+        let sine = (before - after).norm() / 2.0;
+        let cosine = (1.0 - sine * sine).max(1e-6).sqrt();
+        a.max(b) * sine * sine / (cosine * (1.0 + cosine)) > self.accuracy
+    }
+
+    /// The bends that are rounded, in order.
+    fn bends(&self, steps: &[usize], blends: &[Blend], arcs: &[f64]) -> Vec<Bend> {
+        let turns: Vec<usize> = (1..self.members.len()).filter(|&i| self.turns(i)).collect();
+        let bound = |k: Option<usize>, end: usize| arcs[k.map_or(end, |k| turns[k])];
+        let mut bends = Vec::new();
+        for (k, &i) in turns.iter().enumerate() {
+            let (a, b) = self.radii_at(i);
+            // A shoulder stays as it is.
+            let blend = blends.binary_search_by_key(&i, |blend| blend.member);
+            let blended = blend.is_ok_and(|at| blends[at].height >= (a - b).abs());
+            let shoulder = steps.binary_search(&i).is_ok() && !blended;
+            if shoulder || !self.needs_rounding(i) {
+                continue;
+            }
+            let back = arcs[i] - bound(k.checked_sub(1), 0);
+            let on = bound(Some(k + 1).filter(|k| *k < turns.len()), self.members.len()) - arcs[i];
+            let directions = self.directions_at(i);
+            let half = (directions[0] - directions[1]).norm() / 2.0;
+            let tangent = half / (1.0 - half * half).max(1e-6).sqrt();
+            let reach = (ROUNDING * a.max(b) * tangent).min(0.5 * back).min(0.5 * on);
+            let point = self.segments[self.members[i]].start;
+            // A piece turns by 8 degrees at most.
+            let pieces = (half.asin().to_degrees() / 8.0).ceil().max(1.0);
+            bends.push(Bend { at: arcs[i], reach, point, directions, pieces });
+        }
+        bends
+    }
+
+    fn blends(&self, steps: &[usize], arcs: &[f64]) -> Vec<Blend> {
+        let count = self.members.len();
+        let blend = |k: usize| {
+            let member = steps[k];
+            let (before, after) =
+                (self.radii[self.members[member - 1]][1], self.radii[self.members[member]][0]);
+            let (thin, thick) = (before.min(after), before.max(after));
+            let forwards = after < before;
+            let height = (thick - thin).min(MOST * thin);
+            // The stem goes on as thin as this up to the next step.
+            let bound = match forwards {
+                true => arcs[steps.get(k + 1).copied().unwrap_or(count)] - arcs[member],
+                false => arcs[member] - arcs[if k > 0 { steps[k - 1] } else { 0 }],
+            };
+            let length = (LENGTH * height).max(LEAST * thin).min(0.5 * bound);
+            let smooth = (2.0 - (thick - thin) / (MOST * thin)).clamp(0.0, 1.0);
+            Blend { at: arcs[member], member, forwards, height, length, smooth }
+        };
+        (0..steps.len())
+            .map(blend)
+            .filter(|blend| blend.height > self.accuracy && blend.length > 0.0)
+            .collect()
+    }
+
+    /// Where a blend needs cross-sections.
+    fn stations(&self, blend: &Blend) -> impl Iterator<Item = f64> + use<> {
+        // A chord over 1/n of a curve with the second derivative 6 is 6/8 of 1/n² away from it.
+        let enough = |n: &i32| 0.75 * blend.height <= self.accuracy * f64::from(n * n);
+        let pieces = if self.steady { 4 } else { [2, 4, 8].into_iter().find(enough).unwrap_or(8) };
+        let sign = if blend.forwards { 1.0 } else { -1.0 };
+        let (at, step) = (blend.at, sign * blend.length / f64::from(pieces));
+        (1..=pieces).map(move |k| at + step * f64::from(k))
+    }
+}

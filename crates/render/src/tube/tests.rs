@@ -1,0 +1,162 @@
+//! Joints of tubes, on scenes made by hand.
+
+use std::collections::HashMap;
+
+use crate::triangles::{Triangles, triangles};
+use crate::{Survey, View};
+use dlsys_geometry::scene::{MaterialId, Owner, Point, Scene, Segment, Vector, Width};
+use dlsys_tree::Lineage;
+
+/// A stem of segments with directions and lengths, each with a width, each cut into so many equal segments.
+/// Returns the last segment.
+fn stem(
+    scene: &mut Scene,
+    from: (Point, Option<usize>),
+    way: &[(Vector, f64)],
+    pieces: usize,
+) -> (Point, Option<usize>) {
+    let owner = scene.add_owner(Owner { name: "F".into(), lineage: Lineage::of_axiom(0) });
+    let (mut start, mut follows) = (from.0, None);
+    for (direction, width) in way {
+        for _ in 0..pieces {
+            let end = start + direction / pieces as f64;
+            scene.segments.push(Segment {
+                start,
+                end,
+                direction: direction.normalize(),
+                across: Vector::x(),
+                widths: [Width::Set(*width); 2],
+                contour: None,
+                material: MaterialId::STEM,
+                owner,
+                follows,
+                grows_from: from.1.filter(|_| follows.is_none()),
+            });
+            follows = Some(scene.segments.len() - 1);
+            start = end;
+        }
+    }
+    (start, follows)
+}
+
+/// A trunk that steps and bends, a branch, and a twig on that.
+fn tree(pieces: usize) -> Scene {
+    let mut scene = Scene::default();
+    let foot = Point::origin();
+    let trunk = stem(&mut scene, (foot, None), &[(Vector::y() * 3.0, 1.0)], pieces);
+    let last = scene.segments.len();
+    stem(&mut scene, trunk, &[(Vector::new(0.4, 2.0, 0.3), 0.8), (Vector::new(0.4, 2.0, 0.3), 0.3)], pieces);
+    // The trunk goes on from where the branch leaves it.
+    (scene.segments[last].follows, scene.segments[last].grows_from) = (trunk.1, None);
+    let branch = stem(&mut scene, trunk, &[(Vector::new(-1.5, 1.5, 0.4), 0.6)], pieces);
+    stem(&mut scene, branch, &[(Vector::new(-1.0, -0.2, 0.6), 0.35)], pieces);
+    scene
+}
+
+fn mesh(scene: &Scene, accuracy: f64) -> Triangles {
+    let mut survey = Survey::new(View::FRONT);
+    survey.add(scene);
+    triangles(scene, &survey.fit().with_accuracy(accuracy), 0, |_| true)
+}
+
+/// Volume, and whether every edge is passed once in each direction.
+fn solid(mesh: &Triangles) -> (f64, bool) {
+    let mut edges = HashMap::new();
+    let mut volume = 0.0;
+    for face in &mesh.faces {
+        let corners = face.corners.map(|(vertex, _)| vertex);
+        let [p, q, r] = corners.map(|i| mesh.vertices[i as usize].coords);
+        volume += p.dot(&q.cross(&r)) / 6.0;
+        for k in 0..3 {
+            let (a, b) = (corners[k], corners[(k + 1) % 3]);
+            *edges.entry((a, b)).or_insert(0) += 1;
+            *edges.entry((b, a)).or_insert(0) -= 1;
+        }
+    }
+    (volume, edges.values().all(|count| *count == 0))
+}
+
+#[test]
+fn tubes_with_joints_are_closed() {
+    for accuracy in [0.05, 0.005, 0.0005] {
+        let (volume, closed) = solid(&mesh(&tree(1), accuracy));
+        assert!(closed && volume > 0.0, "{accuracy}");
+    }
+}
+
+/// Cutting segments changes nothing: the corners are the same, but for rings at the cuts, which lie on the surface.
+#[test]
+fn a_division_of_stems_with_joints_cannot_be_seen() {
+    let whole = mesh(&tree(1), 1e-3);
+    for pieces in [2, 3, 7] {
+        let cut = mesh(&tree(pieces), 1e-3);
+        for vertex in &whole.vertices {
+            let near = cut.vertices.iter().map(|p| (p - vertex).norm()).fold(f64::INFINITY, f64::min);
+            assert!(near < 1e-9, "{pieces}: {vertex} is {near} away");
+        }
+        let (a, b) = (solid(&whole).0, solid(&cut).0);
+        assert!((a - b).abs() < 2e-3 * a, "{pieces}: volumes {a} and {b}");
+    }
+}
+
+#[test]
+fn normals_agree_with_the_faces() {
+    let mesh = mesh(&tree(1), 1e-3);
+    let (mut wrong, mut all) = (0.0, 0.0);
+    for face in &mesh.faces {
+        let [p, q, r] = face.corners.map(|(vertex, _)| mesh.vertices[vertex as usize]);
+        let area = (q - p).cross(&(r - p));
+        all += area.norm();
+        for (_, normal) in face.corners {
+            let normal = mesh.normals[normal as usize];
+            assert!((normal.norm() - 1.0).abs() < 1e-9);
+            if area.dot(&normal) < 0.0 {
+                wrong += area.norm() / 3.0;
+            }
+        }
+    }
+    // Inside a parent, cross-sections may lie over one another.
+    assert!(wrong < 0.01 * all, "{wrong} of {all}");
+}
+
+/// Nothing of a branch comes out on the other side of its parent, whatever its angle and its width.
+#[test]
+fn a_collar_stays_on_its_side() {
+    for angle in [0.2_f64, 0.4, 0.8, 1.2, 1.57, 2.0, 2.7] {
+        for width in [0.2, 0.6, 1.0] {
+            let mut scene = Scene::default();
+            let trunk = stem(&mut scene, (Point::origin(), None), &[(Vector::y() * 4.0, 1.0)], 1);
+            let (first, direction) = (scene.segments.len(), Vector::new(angle.sin(), angle.cos(), 0.1));
+            stem(&mut scene, trunk, &[(Vector::y() * 4.0, 1.0)], 1);
+            (scene.segments[first].follows, scene.segments[first].grows_from) = (trunk.1, None);
+            let branch = stem(&mut scene, trunk, &[(direction * 5.0, width)], 1).1.expect("a segment");
+            let mesh = mesh(&scene, 1e-3);
+            let owner = scene.segments[branch].owner;
+            for face in mesh.faces.iter().filter(|face| face.owner == owner) {
+                for (vertex, _) in face.corners {
+                    let at = mesh.vertices[vertex as usize];
+                    // Beside the branch, surfaces run alongside.
+                    let beyond = at.x < -0.25;
+                    assert!(!beyond || at.x.hypot(at.z) < 0.505, "{angle} {width}: {at}");
+                }
+            }
+        }
+    }
+}
+
+/// A foot on a declared floor widens towards it; without a floor it is cut flat.
+#[test]
+fn feet_are_flat_and_flare_on_a_floor() {
+    let foot = |floor: Option<f64>| {
+        let mut scene = tree(1);
+        scene.surroundings.floor = floor;
+        let mesh = mesh(&scene, 1e-3);
+        let low = mesh.vertices.iter().map(|p| p.y).fold(f64::INFINITY, f64::min);
+        let wide = mesh.vertices.iter().filter(|p| p.y < 1e-3).map(|p| p.x.hypot(p.z)).fold(0.0, f64::max);
+        (low, wide)
+    };
+    let (low, wide) = foot(None);
+    assert!(low.abs() < 1e-12 && (wide - 0.5).abs() < 1e-12, "{low} {wide}");
+    let (low, wide) = foot(Some(0.0));
+    assert!(low.abs() < 1e-9 && (0.65..0.95).contains(&wide), "{low} {wide}");
+}
