@@ -6,6 +6,9 @@ use super::light::Light;
 use super::{View, number, painter};
 use dlsys_geometry::scene::{Bounds, Point, Scene};
 
+/// Drawings less deep than this part of their extent are flat.
+const FLAT: f64 = 1e-6;
+
 /// The first pass: the extent of an animation, in space and in its view.
 #[derive(Clone, Debug)]
 pub struct Survey {
@@ -14,13 +17,12 @@ pub struct Survey {
     field: Option<f64>,
     space: Bounds,
     seen: Extent,
-    has_surfaces: bool,
 }
 
 impl Survey {
     /// An empty survey, orthographic, in this view.
     pub fn new(view: View) -> Survey {
-        Survey { view, field: None, space: Bounds::default(), seen: Extent::EMPTY, has_surfaces: false }
+        Survey { view, field: None, space: Bounds::default(), seen: Extent::EMPTY }
     }
 
     /// In perspective: the camera is as near as possible if all that is drawn in any frame is within this angle, in degrees (clamped
@@ -32,14 +34,12 @@ impl Survey {
     /// Includes the scene of a frame. The result does not depend on the order.
     pub fn add(&mut self, scene: &Scene) {
         self.space.add(scene);
-        self.has_surfaces |= !scene.surfaces.is_empty() || !scene.patches.is_empty();
         self.seen.merge(&Extent::of(scene, &self.view));
     }
 
     /// Includes another survey in the same view, for example that of another thread.
     pub fn merge(&mut self, other: &Survey) {
         self.space.merge(&other.space);
-        self.has_surfaces |= other.has_surfaces;
         self.seen.merge(&other.seen);
     }
 
@@ -65,7 +65,7 @@ impl Survey {
             bounds,
             picture: Picture::around(shadow.map(|shadow| camera.frame(&shadow))),
             light: Light::new(depths, extent),
-            has_surfaces: self.has_surfaces,
+            has_depth: depths[1] - depths[0] > FLAT * extent,
         }
     }
 }
@@ -87,8 +87,8 @@ pub struct Fit {
     /// The picture area of the view.
     pub picture: Picture,
     pub(super) light: Light,
-    /// Some frame has a surface.
-    has_surfaces: bool,
+    /// Its depth is more than rounding.
+    has_depth: bool,
 }
 
 impl Fit {
@@ -108,10 +108,10 @@ impl Fit {
         Bounds::of(scene).corners(self.default_width)
     }
 
-    /// True if SVG pictures are made of visible regions: some frame has a surface, and the animation has depth. Without depth nothing
-    /// is hidden; stems and polygons alone have an order by depth that is good enough. There every element keeps its exact shape.
+    /// True if SVG pictures are made of visible regions: the animation has depth. Without depth nothing is hidden, and every element
+    /// keeps its exact shape.
     pub(super) fn has_visible_regions(&self) -> bool {
-        self.has_surfaces && !self.light.is_flat()
+        self.has_depth
     }
 
     /// Left, bottom, right and top of a survey as this camera sees it; `None` if it is empty.

@@ -31,8 +31,6 @@ pub(super) struct Style<'a> {
     pub(super) fit: &'a Fit,
     /// Picture units in a scene unit.
     pub(super) scale: f64,
-    /// Larger side of the whole picture, in picture units.
-    pub(super) side: f64,
     /// Pixels of the page in a scene unit.
     pub(super) pixels: f64,
 }
@@ -49,7 +47,7 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
         scene,
         style,
         names,
-        strokes: Strokes::new(scene, style, prefix),
+        strokes: Strokes::new(scene, style, prefix, !named),
         run: None,
         out: String::new(),
     };
@@ -136,7 +134,8 @@ impl Painter<'_> {
     }
 
     fn segment(&mut self, segment: &Segment, index: usize, id: &str) {
-        match self.strokes.stroke(segment, index, self.names.is_none()) {
+        let ends = self.strokes.ends(index);
+        match self.strokes.stroke(segment, ends, self.names.is_none()) {
             None => {}
             Some(Stroke::Element { name, attributes }) => {
                 self.end_run();

@@ -1,12 +1,21 @@
-//! Hidden lines: the parts of thin stems that no surface hides.
+//! Hidden lines: the parts of stems that nothing hides.
 
 use crate::painter::Style;
+use crate::stroke::{End, pixels_across};
 use dlsys_geometry::scene::{Point, Segment, Width};
 
 /// A stem is hidden by what is nearer by more than this part of the extent.
 const NEARER: f32 = 2e-3;
+/// Places along one stem that are examined, at most.
+const MOST_PIECES: f64 = 20_000.0;
+/// Places across a stem that are examined: its edges are at -1 and 1.
+const ACROSS: [f64; 5] = [0.0, -0.4, 0.4, -0.8, 0.8];
+/// A stem that looks shorter than this, in widths, has more to see than the shades across it: its ends.
+const SHORTEST: f64 = 2.0;
+/// Most of the places on a stem that may be hidden though it counts as one that nothing hides.
+const MOST_HIDDEN: f64 = 0.06;
 
-/// The depths of what hides thin stems, by cell; and where the camera's x, y are: at `a x + b` and `c - a y` cells.
+/// The depths of what hides stems, by cell; and where the camera's x, y are: at `a x + b` and `c - a y` cells.
 pub struct Visible<'a> {
     pub style: Style<'a>,
     pub depths: &'a [[f32; 1]],
@@ -14,43 +23,96 @@ pub struct Visible<'a> {
     pub placement: [f64; 3],
 }
 
-/// Places along one stem that are examined, at most.
-const MOST_PIECES: f64 = 20_000.0;
+/// Which places on a stem are visible, in steps along it.
+struct Seen {
+    /// By step: the number of visible places across, and whether the one on the axis is visible.
+    steps: Vec<(usize, bool)>,
+}
 
 impl Visible<'_> {
-    /// The parts of a segment that nothing hides.
-    pub fn parts(&self, segment: &Segment) -> Vec<Segment> {
+    /// Whether nothing hides a segment, but for its ends, and it looks like a stem. A segment that is hidden altogether is not visible.
+    pub fn is_clear(&self, segment: &Segment) -> bool {
+        let [from, to] = [segment.start, segment.end].map(|p| self.style.fit.camera.project(p));
+        let length = (to - from).xy().norm() * self.style.pixels;
+        if length < SHORTEST * pixels_across(segment, self.style) {
+            return false;
+        }
+        let seen = self.seen(segment, &ACROSS);
+        let Some([first, end]) = seen.range() else { return false };
+        let all = (end - first) * ACROSS.len();
+        let visible: usize = seen.steps[first..end].iter().map(|(count, _)| count).sum();
+        (all - visible) as f64 <= MOST_HIDDEN * all as f64
+    }
+
+    /// The parts of a segment that nothing hides, and the shapes of their ends: those of the segment where they are its own. A wide
+    /// segment is clear, so it is one part.
+    pub fn parts(&self, segment: &Segment, ends: [End; 2], is_thin: bool) -> Vec<(Segment, [End; 2])> {
+        let across = if is_thin { &ACROSS[..1] } else { &ACROSS[..] };
+        let seen = self.seen(segment, across);
+        let count = seen.steps.len();
+        let ranges = if is_thin { seen.on_axis() } else { seen.range().into_iter().collect() };
+        let cut = |[first, end]: [usize; 2]| {
+            let [from, to] = [first, end].map(|k| k as f64 / count as f64);
+            let start = if first == 0 { ends[0] } else { End::Straight };
+            let stop = if end == count { ends[1] } else { End::Straight };
+            (part(segment, from, to), [start, stop])
+        };
+        ranges.into_iter().map(cut).collect()
+    }
+
+    fn seen(&self, segment: &Segment, across: &[f64]) -> Seen {
         let camera = &self.style.fit.camera;
         let [a, b, c] = self.placement;
         let extent = if self.style.fit.extent > 0.0 { self.style.fit.extent } else { 1.0 };
         let at = |p: Point| {
             let seen = camera.project(p);
-            ([a * seen.x + b, c - a * seen.y], (seen.z / extent) as f32)
+            ([a * seen.x + b, c - a * seen.y], seen.z / extent)
         };
         let ([x1, y1], _) = at(segment.start);
         let ([x2, y2], _) = at(segment.end);
-        let pieces = ((x2 - x1).hypot(y2 - y1)).ceil().clamp(1.0, MOST_PIECES) as usize;
-        let is_seen = |k: usize| {
-            let p = segment.start + (segment.end - segment.start) * ((k as f64 + 0.5) / pieces as f64);
-            let ([x, y], depth) = at(p);
+        let length = (x2 - x1).hypot(y2 - y1);
+        let pieces = length.ceil().clamp(1.0, MOST_PIECES) as usize;
+        // In cells, and in parts of the extent.
+        let radius = pixels_across(segment, self.style) / self.style.pixels * a / 2.0;
+        let front = radius / a / extent;
+        let aside = if length > 0.0 { [(y2 - y1) / length, (x1 - x2) / length] } else { [1.0, 0.0] };
+        let is_seen = |[x, y]: [f64; 2], depth: f64| {
             let [column, row] = [x.floor(), y.floor()];
             let within =
                 column >= 0.0 && row >= 0.0 && column < self.size[0] as f64 && row < self.size[1] as f64;
-            !within || depth + NEARER >= self.depths[row as usize * self.size[0] + column as usize][0]
+            let cell = || row as usize * self.size[0] + column as usize;
+            !within || depth as f32 + NEARER >= self.depths[cell()][0]
         };
-        let mut parts = Vec::new();
-        let mut from = None;
-        for k in 0..=pieces {
-            match (k < pieces && is_seen(k), from) {
-                (true, None) => from = Some(k),
-                (false, Some(first)) => {
-                    parts.push(part(segment, first as f64 / pieces as f64, k as f64 / pieces as f64));
-                    from = None;
-                }
-                _ => {}
+        let step = |k: usize| {
+            let p = segment.start + (segment.end - segment.start) * ((k as f64 + 0.5) / pieces as f64);
+            let ([x, y], depth) = at(p);
+            let place = |u: &f64| [x + aside[0] * radius * u, y + aside[1] * radius * u];
+            let mut visible = across.iter().map(|u| is_seen(place(u), depth + front));
+            let on_axis = visible.next().unwrap_or(false);
+            (usize::from(on_axis) + visible.filter(|seen| *seen).count(), on_axis)
+        };
+        Seen { steps: (0..pieces).map(step).collect() }
+    }
+}
+
+impl Seen {
+    /// The first step of which something is visible, and the one after the last.
+    fn range(&self) -> Option<[usize; 2]> {
+        let first = self.steps.iter().position(|(count, _)| *count > 0)?;
+        let end = self.steps.iter().rposition(|(count, _)| *count > 0)? + 1;
+        Some([first, end])
+    }
+
+    /// Runs of steps whose middle is visible.
+    fn on_axis(&self) -> Vec<[usize; 2]> {
+        let mut runs: Vec<[usize; 2]> = Vec::new();
+        for (k, _) in self.steps.iter().enumerate().filter(|(_, (_, on_axis))| *on_axis) {
+            match runs.last_mut() {
+                Some([_, end]) if *end == k => *end = k + 1,
+                _ => runs.push([k, k + 1]),
             }
         }
-        parts
+        runs
     }
 }
 

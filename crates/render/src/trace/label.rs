@@ -1,10 +1,11 @@
 //! The region of each cell of a raster: the module, the material and the shade of the nearest triangle there.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
-use super::regions::{NOTHING, Regions};
+use super::regions::{COVERED, NOTHING, Regions};
 use crate::formats::png::Lit;
-use crate::raster::{SIXTEEN, cells};
+use crate::raster::SIXTEEN;
+use crate::raster::cells::{self, Nearest};
 use crate::triangles::Triangles;
 use dlsys_geometry::scene::{MaterialId, OwnerId};
 
@@ -33,23 +34,38 @@ impl Shade {
     }
 }
 
-/// The raster of regions, their shades by number, and the depth of each cell. Regions are painted in the order of modules,
-/// materials and shades.
-pub fn label(mesh: &Triangles, lit: &Lit, size: [usize; 2]) -> (Regions, Vec<Shade>, Vec<[f32; 1]>) {
-    let [width, height] = size;
-    let count = mesh.faces.len();
-    let corners = |n: usize| lit.corners(n);
-    let seen = cells::nearest(&cells::MIDDLE, size, count, corners, width * height, |cell| cell);
-    let numbers: Vec<u32> = seen.numbers.into_iter().map(|[number]| number).collect();
+/// A module and a material.
+pub type Item = (OwnerId, MaterialId);
 
+/// The number of the nearest triangle in the middle of each cell plus 1, or 0; and its depth.
+pub fn nearest(mesh: &Triangles, lit: &Lit, [width, height]: [usize; 2]) -> Nearest<1> {
+    let count = mesh.faces.len();
+    cells::nearest(&cells::MIDDLE, [width, height], count, |n| lit.corners(n), width * height, |cell| cell)
+}
+
+/// The raster of regions, and their shades by number. Regions are painted in the order of modules, materials and shades; `strokes` are the
+/// items that will be drawn over them.
+pub fn label(
+    mesh: &Triangles,
+    lit: &Lit,
+    numbers: &[[u32; 1]],
+    [width, height]: [usize; 2],
+    strokes: &HashSet<Item>,
+) -> (Regions, Vec<Shade>) {
+    let corners = |n: usize| lit.corners(n);
     // Regions are numbered as they are found, then in the order of painting.
     let mut weights = cells::Weights::default();
     let mut shades: Vec<Shade> = Vec::new();
     let mut known: HashMap<(OwnerId, MaterialId, i32), u32> = HashMap::new();
     let mut last = None;
     let mut labels = vec![NOTHING; numbers.len()];
+    let mut strengths = vec![0.0; numbers.len()];
     for (cell, label) in labels.iter_mut().enumerate() {
-        let Some(n) = (numbers[cell] as usize).checked_sub(1) else { continue };
+        let Some(n) = (numbers[cell][0] as usize).checked_sub(1) else { continue };
+        if strokes.contains(&(mesh.faces[n].owner, mesh.faces[n].material)) {
+            *label = COVERED;
+            continue;
+        }
         let strength = lit.strength(n, weights.at(n, || corners(n), [cell % width, cell / width]));
         let (owner, material) = (mesh.faces[n].owner, mesh.faces[n].material);
         let step = (strength * SHADES).round() as i32;
@@ -62,6 +78,7 @@ pub fn label(mesh: &Triangles, lit: &Lit, size: [usize; 2]) -> (Regions, Vec<Sha
             }),
         };
         last = Some((key, number));
+        strengths[cell] = strength as f32;
         let shade = &mut shades[number as usize];
         (shade.sum, shade.count) = (shade.sum + strength, shade.count + 1);
         *label = number;
@@ -70,24 +87,26 @@ pub fn label(mesh: &Triangles, lit: &Lit, size: [usize; 2]) -> (Regions, Vec<Sha
     order.sort_by_key(|number| shades[*number as usize].key());
     let mut ranks = vec![0; order.len()];
     order.iter().zip(0..).for_each(|(number, rank)| ranks[*number as usize] = rank);
-    labels.iter_mut().filter(|label| **label != NOTHING).for_each(|label| *label = ranks[*label as usize]);
+    labels.iter_mut().filter(|label| **label < COVERED).for_each(|label| *label = ranks[*label as usize]);
     shades.sort_by_key(Shade::key);
 
     let (items, of_item) = items(&shades);
     let item_of = |number: u32| {
-        let face = (number as usize).checked_sub(1).map(|n| &mesh.faces[n]);
-        face.and_then(|face| of_item.get(&(face.owner, face.material)).copied()).unwrap_or(NOTHING)
+        let Some(n) = (number as usize).checked_sub(1) else { return NOTHING };
+        let item = (mesh.faces[n].owner, mesh.faces[n].material);
+        of_item.get(&item).copied().unwrap_or(if strokes.contains(&item) { COVERED } else { NOTHING })
     };
     let (places, chosen) = edges(&labels, &items, width);
     let place = |cell: usize| places[cell] as usize;
-    let samples = cells::nearest(&SIXTEEN, size, count, corners, chosen, place).numbers;
+    let samples = cells::nearest(&SIXTEEN, [width, height], mesh.faces.len(), corners, chosen, place).numbers;
     let samples = samples.into_iter().map(|samples| samples.map(item_of)).collect();
-    (Regions { width, height, labels, places, samples, items }, shades, seen.depths)
+    let least = shades.iter().map(|shade| (f64::from(shade.step) - 0.5) / SHADES).collect();
+    (Regions { width, height, labels, places, samples, items, strengths, least }, shades)
 }
 
 /// The item (module and material) of each region, by number in the order of painting; and the number of each item.
-fn items(shades: &[Shade]) -> (Vec<u32>, HashMap<(OwnerId, MaterialId), u32>) {
-    let mut numbers: HashMap<(OwnerId, MaterialId), u32> = HashMap::new();
+fn items(shades: &[Shade]) -> (Vec<u32>, HashMap<Item, u32>) {
+    let mut numbers: HashMap<Item, u32> = HashMap::new();
     let number = |shade: &Shade| {
         let next = numbers.len() as u32;
         *numbers.entry((shade.owner, shade.material)).or_insert(next)

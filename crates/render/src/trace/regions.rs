@@ -8,17 +8,17 @@ use super::contour::{Corner, Mask};
 
 /// The width of the margin, in cells.
 const MARGIN: usize = 3;
-/// The greatest distance of outlines from the edges of regions, in cells.
-const TOLERANCE: f64 = 0.4;
 
 /// No region.
 pub const NOTHING: u32 = u32::MAX;
+/// Cells that will be drawn over by something else, so that regions may reach there.
+pub const COVERED: u32 = u32::MAX - 1;
 
 /// A raster of regions, by number in the order of painting.
 pub struct Regions {
     pub width: usize,
     pub height: usize,
-    /// By cell; [`NOTHING`] for the background.
+    /// By cell; [`NOTHING`] for the background, [`COVERED`] where something else is drawn.
     pub labels: Vec<u32>,
     /// By cell: its place in `samples`, if it is at the edge of an item; or anything greater.
     pub places: Vec<u32>,
@@ -26,6 +26,10 @@ pub struct Regions {
     pub samples: Vec<[u32; 16]>,
     /// By region: its item.
     pub items: Vec<u32>,
+    /// By cell: the strength of light in its middle.
+    pub strengths: Vec<f32>,
+    /// By region: the least strength of light in its cells.
+    pub least: Vec<f64>,
 }
 
 /// Cells of one region that hang together: one of them, and the rectangle around them, from the upper left corner to the one
@@ -43,7 +47,7 @@ impl Regions {
         for cell in 0..self.labels.len() {
             let label = self.labels[cell];
             let around = || neighbours(cell, self.width, self.labels.len()).map(|other| self.labels[other]);
-            if label == NOTHING || around().any(|other| other == label) {
+            if label >= COVERED || around().any(|other| other == label) {
                 continue;
             }
             let own = item(&self.items, label);
@@ -68,7 +72,7 @@ impl Regions {
         let mut stack = Vec::new();
         let mut pieces = Vec::new();
         for first in 0..self.labels.len() {
-            if seen[first] || self.labels[first] == NOTHING {
+            if seen[first] || self.labels[first] >= COVERED {
                 continue;
             }
             let mut piece = Piece { cell: first, low: [self.width, self.height], high: [0, 0] };
@@ -129,8 +133,14 @@ impl Regions {
             }
             None => f64::from(u8::from(inside[i])),
         };
-        let mask = Mask { width, height, inside: &inside, covered };
-        let mut outlines = mask.outlines(TOLERANCE);
+        let shade = |i: usize| {
+            let cell = cell_at(i);
+            let other = self.labels[cell];
+            let is_own = self.items.get(other as usize) == Some(&item);
+            is_own.then(|| f64::from(self.strengths[cell]) - self.least[label as usize])
+        };
+        let mask = Mask { width, height, inside: &inside, covered, shade };
+        let mut outlines = mask.outlines();
         for corner in outlines.iter_mut().flatten() {
             *corner = [corner[0] + left as f64, corner[1] + top as f64];
         }
@@ -208,7 +218,8 @@ mod tests {
         let labels: Vec<u32> = rows.iter().flat_map(|row| row.bytes().map(label)).collect();
         let places = vec![u32::MAX; labels.len()];
         let items = (0..10).collect();
-        Regions { width: rows[0].len(), height: rows.len(), labels, places, samples: Vec::new(), items }
+        let (width, height, strengths) = (rows[0].len(), rows.len(), vec![0.0; labels.len()]);
+        Regions { width, height, labels, places, samples: Vec::new(), items, strengths, least: vec![0.0; 10] }
     }
 
     #[test]
