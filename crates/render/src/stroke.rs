@@ -21,9 +21,6 @@ const PLACES: [f64; 5] = [-1.0, -0.55, 0.0, 0.55, 1.0];
 const STRAIGHT: f64 = 0.999_99;
 /// How far a piece of a line reaches under the one that continues it, in pixels of the page: less can be seen as a seam.
 const OVERLAP: f64 = 0.4;
-/// The greatest gap, in pixels of the page, that two pieces with straight ends may leave on the outer side of a bend.
-const GAP: f64 = 0.3;
-
 /// The mean width of a segment, in pixels of the page.
 pub(super) fn pixels_across(segment: &Segment, style: Style) -> f64 {
     let Style { fit, pixels, .. } = style;
@@ -90,7 +87,7 @@ impl<'a> Strokes<'a> {
         for (i, segment) in scene.segments.iter().enumerate() {
             let Some(before) = segment.follows else { continue };
             let before_it = &scene.segments[before];
-            if (!merged || before_it.material != segment.material) && is_smooth(before_it, segment, style) {
+            if (!merged || before_it.material != segment.material) && is_smooth(before_it, segment) {
                 (ends[before][1], ends[i][0]) = (End::Straight, End::Straight);
             }
         }
@@ -216,14 +213,10 @@ impl<'a> Strokes<'a> {
     }
 }
 
-/// True if a segment continues another one so nearly straight, and so nearly as wide, that both can have straight ends there. Round
-/// ends would lie over one another, and where edges are smoothed twice they are darker.
-fn is_smooth(before: &Segment, after: &Segment, style: Style) -> bool {
-    let [a, b] = [before.widths[1], after.widths[0]].map(|width| width.resolve(style.fit.default_width));
-    let cos = before.direction.dot(&after.direction);
-    let half_bend = ((1.0 - cos).max(0.0) / (1.0 + cos).max(1e-9)).sqrt();
-    cos > STRAIGHT
-        || (cos > 0.0 && half_bend * a.max(b) / 2.0 * style.pixels < GAP && (a - b).abs() <= 0.25 * a.max(b))
+/// True if a segment continues another one straight, so that both have straight ends there. Round ends would lie over one another,
+/// and where edges are smoothed twice they are darker.
+fn is_smooth(before: &Segment, after: &Segment) -> bool {
+    before.direction.dot(&after.direction) > STRAIGHT
 }
 
 /// Appends a command of a path and its numbers.

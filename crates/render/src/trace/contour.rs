@@ -5,10 +5,19 @@ pub struct Mask<'a, F, G> {
     pub width: usize,
     pub height: usize,
     pub inside: &'a [bool],
-    /// The part of a cell that the set covers, from 0 to 1.
+    /// The part of a cell that the set covers, from 0 to 1, or that its item does.
     pub covered: F,
     /// Of a cell of the same item: how much lighter it is than the darkest that belong to the set.
     pub shade: G,
+}
+
+/// What is counted of a cell.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// The shade of the set, lighter ones, and what is painted later.
+    Shade,
+    /// All shades of its item, and what is painted later.
+    Item,
 }
 
 /// A place that an outline passes, no further than a tolerance.
@@ -21,12 +30,12 @@ struct Place {
 /// The greatest distance of outlines, in cells, from the edges of items, and from those between two shades of one item or under what
 /// is painted later.
 const TOLERANCE: f64 = 0.25;
-const TOLERANCE_INSIDE: f64 = 0.6;
+const TOLERANCE_INSIDE: f64 = 0.9;
 
 /// A corner of an outline, in cells from the upper left corner of the mask.
 pub type Corner = [f64; 2];
 
-impl<F: Fn(usize) -> f64, G: Fn(usize) -> Option<f64>> Mask<'_, F, G> {
+impl<F: Fn(usize, Part) -> f64, G: Fn(usize) -> Option<f64>> Mask<'_, F, G> {
     fn at(&self, x: i64, y: i64) -> bool {
         (0..self.width as i64).contains(&x)
             && (0..self.height as i64).contains(&y)
@@ -62,22 +71,27 @@ impl<F: Fn(usize) -> f64, G: Fn(usize) -> Option<f64>> Mask<'_, F, G> {
             let within = (0..self.width as i64).contains(&x) && (0..self.height as i64).contains(&y);
             within.then(|| y as usize * self.width + x as usize)
         };
-        let covered = |cell: [i64; 2]| number(cell).map_or(0.0, &self.covered);
+        let covered = |cell: [i64; 2], of| number(cell).map_or(0.0, |i| (self.covered)(i, of));
         let shade = |cell: [i64; 2]| number(cell).and_then(&self.shade);
+        let between = |a: f64, b: f64| {
+            let (high, low) = (a.max(0.5), b.min(0.5));
+            if high == low { 0.5 } else { (high - 0.5) / (high - low) }
+        };
         let (t, tolerance) = match (shade(inner), shade(outer)) {
-            // Where the shade passes the limit, if it does.
-            (Some(a), Some(b)) if a > 0.0 && b < 0.0 => (a / (a - b), TOLERANCE_INSIDE),
-            (Some(_), Some(_)) => (0.5, TOLERANCE_INSIDE),
-            _ => {
-                let (a, b) = (covered(inner), covered(outer));
-                let (high, low) = (a.max(0.5), b.min(0.5));
-                match () {
-                    // Where both are covered, it ends under what is painted later.
-                    () if b > 0.99 => (0.5, TOLERANCE_INSIDE),
-                    () if high == low => (0.5, TOLERANCE),
-                    () => ((high - 0.5) / (high - low), TOLERANCE),
+            (Some(high), Some(low)) => {
+                let (a, b) = (covered(inner, Part::Shade), covered(outer, Part::Shade));
+                match high > 0.0 && low < 0.0 && a == 1.0 && b == 0.0 {
+                    // Where the shade passes the limit.
+                    true => (high / (high - low), TOLERANCE_INSIDE),
+                    // At a crease.
+                    false => (between(a, b), TOLERANCE_INSIDE),
                 }
             }
+            _ => match (covered(inner, Part::Item), covered(outer, Part::Item)) {
+                // Where both are covered, it ends under what is painted later.
+                (_, b) if b > 0.99 => (0.5, TOLERANCE_INSIDE),
+                (a, b) => (between(a, b), TOLERANCE),
+            },
         };
         let at = [0, 1].map(|k| inner[k] as f64 + 0.5 + t * (outer[k] - inner[k]) as f64);
         Place { at, tolerance }
@@ -156,7 +170,7 @@ mod tests {
 
     fn mask(rows: &[&str]) -> Vec<Vec<Corner>> {
         let inside: Vec<bool> = rows.iter().flat_map(|row| row.bytes().map(|b| b == b'#')).collect();
-        let covered = |i: usize| f64::from(u8::from(inside[i]));
+        let covered = |i: usize, _| f64::from(u8::from(inside[i]));
         Mask { width: rows[0].len(), height: rows.len(), inside: &inside, covered, shade: |_| None }
             .outlines()
     }
@@ -185,7 +199,7 @@ mod tests {
     #[test]
     fn an_edge_is_where_the_covered_parts_say() {
         let inside = [true, true, false, true, true, false];
-        let covered = |i: usize| [1.0, 0.75, 0.0][i % 3];
+        let covered = |i: usize, _| [1.0, 0.75, 0.0][i % 3];
         let outlines = Mask { width: 3, height: 2, inside: &inside, covered, shade: |_| None }.outlines();
         let right = outlines[0].iter().fold(0.0_f64, |right, p| right.max(p[0]));
         assert!((right - 1.75).abs() < 0.1, "{outlines:?}");
@@ -196,7 +210,7 @@ mod tests {
         let rows: Vec<String> = (0..40).map(|y| "#".repeat(20 + y / 4) + &".".repeat(20 - y / 4)).collect();
         let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
         let inside: Vec<bool> = rows.iter().flat_map(|row| row.bytes().map(|b| b == b'#')).collect();
-        let covered = |i: usize| f64::from(u8::from(inside[i]));
+        let covered = |i: usize, _| f64::from(u8::from(inside[i]));
         let outlines = Mask { width: 40, height: 40, inside: &inside, covered, shade: |_| None }.outlines();
         assert!(outlines.len() == 1 && outlines[0].len() <= 6, "{outlines:?}");
     }

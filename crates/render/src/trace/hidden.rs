@@ -12,6 +12,8 @@ const MOST_PIECES: f64 = 20_000.0;
 const ACROSS: [f64; 5] = [0.0, -0.4, 0.4, -0.8, 0.8];
 /// A stem that looks shorter than this, in widths, has more to see than the shades across it: its ends.
 const SHORTEST: f64 = 2.0;
+/// How far from the end of a stem its dome is examined, in radii.
+const DOME: f64 = 0.6;
 /// Most of the places on a stem that may be hidden though it counts as one that nothing hides.
 const MOST_HIDDEN: f64 = 0.06;
 
@@ -39,8 +41,9 @@ impl Visible<'_> {
         }
         let seen = self.seen(segment, &ACROSS);
         let Some([first, end]) = seen.range() else { return false };
-        let all = (end - first) * ACROSS.len();
-        let visible: usize = seen.steps[first..end].iter().map(|(count, _)| count).sum();
+        let steps = &seen.steps[first..end];
+        let visible: usize = steps.iter().map(|(count, _)| count).sum();
+        let all = steps.len() * ACROSS.len();
         (all - visible) as f64 <= MOST_HIDDEN * all as f64
     }
 
@@ -53,17 +56,42 @@ impl Visible<'_> {
         let ranges = if is_thin { seen.on_axis() } else { seen.range().into_iter().collect() };
         let cut = |[first, end]: [usize; 2]| {
             let [from, to] = [first, end].map(|k| k as f64 / count as f64);
-            let start = if first == 0 { ends[0] } else { End::Straight };
-            let stop = if end == count { ends[1] } else { End::Straight };
-            (part(segment, from, to), [start, stop])
+            let shape = |is_own: bool, k: usize| match ends[k] {
+                End::Round if is_own && self.has_dome(segment, k) => End::Round,
+                _ => End::Straight,
+            };
+            (part(segment, from, to), [shape(first == 0, 0), shape(end == count, 1)])
         };
         ranges.into_iter().map(cut).collect()
     }
 
+    /// Whether the dome at one end of a segment is visible.
+    fn has_dome(&self, segment: &Segment, end: usize) -> bool {
+        let radius = segment.widths[end].resolve(self.style.fit.default_width) / 2.0;
+        let (from, sign) = if end == 0 { (segment.start, -1.0) } else { (segment.end, 1.0) };
+        let [a, b, c] = self.placement;
+        let seen = self.style.fit.camera.project(from + segment.direction * (sign * DOME * radius));
+        let front = radius * (1.0 - DOME * DOME).sqrt();
+        self.is_seen([a * seen.x + b, c - a * seen.y], (seen.z + front) / self.extent())
+    }
+
+    fn extent(&self) -> f64 {
+        if self.style.fit.extent > 0.0 { self.style.fit.extent } else { 1.0 }
+    }
+
+    /// Whether nothing hides what is at this depth, in parts of the extent, at a place of the raster.
+    fn is_seen(&self, [x, y]: [f64; 2], depth: f64) -> bool {
+        let [column, row] = [x.floor(), y.floor()];
+        let within = column >= 0.0 && row >= 0.0 && column < self.size[0] as f64 && row < self.size[1] as f64;
+        let cell = || row as usize * self.size[0] + column as usize;
+        !within || depth as f32 + NEARER >= self.depths[cell()][0]
+    }
+
+    /// Which places on a segment are visible.
     fn seen(&self, segment: &Segment, across: &[f64]) -> Seen {
         let camera = &self.style.fit.camera;
         let [a, b, c] = self.placement;
-        let extent = if self.style.fit.extent > 0.0 { self.style.fit.extent } else { 1.0 };
+        let extent = self.extent();
         let at = |p: Point| {
             let seen = camera.project(p);
             ([a * seen.x + b, c - a * seen.y], seen.z / extent)
@@ -76,18 +104,11 @@ impl Visible<'_> {
         let radius = pixels_across(segment, self.style) / self.style.pixels * a / 2.0;
         let front = radius / a / extent;
         let aside = if length > 0.0 { [(y2 - y1) / length, (x1 - x2) / length] } else { [1.0, 0.0] };
-        let is_seen = |[x, y]: [f64; 2], depth: f64| {
-            let [column, row] = [x.floor(), y.floor()];
-            let within =
-                column >= 0.0 && row >= 0.0 && column < self.size[0] as f64 && row < self.size[1] as f64;
-            let cell = || row as usize * self.size[0] + column as usize;
-            !within || depth as f32 + NEARER >= self.depths[cell()][0]
-        };
         let step = |k: usize| {
             let p = segment.start + (segment.end - segment.start) * ((k as f64 + 0.5) / pieces as f64);
             let ([x, y], depth) = at(p);
             let place = |u: &f64| [x + aside[0] * radius * u, y + aside[1] * radius * u];
-            let mut visible = across.iter().map(|u| is_seen(place(u), depth + front));
+            let mut visible = across.iter().map(|u| self.is_seen(place(u), depth + front));
             let on_axis = visible.next().unwrap_or(false);
             (usize::from(on_axis) + visible.filter(|seen| *seen).count(), on_axis)
         };
@@ -98,8 +119,9 @@ impl Visible<'_> {
 impl Seen {
     /// The first step of which something is visible, and the one after the last.
     fn range(&self) -> Option<[usize; 2]> {
-        let first = self.steps.iter().position(|(count, _)| *count > 0)?;
-        let end = self.steps.iter().rposition(|(count, _)| *count > 0)? + 1;
+        let is_seen = |(count, _): &(usize, bool)| *count > 0;
+        let first = self.steps.iter().position(is_seen)?;
+        let end = self.steps.iter().rposition(is_seen)? + 1;
         Some([first, end])
     }
 

@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::regions::{COVERED, NOTHING, Regions};
+use super::regions::{COVERED, NOTHING, Regions, Sample};
 use crate::formats::png::Lit;
 use crate::raster::SIXTEEN;
 use crate::raster::cells::{self, Nearest};
@@ -68,7 +68,7 @@ pub fn label(
         }
         let strength = lit.strength(n, weights.at(n, || corners(n), [cell % width, cell / width]));
         let (owner, material) = (mesh.faces[n].owner, mesh.faces[n].material);
-        let step = (strength * SHADES).round() as i32;
+        let step = step_of(strength);
         let key = (owner, material, step);
         let number = match last {
             Some((same, number)) if same == key => number,
@@ -91,17 +91,39 @@ pub fn label(
     shades.sort_by_key(Shade::key);
 
     let (items, of_item) = items(&shades);
-    let item_of = |number: u32| {
-        let Some(n) = (number as usize).checked_sub(1) else { return NOTHING };
-        let item = (mesh.faces[n].owner, mesh.faces[n].material);
-        of_item.get(&item).copied().unwrap_or(if strokes.contains(&item) { COVERED } else { NOTHING })
-    };
-    let (places, chosen) = edges(&labels, &items, width);
+    let (places, chosen) = edges(&labels, &items, &shades, width);
     let place = |cell: usize| places[cell] as usize;
-    let samples = cells::nearest(&SIXTEEN, [width, height], mesh.faces.len(), corners, chosen, place).numbers;
-    let samples = samples.into_iter().map(|samples| samples.map(item_of)).collect();
+    let seen = cells::nearest(&SIXTEEN, [width, height], mesh.faces.len(), corners, chosen, place).numbers;
+    let sample = |number: u32, cell: usize, weights: &mut cells::Weights| {
+        let Some(n) = (number as usize).checked_sub(1) else { return Sample { item: NOTHING, step: 0 } };
+        let item = (mesh.faces[n].owner, mesh.faces[n].material);
+        match of_item.get(&item) {
+            Some(&item) => {
+                let weights = weights.at(n, || corners(n), [cell % width, cell / width]);
+                Sample { item, step: step_of(lit.strength(n, weights)) }
+            }
+            None => Sample { item: if strokes.contains(&item) { COVERED } else { NOTHING }, step: 0 },
+        }
+    };
+    let cells = (0..labels.len()).filter(|cell| place(*cell) < chosen);
+    let mut samples = Vec::with_capacity(chosen);
+    for (cell, numbers) in cells.zip(&seen) {
+        let mut last = (numbers[0], sample(numbers[0], cell, &mut weights));
+        samples.push(numbers.map(|number| {
+            if last.0 != number {
+                last = (number, sample(number, cell, &mut weights));
+            }
+            last.1
+        }));
+    }
     let least = shades.iter().map(|shade| (f64::from(shade.step) - 0.5) / SHADES).collect();
-    (Regions { width, height, labels, places, samples, items, strengths, least }, shades)
+    let steps = shades.iter().map(|shade| shade.step).collect();
+    (Regions { width, height, labels, places, samples, items, steps, strengths, least }, shades)
+}
+
+/// The shade of a strength of light.
+fn step_of(strength: f64) -> i32 {
+    (strength * SHADES).round() as i32
 }
 
 /// The item (module and material) of each region, by number in the order of painting; and the number of each item.
@@ -115,14 +137,16 @@ fn items(shades: &[Shade]) -> (Vec<u32>, HashMap<Item, u32>) {
     (items, numbers)
 }
 
-/// For each cell beside one of another item its number among these cells, else a number that is greater than any; and their
+/// For each cell beside one of another item, or of a shade that is not the next one, its number among these cells, else a number that is greater than any; and their
 /// count.
-fn edges(labels: &[u32], items: &[u32], width: usize) -> (Vec<u32>, usize) {
-    let item = |cell: usize| items.get(labels[cell] as usize).copied();
+fn edges(labels: &[u32], items: &[u32], shades: &[Shade], width: usize) -> (Vec<u32>, usize) {
+    let item = |label: u32| items.get(label as usize).copied();
+    let step = |label: u32| shades.get(label as usize).map_or(0, |shade| shade.step);
     let mut places = vec![u32::MAX; labels.len()];
     let mut mark = |a: usize, b: usize| {
         // Most neighbours are of one region.
-        if labels[a] != labels[b] && item(a) != item(b) {
+        let [p, q] = [labels[a], labels[b]];
+        if p != q && (item(p) != item(q) || step(p).abs_diff(step(q)) > 1) {
             (places[a], places[b]) = (0, 0);
         }
     };

@@ -38,7 +38,7 @@ const CELLS_PER_PIXEL: f64 = 2.0;
 const LEAST_CELLS: f64 = 1000.0;
 const MOST_CELLS: f64 = 4000.0;
 /// Stems thinner than this many pixels of the page hide nothing: between the middles of cells they would have gaps.
-const LEAST_PIXELS: f64 = 1.0;
+const LEAST_PIXELS: f64 = 1.5;
 
 /// The elements of a scene in depth, one a line. See [`painter::elements`](super::painter::elements).
 pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -> String {

@@ -4,7 +4,7 @@
 //! by a margin, so that no background shows through where two outlines meet; and through holes, so that an outline within another is
 //! needed once only. A region is worked on piece by piece (cells that hang together), so the work is bounded by the pieces' sizes.
 
-use super::contour::{Corner, Mask};
+use super::contour::{Corner, Mask, Part};
 
 /// The width of the margin, in cells.
 const MARGIN: usize = 3;
@@ -14,18 +14,27 @@ pub const NOTHING: u32 = u32::MAX;
 /// Cells that will be drawn over by something else, so that regions may reach there.
 pub const COVERED: u32 = u32::MAX - 1;
 
+/// One place in a cell.
+#[derive(Clone, Copy)]
+pub struct Sample {
+    /// In the order of painting, or [`NOTHING`], or [`COVERED`].
+    pub item: u32,
+    /// Its shade.
+    pub step: i32,
+}
+
 /// A raster of regions, by number in the order of painting.
 pub struct Regions {
     pub width: usize,
     pub height: usize,
     /// By cell; [`NOTHING`] for the background, [`COVERED`] where something else is drawn.
     pub labels: Vec<u32>,
-    /// By cell: its place in `samples`, if it is at the edge of an item; or anything greater.
+    /// By cell: its place in `samples`, if it is at the edge of an item or at a crease; or anything greater.
     pub places: Vec<u32>,
-    /// Items at the samples of cells, in the order of painting.
-    pub samples: Vec<[u32; 16]>,
-    /// By region: its item.
+    pub samples: Vec<[Sample; 16]>,
+    /// By region: its item (module and material), in the order of painting, and its shade.
     pub items: Vec<u32>,
+    pub steps: Vec<i32>,
     /// By cell: the strength of light in its middle.
     pub strengths: Vec<f32>,
     /// By region: the least strength of light in its cells.
@@ -124,19 +133,19 @@ impl Regions {
         }
         spread(&mut inside, &free, width, own);
         fill_holes(&mut inside, &free, width);
-        // The part of a cell that this item covers, or one that is painted later.
-        let item = self.items[label as usize];
-        let covered = |i: usize| match self.samples.get(self.places[cell_at(i)] as usize) {
+        // The part of a cell that this region covers, or one that is painted later.
+        let (item, step) = (self.items[label as usize], self.steps[label as usize]);
+        let covered = |i: usize, part: Part| match self.samples.get(self.places[cell_at(i)] as usize) {
             Some(samples) => {
-                let count = samples.iter().filter(|other| **other != NOTHING && **other >= item).count();
-                count as f64 / samples.len() as f64
+                let least = if part == Part::Shade { step } else { i32::MIN };
+                let is_covered = |at: &&Sample| at.item != NOTHING && (at.item, at.step) >= (item, least);
+                samples.iter().filter(is_covered).count() as f64 / samples.len() as f64
             }
             None => f64::from(u8::from(inside[i])),
         };
         let shade = |i: usize| {
             let cell = cell_at(i);
-            let other = self.labels[cell];
-            let is_own = self.items.get(other as usize) == Some(&item);
+            let is_own = self.items.get(self.labels[cell] as usize) == Some(&item);
             is_own.then(|| f64::from(self.strengths[cell]) - self.least[label as usize])
         };
         let mask = Mask { width, height, inside: &inside, covered, shade };
@@ -219,7 +228,17 @@ mod tests {
         let places = vec![u32::MAX; labels.len()];
         let items = (0..10).collect();
         let (width, height, strengths) = (rows[0].len(), rows.len(), vec![0.0; labels.len()]);
-        Regions { width, height, labels, places, samples: Vec::new(), items, strengths, least: vec![0.0; 10] }
+        Regions {
+            width,
+            height,
+            labels,
+            places,
+            samples: Vec::new(),
+            items,
+            strengths,
+            least: vec![0.0; 10],
+            steps: vec![0; 10],
+        }
     }
 
     #[test]
