@@ -8,6 +8,7 @@
 //! `KIND-LINEAGE`, for the first that a module draws, then `KIND-LINEAGE.2` and so on. Where many frames share a picture,
 //! elements have no names, and neighbours of the same look are one path.
 
+use std::collections::HashMap;
 use std::fmt::Write;
 
 use super::name::Names;
@@ -107,17 +108,21 @@ impl Painter<'_> {
         self.end_run();
     }
 
-    /// Everything, from back to front.
+    /// Everything, from back to front. A line that a later one covers from end to end is left out: where edges are smoothed
+    /// twice they are darker.
     fn layers(&self) -> Vec<Layer> {
         let fit = self.style.fit;
         let quantum = 1e-9 * if fit.extent > 0.0 { fit.extent } else { 1.0 };
         let depth = |p: Point| (fit.camera.project(p).z / quantum).round();
         let mut ordinals = vec![0_u32; self.scene.owners().len()];
         let mut layers = Vec::new();
+        let covered = self.covered();
         let mut add = |owner: OwnerId, depth: f64, thing: Thing| {
             let ordinal = &mut ordinals[owner.index()];
             *ordinal += 1;
-            layers.push(Layer { depth, owner, ordinal: *ordinal, thing });
+            if !matches!(thing, Thing::Segment(i) if covered[i]) {
+                layers.push(Layer { depth, owner, ordinal: *ordinal, thing });
+            }
         };
         for (i, s) in self.scene.segments.iter().enumerate() {
             add(s.owner, depth(nalgebra::center(&s.start, &s.end)), Thing::Segment(i));
@@ -131,6 +136,30 @@ impl Painter<'_> {
         // Stable: a module's own things stay in the order in which they were entered.
         layers.sort_by(|a, b| a.depth.total_cmp(&b.depth).then(a.owner.cmp(&b.owner)));
         layers
+    }
+
+    /// For each segment whether a later one between the same ends is no thinner.
+    fn covered(&self) -> Vec<bool> {
+        let Style { fit, scale, .. } = self.style;
+        let place = |p: Point| {
+            let p = self.style.project(p);
+            // In steps too small to see.
+            [p.x, p.y].map(|x| (x * 1e3).round() as i64)
+        };
+        let width = |s: &Segment, k: usize| (s.widths[k].resolve(fit.default_width) * scale * 1e3).round();
+        let mut last: HashMap<[[i64; 2]; 2], [f64; 2]> = HashMap::new();
+        let mut covered = vec![false; self.scene.segments.len()];
+        for (i, s) in self.scene.segments.iter().enumerate().rev() {
+            let mut ends = [(place(s.start), width(s, 0)), (place(s.end), width(s, 1))];
+            ends.sort_by_key(|(at, _)| *at);
+            let widths = ends.map(|(_, width)| width);
+            let over = last.entry(ends.map(|(at, _)| at)).or_insert([-1.0; 2]);
+            covered[i] = over[0] >= widths[0] && over[1] >= widths[1];
+            if !covered[i] {
+                *over = widths;
+            }
+        }
+        covered
     }
 
     fn segment(&mut self, segment: &Segment, index: usize, id: &str) {
