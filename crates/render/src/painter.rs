@@ -48,7 +48,10 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
         scene,
         style,
         names,
-        strokes: Strokes::new(scene, style, prefix, !named),
+        // Of nameless ones those of one look are one path.
+        strokes: Strokes::new(scene, style, prefix, |a, b| {
+            named || scene.segments[a].material != scene.segments[b].material
+        }),
         run: None,
         out: String::new(),
     };

@@ -20,7 +20,7 @@ const PLACES: [f64; 5] = [-1.0, -0.55, 0.0, 0.55, 1.0];
 /// Least cosine of the angle between two pieces of a straight line.
 const STRAIGHT: f64 = 0.999_99;
 /// How far a piece of a line reaches under the one that continues it, in pixels of the page: less can be seen as a seam.
-const OVERLAP: f64 = 0.4;
+const OVERLAP: f64 = 0.7;
 /// The mean width of a segment, in pixels of the page.
 pub(super) fn pixels_across(segment: &Segment, style: Style) -> f64 {
     let Style { fit, pixels, .. } = style;
@@ -63,6 +63,8 @@ impl Stroke {
 pub(super) enum End {
     #[default]
     Round,
+    /// Round, in the midst of a stem.
+    Joint,
     /// Straight, where the stroke continues or something else hides the rest.
     Straight,
 }
@@ -81,15 +83,19 @@ pub(super) struct Strokes<'a> {
 }
 
 impl<'a> Strokes<'a> {
-    /// With `merged` strokes of one look will be one path, so only those of other materials must not lie over one another.
-    pub(super) fn new(scene: &'a Scene, style: Style<'a>, prefix: &'a str, merged: bool) -> Strokes<'a> {
+    /// `parted` tells of two segments, by number, if they are separate strokes that must not lie over one another.
+    pub(super) fn new(
+        scene: &'a Scene,
+        style: Style<'a>,
+        prefix: &'a str,
+        parted: impl Fn(usize, usize) -> bool,
+    ) -> Strokes<'a> {
         let mut ends = vec![[End::Round; 2]; scene.segments.len()];
         for (i, segment) in scene.segments.iter().enumerate() {
             let Some(before) = segment.follows else { continue };
-            let before_it = &scene.segments[before];
-            if (!merged || before_it.material != segment.material) && is_smooth(before_it, segment) {
-                (ends[before][1], ends[i][0]) = (End::Straight, End::Straight);
-            }
+            let is_straight = is_smooth(&scene.segments[before], segment) && parted(before, i);
+            let end = if is_straight { End::Straight } else { End::Joint };
+            (ends[before][1], ends[i][0]) = (end, end);
         }
         Strokes {
             scene,
@@ -140,11 +146,11 @@ impl<'a> Strokes<'a> {
             Point::new(to.x + along.x, to.y + along.y, to.z)
         };
         let mut look = format!(" stroke=\"{paint}\" stroke-width=\"{from}\"");
-        match ends {
-            [End::Round, End::Round] => {}
-            [End::Straight, End::Round] => return outline(half_round(a, b, wa / 2.0)),
-            [End::Round, End::Straight] => return outline(half_round(overlap(a, b), a, wa / 2.0)),
-            [End::Straight, End::Straight] => {
+        match ends.map(|end| end == End::Straight) {
+            [false, false] => {}
+            [true, false] => return outline(half_round(a, b, wa / 2.0)),
+            [false, true] => return outline(half_round(overlap(a, b), a, wa / 2.0)),
+            [true, true] => {
                 let end = overlap(a, b);
                 [x2, y2] = [end.x, end.y].map(text);
                 look.push_str(" stroke-linecap=\"butt\"");

@@ -1,11 +1,15 @@
 //! Hidden lines: the parts of stems that nothing hides.
 
+use super::regions::COVERED;
 use crate::painter::Style;
 use crate::stroke::{End, pixels_across};
 use dlsys_geometry::scene::{Point, Segment, Width};
 
-/// A stem is hidden by what is nearer by more than this part of the extent.
-const NEARER: f32 = 2e-3;
+/// A stem is hidden by what is nearer by more than this part of the extent, and by more than its depth changes from cell to cell.
+const NEARER: f64 = 2e-4;
+/// How far a stem reaches under the strokes that hide it, in its widths and in cells more.
+const UNDER: f64 = 2.0;
+const UNDER_CELLS: f64 = 2.0;
 /// Places along one stem that are examined, at most.
 const MOST_PIECES: f64 = 20_000.0;
 /// Places across a stem that are examined: its edges are at -1 and 1.
@@ -21,6 +25,8 @@ const MOST_HIDDEN: f64 = 0.06;
 pub struct Visible<'a> {
     pub style: Style<'a>,
     pub depths: &'a [[f32; 1]],
+    /// The regions of cells, if they are known.
+    pub labels: &'a [u32],
     pub size: [usize; 2],
     pub placement: [f64; 3],
 }
@@ -29,6 +35,8 @@ pub struct Visible<'a> {
 struct Seen {
     /// By step: the number of visible places across, and whether the one on the axis is visible.
     steps: Vec<(usize, bool)>,
+    /// By step: whether the axis is visible or hidden by a stroke.
+    open: Vec<bool>,
 }
 
 impl Visible<'_> {
@@ -53,11 +61,14 @@ impl Visible<'_> {
         let across = if is_thin { &ACROSS[..1] } else { &ACROSS[..] };
         let seen = self.seen(segment, across);
         let count = seen.steps.len();
-        let ranges = if is_thin { seen.on_axis() } else { seen.range().into_iter().collect() };
+        let [a, ..] = self.placement;
+        let reach = UNDER_CELLS + UNDER * pixels_across(segment, self.style) / self.style.pixels * a;
+        let ranges = if is_thin { seen.on_axis(reach as usize) } else { seen.range().into_iter().collect() };
         let cut = |[first, end]: [usize; 2]| {
             let [from, to] = [first, end].map(|k| k as f64 / count as f64);
             let shape = |is_own: bool, k: usize| match ends[k] {
-                End::Round if is_own && self.has_dome(segment, k) => End::Round,
+                End::Round if is_own && !self.has_dome(segment, k) => End::Straight,
+                end if is_own => end,
                 _ => End::Straight,
             };
             (part(segment, from, to), [shape(first == 0, 0), shape(end == count, 1)])
@@ -79,12 +90,16 @@ impl Visible<'_> {
         if self.style.fit.extent > 0.0 { self.style.fit.extent } else { 1.0 }
     }
 
-    /// Whether nothing hides what is at this depth, in parts of the extent, at a place of the raster.
-    fn is_seen(&self, [x, y]: [f64; 2], depth: f64) -> bool {
+    /// The cell at a place of the raster.
+    fn cell(&self, [x, y]: [f64; 2]) -> Option<usize> {
         let [column, row] = [x.floor(), y.floor()];
         let within = column >= 0.0 && row >= 0.0 && column < self.size[0] as f64 && row < self.size[1] as f64;
-        let cell = || row as usize * self.size[0] + column as usize;
-        !within || depth as f32 + NEARER >= self.depths[cell()][0]
+        within.then(|| row as usize * self.size[0] + column as usize)
+    }
+
+    /// Whether nothing hides what is at this depth, in parts of the extent, at a place of the raster.
+    fn is_seen(&self, place: [f64; 2], depth: f64) -> bool {
+        self.cell(place).is_none_or(|cell| (depth + NEARER) as f32 >= self.depths[cell][0])
     }
 
     /// Which places on a segment are visible.
@@ -96,23 +111,32 @@ impl Visible<'_> {
             let seen = camera.project(p);
             ([a * seen.x + b, c - a * seen.y], seen.z / extent)
         };
-        let ([x1, y1], _) = at(segment.start);
-        let ([x2, y2], _) = at(segment.end);
+        let ([x1, y1], z1) = at(segment.start);
+        let ([x2, y2], z2) = at(segment.end);
         let length = (x2 - x1).hypot(y2 - y1);
         let pieces = length.ceil().clamp(1.0, MOST_PIECES) as usize;
         // In cells, and in parts of the extent.
         let radius = pixels_across(segment, self.style) / self.style.pixels * a / 2.0;
         let front = radius / a / extent;
         let aside = if length > 0.0 { [(y2 - y1) / length, (x1 - x2) / length] } else { [1.0, 0.0] };
+        let place =
+            |k: usize| segment.start + (segment.end - segment.start) * ((k as f64 + 0.5) / pieces as f64);
+        // Within a cell the depth of a stem changes.
+        let slope = ((z2 - z1) / pieces as f64).abs();
         let step = |k: usize| {
-            let p = segment.start + (segment.end - segment.start) * ((k as f64 + 0.5) / pieces as f64);
-            let ([x, y], depth) = at(p);
+            let ([x, y], depth) = at(place(k));
             let place = |u: &f64| [x + aside[0] * radius * u, y + aside[1] * radius * u];
-            let mut visible = across.iter().map(|u| self.is_seen(place(u), depth + front));
+            let mut visible = across.iter().map(|u| self.is_seen(place(u), depth + front + slope));
             let on_axis = visible.next().unwrap_or(false);
             (usize::from(on_axis) + visible.filter(|seen| *seen).count(), on_axis)
         };
-        Seen { steps: (0..pieces).map(step).collect() }
+        let is_stroke = |k: usize| {
+            let cell = self.cell(at(place(k)).0);
+            cell.and_then(|cell| self.labels.get(cell)) == Some(&COVERED)
+        };
+        let steps: Vec<(usize, bool)> = (0..pieces).map(step).collect();
+        let open = (0..pieces).map(|k| steps[k].1 || is_stroke(k)).collect();
+        Seen { steps, open }
     }
 }
 
@@ -125,10 +149,26 @@ impl Seen {
         Some([first, end])
     }
 
-    /// Runs of steps whose middle is visible.
-    fn on_axis(&self) -> Vec<[usize; 2]> {
+    /// Runs of steps whose middle is visible, each going on for so many steps under the strokes that hide it.
+    fn on_axis(&self, reach: usize) -> Vec<[usize; 2]> {
+        let mut shown: Vec<bool> = self.steps.iter().map(|(_, on_axis)| *on_axis).collect();
+        let mut extend = |order: &mut dyn Iterator<Item = usize>| {
+            let mut left = 0;
+            for k in order {
+                match self.steps[k].1 {
+                    true => left = reach,
+                    false if left > 0 && self.open[k] => {
+                        left -= 1;
+                        shown[k] = true;
+                    }
+                    false => left = 0,
+                }
+            }
+        };
+        extend(&mut (0..self.steps.len()));
+        extend(&mut (0..self.steps.len()).rev());
         let mut runs: Vec<[usize; 2]> = Vec::new();
-        for (k, _) in self.steps.iter().enumerate().filter(|(_, (_, on_axis))| *on_axis) {
+        for k in (0..shown.len()).filter(|k| shown[*k]) {
             match runs.last_mut() {
                 Some([_, end]) if *end == k => *end = k + 1,
                 _ => runs.push([k, k + 1]),

@@ -55,11 +55,12 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
     let lit = Lit::new(&mesh, style.fit, placement);
     let size = size.map(|side| side as usize);
     let nearest = label::nearest(&mesh, &lit, size);
-    let visible = Visible { style, depths: &nearest.depths, size, placement };
+    let mut visible = Visible { style, depths: &nearest.depths, labels: &[], size, placement };
     let strokes = strokes(scene, style, &visible);
     let (mut regions, shades) = label::label(&mesh, &lit, &nearest.numbers, size, &strokes);
     regions.without_specks();
     let outlines = regions.outlines(shades.len());
+    visible.labels = &regions.labels;
 
     let unit = cell * style.scale;
     let origin = [(low[0] - b) * unit, (low[1] - c) * unit];
@@ -207,10 +208,12 @@ impl PageWriter<'_> {
         prefix: &str,
     ) -> String {
         let style = self.style;
-        let mut strokes = Strokes::new(scene, style, prefix, false);
         let is_stroke = |segment: &Segment| {
             items.contains(&(segment.owner, segment.material)) || pixels_across(segment, style) < LEAST_PIXELS
         };
+        let mut strokes = Strokes::new(scene, style, prefix, |a, b| {
+            is_stroke(&scene.segments[a]) && is_stroke(&scene.segments[b])
+        });
         let mut order: Vec<usize> =
             (0..scene.segments.len()).filter(|i| is_stroke(&scene.segments[*i])).collect();
         let depth = |i: usize| {
