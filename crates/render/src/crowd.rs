@@ -68,7 +68,7 @@ mod tests {
     fn lines(count: u32, length: f64, width: Width) -> Scene {
         let mut scene = Scene::default();
         for i in 0..count {
-            let owner = scene.add_owner(Owner { name: "F".into(), lineage: Lineage::of_axiom(i) });
+            let owner = scene.add_owner(Owner { name: "F".into(), lineage: Lineage::of_axiom(i as usize) });
             let start = Point::new(0.0, f64::from(i) / f64::from(count.max(2) - 1), 0.0);
             scene.segments.push(Segment {
                 start,

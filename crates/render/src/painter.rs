@@ -1,8 +1,7 @@
 //! The elements of an SVG picture, from back to front.
 //!
-//! An animation with surfaces in depth is drawn by its visible regions ([`trace`]). In others stems are strokes with round ends, polygons
-//! and the triangles of surfaces are filled paths, in the same light as everywhere ([`Light`](super::Light)). Thick stems have a gradient
-//! across. All elements are drawn from back to front, by the depth of their middles; those that are equally deep in string order.
+//! An animation with depth is drawn by its visible regions ([`trace`]). In flat ones stems are strokes with round ends, polygons
+//! and the triangles of surfaces are filled paths. All elements are drawn in string order.
 //!
 //! In a picture of one frame every element has an id that lasts from frame to frame: the name of its module,
 //! `KIND-LINEAGE`, for the first that a module draws, then `KIND-LINEAGE.2` and so on. Where many frames share a picture,
@@ -12,7 +11,7 @@ use std::collections::HashMap;
 use std::fmt::Write;
 
 use super::name::Names;
-use super::stroke::{Stroke, Strokes};
+use super::stroke::{Stroke, Strokes, is_thin};
 use super::{Fit, number, trace, triangulate};
 use dlsys_geometry::scene::{
     Color, Face, MaterialId, OwnerId, Point, Polygon, Scene, Segment, Surface, Vector,
@@ -48,9 +47,10 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
         scene,
         style,
         names,
-        // Of nameless ones those of one look are one path.
+        // Nameless ones of one look are one path; of wide ones the ends matter little, and they stay lines.
         strokes: Strokes::new(scene, style, prefix, |a, b| {
-            named || scene.segments[a].material != scene.segments[b].material
+            let [a, b] = [&scene.segments[a], &scene.segments[b]];
+            a.material != b.material || (named && is_thin(a, style) && is_thin(b, style))
         }),
         run: None,
         out: String::new(),

@@ -207,11 +207,22 @@ mod tests {
 
     #[test]
     fn a_slanted_edge_is_one_line() {
-        let rows: Vec<String> = (0..40).map(|y| "#".repeat(20 + y / 4) + &".".repeat(20 - y / 4)).collect();
-        let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
-        let inside: Vec<bool> = rows.iter().flat_map(|row| row.bytes().map(|b| b == b'#')).collect();
-        let covered = |i: usize, _| f64::from(u8::from(inside[i]));
-        let outlines = Mask { width: 40, height: 40, inside: &inside, covered, shade: |_| None }.outlines();
-        assert!(outlines.len() == 1 && outlines[0].len() <= 6, "{outlines:?}");
+        let covered = |i: usize| (20.0 + ((i / 40) as f64 + 0.5) / 4.0 - (i % 40) as f64).clamp(0.0, 1.0);
+        let inside: Vec<bool> = (0..1600).map(|i| covered(i) >= 0.5).collect();
+        let mask =
+            Mask { width: 40, height: 40, inside: &inside, covered: |i, _| covered(i), shade: |_| None };
+        let outlines = mask.outlines();
+        assert!(outlines.len() == 1 && outlines[0].len() <= 8, "{outlines:?}");
+    }
+
+    #[test]
+    fn a_shade_ends_where_the_light_passes_its_limit() {
+        let shade = |i: usize| 2.2 - ((i % 5) as f64 + 0.5);
+        let inside: Vec<bool> = (0..25).map(|i| shade(i) > 0.0).collect();
+        let covered = |i: usize, part| if part == Part::Item || inside[i] { 1.0 } else { 0.0 };
+        let mask = Mask { width: 5, height: 5, inside: &inside, covered, shade: |i| Some(shade(i)) };
+        let outlines = mask.outlines();
+        let right = outlines[0].iter().fold(0.0_f64, |right, p| right.max(p[0]));
+        assert!((right - 2.2).abs() < 1e-9, "{outlines:?}");
     }
 }

@@ -59,14 +59,18 @@ pub fn label(
     let mut known: HashMap<(OwnerId, MaterialId, i32), u32> = HashMap::new();
     let mut last = None;
     let mut labels = vec![NOTHING; numbers.len()];
-    let mut strengths = vec![0.0; numbers.len()];
+    let strengths = strengths(lit, numbers, width);
+    let mut at_strokes = (usize::MAX, false);
     for (cell, label) in labels.iter_mut().enumerate() {
         let Some(n) = (numbers[cell][0] as usize).checked_sub(1) else { continue };
-        if strokes.contains(&(mesh.faces[n].owner, mesh.faces[n].material)) {
+        if at_strokes.0 != n {
+            at_strokes = (n, strokes.contains(&(mesh.faces[n].owner, mesh.faces[n].material)));
+        }
+        if at_strokes.1 {
             *label = COVERED;
             continue;
         }
-        let strength = lit.strength(n, weights.at(n, || corners(n), [cell % width, cell / width]));
+        let strength = f64::from(strengths[cell]);
         let (owner, material) = (mesh.faces[n].owner, mesh.faces[n].material);
         let step = step_of(strength);
         let key = (owner, material, step);
@@ -78,7 +82,6 @@ pub fn label(
             }),
         };
         last = Some((key, number));
-        strengths[cell] = strength as f32;
         let shade = &mut shades[number as usize];
         (shade.sum, shade.count) = (shade.sum + strength, shade.count + 1);
         *label = number;
@@ -119,6 +122,42 @@ pub fn label(
     let least = shades.iter().map(|shade| (f64::from(shade.step) - 0.5) / SHADES).collect();
     let steps = shades.iter().map(|shade| shade.step).collect();
     (Regions { width, height, labels, places, samples, items, steps, strengths, least }, shades)
+}
+
+/// The strengths of light in the middles of cells. Between two cells of one triangle it is their mean.
+fn strengths(lit: &Lit, numbers: &[[u32; 1]], width: usize) -> Vec<f32> {
+    let mut weights = cells::Weights::default();
+    let mut strengths = vec![0.0_f32; numbers.len()];
+    let exact = |cell: usize, n: u32, weights: &mut cells::Weights| {
+        let n = n as usize - 1;
+        lit.strength(n, weights.at(n, || lit.corners(n), [cell % width, cell / width])) as f32
+    };
+    // Rows with even numbers first, then those between.
+    for (first, apart) in [(0, 1), (width, width)] {
+        for row in (first..numbers.len()).step_by((2 * width).max(1)) {
+            for offset in [0, 1] {
+                // Of an even row every second cell lies between two; of an odd row all do.
+                for cell in (row + offset..row + width).step_by(2) {
+                    let n = numbers[cell][0];
+                    if n == 0 {
+                        continue;
+                    }
+                    let is_between = apart > 1 || offset == 1;
+                    let after = cell + apart;
+                    let both = is_between
+                        && (apart > 1 || after < row + width)
+                        && after < numbers.len()
+                        && numbers[cell - apart][0] == n
+                        && numbers[after][0] == n;
+                    strengths[cell] = match both {
+                        true => (strengths[cell - apart] + strengths[after]) / 2.0,
+                        false => exact(cell, n, &mut weights),
+                    };
+                }
+            }
+        }
+    }
+    strengths
 }
 
 /// The shade of a strength of light.
