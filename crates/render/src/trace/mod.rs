@@ -37,6 +37,8 @@ const CELLS_PER_PIXEL: f64 = 2.0;
 /// Least and most cells on the larger side of a picture.
 const LEAST_CELLS: f64 = 1000.0;
 const MOST_CELLS: f64 = 4000.0;
+/// Stems wider than this many pixels of the page are regions, because their bends and domes have shades of their own.
+const WIDEST_STROKE: f64 = 16.0;
 /// Stems thinner than this many pixels of the page hide nothing: between the middles of cells they would have gaps.
 const LEAST_PIXELS: f64 = 1.5;
 
@@ -112,7 +114,8 @@ fn strokes(scene: &Scene, style: Style, visible: &Visible) -> HashSet<Item> {
     }
     for segment in scene.segments.iter().filter(|segment| !is_thin(segment, style)) {
         let item = (segment.owner, segment.material);
-        if strokes.contains(&item) && (segment.contour.is_some() || !visible.is_clear(segment)) {
+        let is_wide = pixels_across(segment, style) > WIDEST_STROKE;
+        if strokes.contains(&item) && (segment.contour.is_some() || is_wide || !visible.is_clear(segment)) {
             strokes.remove(&item);
         }
     }
