@@ -9,8 +9,8 @@ use super::new::NewArgs;
 use super::shared::{BudgetArgs, SharedArgs, SolverArgs, TextFormat};
 use super::shell::{self, CompletionsArgs, ManArgs};
 use super::values::{
-    Background, Seeds, background, bytes, columns, field_of_view, figure, frame_format, layout, method,
-    pixels, positive, runs, seeds, setting, size, threads, time, tolerance,
+    Background, LineWidth, Seeds, background, bytes, columns, field_of_view, figure, frame_format, layout,
+    line_width, method, pixels, positive, runs, seeds, setting, size, threads, time, tolerance,
 };
 use super::verify::VerifyArgs;
 use crate::compile::Setting;
@@ -273,6 +273,10 @@ pub struct RenderArgs {
     /// Background of pictures: "#rrggbb" or none (transparent) [default: #fbfaf5]
     #[arg(long, value_name = "COLOUR", value_parser = background)]
     pub background: Option<Background>,
+    /// Width of all lines of pictures, whatever the model says: in pixels, such as 1px, or in the model's units [default:
+    /// the widths of the model; 0.8 % of the largest extent for lines without one, less where they are crowded]
+    #[arg(long, value_name = "WIDTH", value_parser = line_width)]
+    pub line_width: Option<LineWidth>,
     /// More bytes than this, in all files of the render, are an error, such as 500MB
     #[arg(long, value_name = "BYTES", default_value = "10GB", value_parser = bytes)]
     pub max_output: u64,

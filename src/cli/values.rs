@@ -91,6 +91,28 @@ pub(super) fn background(text: &str) -> Result<Background, String> {
     }
 }
 
+/// The width of all lines of pictures.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LineWidth {
+    /// Pixels of the page.
+    Pixels(f64),
+    /// Units of the model.
+    Units(f64),
+}
+
+pub(super) fn line_width(text: &str) -> Result<LineWidth, String> {
+    let wanted =
+        || "expected pixels of the page, such as 1px, or a length of the model, such as 0.05".to_owned();
+    let (number, in_pixels) = text.strip_suffix("px").map_or((text, false), |number| (number, true));
+    match number.trim().parse::<f64>() {
+        Ok(x) if x > 0.0 && x.is_finite() => {
+            Ok(if in_pixels { LineWidth::Pixels(x) } else { LineWidth::Units(x) })
+        }
+        Ok(_) => Err("must be greater than 0".to_owned()),
+        Err(_) => Err(wanted()),
+    }
+}
+
 pub(super) fn field_of_view(text: &str) -> Result<f64, String> {
     match number(text)? {
         x if Camera::FIELDS.contains(&x) => Ok(x),

@@ -104,7 +104,7 @@ fn git(directory: &Path, arguments: &[&str]) -> Result<(), String> {
     }
 }
 
-fn build(tree: &Path, target: &Path) -> Result<PathBuf, String> {
+pub fn build(tree: &Path, target: &Path) -> Result<PathBuf, String> {
     println!("building {}", tree.display());
     let status = Command::new(env!("CARGO"))
         .current_dir(tree)

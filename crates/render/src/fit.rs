@@ -1,11 +1,17 @@
 //! The first pass over an animation, which finds what its frames share: scale, picture area, default width, camera, light.
 
+use std::borrow::Cow;
+
 use super::camera::Camera;
+use super::crowd::Crowd;
 use super::extent::Extent;
 use super::light::Light;
 use super::tube::TubeStyle;
 use super::{View, number, painter};
-use dlsys_geometry::scene::{Bounds, Point, Scene};
+use dlsys_geometry::scene::{Bounds, Point, Scene, Width};
+
+/// Drawings less deep than this part of their extent are flat.
+const FLAT: f64 = 1e-6;
 
 /// The first pass: the extent of an animation, in space and in its view.
 #[derive(Clone, Debug)]
@@ -15,13 +21,21 @@ pub struct Survey {
     field: Option<f64>,
     space: Bounds,
     seen: Extent,
-    has_surfaces: bool,
+    crowd: Crowd,
+    has_one_width: bool,
 }
 
 impl Survey {
     /// An empty survey, orthographic, in this view.
     pub fn new(view: View) -> Survey {
-        Survey { view, field: None, space: Bounds::default(), seen: Extent::EMPTY, has_surfaces: false }
+        Survey {
+            view,
+            field: None,
+            space: Bounds::default(),
+            seen: Extent::EMPTY,
+            crowd: Crowd::default(),
+            has_one_width: false,
+        }
     }
 
     /// In perspective: the camera is as near as possible if all that is drawn in any frame is within this angle, in degrees (clamped
@@ -30,23 +44,35 @@ impl Survey {
         Survey { field: Some(field), ..self }
     }
 
+    /// With one width for all lines, whatever the model says; [`fit_of_width`](Survey::fit_of_width) takes it.
+    pub fn with_one_width(self) -> Survey {
+        Survey { has_one_width: true, ..self }
+    }
+
     /// Includes the scene of a frame. The result does not depend on the order.
     pub fn add(&mut self, scene: &Scene) {
+        let scene = &*if self.has_one_width { Cow::Owned(of_one_width(scene)) } else { Cow::Borrowed(scene) };
         self.space.add(scene);
-        self.has_surfaces |= !scene.surfaces.is_empty() || !scene.patches.is_empty();
         self.seen.merge(&Extent::of(scene, &self.view));
+        self.crowd.merge(Crowd::of(scene));
     }
 
     /// Includes another survey in the same view, for example that of another thread.
     pub fn merge(&mut self, other: &Survey) {
         self.space.merge(&other.space);
-        self.has_surfaces |= other.has_surfaces;
+        self.crowd.merge(other.crowd);
         self.seen.merge(&other.seen);
     }
 
-    /// The values that all frames share.
+    /// The values that all frames share. Lines to which the model gives no width have a fixed part of the extent, or less where they are
+    /// crowded.
     pub fn fit(&self) -> Fit {
-        let default_width = self.space.default_width();
+        self.fit_of_width(self.crowd.default_width(&self.space))
+    }
+
+    /// The values that all frames share if lines of default width are this wide, in scene units.
+    pub fn fit_of_width(&self, default_width: f64) -> Fit {
+        let usual = self.space.default_width();
         let extent = self.space.extent();
         let bounds = self.space.corners(default_width);
         // Where stems are wider than everything is long, their width is what there is to see.
@@ -66,7 +92,9 @@ impl Survey {
             bounds,
             picture: Picture::around(shadow.map(|shadow| camera.frame(&shadow))),
             light: Light::new(depths, extent),
-            has_surfaces: self.has_surfaces,
+            meshes: (usual, self.space.corners(usual)),
+            has_one_width: self.has_one_width,
+            has_depth: depths[1] - depths[0] > FLAT * extent,
         }
     }
 }
@@ -88,8 +116,12 @@ pub struct Fit {
     /// The picture area of the view.
     pub picture: Picture,
     pub(super) light: Light,
-    /// Some frame has a surface.
-    has_surfaces: bool,
+    /// The default width of lines in meshes, and the box around everything.
+    meshes: (f64, Option<[Point; 2]>),
+    /// All lines have the default width.
+    has_one_width: bool,
+    /// Its depth is more than rounding.
+    has_depth: bool,
 }
 
 impl Fit {
@@ -104,15 +136,26 @@ impl Fit {
         Fit { accuracy: accuracy.max(size * FINEST), ..self }
     }
 
-    /// Opposite corners of the box around one scene, lines having their width.
-    pub fn bounds_of(&self, scene: &Scene) -> Option<[Point; 2]> {
-        Bounds::of(scene).corners(self.default_width)
+    /// The same for meshes: lines of default width have a fixed part of the extent, however crowded they are.
+    pub(super) fn of_meshes(self) -> Fit {
+        let (default_width, bounds) = self.meshes;
+        Fit { default_width, bounds, ..self }
     }
 
-    /// True if SVG pictures are made of visible regions: some frame has a surface, and the animation has depth. Without depth nothing
-    /// is hidden; stems and polygons alone have an order by depth that is good enough. There every element keeps its exact shape.
+    /// A scene as it is drawn: with one width for all lines, if that was asked for.
+    pub(super) fn drawn<'s>(&self, scene: Cow<'s, Scene>) -> Cow<'s, Scene> {
+        if self.has_one_width { Cow::Owned(of_one_width(&scene)) } else { scene }
+    }
+
+    /// Opposite corners of the box around one scene, lines having their width.
+    pub fn bounds_of(&self, scene: &Scene) -> Option<[Point; 2]> {
+        Bounds::of(&self.drawn(Cow::Borrowed(scene))).corners(self.default_width)
+    }
+
+    /// True if SVG pictures are made of visible regions: the animation has depth. Without depth nothing is hidden, and every element
+    /// keeps its exact shape.
     pub(super) fn has_visible_regions(&self) -> bool {
-        self.has_surfaces && !self.light.is_flat()
+        self.has_depth
     }
 
     /// How stems become tubes. Without depth they are lines of a diagram, and their joints keep their shape.
@@ -125,6 +168,17 @@ impl Fit {
     pub(super) fn frame_of(&self, survey: &Survey) -> Option<[f64; 4]> {
         survey.seen.shadow(self.default_width).map(|shadow| self.camera.frame(&shadow))
     }
+}
+
+/// A scene whose lines have the default width, but for those that have none.
+fn of_one_width(scene: &Scene) -> Scene {
+    let mut scene = scene.clone();
+    for segment in &mut scene.segments {
+        if segment.widths.iter().any(|width| width.resolve(1.0) > 0.0) {
+            segment.widths = [Width::Default(1.0); 2];
+        }
+    }
+    scene
 }
 
 /// The picture area: a rectangle of what the camera sees, and the scale at which it is drawn.

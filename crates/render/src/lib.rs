@@ -49,6 +49,7 @@
 #![warn(missing_docs)]
 
 mod camera;
+mod crowd;
 mod error;
 mod extent;
 mod fit;
@@ -116,6 +117,7 @@ impl FrameWriter {
     /// accuracy requires.
     pub fn new(format: Format, fit: Fit) -> FrameWriter {
         let page = Page::usual(fit.picture);
+        let fit = if format.content() == Content::Mesh { fit.of_meshes() } else { fit };
         FrameWriter { format, fit, page, sides: 0, threads: 1 }
     }
 
@@ -132,7 +134,7 @@ impl FrameWriter {
     /// # Errors
     /// Those of `out`.
     pub fn write_to(&self, scene: &Scene, title: &str, out: &mut (dyn Write + Send)) -> io::Result<()> {
-        let scene = &*scene.tessellated(self.fit.accuracy);
+        let scene = &*self.fit.drawn(scene.tessellated(self.fit.accuracy));
         self.format.exporter().write(Drawing { scene, writer: self, title }, out)
     }
 
@@ -165,6 +167,6 @@ pub fn pixels_by(
     smoothness: Smoothness,
     threads: usize,
 ) -> Vec<[u8; 4]> {
-    let scene = &*scene.tessellated(fit.accuracy);
+    let scene = &*fit.drawn(scene.tessellated(fit.accuracy));
     formats::png::picture(scene, fit, page.pixels, page.placement(), smoothness, threads).pixels
 }

@@ -63,6 +63,11 @@ impl Page {
         Page { picture, pixels: within(picture, 1000), background: Some(Page::BACKGROUND) }
     }
 
+    /// Pixels in a scene unit of the plane of focus.
+    pub fn pixels_per_unit(&self) -> f64 {
+        self.placement()[0]
+    }
+
     /// The map from the picture to the page, as `[a, b, c]`: a point is at `[ax + b, c - ay]` pixels from the upper left corner.
     /// The picture is in the middle where rounding has left the page another shape.
     pub(super) fn placement(&self) -> [f64; 3] {

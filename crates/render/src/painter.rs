@@ -1,17 +1,17 @@
 //! The elements of an SVG picture, from back to front.
 //!
-//! An animation with surfaces in depth is drawn by its visible regions ([`trace`]). In others stems are strokes with round ends, polygons
-//! and the triangles of surfaces are filled paths, in the same light as everywhere ([`Light`](super::Light)). Thick stems have a gradient
-//! across. All elements are drawn from back to front, by the depth of their middles; those that are equally deep in string order.
+//! An animation with depth is drawn by its visible regions ([`trace`]). In flat ones stems are strokes with round ends, polygons
+//! and the triangles of surfaces are filled paths. All elements are drawn in string order.
 //!
 //! In a picture of one frame every element has an id that lasts from frame to frame: the name of its module,
 //! `KIND-LINEAGE`, for the first that a module draws, then `KIND-LINEAGE.2` and so on. Where many frames share a picture,
 //! elements have no names, and neighbours of the same look are one path.
 
+use std::collections::HashMap;
 use std::fmt::Write;
 
 use super::name::Names;
-use super::stroke::{Stroke, Strokes};
+use super::stroke::{Stroke, Strokes, is_thin};
 use super::{Fit, number, trace, triangulate};
 use dlsys_geometry::scene::{
     Color, Face, MaterialId, OwnerId, Point, Polygon, Scene, Segment, Surface, Vector,
@@ -31,8 +31,6 @@ pub(super) struct Style<'a> {
     pub(super) fit: &'a Fit,
     /// Picture units in a scene unit.
     pub(super) scale: f64,
-    /// Larger side of the whole picture, in picture units.
-    pub(super) side: f64,
     /// Pixels of the page in a scene unit.
     pub(super) pixels: f64,
 }
@@ -50,7 +48,11 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
         scene,
         style,
         names,
-        strokes: Strokes::new(scene, style, prefix),
+        // Nameless ones of one look are one path; of wide ones the ends matter little, and they stay lines.
+        strokes: Strokes::new(scene, style, prefix, |a, b| {
+            let [a, b] = [&scene.segments[a], &scene.segments[b]];
+            a.material != b.material || (named && is_thin(a, style) && is_thin(b, style))
+        }),
         run: None,
         out: String::new(),
     };
@@ -110,17 +112,21 @@ impl Painter<'_> {
         self.end_run();
     }
 
-    /// Everything, from back to front.
+    /// Everything, from back to front. A line that a later one covers from end to end is left out: where edges are smoothed
+    /// twice they are darker.
     fn layers(&self) -> Vec<Layer> {
         let fit = self.style.fit;
         let quantum = 1e-9 * if fit.extent > 0.0 { fit.extent } else { 1.0 };
         let depth = |p: Point| (fit.camera.project(p).z / quantum).round();
         let mut ordinals = vec![0_u32; self.scene.owners().len()];
         let mut layers = Vec::new();
+        let covered = self.covered();
         let mut add = |owner: OwnerId, depth: f64, thing: Thing| {
             let ordinal = &mut ordinals[owner.index()];
             *ordinal += 1;
-            layers.push(Layer { depth, owner, ordinal: *ordinal, thing });
+            if !matches!(thing, Thing::Segment(i) if covered[i]) {
+                layers.push(Layer { depth, owner, ordinal: *ordinal, thing });
+            }
         };
         for (i, s) in self.scene.segments.iter().enumerate() {
             add(s.owner, depth(nalgebra::center(&s.start, &s.end)), Thing::Segment(i));
@@ -136,8 +142,33 @@ impl Painter<'_> {
         layers
     }
 
+    /// For each segment whether a later one between the same ends is no thinner.
+    fn covered(&self) -> Vec<bool> {
+        let Style { fit, scale, .. } = self.style;
+        let place = |p: Point| {
+            let p = self.style.project(p);
+            // In steps too small to see.
+            [p.x, p.y].map(|x| (x * 1e3).round() as i64)
+        };
+        let width = |s: &Segment, k: usize| (s.widths[k].resolve(fit.default_width) * scale * 1e3).round();
+        let mut last: HashMap<[[i64; 2]; 2], [f64; 2]> = HashMap::new();
+        let mut covered = vec![false; self.scene.segments.len()];
+        for (i, s) in self.scene.segments.iter().enumerate().rev() {
+            let mut ends = [(place(s.start), width(s, 0)), (place(s.end), width(s, 1))];
+            ends.sort_by_key(|(at, _)| *at);
+            let widths = ends.map(|(_, width)| width);
+            let over = last.entry(ends.map(|(at, _)| at)).or_insert([-1.0; 2]);
+            covered[i] = over[0] >= widths[0] && over[1] >= widths[1];
+            if !covered[i] {
+                *over = widths;
+            }
+        }
+        covered
+    }
+
     fn segment(&mut self, segment: &Segment, index: usize, id: &str) {
-        match self.strokes.stroke(segment, index, self.names.is_none()) {
+        let ends = self.strokes.ends(index);
+        match self.strokes.stroke(segment, ends, self.names.is_none()) {
             None => {}
             Some(Stroke::Element { name, attributes }) => {
                 self.end_run();

@@ -69,7 +69,7 @@ impl SheetWriter {
     /// Draws the frame with this number. A frame that the sheet has no place for is left out.
     pub fn part(&self, index: usize, scene: &Scene) -> Part {
         let cell = self.sheet.cells.get(index);
-        let scene = &*scene.tessellated(self.fit.accuracy);
+        let scene = &*self.fit.drawn(scene.tessellated(self.fit.accuracy));
         Part(match self.format.content() {
             Content::Pixels => {
                 let (size, corner, placement) = self.window(cell);

@@ -2,8 +2,7 @@
 //! cylinder.
 //!
 //! The colours across a stem depend on its direction and depth only, so they are shared by all stems of about the same; their
-//! position is given by a small gradient of each stem, which pieces of one straight stem share. A
-//! stem that is cut in two looks like a whole one.
+//! position is given by a small gradient of each stem. A stem that is cut in two looks like a whole one.
 
 use std::collections::HashMap;
 use std::fmt::Write;
@@ -12,27 +11,28 @@ use super::number;
 use super::painter::{DECIMALS, SHADES, Style, text};
 use dlsys_geometry::scene::{Color, Point, Scene, Segment};
 
-/// Stems thinner than this part of the picture's larger side (2.5 pixels of 1000) have one colour.
-const THIN: f64 = 0.0025;
-/// Stems thinner than this part are lines also where surfaces are regions: 2 pixels of 1000.
-const HAIR: f64 = 0.002;
+/// Stems thinner than this many pixels of the page have one colour.
+const HAIR: f64 = 0.8;
+/// Stems thinner than this many pixels of the page are strokes, wherever they are visible, and never regions.
+const THIN: f64 = 2.5;
 /// Places across a stem at which its colour is given: its edges are at -1 and 1.
 const PLACES: [f64; 5] = [-1.0, -0.55, 0.0, 0.55, 1.0];
 /// Least cosine of the angle between two pieces of a straight line.
 const STRAIGHT: f64 = 0.999_99;
-/// How far a piece of a line reaches under the one that continues it, in parts of the picture's larger side: less
-/// can be seen as a seam.
-const OVERLAP: f64 = 0.0004;
-
-/// True for a stem that is too thin for shades across it, though the scene has depth.
-pub(super) fn is_thin(segment: &Segment, style: Style) -> bool {
-    let Style { fit, scale, side, .. } = style;
+/// How far a piece of a line reaches under the one that continues it, in pixels of the page: less can be seen as a seam.
+const OVERLAP: f64 = 0.7;
+/// The mean width of a segment, in pixels of the page.
+pub(super) fn pixels_across(segment: &Segment, style: Style) -> f64 {
+    let Style { fit, pixels, .. } = style;
     let width = |i: usize, p: Point| {
-        segment.widths[i].resolve(fit.default_width)
-            * scale
-            * fit.camera.magnification(fit.camera.project(p).z)
+        segment.widths[i].resolve(fit.default_width) * fit.camera.magnification(fit.camera.project(p).z)
     };
-    (width(0, segment.start) + width(1, segment.end)) / 2.0 < HAIR * side
+    (width(0, segment.start) + width(1, segment.end)) / 2.0 * pixels
+}
+
+/// True for a stem that is too thin to be a region of cells, though the scene has depth.
+pub(super) fn is_thin(segment: &Segment, style: Style) -> bool {
+    pixels_across(segment, style) < THIN
 }
 
 /// How a segment is drawn.
@@ -48,12 +48,25 @@ pub(super) enum Stroke {
     },
 }
 
-/// How a segment and its neighbours on a straight line meet.
-#[derive(Clone, Copy, Default)]
-struct Joints {
-    /// It continues one of another colour, and begins straight where that ends.
-    start: bool,
-    end: bool,
+impl Stroke {
+    /// Its element: name and attributes.
+    pub(super) fn element(self) -> (&'static str, String) {
+        match self {
+            Stroke::Element { name, attributes } => (name, attributes),
+            Stroke::Path { attributes, data } => ("path", format!("{attributes} d=\"{data}\"")),
+        }
+    }
+}
+
+/// The shape of an end of a stroke.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum End {
+    #[default]
+    Round,
+    /// Round, in the midst of a stem.
+    Joint,
+    /// Straight, where the stroke continues or something else hides the rest.
+    Straight,
 }
 
 /// The stems of a picture.
@@ -61,7 +74,8 @@ pub(super) struct Strokes<'a> {
     scene: &'a Scene,
     style: Style<'a>,
     prefix: &'a str,
-    joints: Vec<Joints>,
+    /// Shapes of the ends of each segment.
+    ends: Vec<[End; 2]>,
     /// Numbers of colours across, and of gradients.
     profiles: HashMap<[Color; PLACES.len()], usize>,
     gradients: HashMap<String, usize>,
@@ -69,25 +83,25 @@ pub(super) struct Strokes<'a> {
 }
 
 impl<'a> Strokes<'a> {
-    pub(super) fn new(scene: &'a Scene, style: Style<'a>, prefix: &'a str) -> Strokes<'a> {
-        let mut joints = vec![Joints::default(); scene.segments.len()];
+    /// `parted` tells of two segments, by number, if they are separate strokes that must not lie over one another.
+    pub(super) fn new(
+        scene: &'a Scene,
+        style: Style<'a>,
+        prefix: &'a str,
+        parted: impl Fn(usize, usize) -> bool,
+    ) -> Strokes<'a> {
+        let mut ends = vec![[End::Round; 2]; scene.segments.len()];
         for (i, segment) in scene.segments.iter().enumerate() {
             let Some(before) = segment.follows else { continue };
-            let other = &scene.segments[before];
-            let [a, b] = [other.widths[1], segment.widths[0]].map(|w| w.resolve(style.fit.default_width));
-            if other.material != segment.material
-                && other.direction.dot(&segment.direction) > STRAIGHT
-                && (a - b).abs() <= 0.25 * a.max(b)
-            {
-                joints[before].end = true;
-                joints[i].start = true;
-            }
+            let is_straight = is_smooth(&scene.segments[before], segment) && parted(before, i);
+            let end = if is_straight { End::Straight } else { End::Joint };
+            (ends[before][1], ends[i][0]) = (end, end);
         }
         Strokes {
             scene,
             style,
             prefix,
-            joints,
+            ends,
             profiles: HashMap::new(),
             gradients: HashMap::new(),
             definitions: String::new(),
@@ -99,9 +113,14 @@ impl<'a> Strokes<'a> {
         std::mem::take(&mut self.definitions)
     }
 
-    /// A stroke; a dot if it is seen end on; a filled outline if its ends differ in width. `None` if it has no width.
-    pub(super) fn stroke(&mut self, segment: &Segment, index: usize, as_path: bool) -> Option<Stroke> {
-        let Style { fit, scale, side, .. } = self.style;
+    /// The shapes of a segment's ends.
+    pub(super) fn ends(&self, index: usize) -> [End; 2] {
+        self.ends[index]
+    }
+
+    /// A stroke; a dot if it is seen end on; a filled outline if its ends differ in width or shape. `None` if it has no width.
+    pub(super) fn stroke(&mut self, segment: &Segment, ends: [End; 2], as_path: bool) -> Option<Stroke> {
+        let Style { fit, scale, pixels, .. } = self.style;
         let [a, b] = [segment.start, segment.end].map(|p| self.style.project(p));
         let width = |i: usize, z: f64| {
             segment.widths[i].resolve(fit.default_width) * scale * fit.camera.magnification(z / scale)
@@ -113,25 +132,29 @@ impl<'a> Strokes<'a> {
             return None;
         }
         let paint = self.paint(segment, [a, b], (wa + wb) / 2.0);
+        let outline = |data: String| Some(Stroke::Path { attributes: format!(" fill=\"{paint}\""), data });
         if from != to {
-            let attributes = format!(" fill=\"{paint}\"");
-            return Some(Stroke::Path { attributes, data: tapered(a, b, wa / 2.0, wb / 2.0) });
+            return outline(tapered(a, b, wa / 2.0, wb / 2.0));
         }
         // Not every renderer draws the ends of a stroke without length.
         if x1 == x2 && y1 == y2 {
             let attributes = format!(" fill=\"{paint}\" cx=\"{x1}\" cy=\"{y1}\" r=\"{}\"", text(wa / 2.0));
             return Some(Stroke::Element { name: "circle", attributes });
         }
-        let Joints { start, end } = self.joints[index];
-        if start && !end {
-            let attributes = format!(" fill=\"{paint}\"");
-            return Some(Stroke::Path { attributes, data: half_round(a, b, wa / 2.0) });
-        }
+        let overlap = |from: Point, to: Point| {
+            let along = (to - from).xy().normalize() * (OVERLAP * scale / pixels);
+            Point::new(to.x + along.x, to.y + along.y, to.z)
+        };
         let mut look = format!(" stroke=\"{paint}\" stroke-width=\"{from}\"");
-        if start {
-            let along = (b - a).xy().normalize() * (OVERLAP * side);
-            [x2, y2] = [b.x + along.x, b.y + along.y].map(text);
-            look.push_str(" stroke-linecap=\"butt\"");
+        match ends.map(|end| end == End::Straight) {
+            [false, false] => {}
+            [true, false] => return outline(half_round(a, b, wa / 2.0)),
+            [false, true] => return outline(half_round(overlap(a, b), a, wa / 2.0)),
+            [true, true] => {
+                let end = overlap(a, b);
+                [x2, y2] = [end.x, end.y].map(text);
+                look.push_str(" stroke-linecap=\"butt\"");
+            }
         }
         if as_path {
             return Some(Stroke::Path { attributes: look, data: format!("M{x1} {y1}L{x2} {y2}") });
@@ -150,15 +173,16 @@ impl<'a> Strokes<'a> {
         let lit = |strength: f64| color.lit((strength * SHADES).round() / SHADES);
         let (dx, dy) = (b.x - a.x, b.y - a.y);
         let length = dx.hypot(dy);
-        if light.is_flat() || width < THIN * self.style.side || length < 1e-3 * width {
+        if light.is_flat() || width * self.style.pixels < HAIR * self.style.scale || length < 1e-3 * width {
             // The mean over the width, by the trapezoidal rule.
             const SHARES: [f64; PLACES.len()] = [0.1125, 0.25, 0.275, 0.25, 0.1125];
             return lit(strengths.iter().zip(SHARES).map(|(s, share)| s * share).sum()).to_string();
         }
-        // In the picture y goes down; the stem's left is on the left of one who walks along it.
-        let (ux, uy) = (dx / length, dy / length);
-        let across = a.x * uy - a.y * ux;
-        let place = |side: f64| [uy, -ux].map(|n| text(n * (across + side * width / 2.0)));
+        // In the picture y goes down; the stem's left is on the left of one who walks along it. The gradient is given on the stem
+        // itself: further away its rounded direction would lead past it.
+        let middle = nalgebra::center(&a, &b);
+        let aside = [dy / length * width / 2.0, -dx / length * width / 2.0];
+        let place = |side: f64| [middle.x + side * aside[0], middle.y + side * aside[1]].map(text);
         let ([x1, y1], [x2, y2]) = (place(1.0), place(-1.0));
         let profile = self.profile(strengths.map(lit));
         let prefix = self.prefix;
@@ -193,6 +217,12 @@ impl<'a> Strokes<'a> {
             next
         })
     }
+}
+
+/// True if a segment continues another one straight, so that both have straight ends there. Round ends would lie over one another,
+/// and where edges are smoothed twice they are darker.
+fn is_smooth(before: &Segment, after: &Segment) -> bool {
+    before.direction.dot(&after.direction) > STRAIGHT
 }
 
 /// Appends a command of a path and its numbers.

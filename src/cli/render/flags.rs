@@ -2,8 +2,8 @@
 
 use crate::cli::args::RenderArgs;
 use crate::cli::common::Failure;
-use crate::cli::values::Background;
-use crate::render::{Content, Format, Layout, Page, Picture, Size, Spacing, Survey, View};
+use crate::cli::values::{Background, LineWidth};
+use crate::render::{Content, Fit, Format, Layout, Page, Picture, Size, Spacing, Survey, View};
 
 fn usage(message: impl std::fmt::Display) -> Failure {
     Failure::Usage(format!("error: {message}\n"))
@@ -13,6 +13,7 @@ fn usage(message: impl std::fmt::Display) -> Failure {
 pub fn survey(args: &RenderArgs) -> Result<Survey, Failure> {
     let view: View = args.view.parse().map_err(usage)?;
     let survey = Survey::new(view);
+    let survey = if args.line_width.is_some() { survey.with_one_width() } else { survey };
     Ok(match args.perspective {
         Some(field) => survey.with_perspective(field),
         None => survey,
@@ -45,6 +46,7 @@ pub fn agree(args: &RenderArgs) -> Result<(), Failure> {
             ("--width", args.width.is_some()),
             ("--size", args.size.is_some()),
             ("--background", args.background.is_some()),
+            ("--line-width", args.line_width.is_some()),
         ];
         if let Some((flag, _)) = given.iter().find(|(_, given)| *given) {
             return Err(usage(format!(
@@ -73,6 +75,27 @@ pub fn threads(args: &RenderArgs) -> usize {
 
 pub fn spacing(args: &RenderArgs) -> Spacing {
     Spacing { columns: args.columns, row_height: args.row_height }
+}
+
+/// The values that all frames share; `picture` is the area of the page.
+pub fn fit(args: &RenderArgs, survey: &Survey, picture: impl Fn(&Fit) -> Picture) -> Result<Fit, Failure> {
+    let mut fit = match args.line_width {
+        None => survey.fit(),
+        Some(LineWidth::Units(width)) => survey.fit_of_width(width),
+        Some(LineWidth::Pixels(pixels)) => {
+            let mut fit = survey.fit_of_width(0.0);
+            // The area includes the widths of lines, which depend on the area: each time by some hundredths of what they did before.
+            for _ in 0..3 {
+                let page = page(args, picture(&fit))?;
+                fit = survey.fit_of_width(pixels / page.pixels_per_unit());
+            }
+            fit
+        }
+    };
+    if let Some(accuracy) = args.accuracy {
+        fit = fit.with_accuracy(accuracy);
+    }
+    Ok(fit)
 }
 
 /// The page for a picture.

@@ -22,8 +22,8 @@ use super::frame_source::{Frame, Pass, play};
 use super::progress::Progress;
 use super::values::Seeds;
 use crate::render::{
-    self, Content, Fit, FrameDirectory, FrameRecord, FrameWriter, Layout, Manifest, Page, Sheet, SheetWriter,
-    Survey,
+    self, Content, Fit, FrameDirectory, FrameRecord, FrameWriter, Layout, Manifest, Page, Picture, Sheet,
+    SheetWriter, Survey,
 };
 use crate::scene::Scene;
 use crate::sim::{Method, Settings, Stats, brief};
@@ -58,10 +58,7 @@ fn specimens(args: &RenderArgs, mut run: ModelRun, seeds: Seeds) -> Result<(), F
         survey = render.measure(survey, &mut Clock::default()).map_err(|why| why.of_seed(seed))?;
         parts.push(render.frames);
     }
-    let mut fit = survey.fit();
-    if let Some(accuracy) = args.accuracy {
-        fit = fit.with_accuracy(accuracy);
-    }
+    let fit = flags::fit(args, &survey, |fit| picture(args, &run, &parts[0], fit))?;
     let width = seeds.last.to_string().len();
     let mut bytes = 0;
     for (seed, frames) in seeds.iter().zip(parts) {
@@ -96,10 +93,8 @@ pub fn render_run(
     let mut clock = run.clock;
     let threads = flags::threads(args);
     let mut render = Render { args, run: &run, out: &args.out, threads, frames: Vec::new(), stale };
-    let mut fit = render.measure(survey, &mut clock)?.fit();
-    if let Some(accuracy) = args.accuracy {
-        fit = fit.with_accuracy(accuracy);
-    }
+    let survey = render.measure(survey, &mut clock)?;
+    let fit = flags::fit(args, &survey, |fit| picture(args, &run, &render.frames, fit))?;
     let (stats, written) = render.write(fit, &mut clock)?;
     run.write_stats(&args.shared, clock, stats)?;
     if args.quiet {
@@ -117,6 +112,25 @@ pub fn render_run(
             "  large: --accuracy 0.02 makes surfaces of fewer pieces, --format png makes pictures of dots\n";
     }
     std::io::stdout().write_all(line.as_bytes()).map_err(out_error)
+}
+
+/// The area of the page: that of a frame, or of a sheet of frames.
+fn picture(args: &RenderArgs, run: &ModelRun, frames: &[Survey], fit: &Fit) -> Picture {
+    match args.layout {
+        Layout::Frames => fit.picture,
+        _ => sheet(args, run, frames, fit).picture,
+    }
+}
+
+/// Frames on a sheet.
+fn sheet(args: &RenderArgs, run: &ModelRun, frames: &[Survey], fit: &Fit) -> Sheet {
+    let captions: Vec<String> = match args.layout {
+        Layout::Grid if !args.no_captions => {
+            run.times.iter().map(|&t| format!("t = {}", brief(t, 9))).collect()
+        }
+        _ => Vec::new(),
+    };
+    Sheet::new(args.layout, fit, frames, &captions, flags::spacing(args))
 }
 
 /// Bytes from which a render gets a hint about its size.
@@ -147,7 +161,7 @@ impl Render<'_> {
     fn write(&self, fit: Fit, clock: &mut Clock) -> Result<(Stats, Written), Failure> {
         match self.args.layout {
             Layout::Frames => self.frames(fit, clock),
-            layout => self.sheet(layout, fit, clock),
+            _ => self.sheet(fit, clock),
         }
     }
 
@@ -232,15 +246,9 @@ impl Render<'_> {
     }
 
     /// The second pass, if all frames have one file.
-    fn sheet(&self, layout: Layout, fit: Fit, clock: &mut Clock) -> Result<(Stats, Written), Failure> {
+    fn sheet(&self, fit: Fit, clock: &mut Clock) -> Result<(Stats, Written), Failure> {
         let times = &self.run.times;
-        let captions: Vec<String> = match layout {
-            Layout::Grid if !self.args.no_captions => {
-                times.iter().map(|&t| format!("t = {}", brief(t, 9))).collect()
-            }
-            _ => Vec::new(),
-        };
-        let sheet = Sheet::new(layout, &fit, &self.frames, &captions, flags::spacing(self.args));
+        let sheet = sheet(self.args, self.run, &self.frames, &fit);
         let page = flags::page(self.args, sheet.picture)?;
         let refuse = |error: render::Error| Failure::Usage(format!("error: {error}\n"));
         let writer = SheetWriter::new(self.args.format, fit.clone(), sheet, page).map_err(refuse)?;

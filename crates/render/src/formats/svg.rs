@@ -30,9 +30,8 @@ impl Exporter for Svg {
 
 /// How frames are painted on a page.
 pub(crate) fn style<'a>(fit: &'a Fit, page: &Page) -> Style<'a> {
-    let [_, _, width, height] = page.picture.view_box();
     let [pixels, ..] = page.placement();
-    Style { fit, scale: page.picture.scale, side: width.max(height), pixels }
+    Style { fit, scale: page.picture.scale, pixels }
 }
 
 /// The document of a page with these elements, each with its line's end.

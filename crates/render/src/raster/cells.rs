@@ -30,12 +30,15 @@ pub(crate) fn nearest<const N: usize>(
         let [origin, right, down] = triangle.depth;
         let at = &triangle.at_samples;
         let largest = at.map(|at| at.iter().copied().max().unwrap_or(0));
+        let right_by = triangle.sides.map(|[a, ..]| a * STEPS);
         for row in triangle.rows[0]..=triangle.rows[1] {
-            for column in triangle.columns[0]..=triangle.columns[1] {
-                let corner = [0, 1, 2].map(|k| {
-                    let [a, b, c] = triangle.sides[k];
-                    a * (column as i64 * STEPS) + b * (row as i64 * STEPS) + c + triangle.bias[k]
-                });
+            let first = triangle.columns[0];
+            let mut corner = [0, 1, 2].map(|k| {
+                let [a, b, c] = triangle.sides[k];
+                a * (first as i64 * STEPS) + b * (row as i64 * STEPS) + c + triangle.bias[k] - right_by[k]
+            });
+            for column in first..=triangle.columns[1] {
+                corner = [0, 1, 2].map(|k| corner[k] + right_by[k]);
                 if (0..3).any(|k| corner[k] + largest[k] < 0) {
                     continue;
                 }

@@ -1,56 +1,180 @@
-//! Hidden lines: the parts of thin stems that no surface hides.
+//! Hidden lines: the parts of stems that nothing hides.
 
+use super::regions::COVERED;
 use crate::painter::Style;
+use crate::stroke::{End, pixels_across};
 use dlsys_geometry::scene::{Point, Segment, Width};
 
-/// A stem is hidden by what is nearer by more than this part of the extent.
-const NEARER: f32 = 2e-3;
+/// A stem is hidden by what is nearer by more than this part of the extent, and by more than its depth changes from cell to cell.
+const NEARER: f64 = 2e-4;
+/// How far a stem reaches under the strokes that hide it, in its widths and in cells more.
+const UNDER: f64 = 2.0;
+const UNDER_CELLS: f64 = 2.0;
+/// Places along one stem that are examined, at most.
+const MOST_PIECES: f64 = 20_000.0;
+/// Places across a stem that are examined: its edges are at -1 and 1.
+const ACROSS: [f64; 5] = [0.0, -0.4, 0.4, -0.8, 0.8];
+/// A stem that looks shorter than this, in widths, has more to see than the shades across it: its ends.
+const SHORTEST: f64 = 2.0;
+/// How far from the end of a stem its dome is examined, in radii.
+const DOME: f64 = 0.6;
+/// Most of the places on a stem that may be hidden though it counts as one that nothing hides.
+const MOST_HIDDEN: f64 = 0.06;
 
-/// The depths of what hides thin stems, by cell; and where the camera's x, y are: at `a x + b` and `c - a y` cells.
+/// The depths of what hides stems, by cell; and where the camera's x, y are: at `a x + b` and `c - a y` cells.
 pub struct Visible<'a> {
     pub style: Style<'a>,
     pub depths: &'a [[f32; 1]],
+    /// The regions of cells, if they are known.
+    pub labels: &'a [u32],
     pub size: [usize; 2],
     pub placement: [f64; 3],
 }
 
-/// Places along one stem that are examined, at most.
-const MOST_PIECES: f64 = 20_000.0;
+/// Which places on a stem are visible, in steps along it.
+struct Seen {
+    /// By step: the number of visible places across, and whether the one on the axis is visible.
+    steps: Vec<(usize, bool)>,
+    /// By step: whether the axis is visible or hidden by a stroke.
+    open: Vec<bool>,
+}
 
 impl Visible<'_> {
-    /// The parts of a segment that nothing hides.
-    pub fn parts(&self, segment: &Segment) -> Vec<Segment> {
+    /// Whether nothing hides a segment, but for its ends, and it looks like a stem. A segment that is hidden altogether is not visible.
+    pub fn is_clear(&self, segment: &Segment) -> bool {
+        let [from, to] = [segment.start, segment.end].map(|p| self.style.fit.camera.project(p));
+        let length = (to - from).xy().norm() * self.style.pixels;
+        if length < SHORTEST * pixels_across(segment, self.style) {
+            return false;
+        }
+        let seen = self.seen(segment, &ACROSS);
+        let Some([first, end]) = seen.range() else { return false };
+        let steps = &seen.steps[first..end];
+        let visible: usize = steps.iter().map(|(count, _)| count).sum();
+        let all = steps.len() * ACROSS.len();
+        (all - visible) as f64 <= MOST_HIDDEN * all as f64
+    }
+
+    /// The parts of a segment that nothing hides, and the shapes of their ends: those of the segment where they are its own. A wide
+    /// segment is clear, so it is one part.
+    pub fn parts(&self, segment: &Segment, ends: [End; 2], is_thin: bool) -> Vec<(Segment, [End; 2])> {
+        let across = if is_thin { &ACROSS[..1] } else { &ACROSS[..] };
+        let seen = self.seen(segment, across);
+        let count = seen.steps.len();
+        let [a, ..] = self.placement;
+        let reach = UNDER_CELLS + UNDER * pixels_across(segment, self.style) / self.style.pixels * a;
+        let ranges = if is_thin { seen.on_axis(reach as usize) } else { seen.range().into_iter().collect() };
+        let cut = |[first, end]: [usize; 2]| {
+            let [from, to] = [first, end].map(|k| k as f64 / count as f64);
+            let shape = |is_own: bool, k: usize| match ends[k] {
+                End::Round if is_own && !self.has_dome(segment, k) => End::Straight,
+                end if is_own => end,
+                _ => End::Straight,
+            };
+            (part(segment, from, to), [shape(first == 0, 0), shape(end == count, 1)])
+        };
+        ranges.into_iter().map(cut).collect()
+    }
+
+    /// Whether the dome at one end of a segment is visible.
+    fn has_dome(&self, segment: &Segment, end: usize) -> bool {
+        let radius = segment.widths[end].resolve(self.style.fit.default_width) / 2.0;
+        let (from, sign) = if end == 0 { (segment.start, -1.0) } else { (segment.end, 1.0) };
+        let [a, b, c] = self.placement;
+        let seen = self.style.fit.camera.project(from + segment.direction * (sign * DOME * radius));
+        let front = radius * (1.0 - DOME * DOME).sqrt();
+        self.is_seen([a * seen.x + b, c - a * seen.y], (seen.z + front) / self.extent())
+    }
+
+    fn extent(&self) -> f64 {
+        if self.style.fit.extent > 0.0 { self.style.fit.extent } else { 1.0 }
+    }
+
+    /// The cell at a place of the raster.
+    fn cell(&self, [x, y]: [f64; 2]) -> Option<usize> {
+        let [column, row] = [x.floor(), y.floor()];
+        let within = column >= 0.0 && row >= 0.0 && column < self.size[0] as f64 && row < self.size[1] as f64;
+        within.then(|| row as usize * self.size[0] + column as usize)
+    }
+
+    /// Whether nothing hides what is at this depth, in parts of the extent, at a place of the raster.
+    fn is_seen(&self, place: [f64; 2], depth: f64) -> bool {
+        self.cell(place).is_none_or(|cell| (depth + NEARER) as f32 >= self.depths[cell][0])
+    }
+
+    /// Which places on a segment are visible.
+    fn seen(&self, segment: &Segment, across: &[f64]) -> Seen {
         let camera = &self.style.fit.camera;
         let [a, b, c] = self.placement;
-        let extent = if self.style.fit.extent > 0.0 { self.style.fit.extent } else { 1.0 };
+        let extent = self.extent();
         let at = |p: Point| {
             let seen = camera.project(p);
-            ([a * seen.x + b, c - a * seen.y], (seen.z / extent) as f32)
+            ([a * seen.x + b, c - a * seen.y], seen.z / extent)
         };
-        let ([x1, y1], _) = at(segment.start);
-        let ([x2, y2], _) = at(segment.end);
-        let pieces = ((x2 - x1).hypot(y2 - y1)).ceil().clamp(1.0, MOST_PIECES) as usize;
-        let is_seen = |k: usize| {
-            let p = segment.start + (segment.end - segment.start) * ((k as f64 + 0.5) / pieces as f64);
-            let ([x, y], depth) = at(p);
-            let [column, row] = [x.floor(), y.floor()];
-            let within =
-                column >= 0.0 && row >= 0.0 && column < self.size[0] as f64 && row < self.size[1] as f64;
-            !within || depth + NEARER >= self.depths[row as usize * self.size[0] + column as usize][0]
+        let ([x1, y1], z1) = at(segment.start);
+        let ([x2, y2], z2) = at(segment.end);
+        let length = (x2 - x1).hypot(y2 - y1);
+        let pieces = length.ceil().clamp(1.0, MOST_PIECES) as usize;
+        // In cells, and in parts of the extent.
+        let radius = pixels_across(segment, self.style) / self.style.pixels * a / 2.0;
+        let front = radius / a / extent;
+        let aside = if length > 0.0 { [(y2 - y1) / length, (x1 - x2) / length] } else { [1.0, 0.0] };
+        let place =
+            |k: usize| segment.start + (segment.end - segment.start) * ((k as f64 + 0.5) / pieces as f64);
+        // Within a cell the depth of a stem changes.
+        let slope = ((z2 - z1) / pieces as f64).abs();
+        let step = |k: usize| {
+            let ([x, y], depth) = at(place(k));
+            let place = |u: &f64| [x + aside[0] * radius * u, y + aside[1] * radius * u];
+            let mut visible = across.iter().map(|u| self.is_seen(place(u), depth + front + slope));
+            let on_axis = visible.next().unwrap_or(false);
+            (usize::from(on_axis) + visible.filter(|seen| *seen).count(), on_axis)
         };
-        let mut parts = Vec::new();
-        let mut from = None;
-        for k in 0..=pieces {
-            match (k < pieces && is_seen(k), from) {
-                (true, None) => from = Some(k),
-                (false, Some(first)) => {
-                    parts.push(part(segment, first as f64 / pieces as f64, k as f64 / pieces as f64));
-                    from = None;
+        let is_stroke = |k: usize| {
+            let cell = self.cell(at(place(k)).0);
+            cell.and_then(|cell| self.labels.get(cell)) == Some(&COVERED)
+        };
+        let steps: Vec<(usize, bool)> = (0..pieces).map(step).collect();
+        let open = (0..pieces).map(|k| steps[k].1 || is_stroke(k)).collect();
+        Seen { steps, open }
+    }
+}
+
+impl Seen {
+    /// The first step of which something is visible, and the one after the last.
+    fn range(&self) -> Option<[usize; 2]> {
+        let is_seen = |(count, _): &(usize, bool)| *count > 0;
+        let first = self.steps.iter().position(is_seen)?;
+        let end = self.steps.iter().rposition(is_seen)? + 1;
+        Some([first, end])
+    }
+
+    /// Runs of steps whose middle is visible, each going on for so many steps under the strokes that hide it.
+    fn on_axis(&self, reach: usize) -> Vec<[usize; 2]> {
+        let mut shown: Vec<bool> = self.steps.iter().map(|(_, on_axis)| *on_axis).collect();
+        let mut extend = |order: &mut dyn Iterator<Item = usize>| {
+            let mut left = 0;
+            for k in order {
+                match self.steps[k].1 {
+                    true => left = reach,
+                    false if left > 0 && self.open[k] => {
+                        left -= 1;
+                        shown[k] = true;
+                    }
+                    false => left = 0,
                 }
-                _ => {}
+            }
+        };
+        extend(&mut (0..self.steps.len()));
+        extend(&mut (0..self.steps.len()).rev());
+        let mut runs: Vec<[usize; 2]> = Vec::new();
+        for k in (0..shown.len()).filter(|k| shown[*k]) {
+            match runs.last_mut() {
+                Some([_, end]) if *end == k => *end = k + 1,
+                _ => runs.push([k, k + 1]),
             }
         }
-        parts
+        runs
     }
 }
 

@@ -1,10 +1,11 @@
 //! The region of each cell of a raster: the module, the material and the shade of the nearest triangle there.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
-use super::regions::{NOTHING, Regions};
+use super::regions::{COVERED, NOTHING, Regions, Sample};
 use crate::formats::png::Lit;
-use crate::raster::{SIXTEEN, cells};
+use crate::raster::SIXTEEN;
+use crate::raster::cells::{self, Nearest};
 use crate::triangles::Triangles;
 use dlsys_geometry::scene::{MaterialId, OwnerId};
 
@@ -33,26 +34,45 @@ impl Shade {
     }
 }
 
-/// The raster of regions, their shades by number, and the depth of each cell. Regions are painted in the order of modules,
-/// materials and shades.
-pub fn label(mesh: &Triangles, lit: &Lit, size: [usize; 2]) -> (Regions, Vec<Shade>, Vec<[f32; 1]>) {
-    let [width, height] = size;
-    let count = mesh.faces.len();
-    let corners = |n: usize| lit.corners(n);
-    let seen = cells::nearest(&cells::MIDDLE, size, count, corners, width * height, |cell| cell);
-    let numbers: Vec<u32> = seen.numbers.into_iter().map(|[number]| number).collect();
+/// A module and a material.
+pub type Item = (OwnerId, MaterialId);
 
+/// The number of the nearest triangle in the middle of each cell plus 1, or 0; and its depth.
+pub fn nearest(mesh: &Triangles, lit: &Lit, [width, height]: [usize; 2]) -> Nearest<1> {
+    let count = mesh.faces.len();
+    cells::nearest(&cells::MIDDLE, [width, height], count, |n| lit.corners(n), width * height, |cell| cell)
+}
+
+/// The raster of regions, and their shades by number. Regions are painted in the order of modules, materials and shades; `strokes` are the
+/// items that will be drawn over them.
+pub fn label(
+    mesh: &Triangles,
+    lit: &Lit,
+    numbers: &[[u32; 1]],
+    [width, height]: [usize; 2],
+    strokes: &HashSet<Item>,
+) -> (Regions, Vec<Shade>) {
+    let corners = |n: usize| lit.corners(n);
     // Regions are numbered as they are found, then in the order of painting.
     let mut weights = cells::Weights::default();
     let mut shades: Vec<Shade> = Vec::new();
     let mut known: HashMap<(OwnerId, MaterialId, i32), u32> = HashMap::new();
     let mut last = None;
     let mut labels = vec![NOTHING; numbers.len()];
+    let strengths = strengths(lit, numbers, width);
+    let mut at_strokes = (usize::MAX, false);
     for (cell, label) in labels.iter_mut().enumerate() {
-        let Some(n) = (numbers[cell] as usize).checked_sub(1) else { continue };
-        let strength = lit.strength(n, weights.at(n, || corners(n), [cell % width, cell / width]));
+        let Some(n) = (numbers[cell][0] as usize).checked_sub(1) else { continue };
+        if at_strokes.0 != n {
+            at_strokes = (n, strokes.contains(&(mesh.faces[n].owner, mesh.faces[n].material)));
+        }
+        if at_strokes.1 {
+            *label = COVERED;
+            continue;
+        }
+        let strength = f64::from(strengths[cell]);
         let (owner, material) = (mesh.faces[n].owner, mesh.faces[n].material);
-        let step = (strength * SHADES).round() as i32;
+        let step = step_of(strength);
         let key = (owner, material, step);
         let number = match last {
             Some((same, number)) if same == key => number,
@@ -70,24 +90,84 @@ pub fn label(mesh: &Triangles, lit: &Lit, size: [usize; 2]) -> (Regions, Vec<Sha
     order.sort_by_key(|number| shades[*number as usize].key());
     let mut ranks = vec![0; order.len()];
     order.iter().zip(0..).for_each(|(number, rank)| ranks[*number as usize] = rank);
-    labels.iter_mut().filter(|label| **label != NOTHING).for_each(|label| *label = ranks[*label as usize]);
+    labels.iter_mut().filter(|label| **label < COVERED).for_each(|label| *label = ranks[*label as usize]);
     shades.sort_by_key(Shade::key);
 
     let (items, of_item) = items(&shades);
-    let item_of = |number: u32| {
-        let face = (number as usize).checked_sub(1).map(|n| &mesh.faces[n]);
-        face.and_then(|face| of_item.get(&(face.owner, face.material)).copied()).unwrap_or(NOTHING)
-    };
-    let (places, chosen) = edges(&labels, &items, width);
+    let (places, chosen) = edges(&labels, &items, &shades, width);
     let place = |cell: usize| places[cell] as usize;
-    let samples = cells::nearest(&SIXTEEN, size, count, corners, chosen, place).numbers;
-    let samples = samples.into_iter().map(|samples| samples.map(item_of)).collect();
-    (Regions { width, height, labels, places, samples, items }, shades, seen.depths)
+    let seen = cells::nearest(&SIXTEEN, [width, height], mesh.faces.len(), corners, chosen, place).numbers;
+    let sample = |number: u32, cell: usize, weights: &mut cells::Weights| {
+        let Some(n) = (number as usize).checked_sub(1) else { return Sample { item: NOTHING, step: 0 } };
+        let item = (mesh.faces[n].owner, mesh.faces[n].material);
+        match of_item.get(&item) {
+            Some(&item) => {
+                let weights = weights.at(n, || corners(n), [cell % width, cell / width]);
+                Sample { item, step: step_of(lit.strength(n, weights)) }
+            }
+            None => Sample { item: if strokes.contains(&item) { COVERED } else { NOTHING }, step: 0 },
+        }
+    };
+    let cells = (0..labels.len()).filter(|cell| place(*cell) < chosen);
+    let mut samples = Vec::with_capacity(chosen);
+    for (cell, numbers) in cells.zip(&seen) {
+        let mut last = (numbers[0], sample(numbers[0], cell, &mut weights));
+        samples.push(numbers.map(|number| {
+            if last.0 != number {
+                last = (number, sample(number, cell, &mut weights));
+            }
+            last.1
+        }));
+    }
+    let least = shades.iter().map(|shade| (f64::from(shade.step) - 0.5) / SHADES).collect();
+    let steps = shades.iter().map(|shade| shade.step).collect();
+    (Regions { width, height, labels, places, samples, items, steps, strengths, least }, shades)
+}
+
+/// The strengths of light in the middles of cells. Between two cells of one triangle it is their mean.
+fn strengths(lit: &Lit, numbers: &[[u32; 1]], width: usize) -> Vec<f32> {
+    let mut weights = cells::Weights::default();
+    let mut strengths = vec![0.0_f32; numbers.len()];
+    let exact = |cell: usize, n: u32, weights: &mut cells::Weights| {
+        let n = n as usize - 1;
+        lit.strength(n, weights.at(n, || lit.corners(n), [cell % width, cell / width])) as f32
+    };
+    // Rows with even numbers first, then those between.
+    for (first, apart) in [(0, 1), (width, width)] {
+        for row in (first..numbers.len()).step_by((2 * width).max(1)) {
+            for offset in [0, 1] {
+                // Of an even row every second cell lies between two; of an odd row all do.
+                for cell in (row + offset..row + width).step_by(2) {
+                    let n = numbers[cell][0];
+                    if n == 0 {
+                        continue;
+                    }
+                    let is_between = apart > 1 || offset == 1;
+                    let after = cell + apart;
+                    let both = is_between
+                        && (apart > 1 || after < row + width)
+                        && after < numbers.len()
+                        && numbers[cell - apart][0] == n
+                        && numbers[after][0] == n;
+                    strengths[cell] = match both {
+                        true => (strengths[cell - apart] + strengths[after]) / 2.0,
+                        false => exact(cell, n, &mut weights),
+                    };
+                }
+            }
+        }
+    }
+    strengths
+}
+
+/// The shade of a strength of light.
+fn step_of(strength: f64) -> i32 {
+    (strength * SHADES).round() as i32
 }
 
 /// The item (module and material) of each region, by number in the order of painting; and the number of each item.
-fn items(shades: &[Shade]) -> (Vec<u32>, HashMap<(OwnerId, MaterialId), u32>) {
-    let mut numbers: HashMap<(OwnerId, MaterialId), u32> = HashMap::new();
+fn items(shades: &[Shade]) -> (Vec<u32>, HashMap<Item, u32>) {
+    let mut numbers: HashMap<Item, u32> = HashMap::new();
     let number = |shade: &Shade| {
         let next = numbers.len() as u32;
         *numbers.entry((shade.owner, shade.material)).or_insert(next)
@@ -96,14 +176,16 @@ fn items(shades: &[Shade]) -> (Vec<u32>, HashMap<(OwnerId, MaterialId), u32>) {
     (items, numbers)
 }
 
-/// For each cell beside one of another item its number among these cells, else a number that is greater than any; and their
+/// For each cell beside one of another item, or of a shade that is not the next one, its number among these cells, else a number that is greater than any; and their
 /// count.
-fn edges(labels: &[u32], items: &[u32], width: usize) -> (Vec<u32>, usize) {
-    let item = |cell: usize| items.get(labels[cell] as usize).copied();
+fn edges(labels: &[u32], items: &[u32], shades: &[Shade], width: usize) -> (Vec<u32>, usize) {
+    let item = |label: u32| items.get(label as usize).copied();
+    let step = |label: u32| shades.get(label as usize).map_or(0, |shade| shade.step);
     let mut places = vec![u32::MAX; labels.len()];
     let mut mark = |a: usize, b: usize| {
         // Most neighbours are of one region.
-        if labels[a] != labels[b] && item(a) != item(b) {
+        let [p, q] = [labels[a], labels[b]];
+        if p != q && (item(p) != item(q) || step(p).abs_diff(step(q)) > 1) {
             (places[a], places[b]) = (0, 0);
         }
     };

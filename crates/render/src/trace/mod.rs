@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! triangles ─label─▶ raster of regions ─regions, contour─▶ outlines ─▶ paths, in a group for each module
-//! thin stems ─hidden─▶ the parts that nothing hides ─▶ strokes
+//! stems ─hidden─▶ those that nothing hides, and the visible parts of thin ones ─▶ strokes
 //! ```
 //!
 //! A scene in depth has surfaces that hide and cut one another, and shades that change from place to place. Its triangles are drawn
@@ -10,47 +10,62 @@
 //! are a region, and the outlines of regions are the paths of the picture. So surfaces are hidden as in a PNG, no seam shows
 //! between faces, and a file has as many paths as there are shades to see, not as there are triangles.
 //!
-//! Stems of a few pixels are no regions: they are strokes, over everything else, where nothing is in front of them.
+//! Stems that nothing hides are no regions: they are strokes, over everything else. So are thin ones, where nothing is in front of
+//! them.
 
 mod contour;
 mod hidden;
 mod label;
 mod regions;
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::fmt::Write;
 
 use super::formats::png::{Lit, sides};
 use super::name::Names;
+use super::number;
 use super::painter::Style;
-use super::stroke::{Stroke, Strokes, is_thin};
-use super::{number, triangles};
+use super::stroke::{Stroke, Strokes, is_thin, pixels_across};
+use super::triangles::{self, Triangles};
 use contour::Corner;
-use dlsys_geometry::scene::{OwnerId, Scene, Segment};
+use dlsys_geometry::scene::{Face, OwnerId, Scene, Segment};
 use hidden::Visible;
+use label::Item;
 
 /// Cells for each pixel of the page, along a side.
 const CELLS_PER_PIXEL: f64 = 2.0;
 /// Least and most cells on the larger side of a picture.
 const LEAST_CELLS: f64 = 1000.0;
 const MOST_CELLS: f64 = 4000.0;
+/// Stems wider than this many pixels of the page are regions, because their bends and domes have shades of their own.
+const WIDEST_STROKE: f64 = 16.0;
+/// Stems thinner than this many pixels of the page hide nothing: between the middles of cells they would have gaps.
+const LEAST_PIXELS: f64 = 1.5;
 
 /// The elements of a scene in depth, one a line. See [`painter::elements`](super::painter::elements).
 pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -> String {
     let [left, bottom, width, height] = style.fit.picture.area;
     let larger = width.max(height);
     let cell = larger / (CELLS_PER_PIXEL * larger * style.pixels).clamp(LEAST_CELLS, MOST_CELLS);
-    let size = [width, height].map(|side| (side / cell).ceil().max(1.0) as usize);
-    let placement = [1.0 / cell, -left / cell, (bottom + height) / cell];
-    let is_region = |segment: &Segment| !is_thin(segment, style);
-    let mesh = triangles::triangles(scene, style.fit, sides(scene, style.fit, placement[0]), is_region);
+    let [a, b, c] = [1.0 / cell, -left / cell, (bottom + height) / cell];
+    let has_triangles = |segment: &Segment| pixels_across(segment, style) >= LEAST_PIXELS;
+    let mesh = triangles::triangles(scene, style.fit, sides(scene, style.fit, a), has_triangles);
+    let lit = Lit::new(&mesh, style.fit, [a, b, c]);
+    // Of the raster only the part in which something is drawn.
+    let [low, size] = drawn(&mesh, &lit, [width, height].map(|side| (side / cell).ceil().max(1.0)));
+    let placement = [a, b - low[0], c - low[1]];
     let lit = Lit::new(&mesh, style.fit, placement);
-    let (mut regions, shades, depths) = label::label(&mesh, &lit, size);
+    let size = size.map(|side| side as usize);
+    let nearest = label::nearest(&mesh, &lit, size);
+    let mut visible = Visible { style, depths: &nearest.depths, labels: &[], size, placement };
+    let strokes = strokes(scene, style, &visible);
+    let (mut regions, shades) = label::label(&mesh, &lit, &nearest.numbers, size, &strokes);
     regions.without_specks();
     let outlines = regions.outlines(shades.len());
+    visible.labels = &regions.labels;
 
     let unit = cell * style.scale;
-    let origin = [left * style.scale, -(bottom + height) * style.scale];
+    let origin = [(low[0] - b) * unit, (low[1] - c) * unit];
     let to_page = |[x, y]: Corner| [origin[0] + x * unit, origin[1] + y * unit];
     // A quarter of a cell.
     let decimals = (-(unit / 4.0).log10()).ceil().clamp(0.0, 6.0) as usize;
@@ -68,8 +83,43 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
         out: String::new(),
     };
     page.groups(&paths);
-    let visible = Visible { style, depths: &depths, size, placement };
-    page.with_strokes(scene, &visible, prefix)
+    page.with_strokes(scene, &strokes, &visible, prefix)
+}
+
+/// The rectangle of cells that triangles touch, within a picture of this size: its first column and row, and its size.
+fn drawn(mesh: &Triangles, lit: &Lit, size: [f64; 2]) -> [[f64; 2]; 2] {
+    let (mut low, mut high) = (size, [0.0; 2]);
+    for corner in (0..mesh.faces.len()).flat_map(|n| lit.corners(n)) {
+        for (k, at) in [corner.x, corner.y].into_iter().enumerate() {
+            low[k] = at.min(low[k]);
+            high[k] = at.max(high[k]);
+        }
+    }
+    let low = [0, 1].map(|k| (low[k].floor() - 1.0).clamp(0.0, size[k] - 1.0));
+    let high = [0, 1].map(|k| (high[k].ceil() + 1.0).clamp(low[k] + 1.0, size[k]));
+    [low, [0, 1].map(|k| high[k] - low[k])]
+}
+
+/// The modules and materials that are strokes: all stems of theirs are thin, or nothing hides them; and they have nothing but stems.
+fn strokes(scene: &Scene, style: Style, visible: &Visible) -> HashSet<Item> {
+    let mut strokes: HashSet<Item> = scene.segments.iter().map(|s| (s.owner, s.material)).collect();
+    for polygon in &scene.polygons {
+        strokes.remove(&(polygon.owner, polygon.material));
+    }
+    for surface in &scene.surfaces {
+        let material = |face: &Face| surface.tint.filter(|_| face.takes_tint).unwrap_or(face.material);
+        for run in surface.mesh.faces.chunk_by(|a, b| material(a) == material(b)) {
+            strokes.remove(&(surface.owner, material(&run[0])));
+        }
+    }
+    for segment in scene.segments.iter().filter(|segment| !is_thin(segment, style)) {
+        let item = (segment.owner, segment.material);
+        let is_wide = pixels_across(segment, style) > WIDEST_STROKE;
+        if strokes.contains(&item) && (segment.contour.is_some() || is_wide || !visible.is_clear(segment)) {
+            strokes.remove(&item);
+        }
+    }
+    strokes
 }
 
 /// Appends a closed outline to path data, in relative coordinates of so many decimals.
@@ -132,13 +182,13 @@ impl PageWriter<'_> {
     /// The paths of each module, in a group that has its name.
     fn groups(&mut self, paths: &[(OwnerId, String)]) {
         for group in paths.chunk_by(|a, b| a.0 == b.0) {
-            let lines: Vec<&str> = group.iter().map(|(_, path)| &**path).collect();
+            let lines: Vec<&String> = group.iter().map(|(_, path)| path).collect();
             self.group(group[0].0, &lines);
         }
     }
 
     /// Elements of one module that have one name.
-    fn group(&mut self, owner: OwnerId, lines: &[&str]) {
+    fn group(&mut self, owner: OwnerId, lines: &[impl std::fmt::Display]) {
         let id = self.id(owner);
         let is_group = !id.is_empty();
         if is_group {
@@ -152,37 +202,41 @@ impl PageWriter<'_> {
         }
     }
 
-    /// Adds the visible parts of thin stems, from back to front, and completes the elements.
-    fn with_strokes(mut self, scene: &Scene, visible: &Visible, prefix: &str) -> String {
-        let mut strokes = Strokes::new(scene, self.style, prefix);
+    /// Adds the visible parts of stems that are strokes, from back to front, and completes the elements.
+    fn with_strokes(
+        mut self,
+        scene: &Scene,
+        items: &HashSet<Item>,
+        visible: &Visible,
+        prefix: &str,
+    ) -> String {
+        let style = self.style;
+        let is_stroke = |segment: &Segment| {
+            items.contains(&(segment.owner, segment.material)) || pixels_across(segment, style) < LEAST_PIXELS
+        };
+        let mut strokes = Strokes::new(scene, style, prefix, |a, b| {
+            is_stroke(&scene.segments[a]) && is_stroke(&scene.segments[b])
+        });
         let mut order: Vec<usize> =
-            (0..scene.segments.len()).filter(|i| is_thin(&scene.segments[*i], self.style)).collect();
+            (0..scene.segments.len()).filter(|i| is_stroke(&scene.segments[*i])).collect();
         let depth = |i: usize| {
             let segment = &scene.segments[i];
-            self.style.fit.camera.project(nalgebra::center(&segment.start, &segment.end)).z
+            style.fit.camera.project(nalgebra::center(&segment.start, &segment.end)).z
         };
         order.sort_by(|a, b| depth(*a).total_cmp(&depth(*b)).then(a.cmp(b)));
         for index in order {
             let segment = &scene.segments[index];
-            let parts: Vec<(&str, String)> = (visible.parts(segment).iter())
-                .filter_map(|part| strokes.stroke(part, index, false))
-                .map(|stroke| match stroke {
-                    Stroke::Element { name, attributes } => (name, attributes),
-                    Stroke::Path { attributes, data } => ("path", format!("{attributes} d=\"{data}\"")),
-                })
+            let parts = visible.parts(segment, strokes.ends(index), is_thin(segment, style));
+            let elements: Vec<(&str, String)> = (parts.iter())
+                .filter_map(|(part, ends)| strokes.stroke(part, *ends, false))
+                .map(Stroke::element)
                 .collect();
-            match &parts[..] {
-                [] => {}
-                [(name, attributes)] => {
-                    let id = self.id(segment.owner);
-                    let _ = writeln!(self.out, "<{name}{id}{attributes}/>");
-                }
-                parts => {
-                    let lines: Vec<String> =
-                        parts.iter().map(|(name, attributes)| format!("<{name}{attributes}/>")).collect();
-                    let lines: Vec<&str> = lines.iter().map(String::as_str).collect();
-                    self.group(segment.owner, &lines);
-                }
+            if let [(name, attributes)] = &elements[..] {
+                let id = self.id(segment.owner);
+                let _ = writeln!(self.out, "<{name}{id}{attributes}/>");
+            } else if !elements.is_empty() {
+                let line = |(name, attributes): &(&str, String)| format!("<{name}{attributes}/>");
+                self.group(segment.owner, &elements.iter().map(line).collect::<Vec<_>>());
             }
         }
         let definitions = strokes.definitions();

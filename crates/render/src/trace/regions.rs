@@ -4,28 +4,41 @@
 //! by a margin, so that no background shows through where two outlines meet; and through holes, so that an outline within another is
 //! needed once only. A region is worked on piece by piece (cells that hang together), so the work is bounded by the pieces' sizes.
 
-use super::contour::{Corner, Mask};
+use super::contour::{Corner, Mask, Part};
 
 /// The width of the margin, in cells.
 const MARGIN: usize = 3;
-/// The greatest distance of outlines from the edges of regions, in cells.
-const TOLERANCE: f64 = 0.4;
 
 /// No region.
 pub const NOTHING: u32 = u32::MAX;
+/// Cells that will be drawn over by something else, so that regions may reach there.
+pub const COVERED: u32 = u32::MAX - 1;
+
+/// One place in a cell.
+#[derive(Clone, Copy)]
+pub struct Sample {
+    /// In the order of painting, or [`NOTHING`], or [`COVERED`].
+    pub item: u32,
+    /// Its shade.
+    pub step: i32,
+}
 
 /// A raster of regions, by number in the order of painting.
 pub struct Regions {
     pub width: usize,
     pub height: usize,
-    /// By cell; [`NOTHING`] for the background.
+    /// By cell; [`NOTHING`] for the background, [`COVERED`] where something else is drawn.
     pub labels: Vec<u32>,
-    /// By cell: its place in `samples`, if it is at the edge of an item; or anything greater.
+    /// By cell: its place in `samples`, if it is at the edge of an item or at a crease; or anything greater.
     pub places: Vec<u32>,
-    /// Items at the samples of cells, in the order of painting.
-    pub samples: Vec<[u32; 16]>,
-    /// By region: its item.
+    pub samples: Vec<[Sample; 16]>,
+    /// By region: its item (module and material), in the order of painting, and its shade.
     pub items: Vec<u32>,
+    pub steps: Vec<i32>,
+    /// By cell: the strength of light in its middle.
+    pub strengths: Vec<f32>,
+    /// By region: the least strength of light in its cells.
+    pub least: Vec<f64>,
 }
 
 /// Cells of one region that hang together: one of them, and the rectangle around them, from the upper left corner to the one
@@ -43,7 +56,7 @@ impl Regions {
         for cell in 0..self.labels.len() {
             let label = self.labels[cell];
             let around = || neighbours(cell, self.width, self.labels.len()).map(|other| self.labels[other]);
-            if label == NOTHING || around().any(|other| other == label) {
+            if label >= COVERED || around().any(|other| other == label) {
                 continue;
             }
             let own = item(&self.items, label);
@@ -68,7 +81,7 @@ impl Regions {
         let mut stack = Vec::new();
         let mut pieces = Vec::new();
         for first in 0..self.labels.len() {
-            if seen[first] || self.labels[first] == NOTHING {
+            if seen[first] || self.labels[first] >= COVERED {
                 continue;
             }
             let mut piece = Piece { cell: first, low: [self.width, self.height], high: [0, 0] };
@@ -120,17 +133,23 @@ impl Regions {
         }
         spread(&mut inside, &free, width, own);
         fill_holes(&mut inside, &free, width);
-        // The part of a cell that this item covers, or one that is painted later.
-        let item = self.items[label as usize];
-        let covered = |i: usize| match self.samples.get(self.places[cell_at(i)] as usize) {
+        // The part of a cell that this region covers, or one that is painted later.
+        let (item, step) = (self.items[label as usize], self.steps[label as usize]);
+        let covered = |i: usize, part: Part| match self.samples.get(self.places[cell_at(i)] as usize) {
             Some(samples) => {
-                let count = samples.iter().filter(|other| **other != NOTHING && **other >= item).count();
-                count as f64 / samples.len() as f64
+                let least = if part == Part::Shade { step } else { i32::MIN };
+                let is_covered = |at: &&Sample| at.item != NOTHING && (at.item, at.step) >= (item, least);
+                samples.iter().filter(is_covered).count() as f64 / samples.len() as f64
             }
             None => f64::from(u8::from(inside[i])),
         };
-        let mask = Mask { width, height, inside: &inside, covered };
-        let mut outlines = mask.outlines(TOLERANCE);
+        let shade = |i: usize| {
+            let cell = cell_at(i);
+            let is_own = self.items.get(self.labels[cell] as usize) == Some(&item);
+            is_own.then(|| f64::from(self.strengths[cell]) - self.least[label as usize])
+        };
+        let mask = Mask { width, height, inside: &inside, covered, shade };
+        let mut outlines = mask.outlines();
         for corner in outlines.iter_mut().flatten() {
             *corner = [corner[0] + left as f64, corner[1] + top as f64];
         }
@@ -208,7 +227,18 @@ mod tests {
         let labels: Vec<u32> = rows.iter().flat_map(|row| row.bytes().map(label)).collect();
         let places = vec![u32::MAX; labels.len()];
         let items = (0..10).collect();
-        Regions { width: rows[0].len(), height: rows.len(), labels, places, samples: Vec::new(), items }
+        let (width, height, strengths) = (rows[0].len(), rows.len(), vec![0.0; labels.len()]);
+        Regions {
+            width,
+            height,
+            labels,
+            places,
+            samples: Vec::new(),
+            items,
+            strengths,
+            least: vec![0.0; 10],
+            steps: vec![0; 10],
+        }
     }
 
     #[test]
