@@ -3,8 +3,8 @@
 use super::camera::Camera;
 use super::extent::Extent;
 use super::light::Light;
-use super::{View, number, painter};
-use dlsys_geometry::scene::{Bounds, Point, Scene};
+use super::{Page, View, number, painter};
+use dlsys_geometry::scene::{Bounds, Color, Point, Scene, Surroundings};
 
 /// The first pass: the extent of an animation, in space and in its view.
 #[derive(Clone, Debug)]
@@ -15,12 +15,46 @@ pub struct Survey {
     space: Bounds,
     seen: Extent,
     has_surfaces: bool,
+    /// What flags declare in place of the model.
+    declared: Surroundings,
+    zoom: f64,
+    /// Cameras that the model declares count.
+    follows_cameras: bool,
+    has_camera: bool,
+    /// Some frame has a sun, a sky or a floor.
+    has_light: bool,
 }
 
 impl Survey {
     /// An empty survey, orthographic, in this view.
     pub fn new(view: View) -> Survey {
-        Survey { view, field: None, space: Bounds::default(), seen: Extent::EMPTY, has_surfaces: false }
+        Survey {
+            view,
+            field: None,
+            space: Bounds::default(),
+            seen: Extent::EMPTY,
+            has_surfaces: false,
+            declared: Surroundings::default(),
+            zoom: 1.0,
+            follows_cameras: true,
+            has_camera: false,
+            has_light: false,
+        }
+    }
+
+    /// With these surroundings in place of those that the model declares; what is `None` stays the model's.
+    pub fn with_surroundings(self, declared: Surroundings) -> Survey {
+        Survey { declared, ..self }
+    }
+
+    /// Magnified about the middle of the picture, at least a thousandth and at most a million times.
+    pub fn with_zoom(self, zoom: f64) -> Survey {
+        Survey { zoom: if zoom.is_nan() { 1.0 } else { zoom.clamp(1e-3, 1e6) }, ..self }
+    }
+
+    /// In its own view, whatever cameras the model declares.
+    pub fn without_cameras(self) -> Survey {
+        Survey { follows_cameras: false, ..self }
     }
 
     /// In perspective: the camera is as near as possible if all that is drawn in any frame is within this angle, in degrees (clamped
@@ -32,7 +66,11 @@ impl Survey {
     /// Includes the scene of a frame. The result does not depend on the order.
     pub fn add(&mut self, scene: &Scene) {
         self.space.add(scene);
-        self.has_surfaces |= !scene.surfaces.is_empty() || !scene.patches.is_empty();
+        self.has_surfaces |=
+            !scene.surfaces.is_empty() || !scene.patches.is_empty() || !scene.plants.is_empty();
+        let around = joined(&self.declared, &scene.surroundings);
+        self.has_camera |= around.camera.is_some() && self.follows_cameras;
+        self.has_light |= around.sun.is_some() || around.sky.is_some() || around.floor.is_some();
         self.seen.merge(&Extent::of(scene, &self.view));
     }
 
@@ -40,6 +78,8 @@ impl Survey {
     pub fn merge(&mut self, other: &Survey) {
         self.space.merge(&other.space);
         self.has_surfaces |= other.has_surfaces;
+        self.has_camera |= other.has_camera;
+        self.has_light |= other.has_light;
         self.seen.merge(&other.seen);
     }
 
@@ -63,9 +103,16 @@ impl Survey {
             extent,
             accuracy: size * Fit::ACCURACY,
             bounds,
-            picture: Picture::around(shadow.map(|shadow| camera.frame(&shadow))),
+            picture: match self.has_camera {
+                true => Picture::of([-0.5 * CAMERA_SHAPE, -0.5, CAMERA_SHAPE, 1.0]),
+                false => Picture::around(shadow.map(|shadow| camera.frame(&shadow))).magnified(self.zoom),
+            },
             light: Light::new(depths, extent),
             has_surfaces: self.has_surfaces,
+            declared: self.declared.clone(),
+            zoom: self.zoom,
+            follows_cameras: self.follows_cameras,
+            has_light: self.has_light,
         }
     }
 }
@@ -89,6 +136,23 @@ pub struct Fit {
     pub(super) light: Light,
     /// Some frame has a surface.
     has_surfaces: bool,
+    declared: Surroundings,
+    zoom: f64,
+    follows_cameras: bool,
+    has_light: bool,
+}
+
+/// The shape of pictures of declared cameras: width by height.
+const CAMERA_SHAPE: f64 = 1.5;
+
+/// Surroundings of flags, and those of a scene where there are none.
+fn joined(flags: &Surroundings, scene: &Surroundings) -> Surroundings {
+    Surroundings {
+        sun: flags.sun.or(scene.sun),
+        sky: flags.sky.or(scene.sky),
+        camera: flags.camera.or(scene.camera),
+        floor: flags.floor.or(scene.floor),
+    }
 }
 
 impl Fit {
@@ -108,10 +172,40 @@ impl Fit {
         Bounds::of(scene).corners(self.default_width)
     }
 
+    /// The surroundings of a frame: those of flags, and those that its scene declares.
+    pub(super) fn surroundings(&self, scene: &Scene) -> Surroundings {
+        joined(&self.declared, &scene.surroundings)
+    }
+
+    /// The sky behind a frame, zenith and horizon, if one is declared.
+    pub(super) fn sky(&self, scene: &Scene) -> Option<[Color; 2]> {
+        self.surroundings(scene).sky
+    }
+
+    /// The middle of everything, and the extent, which is not 0.
+    pub(super) fn middle(&self) -> (Point, f64) {
+        let middle = self.bounds.map_or_else(Point::origin, |[low, high]| nalgebra::center(&low, &high));
+        (middle, if self.extent > 0.0 { self.extent } else { 1.0 })
+    }
+
+    /// The fit and the page of one frame, which differ from the others where a camera is declared.
+    pub fn for_frame(&self, scene: &Scene, page: &Page) -> (Fit, Page) {
+        let declared = self.surroundings(scene).camera.filter(|_| self.follows_cameras);
+        let camera = declared.and_then(|at| Some((Camera::at(at.eye, at.aim)?, at)));
+        let Some((camera, at)) = camera else { return (self.clone(), *page) };
+        let [width, height] = page.pixels.map(f64::from);
+        let slope = (at.angle.clamp(*Camera::FIELDS.start(), *Camera::FIELDS.end()) / 2.0).to_radians().tan();
+        let smaller = 2.0 * (at.eye - at.aim).norm() * slope / self.zoom;
+        let [w, h] = [width, height].map(|side| smaller * side / width.min(height));
+        let aim = camera.project(at.aim);
+        let picture = Picture::of([aim.x - w / 2.0, aim.y - h / 2.0, w, h]);
+        (Fit { camera, picture, ..self.clone() }, Page { picture, ..*page })
+    }
+
     /// True if SVG pictures are made of visible regions: some frame has a surface, and the animation has depth. Without depth nothing
     /// is hidden; stems and polygons alone have an order by depth that is good enough. There every element keeps its exact shape.
     pub(super) fn has_visible_regions(&self) -> bool {
-        self.has_surfaces && !self.light.is_flat()
+        (self.has_surfaces || self.has_light) && !self.light.is_flat()
     }
 
     /// Left, bottom, right and top of a survey as this camera sees it; `None` if it is empty.
@@ -153,6 +247,13 @@ impl Picture {
     fn of(area: [f64; 4]) -> Picture {
         let scale = 10_f64.powi(2 - area[2].max(area[3]).log10().floor() as i32);
         Picture { area, scale }
+    }
+
+    /// A part of it about its middle, drawn so many times as large.
+    fn magnified(&self, zoom: f64) -> Picture {
+        let [left, bottom, width, height] = self.area;
+        let (w, h) = (width / zoom, height / zoom);
+        Picture::of([left + (width - w) / 2.0, bottom + (height - h) / 2.0, w, h])
     }
 
     /// Widened on both sides, or above and below, to this ratio of width to height.

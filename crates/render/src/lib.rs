@@ -49,6 +49,7 @@
 #![warn(missing_docs)]
 
 mod camera;
+mod draft;
 mod error;
 mod extent;
 mod fit;
@@ -56,8 +57,10 @@ mod formats;
 mod frames;
 mod glyphs;
 mod layout;
+mod lens;
 mod lengths;
 mod light;
+mod lighting;
 mod manifest;
 mod name;
 mod number;
@@ -65,7 +68,10 @@ mod page;
 mod painter;
 mod raster;
 mod relay;
+mod shadow;
 mod sheet;
+mod shot;
+mod stage;
 mod stroke;
 mod text;
 mod trace;
@@ -89,6 +95,7 @@ pub use triangulate::{normal, triangulate};
 pub use tube::Spoke;
 pub use view::View;
 
+use std::borrow::Cow;
 use std::io::{self, Write};
 
 use dlsys_geometry::scene::Scene;
@@ -132,8 +139,12 @@ impl FrameWriter {
     /// # Errors
     /// Those of `out`.
     pub fn write_to(&self, scene: &Scene, title: &str, out: &mut (dyn Write + Send)) -> io::Result<()> {
-        let scene = &*scene.tessellated(self.fit.accuracy);
-        self.format.exporter().write(Drawing { scene, writer: self, title }, out)
+        // Pixels show no more detail than they have room for.
+        let scene = match self.format.content() {
+            Content::Pixels => Cow::Borrowed(scene),
+            Content::Vectors | Content::Mesh => scene.tessellated(self.fit.accuracy),
+        };
+        self.format.exporter().write(Drawing { scene: &scene, writer: self, title }, out)
     }
 
     /// The file that all frames refer to, if there is one: its name and its bytes.
@@ -165,6 +176,5 @@ pub fn pixels_by(
     smoothness: Smoothness,
     threads: usize,
 ) -> Vec<[u8; 4]> {
-    let scene = &*scene.tessellated(fit.accuracy);
     formats::png::picture(scene, fit, page.pixels, page.placement(), smoothness, threads).pixels
 }

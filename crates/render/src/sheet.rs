@@ -69,7 +69,6 @@ impl SheetWriter {
     /// Draws the frame with this number. A frame that the sheet has no place for is left out.
     pub fn part(&self, index: usize, scene: &Scene) -> Part {
         let cell = self.sheet.cells.get(index);
-        let scene = &*scene.tessellated(self.fit.accuracy);
         Part(match self.format.content() {
             Content::Pixels => {
                 let (size, corner, placement) = self.window(cell);
@@ -77,6 +76,7 @@ impl SheetWriter {
             }
             _ => {
                 let style = svg::style(&self.fit, &self.page);
+                let scene = &*scene.tessellated(self.fit.accuracy);
                 Drawn::Elements(cell.map_or_else(String::new, |_| {
                     painter::elements(scene, style, false, &format!("f{index}"))
                 }))

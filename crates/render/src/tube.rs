@@ -88,6 +88,20 @@ impl Profile {
 impl<'s> Tubes<'s> {
     /// Tubes with so many sides (at least 3); 0: as many as make them no further from round ones than `accuracy`.
     pub(super) fn new(scene: &'s Scene, default_width: f64, sides: usize, accuracy: f64) -> Tubes<'s> {
+        let sides_of = |radius: f64, _: Point| match sides {
+            0 => sides_for(radius, accuracy),
+            _ => sides.max(3),
+        };
+        Tubes::of(scene, default_width, sides_of, |_| true)
+    }
+
+    /// Tubes of the segments that are to be `kept`, with as many sides as `sides` tells for the radius and the place of each.
+    pub(super) fn of(
+        scene: &'s Scene,
+        default_width: f64,
+        sides: impl Fn(f64, Point) -> usize,
+        kept: impl Fn(usize) -> bool,
+    ) -> Tubes<'s> {
         let segments = &scene.segments[..];
         let radii: Vec<[f64; 2]> =
             segments.iter().map(|s| s.widths.map(|w| w.resolve(default_width) / 2.0)).collect();
@@ -97,6 +111,8 @@ impl<'s> Tubes<'s> {
         for (i, segment) in segments.iter().enumerate() {
             if let Some(before) = segment.follows
                 && next[before] == NONE
+                && kept(before)
+                && kept(i)
                 && segments[before].contour == segment.contour
                 && radii[before][1] > 0.0
                 && radii[i][0] > 0.0
@@ -113,13 +129,10 @@ impl<'s> Tubes<'s> {
             counts: [0; 2],
         };
         let mut profiles: HashMap<(Option<u32>, usize), usize> = HashMap::new();
-        let visible = |i: usize| radii[i][0] > 0.0 || radii[i][1] > 0.0;
+        let visible = |i: usize| (radii[i][0] > 0.0 || radii[i][1] > 0.0) && kept(i);
         for first in (0..segments.len()).filter(|&i| !continues[i] && visible(i)) {
             let chain = || std::iter::successors(Some(first), |&i| Some(next[i]).filter(|&i| i != NONE));
-            let sides = match sides {
-                0 => sides_for(chain().flat_map(|i| radii[i]).fold(0.0, f64::max), accuracy),
-                _ => sides.max(3),
-            };
+            let sides = sides(chain().flat_map(|i| radii[i]).fold(0.0, f64::max), segments[first].start);
             let contour = segments[first].contour;
             let profile = *profiles.entry((contour, sides)).or_insert_with(|| {
                 let points = contour.and_then(|i| scene.prepared_for.as_ref()?.contours.get(i as usize));

@@ -154,7 +154,7 @@ impl Draft {
     fn groups(&mut self, solid: &Solid, names: &Names, items: &[u32]) {
         let (mut group, mut of) = (None, None);
         let palette = &solid.scene.palette;
-        solid.faces(items, self, |draft, owner: OwnerId, material: MaterialId| {
+        solid.faces(items, self, |draft, owner: OwnerId, material: MaterialId, _| {
             if group != Some(owner) {
                 group = Some(owner);
                 draft.text.words(&[b"g ", names.get(owner).as_bytes(), b"\n"]);
