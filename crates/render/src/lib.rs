@@ -53,6 +53,7 @@ mod draft;
 mod error;
 mod extent;
 mod fit;
+mod floor;
 mod formats;
 mod frames;
 mod glyphs;
@@ -140,9 +141,13 @@ impl FrameWriter {
     /// Those of `out`.
     pub fn write_to(&self, scene: &Scene, title: &str, out: &mut (dyn Write + Send)) -> io::Result<()> {
         // Pixels show no more detail than they have room for.
+        let flattened = match self.format.content() {
+            Content::Pixels => Cow::Borrowed(scene),
+            Content::Vectors | Content::Mesh => scene.flattened(),
+        };
         let scene = match self.format.content() {
             Content::Pixels => Cow::Borrowed(scene),
-            Content::Vectors | Content::Mesh => scene.tessellated(self.fit.accuracy),
+            Content::Vectors | Content::Mesh => flattened.tessellated(self.fit.accuracy),
         };
         self.format.exporter().write(Drawing { scene: &scene, writer: self, title }, out)
     }

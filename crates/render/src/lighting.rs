@@ -3,11 +3,11 @@
 //! Light has one strength at each place, from which its colour follows: what is dark is in the light of the sky, what is bright in that of the
 //! sun. So pictures of pixels and of regions have the same shading.
 
-use super::lens::{Lens, clip};
+use super::lens::Lens;
 use super::light::{GLOSS, SHARPNESS, Spot, TRANSMITTED};
 use super::shadow::{Casters, Maps};
 use super::stage::Stage;
-use super::{Fit, Page};
+use super::{Fit, Page, floor};
 use dlsys_geometry::scene::{Color, Point, Scene, Vector};
 
 /// Strengths of light on what is fully exposed to it: the sky's beside a sun and alone, the sun's, and what the ground throws back.
@@ -22,8 +22,6 @@ const CONTACT: f64 = 0.5;
 /// How much darker the floor is around the plant than far away, and how far that reaches in parts of the extent.
 const POOL: f64 = 0.06;
 const POOL_REACH: f64 = 1.2;
-/// Half of the side of the floor that is drawn, in parts of the extent; further away it has the colour of the background.
-const FLOOR: f64 = 300.0;
 /// Strengths between which the colour of light changes from the sky's to the sun's.
 const COOL: f64 = 0.35;
 const WARM: f64 = 0.85;
@@ -119,12 +117,7 @@ impl<'a> Lighting<'a> {
 
     /// The corners of what is seen of the floor.
     pub(super) fn floor_outline(&self, lens: &Lens) -> Vec<Point> {
-        let Some(height) = self.floor else { return Vec::new() };
-        let (centre, extent) = self.fit.middle();
-        let reach = FLOOR * extent;
-        let corner = |x: f64, z: f64| Point::new(centre.x + x * reach, height, centre.z + z * reach);
-        // Seen from above, against the clock.
-        clip(&[corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0), corner(-1.0, -1.0)], lens)
+        self.floor.map_or_else(Vec::new, |height| floor::outline(self.fit, height, lens))
     }
 
     /// Strength of light on the floor, beside that on an open floor far away.

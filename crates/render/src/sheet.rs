@@ -7,6 +7,7 @@ use super::formats::png::{self, Canvas, Meeting};
 use super::layout::{Caption, Cell};
 use super::painter::{self, text};
 use super::raster::Image;
+use super::floor;
 use super::{Error, Fit, Format, Layout, Page, Sheet, Smoothness, formats::svg, glyphs};
 use dlsys_geometry::scene::{Color, Scene};
 
@@ -76,7 +77,10 @@ impl SheetWriter {
             }
             _ => {
                 let style = svg::style(&self.fit, &self.page);
+                let scene = scene.flattened();
                 let scene = &*scene.tessellated(self.fit.accuracy);
+                let (scene, floor) = floor::added(scene, &self.fit, Some(&self.page));
+                let (scene, style) = (&*scene, painter::Style { floor, ..style });
                 Drawn::Elements(cell.map_or_else(String::new, |_| {
                     painter::elements(scene, style, false, &format!("f{index}"))
                 }))
@@ -167,7 +171,7 @@ impl Assembly<'_> {
     pub fn finish(self, title: &str) -> Vec<u8> {
         let page = &self.writer.page;
         let Some(mut canvas) = self.canvas else {
-            return svg::around(page, title, self.elements).into_bytes();
+            return svg::around(page, title, None, self.elements).into_bytes();
         };
         let [a, b, c] = page.placement();
         let sheet = &self.writer.sheet;

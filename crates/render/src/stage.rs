@@ -97,7 +97,7 @@ impl<'s> Stage<'s> {
             let Some(look) = look else { continue };
             let placement = match place {
                 None => plant.placement,
-                Some(outer) => within(outer, &plant.placement),
+                Some(outer) => outer.of(&plant.placement),
             };
             let Some(seen) = scale_of(placement.point(look.centre), look.radius * placement.scale) else {
                 continue;
@@ -122,14 +122,5 @@ impl<'s> Stage<'s> {
         let colors = self.colors.len() as u32;
         self.colors.extend(scene.palette.materials().iter().map(|material| material.color));
         Some(Look { default_width, centre: nalgebra::center(&low, &high), radius: (high - low).norm() / 2.0, colors })
-    }
-}
-
-/// A placement within another one.
-fn within(outer: &Placement, inner: &Placement) -> Placement {
-    Placement {
-        origin: outer.point(inner.origin),
-        axes: inner.axes.map(|axis| outer.direction(axis)),
-        scale: outer.scale * inner.scale,
     }
 }

@@ -289,8 +289,6 @@ pub(super) struct Triangle {
     /// The surface that it is a part of, by number; and whether that is a leaf or the like, through which light comes.
     pub(super) surface: u32,
     pub(super) is_thin: bool,
-    /// It is a part of the floor.
-    pub(super) is_floor: bool,
 }
 
 /// A triangle mesh in memory.
@@ -318,7 +316,7 @@ impl Points for Triangles {
 impl Faces for Triangles {
     fn face(&mut self, corners: [(u32, u32); 3]) {
         let Triangles { owner, material, surface, is_thin, .. } = *self;
-        self.faces.push(Triangle { owner, material, corners, surface, is_thin, is_floor: false });
+        self.faces.push(Triangle { owner, material, corners, surface, is_thin });
     }
 }
 

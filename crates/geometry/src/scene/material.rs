@@ -186,6 +186,11 @@ impl Palette {
         &self.materials
     }
 
+    /// The number of the material at a position.
+    pub(super) fn at(&self, index: usize) -> Option<MaterialId> {
+        (index < self.materials.len()).then_some(MaterialId(index as u32))
+    }
+
     /// The material with a number of this palette.
     pub fn get(&self, id: MaterialId) -> &Material {
         &self.materials[id.index()]

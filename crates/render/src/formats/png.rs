@@ -10,7 +10,7 @@ use crate::raster::{self, Corner, Image};
 use crate::stage::Stage;
 use crate::triangles::Triangles;
 use crate::{Fit, Page, Smoothness, shot};
-use dlsys_geometry::scene::{Color, Point, Scene, Vector};
+use dlsys_geometry::scene::{Color, MaterialId, Point, Scene, Vector};
 
 /// How far a tube's outline may be from a circle, in pixels.
 const ROUNDNESS: f64 = 0.1;
@@ -66,6 +66,8 @@ pub(crate) fn picture(
 pub(crate) struct Lit<'m> {
     mesh: &'m Triangles,
     lighting: Lighting<'m>,
+    /// The material of the floor.
+    floor: Option<MaterialId>,
     /// By vertex: pixels to the right and down, and depth in scene units.
     places: Vec<[f64; 3]>,
     /// By vertex: as the camera projects it.
@@ -75,13 +77,20 @@ pub(crate) struct Lit<'m> {
 }
 
 impl<'m> Lit<'m> {
-    /// The triangles of a scene. A point that the camera sees at x, y is at `a x + b` and `c - a y` pixels.
-    pub(crate) fn new(scene: &Scene, mesh: &'m Triangles, fit: &'m Fit, [a, b, c]: [f64; 3]) -> Lit<'m> {
+    /// The triangles of a scene, whose floor has a material of its own. A point that the camera sees at x, y is at `a x + b` and
+    /// `c - a y` pixels.
+    pub(crate) fn new(
+        scene: &Scene,
+        mesh: &'m Triangles,
+        fit: &'m Fit,
+        [a, b, c]: [f64; 3],
+        floor: Option<MaterialId>,
+    ) -> Lit<'m> {
         let scale = if fit.extent > 0.0 { 1.0 / fit.extent } else { 1.0 };
         let seen: Vec<Point> = mesh.vertices.iter().map(|p| fit.camera.project(*p)).collect();
         let places = seen.iter().map(|p| [a * p.x + b, c - a * p.y, p.z]).collect();
         let normals = mesh.normals.iter().map(|&n| fit.camera.direction(n)).collect();
-        Lit { mesh, lighting: Lighting::new(scene, fit, a, 1), places, seen, normals, scale }
+        Lit { mesh, lighting: Lighting::new(scene, fit, a, 1), floor, places, seen, normals, scale }
     }
 
     /// The corners of a triangle.
@@ -105,21 +114,25 @@ impl<'m> Lit<'m> {
             normal += self.normals[at as usize] * weight;
             seen += self.seen[vertex as usize].coords * weight;
         }
-        if face.is_floor {
+        if self.floor == Some(face.material) {
             return self.lighting.floor_strength(Point::from(seen));
         }
         let normal = normal.try_normalize(1e-12).unwrap_or_else(Vector::z) * if facing { 1.0 } else { -1.0 };
         self.lighting.strength(&Spot { normal, seen: Point::from(seen), is_thin: face.is_thin })
     }
 
-    /// A colour in light of this strength.
-    pub(crate) fn color(&self, color: Color, strength: f64) -> Color {
-        self.lighting.color(color, strength)
-    }
-
-    /// The floor in light of this strength, before a background.
-    pub(crate) fn floor(&self, background: Option<Color>, strength: f64) -> Color {
-        self.lighting.floor_over(background, strength)
+    /// The colour of a material in light of this strength, before a background.
+    pub(crate) fn color(
+        &self,
+        scene: &Scene,
+        material: MaterialId,
+        strength: f64,
+        background: Option<Color>,
+    ) -> Color {
+        if self.floor == Some(material) {
+            return self.lighting.floor_over(background, strength);
+        }
+        self.lighting.color(scene.palette.get(material).color, strength)
     }
 }
 

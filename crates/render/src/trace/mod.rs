@@ -44,7 +44,7 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
     let placement = [1.0 / cell, -left / cell, (bottom + height) / cell];
     let is_region = |segment: &Segment| !is_thin(segment, style);
     let mesh = triangles::triangles(scene, style.fit, sides(scene, style.fit, placement[0]), is_region);
-    let lit = Lit::new(scene, &mesh, style.fit, placement);
+    let lit = Lit::new(scene, &mesh, style.fit, placement, style.floor);
     let (mut regions, shades, depths) = label::label(&mesh, &lit, size);
     regions.without_specks();
     let outlines = regions.outlines(shades.len());
@@ -56,7 +56,7 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
     let decimals = (-(unit / 4.0).log10()).ceil().clamp(0.0, 6.0) as usize;
     let mut paths: Vec<(OwnerId, String)> = Vec::new();
     for (shade, outlines) in shades.iter().zip(&outlines).filter(|(_, outlines)| !outlines.is_empty()) {
-        let color = lit.color(scene.palette.get(shade.material).color, shade.strength());
+        let color = lit.color(scene, shade.material, shade.strength(), style.background);
         let mut data = String::new();
         outlines.iter().for_each(|outline| push_outline(&mut data, outline, to_page, decimals));
         paths.push((shade.owner, format!("<path fill=\"{color}\" d=\"{data}\"/>")));
