@@ -9,8 +9,9 @@ use super::new::NewArgs;
 use super::shared::{BudgetArgs, SharedArgs, SolverArgs, TextFormat};
 use super::shell::{self, CompletionsArgs, ManArgs};
 use super::values::{
-    Background, Seeds, Sky, background, bytes, camera, columns, direction, field_of_view, figure, frame_format, layout, method,
-    pixels, positive, runs, seeds, setting, size, sky, threads, time, tolerance, zoom,
+    Background, Seeds, Sky, background, bytes, camera, columns, direction, field_of_view, figure,
+    frame_format, layout, method, pixels, positive, runs, seeds, setting, size, sky, threads, time,
+    tolerance, zoom,
 };
 use super::verify::VerifyArgs;
 use crate::compile::Setting;

@@ -77,8 +77,10 @@ pub(super) fn tolerance(text: &str) -> Result<f64, String> {
 pub struct Sky(pub [Color; 2]);
 
 pub(super) fn sky(text: &str) -> Result<Sky, String> {
-    let colors: Vec<Option<Color>> =
-        text.split(',').map(|color| background(color.trim()).ok().and_then(|Background(color)| color)).collect();
+    let colors: Vec<Option<Color>> = text
+        .split(',')
+        .map(|color| background(color.trim()).ok().and_then(|Background(color)| color))
+        .collect();
     match colors[..] {
         [Some(zenith), Some(horizon)] => Ok(Sky([zenith, horizon])),
         _ => Err("expected two colours, of the zenith and of the horizon, like \"#6fa3e0,#e8f0f8\" (in quotes: the shell takes # for a comment)".to_owned()),

@@ -36,6 +36,7 @@ mod replay;
 mod report;
 mod schedulers;
 mod semantics;
+mod shadows;
 mod signals;
 mod verify;
 mod view;

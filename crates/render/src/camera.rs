@@ -111,7 +111,8 @@ impl Camera {
         let distance = away.norm();
         let towards = away.try_normalize(1e-300).filter(|_| distance.is_finite())?;
         let elevation = towards.y.clamp(-1.0, 1.0).asin().to_degrees();
-        let azimuth = if towards.x.hypot(towards.z) > 0.0 { towards.x.atan2(towards.z).to_degrees() } else { 0.0 };
+        let azimuth =
+            if towards.x.hypot(towards.z) > 0.0 { towards.x.atan2(towards.z).to_degrees() } else { 0.0 };
         let view = View::new(azimuth, elevation).ok()?;
         let aim = view.see(aim);
         Some(Camera { view, eye: Some(Eye { x: aim.x, y: aim.y, focus: aim.z, distance }) })

@@ -91,8 +91,7 @@ impl<'s> Draft<'s> {
         let tubes = Tubes::of(scene, default_width, sides, |i| !is_thin[i]);
         let solid = Solid::of(scene, tubes, scene.drafted(accuracy));
         let mesh = Triangles::of(&solid, |_| true);
-        let thin: Vec<u32> =
-            (0..scene.segments.len() as u32).filter(|i| is_thin[*i as usize]).collect();
+        let thin: Vec<u32> = (0..scene.segments.len() as u32).filter(|i| is_thin[*i as usize]).collect();
         let mut next = vec![NONE; if thin.is_empty() { 0 } else { scene.segments.len() }];
         for &i in &thin {
             let follows = scene.segments[i as usize].follows;

@@ -21,6 +21,8 @@ pub struct Survey {
     /// Cameras that the model declares count.
     follows_cameras: bool,
     has_camera: bool,
+    /// The surroundings of the first frame.
+    first: Option<Surroundings>,
     /// Some frame has a sun, a sky or a floor.
     has_light: bool,
 }
@@ -38,6 +40,7 @@ impl Survey {
             zoom: 1.0,
             follows_cameras: true,
             has_camera: false,
+            first: None,
             has_light: false,
         }
     }
@@ -69,18 +72,27 @@ impl Survey {
         self.has_surfaces |=
             !scene.surfaces.is_empty() || !scene.patches.is_empty() || !scene.plants.is_empty();
         let around = joined(&self.declared, &scene.surroundings);
+        self.first.get_or_insert_with(|| around.clone());
         self.has_camera |= around.camera.is_some() && self.follows_cameras;
         self.has_light |= around.sun.is_some() || around.sky.is_some() || around.floor.is_some();
         self.seen.merge(&Extent::of(scene, &self.view));
     }
 
-    /// Includes another survey in the same view, for example that of another thread.
+    /// Includes another survey in the same view, of later frames, for example that of another thread.
     pub fn merge(&mut self, other: &Survey) {
         self.space.merge(&other.space);
         self.has_surfaces |= other.has_surfaces;
         self.has_camera |= other.has_camera;
+        if self.first.is_none() {
+            self.first.clone_from(&other.first);
+        }
         self.has_light |= other.has_light;
         self.seen.merge(&other.seen);
+    }
+
+    /// The surroundings of the first frame.
+    pub fn first_surroundings(&self) -> Surroundings {
+        self.first.clone().unwrap_or_default()
     }
 
     /// The values that all frames share.

@@ -27,7 +27,11 @@ pub(super) fn outline(fit: &Fit, height: f64, lens: &Lens) -> Vec<Point> {
 }
 
 /// A scene with its floor as a polygon of a module named `ground`, and the material of that: what is seen of it on a page, or a large square.
-pub(super) fn added<'s>(scene: &'s Scene, fit: &Fit, page: Option<&Page>) -> (Cow<'s, Scene>, Option<MaterialId>) {
+pub(super) fn added<'s>(
+    scene: &'s Scene,
+    fit: &Fit,
+    page: Option<&Page>,
+) -> (Cow<'s, Scene>, Option<MaterialId>) {
     let Some(height) = fit.surroundings(scene).floor else { return (Cow::Borrowed(scene), None) };
     let vertices = match page {
         Some(page) => outline(fit, height, &Lens::new(fit, page.pixels, page.placement())),

@@ -8,13 +8,13 @@ use super::light::{GLOSS, SHARPNESS, Spot, TRANSMITTED};
 use super::shadow::{Casters, Maps};
 use super::stage::Stage;
 use super::{Fit, Page, floor};
-use dlsys_geometry::scene::{Color, Point, Scene, Vector};
+use dlsys_geometry::scene::{Color, MaterialId, Point, Scene, Vector};
 
 /// Strengths of light on what is fully exposed to it: the sky's beside a sun and alone, the sun's, and what the ground throws back.
-const SKY: f64 = 0.5;
-const SKY_ALONE: f64 = 1.0;
-const SUN: f64 = 0.72;
-const GROUND: f64 = 0.14;
+const SKY: f64 = 0.56;
+const SKY_ALONE: f64 = 1.25;
+const SUN: f64 = 0.66;
+const GROUND: f64 = 0.26;
 /// The colours of zenith and horizon beside a sun, if the model declares none.
 const CLEAR: [Color; 2] = [Color::hex(0xb4cdf0), Color::hex(0xf2efe8)];
 /// How much darker the floor is where no sky is seen, if there is neither sun nor sky.
@@ -41,13 +41,21 @@ pub(super) struct Lighting<'a> {
     declared: Option<Declared>,
     maps: Option<Maps>,
     floor: Option<f64>,
+    open_sky: Option<OpenSky>,
     /// The colour of the sky at the horizon, if it is declared.
     horizon: Option<Color>,
 }
 
 impl<'a> Lighting<'a> {
     /// The light on a scene. Shadows are as fine as a picture with so many pixels for a scene unit shows.
-    pub(super) fn new(scene: &Scene, fit: &'a Fit, scale: f64, threads: usize) -> Lighting<'a> {
+    /// A floor among the polygons has the material `ground`.
+    pub(super) fn new(
+        scene: &Scene,
+        fit: &'a Fit,
+        scale: f64,
+        threads: usize,
+        ground: Option<MaterialId>,
+    ) -> Lighting<'a> {
         let around = fit.surroundings(scene);
         let is_declared = (around.sun.is_some() || around.sky.is_some()) && !fit.light.is_flat();
         let sun = around.sun.and_then(|sun| sun.try_normalize(0.0)).filter(|_| is_declared);
@@ -58,15 +66,19 @@ impl<'a> Lighting<'a> {
             let sky = if sun.is_some() { SKY } else { SKY_ALONE };
             Declared { sun, sky, tint: mean.map(|c| c / most) }
         });
-        let maps = (declared.is_some() || around.floor.is_some()).then(|| {
+        let floor = around.floor.filter(|_| !fit.light.is_flat());
+        let mut open_sky = None;
+        let maps = (declared.is_some() || floor.is_some()).then(|| {
             let extent = if fit.extent > 0.0 { fit.extent } else { 1.0 };
             // Details beyond the maps' cells cast no shadows of their own.
             let stage = Stage::of_all(scene, fit, scale.min(1500.0 / extent));
-            let casters = Casters::of(&stage);
-            (!casters.is_empty()).then(|| Maps::new(&casters, sun, scale, threads))
+            let casters = Casters::of(&stage, ground);
+            let maps = (!casters.is_empty()).then(|| Maps::new(&casters, sun, scale, threads))?;
+            open_sky = floor.map(|height| OpenSky::new(&maps, casters.around(), height));
+            Some(maps)
         });
         let horizon = around.sky.map(|[_, horizon]| horizon);
-        Lighting { fit, declared, maps: maps.flatten(), floor: around.floor, horizon }
+        Lighting { fit, declared, maps: maps.flatten(), floor, open_sky, horizon }
     }
 
     /// Strength of light at a place; 1 leaves a colour as it is.
@@ -106,8 +118,12 @@ impl<'a> Lighting<'a> {
         let warm = ((strength - COOL) / (WARM - COOL)).clamp(0.0, 1.0);
         let [red, green, blue] = [0, 1, 2].map(|k| declared.tint[k] + (1.0 - declared.tint[k]) * warm);
         let tinted = |c: u8, by: f64| (f64::from(c) * by + 0.5) as u8;
-        Color { red: tinted(color.red, red), green: tinted(color.green, green), blue: tinted(color.blue, blue) }
-            .lit(strength)
+        Color {
+            red: tinted(color.red, red),
+            green: tinted(color.green, green),
+            blue: tinted(color.blue, blue),
+        }
+        .lit(strength)
     }
 
     /// The normal of the floor, if there is one.
@@ -126,8 +142,8 @@ impl<'a> Lighting<'a> {
         let (centre, extent) = self.fit.middle();
         let away = ((at.x - centre.x).hypot(at.z - centre.z) / (POOL_REACH * extent)).powi(2);
         let pool = 1.0 - POOL * (-away).exp();
-        let Some(maps) = &self.maps else { return pool };
-        let sky = maps.sky(at, Vector::y());
+        let (Some(maps), Some(open_sky)) = (&self.maps, &self.open_sky) else { return pool };
+        let sky = open_sky.at(at);
         let light = match &self.declared {
             None => 1.0 - CONTACT * (1.0 - sky),
             Some(declared) => {
@@ -165,5 +181,68 @@ impl<'a> Lighting<'a> {
             Some(horizon) => self.color(horizon, strength),
             None => background.unwrap_or(Page::BACKGROUND).lit(strength),
         }
+    }
+}
+
+/// The part of the sky that is seen from places of the floor, on a grid: it changes slowly.
+struct OpenSky {
+    low: [f64; 2],
+    /// Cells in a scene unit.
+    scale: f64,
+    /// By row.
+    parts: Vec<f32>,
+}
+
+impl OpenSky {
+    /// Places along a side of the grid.
+    const SIDE: usize = 320;
+    /// How far the grid reaches beyond the box around everything, in parts of its height.
+    const BEYOND: f64 = 1.5;
+
+    fn new(maps: &Maps, [middle, half]: [Vector; 2], height: f64) -> OpenSky {
+        let reach = half.x.max(half.z) + OpenSky::BEYOND * (middle.y + half.y - height).max(0.0);
+        let reach = if reach > 0.0 { reach } else { 1.0 };
+        let low = [middle.x - reach, middle.z - reach];
+        let side = OpenSky::SIDE;
+        let scale = (side - 1) as f64 / (2.0 * reach);
+        let at = |i: usize, k: usize| low[k] + i as f64 / scale;
+        let mut parts: Vec<f32> = (0..side * side)
+            .map(|i| {
+                let place = Vector::new(at(i % side, 0), height, at(i / side, 1));
+                maps.sky(place, Vector::y()).min(1.0) as f32
+            })
+            .collect();
+        for _ in 0..2 {
+            parts = OpenSky::smoothed(&parts);
+        }
+        OpenSky { low, scale, parts }
+    }
+
+    /// Each value the mean of three by three.
+    fn smoothed(parts: &[f32]) -> Vec<f32> {
+        let side = OpenSky::SIDE;
+        let near = |i: usize| i.saturating_sub(1)..=(i + 1).min(side - 1);
+        let mean = |column: usize, row: usize| {
+            let values = near(row).flat_map(|row| near(column).map(move |column| parts[row * side + column]));
+            let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
+            sum / count
+        };
+        (0..side * side).map(|i| mean(i % side, i / side)).collect()
+    }
+
+    /// The part at a place; 1 beyond the grid, to which it rises at the rim.
+    fn at(&self, place: Vector) -> f64 {
+        let [x, z] = [(place.x - self.low[0]) * self.scale, (place.z - self.low[1]) * self.scale];
+        let last = (OpenSky::SIDE - 1) as f64;
+        let rim = x.min(z).min(last - x).min(last - z) / (0.2 * last);
+        if rim.is_nan() || rim <= 0.0 {
+            return 1.0;
+        }
+        let [column, row] = [x, z].map(|x| (x as usize).min(OpenSky::SIDE - 2));
+        let (u, v) = (x - column as f64, z - row as f64);
+        let value = |column: usize, row: usize| f64::from(self.parts[row * OpenSky::SIDE + column]);
+        let line = |row: usize| value(column, row) * (1.0 - u) + value(column + 1, row) * u;
+        let part = line(row) * (1.0 - v) + line(row + 1) * v;
+        1.0 - (1.0 - part) * rim.min(1.0)
     }
 }

@@ -6,25 +6,26 @@
 //!
 //! **Errors.** The edge of a shadow is smooth over two cells of the map, and a shadow begins up to [`SLOPE`] cells behind what casts it (the
 //! price of no self-shadowing on slopes). The cell of the sun's map is a pixel of the picture, or a [`FINEST`]th of the scene where that is more; that
-//! of the sky's maps is a [`COARSE`]th of the scene, so crevices narrower than a hundredth of the scene are not darkened.
+//! of the sky's maps is a [`COARSE`]th of the scene, so crevices narrower than a fiftieth of the scene are not darkened.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::stage::Stage;
-use dlsys_geometry::scene::{Point, Vector};
+use super::triangles::Triangle;
+use dlsys_geometry::scene::{MaterialId, Point, Vector};
 
 /// Places of the sky from which light comes; fewer where there are more triangles than [`MANY`].
-const PLACES: usize = 48;
-const FEW_PLACES: usize = 20;
+const PLACES: usize = 128;
+const FEW_PLACES: usize = 24;
 const MANY: usize = 500_000;
 /// Cells along the larger side of the maps.
 const FINEST: f64 = 3072.0;
 const LEAST: f64 = 256.0;
-const COARSE: f64 = 256.0;
+const COARSE: f64 = 128.0;
 /// Bias of depths, in cells: on a surface that faces the light, and at most.
-const BIAS: f32 = 0.8;
-const SLOPE: f32 = 5.0;
+const BIAS: f32 = 1.0;
+const SLOPE: f32 = 8.0;
 
 /// Triangles and thin stems that cast shadows, relative to the middle of the box around them.
 #[derive(Default)]
@@ -37,18 +38,23 @@ pub(super) struct Casters {
 }
 
 impl Casters {
-    /// All that a stage has.
-    pub(super) fn of(stage: &Stage) -> Casters {
+    /// All that a stage has, but for what is of this material of its scene.
+    pub(super) fn of(stage: &Stage, without: Option<MaterialId>) -> Casters {
         let mut all = Casters::default();
         let (mut low, mut high) = (Vector::repeat(f64::INFINITY), Vector::repeat(f64::NEG_INFINITY));
         let mut placed: Vec<Point> = Vec::new();
-        for (pass, part) in [0, 1].into_iter().flat_map(|pass| stage.parts.iter().map(move |part| (pass, part))) {
+        for (pass, part) in
+            [0, 1].into_iter().flat_map(|pass| stage.parts.iter().map(move |part| (pass, part)))
+        {
             let (draft, place) = (&stage.drafts[part.draft], part.place.as_ref());
             placed.clear();
             placed.extend(draft.mesh.vertices.iter().map(|&p| place.map_or(p, |place| place.point(p))));
+            let is_caster = |face: &&Triangle| place.is_some() || Some(face.material) != without;
+            let faces = draft.mesh.faces.iter().filter(is_caster);
             if pass == 0 {
                 let ends = draft.lines(place).flat_map(|(ends, _)| ends);
-                for p in placed.iter().copied().chain(ends) {
+                let corners = faces.flat_map(|face| face.corners).map(|(v, _)| placed[v as usize]);
+                for p in corners.chain(ends) {
                     (low, high) = (low.inf(&p.coords), high.sup(&p.coords));
                 }
                 continue;
@@ -61,14 +67,17 @@ impl Casters {
                 let p = p.coords - middle;
                 [p.x as f32, p.y as f32, p.z as f32]
             };
-            all.triangles.extend(
-                draft.mesh.faces.iter().map(|face| face.corners.map(|(v, _)| relative(placed[v as usize]))),
-            );
+            all.triangles.extend(faces.map(|face| face.corners.map(|(v, _)| relative(placed[v as usize]))));
             all.lines.extend(
                 draft.lines(place).map(|(ends, radii)| (ends.map(relative), radii.map(|r| r as f32))),
             );
         }
         all
+    }
+
+    /// The middle of the box around everything, and half of its sides.
+    pub(super) fn around(&self) -> [Vector; 2] {
+        [self.middle, self.half]
     }
 
     /// True if nothing casts a shadow.
@@ -99,18 +108,28 @@ impl Map {
         let axes = [right, towards.cross(&right), towards];
         let reach = [0, 1].map(|k: usize| axes[k].abs().dot(&casters.half));
         let larger = (2.0 * reach[0].max(reach[1])).max(f64::MIN_POSITIVE);
-        let scale = (larger * scale).clamp(LEAST, most) / larger;
+        let scale = (larger * scale).clamp(LEAST.min(most), most) / larger;
         // Two cells all round.
         let size = reach.map(|reach| (2.0 * reach * scale).ceil() as usize + 4);
         let low = reach.map(|reach| -reach - 2.0 / scale);
-        let mut map =
-            Map { axes, middle: casters.middle, low, scale, size, depths: vec![f32::NEG_INFINITY; size[0] * size[1]] };
-        for triangle in &casters.triangles {
-            let corners = triangle.map(|p| map.place(Vector::new(p[0].into(), p[1].into(), p[2].into())));
-            map.fill(corners);
+        let mut map = Map {
+            axes,
+            middle: casters.middle,
+            low,
+            scale,
+            size,
+            depths: vec![f32::NEG_INFINITY; size[0] * size[1]],
+        };
+        let scaled = axes.map(|axis| [axis.x, axis.y, axis.z].map(|x| (x * scale) as f32));
+        let from = [(low[0] * scale) as f32, (low[1] * scale) as f32, 0.0];
+        let place = |p: &[f32; 3]| {
+            [0, 1, 2].map(|k| scaled[k][0] * p[0] + scaled[k][1] * p[1] + scaled[k][2] * p[2] - from[k])
+        };
+        for [p, q, r] in &casters.triangles {
+            map.fill([place(p), place(q), place(r)]);
         }
-        for (ends, radii) in &casters.lines {
-            let [a, b] = ends.map(|p| map.place(Vector::new(p[0].into(), p[1].into(), p[2].into())));
+        for ([a, b], radii) in &casters.lines {
+            let [a, b] = [place(a), place(b)];
             let radii = radii.map(|radius| (radius * scale as f32).max(0.5));
             map.line([a, b], radii);
         }
@@ -139,17 +158,20 @@ impl Map {
 
     /// Keeps the nearest of a triangle in each cell whose middle it covers; on its edge counts as within.
     fn fill(&mut self, [p, q, r]: [[f32; 3]; 3]) {
+        // Most triangles are smaller than a cell and cover the middle of none.
+        let range = |k: usize| {
+            let low = p[k].min(q[k]).min(r[k]) + 0.5;
+            let high = p[k].max(q[k]).max(r[k]) + 0.5;
+            (low.max(0.0) as usize, (high.max(0.0) as usize).min(self.size[k]))
+        };
+        let ((left, right), (bottom, top)) = (range(0), range(1));
+        if left >= right || bottom >= top {
+            return;
+        }
         let area = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
         if area == 0.0 || !area.is_finite() {
             return;
         }
-        let range = |k: usize| {
-            let low = p[k].min(q[k]).min(r[k]) - 0.5;
-            let high = p[k].max(q[k]).max(r[k]) - 0.5;
-            let low = low.ceil().max(0.0) as usize;
-            (low, ((high.floor() + 1.0).max(0.0) as usize).min(self.size[k]))
-        };
-        let ((left, right), (bottom, top)) = (range(0), range(1));
         let scale = 1.0 / area;
         let slope = [
             ((q[2] - p[2]) * (r[1] - p[1]) - (r[2] - p[2]) * (q[1] - p[1])) * scale,
@@ -160,7 +182,9 @@ impl Map {
             let y = row as f32 + 0.5;
             for column in left..right {
                 let x = column as f32 + 0.5;
-                let side = |a: [f32; 3], b: [f32; 3]| ((b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])) * scale;
+                let side = |a: [f32; 3], b: [f32; 3]| {
+                    ((b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])) * scale
+                };
                 if side(p, q) < 0.0 || side(q, r) < 0.0 || side(r, p) < 0.0 {
                     continue;
                 }
@@ -171,8 +195,9 @@ impl Map {
         }
     }
 
-    /// The part of the light that comes to a point on a surface whose lit side has this normal, from 0 to 1.
-    fn visible(&self, at: Vector, normal: Vector) -> f64 {
+    /// Where a point on a surface whose lit side has this normal is in the map: the cell whose middle is to its left and below, the part of
+    /// a cell from there, and its depth; `None` outside of the map.
+    fn cell(&self, at: Vector, normal: Vector, around: i64) -> Option<([usize; 2], [f32; 2], f32)> {
         let cos = normal.dot(&self.axes[2]).clamp(0.05, 1.0);
         let slope = ((1.0 - cos * cos).sqrt() / cos) as f32;
         // Off the surface by a cell, so that it does not hide itself where it bends.
@@ -180,22 +205,36 @@ impl Map {
         let depth = depth + (BIAS * (1.0 + slope)).min(SLOPE);
         let (x, y) = (x - 0.5, y - 0.5);
         let (left, bottom) = (x.floor(), y.floor());
-        let (u, v) = (x - left, y - bottom);
         let [width, height] = self.size.map(|side| side as i64);
-        let (left, bottom) = (left as i64, bottom as i64);
-        if left < 1 || bottom < 1 || left + 2 >= width || bottom + 2 >= height {
-            return 1.0;
-        }
-        // Four by four cells, those at the rim by the part that a square of three by three covers.
+        let (column, row) = (left as i64, bottom as i64);
+        let is_within = |at: i64, side: i64| at >= around && at + around + 1 < side;
+        (is_within(column, width) && is_within(row, height))
+            .then(|| ([column as usize, row as usize], [x - left, y - bottom], depth))
+    }
+
+    /// The part of the light that comes to a point on a surface whose lit side has this normal, from 0 to 1: the mean over a square of
+    /// three by three cells.
+    fn visible(&self, at: Vector, normal: Vector) -> f64 {
+        let Some(([left, bottom], [u, v], depth)) = self.cell(at, normal, 1) else { return 1.0 };
+        // Four by four cells, those at the rim by the part that the square covers.
         let (across, along) = ([1.0 - u, 1.0, 1.0, u], [1.0 - v, 1.0, 1.0, v]);
         let mut sum = 0.0;
         for (j, along) in along.into_iter().enumerate() {
-            let start = (bottom as usize - 1 + j) * self.size[0] + left as usize - 1;
+            let start = (bottom - 1 + j) * self.size[0] + left - 1;
             for (held, across) in self.depths[start..start + 4].iter().zip(across) {
                 sum += if *held > depth { 0.0 } else { across * along };
             }
         }
         f64::from(sum) / 9.0
+    }
+
+    /// The same over a square of one cell.
+    fn roughly_visible(&self, at: Vector, normal: Vector) -> f64 {
+        let Some(([left, bottom], [u, v], depth)) = self.cell(at, normal, 0) else { return 1.0 };
+        let start = bottom * self.size[0] + left;
+        let open = |k: usize| if self.depths[k] > depth { 0.0 } else { 1.0 };
+        let row = |start: usize| open(start) * (1.0 - u) + open(start + 1) * u;
+        f64::from(row(start) * (1.0 - v) + row(start + self.size[0]) * v)
     }
 }
 
@@ -247,7 +286,7 @@ impl Maps {
     pub(super) fn sky(&self, at: Vector, normal: Vector) -> f64 {
         let light = self.sky.iter().map(|map| {
             let cos = normal.dot(&map.axes[2]);
-            if cos > 0.0 { cos * map.visible(at, normal) } else { 0.0 }
+            if cos > 0.0 { cos * map.roughly_visible(at, normal) } else { 0.0 }
         });
         // The mean cosine over the places is a half.
         2.0 * light.sum::<f64>() / self.sky.len().max(1) as f64

@@ -3,11 +3,11 @@
 use super::formats::Content;
 use std::fmt::Write;
 
+use super::floor;
 use super::formats::png::{self, Canvas, Meeting};
 use super::layout::{Caption, Cell};
 use super::painter::{self, text};
 use super::raster::Image;
-use super::floor;
 use super::{Error, Fit, Format, Layout, Page, Sheet, Smoothness, formats::svg, glyphs};
 use dlsys_geometry::scene::{Color, Scene};
 

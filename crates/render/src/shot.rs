@@ -67,7 +67,6 @@ pub(super) fn draw<const N: usize>(
         for part in &stage.parts {
             shot.add(&stage.drafts[part.draft], part);
         }
-        if std::env::var("COUNT").is_ok() { eprintln!("{} faces {} places {} total", shot.faces.len(), shot.places.len(), stage.len()); }
         raster::draw(pattern, threads, lens.size, shot.rows.clone(), &shot, pixels);
     }
     Image { width, height, pixels }
@@ -190,7 +189,8 @@ impl raster::Triangles for Shot<'_> {
         // Pixels go down.
         let wide = |a: i32, b: i32| f64::from(a) - f64::from(b);
         let is_front = wide(q.x, p.x) * wide(r.y, p.y) < wide(q.y, p.y) * wide(r.x, p.x);
-        let normal = normal.try_normalize(1e-12).unwrap_or_else(Vector::z) * if is_front { 1.0 } else { -1.0 };
+        let normal =
+            normal.try_normalize(1e-12).unwrap_or_else(Vector::z) * if is_front { 1.0 } else { -1.0 };
         let spot = Spot { normal, seen, is_thin: face.look & 1 == 1 };
         let color = self.colors[(face.look >> 1) as usize];
         let Color { red, green, blue } = self.lighting.color(color, self.lighting.strength(&spot));

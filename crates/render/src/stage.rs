@@ -5,9 +5,9 @@
 
 use std::collections::HashMap;
 
+use super::Fit;
 use super::draft::{Detail, Draft};
 use super::lens::Lens;
-use super::Fit;
 use dlsys_geometry::scene::{Bounds, Color, Placement, Point, Scene};
 
 /// A draft in its place.
@@ -105,7 +105,8 @@ impl<'s> Stage<'s> {
             let exponent = (seen * placement.scale).log2().ceil().clamp(-60.0, 60.0) as i32;
             let draft = *known.entry((key, exponent)).or_insert_with(|| {
                 let scale_there = 2_f64.powi(exponent);
-                let detail = Detail { scale_at: |_| scale_there, accuracy: fit.accuracy, scale, is_flat: false };
+                let detail =
+                    Detail { scale_at: |_| scale_there, accuracy: fit.accuracy, scale, is_flat: false };
                 self.drafts.push(Draft::new(&plant.scene, look.default_width, &detail));
                 self.drafts.len() - 1
             });
@@ -121,6 +122,11 @@ impl<'s> Stage<'s> {
         let [low, high] = bounds.corners(default_width)?;
         let colors = self.colors.len() as u32;
         self.colors.extend(scene.palette.materials().iter().map(|material| material.color));
-        Some(Look { default_width, centre: nalgebra::center(&low, &high), radius: (high - low).norm() / 2.0, colors })
+        Some(Look {
+            default_width,
+            centre: nalgebra::center(&low, &high),
+            radius: (high - low).norm() / 2.0,
+            colors,
+        })
     }
 }

@@ -194,7 +194,9 @@ fn grid_pieces(net: &Net, accuracy: f64, steps: Steps) -> (usize, usize) {
             (rest > 0.0 && columns <= FINEST as f64).then(|| ((columns.ceil() as usize).max(1), rows))
         };
         let pairs = (1..=FINEST).filter_map(columns);
-        return pairs.min_by_key(|(columns, rows)| (columns * rows, columns.abs_diff(*rows))).unwrap_or((FINEST, FINEST));
+        return pairs
+            .min_by_key(|(columns, rows)| (columns * rows, columns.abs_diff(*rows)))
+            .unwrap_or((FINEST, FINEST));
     }
     let exponents = 0..=FINEST.trailing_zeros();
     let pairs = exponents.clone().flat_map(|i| exponents.clone().map(move |j| (1_usize << i, 1_usize << j)));
@@ -230,8 +232,7 @@ fn tessellate(
     let first = mesh.vertices.len() as u32;
     let mut numbers = vec![u32::MAX; (columns + 1) * (rows + 1)];
     let mut number = |i: usize, j: usize, mesh: &mut Mesh| {
-        let ((mut i, mut u), (mut j, mut v)) =
-            ((i, i as f64 / columns as f64), (j, j as f64 / rows as f64));
+        let ((mut i, mut u), (mut j, mut v)) = ((i, i as f64 / columns as f64), (j, j as f64 / rows as f64));
         if j == 0 || j == rows {
             (i, u) = snap(i, columns, if j == 0 { bottom } else { top });
         }

@@ -5,7 +5,8 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use super::{
-    Bounds, Color, MaterialId, OwnerId, Patch, Placement, Point, Polygon, Scene, Segment, Surface, Vector, Width,
+    Bounds, Color, MaterialId, OwnerId, Patch, Placement, Point, Polygon, Scene, Segment, Surface, Vector,
+    Width,
 };
 
 /// The surroundings that a model declares, at the time of its scene. What is `None` is not declared.

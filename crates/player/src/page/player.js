@@ -27,6 +27,7 @@ class Player {
     this.elements = Object.fromEntries([...document.querySelectorAll("[id]")].map((element) => [element.id, element]));
     const { extent, size } = recording;
     this.camera = new Camera(size.map((side) => side * extent));
+    if (recording.camera) this.camera.look(...recording.camera);
     this.painter = new Painter(this.elements.plant, recording);
     this.moments = [...new Set(recording.events.map(([time]) => time))];
     this.describe();

@@ -55,7 +55,7 @@ pub(crate) fn picture(
 ) -> Image {
     let lens = Lens::new(fit, size, placement);
     let stage = Stage::new(scene, fit, &lens);
-    let lighting = Lighting::new(scene, fit, lens.scale(), threads);
+    let lighting = Lighting::new(scene, fit, lens.scale(), threads, None);
     match smoothness {
         Smoothness::Fine => shot::draw(&raster::SIXTEEN, threads, &stage, &lens, &lighting),
         Smoothness::Quick => shot::draw(&raster::FOUR, threads, &stage, &lens, &lighting),
@@ -90,7 +90,7 @@ impl<'m> Lit<'m> {
         let seen: Vec<Point> = mesh.vertices.iter().map(|p| fit.camera.project(*p)).collect();
         let places = seen.iter().map(|p| [a * p.x + b, c - a * p.y, p.z]).collect();
         let normals = mesh.normals.iter().map(|&n| fit.camera.direction(n)).collect();
-        Lit { mesh, lighting: Lighting::new(scene, fit, a, 1), floor, places, seen, normals, scale }
+        Lit { mesh, lighting: Lighting::new(scene, fit, a, 1, floor), floor, places, seen, normals, scale }
     }
 
     /// The corners of a triangle.

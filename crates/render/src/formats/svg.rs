@@ -64,9 +64,12 @@ pub(crate) fn around(page: &Page, title: &str, sky: Option<[Color; 2]>, mut elem
     if let Some(color) = page.background {
         let fill = sky.map_or_else(|| color.to_string(), |_| "url(#sky)".to_owned());
         if let Some([zenith, horizon]) = sky {
-            let stop = |offset: u8, color: Color| Stop::new().set("offset", offset).set("stop-color", color.to_string());
+            let stop = |offset: u8, color: Color| {
+                Stop::new().set("offset", offset).set("stop-color", color.to_string())
+            };
             let gradient = LinearGradient::new().set("id", "sky").set("x2", 0).set("y2", 1);
-            document = document.add(Definitions::new().add(gradient.add(stop(0, zenith)).add(stop(1, horizon))));
+            document =
+                document.add(Definitions::new().add(gradient.add(stop(0, zenith)).add(stop(1, horizon))));
         }
         let background = Rectangle::new()
             .set("x", text(left))

@@ -120,7 +120,8 @@ impl Ready {
         let slope = |i: usize| (0..3).map(|k| lines[k][i] as f64 * depths[k]).sum::<f64>() * scale;
         let (right, down) = (slope(1), slope(2));
         let steps = STEPS as f64;
-        let depth = depths[0] + right * ((x - at[0][0]) as f64 / steps) + down * ((y - at[0][1]) as f64 / steps);
+        let depth =
+            depths[0] + right * ((x - at[0][0]) as f64 / steps) + down * ((y - at[0][1]) as f64 / steps);
         let (least, greatest) = depths
             .iter()
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &z| (low.min(z), high.max(z)));

@@ -333,7 +333,7 @@ mod tests {
         let square = |x: f64, z: [f64; 3], color| {
             ([corner(x, -20.0, z[0]), corner(x + 40.0, 20.0, z[1]), corner(x - 40.0, 20.0, z[2])], color)
         };
-        let middle = |triangles: &[([Corner; 3], Color)]| drawn([4, 4], triangles).pixels[2 * 4 + 2];
+        let middle = |triangles: &[([Corner; 3], [u8; 3])]| drawn([4, 4], triangles).pixels[2 * 4 + 2];
         let (red, blue) = ([255, 0, 0, 255], [0, 0, 255, 255]);
         assert_eq!(middle(&[square(2.0, [0.5; 3], RED), square(2.0, [0.4; 3], BLUE)]), red);
         assert_eq!(middle(&[square(2.0, [0.4; 3], RED), square(2.0, [0.5; 3], BLUE)]), blue);
