@@ -10,7 +10,7 @@ use dlsys_geometry::scene::{Point, Vector};
 /// Direction to the lamp: to the right, up, towards the viewer. Of unit length.
 pub(super) const LAMP: Vector = Vector::new(-0.36, 0.583, 0.728_361_861);
 /// The weight of the lamp's direction, beside light from all directions.
-const DIFFUSE: f64 = 0.56;
+const DIFFUSE: f64 = 0.48;
 /// How far the lamp's light reaches around a surface, as that of a wide lamp: the cosine beyond a right angle.
 const WRAP: f64 = 0.25;
 /// The part of the light on the other side of a leaf that comes through.

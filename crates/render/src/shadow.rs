@@ -208,8 +208,11 @@ impl Map {
         let [width, height] = self.size.map(|side| side as i64);
         let (column, row) = (left as i64, bottom as i64);
         let is_within = |at: i64, side: i64| at >= around && at + around + 1 < side;
-        (is_within(column, width) && is_within(row, height))
-            .then(|| ([column as usize, row as usize], [x - left, y - bottom], depth))
+        (is_within(column, width) && is_within(row, height)).then_some((
+            [column as usize, row as usize],
+            [x - left, y - bottom],
+            depth,
+        ))
     }
 
     /// The part of the light that comes to a point on a surface whose lit side has this normal, from 0 to 1: the mean over a square of

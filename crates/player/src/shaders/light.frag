@@ -20,7 +20,7 @@ uniform vec3 tint;
 out vec4 painted;
 
 const vec3 LAMP = vec3(-0.36, 0.583, 0.728361861);
-const float DIFFUSE = 0.56;
+const float DIFFUSE = 0.48;
 const float WRAP = 0.25;
 const float TRANSMITTED = 0.55;
 const float ABOVE = 0.08;

@@ -266,10 +266,10 @@ impl<const N: usize> Band<N> {
             triangles.shade(number, pixel, weights)
         };
         for (line, pixels) in pixels.chunks_exact_mut(self.width.max(1)).enumerate() {
-            for column in first..end {
+            for (column, pixel) in pixels.iter_mut().enumerate().take(end).skip(first) {
                 let at = [column, top + line];
                 let index = line * self.width + column;
-                pixels[column] = match self.pixels[index].seen {
+                *pixel = match self.pixels[index].seen {
                     NOTHING => continue,
                     MIXED => {
                         let surface = |place: u32| triangles.surface(numbers[place as usize] as usize);
