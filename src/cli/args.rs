@@ -9,12 +9,14 @@ use super::new::NewArgs;
 use super::shared::{BudgetArgs, SharedArgs, SolverArgs, TextFormat};
 use super::shell::{self, CompletionsArgs, ManArgs};
 use super::values::{
-    Background, LineWidth, Seeds, background, bytes, columns, field_of_view, figure, frame_format, layout,
-    line_width, method, pixels, positive, runs, seeds, setting, size, threads, time, tolerance,
+    Background, LineWidth, Seeds, Sky, background, bytes, camera, columns, direction, field_of_view, figure,
+    frame_format, layout, line_width, method, pixels, positive, runs, seeds, setting, size, sky, threads,
+    time, tolerance, zoom,
 };
 use super::verify::VerifyArgs;
 use crate::compile::Setting;
 use crate::render::{Format, Layout};
+use crate::scene::{Vector, Viewpoint};
 use crate::sim::Method;
 
 /// Differential L-systems: plants as growing strings of modules, whose parameters follow differential
@@ -250,9 +252,23 @@ pub struct RenderArgs {
     /// With --layout stack: from one line to the next, in scene units [default: the height of the highest]
     #[arg(long, value_name = "H", allow_negative_numbers = true, value_parser = positive)]
     pub row_height: Option<f64>,
-    /// Direction of view: front, side, top, or AZIMUTH,ELEVATION in degrees
-    #[arg(long, default_value = "front", allow_hyphen_values = true)]
-    pub view: String,
+    /// Direction of view: front, side, top, or AZIMUTH,ELEVATION in degrees [default: the model's `camera`, or front]
+    #[arg(long, allow_hyphen_values = true)]
+    pub view: Option<String>,
+    /// A camera in perspective: eye/aim, or eye/aim/angle of view in degrees across the smaller side (1 to 120) [default angle: 40]
+    ///
+    /// Points in scene units, such as 4,2,6/0,1,0/35.
+    #[arg(long, value_name = "X,Y,Z/X,Y,Z", allow_hyphen_values = true, value_parser = camera, conflicts_with_all = ["view", "perspective"])]
+    pub camera: Option<Viewpoint>,
+    /// Magnify pictures about their middle
+    #[arg(long, value_name = "K", allow_negative_numbers = true, value_parser = zoom)]
+    pub zoom: Option<f64>,
+    /// Direction towards the sun, such as 1,2,1: its light casts shadows
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = direction)]
+    pub light: Option<Vector>,
+    /// Colours of the sky at the zenith and at the horizon, such as "#6fa3e0,#e8f0f8": light from all over it, and the background
+    #[arg(long, value_name = "COLOUR,COLOUR", value_parser = sky)]
+    pub sky: Option<Sky>,
     /// Largest distance of the drawing from a curved surface, in scene units [default: 1/2000 of the extent of the
     /// whole animation]
     ///

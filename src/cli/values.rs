@@ -4,7 +4,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use crate::compile::Setting;
 use crate::render::{Camera, Format, Layout, Page};
-use crate::scene::Color;
+use crate::scene::{Color, Point, Vector, Viewpoint};
 use crate::sim::Method;
 
 /// A format for frames.
@@ -69,6 +69,56 @@ pub(super) fn tolerance(text: &str) -> Result<f64, String> {
     match number(text)? {
         x if (1e-13..=0.1).contains(&x) => Ok(x),
         _ => Err("must be between 1e-13 and 0.1".to_owned()),
+    }
+}
+
+/// The colours of the sky at the zenith and at the horizon.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sky(pub [Color; 2]);
+
+pub(super) fn sky(text: &str) -> Result<Sky, String> {
+    let colors: Vec<Option<Color>> = text
+        .split(',')
+        .map(|color| background(color.trim()).ok().and_then(|Background(color)| color))
+        .collect();
+    match colors[..] {
+        [Some(zenith), Some(horizon)] => Ok(Sky([zenith, horizon])),
+        _ => Err("expected two colours, of the zenith and of the horizon, like \"#6fa3e0,#e8f0f8\" (in quotes: the shell takes # for a comment)".to_owned()),
+    }
+}
+
+/// Three finite numbers with commas between them.
+fn triple(text: &str) -> Option<[f64; 3]> {
+    let numbers: Vec<f64> = text.split(',').map(|x| x.trim().parse().ok()).collect::<Option<_>>()?;
+    <[f64; 3]>::try_from(numbers).ok().filter(|numbers| numbers.iter().all(|x| x.is_finite()))
+}
+
+pub(super) fn direction(text: &str) -> Result<Vector, String> {
+    let direction = triple(text).map(Vector::from).filter(|direction| direction.norm() > 0.0);
+    direction.ok_or_else(|| "expected a direction, three numbers like 1,2,1, not all 0".to_owned())
+}
+
+pub(super) fn camera(text: &str) -> Result<Viewpoint, String> {
+    /// Angle of view, in degrees.
+    const ANGLE: f64 = 40.0;
+    let expected = "expected eye/aim or eye/aim/angle, like 4,2,6/0,1,0 or 4,2,6/0,1,0/35";
+    let parts: Vec<&str> = text.split('/').collect();
+    let (eye, aim, angle) = match parts[..] {
+        [eye, aim] => (eye, aim, ANGLE),
+        [eye, aim, angle] => (eye, aim, field_of_view(angle.trim())?),
+        _ => return Err(expected.to_owned()),
+    };
+    let (Some(eye), Some(aim)) = (triple(eye), triple(aim)) else { return Err(expected.to_owned()) };
+    if eye == aim {
+        return Err("the eye and the point that it looks at must be different".to_owned());
+    }
+    Ok(Viewpoint { eye: Point::from(eye), aim: Point::from(aim), angle })
+}
+
+pub(super) fn zoom(text: &str) -> Result<f64, String> {
+    match number(text) {
+        Ok(zoom) if (1e-3..=1e6).contains(&zoom) => Ok(zoom),
+        _ => Err("expected a number from 0.001 to 1000000".to_owned()),
     }
 }
 

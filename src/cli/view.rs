@@ -139,6 +139,7 @@ fn record(run: &ModelRun, accuracy: Option<f64>) -> Result<Recording, Failure> {
     let name =
         Path::new(&source.name).file_name().map_or(source.name.clone(), |n| n.to_string_lossy().into());
     let mut recorder = Recorder::new(model, &run.nursery().blank(), &name, &fit);
+    recorder.surround(&survey.first_surroundings());
     let pass = Pass { settings: Settings { log: true, ..run.settings }, accuracy: fit.accuracy };
     let mut progress = Progress::new("recording", run.times.len());
     let staged = |frame: &Frame, scene: &Scene| {

@@ -39,6 +39,7 @@ mod report;
 mod scenes;
 mod schedulers;
 mod semantics;
+mod shadows;
 mod signals;
 mod verify;
 mod view;

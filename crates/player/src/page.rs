@@ -92,8 +92,23 @@ fn description(recording: &Recording, outlines: &[Vec<Spoke>]) -> Value {
         "unit": recording.unit,
         "extent": recording.extent,
         "size": [size.x, size.y, size.z],
+        "light": light(recording),
+        "camera": recording.surroundings.camera.map(|at| {
+            let away = at.eye - at.aim;
+            json!([away.x.atan2(away.z).to_degrees(), away.y.atan2(away.x.hypot(away.z)).to_degrees()])
+        }),
         "shaders": SHADERS.into_iter().collect::<std::collections::BTreeMap<_, _>>(),
     })
+}
+
+/// The declared light: the direction towards the sun, and the colours of zenith and horizon; null if there is neither.
+fn light(recording: &Recording) -> Value {
+    let around = &recording.surroundings;
+    if around.sun.is_none() && around.sky.is_none() {
+        return Value::Null;
+    }
+    let sun = around.sun.and_then(|sun| sun.try_normalize(0.0)).map(|sun| [sun.x, sun.y, sun.z]);
+    json!({ "sun": sun, "sky": around.sky.map(|colors| colors.map(|color| color.to_string())) })
 }
 
 /// A number to some decimals, which is then short in JSON.

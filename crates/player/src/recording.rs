@@ -7,7 +7,7 @@ use super::forms::Forms;
 use super::history::History;
 use super::stage::{Form, Item, Key, Stage};
 use super::track::Track;
-use dlsys_geometry::scene::{Palette, Point, Scene};
+use dlsys_geometry::scene::{Palette, Point, Scene, Surroundings};
 use dlsys_model::{Model, Parameter};
 use dlsys_render::{Fit, Spoke, cross_section};
 
@@ -44,6 +44,8 @@ pub struct Recording {
     pub unit: f64,
     /// The model's contours.
     pub contours: Vec<Vec<[f64; 2]>>,
+    /// Light, sky and camera of the first frame.
+    pub surroundings: Surroundings,
 }
 
 /// A recording that is being made.
@@ -84,6 +86,7 @@ impl Recorder {
             accuracy: fit.accuracy.max(extent * 1e-9),
             unit: extent / STEPS,
             contours: blank.contours.to_vec(),
+            surroundings: Surroundings::default(),
         };
         Recorder { recording, open: HashMap::new(), numbers: 0 }
     }
@@ -91,6 +94,11 @@ impl Recorder {
     /// The list of productions, to be added to between frames.
     pub fn history(&mut self) -> &mut History {
         &mut self.recording.history
+    }
+
+    /// Sets light, sky and camera, which a page shows as they are in one frame.
+    pub fn surround(&mut self, surroundings: &Surroundings) {
+        self.recording.surroundings = surroundings.clone();
     }
 
     /// Takes in a frame. Times increase.

@@ -73,6 +73,67 @@ impl Camera {
         Camera { view, eye: Some(Eye { x, y, focus, distance }) }
     }
 
+    /// The unit vector from a point to the viewer.
+    pub(super) fn towards(&self, p: Point) -> Vector {
+        match &self.eye {
+            None => self.view.towards(),
+            Some(eye) => {
+                let seen = self.view.see(p);
+                let away = Vector::new(eye.x - seen.x, eye.y - seen.y, eye.distance - (seen.z - eye.focus));
+                self.view.space(away).try_normalize(0.0).unwrap_or_else(|| self.view.towards())
+            }
+        }
+    }
+
+    /// The projection of a point in front of the viewer; `None` if it is behind, or too near.
+    pub(super) fn ahead(&self, p: Point) -> Option<Point> {
+        let is_behind =
+            |eye: &Eye| eye.distance - (self.view.see(p).z - eye.focus) < Eye::NEAR * eye.distance;
+        (!self.eye.as_ref().is_some_and(is_behind)).then(|| self.project(p))
+    }
+
+    /// x and y of the projection times a third number, and that number, all linear in space; the third is 1 in the plane of focus and not
+    /// positive behind the viewer.
+    pub(super) fn homogeneous(&self, p: Point) -> [f64; 3] {
+        let p = self.view.see(p);
+        match &self.eye {
+            None => [p.x, p.y, 1.0],
+            Some(eye) => {
+                let w = (eye.distance - (p.z - eye.focus)) / eye.distance;
+                [p.x - eye.x + eye.x * w, p.y - eye.y + eye.y * w, w]
+            }
+        }
+    }
+
+    /// A camera in perspective at an eye, its plane of focus through the aim; `None` if the two are one point.
+    pub(super) fn at(eye: Point, aim: Point) -> Option<Camera> {
+        let away = eye - aim;
+        let distance = away.norm();
+        let towards = away.try_normalize(1e-300).filter(|_| distance.is_finite())?;
+        let elevation = towards.y.clamp(-1.0, 1.0).asin().to_degrees();
+        let azimuth =
+            if towards.x.hypot(towards.z) > 0.0 { towards.x.atan2(towards.z).to_degrees() } else { 0.0 };
+        let view = View::new(azimuth, elevation).ok()?;
+        let aim = view.see(aim);
+        Some(Camera { view, eye: Some(Eye { x: aim.x, y: aim.y, focus: aim.z, distance }) })
+    }
+
+    /// The point in space that [`project`](Camera::project) takes here.
+    pub(super) fn unproject(&self, p: Point) -> Point {
+        let seen = match &self.eye {
+            None => p,
+            Some(eye) => {
+                let larger = 1.0 + p.z / eye.distance;
+                Point::new(
+                    eye.x + (p.x - eye.x) / larger,
+                    eye.y + (p.y - eye.y) / larger,
+                    eye.focus + eye.distance * (1.0 - 1.0 / larger),
+                )
+            }
+        };
+        Point::from(self.view.space(seen.coords))
+    }
+
     /// The direction from the scene to the viewer.
     pub fn view(&self) -> View {
         self.view

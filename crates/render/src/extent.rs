@@ -8,7 +8,7 @@
 use std::array::from_fn;
 
 use super::View;
-use dlsys_geometry::scene::{Scene, Width, sin_cos_degrees};
+use dlsys_geometry::scene::{Point, Reach, Scene, Width, sin_cos_degrees};
 
 /// Lines around a shadow.
 const LINES: usize = 16;
@@ -29,6 +29,15 @@ impl Outline {
             self.0[k] = self.0[k].max(reach + radius);
             self.0[k + LINES / 2] = self.0[k + LINES / 2].max(radius - reach);
         }
+    }
+
+    /// Whether a point is within all lines, by more than rounding.
+    fn encloses(&self, a: f64, z: f64, directions: &[(f64, f64); LINES / 2]) -> bool {
+        let slack = 1e-12 * (a.abs() + z.abs());
+        directions.iter().enumerate().all(|(k, (sin, cos))| {
+            let reach = a * cos + z * sin;
+            reach + slack < self.0[k] && slack - reach < self.0[k + LINES / 2]
+        })
     }
 
     /// Includes another outline, widened by a radius.
@@ -105,23 +114,9 @@ impl Extent {
     /// The extent of one scene.
     pub(super) fn of(scene: &Scene, view: &View) -> Extent {
         let directions: [(f64, f64); LINES / 2] = from_fn(|k| sin_cos_degrees(STEP * k as f64));
-        let mut extent = Extent::EMPTY;
-        scene.each_point(|p, width| {
-            let p = view.see(p);
-            let include = |shadow: &mut Shadow, radius: f64| {
-                shadow.x.include(p.x, p.z, radius, &directions);
-                shadow.y.include(p.y, p.z, radius, &directions);
-            };
-            match width {
-                Width::Set(width) => include(&mut extent.known, width / 2.0),
-                Width::Default(factor) => {
-                    include(&mut extent.styled, 0.0);
-                    extent.factor = extent.factor.max(factor);
-                }
-            }
-            extent.depth = [extent.depth[0].min(p.z), extent.depth[1].max(p.z)];
-        });
-        extent
+        let mut seen = Seen { extent: Extent::EMPTY, view, directions };
+        scene.reach(&mut seen);
+        seen.extent
     }
 
     /// Includes another extent in the same view.
@@ -142,6 +137,44 @@ impl Extent {
     /// Least and greatest z of all points, widths not counted; `None` if there is nothing.
     pub(super) fn depth(&self) -> Option<[f64; 2]> {
         (self.depth[0] <= self.depth[1]).then_some(self.depth)
+    }
+}
+
+/// An extent that grows.
+struct Seen<'v> {
+    extent: Extent,
+    view: &'v View,
+    directions: [(f64, f64); LINES / 2],
+}
+
+impl Reach for Seen<'_> {
+    fn covers(&self, rough: impl Iterator<Item = Point>) -> bool {
+        let [far, near] = self.extent.depth;
+        let known = &self.extent.known;
+        let mut rough = rough;
+        rough.all(|p| {
+            let p = self.view.see(p);
+            far < p.z
+                && p.z < near
+                && known.x.encloses(p.x, p.z, &self.directions)
+                && known.y.encloses(p.y, p.z, &self.directions)
+        })
+    }
+
+    fn include(&mut self, p: Point, width: Width) {
+        let (extent, p) = (&mut self.extent, self.view.see(p));
+        let include = |shadow: &mut Shadow, radius: f64| {
+            shadow.x.include(p.x, p.z, radius, &self.directions);
+            shadow.y.include(p.y, p.z, radius, &self.directions);
+        };
+        match width {
+            Width::Set(width) => include(&mut extent.known, width / 2.0),
+            Width::Default(factor) => {
+                include(&mut extent.styled, 0.0);
+                extent.factor = extent.factor.max(factor);
+            }
+        }
+        extent.depth = [extent.depth[0].min(p.z), extent.depth[1].max(p.z)];
     }
 }
 

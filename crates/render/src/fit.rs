@@ -7,8 +7,8 @@ use super::crowd::Crowd;
 use super::extent::Extent;
 use super::light::Light;
 use super::tube::TubeStyle;
-use super::{View, number, painter};
-use dlsys_geometry::scene::{Bounds, Point, Scene, Width};
+use super::{Page, View, number, painter};
+use dlsys_geometry::scene::{Bounds, Color, Point, Scene, Surroundings, Width};
 
 /// Drawings less deep than this part of their extent are flat.
 const FLAT: f64 = 1e-6;
@@ -23,6 +23,16 @@ pub struct Survey {
     seen: Extent,
     crowd: Crowd,
     has_one_width: bool,
+    /// What flags declare in place of the model.
+    declared: Surroundings,
+    zoom: f64,
+    /// Cameras that the model declares count.
+    follows_cameras: bool,
+    has_camera: bool,
+    /// The surroundings of the first frame.
+    first: Option<Surroundings>,
+    /// Some frame has a sun, a sky or a floor.
+    has_light: bool,
 }
 
 impl Survey {
@@ -35,7 +45,28 @@ impl Survey {
             seen: Extent::EMPTY,
             crowd: Crowd::default(),
             has_one_width: false,
+            declared: Surroundings::default(),
+            zoom: 1.0,
+            follows_cameras: true,
+            has_camera: false,
+            first: None,
+            has_light: false,
         }
+    }
+
+    /// With these surroundings in place of those that the model declares; what is `None` stays the model's.
+    pub fn with_surroundings(self, declared: Surroundings) -> Survey {
+        Survey { declared, ..self }
+    }
+
+    /// Magnified about the middle of the picture, at least a thousandth and at most a million times.
+    pub fn with_zoom(self, zoom: f64) -> Survey {
+        Survey { zoom: if zoom.is_nan() { 1.0 } else { zoom.clamp(1e-3, 1e6) }, ..self }
+    }
+
+    /// In its own view, whatever cameras the model declares.
+    pub fn without_cameras(self) -> Survey {
+        Survey { follows_cameras: false, ..self }
     }
 
     /// In perspective: the camera is as near as possible if all that is drawn in any frame is within this angle, in degrees (clamped
@@ -53,15 +84,29 @@ impl Survey {
     pub fn add(&mut self, scene: &Scene) {
         let scene = &*if self.has_one_width { Cow::Owned(of_one_width(scene)) } else { Cow::Borrowed(scene) };
         self.space.add(scene);
+        let around = joined(&self.declared, &scene.surroundings);
+        self.first.get_or_insert_with(|| around.clone());
+        self.has_camera |= around.camera.is_some() && self.follows_cameras;
+        self.has_light |= around.sun.is_some() || around.sky.is_some() || around.floor.is_some();
         self.seen.merge(&Extent::of(scene, &self.view));
         self.crowd.merge(Crowd::of(scene));
     }
 
-    /// Includes another survey in the same view, for example that of another thread.
+    /// Includes another survey in the same view, of later frames, for example that of another thread.
     pub fn merge(&mut self, other: &Survey) {
         self.space.merge(&other.space);
         self.crowd.merge(other.crowd);
+        self.has_camera |= other.has_camera;
+        if self.first.is_none() {
+            self.first.clone_from(&other.first);
+        }
+        self.has_light |= other.has_light;
         self.seen.merge(&other.seen);
+    }
+
+    /// The surroundings of the first frame.
+    pub fn first_surroundings(&self) -> Surroundings {
+        self.first.clone().unwrap_or_default()
     }
 
     /// The values that all frames share. Lines to which the model gives no width have a fixed part of the extent, or less where they are
@@ -90,11 +135,18 @@ impl Survey {
             extent,
             accuracy: size * Fit::ACCURACY,
             bounds,
-            picture: Picture::around(shadow.map(|shadow| camera.frame(&shadow))),
+            picture: match self.has_camera {
+                true => Picture::of([-0.5 * CAMERA_SHAPE, -0.5, CAMERA_SHAPE, 1.0]),
+                false => Picture::around(shadow.map(|shadow| camera.frame(&shadow))).magnified(self.zoom),
+            },
             light: Light::new(depths, extent),
             meshes: (usual, self.space.corners(usual)),
             has_one_width: self.has_one_width,
             has_depth: depths[1] - depths[0] > FLAT * extent,
+            declared: self.declared.clone(),
+            zoom: self.zoom,
+            follows_cameras: self.follows_cameras,
+            has_light: self.has_light,
         }
     }
 }
@@ -122,6 +174,23 @@ pub struct Fit {
     has_one_width: bool,
     /// Its depth is more than rounding.
     has_depth: bool,
+    declared: Surroundings,
+    zoom: f64,
+    follows_cameras: bool,
+    has_light: bool,
+}
+
+/// The shape of pictures of declared cameras: width by height.
+const CAMERA_SHAPE: f64 = 1.5;
+
+/// Surroundings of flags, and those of a scene where there are none.
+fn joined(flags: &Surroundings, scene: &Surroundings) -> Surroundings {
+    Surroundings {
+        sun: flags.sun.or(scene.sun),
+        sky: flags.sky.or(scene.sky),
+        camera: flags.camera.or(scene.camera),
+        floor: flags.floor.or(scene.floor),
+    }
 }
 
 impl Fit {
@@ -152,16 +221,46 @@ impl Fit {
         Bounds::of(&self.drawn(Cow::Borrowed(scene))).corners(self.default_width)
     }
 
-    /// True if SVG pictures are made of visible regions: the animation has depth. Without depth nothing is hidden, and every element
+    /// True if SVG pictures are made of visible regions: the animation has depth, or light that is declared. Without depth nothing is hidden, and every element
     /// keeps its exact shape.
     pub(super) fn has_visible_regions(&self) -> bool {
-        self.has_depth
+        self.has_depth || self.has_light
     }
 
     /// How stems become tubes. Without depth they are lines of a diagram, and their joints keep their shape.
     pub(super) fn tubes(&self) -> TubeStyle {
         let Fit { default_width, accuracy, .. } = *self;
         TubeStyle { default_width, sides: 0, accuracy, grown: !self.light.is_flat(), steady: false }
+    }
+
+    /// The surroundings of a frame: those of flags, and those that its scene declares.
+    pub(super) fn surroundings(&self, scene: &Scene) -> Surroundings {
+        joined(&self.declared, &scene.surroundings)
+    }
+
+    /// The sky behind a frame, zenith and horizon, if one is declared.
+    pub(super) fn sky(&self, scene: &Scene) -> Option<[Color; 2]> {
+        self.surroundings(scene).sky
+    }
+
+    /// The middle of everything, and the extent, which is not 0.
+    pub(super) fn middle(&self) -> (Point, f64) {
+        let middle = self.bounds.map_or_else(Point::origin, |[low, high]| nalgebra::center(&low, &high));
+        (middle, if self.extent > 0.0 { self.extent } else { 1.0 })
+    }
+
+    /// The fit and the page of one frame, which differ from the others where a camera is declared.
+    pub fn for_frame(&self, scene: &Scene, page: &Page) -> (Fit, Page) {
+        let declared = self.surroundings(scene).camera.filter(|_| self.follows_cameras);
+        let camera = declared.and_then(|at| Some((Camera::at(at.eye, at.aim)?, at)));
+        let Some((camera, at)) = camera else { return (self.clone(), *page) };
+        let [width, height] = page.pixels.map(f64::from);
+        let slope = (at.angle.clamp(*Camera::FIELDS.start(), *Camera::FIELDS.end()) / 2.0).to_radians().tan();
+        let smaller = 2.0 * (at.eye - at.aim).norm() * slope / self.zoom;
+        let [w, h] = [width, height].map(|side| smaller * side / width.min(height));
+        let aim = camera.project(at.aim);
+        let picture = Picture::of([aim.x - w / 2.0, aim.y - h / 2.0, w, h]);
+        (Fit { camera, picture, ..self.clone() }, Page { picture, ..*page })
     }
 
     /// Left, bottom, right and top of a survey as this camera sees it; `None` if it is empty.
@@ -214,6 +313,13 @@ impl Picture {
     fn of(area: [f64; 4]) -> Picture {
         let scale = 10_f64.powi(2 - area[2].max(area[3]).log10().floor() as i32);
         Picture { area, scale }
+    }
+
+    /// A part of it about its middle, drawn so many times as large.
+    fn magnified(&self, zoom: f64) -> Picture {
+        let [left, bottom, width, height] = self.area;
+        let (w, h) = (width / zoom, height / zoom);
+        Picture::of([left + (width - w) / 2.0, bottom + (height - h) / 2.0, w, h])
     }
 
     /// Widened on both sides, or above and below, to this ratio of width to height.

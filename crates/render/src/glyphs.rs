@@ -3,7 +3,7 @@
 //! A font file would be a megabyte for fifteen characters. A glyph consists of lines and arcs of ellipses, in a box
 //! one half wide, with capitals and digits 0.7 high and small letters 0.5.
 
-use super::raster::{self, Corner, Image};
+use super::raster::{self, Corner, Image, Plain};
 use dlsys_geometry::scene::{Color, sin_cos_degrees};
 
 /// Width of the pen, and from the middle of one glyph to the middle of the next, in sizes of letters.
@@ -81,7 +81,11 @@ pub(super) fn draw(size: [u32; 2], lines: &[GlyphLine], color: Color) -> Image {
             }
         }
     }
-    raster::draw(&raster::SIXTEEN, 1, size, triangles.len(), |n| triangles[n], |_, _| color)
+    let [width, height] = size.map(|side| side as usize);
+    let mut pixels = vec![[0; 4]; width * height];
+    let triangles = Plain { triangles: &triangles, color: [color.red, color.green, color.blue] };
+    raster::draw(&raster::SIXTEEN, 1, [width, height], 0..height, &triangles, &mut pixels);
+    Image { width, height, pixels }
 }
 
 /// The points of a stroke.

@@ -50,15 +50,19 @@
 
 mod camera;
 mod crowd;
+mod draft;
 mod error;
 mod extent;
 mod fit;
+mod floor;
 mod formats;
 mod frames;
 mod glyphs;
 mod layout;
 mod lengths;
+mod lens;
 mod light;
+mod lighting;
 mod manifest;
 mod name;
 mod number;
@@ -66,7 +70,10 @@ mod page;
 mod painter;
 mod raster;
 mod relay;
+mod shadow;
 mod sheet;
+mod shot;
+mod stage;
 mod stroke;
 mod text;
 mod trace;
@@ -90,6 +97,7 @@ pub use triangulate::{normal, triangulate};
 pub use tube::Spoke;
 pub use view::View;
 
+use std::borrow::Cow;
 use std::io::{self, Write};
 
 use dlsys_geometry::scene::Scene;
@@ -134,8 +142,16 @@ impl FrameWriter {
     /// # Errors
     /// Those of `out`.
     pub fn write_to(&self, scene: &Scene, title: &str, out: &mut (dyn Write + Send)) -> io::Result<()> {
-        let scene = &*self.fit.drawn(scene.tessellated(self.fit.accuracy));
-        self.format.exporter().write(Drawing { scene, writer: self, title }, out)
+        // Pixels show no more detail than they have room for.
+        let flattened = match self.format.content() {
+            Content::Pixels => Cow::Borrowed(scene),
+            Content::Vectors | Content::Mesh => scene.flattened(),
+        };
+        let scene = match self.format.content() {
+            Content::Pixels => self.fit.drawn(Cow::Borrowed(scene)),
+            Content::Vectors | Content::Mesh => self.fit.drawn(flattened.tessellated(self.fit.accuracy)),
+        };
+        self.format.exporter().write(Drawing { scene: &scene, writer: self, title }, out)
     }
 
     /// The file that all frames refer to, if there is one: its name and its bytes.
@@ -167,6 +183,6 @@ pub fn pixels_by(
     smoothness: Smoothness,
     threads: usize,
 ) -> Vec<[u8; 4]> {
-    let scene = &*fit.drawn(scene.tessellated(fit.accuracy));
+    let scene = &*fit.drawn(Cow::Borrowed(scene));
     formats::png::picture(scene, fit, page.pixels, page.placement(), smoothness, threads).pixels
 }

@@ -1,23 +1,43 @@
-//! The light in which pictures are drawn, the same in SVG and PNG.
+//! The light in which pictures are drawn unless a model or a flag declares another ([`lighting`](super::lighting)), the same in SVG and PNG.
 //!
-//! One lamp, up on the left behind the viewer, fixed to the camera; a gloss; and things get darker with their distance. A
-//! surface that faces the viewer at the front of the plant keeps its colour. So does everything in a flat drawing: light
-//! comes up as the drawing gains depth, so that it does not come on at once in an animation.
+//! One lamp, up on the left behind the viewer, fixed to the camera; light from all directions, more of it from above; a gloss; and things
+//! get darker with their distance. Through leaves and petals light comes from behind, so their undersides are not dark. A surface that
+//! faces the viewer at the front of the plant keeps its colour. So does everything in a flat drawing: light comes up as the drawing gains
+//! depth, so that it does not come on at once in an animation.
 
-use dlsys_geometry::scene::Vector;
+use dlsys_geometry::scene::{Point, Vector};
 
 /// Direction to the lamp: to the right, up, towards the viewer. Of unit length.
 pub(super) const LAMP: Vector = Vector::new(-0.36, 0.583, 0.728_361_861);
 /// The weight of the lamp's direction, beside light from all directions.
-const DIFFUSE: f64 = 0.52;
+const DIFFUSE: f64 = 0.48;
+/// How far the lamp's light reaches around a surface, as that of a wide lamp: the cosine beyond a right angle.
+const WRAP: f64 = 0.25;
+/// The part of the light on the other side of a leaf that comes through.
+pub(super) const TRANSMITTED: f64 = 0.55;
+/// One over the length of the sum of the unit vectors to the lamp and to the viewer.
+const HALF: f64 = 0.537_858_04;
+/// How much lighter what faces up is than what faces the viewer.
+const ABOVE: f64 = 0.08;
 /// Strength and sharpness of the gloss (Blinn 1977).
-const GLOSS: f64 = 0.16;
-const SHARPNESS: i32 = 24;
+pub(super) const GLOSS: f64 = 0.16;
+pub(super) const SHARPNESS: i32 = 24;
 /// Light that is lost from the nearest to the farthest.
 const DISTANCE: f64 = 0.16;
 /// Depths, in parts of the extent, from which relief and distance are drawn in full.
 const RELIEF_FROM: f64 = 0.02;
 const DISTANCE_FROM: f64 = 0.2;
+
+/// A place on a surface that is to be shaded.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Spot {
+    /// The unit normal of the side that is seen: to the right, up, towards the viewer.
+    pub(super) normal: Vector,
+    /// Where it is, as the camera projects it.
+    pub(super) seen: Point,
+    /// Light comes through it.
+    pub(super) is_thin: bool,
+}
 
 /// Light on an animation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,18 +63,32 @@ impl Light {
         self.relief == 0.0
     }
 
+    /// How much of the relief is drawn, from 0 (flat) to 1.
+    pub(super) fn relief(&self) -> f64 {
+        self.relief
+    }
+
     /// Strength of light, 1 leaving a colour as it is, on something with a unit normal that is turned to the viewer (to
     /// the right, up, towards the viewer) at a depth.
     pub(super) fn strength(&self, normal: Vector, depth: f64) -> f64 {
-        self.at_depth(depth) + self.of_normal(normal)
+        self.at_depth(depth) + self.of_normal(normal, false)
+    }
+
+    /// The same at a spot, which light may come through.
+    pub(super) fn strength_at(&self, spot: &Spot) -> f64 {
+        self.at_depth(spot.seen.z) + self.of_normal(spot.normal, spot.is_thin)
     }
 
     /// The part that depends on the direction.
-    fn of_normal(&self, normal: Vector) -> f64 {
+    fn of_normal(&self, normal: Vector, is_thin: bool) -> f64 {
         // Half-way between the lamp and the viewer.
-        let half = (LAMP + Vector::z()).normalize();
+        let half = Vector::new(LAMP.x, LAMP.y, LAMP.z + 1.0) * HALF;
         let gloss = normal.dot(&half).max(0.0).powi(SHARPNESS) - half.z.powi(SHARPNESS);
-        self.relief * (DIFFUSE * (normal.dot(&LAMP).max(0.0) - LAMP.z) + GLOSS * gloss)
+        let cos = normal.dot(&LAMP);
+        let around = |cos: f64| ((cos + WRAP) / (1.0 + WRAP)).max(0.0);
+        let through = if is_thin { TRANSMITTED * (-cos).max(0.0) } else { 0.0 };
+        let diffuse = around(cos) - around(LAMP.z) + through;
+        self.relief * (DIFFUSE * diffuse + ABOVE * normal.y + GLOSS * gloss)
     }
 
     /// The part that is left at a depth.

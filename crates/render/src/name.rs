@@ -54,6 +54,10 @@ impl<'s> Names<'s> {
 
     fn usual(&self, owner: usize) -> String {
         let owner = &self.owners[owner];
+        // What is no module, such as the ground, is there once.
+        if let Some(name) = owner.name.strip_prefix('=') {
+            return name.to_owned();
+        }
         let kind = self.kinds.get(&*owner.name).map_or("", String::as_str);
         let mut name = String::with_capacity(kind.len() + 16);
         name.push_str(kind);

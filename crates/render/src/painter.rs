@@ -33,6 +33,10 @@ pub(super) struct Style<'a> {
     pub(super) scale: f64,
     /// Pixels of the page in a scene unit.
     pub(super) pixels: f64,
+    /// The colour behind everything.
+    pub(super) background: Option<Color>,
+    /// The material of the floor.
+    pub(super) floor: Option<MaterialId>,
 }
 
 /// The elements of a scene, one a line. Names are those of modules; without them the elements have none, and `prefix`

@@ -1,8 +1,10 @@
 //! Writing of a [`Sheet`]: each frame is drawn by itself, on any thread; then all are put together in order.
 
 use super::formats::Content;
+use std::borrow::Cow;
 use std::fmt::Write;
 
+use super::floor;
 use super::formats::png::{self, Canvas, Meeting};
 use super::layout::{Caption, Cell};
 use super::painter::{self, text};
@@ -69,7 +71,7 @@ impl SheetWriter {
     /// Draws the frame with this number. A frame that the sheet has no place for is left out.
     pub fn part(&self, index: usize, scene: &Scene) -> Part {
         let cell = self.sheet.cells.get(index);
-        let scene = &*self.fit.drawn(scene.tessellated(self.fit.accuracy));
+        let scene = &*self.fit.drawn(Cow::Borrowed(scene));
         Part(match self.format.content() {
             Content::Pixels => {
                 let (size, corner, placement) = self.window(cell);
@@ -77,6 +79,10 @@ impl SheetWriter {
             }
             _ => {
                 let style = svg::style(&self.fit, &self.page);
+                let scene = scene.flattened();
+                let scene = &*scene.tessellated(self.fit.accuracy);
+                let (scene, floor) = floor::added(scene, &self.fit, Some(&self.page));
+                let (scene, style) = (&*scene, painter::Style { floor, ..style });
                 Drawn::Elements(cell.map_or_else(String::new, |_| {
                     painter::elements(scene, style, false, &format!("f{index}"))
                 }))
@@ -167,7 +173,7 @@ impl Assembly<'_> {
     pub fn finish(self, title: &str) -> Vec<u8> {
         let page = &self.writer.page;
         let Some(mut canvas) = self.canvas else {
-            return svg::around(page, title, self.elements).into_bytes();
+            return svg::around(page, title, None, self.elements).into_bytes();
         };
         let [a, b, c] = page.placement();
         let sheet = &self.writer.sheet;

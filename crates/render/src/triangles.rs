@@ -7,11 +7,12 @@
 //! Vertices and normals are numbered first; then every part of the mesh can be made by itself. So a file is
 //! written on several threads without the mesh being in memory.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use super::tube::{TubeStyle, Tubes};
 use super::{Fit, triangulate};
-use dlsys_geometry::scene::{MaterialId, OwnerId, Point, Scene, Segment, Vector};
+use dlsys_geometry::scene::{MaterialId, OwnerId, Point, Scene, Segment, Surface, Vector};
 
 /// Takes vertices and normals, in the order of their numbers.
 pub(super) trait Points {
@@ -86,6 +87,7 @@ struct Run {
 pub(super) struct Solid<'s> {
     pub(super) scene: &'s Scene,
     tubes: Tubes<'s>,
+    placed: Cow<'s, [Surface]>,
     /// Numbers of the first vertices and normals of each polygon and surface.
     polygons: Vec<[u32; 2]>,
     surfaces: Vec<[u32; 2]>,
@@ -97,6 +99,11 @@ impl<'s> Solid<'s> {
     /// Of everything in a scene; stems are tubes with so many sides, 0: as many as it takes.
     pub(super) fn new(scene: &'s Scene, fit: &Fit, sides: usize) -> Solid<'s> {
         let tubes = Tubes::new(scene, TubeStyle { sides, ..fit.tubes() });
+        Solid::of(scene, tubes, Cow::Borrowed(&scene.surfaces))
+    }
+
+    /// Of these tubes, the polygons of a scene, and these surfaces in place of its own.
+    pub(super) fn of(scene: &'s Scene, tubes: Tubes<'s>, placed: Cow<'s, [Surface]>) -> Solid<'s> {
         let mut counts = tubes.counts;
         let mut number = |vertices: usize, normals: usize| {
             let first = counts;
@@ -104,14 +111,14 @@ impl<'s> Solid<'s> {
             first
         };
         let polygons = scene.polygons.iter().map(|polygon| number(polygon.vertices.len(), 1)).collect();
-        let surfaces = scene.surfaces.iter().map(|s| number(s.mesh.vertices.len(), s.mesh.normals.len()));
+        let surfaces = placed.iter().map(|s| number(s.mesh.vertices.len(), s.mesh.normals.len()));
         let surfaces = surfaces.collect();
-        Solid { scene, tubes, polygons, surfaces, counts }
+        Solid { scene, tubes, placed, polygons, surfaces, counts }
     }
 
     /// Number of items: pieces of stems, polygons, surfaces.
     pub(super) fn len(&self) -> usize {
-        self.tubes.len() + self.polygons.len() + self.surfaces.len()
+        self.tubes.len() + self.polygons.len() + self.placed.len()
     }
 
     fn item(&self, n: usize) -> Item {
@@ -127,7 +134,7 @@ impl<'s> Solid<'s> {
         match item {
             Item::Stem(i) => self.tubes.segment(i).owner,
             Item::Polygon(i) => self.scene.polygons[i].owner,
-            Item::Surface(i) => self.scene.surfaces[i].owner,
+            Item::Surface(i) => self.placed[i].owner,
         }
     }
 
@@ -141,7 +148,7 @@ impl<'s> Solid<'s> {
         match self.item(n) {
             Item::Stem(_) => 16,
             Item::Polygon(i) => self.scene.polygons[i].vertices.len(),
-            Item::Surface(i) => self.scene.surfaces[i].mesh.vertices.len(),
+            Item::Surface(i) => self.placed[i].mesh.vertices.len(),
         }
     }
 
@@ -178,7 +185,7 @@ impl<'s> Solid<'s> {
                     }
                 }
                 Item::Surface(i) => {
-                    let surface = &self.scene.surfaces[i];
+                    let surface = &self.placed[i];
                     for &v in &surface.mesh.vertices {
                         out.vertex(|| surface.placement.point(v));
                     }
@@ -209,12 +216,13 @@ impl<'s> Solid<'s> {
     }
 
     /// Makes the triangles of items that are given [by owner](Solid::by_owner), by material within an owner: `begin`
-    /// is told the owner and the material before those that have them. All of an owner must be given at once.
+    /// is told the owner and the material before those that have them, and whether they are of a stem. All of an owner must be given
+    /// at once.
     pub(super) fn faces<Out: Faces>(
         &self,
         items: &[u32],
         out: &mut Out,
-        mut begin: impl FnMut(&mut Out, OwnerId, MaterialId),
+        mut begin: impl FnMut(&mut Out, OwnerId, MaterialId, bool),
     ) {
         let owner = |n: u32| self.owner_of(n as usize);
         let mut runs: Vec<Run> = Vec::new();
@@ -228,7 +236,7 @@ impl<'s> Solid<'s> {
                 runs.sort_by_key(|run| run.material);
             }
             for run in &runs {
-                begin(out, owner(group[0]), run.material);
+                begin(out, owner(group[0]), run.material, matches!(run.item, Item::Stem(_)));
                 self.faces_of(run, out);
             }
         }
@@ -241,7 +249,7 @@ impl<'s> Solid<'s> {
                 runs.push(Run { material: self.scene.polygons[i].material, item, faces: 0..0 });
             }
             Item::Surface(i) => {
-                let surface = &self.scene.surfaces[i];
+                let surface = &self.placed[i];
                 for (start, face) in surface.mesh.faces.iter().enumerate() {
                     let material = surface.tint.filter(|_| face.takes_tint).unwrap_or(face.material);
                     match runs.last_mut().filter(|run| start > 0 && run.material == material) {
@@ -265,7 +273,7 @@ impl<'s> Solid<'s> {
             }
             Item::Surface(i) => {
                 let [vertex, normal] = self.surfaces[i];
-                for face in &self.scene.surfaces[i].mesh.faces[run.faces.clone()] {
+                for face in &self.placed[i].mesh.faces[run.faces.clone()] {
                     out.face(face.corners.map(|k| (vertex + k, normal + k)));
                 }
             }
@@ -278,6 +286,9 @@ pub(super) struct Triangle {
     pub(super) owner: OwnerId,
     pub(super) material: MaterialId,
     pub(super) corners: [(u32, u32); 3],
+    /// The surface that it is a part of, by number; and whether that is a leaf or the like, through which light comes.
+    pub(super) surface: u32,
+    pub(super) is_thin: bool,
 }
 
 /// A triangle mesh in memory.
@@ -288,6 +299,8 @@ pub(super) struct Triangles {
     /// Of the triangles that come next.
     owner: OwnerId,
     material: MaterialId,
+    surface: u32,
+    is_thin: bool,
 }
 
 impl Points for Triangles {
@@ -302,7 +315,35 @@ impl Points for Triangles {
 
 impl Faces for Triangles {
     fn face(&mut self, corners: [(u32, u32); 3]) {
-        self.faces.push(Triangle { owner: self.owner, material: self.material, corners });
+        let Triangles { owner, material, surface, is_thin, .. } = *self;
+        self.faces.push(Triangle { owner, material, corners, surface, is_thin });
+    }
+}
+
+impl Triangles {
+    /// Everything in a solid, in string order; stems only if they are to be `kept`.
+    pub(super) fn of(solid: &Solid, kept: impl Fn(&Segment) -> bool) -> Triangles {
+        let [vertices, normals] = solid.counts.map(|count| count as usize);
+        let mut mesh = Triangles {
+            vertices: Vec::with_capacity(vertices),
+            normals: Vec::with_capacity(normals),
+            faces: Vec::with_capacity(2 * vertices),
+            owner: OwnerId::default(),
+            material: MaterialId::STEM,
+            surface: 0,
+            is_thin: false,
+        };
+        solid.points(0..solid.len(), &mut mesh);
+        let mut items = solid.by_owner();
+        items.retain(|&n| match solid.item(n as usize) {
+            Item::Stem(piece) => kept(solid.tubes.segment(piece)),
+            _ => true,
+        });
+        solid.faces(&items, &mut mesh, |mesh, owner, material, is_stem| {
+            (mesh.owner, mesh.material, mesh.is_thin) = (owner, material, !is_stem);
+            mesh.surface += 1;
+        });
+        mesh
     }
 }
 
@@ -313,23 +354,5 @@ pub(super) fn triangles(
     sides: usize,
     kept: impl Fn(&Segment) -> bool,
 ) -> Triangles {
-    let solid = Solid::new(scene, fit, sides);
-    let [vertices, normals] = solid.counts.map(|count| count as usize);
-    let mut mesh = Triangles {
-        vertices: Vec::with_capacity(vertices),
-        normals: Vec::with_capacity(normals),
-        faces: Vec::with_capacity(2 * vertices),
-        owner: OwnerId::default(),
-        material: MaterialId::STEM,
-    };
-    solid.points(0..solid.len(), &mut mesh);
-    let mut items = solid.by_owner();
-    items.retain(|&n| match solid.item(n as usize) {
-        Item::Stem(piece) => kept(solid.tubes.segment(piece)),
-        _ => true,
-    });
-    solid.faces(&items, &mut mesh, |mesh, owner, material| {
-        (mesh.owner, mesh.material) = (owner, material);
-    });
-    mesh
+    Triangles::of(&Solid::new(scene, fit, sides), kept)
 }

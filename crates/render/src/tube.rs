@@ -112,7 +112,7 @@ struct Structure {
 }
 
 impl Structure {
-    fn of(segments: &[Segment], default_width: f64) -> Structure {
+    fn of(segments: &[Segment], default_width: f64, kept: impl Fn(usize) -> bool) -> Structure {
         let radii: Vec<[f64; 2]> =
             segments.iter().map(|s| s.widths.map(|w| w.resolve(default_width) / 2.0)).collect();
         let mut next = vec![NONE; segments.len()];
@@ -122,6 +122,8 @@ impl Structure {
             let Some(before) = segment.follows else { continue };
             ahead[before] = i;
             if next[before] == NONE
+                && kept(before)
+                && kept(i)
                 && segments[before].contour == segment.contour
                 && radii[before][1] > 0.0
                 && radii[i][0] > 0.0
@@ -167,8 +169,22 @@ impl Structure {
 
 impl<'s> Tubes<'s> {
     pub(super) fn new(scene: &'s Scene, style: TubeStyle) -> Tubes<'s> {
+        let sides = |radius: f64, _: Point| match style.sides {
+            0 => sides_for(radius, style.accuracy),
+            sides => sides.max(3),
+        };
+        Tubes::of(scene, style, sides, |_| true)
+    }
+
+    /// Tubes of the segments that are to be `kept`, with as many sides as `sides` tells for the radius and the place of each.
+    pub(super) fn of(
+        scene: &'s Scene,
+        style: TubeStyle,
+        sides: impl Fn(f64, Point) -> usize,
+        kept: impl Fn(usize) -> bool,
+    ) -> Tubes<'s> {
         let segments = &scene.segments[..];
-        let structure = Structure::of(segments, style.default_width);
+        let structure = Structure::of(segments, style.default_width, &kept);
         let mut tubes = Tubes {
             segments,
             profiles: Vec::new(),
@@ -178,18 +194,14 @@ impl<'s> Tubes<'s> {
         };
         let mut profiles: HashMap<(Option<u32>, usize), usize> = HashMap::new();
         let (mut members, mut parts) = (Vec::new(), Vec::new());
-        let firsts = (0..segments.len()).filter(|&i| !structure.continues[i] && structure.is_visible(i));
+        let firsts =
+            (0..segments.len()).filter(|&i| !structure.continues[i] && structure.is_visible(i) && kept(i));
         for first in firsts {
             members.clear();
             let next = |&i: &usize| Some(structure.next[i]).filter(|&i| i != NONE);
             members.extend(std::iter::successors(Some(first), next));
-            let sides = match style.sides {
-                0 => sides_for(
-                    members.iter().flat_map(|&i| structure.radii[i]).fold(0.0, f64::max),
-                    style.accuracy,
-                ),
-                sides => sides.max(3),
-            };
+            let widest = members.iter().flat_map(|&i| structure.radii[i]).fold(0.0, f64::max);
+            let sides = sides(widest, segments[first].start);
             let contour = segments[first].contour;
             let profile = *profiles.entry((contour, sides)).or_insert_with(|| {
                 let points = contour.and_then(|i| scene.contours.get(i as usize));

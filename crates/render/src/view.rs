@@ -47,6 +47,16 @@ impl View {
         Ok(View { azimuth, elevation, right, up: towards.cross(&right), towards })
     }
 
+    /// The unit vector towards the viewer.
+    pub(super) fn towards(&self) -> Vector {
+        self.towards
+    }
+
+    /// The direction in space that is to the right, up and towards the viewer by these lengths.
+    pub(super) fn space(&self, v: Vector) -> Vector {
+        self.right * v.x + self.up * v.y + self.towards * v.z
+    }
+
     /// A point in the axes of the view: to the right, up, and towards the viewer; scene units.
     pub fn see(&self, p: Point) -> Point {
         Point::new(self.right.dot(&p.coords), self.up.dot(&p.coords), self.towards.dot(&p.coords))

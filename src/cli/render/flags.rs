@@ -2,22 +2,31 @@
 
 use crate::cli::args::RenderArgs;
 use crate::cli::common::Failure;
-use crate::cli::values::{Background, LineWidth};
+use crate::cli::values::{Background, LineWidth, Sky};
 use crate::render::{Content, Fit, Format, Layout, Page, Picture, Size, Spacing, Survey, View};
+use crate::scene::Surroundings;
 
 fn usage(message: impl std::fmt::Display) -> Failure {
     Failure::Usage(format!("error: {message}\n"))
 }
 
-/// An empty survey in the chosen view.
+/// An empty survey in the chosen view, light and size.
 pub fn survey(args: &RenderArgs) -> Result<Survey, Failure> {
-    let view: View = args.view.parse().map_err(usage)?;
-    let survey = Survey::new(view);
+    let view: View = args.view.as_deref().unwrap_or("front").parse().map_err(usage)?;
+    let declared = Surroundings {
+        sun: args.light,
+        sky: args.sky.map(|Sky(colors)| colors),
+        camera: args.camera,
+        floor: None,
+    };
+    let survey = Survey::new(view).with_surroundings(declared).with_zoom(args.zoom.unwrap_or(1.0));
     let survey = if args.line_width.is_some() { survey.with_one_width() } else { survey };
-    Ok(match args.perspective {
+    let survey = match args.perspective {
         Some(field) => survey.with_perspective(field),
         None => survey,
-    })
+    };
+    let has_view = args.view.is_some() || args.perspective.is_some();
+    Ok(if has_view { survey.without_cameras() } else { survey })
 }
 
 /// Refuses flags that have no meaning for the format or the layout.
@@ -43,6 +52,10 @@ pub fn agree(args: &RenderArgs) -> Result<(), Failure> {
         }
         let given = [
             ("--perspective", args.perspective.is_some()),
+            ("--camera", args.camera.is_some()),
+            ("--zoom", args.zoom.is_some()),
+            ("--light", args.light.is_some()),
+            ("--sky", args.sky.is_some()),
             ("--width", args.width.is_some()),
             ("--size", args.size.is_some()),
             ("--background", args.background.is_some()),

@@ -1,6 +1,6 @@
 //! Bounds of scenes, before the default width of their lines is known.
 
-use super::{Point, Scene, Width};
+use super::{Point, Reach, Scene, Width};
 
 /// An upright box; empty if `low > high`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,16 +66,7 @@ impl Bounds {
 
     /// Includes a scene.
     pub fn add(&mut self, scene: &Scene) {
-        scene.each_point(|point, width| {
-            self.points.include(point, 0.0);
-            match width {
-                Width::Set(width) => self.known.include(point, width / 2.0),
-                Width::Default(factor) => {
-                    self.styled.include(point, 0.0);
-                    self.factor = self.factor.max(factor);
-                }
-            }
-        });
+        scene.reach(self);
     }
 
     /// Includes other bounds in the same coordinates.
@@ -115,6 +106,30 @@ impl Bounds {
             all.include(self.styled.high, radius);
         }
         Some([all.low, all.high])
+    }
+}
+
+impl Reach for Bounds {
+    fn covers(&self, rough: impl Iterator<Item = Point>) -> bool {
+        let [points, known] = [&self.points, &self.known];
+        let mut rough = rough;
+        rough.all(|p| {
+            (0..3).all(|i| {
+                let within = |block: &Block| block.low[i] < p[i] && p[i] < block.high[i];
+                within(points) && within(known)
+            })
+        })
+    }
+
+    fn include(&mut self, point: Point, width: Width) {
+        self.points.include(point, 0.0);
+        match width {
+            Width::Set(width) => self.known.include(point, width / 2.0),
+            Width::Default(factor) => {
+                self.styled.include(point, 0.0);
+                self.factor = self.factor.max(factor);
+            }
+        }
     }
 }
 

@@ -40,7 +40,8 @@ impl Color {
             } else {
                 c + (1.0 - c) * (strength - 1.0)
             };
-            (lit.clamp(0.0, 1.0) * 255.0).round() as u8
+            // To the nearest, without a call of the mathematical library.
+            (lit.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
         };
         Color { red: shade(r, 0.0), green: shade(g, 0.05), blue: shade(b, 0.15) }
     }

@@ -34,6 +34,7 @@ pub use patch::{Net, Patch, PatchFace, PatchSet};
 pub use surroundings::{Plant, Seedling, Surroundings, Viewpoint};
 
 use std::borrow::Cow;
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use dlsys_diagnostic::Diagnostic;
@@ -133,6 +134,26 @@ pub struct Scene {
     pub warnings: Vec<Diagnostic>,
 }
 
+/// Takes in the extent of a scene: points whose hull contains all of it.
+pub trait Reach {
+    /// True if nothing within the hull of these points can add anything: then its points are left out.
+    fn covers(&self, _rough: impl Iterator<Item = Point>) -> bool {
+        false
+    }
+
+    /// Takes in a point, with the width of the line there.
+    fn include(&mut self, point: Point, width: Width);
+}
+
+/// Every point, for a function.
+struct Visit<'f>(&'f mut dyn FnMut(Point, Width));
+
+impl Reach for Visit<'_> {
+    fn include(&mut self, point: Point, width: Width) {
+        (self.0)(point, width);
+    }
+}
+
 impl Scene {
     /// Removes all elements and warnings; palette, shapes and memory stay.
     pub fn clear(&mut self) {
@@ -172,20 +193,64 @@ impl Scene {
         Cow::Owned(scene)
     }
 
+    /// The surfaces and patches as meshes for a picture, in the order of [`tessellated`](Scene::tessellated): each within
+    /// `accuracy` (scene units) of its shape, which may depend on its place.
+    pub fn drafted(&self, accuracy: impl Fn(Point) -> f64) -> Cow<'_, [Surface]> {
+        if self.patches.is_empty() && self.surfaces.iter().all(|surface| surface.patches.is_none()) {
+            return Cow::Borrowed(&self.surfaces);
+        }
+        let placed = self.surfaces.iter().map(|surface| {
+            let mut surface = surface.clone();
+            if let Some(patches) = surface.patches.take() {
+                let place = surface.placement;
+                surface.mesh = patches.draft(accuracy(place.origin) / place.largest());
+            }
+            surface
+        });
+        let patches = self.patches.iter().map(|patch| patch.draft(accuracy(patch.net[0][0])));
+        Cow::Owned(placed.chain(patches).collect())
+    }
+
     /// Visits points whose hull contains all elements, each with the width of the line there; corners of surfaces
     /// and polygons have the width 0.
     pub fn each_point(&self, mut visit: impl FnMut(Point, Width)) {
+        self.reach(&mut Visit(&mut visit));
+    }
+
+    /// Shows the extent of all elements to `reach`, plants of other models included. Lines of default width in a plant have the width
+    /// that the extent of that plant gives them.
+    pub fn reach(&self, reach: &mut impl Reach) {
         for segment in &self.segments {
-            visit(segment.start, segment.widths[0]);
-            visit(segment.end, segment.widths[1]);
+            reach.include(segment.start, segment.widths[0]);
+            reach.include(segment.end, segment.widths[1]);
         }
-        let corners = self.polygons.iter().flat_map(|polygon| polygon.vertices.iter().copied());
-        let surfaces = self
-            .surfaces
-            .iter()
-            .flat_map(|surface| surface.mesh.vertices.iter().map(|&v| surface.placement.point(v)));
-        let patches = self.patches.iter().flat_map(Patch::hull);
-        corners.chain(surfaces).chain(patches).for_each(|point| visit(point, Width::Set(0.0)));
+        let mut include = |point| reach.include(point, Width::Set(0.0));
+        self.polygons.iter().flat_map(|polygon| polygon.vertices.iter().copied()).for_each(&mut include);
+        for surface in &self.surfaces {
+            surface.mesh.vertices.iter().for_each(|&v| include(surface.placement.point(v)));
+        }
+        for patch in &self.patches {
+            if !reach.covers(patch.net.iter().flatten().copied()) {
+                patch.hull().for_each(|point| reach.include(point, Width::Set(0.0)));
+            }
+        }
+        let mut known: HashMap<*const Scene, Bounds> = HashMap::new();
+        for plant in &self.plants {
+            let bounds = known.entry(Arc::as_ptr(&plant.scene)).or_insert_with(|| Bounds::of(&plant.scene));
+            let width = bounds.default_width();
+            let Some([low, high]) = bounds.corners(width) else { continue };
+            let corner = |i: usize| {
+                let side = |k: usize| if i >> k & 1 == 0 { low[k] } else { high[k] };
+                plant.placement.point(Point::new(side(0), side(1), side(2)))
+            };
+            if !reach.covers((0..8).map(corner)) {
+                let mut include = |point, of_line: Width| {
+                    let of_line = of_line.resolve(width) * plant.placement.largest();
+                    reach.include(plant.placement.point(point), Width::Set(of_line));
+                };
+                plant.scene.reach(&mut Visit(&mut include));
+            }
+        }
     }
 
     /// Adds a module that draws something. Modules are added in string order, each once.

@@ -46,12 +46,21 @@ impl Patch {
 
     /// As a mesh in its place; `accuracy` is in scene units.
     pub fn surface(&self, accuracy: f64) -> Surface {
+        self.placed(accuracy, Steps::Powers)
+    }
+
+    /// The same for a picture, of fewer triangles: pieces are any number, not a power of two.
+    pub fn draft(&self, accuracy: f64) -> Surface {
+        self.placed(accuracy, Steps::Whole)
+    }
+
+    fn placed(&self, accuracy: f64, steps: Steps) -> Surface {
         let origin = self.net[0][0];
         let reach = self.net.iter().flatten().map(|p| (p - origin).amax()).fold(0.0, f64::max);
         let scale = if reach > 0.0 { reach } else { 1.0 };
         let unit = self.net.map(|row| row.map(|p| Point::from((p - origin) / scale)));
         let mut mesh = Mesh::new();
-        tessellate(&unit, accuracy / scale, self.material, false, &mut mesh);
+        tessellate(&unit, accuracy / scale, steps, self.material, false, &mut mesh);
         let placement = Placement::uniform(origin, [Vector::x(), Vector::y(), Vector::z()], scale);
         Surface { mesh: Arc::new(mesh), patches: None, placement, tint: None, owner: self.owner }
     }
@@ -72,8 +81,10 @@ pub struct PatchFace {
 #[derive(Debug)]
 pub struct PatchSet {
     shape: Curved,
-    /// Meshes that were asked for, by the exponent of their accuracy.
+    /// Meshes that were made so far, by the exponent of their accuracy.
     meshes: Mutex<BTreeMap<i32, Arc<Mesh>>>,
+    /// Meshes for pictures, by the exponent of their accuracy.
+    drafts: Mutex<BTreeMap<i32, Arc<Mesh>>>,
 }
 
 #[derive(Debug)]
@@ -85,12 +96,12 @@ enum Curved {
 impl PatchSet {
     /// The surface made of these patches.
     pub fn new(faces: Vec<PatchFace>) -> PatchSet {
-        PatchSet { shape: Curved::Patches(faces), meshes: Mutex::default() }
+        PatchSet { shape: Curved::Patches(faces), meshes: Mutex::default(), drafts: Mutex::default() }
     }
 
     /// A ball of diameter 1 around the origin; a colour replaces its material.
     pub fn ball(material: MaterialId) -> PatchSet {
-        PatchSet { shape: Curved::Ball(material), meshes: Mutex::default() }
+        PatchSet { shape: Curved::Ball(material), meshes: Mutex::default(), drafts: Mutex::default() }
     }
 
     /// The surface as triangles that deviate from it by no more than `accuracy`, in its own units. Meshes
@@ -98,20 +109,36 @@ impl PatchSet {
     pub fn mesh(&self, accuracy: f64) -> Arc<Mesh> {
         // With 64 pieces an edge is as fine as it gets; coarser than a surface of unit size makes no sense.
         let exponent = (accuracy.log2() / 2.0).floor().clamp(-20.0, 0.0) as i32;
+        self.kept(&self.meshes, exponent, 4_f64.powi(exponent), Steps::Powers)
+    }
+
+    /// The same for a picture, where the surface may be small: accuracies within a factor of two share a mesh, and a
+    /// surface that is less than `accuracy` in size is a few triangles.
+    pub fn draft(&self, accuracy: f64) -> Arc<Mesh> {
+        let exponent = accuracy.log2().floor().clamp(-40.0, 3.0) as i32;
+        self.kept(&self.drafts, exponent, 2_f64.powi(exponent), Steps::Whole)
+    }
+
+    fn kept(
+        &self,
+        meshes: &Mutex<BTreeMap<i32, Arc<Mesh>>>,
+        exponent: i32,
+        accuracy: f64,
+        steps: Steps,
+    ) -> Arc<Mesh> {
         let make = || {
-            let accuracy = 4_f64.powi(exponent);
             let mut mesh = Mesh::new();
             match &self.shape {
                 Curved::Patches(faces) => {
                     for face in faces {
-                        tessellate(&face.net, accuracy, face.material, face.takes_tint, &mut mesh);
+                        tessellate(&face.net, accuracy, steps, face.material, face.takes_tint, &mut mesh);
                     }
                 }
                 Curved::Ball(material) => mesh = ball::mesh(accuracy, FINEST, *material),
             }
             Arc::new(mesh)
         };
-        match self.meshes.lock() {
+        match meshes.lock() {
             Ok(mut meshes) => meshes.entry(exponent).or_insert_with(make).clone(),
             // Another thread panicked; the mesh is made again.
             Err(_) => make(),
@@ -134,8 +161,20 @@ fn bend(p: &[Point; 4]) -> f64 {
     second(0).max(second(1))
 }
 
-/// The least power of two whose square is at least this.
-fn pieces(square: f64) -> usize {
+/// The numbers of pieces that an edge may have.
+#[derive(Clone, Copy, PartialEq)]
+enum Steps {
+    /// Powers of two: few numbers, so that the mesh of a growing patch does not change all the time.
+    Powers,
+    /// Any, so that there are no more triangles than the accuracy asks for.
+    Whole,
+}
+
+/// The least number of pieces whose square is at least this.
+fn pieces(square: f64, steps: Steps) -> usize {
+    if steps == Steps::Whole {
+        return (square.sqrt().ceil() as usize).clamp(1, FINEST);
+    }
     let mut n = 1;
     while n < FINEST && ((n * n) as f64) < square {
         n *= 2;
@@ -145,13 +184,13 @@ fn pieces(square: f64) -> usize {
 
 /// Pieces of an edge: a cubic's second derivative is at most 6 times its second differences, a chord over
 /// 1/n deviates by 1/8 of that over n².
-fn edge_pieces(edge: &[Point; 4], accuracy: f64) -> usize {
-    pieces(6.0 * bend(edge) / (8.0 * accuracy))
+fn edge_pieces(edge: &[Point; 4], accuracy: f64, steps: Steps) -> usize {
+    pieces(6.0 * bend(edge) / (8.0 * accuracy), steps)
 }
 
 /// Pieces along rows (from column to column) and along columns that keep the whole patch accurate, as few as
 /// will do.
-fn grid_pieces(net: &Net, accuracy: f64) -> (usize, usize) {
+fn grid_pieces(net: &Net, accuracy: f64, steps: Steps) -> (usize, usize) {
     let along = |of: &dyn Fn(usize) -> [Point; 4]| (0..4).map(|i| bend(&of(i))).fold(0.0, f64::max);
     let (uu, vv) = (6.0 * along(&|r| net[r]), 6.0 * along(&|c| column(net, c)));
     let twist = (0..9)
@@ -161,6 +200,20 @@ fn grid_pieces(net: &Net, accuracy: f64) -> (usize, usize) {
         })
         .fold(0.0, f64::max);
     let uv = 9.0 * twist;
+    if steps == Steps::Whole {
+        // For each number of rows the least number of columns: where a quadratic in one over it is zero.
+        let columns = |rows: usize| {
+            let v = rows as f64;
+            let (half, rest) = (uv / v, 8.0 * accuracy - vv / (v * v));
+            let root = half + (half * half + uu * rest).sqrt();
+            let columns = if root > 0.0 { root / rest } else { 1.0 };
+            (rest > 0.0 && columns <= FINEST as f64).then(|| ((columns.ceil() as usize).max(1), rows))
+        };
+        let pairs = (1..=FINEST).filter_map(columns);
+        return pairs
+            .min_by_key(|(columns, rows)| (columns * rows, columns.abs_diff(*rows)))
+            .unwrap_or((FINEST, FINEST));
+    }
     let exponents = 0..=FINEST.trailing_zeros();
     let pairs = exponents.clone().flat_map(|i| exponents.clone().map(move |j| (1_usize << i, 1_usize << j)));
     pairs
@@ -173,31 +226,38 @@ fn grid_pieces(net: &Net, accuracy: f64) -> (usize, usize) {
 }
 
 /// Adds the triangles of a patch.
-fn tessellate(net: &Net, accuracy: f64, material: MaterialId, takes_tint: bool, mesh: &mut Mesh) {
+fn tessellate(
+    net: &Net,
+    accuracy: f64,
+    steps: Steps,
+    material: MaterialId,
+    takes_tint: bool,
+    mesh: &mut Mesh,
+) {
     let accuracy = if accuracy > 0.0 { accuracy } else { f64::MIN_POSITIVE };
     // Half of the deviation for the edge, half for the triangles that lead to it.
-    let [bottom, top, left, right] = edges(net).map(|edge| edge_pieces(&edge, accuracy / 2.0));
-    let (columns, rows) = grid_pieces(net, accuracy);
+    let [bottom, top, left, right] = edges(net).map(|edge| edge_pieces(&edge, accuracy / 2.0, steps));
+    let (columns, rows) = grid_pieces(net, accuracy, steps);
     let (columns, rows) = (columns.max(bottom).max(top), rows.max(left).max(right));
-    // Of the grid's vertices on an edge those that the edge has; the others fall upon the nearest.
+    // On an edge the grid's vertices fall upon the nearest of those that the edge has: the number of that one, the first vertex of the
+    // grid that falls upon it, and its parameter.
     let snap = |i: usize, count: usize, kept: usize| {
-        let step = count / kept;
-        (i + step / 2) / step * step
+        let nearest = (i * kept + count / 2) / count;
+        ((nearest * count).div_ceil(kept), nearest as f64 / kept as f64)
     };
     let first = mesh.vertices.len() as u32;
     let mut numbers = vec![u32::MAX; (columns + 1) * (rows + 1)];
     let mut number = |i: usize, j: usize, mesh: &mut Mesh| {
-        let (mut i, mut j) = (i, j);
+        let ((mut i, mut u), (mut j, mut v)) = ((i, i as f64 / columns as f64), (j, j as f64 / rows as f64));
         if j == 0 || j == rows {
-            i = snap(i, columns, if j == 0 { bottom } else { top });
+            (i, u) = snap(i, columns, if j == 0 { bottom } else { top });
         }
         if i == 0 || i == columns {
-            j = snap(j, rows, if i == 0 { left } else { right });
+            (j, v) = snap(j, rows, if i == 0 { left } else { right });
         }
         let place = &mut numbers[j * (columns + 1) + i];
         if *place == u32::MAX {
             *place = mesh.vertices.len() as u32;
-            let (u, v) = (i as f64 / columns as f64, j as f64 / rows as f64);
             mesh.vertices.push(point(net, u, v));
             mesh.normals.push(normal(net, u, v));
         }
@@ -305,7 +365,7 @@ mod tests {
 
     fn mesh(net: &Net, accuracy: f64) -> Mesh {
         let mut mesh = Mesh::new();
-        tessellate(net, accuracy, MaterialId::LEAF, true, &mut mesh);
+        tessellate(net, accuracy, Steps::Powers, MaterialId::LEAF, true, &mut mesh);
         mesh
     }
 

@@ -23,7 +23,7 @@ class Painter {
     this.geometry = new Geometry(recording);
     const { surface, light } = recording.shaders;
     const program = (this.program = this.compiled(surface, light));
-    const uniforms = ["view", "projection", "relief", "falloff", "near"];
+    const uniforms = ["view", "projection", "relief", "falloff", "near", "sun", "zenith", "tint"];
     this.places = Object.fromEntries(uniforms.map((name) => [name, gl.getUniformLocation(program, name)]));
     gl.useProgram(program);
     this.corners = gl.createBuffer();
@@ -62,6 +62,19 @@ class Painter {
     this.triangles = geometry.used / 3;
   }
 
+  // The declared light, in the directions of the view; its shadows are in pictures only.
+  light(view) {
+    const { gl, places } = this;
+    const { light } = this.recording;
+    if (!light) return gl.uniform3f(places.tint, -1, 0, 0);
+    const seen = ([x, y, z]) => [0, 1, 2].map((i) => view[i] * x + view[4 + i] * y + view[8 + i] * z);
+    const [zenith, horizon] = (light.sky || ["#b4cdf0", "#f2efe8"]).map((hex) => [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16) / 255));
+    const mean = zenith.map((c, i) => 0.6 * c + 0.4 * horizon[i]);
+    gl.uniform3fv(places.sun, light.sun ? seen(light.sun) : [0, 0, 0]);
+    gl.uniform3fv(places.zenith, seen([0, 1, 0]));
+    gl.uniform3fv(places.tint, mean.map((c) => c / Math.max(1e-3, ...mean)));
+  }
+
   // Draws what was taken in last.
   paint(camera, width, height) {
     const { gl, places } = this;
@@ -76,6 +89,7 @@ class Painter {
     gl.uniform1f(places.relief, Math.min(1, depth / 0.02));
     gl.uniform1f(places.falloff, (0.16 * Math.min(1, depth / 0.2)) / extent);
     gl.uniform1f(places.near, near);
+    this.light(view);
     gl.drawElements(gl.TRIANGLES, 3 * this.triangles, gl.UNSIGNED_INT, 0);
   }
 }

@@ -30,6 +30,7 @@ class Player {
       size.map((side) => side * extent),
       outermost(recording),
     );
+    if (recording.camera) this.camera.look(...recording.camera);
     this.painter = new Painter(this.elements.plant, recording);
     this.moments = [...new Set(recording.events.map(([time]) => time))];
     this.describe();

@@ -1,4 +1,5 @@
-// The light of pictures (export/light.rs): one lamp, fixed to the viewer; a gloss; things get darker with their distance.
+// The light of pictures (crates/render/src/light.rs): one lamp, fixed to the viewer; light from all directions, more of it from above; light
+// that comes through leaves; a gloss; things get darker with their distance. Or a declared sun and sky, without shadows.
 
 in vec3 seen;
 in vec3 facing;
@@ -9,11 +10,20 @@ uniform float relief;
 // Light that is lost for a unit of depth, and the depth from which.
 uniform float falloff;
 uniform float near;
+// Towards the declared sun, to the right, up and towards the viewer; 0 if there is none.
+uniform vec3 sun;
+// Up, in the same directions.
+uniform vec3 zenith;
+// Tint of the light of a declared sky; its first number is negative if there is neither sun nor sky.
+uniform vec3 tint;
 
 out vec4 painted;
 
 const vec3 LAMP = vec3(-0.36, 0.583, 0.728361861);
-const float DIFFUSE = 0.52;
+const float DIFFUSE = 0.48;
+const float WRAP = 0.25;
+const float TRANSMITTED = 0.55;
+const float ABOVE = 0.08;
 const float GLOSS = 0.16;
 const float SHARPNESS = 24.0;
 
@@ -21,13 +31,31 @@ void main() {
     vec3 normal = normalize(facing);
     // Of what is seen from behind, the back is lit.
     if (!gl_FrontFacing) normal = -normal;
-    vec3 half_way = normalize(LAMP + vec3(0.0, 0.0, 1.0));
-    float gloss = pow(max(dot(normal, half_way), 0.0), SHARPNESS) - pow(half_way.z, SHARPNESS);
-    float strength = 1.0 - falloff * max(near - seen.z, 0.0)
-        + relief * (DIFFUSE * (max(dot(normal, LAMP), 0.0) - LAMP.z) + GLOSS * gloss);
+    vec3 color = shade;
+    float strength;
+    if (tint.r < 0.0) {
+        vec3 half_way = normalize(LAMP + vec3(0.0, 0.0, 1.0));
+        float gloss = pow(max(dot(normal, half_way), 0.0), SHARPNESS) - pow(half_way.z, SHARPNESS);
+        float cosine = dot(normal, LAMP);
+        // What is closed shows no side that light comes through.
+        float diffuse = (max(cosine + WRAP, 0.0) - (LAMP.z + WRAP)) / (1.0 + WRAP) + TRANSMITTED * max(-cosine, 0.0);
+        strength = 1.0 - falloff * max(near - seen.z, 0.0) + relief * (DIFFUSE * diffuse + ABOVE * normal.y + GLOSS * gloss);
+    } else {
+        bool has_sun = dot(sun, sun) > 0.0;
+        float up = dot(normal, zenith);
+        float lit = (has_sun ? 0.56 : 1.25) * (0.5 + 0.5 * up) + 0.26 * (0.5 - 0.5 * up) + 0.04;
+        if (has_sun) {
+            float cosine = dot(normal, sun);
+            vec3 half_way = normalize(sun + vec3(0.0, 0.0, 1.0));
+            float gloss = cosine > 0.0 ? GLOSS * pow(max(dot(normal, half_way), 0.0), SHARPNESS) : 0.0;
+            lit += 0.66 * (cosine > 0.0 ? cosine : -TRANSMITTED * cosine) + gloss;
+        }
+        strength = 1.0 + relief * (lit - 1.0);
+        color *= mix(tint, vec3(1.0), clamp((strength - 0.35) / 0.5, 0.0, 1.0));
+    }
     vec3 shadow = vec3(0.0, 0.05, 0.15);
     vec3 lit = strength <= 1.0
-        ? shade * (shadow + (1.0 - shadow) * strength)
-        : shade + (1.0 - shade) * (strength - 1.0);
+        ? color * (shadow + (1.0 - shadow) * strength)
+        : color + (1.0 - color) * (strength - 1.0);
     painted = vec4(clamp(lit, 0.0, 1.0), 1.0);
 }

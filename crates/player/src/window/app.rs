@@ -142,8 +142,8 @@ impl Window {
             News::Life(life) => {
                 if self.look.is_none() || !self.touched && !self.life.as_ref().is_some_and(|l| l.whole) {
                     self.space = life.space.clone();
-                    let (azimuth, elevation, perspective) = (0.0, 0.0, true);
-                    self.look = Some(Viewpoint::at(&self.space, azimuth, elevation, perspective));
+                    let [azimuth, elevation] = self.space.front;
+                    self.look = Some(Viewpoint::at(&self.space, azimuth, elevation, true));
                 }
                 self.life = Some(*life);
                 self.aged = false;

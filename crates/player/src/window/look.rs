@@ -16,11 +16,17 @@ pub struct Space {
     pub corners: [Point; 2],
     /// Of a line of default width, in scene units.
     pub default_width: f64,
+    /// Azimuth and elevation of the camera that the model declares for its first frame, in degrees; else those of the front.
+    pub front: [f64; 2],
 }
 
 impl Default for Space {
     fn default() -> Space {
-        Space { corners: [Point::new(-0.5, -0.5, -0.5), Point::new(0.5, 0.5, 0.5)], default_width: 0.01 }
+        Space {
+            corners: [Point::new(-0.5, -0.5, -0.5), Point::new(0.5, 0.5, 0.5)],
+            default_width: 0.01,
+            front: [0.0; 2],
+        }
     }
 }
 
@@ -28,7 +34,12 @@ impl Space {
     /// What a survey has found; a cube if that is nothing.
     pub fn of(survey: &Survey) -> Space {
         let fit = survey.fit();
-        fit.bounds.map_or_else(Space::default, |corners| Space { corners, default_width: fit.default_width })
+        let front = survey.first_surroundings().camera.map_or([0.0; 2], |at| {
+            let away = at.eye - at.aim;
+            [away.x.atan2(away.z), away.y.atan2(away.x.hypot(away.z))].map(f64::to_degrees)
+        });
+        let default_width = fit.default_width;
+        fit.bounds.map_or_else(Space::default, |corners| Space { corners, default_width, front })
     }
 
     fn middle(&self) -> Point {
@@ -165,8 +176,11 @@ mod tests {
 
     #[test]
     fn everything_is_in_the_picture_from_every_side() {
-        let space =
-            Space { corners: [Point::new(1.0, 0.0, -1.0), Point::new(3.0, 9.0, 1.0)], default_width: 0.1 };
+        let space = Space {
+            corners: [Point::new(1.0, 0.0, -1.0), Point::new(3.0, 9.0, 1.0)],
+            default_width: 0.1,
+            front: [0.0; 2],
+        };
         for perspective in [false, true] {
             for (azimuth, elevation) in [(0.0, 0.0), (90.0, 0.0), (0.0, 90.0), (30.0, 20.0), (200.0, -50.0)] {
                 let look = Viewpoint::at(&space, azimuth, elevation, perspective);

@@ -12,7 +12,7 @@ use std::ops::Range;
 use crate::name::Names;
 use crate::text::{Corner, Text};
 use crate::triangles::{Faces, Points, Ring, Solid};
-use crate::{GENERATOR, number, relay};
+use crate::{GENERATOR, Page, floor, number, relay};
 use dlsys_geometry::scene::{MaterialId, OwnerId, Palette, Point, Scene, Vector};
 
 /// Name of the material library that all frames refer to.
@@ -42,7 +42,8 @@ impl Exporter for Obj {
         Drawing { scene, writer, title }: Drawing<'_>,
         out: &mut (dyn Write + Send),
     ) -> io::Result<()> {
-        let scene = &*scene.flattened();
+        let (scene, _) = floor::added(scene, &writer.fit, None);
+        let scene = &*scene;
         let solid = Solid::new(scene, &writer.fit, writer.sides);
         if solid.counts.contains(&u32::MAX) {
             return Err(io::Error::other("a mesh has at most 4e9 points: choose a coarser accuracy"));
@@ -73,7 +74,12 @@ impl Exporter for Obj {
     }
 
     fn companion(&self, scene: &Scene) -> Option<(&'static str, Vec<u8>)> {
-        Some((MATERIALS, materials(&scene.palette)))
+        let scene = scene.flattened();
+        let mut palette = scene.palette.clone();
+        if scene.surroundings.floor.is_some() {
+            palette.add("ground", Page::BACKGROUND);
+        }
+        Some((MATERIALS, materials(&palette)))
     }
 }
 
@@ -155,7 +161,7 @@ impl Draft {
     fn groups(&mut self, solid: &Solid, names: &Names, items: &[u32]) {
         let (mut group, mut of) = (None, None);
         let palette = &solid.scene.palette;
-        solid.faces(items, self, |draft, owner: OwnerId, material: MaterialId| {
+        solid.faces(items, self, |draft, owner: OwnerId, material: MaterialId, _| {
             if group != Some(owner) {
                 group = Some(owner);
                 draft.text.words(&[b"g ", names.get(owner).as_bytes(), b"\n"]);

@@ -3,10 +3,14 @@
 use std::io::{self, Write};
 
 use super::{Content, Description, Drawing, Exporter};
+use crate::lens::Lens;
+use crate::light::Spot;
+use crate::lighting::Lighting;
 use crate::raster::{self, Corner, Image};
-use crate::triangles::{self, Triangles};
-use crate::{Fit, Page, Smoothness};
-use dlsys_geometry::scene::{Color, Point, Scene, Vector};
+use crate::stage::Stage;
+use crate::triangles::Triangles;
+use crate::{Fit, Page, Smoothness, shot};
+use dlsys_geometry::scene::{Color, MaterialId, Point, Scene, Vector};
 
 /// How far a tube's outline may be from a circle, in pixels.
 const ROUNDNESS: f64 = 0.1;
@@ -32,11 +36,9 @@ impl Exporter for Png {
         Drawing { scene, writer, title }: Drawing<'_>,
         out: &mut (dyn Write + Send),
     ) -> io::Result<()> {
-        let page = &writer.page;
-        let image = picture(scene, &writer.fit, page.pixels, page.placement(), Smoothness::Fine, 1);
-        let mut canvas = Canvas::new(page);
-        canvas.add(&image, [0, 0], 1.0, Meeting::Over);
-        out.write_all(&canvas.encode(title))
+        let (fit, page) = writer.fit.for_frame(scene, &writer.page);
+        let image = picture(scene, &fit, page.pixels, page.placement(), Smoothness::Fine, 1);
+        out.write_all(&encode(&page, title, fit.sky(scene), &image))
     }
 }
 
@@ -47,44 +49,55 @@ pub(crate) fn picture(
     scene: &Scene,
     fit: &Fit,
     size: [u32; 2],
-    [a, b, c]: [f64; 3],
+    placement: [f64; 3],
     smoothness: Smoothness,
     threads: usize,
 ) -> Image {
-    let mesh = triangles::triangles(scene, fit, sides(scene, fit, a), |_| true);
-    let lit = Lit::new(&mesh, fit, [a, b, c]);
-    let corners = |n: usize| lit.corners(n);
-    let shade = |n: usize, weights: [f64; 3]| {
-        scene.palette.get(mesh.faces[n].material).color.lit(lit.strength(n, weights))
-    };
-    let count = mesh.faces.len();
+    let lens = Lens::new(fit, size, placement);
+    let stage = Stage::new(scene, fit, &lens);
+    let lighting = Lighting::new(scene, fit, lens.scale(), threads, None);
     match smoothness {
-        Smoothness::Fine => raster::draw(&raster::SIXTEEN, threads, size, count, corners, shade),
-        Smoothness::Quick => raster::draw(&raster::FOUR, threads, size, count, corners, shade),
+        Smoothness::Fine => shot::draw(&raster::SIXTEEN, threads, &stage, &lens, &lighting),
+        Smoothness::Quick => shot::draw(&raster::FOUR, threads, &stage, &lens, &lighting),
     }
 }
 
 /// Triangles in pixels, and the light on them.
 pub(crate) struct Lit<'m> {
     mesh: &'m Triangles,
-    fit: &'m Fit,
+    lighting: Lighting<'m>,
+    /// The material of the floor.
+    floor: Option<MaterialId>,
     /// By vertex: pixels to the right and down, and depth in scene units.
     places: Vec<[f64; 3]>,
+    /// By vertex: as the camera projects it.
+    seen: Vec<Point>,
     normals: Vec<Vector>,
     scale: f64,
 }
 
 impl<'m> Lit<'m> {
-    /// A point that the camera sees at x, y is at `a x + b` and `c - a y` pixels.
-    pub(crate) fn new(mesh: &'m Triangles, fit: &'m Fit, [a, b, c]: [f64; 3]) -> Lit<'m> {
+    /// The triangles of a scene, whose floor has a material of its own. A point that the camera sees at x, y is at `a x + b` and
+    /// `c - a y` pixels.
+    pub(crate) fn new(
+        scene: &Scene,
+        mesh: &'m Triangles,
+        fit: &'m Fit,
+        [a, b, c]: [f64; 3],
+        floor: Option<MaterialId>,
+    ) -> Lit<'m> {
         let scale = if fit.extent > 0.0 { 1.0 / fit.extent } else { 1.0 };
-        let place = |p: &Point| {
-            let p = fit.camera.project(*p);
-            [a * p.x + b, c - a * p.y, p.z]
-        };
-        let places = mesh.vertices.iter().map(place).collect();
+        let seen: Vec<Point> = mesh.vertices.iter().map(|p| fit.camera.project(*p)).collect();
+        let places = seen.iter().map(|p| [a * p.x + b, c - a * p.y, p.z]).collect();
         let normals = mesh.normals.iter().map(|&n| fit.camera.direction(n)).collect();
-        Lit { mesh, fit, places, normals, scale }
+        Lit { mesh, lighting: Lighting::new(scene, fit, a, 1, floor), floor, places, seen, normals, scale }
+    }
+
+    /// Moves the origin of pixels to another one.
+    pub(crate) fn shift(&mut self, [right, down]: [f64; 2]) {
+        for [x, y, _] in &mut self.places {
+            (*x, *y) = (*x - right, *y - down);
+        }
     }
 
     /// The corners of a triangle.
@@ -102,14 +115,31 @@ impl<'m> Lit<'m> {
         let [p, q, r] = face.corners.map(|(vertex, _)| self.places[vertex as usize]);
         // Pixels go down.
         let facing = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]) < 0.0;
-        let (mut normal, mut depth) = (Vector::zeros(), 0.0);
+        let (mut normal, mut seen) = (Vector::zeros(), Vector::zeros());
         for (k, weight) in weights.into_iter().enumerate() {
             let (vertex, at) = face.corners[k];
             normal += self.normals[at as usize] * weight;
-            depth += self.places[vertex as usize][2] * weight;
+            seen += self.seen[vertex as usize].coords * weight;
+        }
+        if self.floor == Some(face.material) {
+            return self.lighting.floor_strength(Point::from(seen));
         }
         let normal = normal.try_normalize(1e-12).unwrap_or_else(Vector::z) * if facing { 1.0 } else { -1.0 };
-        self.fit.light.strength(normal, depth)
+        self.lighting.strength(&Spot { normal, seen: Point::from(seen), is_thin: face.is_thin })
+    }
+
+    /// The colour of a material in light of this strength, before a background.
+    pub(crate) fn color(
+        &self,
+        scene: &Scene,
+        material: MaterialId,
+        strength: f64,
+        background: Option<Color>,
+    ) -> Color {
+        if self.floor == Some(material) {
+            return self.lighting.floor_over(background, strength);
+        }
+        self.lighting.color(scene.palette.get(material).color, strength)
     }
 }
 
@@ -175,8 +205,7 @@ impl Canvas<'_> {
     /// The file. `title` is for people.
     pub(crate) fn encode(&self, title: &str) -> Vec<u8> {
         let background = self.page.background.map(|Color { red, green, blue }| [red, green, blue]);
-        let opaque = background.is_some();
-        let mut data = Vec::with_capacity(self.pixels.len() * if opaque { 3 } else { 4 });
+        let mut data = Vec::with_capacity(self.pixels.len() * if background.is_some() { 3 } else { 4 });
         for &[red, green, blue, opacity] in &self.pixels {
             let (color, opacity) = ([red, green, blue].map(u32::from), u32::from(opacity));
             match background {
@@ -191,21 +220,63 @@ impl Canvas<'_> {
                 }
             }
         }
-        let mut bytes = Vec::new();
-        let [width, height] = self.page.pixels;
-        let mut encoder = png::Encoder::new(&mut bytes, width, height);
-        encoder.set_color(if opaque { png::ColorType::Rgb } else { png::ColorType::Rgba });
-        encoder.set_depth(png::BitDepth::Eight);
-        // PNG's own texts are of another alphabet.
-        let _ = encoder.add_itxt_chunk("Title".to_owned(), title.to_owned());
-        // Writing to memory does not fail, and the sizes are right.
-        let written = encoder.write_header().and_then(|mut writer| {
-            writer.write_image_data(&data)?;
-            writer.finish()
-        });
-        debug_assert!(written.is_ok(), "{written:?}");
-        bytes
+        file(self.page, title, &data)
     }
+}
+
+/// The file of one image that fills a page; a sky (zenith, horizon) stands behind it where there is a background.
+fn encode(page: &Page, title: &str, sky: Option<[Color; 2]>, image: &Image) -> Vec<u8> {
+    let mut data = Vec::with_capacity(image.pixels.len() * if page.background.is_some() { 3 } else { 4 });
+    for (line, row) in image.pixels.chunks_exact(image.width.max(1)).enumerate() {
+        let background = page.background.map(|color| match sky {
+            Some([zenith, horizon]) => between(zenith, horizon, line, image.height),
+            None => [color.red, color.green, color.blue],
+        });
+        for &[red, green, blue, opacity] in row {
+            let (color, open) = ([red, green, blue], u32::from(255 - opacity));
+            match background {
+                Some(_) if open == 0 => data.extend(color),
+                Some(background) if open == 255 => data.extend(background),
+                Some(background) => data.extend([0, 1, 2].map(|k| {
+                    let behind = (u32::from(background[k]) * open + 127) / 255;
+                    (u32::from(color[k]) + behind).min(255) as u8
+                })),
+                None if open == 0 => data.extend([red, green, blue, 255]),
+                None => {
+                    let whole = u32::from(opacity.max(1));
+                    data.extend(color.map(|c| ((u32::from(c) * 255 + whole / 2) / whole).min(255) as u8));
+                    data.push(opacity);
+                }
+            }
+        }
+    }
+    file(page, title, &data)
+}
+
+/// The sky behind a line of a picture: the colour of the zenith above, that of the horizon below.
+fn between(zenith: Color, horizon: Color, line: usize, height: usize) -> [u8; 3] {
+    let part = (line as f64 + 0.5) / height.max(1) as f64;
+    let mix = |a: u8, b: u8| (f64::from(a) + (f64::from(b) - f64::from(a)) * part + 0.5) as u8;
+    [mix(zenith.red, horizon.red), mix(zenith.green, horizon.green), mix(zenith.blue, horizon.blue)]
+}
+
+/// The file of a page with this data, of three bytes a pixel, or four if there is no background.
+fn file(page: &Page, title: &str, data: &[u8]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let [width, height] = page.pixels;
+    let mut encoder = png::Encoder::new(&mut bytes, width, height);
+    encoder.set_color(if page.background.is_some() { png::ColorType::Rgb } else { png::ColorType::Rgba });
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::Fast);
+    // PNG's own texts are of another alphabet.
+    let _ = encoder.add_itxt_chunk("Title".to_owned(), title.to_owned());
+    // Writing to memory does not fail, and the sizes are right.
+    let written = encoder.write_header().and_then(|mut writer| {
+        writer.write_image_data(data)?;
+        writer.finish()
+    });
+    debug_assert!(written.is_ok(), "{written:?}");
+    bytes
 }
 
 #[cfg(test)]

@@ -5,10 +5,11 @@ use std::io::{self, Write};
 use super::{Content, Description, Drawing, Exporter};
 use svg::Document;
 use svg::node::Blob;
-use svg::node::element::{Group, Rectangle, Title};
+use svg::node::element::{Definitions, Group, LinearGradient, Rectangle, Stop, Title};
 
 use crate::painter::{self, Style, text};
-use crate::{Fit, Page};
+use crate::{Fit, Page, floor};
+use dlsys_geometry::scene::Color;
 
 /// Scalable Vector Graphics.
 pub(crate) struct Svg;
@@ -23,19 +24,22 @@ impl Exporter for Svg {
         Drawing { scene, writer, title }: Drawing<'_>,
         out: &mut (dyn Write + Send),
     ) -> io::Result<()> {
-        let style = style(&writer.fit, &writer.page);
-        out.write_all(around(&writer.page, title, painter::elements(scene, style, true, "")).as_bytes())
+        let (fit, page) = writer.fit.for_frame(scene, &writer.page);
+        let sky = fit.sky(scene);
+        let (scene, floor) = floor::added(scene, &fit, Some(&page));
+        let style = Style { floor, ..style(&fit, &page) };
+        out.write_all(around(&page, title, sky, painter::elements(&scene, style, true, "")).as_bytes())
     }
 }
 
 /// How frames are painted on a page.
 pub(crate) fn style<'a>(fit: &'a Fit, page: &Page) -> Style<'a> {
     let [pixels, ..] = page.placement();
-    Style { fit, scale: page.picture.scale, pixels }
+    Style { fit, scale: page.picture.scale, pixels, background: page.background, floor: None }
 }
 
-/// The document of a page with these elements, each with its line's end.
-pub(crate) fn around(page: &Page, title: &str, mut elements: String) -> String {
+/// The document of a page with these elements, each with its line's end. A sky (zenith, horizon) stands in place of the background.
+pub(crate) fn around(page: &Page, title: &str, sky: Option<[Color; 2]>, mut elements: String) -> String {
     let view_box = page.picture.view_box();
     let [left, top, width, height] = view_box;
     elements.truncate(elements.trim_end().len());
@@ -50,12 +54,21 @@ pub(crate) fn around(page: &Page, title: &str, mut elements: String) -> String {
         document = document.set("xmlns:xlink", "http://www.w3.org/1999/xlink");
     }
     if let Some(color) = page.background {
+        let fill = sky.map_or_else(|| color.to_string(), |_| "url(#sky)".to_owned());
+        if let Some([zenith, horizon]) = sky {
+            let stop = |offset: u8, color: Color| {
+                Stop::new().set("offset", offset).set("stop-color", color.to_string())
+            };
+            let gradient = LinearGradient::new().set("id", "sky").set("x2", 0).set("y2", 1);
+            document =
+                document.add(Definitions::new().add(gradient.add(stop(0, zenith)).add(stop(1, horizon))));
+        }
         let background = Rectangle::new()
             .set("x", text(left))
             .set("y", text(top))
             .set("width", text(width))
             .set("height", text(height))
-            .set("fill", color.to_string());
+            .set("fill", fill);
         document = document.add(background);
     }
     let things =

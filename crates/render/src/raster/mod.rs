@@ -2,18 +2,20 @@
 //!
 //! Each pixel has sixteen samples, or four for speed, no two in one row or column (the usual patterns for so many),
 //! so that edges of any direction come out smooth and a line thinner than a pixel is as faint as it is thin. A sample holds
-//! the nearest triangle there; of two at the same depth, the later one. A triangle is shaded once in each
-//! pixel.
+//! the nearest triangle there; of two at the same depth, the later one. What is seen is known before anything is shaded: a pixel is
+//! shaded once for each surface that is seen in it.
 //!
 //! Corners are rounded to 1/256 pixel and the rest is integers, so triangles that share an edge leave no gap, and pictures are
-//! the same bytes on every machine and any number of threads. A band of rows is done at a time: memory is that of the triangles
-//! and of the picture, whatever the number of samples.
+//! the same bytes on every machine and any number of threads. A band of rows is done at a time ([`band`]): memory is that of the
+//! triangles and of the picture, whatever the number of samples.
 
+mod band;
 pub(super) mod cells;
 
+use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
-use dlsys_geometry::scene::Color;
+use band::Band;
 
 /// Rows in a band.
 const BAND: usize = 16;
@@ -39,7 +41,7 @@ pub(super) const SIXTEEN: Pattern<16> = [
 ];
 pub(super) const FOUR: Pattern<4> = [(-2, -6), (6, -2), (-6, 2), (2, 6)];
 /// Steps of a coordinate in a pixel.
-const STEPS: i64 = 256;
+pub(super) const STEPS: i64 = 256;
 /// Corners further away than this many pixels are moved in.
 const FARTHEST: f64 = 500_000.0;
 /// Depths that differ by less are equal.
@@ -54,6 +56,21 @@ pub(super) struct Corner {
     pub(super) depth: f64,
 }
 
+/// A corner on the grid of steps.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    pub(super) x: i32,
+    pub(super) y: i32,
+    pub(super) depth: f32,
+}
+
+impl Corner {
+    /// Rounded to the grid of steps.
+    pub(super) fn place(&self) -> Place {
+        Place { x: snap(self.x) as i32, y: snap(self.y) as i32, depth: self.depth as f32 }
+    }
+}
+
 /// Pixels, row by row from the top: red, green, blue, each times the opacity, and opacity.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Image {
@@ -62,41 +79,49 @@ pub(super) struct Image {
     pub(super) pixels: Vec<[u8; 4]>,
 }
 
-/// Draws `count` triangles, the n-th with corners `corners(n)` and the colour `shade(n, weights)` at a place between
-/// them, in a picture of this size.
+/// Triangles that are to be drawn, by number.
+pub(super) trait Triangles: Sync {
+    /// How many there are.
+    fn count(&self) -> usize;
+
+    /// The corners of one.
+    fn corners(&self, n: usize) -> [Place; 3];
+
+    /// The surface that it belongs to: in a pixel, triangles of one surface have one shade.
+    fn surface(&self, n: usize) -> u32;
+
+    /// Red, green and blue, each times the opacity, and the opacity, in a pixel (column and row), at a place between the corners
+    /// that has these weights.
+    fn shade(&self, n: usize, pixel: [usize; 2], weights: [f64; 3]) -> [u8; 4];
+}
+
+/// Draws triangles in some rows of a picture that is so wide and high. `pixels` are those of the rows.
 pub(super) fn draw<const N: usize>(
     pattern: &Pattern<N>,
     threads: usize,
-    [width, height]: [u32; 2],
-    count: usize,
-    corners: impl Fn(usize) -> [Corner; 3] + Sync,
-    shade: impl Fn(usize, [f64; 3]) -> Color + Sync,
-) -> Image {
-    let [width, height] = [width as usize, height as usize];
+    [width, height]: [usize; 2],
+    rows: Range<usize>,
+    triangles: &impl Triangles,
+    pixels: &mut [[u8; 4]],
+) {
     // Triangles that each band may show, in order.
-    let mut bands: Vec<Vec<u32>> = vec![Vec::new(); height.div_ceil(BAND)];
-    for number in 0..count {
-        let at = corners(number).map(|corner| snap(corner.y));
-        if let Some([first, last]) = range(at, height) {
-            bands[first / BAND..=last / BAND].iter_mut().for_each(|band| band.push(number as u32));
+    let mut bands: Vec<Vec<u32>> = vec![Vec::new(); rows.len().div_ceil(BAND)];
+    for number in 0..triangles.count() {
+        let at = triangles.corners(number).map(|corner| i64::from(corner.y));
+        if let Some([first, last]) = range(at, rows.end.min(height)).filter(|[_, last]| *last >= rows.start) {
+            let [first, last] = [first, last].map(|row| row.saturating_sub(rows.start) / BAND);
+            let last = last.min(bands.len().saturating_sub(1));
+            bands[first..=last].iter_mut().for_each(|band| band.push(number as u32));
         }
     }
-    let mut pixels = vec![[0; 4]; width * height];
     let work = Mutex::new(pixels.chunks_mut((BAND * width).max(1)).zip(&bands).enumerate());
     let draw_bands = || {
         let mut band = Band::new(pattern, width);
         let next = || work.lock().unwrap_or_else(PoisonError::into_inner).next();
         while let Some((index, (pixels, numbers))) = next() {
-            let top = index * BAND;
-            let rows = BAND.min(height - top);
-            band.clear();
-            for &number in numbers {
-                let number = number as usize;
-                if let Some(triangle) = Triangle::new(pattern, number, corners(number), width, height) {
-                    band.fill(&triangle, top, rows, &shade);
-                }
-            }
-            band.resolve(pixels);
+            let top = rows.start + index * BAND;
+            band.draw(triangles, numbers, top..(top + BAND).min(rows.end));
+            band.resolve(triangles, numbers, top, pixels);
         }
     };
     std::thread::scope(|scope| {
@@ -105,7 +130,31 @@ pub(super) fn draw<const N: usize>(
         }
         draw_bands();
     });
-    Image { width, height, pixels }
+}
+
+/// Triangles of one colour.
+pub(super) struct Plain<'t> {
+    pub(super) triangles: &'t [[Corner; 3]],
+    pub(super) color: [u8; 3],
+}
+
+impl Triangles for Plain<'_> {
+    fn count(&self) -> usize {
+        self.triangles.len()
+    }
+
+    fn corners(&self, n: usize) -> [Place; 3] {
+        self.triangles[n].map(|corner| corner.place())
+    }
+
+    fn surface(&self, _: usize) -> u32 {
+        0
+    }
+
+    fn shade(&self, _: usize, _: [usize; 2], _: [f64; 3]) -> [u8; 4] {
+        let [red, green, blue] = self.color;
+        [red, green, blue, 255]
+    }
 }
 
 /// A coordinate in steps.
@@ -208,131 +257,61 @@ impl<const N: usize> Triangle<N> {
     }
 }
 
-/// The samples of some rows.
-struct Band<'p, const N: usize> {
-    pattern: &'p Pattern<N>,
-    width: usize,
-    depths: Vec<f32>,
-    /// `0xffrrggbb`, or 0 where there is nothing.
-    colors: Vec<u32>,
-    /// First column in which something may be drawn, and the one after the last: most of a picture is empty.
-    touched: [usize; 2],
-}
-
-impl<const N: usize> Band<'_, N> {
-    fn new(pattern: &Pattern<N>, width: usize) -> Band<'_, N> {
-        let samples = width * BAND * N;
-        Band {
-            pattern,
-            width,
-            depths: vec![f32::NEG_INFINITY; samples],
-            colors: vec![0; samples],
-            touched: [0; 2],
-        }
-    }
-
-    fn clear(&mut self) {
-        let [first, end] = std::mem::take(&mut self.touched).map(|column| column * N);
-        let row = (self.width * N).max(1);
-        for (depths, colors) in self.depths.chunks_exact_mut(row).zip(self.colors.chunks_exact_mut(row)) {
-            depths[first..end].fill(f32::NEG_INFINITY);
-            colors[first..end].fill(0);
-        }
-    }
-
-    /// Draws the part of a triangle in the `rows` rows from `top`.
-    fn fill(
-        &mut self,
-        triangle: &Triangle<N>,
-        top: usize,
-        rows: usize,
-        shade: &impl Fn(usize, [f64; 3]) -> Color,
-    ) {
-        let [first, last] = triangle.columns;
-        let [from, end] = self.touched;
-        self.touched = if from == end { [first, last + 1] } else { [from.min(first), end.max(last + 1)] };
-        let place = |k: i64| (k as f64 + 8.5) / 16.0;
-        let [origin, right, down] = triangle.depth;
-        let depth_at = self.pattern.map(|(x, y)| right * place(x) + down * place(y));
-        let largest = triangle.at_samples.map(|at| at.iter().copied().max().unwrap_or(0));
-        for row in triangle.rows[0].max(top)..=triangle.rows[1].min(top + rows - 1) {
-            for column in triangle.columns[0]..=triangle.columns[1] {
-                let (x, y) = (column as i64 * STEPS, row as i64 * STEPS);
-                let value = |k: usize| {
-                    let [a, b, c] = triangle.sides[k];
-                    a * x + b * y + c + triangle.bias[k]
-                };
-                let corner = [value(0), value(1), value(2)];
-                if (0..3).any(|k| corner[k] + largest[k] < 0) {
-                    continue;
-                }
-                let base = origin + right * column as f64 + down * row as f64;
-                let first = ((row - top) * self.width + column) * N;
-                let mut color = None;
-                for s in 0..N {
-                    let at = &triangle.at_samples;
-                    if (corner[0] + at[0][s]) | (corner[1] + at[1][s]) | (corner[2] + at[2][s]) < 0 {
-                        continue;
-                    }
-                    let [least, greatest] = triangle.depths;
-                    let depth = (base + depth_at[s]).clamp(least, greatest) as f32;
-                    let held = &mut self.depths[first + s];
-                    if depth + EQUAL >= *held {
-                        *held = depth.max(*held);
-                        self.colors[first + s] = *color.get_or_insert_with(|| {
-                            let half = STEPS / 2;
-                            let Color { red, green, blue } =
-                                shade(triangle.number, triangle.weights(x + half, y + half));
-                            u32::from_be_bytes([255, red, green, blue])
-                        });
-                    }
-                }
-            }
-        }
-    }
-
-    /// The pixels of the first rows: the means of their samples. They are transparent before.
-    fn resolve(&self, pixels: &mut [[u8; 4]]) {
-        let [first, end] = self.touched;
-        let samples = self.colors.chunks_exact((self.width * N).max(1));
-        for (pixels, samples) in pixels.chunks_exact_mut(self.width.max(1)).zip(samples) {
-            let samples = samples[first * N..end * N].chunks_exact(N);
-            for (pixel, samples) in pixels[first..end].iter_mut().zip(samples) {
-                if samples[1..].iter().all(|sample| *sample == samples[0]) {
-                    let [opacity, red, green, blue] = samples[0].to_be_bytes();
-                    *pixel = [red, green, blue, opacity];
-                    continue;
-                }
-                let mut sum = [0_u32; 4];
-                for sample in samples {
-                    let [opacity, red, green, blue] = sample.to_be_bytes();
-                    for (total, channel) in sum.iter_mut().zip([red, green, blue, opacity]) {
-                        *total += u32::from(channel);
-                    }
-                }
-                *pixel = sum.map(|total| ((total + N as u32 / 2) / N as u32) as u8);
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const RED: Color = Color::hex(0xff0000);
-    const BLUE: Color = Color::hex(0x0000ff);
+    const RED: [u8; 3] = [255, 0, 0];
+    const BLUE: [u8; 3] = [0, 0, 255];
 
     fn corner(x: f64, y: f64, depth: f64) -> Corner {
         Corner { x, y, depth }
     }
 
-    fn drawn(size: [u32; 2], triangles: &[([Corner; 3], Color)]) -> Image {
-        let threads = |threads| {
-            draw(&SIXTEEN, threads, size, triangles.len(), |n| triangles[n].0, |n, _| triangles[n].1)
+    /// Triangles with colours that may depend on the weights of their corners.
+    struct Given<'t, Shade>(&'t [([Corner; 3], Shade)]);
+
+    impl<Shade: Fn([f64; 3]) -> [u8; 3] + Sync> Triangles for Given<'_, Shade> {
+        fn count(&self) -> usize {
+            self.0.len()
+        }
+
+        fn corners(&self, n: usize) -> [Place; 3] {
+            self.0[n].0.map(|corner| corner.place())
+        }
+
+        fn surface(&self, n: usize) -> u32 {
+            n as u32
+        }
+
+        fn shade(&self, n: usize, _: [usize; 2], weights: [f64; 3]) -> [u8; 4] {
+            let [red, green, blue] = (self.0[n].1)(weights);
+            [red, green, blue, 255]
+        }
+    }
+
+    fn painted<const N: usize>(
+        pattern: &Pattern<N>,
+        [width, height]: [usize; 2],
+        triangles: &impl Triangles,
+    ) -> Image {
+        let image = |threads, strip: usize| {
+            let mut pixels = vec![[0; 4]; width * height];
+            for (k, pixels) in pixels.chunks_mut((strip * width).max(1)).enumerate() {
+                let rows = k * strip..((k + 1) * strip).min(height);
+                draw(pattern, threads, [width, height], rows, triangles, pixels);
+            }
+            Image { width, height, pixels }
         };
-        assert_eq!(threads(1), threads(3));
-        threads(1)
+        let whole = image(1, height);
+        assert_eq!(whole, image(3, height));
+        assert_eq!(whole, image(2, 16), "strip by strip");
+        whole
+    }
+
+    fn drawn(size: [usize; 2], triangles: &[([Corner; 3], [u8; 3])]) -> Image {
+        let shades: Vec<_> = triangles.iter().map(|&(corners, color)| (corners, move |_| color)).collect();
+        painted(&SIXTEEN, size, &Given(&shades))
     }
 
     #[test]
@@ -354,7 +333,7 @@ mod tests {
         let square = |x: f64, z: [f64; 3], color| {
             ([corner(x, -20.0, z[0]), corner(x + 40.0, 20.0, z[1]), corner(x - 40.0, 20.0, z[2])], color)
         };
-        let middle = |triangles: &[([Corner; 3], Color)]| drawn([4, 4], triangles).pixels[2 * 4 + 2];
+        let middle = |triangles: &[([Corner; 3], [u8; 3])]| drawn([4, 4], triangles).pixels[2 * 4 + 2];
         let (red, blue) = ([255, 0, 0, 255], [0, 0, 255, 255]);
         assert_eq!(middle(&[square(2.0, [0.5; 3], RED), square(2.0, [0.4; 3], BLUE)]), red);
         assert_eq!(middle(&[square(2.0, [0.4; 3], RED), square(2.0, [0.5; 3], BLUE)]), blue);
@@ -368,11 +347,8 @@ mod tests {
     #[test]
     fn shades_are_interpolated_and_order_of_bands_does_not_matter() {
         let corners = [corner(0.0, 0.0, 0.0), corner(100.0, 0.0, 0.0), corner(0.0, 100.0, 0.0)];
-        let shade = |_, [a, b, c]: [f64; 3]| {
-            let byte = |w: f64| (w * 255.0).round() as u8;
-            Color { red: byte(a), green: byte(b), blue: byte(c) }
-        };
-        let image = draw(&FOUR, 2, [100, 100], 1, |_| corners, shade);
+        let shade = |weights: [f64; 3]| weights.map(|w| (w * 255.0).round() as u8);
+        let image = painted(&FOUR, [100, 100], &Given(&[(corners, shade)]));
         let [red, green, blue, opacity] = image.pixels[20 * 100 + 50];
         // At (50.5, 20.5): weights 0.29, 0.505, 0.205.
         assert_eq!([red, green, blue, opacity], [74, 129, 52, 255]);

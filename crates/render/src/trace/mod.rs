@@ -50,11 +50,11 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
     let [a, b, c] = [1.0 / cell, -left / cell, (bottom + height) / cell];
     let has_triangles = |segment: &Segment| pixels_across(segment, style) >= LEAST_PIXELS;
     let mesh = triangles::triangles(scene, style.fit, sides(scene, style.fit, a), has_triangles);
-    let lit = Lit::new(&mesh, style.fit, [a, b, c]);
+    let mut lit = Lit::new(scene, &mesh, style.fit, [a, b, c], style.floor);
     // Of the raster only the part in which something is drawn.
     let [low, size] = drawn(&mesh, &lit, [width, height].map(|side| (side / cell).ceil().max(1.0)));
     let placement = [a, b - low[0], c - low[1]];
-    let lit = Lit::new(&mesh, style.fit, placement);
+    lit.shift(low);
     let size = size.map(|side| side as usize);
     let nearest = label::nearest(&mesh, &lit, size);
     let mut visible = Visible { style, depths: &nearest.depths, labels: &[], size, placement };
@@ -71,7 +71,7 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
     let decimals = (-(unit / 4.0).log10()).ceil().clamp(0.0, 6.0) as usize;
     let mut paths: Vec<(OwnerId, String)> = Vec::new();
     for (shade, outlines) in shades.iter().zip(&outlines).filter(|(_, outlines)| !outlines.is_empty()) {
-        let color = scene.palette.get(shade.material).color.lit(shade.strength());
+        let color = lit.color(scene, shade.material, shade.strength(), style.background);
         let mut data = String::new();
         outlines.iter().for_each(|outline| push_outline(&mut data, outline, to_page, decimals));
         paths.push((shade.owner, format!("<path fill=\"{color}\" d=\"{data}\"/>")));

@@ -1,0 +1,102 @@
+//! A camera with the pixels of its picture: where points come to lie, how large things are there, and what is outside.
+
+use super::{Camera, Fit};
+use crate::raster::{Corner, Place};
+use dlsys_geometry::scene::{Point, Vector};
+
+/// A camera, and the pixels that it fills.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lens {
+    pub(super) camera: Camera,
+    /// A point that the camera sees at x, y is at `a x + b` and `c - a y` pixels from the upper left corner.
+    placement: [f64; 3],
+    /// Width and height in pixels.
+    pub(super) size: [usize; 2],
+    /// Depths of the rasteriser in a scene unit, in the plane of focus.
+    depth: f64,
+}
+
+impl Lens {
+    pub(super) fn new(fit: &Fit, size: [u32; 2], placement: [f64; 3]) -> Lens {
+        let depth = if fit.extent > 0.0 { 1.0 / fit.extent } else { 1.0 };
+        Lens { camera: fit.camera, placement, size: size.map(|side| side as usize), depth }
+    }
+
+    /// Pixels in a scene unit at a point; 0 behind the viewer.
+    pub(super) fn scale_at(&self, p: Point) -> f64 {
+        self.camera.ahead(p).map_or(0.0, |seen| self.placement[0] * self.camera.magnification(seen.z))
+    }
+
+    /// Pixels in a scene unit in the plane of focus.
+    pub(super) fn scale(&self) -> f64 {
+        self.placement[0]
+    }
+
+    /// The place of a point in the picture; one behind the viewer has an undefined depth.
+    pub(super) fn place(&self, p: Point) -> Place {
+        let [a, b, c] = self.placement;
+        match self.camera.ahead(p) {
+            Some(p) => Corner { x: a * p.x + b, y: c - a * p.y, depth: p.z * self.depth }.place(),
+            None => Place { x: 0, y: 0, depth: f32::NAN },
+        }
+    }
+
+    /// The direction of a normal, to the right, up and towards the viewer.
+    pub(super) fn normal(&self, v: Vector) -> [f32; 3] {
+        let v = self.camera.direction(v);
+        [v.x as f32, v.y as f32, v.z as f32]
+    }
+
+    /// The point that the camera sees in the middle of a pixel at a depth of the rasteriser, as the camera projects it.
+    pub(super) fn seen(&self, [column, row]: [usize; 2], depth: f64) -> Point {
+        let [a, b, c] = self.placement;
+        Point::new((column as f64 + 0.5 - b) / a, (c - row as f64 - 0.5) / a, depth / self.depth)
+    }
+
+    /// True if a ball is outside of the picture.
+    pub(super) fn misses(&self, centre: Point, radius: f64) -> bool {
+        let Some(nearest) = self.camera.ahead(centre + self.camera.towards(centre) * radius) else {
+            // The viewer is in it, or it is behind.
+            return self.camera.ahead(centre - self.camera.view().towards() * radius).is_none();
+        };
+        let [a, b, c] = self.placement;
+        let seen = self.camera.project(centre);
+        let (x, y) = (a * seen.x + b, c - a * seen.y);
+        let reach = 1.5 * radius * a * self.camera.magnification(nearest.z);
+        let [width, height] = self.size.map(|side| side as f64);
+        x + reach < 0.0 || y + reach < 0.0 || x - reach > width || y - reach > height
+    }
+}
+
+/// The part of a flat outline that is in front of the viewer and in the picture, or beside it by no more than its width and height.
+pub(super) fn clip(outline: &[Point], lens: &Lens) -> Vec<Point> {
+    /// Nearer to the viewer than this part of the distance to the plane of focus, nothing is seen.
+    const NEAREST: f64 = 2e-3;
+    let [a, b, c] = lens.placement;
+    let [width, height] = lens.size.map(|side| side as f64);
+    // Each is not negative within, and linear in space.
+    let sides: [&dyn Fn([f64; 3]) -> f64; 5] = [
+        &|[_, _, w]| w - NEAREST,
+        &|[x, _, w]| a * x + (b + width) * w,
+        &|[x, _, w]| (2.0 * width - b) * w - a * x,
+        &|[_, y, w]| (c + height) * w - a * y,
+        &|[_, y, w]| a * y + (2.0 * height - c) * w,
+    ];
+    let mut outline = outline.to_vec();
+    for side in sides {
+        let inside = |p: &Point| side(lens.camera.homogeneous(*p));
+        let mut kept = Vec::new();
+        for (i, p) in outline.iter().enumerate() {
+            let q = &outline[(i + 1) % outline.len()];
+            let (here, there) = (inside(p), inside(q));
+            if here >= 0.0 {
+                kept.push(*p);
+            }
+            if (here >= 0.0) != (there >= 0.0) {
+                kept.push(p + (q - p) * (here / (here - there)));
+            }
+        }
+        outline = kept;
+    }
+    outline
+}

@@ -1,0 +1,248 @@
+//! The light on a frame: the lamp of [`Light`](super::Light), or a declared sun and sky with shadows; and the floor.
+//!
+//! Light has one strength at each place, from which its colour follows: what is dark is in the light of the sky, what is bright in that of the
+//! sun. So pictures of pixels and of regions have the same shading.
+
+use super::lens::Lens;
+use super::light::{GLOSS, SHARPNESS, Spot, TRANSMITTED};
+use super::shadow::{Casters, Maps};
+use super::stage::Stage;
+use super::{Fit, Page, floor};
+use dlsys_geometry::scene::{Color, MaterialId, Point, Scene, Vector};
+
+/// Strengths of light on what is fully exposed to it: the sky's beside a sun and alone, the sun's, and what the ground throws back.
+const SKY: f64 = 0.56;
+const SKY_ALONE: f64 = 1.25;
+const SUN: f64 = 0.66;
+const GROUND: f64 = 0.26;
+/// The colours of zenith and horizon beside a sun, if the model declares none.
+const CLEAR: [Color; 2] = [Color::hex(0xb4cdf0), Color::hex(0xf2efe8)];
+/// How much darker the floor is where no sky is seen, if there is neither sun nor sky.
+const CONTACT: f64 = 0.5;
+/// How much darker the floor is around the plant than far away, and how far that reaches in parts of the extent.
+const POOL: f64 = 0.06;
+const POOL_REACH: f64 = 1.2;
+/// Strengths between which the colour of light changes from the sky's to the sun's.
+const COOL: f64 = 0.35;
+const WARM: f64 = 0.85;
+
+/// A declared light.
+struct Declared {
+    /// Unit vector towards the sun.
+    sun: Option<Vector>,
+    sky: f64,
+    /// Tint of what only the sky lights.
+    tint: [f64; 3],
+}
+
+/// The light on one frame.
+pub(super) struct Lighting<'a> {
+    fit: &'a Fit,
+    declared: Option<Declared>,
+    maps: Option<Maps>,
+    floor: Option<f64>,
+    open_sky: Option<OpenSky>,
+    /// The colour of the sky at the horizon, if it is declared.
+    horizon: Option<Color>,
+}
+
+impl<'a> Lighting<'a> {
+    /// The light on a scene. Shadows are as fine as a picture with so many pixels for a scene unit shows.
+    /// A floor among the polygons has the material `ground`.
+    pub(super) fn new(
+        scene: &Scene,
+        fit: &'a Fit,
+        scale: f64,
+        threads: usize,
+        ground: Option<MaterialId>,
+    ) -> Lighting<'a> {
+        let around = fit.surroundings(scene);
+        let is_declared = (around.sun.is_some() || around.sky.is_some()) && !fit.light.is_flat();
+        let sun = around.sun.and_then(|sun| sun.try_normalize(0.0)).filter(|_| is_declared);
+        let declared = is_declared.then(|| {
+            let [zenith, horizon] = around.sky.unwrap_or(CLEAR).map(Color::channels);
+            let mean = [0, 1, 2].map(|k| 0.6 * zenith[k] + 0.4 * horizon[k]);
+            let most = mean.into_iter().fold(1e-3, f64::max);
+            let sky = if sun.is_some() { SKY } else { SKY_ALONE };
+            Declared { sun, sky, tint: mean.map(|c| c / most) }
+        });
+        let floor = around.floor.filter(|_| !fit.light.is_flat());
+        let mut open_sky = None;
+        let maps = (declared.is_some() || floor.is_some()).then(|| {
+            let extent = if fit.extent > 0.0 { fit.extent } else { 1.0 };
+            // Details beyond the maps' cells cast no shadows of their own.
+            let stage = Stage::of_all(scene, fit, scale.min(1500.0 / extent));
+            let casters = Casters::of(&stage, ground);
+            let maps = (!casters.is_empty()).then(|| Maps::new(&casters, sun, scale, threads))?;
+            open_sky = floor.map(|height| OpenSky::new(&maps, casters.around(), height));
+            Some(maps)
+        });
+        let horizon = around.sky.map(|[_, horizon]| horizon);
+        Lighting { fit, declared, maps: maps.flatten(), floor, open_sky, horizon }
+    }
+
+    /// Strength of light at a place; 1 leaves a colour as it is.
+    pub(super) fn strength(&self, spot: &Spot) -> f64 {
+        let Some(declared) = &self.declared else { return self.fit.light.strength_at(spot) };
+        let view = self.fit.camera.view();
+        let at = self.fit.camera.unproject(spot.seen).coords;
+        let normal = view.space(spot.normal);
+        let sky = |normal: Vector| match &self.maps {
+            Some(maps) => maps.sky(at, normal),
+            None => 0.5 + 0.5 * normal.y,
+        };
+        let mut from_sky = sky(normal);
+        if spot.is_thin {
+            from_sky += (sky(-normal) - from_sky).max(0.0) * TRANSMITTED;
+        }
+        let mut strength = declared.sky * from_sky + GROUND * (0.5 - 0.5 * normal.y) + 0.04;
+        if let Some(sun) = declared.sun {
+            let cos = normal.dot(&sun);
+            let part = if spot.is_thin && cos < 0.0 { -cos * TRANSMITTED } else { cos.max(0.0) };
+            if part > 0.0 {
+                let lit_side = if cos < 0.0 { -normal } else { normal };
+                let visible = self.maps.as_ref().map_or(1.0, |maps| maps.sun(at, lit_side));
+                let half = (sun + view.towards()).try_normalize(1e-9).unwrap_or(sun);
+                let gloss = if cos > 0.0 { normal.dot(&half).max(0.0).powi(SHARPNESS) * GLOSS } else { 0.0 };
+                strength += visible * (SUN * part + gloss);
+            }
+        }
+        // As the drawing gains depth.
+        let relief = self.fit.light.relief();
+        1.0 + relief * (strength - 1.0)
+    }
+
+    /// A colour in light of this strength.
+    pub(super) fn color(&self, color: Color, strength: f64) -> Color {
+        let Some(declared) = &self.declared else { return color.lit(strength) };
+        let warm = ((strength - COOL) / (WARM - COOL)).clamp(0.0, 1.0);
+        let [red, green, blue] = [0, 1, 2].map(|k| declared.tint[k] + (1.0 - declared.tint[k]) * warm);
+        let tinted = |c: u8, by: f64| (f64::from(c) * by + 0.5) as u8;
+        Color {
+            red: tinted(color.red, red),
+            green: tinted(color.green, green),
+            blue: tinted(color.blue, blue),
+        }
+        .lit(strength)
+    }
+
+    /// The normal of the floor, if there is one.
+    pub(super) fn floor_normal(&self) -> Option<Vector> {
+        self.floor.map(|_| Vector::y())
+    }
+
+    /// The corners of what is seen of the floor.
+    pub(super) fn floor_outline(&self, lens: &Lens) -> Vec<Point> {
+        self.floor.map_or_else(Vec::new, |height| floor::outline(self.fit, height, lens))
+    }
+
+    /// Strength of light on the floor, beside that on an open floor far away.
+    pub(super) fn floor_strength(&self, seen: Point) -> f64 {
+        let at = self.fit.camera.unproject(seen).coords;
+        let (centre, extent) = self.fit.middle();
+        let away = ((at.x - centre.x).hypot(at.z - centre.z) / (POOL_REACH * extent)).powi(2);
+        let pool = 1.0 - POOL * (-away).exp();
+        let (Some(maps), Some(open_sky)) = (&self.maps, &self.open_sky) else { return pool };
+        let sky = open_sky.at(at);
+        let light = match &self.declared {
+            None => 1.0 - CONTACT * (1.0 - sky),
+            Some(declared) => {
+                let (mut here, mut open) = (declared.sky * sky + 0.04, declared.sky + 0.04);
+                if let Some(sun) = declared.sun.filter(|sun| sun.y > 0.0) {
+                    here += SUN * sun.y * maps.sun(at, Vector::y());
+                    open += SUN * sun.y;
+                }
+                here / open
+            }
+        };
+        pool * light.min(1.0)
+    }
+
+    /// The floor where it is seen: times its opacity, and the opacity. Without a sky it is as light as the background.
+    pub(super) fn floor_color(&self, seen: Point) -> [u8; 4] {
+        let strength = self.floor_strength(seen);
+        match self.horizon {
+            Some(horizon) => {
+                let Color { red, green, blue } = self.color(horizon, strength);
+                [red, green, blue, 255]
+            }
+            None => {
+                let opacity = (1.0 - strength) * 255.0;
+                let Color { red, green, blue } = Color::hex(0xffffff).lit(0.0);
+                let part = |c: u8| (f64::from(c) / 255.0 * opacity + 0.5) as u8;
+                [part(red), part(green), part(blue), (opacity + 0.5) as u8]
+            }
+        }
+    }
+
+    /// The floor in light of this strength, before a background.
+    pub(super) fn floor_over(&self, background: Option<Color>, strength: f64) -> Color {
+        match self.horizon {
+            Some(horizon) => self.color(horizon, strength),
+            None => background.unwrap_or(Page::BACKGROUND).lit(strength),
+        }
+    }
+}
+
+/// The part of the sky that is seen from places of the floor, on a grid: it changes slowly.
+struct OpenSky {
+    low: [f64; 2],
+    /// Cells in a scene unit.
+    scale: f64,
+    /// By row.
+    parts: Vec<f32>,
+}
+
+impl OpenSky {
+    /// Places along a side of the grid.
+    const SIDE: usize = 320;
+    /// How far the grid reaches beyond the box around everything, in parts of its height.
+    const BEYOND: f64 = 1.5;
+
+    fn new(maps: &Maps, [middle, half]: [Vector; 2], height: f64) -> OpenSky {
+        let reach = half.x.max(half.z) + OpenSky::BEYOND * (middle.y + half.y - height).max(0.0);
+        let reach = if reach > 0.0 { reach } else { 1.0 };
+        let low = [middle.x - reach, middle.z - reach];
+        let side = OpenSky::SIDE;
+        let scale = (side - 1) as f64 / (2.0 * reach);
+        let at = |i: usize, k: usize| low[k] + i as f64 / scale;
+        let mut parts: Vec<f32> = (0..side * side)
+            .map(|i| {
+                let place = Vector::new(at(i % side, 0), height, at(i / side, 1));
+                maps.sky(place, Vector::y()).min(1.0) as f32
+            })
+            .collect();
+        for _ in 0..2 {
+            parts = OpenSky::smoothed(&parts);
+        }
+        OpenSky { low, scale, parts }
+    }
+
+    /// Each value the mean of three by three.
+    fn smoothed(parts: &[f32]) -> Vec<f32> {
+        let side = OpenSky::SIDE;
+        let near = |i: usize| i.saturating_sub(1)..=(i + 1).min(side - 1);
+        let mean = |column: usize, row: usize| {
+            let values = near(row).flat_map(|row| near(column).map(move |column| parts[row * side + column]));
+            let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
+            sum / count
+        };
+        (0..side * side).map(|i| mean(i % side, i / side)).collect()
+    }
+
+    /// The part at a place; 1 beyond the grid, to which it rises at the rim.
+    fn at(&self, place: Vector) -> f64 {
+        let [x, z] = [(place.x - self.low[0]) * self.scale, (place.z - self.low[1]) * self.scale];
+        let last = (OpenSky::SIDE - 1) as f64;
+        let rim = x.min(z).min(last - x).min(last - z) / (0.2 * last);
+        if rim.is_nan() || rim <= 0.0 {
+            return 1.0;
+        }
+        let [column, row] = [x, z].map(|x| (x as usize).min(OpenSky::SIDE - 2));
+        let (u, v) = (x - column as f64, z - row as f64);
+        let value = |column: usize, row: usize| f64::from(self.parts[row * OpenSky::SIDE + column]);
+        let line = |row: usize| value(column, row) * (1.0 - u) + value(column + 1, row) * u;
+        let part = line(row) * (1.0 - v) + line(row + 1) * v;
+        1.0 - (1.0 - part) * rim.min(1.0)
+    }
+}

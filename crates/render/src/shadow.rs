@@ -1,0 +1,306 @@
+//! Shadows: maps of what is nearest to the sun, and to each of many places of the sky.
+//!
+//! A map is a raster of depths, seen from infinitely far away in one direction. A point is in shadow if the map holds something nearer than it
+//! there. The sun has one map, about as fine as the picture; the sky has [`PLACES`], coarse ones, and the part of the sky that a point sees is the mean over
+//! them. Maps are rastered by rules without chance and read in the same way by every thread.
+//!
+//! **Errors.** The edge of a shadow is smooth over two cells of the map, and a shadow begins up to [`SLOPE`] cells behind what casts it (the
+//! price of no self-shadowing on slopes). The cell of the sun's map is a pixel of the picture, or a [`FINEST`]th of the scene where that is more; that
+//! of the sky's maps is a [`COARSE`]th of the scene, so crevices narrower than a fiftieth of the scene are not darkened.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use super::stage::Stage;
+use super::triangles::Triangle;
+use dlsys_geometry::scene::{MaterialId, Point, Vector};
+
+/// Places of the sky from which light comes; fewer where there are more triangles than [`MANY`].
+const PLACES: usize = 128;
+const FEW_PLACES: usize = 24;
+const MANY: usize = 500_000;
+/// Cells along the larger side of the maps.
+const FINEST: f64 = 3072.0;
+const LEAST: f64 = 256.0;
+const COARSE: f64 = 128.0;
+/// Bias of depths, in cells: on a surface that faces the light, and at most.
+const BIAS: f32 = 1.0;
+const SLOPE: f32 = 8.0;
+
+/// Triangles and thin stems that cast shadows, relative to the middle of the box around them.
+#[derive(Default)]
+pub(super) struct Casters {
+    middle: Vector,
+    /// Half of the sides of the box.
+    half: Vector,
+    triangles: Vec<[[f32; 3]; 3]>,
+    lines: Vec<([[f32; 3]; 2], [f32; 2])>,
+}
+
+impl Casters {
+    /// All that a stage has, but for what is of this material of its scene.
+    pub(super) fn of(stage: &Stage, without: Option<MaterialId>) -> Casters {
+        let mut all = Casters::default();
+        let (mut low, mut high) = (Vector::repeat(f64::INFINITY), Vector::repeat(f64::NEG_INFINITY));
+        let mut placed: Vec<Point> = Vec::new();
+        for (pass, part) in
+            [0, 1].into_iter().flat_map(|pass| stage.parts.iter().map(move |part| (pass, part)))
+        {
+            let (draft, place) = (&stage.drafts[part.draft], part.place.as_ref());
+            placed.clear();
+            placed.extend(draft.mesh.vertices.iter().map(|&p| place.map_or(p, |place| place.point(p))));
+            let is_caster = |face: &&Triangle| place.is_some() || Some(face.material) != without;
+            let faces = draft.mesh.faces.iter().filter(is_caster);
+            if pass == 0 {
+                let ends = draft.lines(place).flat_map(|(ends, _)| ends);
+                let corners = faces.flat_map(|face| face.corners).map(|(v, _)| placed[v as usize]);
+                for p in corners.chain(ends) {
+                    (low, high) = (low.inf(&p.coords), high.sup(&p.coords));
+                }
+                continue;
+            }
+            if all.half == Vector::zeros() && low.x <= high.x {
+                (all.middle, all.half) = ((low + high) / 2.0, (high - low) / 2.0);
+            }
+            let middle = all.middle;
+            let relative = |p: Point| {
+                let p = p.coords - middle;
+                [p.x as f32, p.y as f32, p.z as f32]
+            };
+            all.triangles.extend(faces.map(|face| face.corners.map(|(v, _)| relative(placed[v as usize]))));
+            all.lines.extend(
+                draft.lines(place).map(|(ends, radii)| (ends.map(relative), radii.map(|r| r as f32))),
+            );
+        }
+        all
+    }
+
+    /// The middle of the box around everything, and half of its sides.
+    pub(super) fn around(&self) -> [Vector; 2] {
+        [self.middle, self.half]
+    }
+
+    /// True if nothing casts a shadow.
+    pub(super) fn is_empty(&self) -> bool {
+        self.triangles.is_empty() && self.lines.is_empty()
+    }
+}
+
+/// Depths towards a light.
+struct Map {
+    /// To the right, up, and towards the light.
+    axes: [Vector; 3],
+    middle: Vector,
+    low: [f64; 2],
+    /// Cells in a scene unit.
+    scale: f64,
+    size: [usize; 2],
+    /// In cells, greater being nearer to the light.
+    depths: Vec<f32>,
+}
+
+impl Map {
+    /// Of light from a direction, with so many cells for a scene unit, as far as `most` cells on a side allow.
+    fn new(casters: &Casters, towards: Vector, scale: f64, most: f64) -> Map {
+        let towards = towards.normalize();
+        let aside = if towards.y.abs() < 0.9 { Vector::y() } else { Vector::z() };
+        let right = aside.cross(&towards).normalize();
+        let axes = [right, towards.cross(&right), towards];
+        let reach = [0, 1].map(|k: usize| axes[k].abs().dot(&casters.half));
+        let larger = (2.0 * reach[0].max(reach[1])).max(f64::MIN_POSITIVE);
+        let scale = (larger * scale).clamp(LEAST.min(most), most) / larger;
+        // Two cells all round.
+        let size = reach.map(|reach| (2.0 * reach * scale).ceil() as usize + 4);
+        let low = reach.map(|reach| -reach - 2.0 / scale);
+        let mut map = Map {
+            axes,
+            middle: casters.middle,
+            low,
+            scale,
+            size,
+            depths: vec![f32::NEG_INFINITY; size[0] * size[1]],
+        };
+        let scaled = axes.map(|axis| [axis.x, axis.y, axis.z].map(|x| (x * scale) as f32));
+        let from = [(low[0] * scale) as f32, (low[1] * scale) as f32, 0.0];
+        let place = |p: &[f32; 3]| {
+            [0, 1, 2].map(|k| scaled[k][0] * p[0] + scaled[k][1] * p[1] + scaled[k][2] * p[2] - from[k])
+        };
+        for [p, q, r] in &casters.triangles {
+            map.fill([place(p), place(q), place(r)]);
+        }
+        for ([a, b], radii) in &casters.lines {
+            let [a, b] = [place(a), place(b)];
+            let radii = radii.map(|radius| (radius * scale as f32).max(0.5));
+            map.line([a, b], radii);
+        }
+        map
+    }
+
+    /// Cells to the right and up, and depth, of a point relative to the middle.
+    fn place(&self, p: Vector) -> [f32; 3] {
+        let at = |k: usize, low: f64| ((self.axes[k].dot(&p) - low) * self.scale) as f32;
+        [at(0, self.low[0]), at(1, self.low[1]), at(2, 0.0)]
+    }
+
+    /// A thin stem as two triangles that face the light.
+    fn line(&mut self, [a, b]: [[f32; 3]; 2], radii: [f32; 2]) {
+        let (x, y) = (b[0] - a[0], b[1] - a[1]);
+        let length = x.hypot(y).max(1e-6);
+        let (x, y) = (x / length, y / length);
+        let corner = |p: [f32; 3], r: f32, ahead: f32, side: f32| {
+            [p[0] + r * (x * ahead - y * side), p[1] + r * (y * ahead + x * side), p[2]]
+        };
+        let [p, q] = [corner(a, radii[0], -0.7, 1.0), corner(a, radii[0], -0.7, -1.0)];
+        let [s, t] = [corner(b, radii[1], 0.7, 1.0), corner(b, radii[1], 0.7, -1.0)];
+        self.fill([p, q, t]);
+        self.fill([p, t, s]);
+    }
+
+    /// Keeps the nearest of a triangle in each cell whose middle it covers; on its edge counts as within.
+    fn fill(&mut self, [p, q, r]: [[f32; 3]; 3]) {
+        // Most triangles are smaller than a cell and cover the middle of none.
+        let range = |k: usize| {
+            let low = p[k].min(q[k]).min(r[k]) + 0.5;
+            let high = p[k].max(q[k]).max(r[k]) + 0.5;
+            (low.max(0.0) as usize, (high.max(0.0) as usize).min(self.size[k]))
+        };
+        let ((left, right), (bottom, top)) = (range(0), range(1));
+        if left >= right || bottom >= top {
+            return;
+        }
+        let area = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
+        if area == 0.0 || !area.is_finite() {
+            return;
+        }
+        let scale = 1.0 / area;
+        let slope = [
+            ((q[2] - p[2]) * (r[1] - p[1]) - (r[2] - p[2]) * (q[1] - p[1])) * scale,
+            ((r[2] - p[2]) * (q[0] - p[0]) - (q[2] - p[2]) * (r[0] - p[0])) * scale,
+        ];
+        let (least, most) = (p[2].min(q[2]).min(r[2]), p[2].max(q[2]).max(r[2]));
+        for row in bottom..top {
+            let y = row as f32 + 0.5;
+            for column in left..right {
+                let x = column as f32 + 0.5;
+                let side = |a: [f32; 3], b: [f32; 3]| {
+                    ((b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])) * scale
+                };
+                if side(p, q) < 0.0 || side(q, r) < 0.0 || side(r, p) < 0.0 {
+                    continue;
+                }
+                let depth = p[2] + slope[0] * (x - p[0]) + slope[1] * (y - p[1]);
+                let held = &mut self.depths[row * self.size[0] + column];
+                *held = held.max(depth.clamp(least, most));
+            }
+        }
+    }
+
+    /// Where a point on a surface whose lit side has this normal is in the map: the cell whose middle is to its left and below, the part of
+    /// a cell from there, and its depth; `None` outside of the map.
+    fn cell(&self, at: Vector, normal: Vector, around: i64) -> Option<([usize; 2], [f32; 2], f32)> {
+        let cos = normal.dot(&self.axes[2]).clamp(0.05, 1.0);
+        let slope = ((1.0 - cos * cos).sqrt() / cos) as f32;
+        // Off the surface by a cell, so that it does not hide itself where it bends.
+        let [x, y, depth] = self.place(at - self.middle + normal * (1.0 / self.scale));
+        let depth = depth + (BIAS * (1.0 + slope)).min(SLOPE);
+        let (x, y) = (x - 0.5, y - 0.5);
+        let (left, bottom) = (x.floor(), y.floor());
+        let [width, height] = self.size.map(|side| side as i64);
+        let (column, row) = (left as i64, bottom as i64);
+        let is_within = |at: i64, side: i64| at >= around && at + around + 1 < side;
+        (is_within(column, width) && is_within(row, height)).then_some((
+            [column as usize, row as usize],
+            [x - left, y - bottom],
+            depth,
+        ))
+    }
+
+    /// The part of the light that comes to a point on a surface whose lit side has this normal, from 0 to 1: the mean over a square of
+    /// three by three cells.
+    fn visible(&self, at: Vector, normal: Vector) -> f64 {
+        let Some(([left, bottom], [u, v], depth)) = self.cell(at, normal, 1) else { return 1.0 };
+        // Four by four cells, those at the rim by the part that the square covers.
+        let (across, along) = ([1.0 - u, 1.0, 1.0, u], [1.0 - v, 1.0, 1.0, v]);
+        let mut sum = 0.0;
+        for (j, along) in along.into_iter().enumerate() {
+            let start = (bottom - 1 + j) * self.size[0] + left - 1;
+            for (held, across) in self.depths[start..start + 4].iter().zip(across) {
+                sum += if *held > depth { 0.0 } else { across * along };
+            }
+        }
+        f64::from(sum) / 9.0
+    }
+
+    /// The same over a square of one cell.
+    fn roughly_visible(&self, at: Vector, normal: Vector) -> f64 {
+        let Some(([left, bottom], [u, v], depth)) = self.cell(at, normal, 0) else { return 1.0 };
+        let start = bottom * self.size[0] + left;
+        let open = |k: usize| if self.depths[k] > depth { 0.0 } else { 1.0 };
+        let row = |start: usize| open(start) * (1.0 - u) + open(start + 1) * u;
+        f64::from(row(start) * (1.0 - v) + row(start + self.size[0]) * v)
+    }
+}
+
+/// The maps of a frame.
+pub(super) struct Maps {
+    sun: Option<Map>,
+    sky: Vec<Map>,
+}
+
+impl Maps {
+    /// Maps of the sun, if there is one in this direction, with so many cells for a scene unit, and of the sky.
+    pub(super) fn new(casters: &Casters, sun: Option<Vector>, scale: f64, threads: usize) -> Maps {
+        let count = if casters.triangles.len() + casters.lines.len() > MANY { FEW_PLACES } else { PLACES };
+        let make = |i: usize| match (i.checked_sub(count), sun) {
+            (None, _) => Some(Map::new(casters, place_of_sky(i, count), 0.0, COARSE)),
+            (Some(_), Some(sun)) => Some(Map::new(casters, sun, scale, FINEST)),
+            (Some(_), None) => None,
+        };
+        let next = AtomicUsize::new(0);
+        let made = Mutex::new(Vec::new());
+        let work = || {
+            loop {
+                // The sun's map is the largest, and first.
+                let i = count.wrapping_sub(next.fetch_add(1, Ordering::Relaxed));
+                if i > count {
+                    return;
+                }
+                let map = make(i);
+                made.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((i, map));
+            }
+        };
+        std::thread::scope(|scope| {
+            (1..threads).for_each(|_| drop(scope.spawn(work)));
+            work();
+        });
+        let mut made = made.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+        made.sort_by_key(|(i, _)| *i);
+        let mut maps: Vec<Option<Map>> = made.into_iter().map(|(_, map)| map).collect();
+        let sun = maps.pop().flatten();
+        Maps { sun, sky: maps.into_iter().flatten().collect() }
+    }
+
+    /// The part of the sun's light that comes to a point on a surface whose lit side has this normal.
+    pub(super) fn sun(&self, at: Vector, normal: Vector) -> f64 {
+        self.sun.as_ref().map_or(1.0, |map| map.visible(at, normal))
+    }
+
+    /// The light of the sky on the side of a surface with this normal: 1 on the open ground.
+    pub(super) fn sky(&self, at: Vector, normal: Vector) -> f64 {
+        let light = self.sky.iter().map(|map| {
+            let cos = normal.dot(&map.axes[2]);
+            if cos > 0.0 { cos * map.roughly_visible(at, normal) } else { 0.0 }
+        });
+        // The mean cosine over the places is a half.
+        2.0 * light.sum::<f64>() / self.sky.len().max(1) as f64
+    }
+}
+
+/// The direction towards a place of the sky: evenly spread, along a spiral at golden angles (Vogel 1979).
+fn place_of_sky(i: usize, count: usize) -> Vector {
+    const GOLDEN: f64 = 2.399_963_229_728_653;
+    let up = (i as f64 + 0.5) / count as f64;
+    let (sin, cos) = (GOLDEN * i as f64).sin_cos();
+    let flat = (1.0 - up * up).sqrt();
+    Vector::new(flat * sin, up, flat * cos)
+}

@@ -1,0 +1,199 @@
+//! A picture in the making: the triangles of a [`Stage`] in pixels, and their colours in the light.
+
+use std::ops::Range;
+
+use super::draft::Draft;
+use super::lens::Lens;
+use super::light::Spot;
+use super::lighting::Lighting;
+use super::raster::{self, Image, Pattern, Place};
+use super::stage::{Part, Stage};
+use dlsys_geometry::scene::{Color, Vector};
+
+/// Most triangles that are in memory at a time: a picture with more is drawn in strips.
+const MOST: usize = 4_000_000;
+/// How far the edges of a ribbon are turned away, as those of a stem: sine and cosine.
+const TURNED: (f32, f32) = (0.866, 0.5);
+
+/// A triangle in pixels.
+struct Face {
+    corners: [u32; 3],
+    normals: [u32; 3],
+    surface: u32,
+    /// Twice the number of its colour, and 1 if light comes through it.
+    look: u32,
+}
+
+/// Triangles in some rows of a picture.
+struct Shot<'a> {
+    lens: &'a Lens,
+    lighting: &'a Lighting<'a>,
+    colors: &'a [Color],
+    rows: Range<usize>,
+    places: Vec<Place>,
+    normals: Vec<[f32; 3]>,
+    faces: Vec<Face>,
+    surface: u32,
+}
+
+/// Draws a stage with so many samples.
+pub(super) fn draw<const N: usize>(
+    pattern: &Pattern<N>,
+    threads: usize,
+    stage: &Stage,
+    lens: &Lens,
+    lighting: &Lighting,
+) -> Image {
+    let [width, height] = lens.size;
+    let mut pixels = vec![[0; 4]; width * height];
+    let strips = stage.len().div_ceil(MOST).max(1);
+    let rows = height.div_ceil(strips).next_multiple_of(16).max(16);
+    let mut shot = Shot {
+        lens,
+        lighting,
+        colors: &stage.colors,
+        rows: 0..0,
+        places: Vec::new(),
+        normals: Vec::new(),
+        faces: Vec::new(),
+        surface: 0,
+    };
+    for (strip, pixels) in pixels.chunks_mut((rows * width).max(1)).enumerate() {
+        shot.rows = strip * rows..((strip + 1) * rows).min(height);
+        shot.places.clear();
+        shot.normals.clear();
+        shot.faces.clear();
+        shot.add_floor();
+        for part in &stage.parts {
+            shot.add(&stage.drafts[part.draft], part);
+        }
+        raster::draw(pattern, threads, lens.size, shot.rows.clone(), &shot, pixels);
+    }
+    Image { width, height, pixels }
+}
+
+impl Shot<'_> {
+    /// Adds a draft in its place.
+    fn add(&mut self, draft: &Draft, part: &Part) {
+        let place = part.place.as_ref();
+        let (vertex, normal) = (self.places.len() as u32, self.normals.len() as u32);
+        let mesh = &draft.mesh;
+        let lens = self.lens;
+        match place {
+            None => {
+                self.places.extend(mesh.vertices.iter().map(|&p| lens.place(p)));
+                self.normals.extend(mesh.normals.iter().map(|&n| lens.normal(n)));
+            }
+            Some(place) => {
+                self.places.extend(mesh.vertices.iter().map(|&p| lens.place(place.point(p))));
+                self.normals.extend(mesh.normals.iter().map(|&n| lens.normal(place.turned(n))));
+            }
+        }
+        let first = self.surface;
+        for face in &mesh.faces {
+            self.surface = first + face.surface;
+            let look = (part.colors + face.material.index() as u32) << 1 | u32::from(face.is_thin);
+            let corners = face.corners.map(|(v, _)| vertex + v);
+            self.face(corners, face.corners.map(|(_, n)| normal + n), look);
+        }
+        if self.faces.last().is_none_or(|face| face.corners[0] < vertex) {
+            self.places.truncate(vertex as usize);
+            self.normals.truncate(normal as usize);
+        }
+        for ribbon in draft.ribbons(place, |p| lens.camera.towards(p)) {
+            self.surface += 1;
+            let (vertex, normal) = (self.places.len() as u32, self.normals.len() as u32);
+            self.places.extend(ribbon.corners.iter().flatten().map(|&p| lens.place(p)));
+            let [side, facing] = [ribbon.side, ribbon.facing].map(|v| lens.normal(v));
+            let turned = |sign: f32| [0, 1, 2].map(|k| sign * TURNED.0 * side[k] + TURNED.1 * facing[k]);
+            self.normals.extend([turned(-1.0), turned(1.0)]);
+            let look = (part.colors + ribbon.material.index() as u32) << 1;
+            let count = self.faces.len();
+            for corners in [[0, 1, 3], [0, 3, 2]] {
+                let normals = corners.map(|k| normal + (k & 1));
+                self.face(corners.map(|k| vertex + k), normals, look);
+            }
+            if self.faces.len() == count {
+                self.places.truncate(vertex as usize);
+                self.normals.truncate(normal as usize);
+            }
+        }
+        self.surface += 1;
+    }
+
+    /// Adds what is seen of the floor.
+    fn add_floor(&mut self) {
+        let outline = self.lighting.floor_outline(self.lens);
+        let Some(normal) = self.lighting.floor_normal() else { return };
+        let vertex = self.places.len() as u32;
+        self.places.extend(outline.iter().map(|&p| self.lens.place(p)));
+        let at = self.normals.len() as u32;
+        self.normals.push(self.lens.normal(normal));
+        self.surface += 1;
+        for k in 2..outline.len() as u32 {
+            self.face([vertex, vertex + k - 1, vertex + k], [at; 3], FLOOR);
+        }
+        self.surface += 1;
+    }
+
+    /// Adds a triangle if it may be seen.
+    fn face(&mut self, corners: [u32; 3], normals: [u32; 3], look: u32) {
+        let [p, q, r] = corners.map(|corner| self.places[corner as usize]);
+        let outside = |low: i32, high: i32, from: usize, end: usize| {
+            i64::from(high) < from as i64 * raster::STEPS || i64::from(low) > end as i64 * raster::STEPS
+        };
+        let is_behind = p.depth.is_nan() || q.depth.is_nan() || r.depth.is_nan();
+        if is_behind
+            || outside(p.y.min(q.y).min(r.y), p.y.max(q.y).max(r.y), self.rows.start, self.rows.end)
+            || outside(p.x.min(q.x).min(r.x), p.x.max(q.x).max(r.x), 0, self.lens.size[0])
+        {
+            return;
+        }
+        // A stem is closed: its far side is never seen.
+        let wide = |a: i32, b: i32| i64::from(a) - i64::from(b);
+        if look & 1 == 0 && wide(q.x, p.x) * wide(r.y, p.y) >= wide(q.y, p.y) * wide(r.x, p.x) {
+            return;
+        }
+        self.faces.push(Face { corners, normals, surface: self.surface, look });
+    }
+}
+
+/// The look of the floor.
+const FLOOR: u32 = u32::MAX;
+
+impl raster::Triangles for Shot<'_> {
+    fn count(&self) -> usize {
+        self.faces.len()
+    }
+
+    fn corners(&self, n: usize) -> [Place; 3] {
+        self.faces[n].corners.map(|corner| self.places[corner as usize])
+    }
+
+    fn surface(&self, n: usize) -> u32 {
+        self.faces[n].surface
+    }
+
+    fn shade(&self, n: usize, pixel: [usize; 2], weights: [f64; 3]) -> [u8; 4] {
+        let face = &self.faces[n];
+        let [p, q, r] = self.corners(n);
+        let depth = (0..3).map(|k| f64::from([p, q, r][k].depth) * weights[k]).sum();
+        let seen = self.lens.seen(pixel, depth);
+        if face.look == FLOOR {
+            return self.lighting.floor_color(seen);
+        }
+        let normal = (0..3).fold(Vector::zeros(), |sum, k| {
+            let [x, y, z] = self.normals[face.normals[k] as usize];
+            sum + Vector::new(f64::from(x), f64::from(y), f64::from(z)) * weights[k]
+        });
+        // Pixels go down.
+        let wide = |a: i32, b: i32| f64::from(a) - f64::from(b);
+        let is_front = wide(q.x, p.x) * wide(r.y, p.y) < wide(q.y, p.y) * wide(r.x, p.x);
+        let normal =
+            normal.try_normalize(1e-12).unwrap_or_else(Vector::z) * if is_front { 1.0 } else { -1.0 };
+        let spot = Spot { normal, seen, is_thin: face.look & 1 == 1 };
+        let color = self.colors[(face.look >> 1) as usize];
+        let Color { red, green, blue } = self.lighting.color(color, self.lighting.strength(&spot));
+        [red, green, blue, 255]
+    }
+}

@@ -1,0 +1,247 @@
+//! Light, shadows, floor, camera, and plants of other models: at places that can be computed.
+
+use std::sync::Arc;
+
+use crate::cli::{bad, good};
+use crate::common::scene;
+use dlsys::render::{Fit, Format, FrameWriter, Page, Size, Smoothness, Survey, View, pixels_by};
+use dlsys::scene::{
+    Bounds, Color, MaterialId, Owner, Placement, Plant, Point, Polygon, Scene, Surroundings, Vector,
+    Viewpoint,
+};
+use dlsys::tree::Lineage;
+
+/// A pole of height 4 on a floor at 0, and the sun in the east at 45 degrees.
+fn pole() -> Scene {
+    let mut scene = scene("!(0.2)F(4)");
+    scene.surroundings.floor = Some(0.0);
+    scene.surroundings.sun = Some(Vector::new(1.0, 1.0, 0.0));
+    scene
+}
+
+fn fit(scene: &Scene, view: &str) -> Fit {
+    let mut survey = Survey::new(view.parse().expect("a view")).with_perspective(40.0);
+    survey.add(scene);
+    survey.fit()
+}
+
+/// Red, green and blue before white of the pixel at which a camera sees a point, on a page of 400 pixels that shows eight units.
+fn seen_at(scene: &Scene, view: &str, place: Point) -> [f64; 3] {
+    let mut fit = fit(scene, view);
+    fit.picture.area = [-4.0, -4.0, 8.0, 8.0];
+    let page = Page::new(fit.picture, Size::Exact(400, 400), None).expect("small");
+    let pixels = pixels_by(scene, &fit, &page, Smoothness::Fine, 1);
+    let at = fit.camera.project(place);
+    let (x, y) = ((at.x + 4.0) * 50.0, (4.0 - at.y) * 50.0);
+    let pixel = pixels[y as usize * 400 + x as usize];
+    [0, 1, 2].map(|k| f64::from(pixel[k]) + 255.0 - f64::from(pixel[3]))
+}
+
+#[test]
+fn the_shadow_of_a_pole_lies_on_the_side_away_from_the_sun_and_is_as_long_as_it_is_high() {
+    let scene = pole();
+    let floor = |x: f64, z: f64| seen_at(&scene, "0,50", Point::new(x, 0.0, z))[1];
+    let lit = floor(2.0, 0.0);
+    assert!(lit > 215.0, "towards the sun the floor is lit: {lit}");
+    for x in [-1.0, -2.0, -3.0, -3.7] {
+        let dark = floor(x, 0.0);
+        assert!(dark < 0.8 * lit, "in shadow at {x}: {dark} beside {lit}");
+        // The pole is 0.2 wide, and so is its shadow.
+        for z in [-0.25, 0.25] {
+            assert!(floor(x, z) > 0.9 * lit, "lit beside the shadow at {x}, {z}");
+        }
+    }
+    assert!(floor(-4.3, 0.0) > 0.9 * lit, "beyond the shadow's end");
+}
+
+#[test]
+fn without_a_sun_the_floor_is_soft_and_dark_where_something_stands() {
+    let mut scene = scene("!(1)F(2)");
+    scene.surroundings.floor = Some(0.0);
+    let floor = |x: f64| seen_at(&scene, "0,40", Point::new(x, 0.0, 0.0))[1];
+    let [near, middle, far] = [0.6, 1.2, 3.5].map(floor);
+    assert!(near + 5.0 < middle && middle < far, "{near} {middle} {far}");
+    assert!(near > 120.0, "no hard shadow: {near}");
+}
+
+#[test]
+fn light_stays_within_bounds_and_passes_through_leaves() {
+    // A leaf that the sun lights from above, seen from both sides.
+    let mut scene = Scene::default();
+    let owner = scene.add_owner(Owner { name: "P".into(), lineage: Lineage::of_axiom(0) });
+    let vertices = [[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]].map(|[x, z]| Point::new(x, 1.0, z));
+    scene.polygons.push(Polygon { vertices: vertices.to_vec(), material: MaterialId::LEAF, owner });
+    let own = scene.palette.get(MaterialId::LEAF).color;
+    let green =
+        |scene: &Scene, view: &str| seen_at(scene, view, Point::new(0.3, 1.0, 0.3))[1] / f64::from(own.green);
+    for sun in [None, Some(Vector::y())] {
+        scene.surroundings.sun = sun;
+        let [above, below] = [green(&scene, "0,60"), green(&scene, "0,-60")];
+        assert!((0.7..1.4).contains(&above), "{above}");
+        assert!((0.45..above).contains(&below), "{below} below, {above} above");
+    }
+    // In the shadow of another one it is darker, but not black.
+    let lit = green(&scene, "0,60");
+    let roof = vertices.map(|p| Point::new(p.x, 3.0, p.z - 4.5));
+    scene.polygons.push(Polygon { vertices: roof.to_vec(), material: MaterialId::LEAF, owner });
+    scene.surroundings.sun = Some(Vector::new(0.0, 2.0, -4.5));
+    let shaded = green(&scene, "0,60");
+    assert!((0.2..0.75 * lit).contains(&shaded), "{shaded} of {lit}");
+}
+
+#[test]
+fn pixels_do_not_depend_on_threads() {
+    let scene = pole();
+    let fit = fit(&scene, "30,20");
+    let page = Page::new(fit.picture, Size::Exact(200, 150), None).expect("small");
+    let pixels = |threads| pixels_by(&scene, &fit, &page, Smoothness::Fine, threads);
+    let one = pixels(1);
+    assert!(one == pixels(2) && one == pixels(5));
+}
+
+#[test]
+fn a_flat_drawing_stays_as_it_is() {
+    let plain = scene("F(1)[+(30)F(1)]F(1)");
+    let mut lit = plain.clone();
+    lit.surroundings.sun = Some(Vector::new(1.0, 2.0, 3.0));
+    lit.surroundings.floor = Some(0.0);
+    for format in [Format::PNG, Format::SVG] {
+        let drawn = |scene: &Scene| {
+            let mut survey = Survey::new(View::FRONT);
+            survey.add(scene);
+            FrameWriter::new(format, survey.fit()).write(scene, "")
+        };
+        assert!(drawn(&plain) == drawn(&lit), "{format:?}");
+    }
+}
+
+#[test]
+fn a_floor_is_a_group_of_a_mesh_and_regions_of_a_drawing_and_does_not_change_the_frame() {
+    let scene = pole();
+    let mut bare = scene.clone();
+    bare.surroundings = Surroundings::default();
+    assert_eq!(fit(&scene, "20,30").picture, fit(&bare, "20,30").picture);
+    let write = |format| {
+        String::from_utf8(FrameWriter::new(format, fit(&scene, "20,30")).write(&scene, "")).expect("UTF-8")
+    };
+    let mesh = write(Format::OBJ);
+    assert!(mesh.contains("\ng ground\nusemtl ground\n"));
+    let svg = write(Format::SVG);
+    let ground = svg.split("<g id=\"ground\">").nth(1).and_then(|rest| rest.split("</g>").next());
+    assert!(ground.is_some_and(|ground| ground.lines().count() > 3), "lit and in shadow");
+}
+
+#[test]
+fn a_declared_camera_sees_its_aim_in_the_middle() {
+    let mut scene = squares();
+    scene.surroundings.camera =
+        Some(Viewpoint { eye: Point::new(3.0, 2.0, 9.0), aim: Point::new(3.0, 2.0, 1.0), angle: 20.0 });
+    let mut survey = Survey::new(View::FRONT);
+    survey.add(&scene);
+    let page = Page::usual(survey.fit().picture);
+    let (fit, page) = survey.fit().for_frame(&scene, &page);
+    let [left, bottom, width, height] = page.picture.area;
+    let aim = fit.camera.project(Point::new(3.0, 2.0, 1.0));
+    assert!((aim.x - left - width / 2.0).abs() < 1e-9 && (aim.y - bottom - height / 2.0).abs() < 1e-9);
+    // 20 degrees from top to bottom, at a distance of 8.
+    assert!((height - 16.0 * 10_f64.to_radians().tan()).abs() < 1e-9);
+    let survey = Survey::new(View::FRONT).without_cameras();
+    assert_eq!(survey.fit().for_frame(&scene, &page).1, page);
+}
+
+fn squares() -> Scene {
+    let mut scene = Scene::default();
+    let owner = scene.add_owner(Owner { name: "P".into(), lineage: Lineage::of_axiom(0) });
+    for z in [0.0, 2.0] {
+        let vertices = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]].map(|[x, y]| Point::new(x, y, z));
+        scene.polygons.push(Polygon { vertices: vertices.to_vec(), material: MaterialId::LEAF, owner });
+    }
+    scene
+}
+
+/// A row of plants, `step` apart along x.
+fn row(plant: Scene, count: usize, step: f64) -> Scene {
+    let plant = Arc::new(plant);
+    let mut scene = Scene::default();
+    for i in 0..count {
+        let owner = scene.add_owner(Owner { name: "@P".into(), lineage: Lineage::of_axiom(i) });
+        let origin = Point::new(step * i as f64, 0.0, 0.0);
+        let placement = Placement::uniform(origin, [Vector::x(), Vector::y(), Vector::z()], 2.0);
+        scene.plants.push(Plant { scene: plant.clone(), placement, owner });
+    }
+    scene
+}
+
+#[test]
+fn plants_count_in_bounds_and_are_drawn_where_they_stand() {
+    let scene = row(scene("!(0.2);(7)F(3)[&(90)!(0.2);(7)F(0.5)]"), 3, 4.0);
+    let bounds = Bounds::of(&scene);
+    let [low, high] = bounds.corners(bounds.default_width()).expect("something");
+    assert!((high.y - 6.2).abs() < 1e-9 && (high.x - 8.2).abs() < 1e-9 && (low.x + 0.2).abs() < 1e-9);
+    let mut survey = Survey::new(View::FRONT);
+    survey.add(&scene);
+    let fit = survey.fit();
+    let page = Page::new(fit.picture, Size::Width(300), None).expect("small");
+    let pixels = pixels_by(&scene, &fit, &page, Smoothness::Fine, 1);
+    let [left, bottom, width, height] = page.picture.area;
+    let [w, h] = page.pixels.map(f64::from);
+    let opacity = |x: f64, y: f64| {
+        let (column, row) = ((x - left) / width * w, (bottom + height - y) / height * h);
+        pixels[row as usize * page.pixels[0] as usize + column as usize][3]
+    };
+    for i in 0..3 {
+        let x = 4.0 * f64::from(i);
+        assert_eq!([opacity(x, 1.0), opacity(x, 5.9), opacity(x + 2.0, 3.0)], [255, 255, 0]);
+    }
+    // The same in one mesh, where every plant is a group of its module.
+    let mesh = String::from_utf8(FrameWriter::new(Format::OBJ, fit).write(&scene, "")).expect("UTF-8");
+    assert_eq!(mesh.matches("\ng P.").count(), 3, "{}", &mesh[..400]);
+}
+
+#[test]
+fn detail_follows_the_picture_but_never_the_mesh() {
+    let plant = scene("!(0.1)F(1)[+(40)@K(0.5)]F(1)@L(0.7)");
+    let mut survey = Survey::new(View::FRONT);
+    survey.add(&plant);
+    let mesh = |width| {
+        let mut writer = FrameWriter::new(Format::OBJ, survey.fit());
+        writer.page = Page::new(writer.fit.picture, Size::Width(width), None).expect("small");
+        writer.write(&plant, "")
+    };
+    assert!(mesh(20) == mesh(2000));
+}
+
+#[test]
+fn flags_say_what_is_wrong_with_them() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("out");
+    let out = out.to_str().expect("UTF-8");
+    let render =
+        ["render", "models/campanula.dls", "-o", out, "--at", "20", "--format", "png", "--width", "60"];
+    for (flags, message) in [
+        (&["--camera", "1,2/0,0,0"][..], "expected eye/aim"),
+        (&["--camera", "1,2,3/1,2,3"], "must be different"),
+        (&["--camera", "1,2,3/0,0,0/200"], "between 1 and 120"),
+        (&["--light", "0,0,0"], "not all 0"),
+        (&["--sky", "#ffffff"], "two colours"),
+        (&["--zoom", "0"], "from 0.001"),
+    ] {
+        let (_, said) = bad(&[&render, flags].concat());
+        assert!(said.contains(message), "{said}");
+    }
+    let flags =
+        ["--camera", "20,20,90/0,20,0/40", "--zoom", "2", "--light", "1,2,1", "--sky", "#6fa3e0,#e8f0f8"];
+    good(&[&render[..], &flags].concat());
+    assert!(
+        bad(&[&render[..6], &["--format", "obj", "--light", "1,2,1"]].concat()).1.contains("for pictures")
+    );
+}
+
+#[test]
+fn the_sky_is_behind_everything() {
+    let mut scene = squares();
+    scene.surroundings.sky = Some([Color::hex(0x0000ff), Color::hex(0xffffff)]);
+    let svg = String::from_utf8(FrameWriter::new(Format::SVG, fit(&scene, "30,20")).write(&scene, ""))
+        .expect("UTF-8");
+    assert!(svg.contains("fill=\"url(#sky)\"") && svg.contains("stop-color=\"#0000ff\""));
+}
