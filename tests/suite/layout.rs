@@ -39,8 +39,10 @@ fn model(path: &std::path::Path, text: &str) -> String {
     }
     out += rest;
     // A map, whose order is another each time; it says nothing that the list of kinds does not.
-    if let (Some(from), Some(to)) = (out.find(", ids: {"), out.find("}, axiom: ")) {
-        out.replace_range(from..to, "");
+    // Models of plants have maps of their own.
+    while let Some(from) = out.find(", ids: {") {
+        let Some(length) = out[from..].find("}, axiom: ") else { break };
+        out.replace_range(from..from + length, "");
     }
     out
 }

@@ -59,7 +59,7 @@ fn without_a_sun_the_floor_is_soft_and_dark_where_something_stands() {
     let mut scene = scene("!(1)F(2)");
     scene.surroundings.floor = Some(0.0);
     let floor = |x: f64| seen_at(&scene, "0,40", Point::new(x, 0.0, 0.0))[1];
-    let [near, middle, far] = [0.6, 1.2, 3.5].map(floor);
+    let [near, middle, far] = [1.0, 1.5, 3.5].map(floor);
     assert!(near + 5.0 < middle && middle < far, "{near} {middle} {far}");
     assert!(near > 120.0, "no hard shadow: {near}");
 }
@@ -167,7 +167,7 @@ fn row(plant: Scene, count: usize, step: f64) -> Scene {
         let owner = scene.add_owner(Owner { name: "@P".into(), lineage: Lineage::of_axiom(i) });
         let origin = Point::new(step * i as f64, 0.0, 0.0);
         let placement = Placement::uniform(origin, [Vector::x(), Vector::y(), Vector::z()], 2.0);
-        scene.plants.push(Plant { scene: plant.clone(), placement, owner });
+        scene.plants.push(Plant::new(plant.clone(), placement, owner));
     }
     scene
 }
@@ -193,9 +193,9 @@ fn plants_count_in_bounds_and_are_drawn_where_they_stand() {
         let x = 4.0 * f64::from(i);
         assert_eq!([opacity(x, 1.0), opacity(x, 5.9), opacity(x + 2.0, 3.0)], [255, 255, 0]);
     }
-    // The same in one mesh, where every plant is a group of its module.
+    // The same in one mesh, where every module of every plant is a group.
     let mesh = String::from_utf8(FrameWriter::new(Format::OBJ, fit).write(&scene, "")).expect("UTF-8");
-    assert_eq!(mesh.matches("\ng P.").count(), 3, "{}", &mesh[..400]);
+    assert_eq!(mesh.matches("\ng F.").count(), 6, "{}", &mesh[..400]);
 }
 
 #[test]
@@ -241,7 +241,9 @@ fn flags_say_what_is_wrong_with_them() {
 fn the_sky_is_behind_everything() {
     let mut scene = squares();
     scene.surroundings.sky = Some([Color::hex(0x0000ff), Color::hex(0xffffff)]);
-    let svg = String::from_utf8(FrameWriter::new(Format::SVG, fit(&scene, "30,20")).write(&scene, ""))
+    let svg = String::from_utf8(FrameWriter::new(Format::SVG, fit(&scene, "30,-70")).write(&scene, ""))
         .expect("UTF-8");
-    assert!(svg.contains("fill=\"url(#sky)\"") && svg.contains("stop-color=\"#0000ff\""));
+    let has = |text: &str| assert!(svg.contains(text), "{text}: {}", &svg[..600.min(svg.len())]);
+    has("fill=\"url(#sky)\"");
+    has("stop-color=\"#0000ff\"");
 }

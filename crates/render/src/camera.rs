@@ -134,6 +134,13 @@ impl Camera {
         Point::from(self.view.space(seen.coords))
     }
 
+    /// Sine of the elevation above the horizon of what is seen at this height of the picture, in its middle; `None` without perspective.
+    pub(super) fn elevation(&self, y: f64) -> Option<f64> {
+        let eye = self.eye.as_ref()?;
+        let seen = self.view.space(Vector::new(0.0, y - eye.y, -eye.distance));
+        Some(seen.y / seen.norm())
+    }
+
     /// The direction from the scene to the viewer.
     pub fn view(&self) -> View {
         self.view

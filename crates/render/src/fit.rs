@@ -8,7 +8,7 @@ use super::extent::Extent;
 use super::light::Light;
 use super::tube::TubeStyle;
 use super::{Page, View, number, painter};
-use dlsys_geometry::scene::{Bounds, Color, Point, Scene, Surroundings, Width};
+use dlsys_geometry::scene::{Bounds, Point, Scene, Surroundings, Width};
 
 /// Drawings less deep than this part of their extent are flat.
 const FLAT: f64 = 1e-6;
@@ -221,10 +221,10 @@ impl Fit {
         Bounds::of(&self.drawn(Cow::Borrowed(scene))).corners(self.default_width)
     }
 
-    /// True if SVG pictures are made of visible regions: the animation has depth, or light that is declared. Without depth nothing is hidden, and every element
+    /// True if SVG pictures are made of visible regions: the animation has depth. Without depth nothing is hidden, and every element
     /// keeps its exact shape.
     pub(super) fn has_visible_regions(&self) -> bool {
-        self.has_depth || self.has_light
+        self.has_depth
     }
 
     /// How stems become tubes. Without depth they are lines of a diagram, and their joints keep their shape.
@@ -236,11 +236,6 @@ impl Fit {
     /// The surroundings of a frame: those of flags, and those that its scene declares.
     pub(super) fn surroundings(&self, scene: &Scene) -> Surroundings {
         joined(&self.declared, &scene.surroundings)
-    }
-
-    /// The sky behind a frame, zenith and horizon, if one is declared.
-    pub(super) fn sky(&self, scene: &Scene) -> Option<[Color; 2]> {
-        self.surroundings(scene).sky
     }
 
     /// The middle of everything, and the extent, which is not 0.

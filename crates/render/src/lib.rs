@@ -73,6 +73,7 @@ mod relay;
 mod shadow;
 mod sheet;
 mod shot;
+mod sky;
 mod stage;
 mod stroke;
 mod text;

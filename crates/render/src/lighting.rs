@@ -22,6 +22,9 @@ const CONTACT: f64 = 0.5;
 /// How much darker the floor is around the plant than far away, and how far that reaches in parts of the extent.
 const POOL: f64 = 0.06;
 const POOL_REACH: f64 = 1.2;
+/// The colour of bare ground, and its part beside the haze of the horizon in the floor under a declared sky.
+const EARTH: Color = Color::hex(0xa99a78);
+const EARTHY: f64 = 0.6;
 /// Strengths between which the colour of light changes from the sky's to the sun's.
 const COOL: f64 = 0.35;
 const WARM: f64 = 0.85;
@@ -42,8 +45,8 @@ pub(super) struct Lighting<'a> {
     maps: Option<Maps>,
     floor: Option<f64>,
     open_sky: Option<OpenSky>,
-    /// The colour of the sky at the horizon, if it is declared.
-    horizon: Option<Color>,
+    /// The colour of the floor under a declared sky.
+    ground: Option<Color>,
 }
 
 impl<'a> Lighting<'a> {
@@ -77,8 +80,8 @@ impl<'a> Lighting<'a> {
             open_sky = floor.map(|height| OpenSky::new(&maps, casters.around(), height));
             Some(maps)
         });
-        let horizon = around.sky.map(|[_, horizon]| horizon);
-        Lighting { fit, declared, maps: maps.flatten(), floor, open_sky, horizon }
+        let ground = around.sky.map(|[_, horizon]| between(horizon, EARTH, EARTHY));
+        Lighting { fit, declared, maps: maps.flatten(), floor, open_sky, ground }
     }
 
     /// Strength of light at a place; 1 leaves a colour as it is.
@@ -161,9 +164,9 @@ impl<'a> Lighting<'a> {
     /// The floor where it is seen: times its opacity, and the opacity. Without a sky it is as light as the background.
     pub(super) fn floor_color(&self, seen: Point) -> [u8; 4] {
         let strength = self.floor_strength(seen);
-        match self.horizon {
-            Some(horizon) => {
-                let Color { red, green, blue } = self.color(horizon, strength);
+        match self.ground {
+            Some(ground) => {
+                let Color { red, green, blue } = self.color(ground, strength);
                 [red, green, blue, 255]
             }
             None => {
@@ -177,11 +180,17 @@ impl<'a> Lighting<'a> {
 
     /// The floor in light of this strength, before a background.
     pub(super) fn floor_over(&self, background: Option<Color>, strength: f64) -> Color {
-        match self.horizon {
-            Some(horizon) => self.color(horizon, strength),
+        match self.ground {
+            Some(ground) => self.color(ground, strength),
             None => background.unwrap_or(Page::BACKGROUND).lit(strength),
         }
     }
+}
+
+/// A colour between two.
+fn between(from: Color, to: Color, part: f64) -> Color {
+    let mix = |a: u8, b: u8| (f64::from(a) + (f64::from(b) - f64::from(a)) * part + 0.5) as u8;
+    Color { red: mix(from.red, to.red), green: mix(from.green, to.green), blue: mix(from.blue, to.blue) }
 }
 
 /// The part of the sky that is seen from places of the floor, on a grid: it changes slowly.

@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use super::Fit;
 use super::draft::{Detail, Draft};
 use super::lens::Lens;
-use dlsys_geometry::scene::{Bounds, Color, Placement, Point, Scene};
+use dlsys_geometry::scene::{Color, Placement, Plant, Point, Scene};
 
 /// A draft in its place.
 pub(super) struct Part {
@@ -93,7 +93,7 @@ impl<'s> Stage<'s> {
         let mut known: HashMap<(*const Scene, i32), usize> = HashMap::new();
         for plant in &scene.plants {
             let key = &raw const *plant.scene;
-            let look = *looks.entry(key).or_insert_with(|| self.look(&plant.scene));
+            let look = *looks.entry(key).or_insert_with(|| self.look(plant));
             let Some(look) = look else { continue };
             let placement = match place {
                 None => plant.placement,
@@ -116,14 +116,12 @@ impl<'s> Stage<'s> {
     }
 
     /// `None` if nothing is drawn.
-    fn look(&mut self, scene: &Scene) -> Option<Look> {
-        let bounds = Bounds::of(scene);
-        let default_width = bounds.default_width();
-        let [low, high] = bounds.corners(default_width)?;
+    fn look(&mut self, plant: &Plant) -> Option<Look> {
+        let [low, high] = plant.bounds()?;
         let colors = self.colors.len() as u32;
-        self.colors.extend(scene.palette.materials().iter().map(|material| material.color));
+        self.colors.extend(plant.scene.palette.materials().iter().map(|material| material.color));
         Some(Look {
-            default_width,
+            default_width: plant.default_width(),
             centre: nalgebra::center(&low, &high),
             radius: (high - low).norm() / 2.0,
             colors,

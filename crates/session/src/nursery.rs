@@ -140,7 +140,7 @@ impl<'m> Nursery<'m> {
             let (a, b) = (&seedlings[*a], &seedlings[*b]);
             key(a).cmp(&key(b)).then(a.age.total_cmp(&b.age))
         });
-        let mut drawn: Vec<Option<Arc<Scene>>> = vec![None; seedlings.len()];
+        let mut drawn: Vec<Option<Plant>> = vec![None; seedlings.len()];
         let mut elements = 0;
         for group in order.chunk_by(|a, b| key(&seedlings[*a]) == key(&seedlings[*b])) {
             let first = &seedlings[group[0]];
@@ -157,17 +157,20 @@ impl<'m> Nursery<'m> {
                     let what = format!("the plants of this scene have more than {MOST_ELEMENTS} pieces");
                     return Err(too_many(plant, what));
                 }
-                let grown = Arc::new(grown);
-                twins.iter().for_each(|i| drawn[*i] = Some(grown.clone()));
+                if grown.is_empty() {
+                    continue;
+                }
+                let Seedling { placement, owner, .. } = seedlings[twins[0]];
+                let grown = Plant::new(Arc::new(grown), placement, owner);
+                for &i in twins {
+                    drawn[i] = Some(grown.twin(seedlings[i].placement, seedlings[i].owner));
+                }
             }
             if growing.len() < MOST_KEPT {
                 growing.insert(key, kept);
             }
         }
-        for (Seedling { placement, owner, .. }, grown) in seedlings.into_iter().zip(drawn) {
-            let grown = grown.filter(|grown| !grown.is_empty());
-            scene.plants.extend(grown.map(|scene| Plant { scene, placement, owner }));
-        }
+        scene.plants.extend(drawn.into_iter().flatten());
         Ok(())
     }
 
@@ -212,6 +215,10 @@ impl<'m> Nursery<'m> {
 
 /// Gives lines of default width the width that suits the plant at its age, so that it does not depend on the scene around it.
 fn set_widths(scene: &mut Scene) {
+    let is_default = |width: &Width| matches!(width, Width::Default(_));
+    if !scene.segments.iter().flat_map(|segment| &segment.widths).any(is_default) {
+        return;
+    }
     let default = Bounds::of(scene).default_width();
     for width in scene.segments.iter_mut().flat_map(|segment| &mut segment.widths) {
         *width = Width::Set(width.resolve(default));

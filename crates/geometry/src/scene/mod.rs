@@ -34,7 +34,6 @@ pub use patch::{Net, Patch, PatchFace, PatchSet};
 pub use surroundings::{Plant, Seedling, Surroundings, Viewpoint};
 
 use std::borrow::Cow;
-use std::collections::HashMap;
 use std::sync::Arc;
 
 use dlsys_diagnostic::Diagnostic;
@@ -217,8 +216,7 @@ impl Scene {
         self.reach(&mut Visit(&mut visit));
     }
 
-    /// Shows the extent of all elements to `reach`, plants of other models included. Lines of default width in a plant have the width
-    /// that the extent of that plant gives them.
+    /// Shows the extent of all elements to `reach`, plants of other models included: of these the box around each.
     pub fn reach(&self, reach: &mut impl Reach) {
         for segment in &self.segments {
             reach.include(segment.start, segment.widths[0]);
@@ -234,22 +232,9 @@ impl Scene {
                 patch.hull().for_each(|point| reach.include(point, Width::Set(0.0)));
             }
         }
-        let mut known: HashMap<*const Scene, Bounds> = HashMap::new();
-        for plant in &self.plants {
-            let bounds = known.entry(Arc::as_ptr(&plant.scene)).or_insert_with(|| Bounds::of(&plant.scene));
-            let width = bounds.default_width();
-            let Some([low, high]) = bounds.corners(width) else { continue };
-            let corner = |i: usize| {
-                let side = |k: usize| if i >> k & 1 == 0 { low[k] } else { high[k] };
-                plant.placement.point(Point::new(side(0), side(1), side(2)))
-            };
-            if !reach.covers((0..8).map(corner)) {
-                let mut include = |point, of_line: Width| {
-                    let of_line = of_line.resolve(width) * plant.placement.largest();
-                    reach.include(plant.placement.point(point), Width::Set(of_line));
-                };
-                plant.scene.reach(&mut Visit(&mut include));
-            }
+        // The box around a plant: exact enough to frame a picture, at a cost that does not depend on the plant.
+        for corner in self.plants.iter().flat_map(Plant::corners) {
+            reach.include(corner, Width::Set(0.0));
         }
     }
 

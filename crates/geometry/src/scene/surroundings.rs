@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Color, OwnerId, Placement, Point, Scene, Vector};
+use super::{Bounds, Color, OwnerId, Placement, Point, Scene, Vector};
 
 /// The surroundings that a model declares, at the time of its scene. What is `None` is not declared.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -52,4 +52,39 @@ pub struct Plant {
     pub placement: Placement,
     /// The module that drew it.
     pub owner: OwnerId,
+    default_width: f64,
+    bounds: Option<[Point; 2]>,
+}
+
+impl Plant {
+    /// A plant that looks like this.
+    pub fn new(scene: Arc<Scene>, placement: Placement, owner: OwnerId) -> Plant {
+        let all = Bounds::of(&scene);
+        let default_width = all.default_width();
+        Plant { default_width, bounds: all.corners(default_width), scene, placement, owner }
+    }
+
+    /// Another plant of the same look.
+    pub fn twin(&self, placement: Placement, owner: OwnerId) -> Plant {
+        Plant { placement, owner, ..self.clone() }
+    }
+
+    /// Width of its lines of default width, which follows from its own extent, in its own units.
+    pub fn default_width(&self) -> f64 {
+        self.default_width
+    }
+
+    /// Opposite corners of the box around it in its own coordinates; `None` if nothing is drawn.
+    pub fn bounds(&self) -> Option<[Point; 2]> {
+        self.bounds
+    }
+
+    /// The corners of that box in the scene.
+    pub fn corners(&self) -> impl Iterator<Item = Point> {
+        let corner = |[low, high]: [Point; 2], i: usize| {
+            let side = |k: usize| if i >> k & 1 == 0 { low[k] } else { high[k] };
+            self.placement.point(Point::new(side(0), side(1), side(2)))
+        };
+        self.bounds.into_iter().flat_map(move |bounds| (0..8).map(move |i| corner(bounds, i)))
+    }
 }

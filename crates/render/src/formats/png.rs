@@ -7,6 +7,7 @@ use crate::lens::Lens;
 use crate::light::Spot;
 use crate::lighting::Lighting;
 use crate::raster::{self, Corner, Image};
+use crate::sky::Sky;
 use crate::stage::Stage;
 use crate::triangles::Triangles;
 use crate::{Fit, Page, Smoothness, shot};
@@ -38,7 +39,7 @@ impl Exporter for Png {
     ) -> io::Result<()> {
         let (fit, page) = writer.fit.for_frame(scene, &writer.page);
         let image = picture(scene, &fit, page.pixels, page.placement(), Smoothness::Fine, 1);
-        out.write_all(&encode(&page, title, fit.sky(scene), &image))
+        out.write_all(&encode(&page, title, Sky::of(scene, &fit, &page).as_ref(), &image))
     }
 }
 
@@ -224,14 +225,13 @@ impl Canvas<'_> {
     }
 }
 
-/// The file of one image that fills a page; a sky (zenith, horizon) stands behind it where there is a background.
-fn encode(page: &Page, title: &str, sky: Option<[Color; 2]>, image: &Image) -> Vec<u8> {
+/// The file of one image that fills a page; a sky stands behind it where there is a background.
+fn encode(page: &Page, title: &str, sky: Option<&Sky>, image: &Image) -> Vec<u8> {
     let mut data = Vec::with_capacity(image.pixels.len() * if page.background.is_some() { 3 } else { 4 });
     for (line, row) in image.pixels.chunks_exact(image.width.max(1)).enumerate() {
-        let background = page.background.map(|color| match sky {
-            Some([zenith, horizon]) => between(zenith, horizon, line, image.height),
-            None => [color.red, color.green, color.blue],
-        });
+        let part = (line as f64 + 0.5) / image.height.max(1) as f64;
+        let background = page.background.map(|color| sky.map_or(color, |sky| sky.color(part)));
+        let background = background.map(|color| [color.red, color.green, color.blue]);
         for &[red, green, blue, opacity] in row {
             let (color, open) = ([red, green, blue], u32::from(255 - opacity));
             match background {
@@ -251,13 +251,6 @@ fn encode(page: &Page, title: &str, sky: Option<[Color; 2]>, image: &Image) -> V
         }
     }
     file(page, title, &data)
-}
-
-/// The sky behind a line of a picture: the colour of the zenith above, that of the horizon below.
-fn between(zenith: Color, horizon: Color, line: usize, height: usize) -> [u8; 3] {
-    let part = (line as f64 + 0.5) / height.max(1) as f64;
-    let mix = |a: u8, b: u8| (f64::from(a) + (f64::from(b) - f64::from(a)) * part + 0.5) as u8;
-    [mix(zenith.red, horizon.red), mix(zenith.green, horizon.green), mix(zenith.blue, horizon.blue)]
 }
 
 /// The file of a page with this data, of three bytes a pixel, or four if there is no background.

@@ -8,8 +8,8 @@ use svg::node::Blob;
 use svg::node::element::{Definitions, Group, LinearGradient, Rectangle, Stop, Title};
 
 use crate::painter::{self, Style, text};
+use crate::sky::Sky;
 use crate::{Fit, Page, floor};
-use dlsys_geometry::scene::Color;
 
 /// Scalable Vector Graphics.
 pub(crate) struct Svg;
@@ -25,10 +25,12 @@ impl Exporter for Svg {
         out: &mut (dyn Write + Send),
     ) -> io::Result<()> {
         let (fit, page) = writer.fit.for_frame(scene, &writer.page);
-        let sky = fit.sky(scene);
+        let sky = Sky::of(scene, &fit, &page);
         let (scene, floor) = floor::added(scene, &fit, Some(&page));
         let style = Style { floor, ..style(&fit, &page) };
-        out.write_all(around(&page, title, sky, painter::elements(&scene, style, true, "")).as_bytes())
+        out.write_all(
+            around(&page, title, sky.as_ref(), painter::elements(&scene, style, true, "")).as_bytes(),
+        )
     }
 }
 
@@ -38,8 +40,8 @@ pub(crate) fn style<'a>(fit: &'a Fit, page: &Page) -> Style<'a> {
     Style { fit, scale: page.picture.scale, pixels, background: page.background, floor: None }
 }
 
-/// The document of a page with these elements, each with its line's end. A sky (zenith, horizon) stands in place of the background.
-pub(crate) fn around(page: &Page, title: &str, sky: Option<[Color; 2]>, mut elements: String) -> String {
+/// The document of a page with these elements, each with its line's end. A sky stands in place of the background.
+pub(crate) fn around(page: &Page, title: &str, sky: Option<&Sky>, mut elements: String) -> String {
     let view_box = page.picture.view_box();
     let [left, top, width, height] = view_box;
     elements.truncate(elements.trim_end().len());
@@ -55,13 +57,13 @@ pub(crate) fn around(page: &Page, title: &str, sky: Option<[Color; 2]>, mut elem
     }
     if let Some(color) = page.background {
         let fill = sky.map_or_else(|| color.to_string(), |_| "url(#sky)".to_owned());
-        if let Some([zenith, horizon]) = sky {
-            let stop = |offset: u8, color: Color| {
-                Stop::new().set("offset", offset).set("stop-color", color.to_string())
-            };
-            let gradient = LinearGradient::new().set("id", "sky").set("x2", 0).set("y2", 1);
-            document =
-                document.add(Definitions::new().add(gradient.add(stop(0, zenith)).add(stop(1, horizon))));
+        if let Some(sky) = sky {
+            let mut gradient = LinearGradient::new().set("id", "sky").set("x2", 0).set("y2", 1);
+            for (part, color) in sky.stops() {
+                gradient =
+                    gradient.add(Stop::new().set("offset", text(part)).set("stop-color", color.to_string()));
+            }
+            document = document.add(Definitions::new().add(gradient));
         }
         let background = Rectangle::new()
             .set("x", text(left))

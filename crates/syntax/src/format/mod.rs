@@ -106,6 +106,9 @@ mod tests {
                 "axiom: F for i in 0..n-1:([+(10*i)A(i)])if n>2:(B)else(C D)E",
                 "axiom: F for i in 0 .. n - 1: ( [+(10*i)A(i)] ) if n > 2: ( B ) else ( C D ) E",
             ),
+            ("light   -1,2 , -3", "light -1, 2, -3"),
+            ("ground -0.5", "ground -0.5"),
+            ("camera at 0,1,-5 towards -x,0 , 0 angle 30", "camera at 0, 1, -5 towards -x, 0, 0 angle 30"),
             ("axiom: for(1) if(x):( for(2) )", "axiom: for(1) if (x): ( for(2) )"),
             ("interpret @L(s) :;(2)F( s )@L(s)", "interpret @L(s): ;(2)F(s)@L(s)"),
         ] {

@@ -1,7 +1,7 @@
 //! Keywords that begin a string or an expression, the nesting that they open, and line breaks that end an expression.
 
 use super::{ItemKind, Last, Level, Scanner};
-use crate::declarations::{Follow, OptionWord, options};
+use crate::declarations::{Begins, Follow, OptionWord, options};
 use crate::lexeme::Token;
 
 impl Scanner<'_> {
@@ -80,9 +80,17 @@ impl Scanner<'_> {
             }
             "for" if in_rule && !inside && !self.in_string && self.last == Last::Operand => Last::Operator,
             "in" if self.level().in_header => Last::Operator,
+            // A sign behind it is that of its value.
+            _ if self.begins_before_value(start) => Last::Operator,
             word if self.goes_on_after(word) => Last::Operator,
             _ => Last::Operand,
         }
+    }
+
+    /// True for the first word of a declaration whose value follows at once.
+    fn begins_before_value(&self, start: usize) -> bool {
+        let item = self.items.last().filter(|item| item.start == start);
+        item.and_then(|item| item.kind.declaration()).is_some_and(|d| d.begins == Begins::BeforeValue)
     }
 
     /// True if a word is an option with a value behind it, so that a line break between the two ends nothing.
