@@ -22,6 +22,7 @@ portrait="--size 540x600 --perspective 25"
     picture readme-pappus frame-0000 hieracium --set n_0=0 --set t_h=8 --set x_th=20 --at 26 --view 0,20 $portrait
     picture readme-sapling frame-0000 sapling --at 14 --view 20,8 $portrait
 }
+picture readme-meadow frame-0000 meadow --at 1 --size 1200x560
 picture campanula grid campanula --from 7 --to 17 --step 1 --layout grid --accuracy 0.02 --width 1000
 picture lychnis grid lychnis --from 3 --to 6 --step 0.5 --layout grid --view 25,10 --accuracy 0.02 --width 1000
 picture hieracium grid hieracium --set diagram=1 --at 17,26.5,36,40,47,49.6,52 --layout grid --accuracy 0.03 --width 1000

@@ -1,13 +1,18 @@
 //! The text of a model as a tree, close to how it is written.
 //!
-//! Expressions live in one arena, operands before their users, so that passes over them are loops: a
-//! sum of a million terms is a million nodes, not a million stack frames.
+//! - [`Expressions`]: the arena of all expressions. [`Part`]: a part of a string of modules.
+//! - [`Rule`], [`Item`]: a rule, and a declaration or rule. [`Document`]: a model.
+
+mod expression;
+mod string;
 
 use std::sync::Arc;
 
 use crate::declarations::Declaration;
 use dlsys_diagnostic::Span;
-use dlsys_expr::{Comparison, Fold, Sort};
+use dlsys_expr::Sort;
+pub use expression::{Aggregate, Expr, ExprId, Expression, Expressions, Operator};
+pub use string::{Conditional, Module, Part, Repetition, modules_of};
 
 /// A name and where it stands.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,205 +21,6 @@ pub struct Name {
     pub text: Arc<str>,
     /// Its place in the text.
     pub span: Span,
-}
-
-/// A node of an expression, by its place in [`Expressions`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct ExprId(pub u32);
-
-/// A whole expression: its nodes are those from `first` to `root`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Expression {
-    /// The node that was read first.
-    pub first: ExprId,
-    /// The node of the whole expression.
-    pub root: ExprId,
-}
-
-/// An operator between two operands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Operator {
-    /// `a + b`
-    Add,
-    /// `a - b`
-    Sub,
-    /// `a*b`
-    Mul,
-    /// `a/b`
-    Div,
-    /// `a^b`
-    Pow,
-    /// `a & b`, of conditions.
-    And,
-    /// `a | b`, of conditions.
-    Or,
-}
-
-/// A node of an expression.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Expr {
-    /// A number as written, always finite and without a sign.
-    Number(f64),
-    /// A constant, parameter or variable.
-    Name(Arc<str>),
-    /// A function and its arguments.
-    Call(Arc<str>, Vec<ExprId>),
-    /// `-a`
-    Negate(ExprId),
-    /// `!a`, of a condition.
-    Not(ExprId),
-    /// `a + b` and the like.
-    Binary(Operator, ExprId, ExprId),
-    /// `2c`: a number written directly before its factor.
-    Scale(f64, ExprId),
-    /// `a < b <= c`
-    Compare(ExprId, Vec<(Comparison, ExprId)>),
-    /// Condition, then, else.
-    If(ExprId, ExprId, ExprId),
-    /// `match n case a: x … else y`: the number, each case with its value, and the value if no case matches.
-    Match(ExprId, Vec<(ExprId, ExprId)>, ExprId),
-    /// `a[i]`
-    Index(Arc<str>, ExprId),
-    /// `(a)`; kept so that printing preserves the parentheses.
-    Parenthesis(ExprId),
-    /// `sum(B(x, c): D*(c - c_0))`
-    Aggregate(Box<Aggregate>),
-}
-
-/// An aggregate of the modules attached to one, over those that match a head.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Aggregate {
-    /// How the values are combined.
-    pub fold: Fold,
-    /// The modules that count, with names for their parameters.
-    pub head: HeadModule,
-    /// The term of one module; its nodes precede that of the aggregate. None for `count`.
-    pub term: Option<Expression>,
-}
-
-/// The arena of all expressions of a document.
-#[derive(Clone, Debug, Default)]
-pub struct Expressions {
-    nodes: Vec<Expr>,
-    spans: Vec<Span>,
-}
-
-impl Expressions {
-    /// Adds a node whose operands are already in the arena.
-    pub fn push(&mut self, node: Expr, span: Span) -> ExprId {
-        self.nodes.push(node);
-        self.spans.push(span);
-        ExprId(self.nodes.len() as u32 - 1)
-    }
-
-    /// The id that the next node will get.
-    pub fn next(&self) -> ExprId {
-        ExprId(self.nodes.len() as u32)
-    }
-
-    /// A node of this arena.
-    pub fn get(&self, id: ExprId) -> &Expr {
-        &self.nodes[id.0 as usize]
-    }
-
-    /// A node of this arena, to be changed.
-    pub fn get_mut(&mut self, id: ExprId) -> &mut Expr {
-        &mut self.nodes[id.0 as usize]
-    }
-
-    /// The place of a node in the text.
-    pub fn span(&self, id: ExprId) -> Span {
-        self.spans[id.0 as usize]
-    }
-
-    /// All nodes, operands before their users.
-    pub fn iter(&self) -> impl Iterator<Item = &Expr> {
-        self.nodes.iter()
-    }
-
-    /// The nodes from `first` on that begin in the text before the end of `last`, or all of them if that is None.
-    pub fn iter_within(&self, first: ExprId, last: Option<Span>) -> impl Iterator<Item = &Expr> {
-        let end = last.map_or(u32::MAX, |span| span.end);
-        let from = first.0 as usize;
-        self.nodes[from..]
-            .iter()
-            .zip(&self.spans[from..])
-            .take_while(move |(_, s)| s.start < end)
-            .map(|n| n.0)
-    }
-
-    /// Widens the place of a node in the text, as parentheses do.
-    pub fn widen(&mut self, id: ExprId, span: Span) {
-        self.spans[id.0 as usize] = self.spans[id.0 as usize].to(span);
-    }
-}
-
-/// A module of the initial string or of a successor.
-#[derive(Clone, Debug)]
-pub struct Module {
-    /// The name with its mark, as in `F`, `@L` or `+`.
-    pub name: Arc<str>,
-    /// Name and arguments.
-    pub span: Span,
-    /// The values of its parameters.
-    pub arguments: Vec<Expression>,
-}
-
-/// A part of a string of modules.
-#[derive(Clone, Debug)]
-pub enum Part {
-    /// A module.
-    Module(Module),
-    /// `for i in A .. B: ( … )`
-    Repeat(Box<Repetition>),
-    /// `if C: ( … ) else ( … )`
-    If(Box<Conditional>),
-}
-
-/// A repeated part of a string: `for i in A .. B: ( … )`.
-#[derive(Clone, Debug)]
-pub struct Repetition {
-    /// The name of the index, in the body only.
-    pub index: Name,
-    /// The first value of the index.
-    pub from: Expression,
-    /// The last value of the index.
-    pub to: Expression,
-    /// The string that is repeated.
-    pub body: Vec<Part>,
-    /// From `for` to the last `)`.
-    pub span: Span,
-}
-
-/// A part of a string under a condition: `if C: ( … ) else ( … )`.
-#[derive(Clone, Debug)]
-pub struct Conditional {
-    /// The condition.
-    pub condition: Expression,
-    /// The string where it holds.
-    pub then: Vec<Part>,
-    /// The string where it does not; empty without an `else`.
-    pub otherwise: Vec<Part>,
-    /// From `if` to the last `)`.
-    pub span: Span,
-}
-
-/// All modules of a string as written, those of repetitions once, those of both branches of a condition.
-pub fn modules_of(parts: &[Part]) -> impl Iterator<Item = &Module> {
-    let mut stack = vec![parts.iter()];
-    std::iter::from_fn(move || {
-        loop {
-            match stack.last_mut()?.next() {
-                None => drop(stack.pop()),
-                Some(Part::Module(module)) => return Some(module),
-                Some(Part::Repeat(repetition)) => stack.push(repetition.body.iter()),
-                Some(Part::If(conditional)) => {
-                    stack.push(conditional.otherwise.iter());
-                    stack.push(conditional.then.iter());
-                }
-            }
-        }
-    })
 }
 
 /// A module of a rule's head: a name and the names of its parameters.
