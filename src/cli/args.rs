@@ -50,7 +50,7 @@ pub enum Action {
     Run(RunArgs),
     /// Run a model and draw it: a file for each frame, or all frames on one sheet
     #[command(after_long_help = RENDER_EXAMPLES)]
-    Render(RenderArgs),
+    Render(Box<RenderArgs>),
     /// Look at a growing plant in a window, or write a page for the browser that plays its growth
     ///
     /// The window plays, goes to any time, and rotates; it has a slider for each param with a range, reads the model again when

@@ -236,7 +236,7 @@ fn count(scene: &Scene) -> usize {
 
 /// A seed as it is given in a string: whole numbers as `--seed` takes them; others by their digits.
 fn number_of(seed: f64) -> u64 {
-    match seed >= 0.0 && seed < 9e15 && seed.fract() == 0.0 {
+    match (0.0..9e15).contains(&seed) && seed.fract() == 0.0 {
         true => seed as u64,
         false => seed.to_bits(),
     }

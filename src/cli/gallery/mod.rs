@@ -100,7 +100,7 @@ fn typed(picture: &Picture, out: &Path, target: &Path, args: &GalleryArgs) -> Re
     typed.format = args.format;
     // The gallery prints its own summary.
     typed.quiet = true;
-    Ok(typed)
+    Ok(*typed)
 }
 
 fn say(text: &str) -> Result<(), Failure> {

@@ -46,7 +46,7 @@ pub(super) fn surroundings(model: &Model, time: f64) -> Result<Surroundings, Err
 fn evaluate(program: &Program, time: f64, (name, span): (&str, Span)) -> Result<Vec<f64>, Error> {
     let mut values = vec![0.0; program.outputs()];
     program.eval(&[time], &mut Vec::new(), &mut values);
-    match values.iter().find(|value| !(value.abs() <= COORDINATE_LIMIT)) {
+    match values.iter().find(|value| value.is_nan() || value.abs() > COORDINATE_LIMIT) {
         Some(value) => Err(fault(name, span, time, &format!("a number of it is {value}"))),
         None => Ok(values),
     }
