@@ -14,7 +14,7 @@ use dlsys_geometry::scene::{MaterialId, Placement, Point, Scene, Vector};
 
 /// Greatest distance of triangles from curved surfaces, in pixels. It is a bound that holds for the worst of surfaces; measured on petals
 /// and leaves, the distance is a fifth of it.
-const SLACK: f64 = 1.0;
+const SLACK: f64 = 0.35;
 /// Greatest distance of tubes from round ones, in pixels.
 const ROUNDNESS: f64 = 0.1;
 /// Stems of fewer pixels are ribbons.
