@@ -27,6 +27,7 @@
 mod curves;
 mod given;
 mod plan;
+mod scene;
 #[cfg(test)]
 mod tests;
 mod text;

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::curves::CurvePlan;
+use super::scene::{self, ScenePart};
 use super::{given, words};
 use crate::diagnostic::Source;
 use crate::model::{
@@ -18,6 +19,9 @@ pub struct Explanation {
     pub kinds: Vec<KindPlan>,
     pub rules: Vec<RulePlan>,
     pub curves: Vec<CurvePlan>,
+    /// What stands around the plant; empty for a plant alone.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub scene: Vec<ScenePart>,
     pub summary: Summary,
 }
 
@@ -168,6 +172,7 @@ impl Explanation {
             kinds,
             rules: (0..model.rules.len()).map(|rule| facts.rule(rule)).collect(),
             curves: model.curves.iter().map(|curve| CurvePlan::new(curve)).collect(),
+            scene: scene::parts(model),
             summary,
         }
     }

@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use super::curves::CurvePlan;
 use super::plan::{ClausePlan, ConditionPlan, Explanation, KindPlan, RulePlan, Work};
+use super::scene::ScenePart;
 use super::words::SUM;
 
 const COLUMNS: usize = 100;
@@ -153,6 +154,11 @@ pub fn show(plan: &Explanation) -> String {
     if !plan.curves.is_empty() {
         let _ = writeln!(out, "Curves");
         Table(plan.curves.iter().map(CurvePlan::row).collect()).show(2, &mut out);
+        out.push('\n');
+    }
+    if !plan.scene.is_empty() {
+        let _ = writeln!(out, "Scene");
+        Table(plan.scene.iter().map(ScenePart::row).collect()).show(2, &mut out);
         out.push('\n');
     }
     let _ = writeln!(out, "Summary");

@@ -70,7 +70,7 @@ impl Scanner<'_> {
     pub(super) fn is_string_condition(&self, end: usize) -> bool {
         /// Longer conditions are those of clauses, which bounds the work.
         const LONGEST: usize = 10_000;
-        let mut depth = 0usize;
+        let (mut depth, mut ifs) = (0usize, 0usize);
         // True behind a token that can end an expression.
         let mut ended = false;
         let mut rest = self.text[end..].char_indices().take_while(|(i, _)| *i < LONGEST).peekable();
@@ -91,8 +91,13 @@ impl Scanner<'_> {
                 c if c.is_alphabetic() => {
                     let word: &str = self.text[end + i..].split(|c| !in_name(c)).next().unwrap_or_default();
                     while rest.next_if(|(j, _)| *j < i + word.len()).is_some() {}
-                    if depth == 0 && matches!(word, "solve" | "produce") {
-                        return false;
+                    match word {
+                        "solve" | "produce" if depth == 0 => return false,
+                        "if" => ifs += 1,
+                        // That of this `if`, which is one within an expression.
+                        "then" if ifs == 0 => return false,
+                        "then" => ifs -= 1,
+                        _ => {}
                     }
                 }
                 _ => {}
