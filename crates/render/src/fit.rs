@@ -31,8 +31,6 @@ pub struct Survey {
     has_camera: bool,
     /// The surroundings of the first frame.
     first: Option<Surroundings>,
-    /// Some frame has a sun, a sky or a floor.
-    has_light: bool,
 }
 
 impl Survey {
@@ -50,7 +48,6 @@ impl Survey {
             follows_cameras: true,
             has_camera: false,
             first: None,
-            has_light: false,
         }
     }
 
@@ -87,7 +84,6 @@ impl Survey {
         let around = joined(&self.declared, &scene.surroundings);
         self.first.get_or_insert_with(|| around.clone());
         self.has_camera |= around.camera.is_some() && self.follows_cameras;
-        self.has_light |= around.sun.is_some() || around.sky.is_some() || around.floor.is_some();
         self.seen.merge(&Extent::of(scene, &self.view));
         self.crowd.merge(Crowd::of(scene));
     }
@@ -100,7 +96,6 @@ impl Survey {
         if self.first.is_none() {
             self.first.clone_from(&other.first);
         }
-        self.has_light |= other.has_light;
         self.seen.merge(&other.seen);
     }
 
@@ -146,7 +141,6 @@ impl Survey {
             declared: self.declared.clone(),
             zoom: self.zoom,
             follows_cameras: self.follows_cameras,
-            has_light: self.has_light,
         }
     }
 }
@@ -177,7 +171,6 @@ pub struct Fit {
     declared: Surroundings,
     zoom: f64,
     follows_cameras: bool,
-    has_light: bool,
 }
 
 /// The shape of pictures of declared cameras: width by height.

@@ -4,7 +4,7 @@
 //! there. The sun has one map, about as fine as the picture; the sky has [`PLACES`], coarse ones, and the part of the sky that a point sees is the mean over
 //! them. Maps are rastered by rules without chance and read in the same way by every thread.
 //!
-//! **Errors.** The edge of a shadow is smooth over two cells of the map, and a shadow begins up to [`SLOPE`] cells behind what casts it (the
+//! **Errors.** The edge of a shadow is smooth over three cells of the map, and a shadow begins up to [`SLOPE`] cells behind what casts it (the
 //! price of no self-shadowing on slopes). The cell of the sun's map is a pixel of the picture, or a [`FINEST`]th of the scene where that is more; that
 //! of the sky's maps is a [`COARSE`]th of the scene, so crevices narrower than a fiftieth of the scene are not darkened.
 

@@ -27,6 +27,9 @@ pub(super) struct Stage<'s> {
     pub(super) parts: Vec<Part>,
     /// All palettes, one after the other.
     pub(super) colors: Vec<Color>,
+    /// The looks of plants so far, and their drafts by the power of two of their size; plants in plants share them.
+    looks: HashMap<*const Scene, Option<Look>>,
+    drafted: HashMap<(*const Scene, i32), usize>,
 }
 
 /// A ball around all that one look has.
@@ -77,6 +80,8 @@ impl<'s> Stage<'s> {
             drafts: vec![Draft::new(scene, fit.default_width, &detail)],
             parts: vec![Part { draft: 0, place: None, colors: 0 }],
             colors: scene.palette.materials().iter().map(|material| material.color).collect(),
+            looks: HashMap::new(),
+            drafted: HashMap::new(),
         }
     }
 
@@ -89,11 +94,11 @@ impl<'s> Stage<'s> {
         scale: f64,
         scale_of: &dyn Fn(Point, f64) -> Option<f64>,
     ) {
-        let mut looks: HashMap<*const Scene, Option<Look>> = HashMap::new();
-        let mut known: HashMap<(*const Scene, i32), usize> = HashMap::new();
         for plant in &scene.plants {
             let key = &raw const *plant.scene;
-            let look = *looks.entry(key).or_insert_with(|| self.look(plant));
+            let known = self.looks.get(&key).copied();
+            let look = known.unwrap_or_else(|| self.look(plant));
+            self.looks.insert(key, look);
             let Some(look) = look else { continue };
             let placement = match place {
                 None => plant.placement,
@@ -103,7 +108,7 @@ impl<'s> Stage<'s> {
                 continue;
             };
             let exponent = (seen * placement.largest()).log2().ceil().clamp(-60.0, 60.0) as i32;
-            let draft = *known.entry((key, exponent)).or_insert_with(|| {
+            let draft = *self.drafted.entry((key, exponent)).or_insert_with(|| {
                 let scale_there = 2_f64.powi(exponent);
                 let detail =
                     Detail { scale_at: |_| scale_there, accuracy: fit.accuracy, scale, is_flat: false };
