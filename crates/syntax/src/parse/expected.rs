@@ -172,6 +172,12 @@ pub fn unknown_line(text: &str, item: &RawItem) -> Diagnostic {
     if matches!(first, "if" | "solve" | "produce") {
         return diagnostic.help("a clause stands under the head of its rule, such as `F(x):`");
     }
+    // A word that begins a declaration where its value follows.
+    if let Some(declaration) = Declaration::of_word(first) {
+        return Diagnostic::error(format!("`{first}` is not complete"))
+            .at(span, "expected its value behind it")
+            .help(declaration.written);
+    }
     if let Some(help) = keyword_hint(first, &names) {
         return diagnostic.help(help);
     }
