@@ -102,6 +102,10 @@ pub const SURFACE_SIZES: usize = 3;
 /// The command that sets the turtle on the ground. A model may declare a surface or a drawing of this name instead.
 pub const GROUND: &str = "@G";
 
+/// The command after which stems give way: `@E(TISSUE)`; with 0 they are rigid. A model may declare a surface or a drawing of this
+/// name instead.
+pub const ELASTIC: &str = "@E";
+
 /// The cut symbol: removes itself and the rest of its branch.
 pub const CUT: &str = "%";
 

@@ -37,6 +37,7 @@ mod chance;
 mod condition;
 mod kind;
 mod measure;
+mod physics;
 mod remedy;
 mod rule;
 mod scenery;
@@ -52,10 +53,11 @@ pub use chance::{Clock, Distribution, Draw, NewClock, choose};
 pub use condition::{Condition, ConditionStep};
 pub use dlsys_expr::{Comparison, Fold, Sign, Truth};
 pub use kind::{
-    BUILT_IN_SURFACES, COMMAND_SURFACES, CUT, Class, DRAWN_WORDS, GROUND, Kind, KindId, Kinds, SURFACE_SIZES,
-    base_of, class_of,
+    BUILT_IN_SURFACES, COMMAND_SURFACES, CUT, Class, DRAWN_WORDS, ELASTIC, GROUND, Kind, KindId, Kinds,
+    SURFACE_SIZES, base_of, class_of,
 };
 pub use measure::Measure;
+pub use physics::{Flow, Primitive, Spectrum, Tissue, Units, Wind};
 pub use remedy::{Boundary, Remedy};
 pub use rule::{Interpretation, Outcome, Pattern, Produce, Rule, Solve, Switch};
 pub use scenery::{Camera, Plant, Scenery};

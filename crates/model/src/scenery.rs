@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use crate::{Model, Rgb};
+use crate::{Flow, Model, Rgb, Tissue, Units, Wind};
 use dlsys_diagnostic::{Source, Span};
 use dlsys_expr::Program;
 
-/// The declarations `plant`, `light`, `sky`, `camera` and `ground` of a model.
+/// The declarations of a model that concern its surroundings: `plant`, `light`, `sky`, `camera`, `ground`, `units`, `wind`, `flow`, `tissue`.
 #[derive(Clone, Debug, Default)]
 pub struct Scenery {
     /// In the order written.
@@ -19,6 +19,14 @@ pub struct Scenery {
     pub camera: Option<Camera>,
     /// The height of a rigid floor without end, in scene units.
     pub ground: Option<f64>,
+    /// What a unit of the model is in SI.
+    pub units: Units,
+    /// The wind.
+    pub wind: Option<Wind>,
+    /// Further parts of the wind, in the order written.
+    pub flows: Vec<Flow>,
+    /// In the order written; their names stand for their numbers, from 1.
+    pub tissues: Vec<Tissue>,
 }
 
 /// `camera at X, Y, Z towards X, Y, Z angle A`

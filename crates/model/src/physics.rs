@@ -1,0 +1,107 @@
+//! The physics of a scene: units, wind, and the tissues that give way in it. All values but those of `units` are in SI.
+
+use std::sync::Arc;
+
+use dlsys_diagnostic::Span;
+use dlsys_expr::Program;
+
+/// `units length M, time S`: what a unit of the model is in SI.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Units {
+    /// Metres in a unit of length.
+    pub length: f64,
+    /// Seconds in a unit of time.
+    pub time: f64,
+}
+
+impl Default for Units {
+    fn default() -> Units {
+        Units { length: 1.0, time: 1.0 }
+    }
+}
+
+/// `tissue NAME = stiffness E, density D, damping Z`: a material of stems and surfaces.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tissue {
+    /// The name, which stands for its number (from 1) in expressions.
+    pub name: Arc<str>,
+    /// Young's modulus in Pa.
+    pub stiffness: f64,
+    /// Density in kg/m³.
+    pub density: f64,
+    /// Damping ratio at 1 Hz.
+    pub damping: f64,
+    /// Thickness of surfaces in m.
+    pub thickness: f64,
+    /// True if the drawing is the shape without weight, which weight then bends; else it is the shape under its own weight.
+    pub sag: bool,
+    /// The place of the declaration in the text.
+    pub span: Span,
+}
+
+impl Tissue {
+    /// The thickness of surfaces if the text gives none, in m.
+    pub const THICKNESS: f64 = 2e-4;
+    /// The density of surfaces without a tissue, in kg/m³.
+    pub const SURFACE_DENSITY: f64 = 1000.0;
+}
+
+/// `wind X, Y, Z speed U turbulence I scale L …`
+#[derive(Clone, Debug)]
+pub struct Wind {
+    /// The direction of the mean flow, of any length but 0.
+    pub direction: [f64; 3],
+    /// The mean speed in m/s; it reads `t`, in units of the model.
+    pub speed: Program,
+    /// Root mean square of a component of the turbulence, relative to the speed.
+    pub turbulence: f64,
+    /// The longitudinal integral scale of the turbulence in m.
+    pub scale: f64,
+    /// Roughness length of a logarithmic profile in m.
+    pub roughness: Option<f64>,
+    /// Period after which the wind repeats, in units of the model.
+    pub period: Option<f64>,
+    /// The seed of the turbulence.
+    pub seed: u64,
+    /// The spectrum of the turbulence.
+    pub spectrum: Spectrum,
+    /// The place of the declaration in the text.
+    pub span: Span,
+}
+
+/// The spectrum of turbulence.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub enum Spectrum {
+    /// Von Kármán's, from intensity and scale.
+    #[default]
+    VonKarman,
+    /// Kolmogorov's as in Stam and Fiume 1993: rate of dissipation, smallest wave number, spread of frequencies.
+    Kolmogorov([f64; 3]),
+}
+
+/// `flow …`: a further part of the large-scale wind (Stam and Fiume 1993, section 3).
+#[derive(Clone, Debug)]
+pub struct Flow {
+    /// Its kind.
+    pub primitive: Primitive,
+    /// Its values, which read `t`: velocity (3) of a uniform flow; else strength, position (3, in units of the model), and of
+    /// a vortex the axis (3).
+    pub program: Program,
+    /// Distance in units of the model within which a source, sink or vortex decays to 1/e; `None` without decay.
+    pub decay: Option<f64>,
+    /// The place of the declaration in the text.
+    pub span: Span,
+}
+
+/// Kinds of flow.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Primitive {
+    /// The same velocity everywhere.
+    Uniform,
+    /// Away from a point.
+    Source,
+    /// Towards a point.
+    Sink,
+    /// Around an axis.
+    Vortex,
+}
