@@ -39,6 +39,22 @@ impl Patch {
         nets.into_iter().flat_map(|net| net.into_iter().flatten())
     }
 
+    /// The point of the patch at a place from 0 to 1 between its rows and between its columns.
+    pub fn point(&self, row: f64, column: f64) -> Point {
+        let weights = |u: f64| {
+            let v = 1.0 - u;
+            [v * v * v, 3.0 * v * v * u, 3.0 * v * u * u, u * u * u]
+        };
+        let (rows, columns) = (weights(row), weights(column));
+        let mut sum = Vector::zeros();
+        for (points, r) in self.net.iter().zip(rows) {
+            for (point, c) in points.iter().zip(columns) {
+                sum += point.coords * (r * c);
+            }
+        }
+        Point::from(sum)
+    }
+
     /// A measure of size: the lengths of the four edges of the control net.
     pub fn length(&self) -> f64 {
         edges(&self.net).iter().map(|e| (0..3).map(|i| (e[i + 1] - e[i]).norm()).sum::<f64>()).sum()
@@ -102,6 +118,11 @@ impl PatchSet {
     /// A ball of diameter 1 around the origin; a colour replaces its material.
     pub fn ball(material: MaterialId) -> PatchSet {
         PatchSet { shape: Curved::Ball(material), meshes: Mutex::default(), drafts: Mutex::default() }
+    }
+
+    /// True for a ball.
+    pub fn is_ball(&self) -> bool {
+        matches!(self.shape, Curved::Ball(_))
     }
 
     /// The surface as triangles that deviate from it by no more than `accuracy`, in its own units. Meshes

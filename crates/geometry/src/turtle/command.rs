@@ -28,6 +28,8 @@ pub(super) enum Command {
     Bend,
     /// `@C(n)`: cross-section of stems.
     Contour,
+    /// `@E(n)`: the tissue of stems that give way; 0 is rigid.
+    Elastic,
     /// `;(n)`, `;(n, v)`
     Color,
     /// `[`
@@ -110,6 +112,7 @@ impl Command {
             "@W" => Command::Taper,
             "@T" => Command::Bend,
             "@C" => Command::Contour,
+            "@E" => Command::Elastic,
             "@G" => Command::Ground,
             "@PS" => Command::BeginPatch,
             "@PC" => Command::ControlPoint,
@@ -121,6 +124,11 @@ impl Command {
     /// The commands of all kinds of a model, by the kinds' index.
     pub(super) fn table(model: &Model) -> Vec<Command> {
         model.kinds.iter().map(|(_, kind)| Command::of(kind, model)).collect()
+    }
+
+    /// True for a step that may continue the stem before it.
+    pub(super) fn is_step(self) -> bool {
+        matches!(self, Command::Draw | Command::Nothing | Command::Interpret(_) | Command::Color)
     }
 
     /// How many parameters it reads, at most.
@@ -142,6 +150,7 @@ impl Command {
             | Command::Taper
             | Command::Bend
             | Command::Contour
+            | Command::Elastic
             | Command::BeginPatch
             | Command::DrawPatch => 1,
             _ => 0,

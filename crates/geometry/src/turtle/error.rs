@@ -64,6 +64,9 @@ pub enum ErrorKind {
         /// The reason, as a part of a sentence.
         why: String,
     },
+    /// A stem under `@E` without a width of its own.
+    #[error("it draws a stem that gives way, and its width is not set")]
+    NoWidth,
     /// More patches have been begun than a frame may have.
     #[error("it begins more patches than a frame may have")]
     TooManyPatches,
@@ -92,6 +95,9 @@ impl ErrorKind {
             }
             ErrorKind::BadBounds { .. } => {
                 "bounds are whole numbers, at most a million apart: round them with `floor(…)` or `ceil(…)`".to_owned()
+            }
+            ErrorKind::NoWidth => {
+                "stiffness and mass follow from the width: write `!(w)` before it, or `@E(0)` for a rigid stem".to_owned()
             }
             ErrorKind::TooManyPatches => {
                 "use the number of a patch again when it is drawn: `@PS(1)` forgets the patch 1 that was there".to_owned()
@@ -143,6 +149,7 @@ pub(super) enum Remark {
     /// A gradient of this number, without a place in it.
     GradientWithoutPlace(usize),
     NoContour(f64, usize),
+    NoTissue(f64, usize),
     /// A polygon with so many vertices.
     FewVertices(usize),
     PolygonNotOpen,
@@ -220,6 +227,14 @@ fn warning(remark: Remark, model: &Model, span: Option<Span>, time: f64) -> Diag
             match &appearance.contours[..] {
                 [] => "declare one and write its name: `contour square = (1, 1) (-1, 1) (-1, -1) (1, -1)`, `@C(square)`".to_owned(),
                 [first, ..] => format!("write the name of a contour, such as `@C({})`; the model has {count}, and 0 is a circle", first.name),
+            },
+        ),
+        Remark::NoTissue(number, count) => (
+            "there is no such tissue".to_owned(),
+            format!("tissue {} at t = {time}, drawn rigid", short(number)),
+            match &model.scenery.tissues[..] {
+                [] => "declare one and write its name: `tissue stalk = stiffness 2e8, density 900, damping 0.05`, `@E(stalk)`".to_owned(),
+                [first, ..] => format!("write the name of a tissue, such as `@E({})`; the model has {count}, and 0 is rigid", first.name),
             },
         ),
         Remark::FewVertices(count) => (

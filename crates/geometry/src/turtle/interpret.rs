@@ -5,9 +5,10 @@
 
 use super::command::Command;
 use super::prepare::prepare;
+use super::skeleton::Skeleton;
 use super::surroundings::surroundings;
 use super::walk::{DrawnModule, Walk};
-use super::{DEPTH_LIMIT, Error, ErrorKind, MODULE_LIMIT, Pose};
+use super::{DEPTH_LIMIT, Error, ErrorKind, MODULE_LIMIT, Pose, Strains};
 use crate::scene::Scene;
 use dlsys_expr::Scratch;
 use dlsys_model::{BadBounds, KindId, Model, Stretch};
@@ -41,20 +42,51 @@ struct Level {
 
 /// See [`super::trace`].
 pub(super) fn trace(model: &Model, string: &ModuleString, scene: &mut Scene) -> Result<Pose, Error> {
-    let commands = Command::table(model);
+    begin(model, string, scene)?;
+    let mut walk = Walk::new(model, scene, string.time);
+    run(model, string, &mut walk)?;
+    Ok(walk.pose())
+}
+
+/// See [`super::draw_bent`].
+pub(super) fn bent(
+    model: &Model,
+    string: &ModuleString,
+    strains: &dyn Strains,
+    scene: &mut Scene,
+) -> Result<(), Error> {
+    begin(model, string, scene)?;
+    run(model, string, &mut Walk::new(model, scene, string.time).bending(strains))
+}
+
+/// See [`super::skeleton`].
+pub(super) fn skeleton(model: &Model, string: &ModuleString, scene: &mut Scene) -> Result<Skeleton, Error> {
+    scene.clear();
+    prepare(model, scene);
+    let mut walk = Walk::new(model, scene, string.time).recording();
+    run(model, string, &mut walk)?;
+    Ok(walk.skeleton())
+}
+
+fn begin(model: &Model, string: &ModuleString, scene: &mut Scene) -> Result<(), Error> {
     prepare(model, scene);
     scene.surroundings = surroundings(model, string.time)?;
-    let mut walk = Walk::new(model, scene, string.time);
+    Ok(())
+}
+
+/// Walks through a string.
+fn run(model: &Model, string: &ModuleString, walk: &mut Walk<'_>) -> Result<(), Error> {
+    let commands = Command::table(model);
     let mut expander = Expander::new(model, &commands, string);
     for module in string.iter() {
         walk.set_drawn(DrawnModule { kind: module.kind, lineage: module.lineage });
         match commands[module.kind.index()] {
-            Command::Interpret(index) => expander.expand(index, module, &mut walk)?,
+            Command::Interpret(index) => expander.expand(index, module, walk)?,
             command => walk.obey(command, module.parameters, module.kind)?,
         }
     }
     walk.finish();
-    Ok(walk.pose())
+    Ok(())
 }
 
 struct Expander<'a> {

@@ -19,7 +19,8 @@
 //! | `;(n, v)` | colour at place `v` (0 to 1) of gradient `n` |
 //! | `@T(e)` | strength of the tropism from here on, in radians per scene unit: headings bend towards its direction (down, if the model declares none), see `bend.rs` |
 //! | `@C(n)` | cross-section of stems from here on: a contour that the model declares, 0 being a circle. Meshes only |
-//! | `[` `]` | remember and return to position, orientation, width, colour, cross-section and strength of tropism |
+//! | `@E(n)` | stems from here on give way, made of tissue `n` of the model, and are clamped here or at the stem below; 0 is rigid |
+//! | `[` `]` | remember and return to position, orientation, width, colour, cross-section, tissue and strength of tropism |
 //! | `{` `.` `}` | begin a filled polygon, make the position a vertex, end it; steps between them make vertices, too, and are not drawn |
 //! | `@L(s)` `@K(s)` `@P(s)` `@B(s)` | a leaf, a flower, a petal, a bud of size `s` (1), or any surface that the model declares; nothing if `s` is not positive |
 //! | `@O(d)` | a ball of diameter `d` (1) around the turtle |
@@ -50,6 +51,7 @@
 //! ```
 
 mod bend;
+mod bent;
 mod command;
 mod error;
 mod frame;
@@ -57,6 +59,7 @@ mod interpret;
 mod patch;
 mod prepare;
 mod shapes;
+mod skeleton;
 mod surroundings;
 mod twofold;
 mod walk;
@@ -67,9 +70,11 @@ mod organ_tests;
 mod tests;
 
 use crate::scene::{Point, Scene, Vector};
+pub use bent::{StemKey, Strains};
 use dlsys_model::Model;
 use dlsys_tree::ModuleString;
 pub use error::{Error, ErrorKind};
+pub use skeleton::{Form, Load, Skeleton, Stem};
 
 /// Most modules that one frame may draw, those that interpretations make included.
 pub const MODULE_LIMIT: usize = 10_000_000;
@@ -118,4 +123,25 @@ pub fn draw(model: &Model, string: &ModuleString, scene: &mut Scene) -> Result<(
 /// As of [`draw`].
 pub fn trace(model: &Model, string: &ModuleString, scene: &mut Scene) -> Result<Pose, Error> {
     interpret::trace(model, string, scene)
+}
+
+/// Draws as [`draw`] does, with stems bent by these strains. Without a strain anywhere the scene is the same to the bit.
+///
+/// # Errors
+/// As of [`draw`].
+pub fn draw_bent(
+    model: &Model,
+    string: &ModuleString,
+    strains: &dyn Strains,
+    scene: &mut Scene,
+) -> Result<(), Error> {
+    interpret::bent(model, string, strains, scene)
+}
+
+/// The skeleton of a string: its stems that give way, and what they carry. `scene` is overwritten.
+///
+/// # Errors
+/// As of [`draw`].
+pub fn skeleton(model: &Model, string: &ModuleString, scene: &mut Scene) -> Result<Skeleton, Error> {
+    interpret::skeleton(model, string, scene)
 }

@@ -1,19 +1,19 @@
 //! The turtle: its state, and the effect of each command on it and on the scene.
 
+mod place;
+mod step;
 mod width;
 
 use std::sync::Arc;
 
-use super::bend::Bend;
+use super::bent::{Bent, Strains};
 use super::command::Command;
 use super::error::{self, Error, ErrorKind, Remark, Remarks};
 use super::frame::{Axis, Frame};
 use super::patch::OpenPatches;
+use super::skeleton::{Recorder, Skeleton};
 use super::{COORDINATE_LIMIT, Pose, SMALLEST_LENGTH, shapes};
-use crate::scene::{
-    MaterialId, Owner, OwnerId, Patch, Placement, Point, Polygon, Scene, Seedling, Segment, Shape, Surface,
-    Vector, Width,
-};
+use crate::scene::{MaterialId, Owner, OwnerId, Point, Scene, Vector, Width};
 use dlsys_diagnostic::Span;
 use dlsys_model::{KindId, Model};
 use dlsys_tree::Lineage;
@@ -52,6 +52,16 @@ struct State {
     set_by: Option<(Option<(usize, KindId)>, DrawnModule)>,
     /// A branch or an organ stands where the turtle is.
     node: bool,
+    /// The tissue of stems that give way, by its number from 0; `None` for rigid ones.
+    tissue: Option<usize>,
+    /// The tissue of what is rigid: the last one that gave way.
+    rigid: Option<usize>,
+    /// The motion from the shape at rest to what is seen; `None` if there is none.
+    bent: Option<Bent>,
+    /// The stem of the skeleton at whose end the turtle is, rigid parts in between.
+    stem: Option<usize>,
+    /// The number of the stem that a step here continues.
+    joined: Option<u32>,
 }
 
 /// A polygon that is open.
@@ -83,6 +93,14 @@ pub(super) struct Walk<'a> {
     pub(super) inside: Option<(usize, KindId)>,
     time: f64,
     remarks: Remarks,
+    /// How far stems are from their shape at rest.
+    strains: Option<&'a dyn Strains>,
+    /// What is noted for the skeleton.
+    recorder: Option<Recorder>,
+    /// Number of brackets of the string around the module that is being drawn.
+    depth: usize,
+    /// Number of stems that this module has drawn.
+    stems_drawn: u32,
 }
 
 impl<'a> Walk<'a> {
@@ -104,6 +122,11 @@ impl<'a> Walk<'a> {
                 run: 0,
                 set_by: None,
                 node: false,
+                tissue: None,
+                rigid: None,
+                bent: None,
+                stem: None,
+                joined: None,
             },
             stack: Vec::new(),
             polygons: Vec::new(),
@@ -117,17 +140,37 @@ impl<'a> Walk<'a> {
             inside: None,
             time,
             remarks: Remarks::default(),
+            strains: None,
+            recorder: None,
+            depth: 0,
+            stems_drawn: 0,
         }
     }
 
+    /// Bends stems by these strains.
+    pub(super) fn bending(self, strains: &'a dyn Strains) -> Walk<'a> {
+        Walk { strains: Some(strains), ..self }
+    }
+
+    /// Notes the skeleton of what is drawn; the scene must be empty.
+    pub(super) fn recording(self) -> Walk<'a> {
+        Walk { recorder: Some(Recorder::default()), ..self }
+    }
+
+    /// The skeleton, if it was noted.
+    pub(super) fn skeleton(self) -> Skeleton {
+        self.recorder.map_or_else(Skeleton::default, |recorder| recorder.finish(self.scene))
+    }
+
     pub(super) fn pose(&self) -> Pose {
-        Pose { position: self.state.position, axes: self.state.frame.vectors() }
+        Pose { position: self.seen(self.state.position), axes: self.seen_axes() }
     }
 
     /// Sets the module for which the next commands are.
     pub(super) fn set_drawn(&mut self, module: DrawnModule) {
         self.drawn = module;
         self.owner = None;
+        (self.depth, self.stems_drawn, self.state.joined) = (self.stack.len(), 0, None);
     }
 
     /// An error of the module that is being drawn.
@@ -163,6 +206,9 @@ impl<'a> Walk<'a> {
             return Err(Error { name, ..self.error(ErrorKind::NotFinite { value }) });
         }
         let given = read.first().copied();
+        if !command.is_step() {
+            self.state.joined = None;
+        }
         match command {
             Command::Nothing | Command::Interpret(_) => {}
             Command::Draw => self.step(given.unwrap_or(1.0), true)?,
@@ -182,6 +228,7 @@ impl<'a> Walk<'a> {
                 (self.state.run, self.state.set_by) = (0, None);
             }
             Command::Bend => self.state.strength = self.in_range(given.unwrap_or(0.0))?,
+            Command::Elastic => self.set_tissue(given.unwrap_or(0.0)),
             Command::Contour => self.set_contour(given.unwrap_or(0.0).round()),
             Command::Color => {
                 if let Some(number) = given {
@@ -227,14 +274,6 @@ impl<'a> Walk<'a> {
         Ok(())
     }
 
-    /// A step that is not drawn and makes no vertex: open polygons are put aside.
-    fn hop(&mut self, length: f64) -> Result<(), Error> {
-        let open = std::mem::take(&mut self.polygons);
-        let done = self.step(length, false);
-        self.polygons = open;
-        done
-    }
-
     /// Sets the width of lines, or makes them thinner.
     fn set_width(&mut self, given: Option<f64>) -> Result<(), Error> {
         self.check_width(given);
@@ -250,6 +289,17 @@ impl<'a> Walk<'a> {
         Ok(())
     }
 
+    /// Sets the tissue of the stems that follow; 0, and the number of no tissue, is rigid.
+    fn set_tissue(&mut self, number: f64) {
+        let count = self.model.scenery.tissues.len();
+        let number = number.round();
+        if number != 0.0 && !(1.0..=count as f64).contains(&number) {
+            self.remark(Remark::NoTissue(number, count));
+        }
+        self.state.rigid = self.state.tissue.or(self.state.rigid);
+        self.state.tissue = (1.0..=count as f64).contains(&number).then(|| number as usize - 1);
+    }
+
     /// Sets the cross-section of stems; 0, and the number of no contour, is a circle.
     fn set_contour(&mut self, number: f64) {
         let count = self.model.appearance.contours.len();
@@ -260,120 +310,12 @@ impl<'a> Walk<'a> {
         self.state.contour = (1.0..=count as f64).contains(&number).then(|| first + number as u32 - 1);
     }
 
-    /// Begins a patch, sets a point of it, or draws it.
-    fn patch(&mut self, command: Command, parameters: &[f64]) -> Result<(), Error> {
-        let given = |i: usize| parameters.get(i).copied().unwrap_or(0.0);
-        match command {
-            Command::BeginPatch => self.patches.begin(given(0)).map_err(|fault| self.error(fault))?,
-            Command::ControlPoint => {
-                let set = self.patches.set([0, 1, 2].map(given), self.state.position);
-                set.map_err(|fault| self.error(fault))?;
-            }
-            _ => {
-                let net = self.patches.net(given(0)).map_err(|fault| self.error(fault))?;
-                let material = self.chosen().unwrap_or(MaterialId::PETAL);
-                let owner = self.owner();
-                // All in one place there is nothing to see, as at the birth of an organ.
-                if net.iter().flatten().any(|p| *p != net[0][0]) {
-                    self.scene.patches.push(Patch { net, material, owner });
-                }
-            }
-        }
-        Ok(())
-    }
-
     /// A length, or another measure, as it is drawn: what is too small to be told from nothing is nothing.
     fn in_range(&self, x: f64) -> Result<f64, Error> {
         if x.abs() < SMALLEST_LENGTH {
             return Ok(0.0);
         }
         if x.abs() <= COORDINATE_LIMIT { Ok(x) } else { Err(self.error(ErrorKind::TooFar)) }
-    }
-
-    /// A step along the heading, drawn if `draw` and if no polygon is open; along an arc where there is a
-    /// tropism.
-    fn step(&mut self, length: f64, draw: bool) -> Result<(), Error> {
-        let [heading, left, _] = self.state.frame.vectors();
-        let length = self.in_range(length)?;
-        let bend = Bend::new(heading, self.target, self.state.strength).filter(|_| length != 0.0);
-        if let Some(bend) = bend {
-            let pieces = bend.pieces(length, self.scene.accuracy);
-            let mut before = Vector::zeros();
-            for i in 1..=pieces {
-                let displacement = bend.displacement(length * i as f64 / pieces as f64);
-                let way = displacement - before;
-                before = displacement;
-                if let Some(direction) = way.try_normalize(0.0) {
-                    self.go(way, direction, left, draw)?;
-                }
-                self.record_vertex();
-            }
-            self.state.frame.bend(bend.towards(), bend.turn(length));
-            return Ok(());
-        }
-        if length != 0.0 {
-            self.go(heading * length, heading * length.signum(), left, draw)?;
-        }
-        self.record_vertex();
-        Ok(())
-    }
-
-    /// Moves straight, by a displacement with its direction, and draws a segment if `draw`.
-    fn go(&mut self, way: Vector, direction: Vector, across: Vector, draw: bool) -> Result<(), Error> {
-        let start = self.state.position;
-        self.advance(way)?;
-        let end = self.state.position;
-        if end == start {
-            return Ok(());
-        }
-        let (follows, grows_from) = (self.state.last.take(), self.state.parent.take());
-        let node = std::mem::replace(&mut self.state.node, false);
-        if draw && self.polygons.is_empty() {
-            let material = self.chosen().unwrap_or(MaterialId::STEM);
-            if let Some(before) = follows.filter(|_| !node) {
-                self.check_step(before, material);
-            }
-            let segment = Segment {
-                start,
-                end,
-                direction,
-                across,
-                widths: [self.state.width; 2],
-                contour: self.state.contour,
-                material,
-                owner: self.owner(),
-                follows,
-                grows_from,
-            };
-            self.state.run = if follows.is_some() { self.state.run + 1 } else { 1 };
-            self.state.last = Some(self.scene.segments.len());
-            self.scene.segments.push(segment);
-        }
-        Ok(())
-    }
-
-    /// Moves, with compensated summation (Neumaier 1974).
-    fn advance(&mut self, by: Vector) -> Result<(), Error> {
-        // A direction that is nearly an axis has parts far shorter than the whole.
-        let by = by.map(|x| if x.abs() < SMALLEST_LENGTH { 0.0 } else { x });
-        for i in 0..3 {
-            let (old, step) = (self.state.position[i], by[i] + self.state.remainder[i]);
-            let new = old + step;
-            self.in_range(new)?;
-            self.state.remainder[i] =
-                if old.abs() >= step.abs() { (old - new) + step } else { (step - new) + old };
-            self.state.position[i] = new;
-        }
-        Ok(())
-    }
-
-    fn record_vertex(&mut self) {
-        if let Some(open) = self.polygons.last_mut() {
-            open.made += 1;
-            if open.vertices.last() != Some(&self.state.position) {
-                open.vertices.push(self.state.position);
-            }
-        }
     }
 
     fn check_width(&mut self, given: Option<f64>) {
@@ -392,71 +334,6 @@ impl<'a> Walk<'a> {
             self.remark(Remark::NoColor(number, count));
         } else if !has_place && number > colors as f64 {
             self.remark(Remark::GradientWithoutPlace(number as usize - colors - 1));
-        }
-    }
-
-    fn end_polygon(&mut self) {
-        let Some(Outline { mut vertices, made, .. }) = self.polygons.pop() else {
-            return self.remark(Remark::PolygonNotOpen);
-        };
-        // One that has yet to grow has all its vertices in one place.
-        if made < 3 {
-            self.remark(Remark::FewVertices(made));
-        }
-        while vertices.len() > 1 && vertices.first() == vertices.last() {
-            vertices.pop();
-        }
-        let distinct = |p: &Point, among: &[Point]| among.iter().all(|q| p != q);
-        let different =
-            (0..vertices.len()).filter(|&i| distinct(&vertices[i], &vertices[..i])).take(3).count();
-        if different == 3 {
-            let material = self.chosen().unwrap_or(MaterialId::LEAF);
-            let owner = self.owner();
-            self.scene.polygons.push(Polygon { vertices, material, owner });
-        }
-    }
-
-    /// Puts a surface at the turtle's position: of one size (1), or of a width, a length and a height, which is
-    /// the length if it is missing.
-    fn place(&mut self, shape: &Shape, sizes: &[f64]) -> Result<(), Error> {
-        let [width, length, height] = match *sizes {
-            [] => [1.0; 3],
-            [size] => [size; 3],
-            [width, length] => [width, length, length],
-            [width, length, height, ..] => [width, length, height],
-        };
-        self.state.node = true;
-        // The axes are heading, left, up.
-        let scales = [self.in_range(length)?, self.in_range(width)?, self.in_range(height)?];
-        if scales.iter().all(|scale| *scale > 0.0) {
-            let placement =
-                Placement { origin: self.state.position, axes: self.state.frame.vectors(), scales };
-            let (tint, owner) = (self.chosen(), self.owner());
-            let Shape { mesh, patches } = shape.clone();
-            self.scene.surfaces.push(Surface { mesh, patches, placement, tint, owner });
-        }
-        Ok(())
-    }
-
-    /// Puts a plant of another model, born at the time given first, at the turtle's position. Its axes follow the turtle's.
-    fn plant(&mut self, plant: usize, parameters: &[f64]) {
-        let age = self.time - parameters.first().copied().unwrap_or(0.0);
-        if age < 0.0 {
-            return;
-        }
-        let [heading, left, up] = self.state.frame.vectors();
-        let placement = Placement::uniform(self.state.position, [-left, heading, up], 1.0);
-        let (seed, owner) = (parameters.get(1).copied(), self.owner());
-        self.scene.seedlings.push(Seedling { plant, age, seed, placement, owner });
-    }
-
-    /// Moves to the ground below or above, without a vertex of a polygon.
-    fn set_down(&mut self) {
-        if let Some(height) = self.model.scenery.ground
-            && height != self.state.position.y
-        {
-            (self.state.position.y, self.state.remainder.y) = (height, 0.0);
-            self.state.last = None;
         }
     }
 

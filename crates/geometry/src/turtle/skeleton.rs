@@ -1,0 +1,272 @@
+//! The skeleton of a string: its stems that give way, and what they carry, in their shape at rest.
+//!
+//! The turtle notes, for each element that it draws, the stem at whose end it is. Masses follow from the elements of the scene.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use nalgebra::Matrix3;
+
+use super::bent::StemKey;
+use crate::scene::{Mesh, Patch, Placement, Point, Polygon, Scene, Segment, Surface, Vector};
+
+/// A stem that gives way: a straight or, under a tropism, bent piece of one width, in its shape at rest.
+#[derive(Clone, Debug)]
+pub struct Stem {
+    /// Its identity.
+    pub key: StemKey,
+    /// The stem from whose end it grows, rigid parts in between; `None` if it is clamped where the turtle stands.
+    pub parent: Option<usize>,
+    /// Number of brackets of the string around the module that draws it.
+    pub depth: usize,
+    /// Where it begins, in scene units.
+    pub start: Point,
+    /// Heading, left and up where it begins.
+    pub axes: [Vector; 3],
+    /// Where it ends.
+    pub end: Point,
+    /// Heading, left and up where it ends.
+    pub end_axes: [Vector; 3],
+    /// Its length along its axis.
+    pub length: f64,
+    /// Its diameter.
+    pub width: f64,
+    /// Number of its tissue among those of the model, from 0.
+    pub tissue: usize,
+}
+
+/// Something that a stem carries, in its shape at rest.
+#[derive(Clone, Debug)]
+pub struct Load {
+    /// The stem at whose end it is.
+    pub stem: usize,
+    /// Number of its tissue among those of the model, from 0; `None` if there is no tissue.
+    pub tissue: Option<usize>,
+    /// Its measure.
+    pub form: Form,
+    /// The centre of its measure, in scene units.
+    pub centre: Point,
+    /// The integral of (x - centre)(x - centre)ᵀ over its measure.
+    pub spread: Matrix3<f64>,
+    /// The sum of the normals of its faces times their areas, for drag: of a flat leaf its length is the area, of a solid it is 0.
+    pub face: Vector,
+}
+
+/// The kind of the measure of a [`Load`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Form {
+    /// A surface of this area.
+    Surface(f64),
+    /// A solid of this volume.
+    Solid(f64),
+}
+
+impl Form {
+    /// Area or volume, in scene units.
+    pub fn measure(self) -> f64 {
+        match self {
+            Form::Surface(measure) | Form::Solid(measure) => measure,
+        }
+    }
+}
+
+/// The stems of a string that give way, and what they carry.
+#[derive(Clone, Debug, Default)]
+pub struct Skeleton {
+    /// In string order: a stem comes after the one that it grows from.
+    pub stems: Vec<Stem>,
+    /// In string order, by kind.
+    pub loads: Vec<Load>,
+}
+
+/// The stem that carries an element, if one does, and the number of its tissue.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Carrier {
+    pub(super) stem: Option<usize>,
+    pub(super) tissue: Option<usize>,
+}
+
+/// What the turtle notes.
+#[derive(Debug, Default)]
+pub(super) struct Recorder {
+    pub(super) stems: Vec<Stem>,
+    pub(super) segments: Vec<Carrier>,
+    pub(super) surfaces: Vec<Carrier>,
+    pub(super) polygons: Vec<Carrier>,
+    pub(super) patches: Vec<Carrier>,
+}
+
+impl Recorder {
+    /// The skeleton, with the masses of what has been drawn into the scene.
+    pub(super) fn finish(self, scene: &Scene) -> Skeleton {
+        let mut loads = Vec::new();
+        let mut add = |carrier: &Carrier, moments: Moments, solid: bool| {
+            if let Some(stem) = carrier.stem
+                && moments.measure > 0.0
+            {
+                loads.push(moments.load(stem, carrier.tissue, solid));
+            }
+        };
+        for (carrier, segment) in self.segments.iter().zip(&scene.segments) {
+            add(carrier, Moments::of_segment(segment), true);
+        }
+        let mut known: HashMap<*const Mesh, Moments> = HashMap::new();
+        for (carrier, surface) in self.surfaces.iter().zip(&scene.surfaces).filter(|(c, _)| c.stem.is_some())
+        {
+            let (moments, solid) = Moments::of_surface(surface, &mut known);
+            add(carrier, moments, solid);
+        }
+        for (carrier, polygon) in self.polygons.iter().zip(&scene.polygons) {
+            add(carrier, Moments::of_polygon(polygon), false);
+        }
+        for (carrier, patch) in self.patches.iter().zip(&scene.patches) {
+            add(carrier, Moments::of_patch(patch), false);
+        }
+        Skeleton { stems: self.stems, loads }
+    }
+}
+
+/// Integrals over a surface or a solid about a point of reference.
+#[derive(Clone, Copy, Debug, Default)]
+struct Moments {
+    measure: f64,
+    first: Vector,
+    second: Matrix3<f64>,
+    face: Vector,
+    origin: Vector,
+}
+
+impl Moments {
+    fn about(origin: Point) -> Moments {
+        Moments { origin: origin.coords, ..Moments::default() }
+    }
+
+    /// Adds a triangle (exact for polynomials of degree 2: the three mid-points of its sides).
+    fn add(&mut self, corners: [Point; 3]) {
+        let [p, q, r] = corners.map(|corner| corner.coords - self.origin);
+        let normal = (q - p).cross(&(r - p)) / 2.0;
+        let area = normal.norm();
+        self.measure += area;
+        self.face += normal;
+        for middle in [(p + q) / 2.0, (q + r) / 2.0, (r + p) / 2.0] {
+            self.first += middle * (area / 3.0);
+            self.second += middle * middle.transpose() * (area / 3.0);
+        }
+    }
+
+    fn of_mesh(mesh: &Mesh, place: impl Fn(Point) -> Point, origin: Point) -> Moments {
+        let mut moments = Moments::about(origin);
+        for face in &mesh.faces {
+            moments.add(face.corners.map(|corner| place(mesh.vertices[corner as usize])));
+        }
+        moments
+    }
+
+    /// Also whether it is a solid: a ball.
+    fn of_surface(surface: &Surface, known: &mut HashMap<*const Mesh, Moments>) -> (Moments, bool) {
+        let place = &surface.placement;
+        if surface.patches.as_ref().is_some_and(|patches| patches.is_ball()) {
+            let [x, y, z] = place.scales.map(|scale| scale / 2.0);
+            let volume = 4.0 / 3.0 * std::f64::consts::PI * x * y * z;
+            let axes = Matrix3::from_columns(&place.axes);
+            let spread = Matrix3::from_diagonal(&Vector::new(x * x, y * y, z * z)) * (volume / 5.0);
+            let second = axes * spread * axes.transpose();
+            return (
+                Moments { measure: volume, second, origin: place.origin.coords, ..Moments::default() },
+                true,
+            );
+        }
+        if !place.is_uniform() {
+            return (Moments::of_mesh(&surface.mesh, |p| place.point(p), place.origin), false);
+        }
+        let own = *known
+            .entry(Arc::as_ptr(&surface.mesh))
+            .or_insert_with(|| Moments::of_mesh(&surface.mesh, |p| p, Point::origin()));
+        (own.placed(place), false)
+    }
+
+    /// These moments, of a surface with its origin at 0, after a placement with one scale.
+    fn placed(&self, place: &Placement) -> Moments {
+        let scale = place.largest();
+        let axes = Matrix3::from_columns(&place.axes);
+        let area = scale * scale;
+        Moments {
+            measure: self.measure * area,
+            first: axes * self.first * (area * scale),
+            second: axes * self.second * axes.transpose() * (area * area),
+            face: axes * self.face * area,
+            origin: place.origin.coords,
+        }
+    }
+
+    fn of_polygon(polygon: &Polygon) -> Moments {
+        let first = polygon.vertices[0];
+        let mut moments = Moments::about(first);
+        for pair in polygon.vertices[1..].windows(2) {
+            moments.add([first, pair[0], pair[1]]);
+        }
+        moments
+    }
+
+    /// Of a patch by the triangles of its control net drawn on the surface: 4 × 4 squares.
+    fn of_patch(patch: &Patch) -> Moments {
+        const PARTS: usize = 4;
+        let mut moments = Moments::about(patch.net[0][0]);
+        let at =
+            |row: usize, column: usize| patch.point(row as f64 / PARTS as f64, column as f64 / PARTS as f64);
+        for (row, column) in (0..PARTS).flat_map(|row| (0..PARTS).map(move |column| (row, column))) {
+            let [a, b, c, d] =
+                [at(row, column), at(row, column + 1), at(row + 1, column + 1), at(row + 1, column)];
+            moments.add([a, b, c]);
+            moments.add([a, c, d]);
+        }
+        moments
+    }
+
+    /// Of a rigid stem: a cylinder.
+    fn of_segment(segment: &Segment) -> Moments {
+        let [a, b] = segment.widths.map(|width| width.resolve(0.0));
+        let (way, width) = (segment.end - segment.start, (a + b) / 2.0);
+        let volume = std::f64::consts::FRAC_PI_4 * width * width * way.norm();
+        let across = Matrix3::identity() - segment.direction * segment.direction.transpose();
+        Moments {
+            measure: volume,
+            second: (way * way.transpose() / 12.0 + across * (width * width / 16.0)) * volume,
+            origin: (segment.start + way / 2.0).coords,
+            ..Moments::default()
+        }
+    }
+
+    fn load(&self, stem: usize, tissue: Option<usize>, solid: bool) -> Load {
+        let mean = self.first / self.measure;
+        Load {
+            stem,
+            tissue,
+            form: if solid { Form::Solid(self.measure) } else { Form::Surface(self.measure) },
+            centre: Point::from(self.origin + mean),
+            spread: self.second - mean * mean.transpose() * self.measure,
+            face: self.face,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn moments_of_a_square() {
+        let corner = |x: f64, y: f64| Point::new(3.0 + x, y, 1.0);
+        let mut moments = Moments::about(corner(0.0, 0.0));
+        moments.add([corner(0.0, 0.0), corner(2.0, 0.0), corner(2.0, 2.0)]);
+        moments.add([corner(0.0, 0.0), corner(2.0, 2.0), corner(0.0, 2.0)]);
+        let load = moments.load(0, None, false);
+        assert_eq!(load.form, Form::Surface(4.0));
+        assert!((load.centre - corner(1.0, 1.0)).norm() < 1e-14);
+        // ∫ x² over a square of the side 2 about its middle is a⁴/12.
+        assert!(
+            (load.spread - Matrix3::from_diagonal(&Vector::new(4.0 / 3.0, 4.0 / 3.0, 0.0))).norm() < 1e-14
+        );
+        assert!((load.face - Vector::z() * 4.0).norm() < 1e-14);
+    }
+}

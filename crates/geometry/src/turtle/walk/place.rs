@@ -1,0 +1,127 @@
+//! Elements that stand where the turtle is: surfaces, plants, polygons, patches.
+
+use super::super::Error;
+use super::super::command::Command;
+use super::super::error::Remark;
+use super::{Outline, Walk};
+use crate::scene::{MaterialId, Patch, Placement, Point, Polygon, Seedling, Shape, Surface, Vector};
+
+impl Walk<'_> {
+    /// Makes the position a vertex of the open polygon.
+    pub(super) fn record_vertex(&mut self) {
+        let position = self.seen(self.state.position);
+        if let Some(open) = self.polygons.last_mut() {
+            open.made += 1;
+            if open.vertices.last() != Some(&position) {
+                open.vertices.push(position);
+            }
+        }
+    }
+
+    /// Begins a patch, sets a point of it, or draws it.
+    pub(super) fn patch(&mut self, command: Command, parameters: &[f64]) -> Result<(), Error> {
+        let given = |i: usize| parameters.get(i).copied().unwrap_or(0.0);
+        match command {
+            Command::BeginPatch => self.patches.begin(given(0)).map_err(|fault| self.error(fault))?,
+            Command::ControlPoint => {
+                let set = self.patches.set([0, 1, 2].map(given), self.seen(self.state.position));
+                set.map_err(|fault| self.error(fault))?;
+            }
+            _ => {
+                let net = self.patches.net(given(0)).map_err(|fault| self.error(fault))?;
+                let material = self.chosen().unwrap_or(MaterialId::PETAL);
+                let owner = self.owner();
+                // All in one place there is nothing to see, as at the birth of an organ.
+                if net.iter().flatten().any(|p| *p != net[0][0]) {
+                    self.scene.patches.push(Patch { net, material, owner });
+                    let carrier = self.carrier();
+                    if let Some(recorder) = &mut self.recorder {
+                        recorder.patches.push(carrier);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Ends the innermost polygon, and draws it.
+    pub(super) fn end_polygon(&mut self) {
+        let Some(Outline { mut vertices, made, .. }) = self.polygons.pop() else {
+            return self.remark(Remark::PolygonNotOpen);
+        };
+        // One that has yet to grow has all its vertices in one place.
+        if made < 3 {
+            self.remark(Remark::FewVertices(made));
+        }
+        while vertices.len() > 1 && vertices.first() == vertices.last() {
+            vertices.pop();
+        }
+        let distinct = |p: &Point, among: &[Point]| among.iter().all(|q| p != q);
+        let different =
+            (0..vertices.len()).filter(|&i| distinct(&vertices[i], &vertices[..i])).take(3).count();
+        if different == 3 {
+            let material = self.chosen().unwrap_or(MaterialId::LEAF);
+            let owner = self.owner();
+            self.scene.polygons.push(Polygon { vertices, material, owner });
+            let carrier = self.carrier();
+            if let Some(recorder) = &mut self.recorder {
+                recorder.polygons.push(carrier);
+            }
+        }
+    }
+
+    /// Puts a surface at the turtle's position: of one size (1), or of a width, a length and a height, which is
+    /// the length if it is missing.
+    pub(super) fn place(&mut self, shape: &Shape, sizes: &[f64]) -> Result<(), Error> {
+        let [width, length, height] = match *sizes {
+            [] => [1.0; 3],
+            [size] => [size; 3],
+            [width, length] => [width, length, length],
+            [width, length, height, ..] => [width, length, height],
+        };
+        self.state.node = true;
+        // The axes are heading, left, up.
+        let scales = [self.in_range(length)?, self.in_range(width)?, self.in_range(height)?];
+        if scales.iter().all(|scale| *scale > 0.0) {
+            let placement =
+                Placement { origin: self.seen(self.state.position), axes: self.seen_axes(), scales };
+            let (tint, owner) = (self.chosen(), self.owner());
+            let Shape { mesh, patches } = shape.clone();
+            self.scene.surfaces.push(Surface { mesh, patches, placement, tint, owner });
+            let carrier = self.carrier();
+            if let Some(recorder) = &mut self.recorder {
+                recorder.surfaces.push(carrier);
+            }
+        }
+        Ok(())
+    }
+
+    /// Puts a plant of another model, born at the time given first, at the turtle's position. Its axes follow the turtle's.
+    pub(super) fn plant(&mut self, plant: usize, parameters: &[f64]) {
+        let age = self.time - parameters.first().copied().unwrap_or(0.0);
+        if age < 0.0 {
+            return;
+        }
+        let [heading, left, up] = self.seen_axes();
+        let placement = Placement::uniform(self.seen(self.state.position), [-left, heading, up], 1.0);
+        let (seed, owner) = (parameters.get(1).copied(), self.owner());
+        self.scene.seedlings.push(Seedling { plant, age, seed, placement, owner });
+    }
+
+    /// Moves to the ground below or above, without a vertex of a polygon.
+    pub(super) fn set_down(&mut self) {
+        let Some(height) = self.model.scenery.ground else { return };
+        if let Some(bent) = self.state.bent {
+            // Below the place where the turtle is seen, which is then also its place at rest.
+            let mut there = bent.point(self.state.position);
+            there.y = height;
+            self.state.bent = Some(bent.put(there, there));
+            (self.state.position, self.state.remainder) = (there, Vector::zeros());
+        } else if height != self.state.position.y {
+            (self.state.position.y, self.state.remainder.y) = (height, 0.0);
+        } else {
+            return;
+        }
+        (self.state.last, self.state.joined) = (None, None);
+    }
+}
