@@ -36,6 +36,8 @@ pub struct Event {
     pub clause: usize,
     /// Index of the successor that chance has chosen, where a clause has several.
     pub successor: Option<usize>,
+    /// Number of modules of the successor: they are `lineage.family(KEY).child(0)` and so on.
+    pub made: u32,
     /// How far the located instant is from the boundary: the largest difference between the two sides of a
     /// comparison that is met with equality there.
     pub residual: f64,

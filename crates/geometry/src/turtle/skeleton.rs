@@ -3,6 +3,7 @@
 //! The turtle notes, for each element that it draws, the stem at whose end it is. Masses follow from the elements of the scene.
 
 use std::collections::HashMap;
+use std::f64::consts::PI;
 use std::sync::Arc;
 
 use nalgebra::Matrix3;
@@ -48,8 +49,9 @@ pub struct Load {
     pub centre: Point,
     /// The integral of (x - centre)(x - centre)ᵀ over its measure.
     pub spread: Matrix3<f64>,
-    /// The sum of the normals of its faces times their areas, for drag: of a flat leaf its length is the area, of a solid it is 0.
-    pub face: Vector,
+    /// Normals times areas, for drag: of a surface the sum over its faces, so that of a flat leaf its length is the area; of a solid the
+    /// areas that it shows along three axes at right angles, or two of a stem.
+    pub faces: [Vector; 3],
 }
 
 /// The kind of the measure of a [`Load`].
@@ -57,15 +59,17 @@ pub struct Load {
 pub enum Form {
     /// A surface of this area.
     Surface(f64),
-    /// A solid of this volume.
-    Solid(f64),
+    /// A ball of this volume.
+    Ball(f64),
+    /// A rigid stem of this volume.
+    Rod(f64),
 }
 
 impl Form {
     /// Area or volume, in scene units.
     pub fn measure(self) -> f64 {
         match self {
-            Form::Surface(measure) | Form::Solid(measure) => measure,
+            Form::Surface(measure) | Form::Ball(measure) | Form::Rod(measure) => measure,
         }
     }
 }
@@ -100,27 +104,27 @@ impl Recorder {
     /// The skeleton, with the masses of what has been drawn into the scene.
     pub(super) fn finish(self, scene: &Scene) -> Skeleton {
         let mut loads = Vec::new();
-        let mut add = |carrier: &Carrier, moments: Moments, solid: bool| {
+        let mut add = |carrier: &Carrier, moments: Moments, form: fn(f64) -> Form| {
             if let Some(stem) = carrier.stem
                 && moments.measure > 0.0
             {
-                loads.push(moments.load(stem, carrier.tissue, solid));
+                loads.push(moments.load(stem, carrier.tissue, form));
             }
         };
         for (carrier, segment) in self.segments.iter().zip(&scene.segments) {
-            add(carrier, Moments::of_segment(segment), true);
+            add(carrier, Moments::of_segment(segment), Form::Rod);
         }
         let mut known: HashMap<*const Mesh, Moments> = HashMap::new();
         for (carrier, surface) in self.surfaces.iter().zip(&scene.surfaces).filter(|(c, _)| c.stem.is_some())
         {
-            let (moments, solid) = Moments::of_surface(surface, &mut known);
-            add(carrier, moments, solid);
+            let (moments, form) = Moments::of_surface(surface, &mut known);
+            add(carrier, moments, form);
         }
         for (carrier, polygon) in self.polygons.iter().zip(&scene.polygons) {
-            add(carrier, Moments::of_polygon(polygon), false);
+            add(carrier, Moments::of_polygon(polygon), Form::Surface);
         }
         for (carrier, patch) in self.patches.iter().zip(&scene.patches) {
-            add(carrier, Moments::of_patch(patch), false);
+            add(carrier, Moments::of_patch(patch), Form::Surface);
         }
         Skeleton { stems: self.stems, loads }
     }
@@ -132,7 +136,7 @@ struct Moments {
     measure: f64,
     first: Vector,
     second: Matrix3<f64>,
-    face: Vector,
+    faces: [Vector; 3],
     origin: Vector,
 }
 
@@ -147,7 +151,7 @@ impl Moments {
         let normal = (q - p).cross(&(r - p)) / 2.0;
         let area = normal.norm();
         self.measure += area;
-        self.face += normal;
+        self.faces[0] += normal;
         for middle in [(p + q) / 2.0, (q + r) / 2.0, (r + p) / 2.0] {
             self.first += middle * (area / 3.0);
             self.second += middle * middle.transpose() * (area / 3.0);
@@ -162,27 +166,30 @@ impl Moments {
         moments
     }
 
-    /// Also whether it is a solid: a ball.
-    fn of_surface(surface: &Surface, known: &mut HashMap<*const Mesh, Moments>) -> (Moments, bool) {
+    /// Also the form that it has.
+    fn of_surface(
+        surface: &Surface,
+        known: &mut HashMap<*const Mesh, Moments>,
+    ) -> (Moments, fn(f64) -> Form) {
         let place = &surface.placement;
         if surface.patches.as_ref().is_some_and(|patches| patches.is_ball()) {
             let [x, y, z] = place.scales.map(|scale| scale / 2.0);
-            let volume = 4.0 / 3.0 * std::f64::consts::PI * x * y * z;
+            let volume = 4.0 / 3.0 * PI * x * y * z;
             let axes = Matrix3::from_columns(&place.axes);
             let spread = Matrix3::from_diagonal(&Vector::new(x * x, y * y, z * z)) * (volume / 5.0);
             let second = axes * spread * axes.transpose();
-            return (
-                Moments { measure: volume, second, origin: place.origin.coords, ..Moments::default() },
-                true,
-            );
+            let faces =
+                [place.axes[0] * (PI * y * z), place.axes[1] * (PI * x * z), place.axes[2] * (PI * x * y)];
+            let (first, origin) = (Vector::zeros(), place.origin.coords);
+            return (Moments { measure: volume, first, second, faces, origin }, Form::Ball);
         }
         if !place.is_uniform() {
-            return (Moments::of_mesh(&surface.mesh, |p| place.point(p), place.origin), false);
+            return (Moments::of_mesh(&surface.mesh, |p| place.point(p), place.origin), Form::Surface);
         }
         let own = *known
             .entry(Arc::as_ptr(&surface.mesh))
             .or_insert_with(|| Moments::of_mesh(&surface.mesh, |p| p, Point::origin()));
-        (own.placed(place), false)
+        (own.placed(place), Form::Surface)
     }
 
     /// These moments, of a surface with its origin at 0, after a placement with one scale.
@@ -194,7 +201,7 @@ impl Moments {
             measure: self.measure * area,
             first: axes * self.first * (area * scale),
             second: axes * self.second * axes.transpose() * (area * area),
-            face: axes * self.face * area,
+            faces: self.faces.map(|face| axes * face * area),
             origin: place.origin.coords,
         }
     }
@@ -227,25 +234,27 @@ impl Moments {
     fn of_segment(segment: &Segment) -> Moments {
         let [a, b] = segment.widths.map(|width| width.resolve(0.0));
         let (way, width) = (segment.end - segment.start, (a + b) / 2.0);
-        let volume = std::f64::consts::FRAC_PI_4 * width * width * way.norm();
+        let volume = PI / 4.0 * width * width * way.norm();
+        let side = segment.across * (width * way.norm());
         let across = Matrix3::identity() - segment.direction * segment.direction.transpose();
         Moments {
             measure: volume,
             second: (way * way.transpose() / 12.0 + across * (width * width / 16.0)) * volume,
+            faces: [side, segment.direction.cross(&side), Vector::zeros()],
             origin: (segment.start + way / 2.0).coords,
-            ..Moments::default()
+            first: Vector::zeros(),
         }
     }
 
-    fn load(&self, stem: usize, tissue: Option<usize>, solid: bool) -> Load {
+    fn load(&self, stem: usize, tissue: Option<usize>, form: fn(f64) -> Form) -> Load {
         let mean = self.first / self.measure;
         Load {
             stem,
             tissue,
-            form: if solid { Form::Solid(self.measure) } else { Form::Surface(self.measure) },
+            form: form(self.measure),
             centre: Point::from(self.origin + mean),
             spread: self.second - mean * mean.transpose() * self.measure,
-            face: self.face,
+            faces: self.faces,
         }
     }
 }
@@ -260,13 +269,13 @@ mod tests {
         let mut moments = Moments::about(corner(0.0, 0.0));
         moments.add([corner(0.0, 0.0), corner(2.0, 0.0), corner(2.0, 2.0)]);
         moments.add([corner(0.0, 0.0), corner(2.0, 2.0), corner(0.0, 2.0)]);
-        let load = moments.load(0, None, false);
+        let load = moments.load(0, None, Form::Surface);
         assert_eq!(load.form, Form::Surface(4.0));
         assert!((load.centre - corner(1.0, 1.0)).norm() < 1e-14);
         // ∫ x² over a square of the side 2 about its middle is a⁴/12.
         assert!(
             (load.spread - Matrix3::from_diagonal(&Vector::new(4.0 / 3.0, 4.0 / 3.0, 0.0))).norm() < 1e-14
         );
-        assert!((load.face - Vector::z() * 4.0).norm() < 1e-14);
+        assert!((load.faces[0] - Vector::z() * 4.0).norm() < 1e-14);
     }
 }

@@ -131,12 +131,14 @@ impl EventStage<'_, '_> {
         &mut self,
         (kind, lineage): (KindId, Lineage),
         (rule, clause): (usize, usize),
-        successor: Option<usize>,
+        (successor, made): (Option<usize>, &[KindId]),
         residual: f64,
     ) {
         let Some(log) = &mut self.log.events else { return };
         let (time, group) = (self.instant.at.to_f64(), self.instant.number);
-        log.push(Event { time, lineage, kind, rule, clause, successor, residual, group, transition: None });
+        let made = made.iter().filter(|kind| !kind.is_bracket()).count() as u32;
+        let transition = None;
+        log.push(Event { time, lineage, kind, rule, clause, successor, made, residual, group, transition });
     }
 
     /// Replaces all modules in parallel: every successor is computed before any is put in.
@@ -167,10 +169,16 @@ impl EventStage<'_, '_> {
             };
             match made {
                 Ok((which, family)) => {
+                    let first = ends.last().map_or(0, |(end, ..): &([usize; 2], _, _)| end[0]);
                     ends.push(([new.kinds.len(), new.arguments.len()], which, family));
-                    let (kind, chosen) =
-                        (self.world.tree.kind(fire.id), clause.outcome.weights.is_some().then_some(which));
-                    self.record((kind, lineage), (fire.rule, fire.produce), chosen, residual);
+                    if self.log.events.is_some() {
+                        let (kind, chosen) = (
+                            self.world.tree.kind(fire.id),
+                            clause.outcome.weights.is_some().then_some(which),
+                        );
+                        let kinds = kinds_of(&clause.outcome.successors[which], &new.kinds[first..]);
+                        self.record((kind, lineage), (fire.rule, fire.produce), (chosen, kinds), residual);
+                    }
                 }
                 Err(refusal) => {
                     // None of this round takes place.

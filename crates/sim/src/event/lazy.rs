@@ -91,7 +91,8 @@ impl EventStage<'_, '_> {
         }
         if self.log.events.is_some() {
             let which = clause.outcome.weights.is_some().then_some(life.successor);
-            self.record((kind, lineage), (rule, produce), which, life.residual);
+            let kinds = kinds_of(&clause.outcome.successors[life.successor], &life.new.kinds);
+            self.record((kind, lineage), (rule, produce), (which, kinds), life.residual);
         }
         let family = lineage.family(Outcome::production(clause.key, life.successor));
         let (tree, made) = (&mut self.world.tree, &mut self.events.made);

@@ -190,6 +190,7 @@ mod tests {
             rule: 0,
             clause,
             successor: None,
+            made: 1,
             residual: 0.0,
             group: 0,
             transition: None,
