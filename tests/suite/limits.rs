@@ -103,7 +103,7 @@ fn drawing(dice: &mut Dice) -> String {
             4 => format!(" +({a}) &({b})"),
             5 => format!(" @L({a})"),
             6 => format!(" f({a}) @K({b})"),
-            7 => format!(" @E({a}) F({b}) @E(0)"),
+            7 => format!(" @T({a}) F({b}) @T(0)"),
             8 => format!(" @W({a}) F({b})"),
             9 => format!(" {{ f({a}) +(90) f({b}) +(90) f({a}) }}"),
             10 => format!(" [ +(30) F({a}) ] F({b})"),

@@ -5,7 +5,7 @@
 
 use crate::scope::{RESERVED, Variables};
 use dlsys_diagnostic::Diagnostic;
-use dlsys_model::{Class, Kinds};
+use dlsys_model::{Class, ELASTIC, Kinds};
 use dlsys_syntax::ast::{Expr, ExprId, Expressions, HeadModule, Module, Name};
 use dlsys_syntax::print;
 use dlsys_syntax::suggest::{did_you_mean, meant, nearest};
@@ -162,11 +162,13 @@ pub fn decimal_comma(
     (joined && texts.len() == wanted).then(|| texts.join(", "))
 }
 
-/// Help for an unknown name in `;(rose)` or `@C(square)`: the missing declaration is a colour or a contour.
+/// Help for an unknown name in `;(rose)`, `@C(square)` or `@E(stalk)`: the missing declaration is a colour, a contour or a
+/// tissue.
 pub fn of_look(module: &Module, all: &Expressions, said: &mut [Diagnostic]) {
     let example = match &*module.name {
         ";" => "color NAME = \"#e573a5\"",
         "@C" => "contour NAME = (1, 1) (-1, 1) (-1, -1) (1, -1)",
+        ELASTIC => "tissue NAME = stiffness 2e8, density 900, damping 0.05",
         _ => return,
     };
     let Some(Expr::Name(name)) = module.arguments.first().map(|a| all.get(a.root)) else { return };

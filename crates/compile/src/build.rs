@@ -12,9 +12,10 @@ use crate::chance::Clocks;
 use crate::clauses::names_of;
 use crate::declared::DeclaredRule;
 use crate::rules::RuleBuilder;
+use crate::scene_checks::TissueNumber;
 use crate::scenery::Nesting;
 use crate::scope::{Scope, Variables};
-use crate::{Setting, appearance, check, contexts, dead_rules, globals, porting, scenery};
+use crate::{Setting, appearance, check, contexts, dead_rules, globals, porting, scene_checks, scenery};
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{
     Appearance, DRAWN_WORDS, Frames, Interpretation, KindId, Kinds, Model, Parameter, Scenery, Successor,
@@ -45,7 +46,7 @@ pub fn build(
     }
     parts.check_strings(&mut builder, unread);
     porting::comments(document, &mut builder.scope.diagnostics);
-    let RuleBuilder { occurs, drawn, clocks, .. } = builder;
+    let RuleBuilder { occurs, drawn, clocks, tissues, .. } = builder;
     if !parts.singles.seen(INITIAL_STRING) && !unread {
         scope.diagnostics.push(
             Diagnostic::error("the model has no initial string")
@@ -61,7 +62,7 @@ pub fn build(
     if parts.faulty || unread {
         return None;
     }
-    let places = Places { occurs, drawn };
+    let places = Places { occurs, drawn, tissues };
     let looks = Looks { parameters, appearance, scenery };
     Some(parts.model(document, kinds, &clocks, &places, looks, scope))
 }
@@ -73,10 +74,11 @@ struct Looks {
     scenery: Scenery,
 }
 
-/// The first place of each kind of module in strings and in drawings.
+/// The first place of each kind of module in strings and in drawings, and the tissues that strings name.
 struct Places {
     occurs: HashMap<KindId, Span>,
     drawn: HashMap<KindId, Span>,
+    tissues: Vec<TissueNumber>,
 }
 
 /// The declarations and rules that have been lowered.
@@ -225,7 +227,7 @@ impl<'d> Parts<'d> {
             drawn_only,
             curves: scope.graph.curves().to_vec(),
         };
-        let Places { occurs, drawn } = places;
+        let Places { occurs, drawn, .. } = places;
         if has_axiom {
             check::reachability(&model, &self.written, occurs, diagnostics);
         }
@@ -236,7 +238,8 @@ impl<'d> Parts<'d> {
         porting::strings(document, &self.written, diagnostics);
         porting::drawn_words(&model, drawn, diagnostics);
         let all = drawn.iter().chain(occurs).map(|(k, s)| (*k, *s)).collect();
-        check::ground(&model, &all, diagnostics);
+        scene_checks::ground(&model, &all, diagnostics);
+        scene_checks::tissues(&model, &all, &places.tissues, diagnostics);
         check::commands(&model, diagnostics, &all);
         check::surface_sizes(&model, diagnostics, &all);
         model
@@ -350,6 +353,9 @@ fn unused(document: &Document, scope: &mut Scope) {
             }
             Item::Contour { name, .. } => {
                 ("contour", name, format!("draw with it: `@C({})` in a string", text(name)))
+            }
+            Item::Tissue { name, .. } => {
+                ("tissue", name, format!("let stems give way: `@E({})` in a string before them", text(name)))
             }
             _ => continue,
         };

@@ -5,10 +5,11 @@ use std::collections::{HashMap, HashSet};
 use crate::advice;
 use crate::appearance::surface_hint;
 use crate::clauses::names_of;
+use crate::scene_checks::is_hidden;
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{
-    BUILT_IN_SURFACES, COMMAND_SURFACES, Class, Condition, ConditionStep, ContextPart, DRAWN_WORDS, GROUND,
-    KindId, Model, Pattern, Remedy, Rule, SURFACE_SIZES, Sign, base_of, class_of,
+    BUILT_IN_SURFACES, COMMAND_SURFACES, Class, Condition, ConditionStep, ContextPart, DRAWN_WORDS, ELASTIC,
+    GROUND, KindId, Model, Pattern, Remedy, Rule, SURFACE_SIZES, Sign, base_of, class_of,
 };
 use dlsys_syntax::ast;
 use dlsys_syntax::foreign_syntax;
@@ -293,6 +294,7 @@ pub fn inert_modules(model: &Model, occurs: &HashMap<KindId, Span>, diagnostics:
                 if BUILT_IN_SURFACES.contains(&kind.base())
                     || COMMAND_SURFACES.iter().any(|(command, _)| *command == name)
                     || name == GROUND
+                    || kind.base() == ELASTIC
                     || model.scenery.plants.iter().any(|plant| plant.name == name)
                     || model.appearance.surfaces.iter().any(|shape| shape.name == name) => {}
             Class::Surface => diagnostics.push(
@@ -341,39 +343,21 @@ pub fn inert_modules(model: &Model, occurs: &HashMap<KindId, Span>, diagnostics:
     }
 }
 
-/// Reports `@G` in a model without a ground.
-pub fn ground(model: &Model, places: &HashMap<KindId, Span>, diagnostics: &mut Vec<Diagnostic>) {
-    let is_own = |name: &str| model.appearance.surfaces.iter().any(|shape| shape.name == name);
-    let stands =
-        |kind: &dlsys_model::Kind| kind.name == GROUND && kind.interpretation.is_none() && !is_own(GROUND);
-    if model.scenery.ground.is_some() {
-        return;
-    }
-    for (id, _) in model.kinds.iter().filter(|(_, kind)| stands(kind)) {
-        if let Some(span) = places.get(&id) {
-            diagnostics.push(
-                Diagnostic::error("`@G` sets the turtle on the ground, and there is none")
-                    .at(*span, "the model declares no ground")
-                    .help("declare one: `ground 0`"),
-            );
-        }
-    }
-}
-
 /// Reports turtle commands with too few parameters.
 pub fn commands(model: &Model, diagnostics: &mut Vec<Diagnostic>, places: &HashMap<KindId, Span>) {
     for (id, kind) in model.kinds.iter() {
-        let Some((name, needed)) = COMMAND_SURFACES.into_iter().find(|(name, _)| *name == kind.base()) else {
+        let mut commands = COMMAND_SURFACES.into_iter().chain([(ELASTIC, 1)]);
+        let Some((name, needed)) = commands.find(|(name, _)| *name == kind.base()) else {
             continue;
         };
-        let Some(span) = places.get(&id).filter(|_| kind.arity < needed && kind.interpretation.is_none())
-        else {
+        let Some(span) = places.get(&id).filter(|_| kind.arity < needed && !is_hidden(model, kind)) else {
             continue;
         };
         let usage = match name {
             "@W" => "`@W(w)`, w the width to which the stem tapers",
             "@T" => "`@T(e)`, e the strength of the tropism",
             "@C" => "`@C(name)`, name that of a `contour`",
+            ELASTIC => "`@E(name)`, name that of a `tissue`, or `@E(0)`: rigid from here",
             "@PC" => "`@PC(n, row, column)`: a control point of patch n, row and column from 0 to 3",
             "@PS" => "`@PS(n)`: patch n begins",
             _ => "`@PD(n)`: patch n is drawn",

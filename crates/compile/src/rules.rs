@@ -6,6 +6,7 @@ use std::sync::Arc;
 use crate::advice;
 use crate::chance::Clocks;
 use crate::declared::DeclaredPattern;
+use crate::scene_checks::TissueNumber;
 use crate::scope::{RESERVED, Scope, Variables};
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_expr::NodeId;
@@ -23,6 +24,8 @@ pub struct RuleBuilder<'b> {
     pub occurs: HashMap<KindId, Span>,
     /// Each kind that occurs in the drawing of another kind, with its first place.
     pub drawn: HashMap<KindId, Span>,
+    /// The constant arguments of `@E`, in strings and drawings.
+    pub tissues: Vec<TissueNumber>,
 }
 
 impl<'b> RuleBuilder<'b> {
@@ -33,7 +36,15 @@ impl<'b> RuleBuilder<'b> {
         kinds: &'b mut Kinds,
         clocks: Clocks,
     ) -> RuleBuilder<'b> {
-        RuleBuilder { document, scope, kinds, clocks, occurs: HashMap::new(), drawn: HashMap::new() }
+        RuleBuilder {
+            document,
+            scope,
+            kinds,
+            clocks,
+            occurs: HashMap::new(),
+            drawn: HashMap::new(),
+            tissues: Vec::new(),
+        }
     }
 
     /// Number of hidden parameters of a module.

@@ -1,4 +1,5 @@
-//! Plants of other models, light, sky, camera and floor: from the syntax tree to the model.
+//! The declarations of a scene: plants of other models, light, sky, camera and floor; wind and tissues are in `physics.rs`.
+//! From the syntax tree to the model.
 
 use std::cell::Cell;
 use std::path::{Path, PathBuf};
@@ -73,17 +74,28 @@ pub(crate) fn build(
                 builder.once("camera", *span);
                 builder.camera(eye, aim, *angle, *span);
             }
+            Item::Units(attributes) => {
+                builder.once("units", *span);
+                builder.units(attributes);
+            }
+            Item::Wind { direction, attributes } => {
+                builder.once("wind", *span);
+                builder.wind(direction, attributes, *span);
+            }
+            Item::Flow { kind, attributes } => builder.flow(kind, attributes, *span),
+            Item::Tissue { name, attributes } => builder.tissue(name, attributes, *span),
             _ => {}
         }
     }
     builder.scenery
 }
 
-struct Builder<'b> {
-    document: &'b Document,
-    scope: &'b mut Scope,
+/// The scenery so far, and what its declarations are compiled with.
+pub(crate) struct Builder<'b> {
+    pub(crate) document: &'b Document,
+    pub(crate) scope: &'b mut Scope,
     files: &'b dyn Files,
-    scenery: Scenery,
+    pub(crate) scenery: Scenery,
     /// Declarations that may stand once, with their places.
     seen: Vec<(&'static str, Span)>,
 }
@@ -101,7 +113,7 @@ impl Builder<'_> {
     }
 
     /// A program over `t`.
-    fn of_time(&mut self, expressions: &[Expression]) -> Option<Program> {
+    pub(crate) fn of_time(&mut self, expressions: &[Expression]) -> Option<Program> {
         let no_age = "a scene has no age; `t` is the time";
         let mut variables = Variables { no_time: Some(no_age), ..Variables::default() };
         variables.names.insert("t".into(), self.scope.graph.var(0));

@@ -6,10 +6,13 @@ use std::collections::{HashMap, HashSet};
 use crate::advice;
 use crate::chance::Drawn;
 use crate::rules::RuleBuilder;
+use crate::scene_checks::TissueNumber;
 use crate::scope::{RESERVED, Scope, Variables, plural};
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_expr::{NodeId, Program};
-use dlsys_model::{Choice, Class, Outcome, Part, Repeat, Stretch, Successor, choose, class_of};
+use dlsys_model::{
+    Choice, Class, ELASTIC, KindId, Outcome, Part, Repeat, Stretch, Successor, base_of, choose, class_of,
+};
 use dlsys_syntax::ast::{self, Alternative, HeadModule, modules_of};
 use dlsys_syntax::print;
 use dlsys_syntax::suggest::{looks_like, meant};
@@ -219,7 +222,9 @@ impl RuleBuilder<'_> {
             self.occurs.entry(kind).or_insert(module.span);
             kinds.push(kind);
             let first = self.scope.draws.all.len() as u32;
+            let argument = roots.len();
             good &= self.arguments(module, variables, count > 0, &mut roots);
+            self.note_tissue(module, kind, roots.get(argument));
             let draws = first..self.scope.draws.all.len() as u32;
             if !draws.is_empty() {
                 drawn.modules.push((place, draws));
@@ -272,6 +277,18 @@ impl RuleBuilder<'_> {
             roots.push(node);
         }
         good
+    }
+
+    /// Notes the first argument of `@E` if it is a constant.
+    fn note_tissue(&mut self, module: &ast::Module, kind: KindId, argument: Option<&NodeId>) {
+        if base_of(&module.name) != ELASTIC {
+            return;
+        }
+        let value = argument.and_then(|node| self.scope.graph.as_constant(*node));
+        if let (Some(value), Some(written)) = (value, module.arguments.first()) {
+            let span = self.document.expressions.span(written.root);
+            self.tissues.push(TissueNumber { kind, value, span });
+        }
     }
 
     /// Updates the open brackets and reports those without a partner or with arguments.

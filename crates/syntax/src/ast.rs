@@ -147,6 +147,19 @@ pub struct Text {
     pub span: Span,
 }
 
+/// A word within a declaration with the values behind it: `speed 3`, `at 0, 1, 0`, `spectrum kolmogorov 1, 4, 1`, `sag`.
+#[derive(Clone, Debug)]
+pub struct Attribute {
+    /// The word.
+    pub word: Name,
+    /// A second word, which is the one of several alternatives that the values belong to.
+    pub choice: Option<Name>,
+    /// The values, of which the grammar determines the number.
+    pub values: Vec<Expression>,
+    /// The whole attribute.
+    pub span: Span,
+}
+
 /// A declaration or a rule.
 #[derive(Clone, Debug)]
 pub enum Item {
@@ -291,6 +304,29 @@ pub enum Item {
         /// The angle of view in degrees; None for the default.
         angle: Option<Expression>,
     },
+    /// `units length metres, time seconds`
+    Units(Vec<Attribute>),
+    /// `wind x, y, z speed u turbulence i scale l …`
+    Wind {
+        /// The direction in scene coordinates, of any length but 0.
+        direction: [Expression; 3],
+        /// Its other values, in the order written.
+        attributes: Vec<Attribute>,
+    },
+    /// `flow source s at x, y, z decay r`: a further part of the wind.
+    Flow {
+        /// The kind of flow with its velocity or its strength.
+        kind: Attribute,
+        /// Its other values, in the order written.
+        attributes: Vec<Attribute>,
+    },
+    /// `tissue name = stiffness e, density d, damping z`: a material of stems and surfaces.
+    Tissue {
+        /// The name that expressions read as the number of the tissue.
+        name: Name,
+        /// Its values, in the order written.
+        attributes: Vec<Attribute>,
+    },
     /// `ignore names`: the modules that context matching passes over.
     Ignore(Vec<Name>),
     /// `consider names`: the only modules that context matching does not pass over.
@@ -332,6 +368,10 @@ impl Item {
             Item::Light(_) => "light",
             Item::Sky(_) => "sky",
             Item::Camera { .. } => "camera",
+            Item::Units(_) => "units",
+            Item::Wind { .. } => "wind",
+            Item::Flow { .. } => "flow",
+            Item::Tissue { .. } => "tissue",
             Item::Ignore(_) => "ignore",
             Item::Consider(_) => "consider",
             Item::Axiom(_) => "initial",
@@ -354,6 +394,7 @@ impl Item {
             | Item::Gradient { name, .. }
             | Item::Surface { name, .. }
             | Item::Plant { name, .. }
+            | Item::Tissue { name, .. }
             | Item::Contour { name, .. } => Some(name),
             _ => None,
         }

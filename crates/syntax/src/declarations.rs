@@ -5,7 +5,11 @@
 //! variant of [`Item`](crate::ast::Item), and how that is read and printed in `notation.rs`; then its meaning, in
 //! `dlsys-compile` and `dlsys-model`.
 
+mod traits;
+
 use crate::grammar::Rule;
+pub(crate) use traits::Begins;
+pub use traits::{Body, Category, Follow, Named, OptionWord, Repeats};
 
 /// A kind of declaration.
 #[derive(Debug)]
@@ -44,139 +48,6 @@ impl PartialEq for Declaration {
 
 impl Eq for Declaration {}
 
-/// The subject of a declaration.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-#[non_exhaustive]
-pub enum Category {
-    /// The text itself.
-    Text,
-    /// Numbers and functions.
-    Values,
-    /// Times at which something happens.
-    Time,
-    /// The appearance of modules.
-    Looks,
-    /// The surroundings of a plant.
-    Scene,
-    /// Strings of modules.
-    Modules,
-}
-
-impl Category {
-    /// All categories, in the order in which help lists them.
-    pub const ALL: [Category; 6] = [
-        Category::Text,
-        Category::Values,
-        Category::Time,
-        Category::Looks,
-        Category::Scene,
-        Category::Modules,
-    ];
-
-    /// A heading for its declarations.
-    pub fn title(self) -> &'static str {
-        match self {
-            Category::Text => "text",
-            Category::Values => "values",
-            Category::Time => "time",
-            Category::Looks => "looks",
-            Category::Scene => "scene",
-            Category::Modules => "modules",
-        }
-    }
-}
-
-/// The position of the name that a declaration introduces.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Named {
-    /// It introduces no name.
-    No,
-    /// A word: `const k = …`.
-    Word,
-    /// A word, optionally after one of the options: `curve linear g = …`.
-    AfterOption,
-    /// The name of a function: `def f(x) = …`.
-    Function,
-    /// A name with its mark: `surface @P from …`.
-    Surface,
-}
-
-impl Named {
-    /// True if the name is a word of letters, digits and `_`.
-    pub fn is_word(self) -> bool {
-        matches!(self, Named::Word | Named::AfterOption | Named::Function)
-    }
-}
-
-/// The rule by which a declaration replaces another in the interactive session. In one text, two such declarations are an
-/// error.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Repeats {
-    /// One for each text.
-    Once,
-    /// One for each name. Declarations with the same word here share their names.
-    PerName(&'static str),
-    /// One for each head of a module.
-    PerHead,
-    /// One for each file.
-    PerFile,
-    /// Any number.
-    Freely,
-}
-
-/// The syntax behind the head of a declaration.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Body {
-    /// Expressions and texts; a line break ends it.
-    Line,
-    /// Names of modules.
-    Names,
-    /// A `:` and a string of modules, in which line breaks have no meaning.
-    String,
-    /// The head of a module, a `:` and a string of modules.
-    Drawing,
-}
-
-/// The condition under which the word of a declaration begins one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Begins {
-    /// Wherever a declaration may begin: no module has this name.
-    Always,
-    /// Where a word or a text follows, unless a `:` makes the line the head of a rule. For words added after models had begun
-    /// to use them as names of modules.
-    BeforeName,
-    /// As `BeforeName`, and also where a number, a negative number or the mark of a name follows.
-    BeforeValue,
-}
-
-/// A keyword inside a declaration.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct OptionWord {
-    /// The word as it is written.
-    pub word: &'static str,
-    /// The syntax that must follow it.
-    pub follow: Follow,
-}
-
-/// The syntax that follows an option.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Follow {
-    /// The name that is declared, on the same line.
-    Name,
-    /// A text in quotes, on the same line.
-    Text,
-    /// An expression; a line break before that ends nothing.
-    Value,
-    /// As `Value`, in every declaration and rule.
-    ValueEverywhere,
-    /// Nothing: the option ends the declaration.
-    Nothing,
-}
-
 const fn option(word: &'static str, follow: Follow) -> OptionWord {
     OptionWord { word, follow }
 }
@@ -202,7 +73,7 @@ const fn row(word: &'static str, rule: Rule) -> Declaration {
 }
 
 /// All declarations, in the order in which messages list them.
-pub static DECLARATIONS: [Declaration; 25] = [
+pub static DECLARATIONS: [Declaration; 29] = [
     Declaration {
         usage: "\"…\"",
         summary: "the title of the model, shown above its pictures",
@@ -388,6 +259,68 @@ pub static DECLARATIONS: [Declaration; 25] = [
         begins: Begins::BeforeValue,
         written: "a camera is written `camera at 0, 1, 5 towards 0, 1, 0 angle 40`",
         ..row("camera", Rule::camera_item)
+    },
+    Declaration {
+        usage: "length METRES, time SECONDS",
+        summary: "what a unit of length and a unit of time of the model are; 1 and 1 if they are not given",
+        category: Category::Scene,
+        options: &[option("length", Follow::Value), option("time", Follow::Value)],
+        begins: Begins::BeforeValue,
+        written: "units are written `units length 0.01, time 86400`: a unit of length in metres, a unit of t in seconds",
+        ..row("units", Rule::units_item)
+    },
+    Declaration {
+        usage: "X, Y, Z speed U turbulence I scale L",
+        summary: "direction, speed in m/s, and turbulence of the wind; the speed may depend on t",
+        category: Category::Scene,
+        options: &[
+            option("speed", Follow::Value),
+            option("turbulence", Follow::Value),
+            option("scale", Follow::Value),
+            option("roughness", Follow::Value),
+            option("period", Follow::Value),
+            option("seed", Follow::Value),
+            option("spectrum", Follow::Value),
+            option("kolmogorov", Follow::Value),
+        ],
+        begins: Begins::BeforeValue,
+        written: "a wind is written `wind 1, 0, 0 speed 3 turbulence 0.2 scale 5`",
+        ..row("wind", Rule::wind_item)
+    },
+    Declaration {
+        usage: "uniform U, V, W, or source|sink|vortex S at X, Y, Z axis X, Y, Z decay R",
+        summary: "a further part of the wind; its values may depend on t",
+        category: Category::Scene,
+        repeats: Repeats::Freely,
+        options: &[
+            option("uniform", Follow::Value),
+            option("source", Follow::Value),
+            option("sink", Follow::Value),
+            option("vortex", Follow::Value),
+            option("at", Follow::Value),
+            option("axis", Follow::Value),
+            option("decay", Follow::Value),
+        ],
+        begins: Begins::BeforeValue,
+        written: "a flow is written `flow uniform 1, 0, 0`, or `flow source 2 at 0, 1, 0 decay 3`; likewise `sink`, and `vortex` with an `axis`",
+        ..row("flow", Rule::flow_item)
+    },
+    Declaration {
+        usage: "NAME = stiffness E, density D, damping Z",
+        summary: "a material of stems and surfaces, used as `@E(NAME)`: Pa, kg/m³, damping ratio at 1 Hz",
+        category: Category::Scene,
+        named: Named::Word,
+        repeats: Repeats::PerName("value"),
+        options: &[
+            option("stiffness", Follow::Value),
+            option("density", Follow::Value),
+            option("damping", Follow::Value),
+            option("thickness", Follow::Value),
+            option("sag", Follow::Nothing),
+        ],
+        begins: Begins::BeforeValue,
+        written: "a tissue is written `tissue stalk = stiffness 2e8, density 900, damping 0.05`",
+        ..row("tissue", Rule::tissue_item)
     },
     Declaration {
         usage: "NAME …",

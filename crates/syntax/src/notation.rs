@@ -2,7 +2,7 @@
 //!
 //! Reading and printing stand side by side so that they agree: the printed text parses to the same tree.
 
-use crate::ast::{Expression, Expressions, Item, Name, Text};
+use crate::ast::{Attribute, Expression, Expressions, Item, Name, Text};
 use crate::grammar::{Pair, Rule};
 use crate::parse::build::{Builder, Built, is_punctuation};
 use crate::print;
@@ -70,6 +70,10 @@ pub(crate) fn read(builder: &mut Builder, pair: Pair) -> Built<Item> {
         Rule::camera_item => {
             Item::Camera { eye: parts.triple()?, aim: parts.triple()?, angle: parts.expression_if_any()? }
         }
+        Rule::units_item => Item::Units(parts.attributes()?),
+        Rule::wind_item => Item::Wind { direction: parts.triple()?, attributes: parts.attributes()? },
+        Rule::flow_item => Item::Flow { kind: parts.attribute()?, attributes: parts.attributes()? },
+        Rule::tissue_item => Item::Tissue { name: parts.name(), attributes: parts.attributes()? },
         Rule::ignore_item => Item::Ignore(parts.names()),
         Rule::consider_item => Item::Consider(parts.names()),
         Rule::interpret_item => {
@@ -142,6 +146,20 @@ pub(crate) fn write(expressions: &Expressions, item: &Item) -> String {
             let angle = angle.as_ref().map(|e| format!(" angle {}", show(e))).unwrap_or_default();
             format!("camera at {} towards {}{angle}", triple(expressions, eye), triple(expressions, aim))
         }
+        Item::Units(attributes) => format!("units {}", written(expressions, attributes, ", ")),
+        Item::Wind { direction, attributes } => {
+            let gap = if attributes.is_empty() { "" } else { " " };
+            let attributes = written(expressions, attributes, " ");
+            format!("wind {}{gap}{attributes}", triple(expressions, direction))
+        }
+        Item::Flow { kind, attributes } => {
+            let gap = if attributes.is_empty() { "" } else { " " };
+            let attributes = written(expressions, attributes, " ");
+            format!("flow {}{gap}{attributes}", attribute(expressions, kind))
+        }
+        Item::Tissue { name, attributes } => {
+            format!("tissue {} = {}", name.text, written(expressions, attributes, ", "))
+        }
         Item::Ignore(list) => format!("ignore {}", print::names(list, " ")),
         Item::Consider(list) => format!("consider {}", print::names(list, " ")),
         Item::Axiom(string) => format!("initial string: {}", print::modules(expressions, string)),
@@ -208,6 +226,27 @@ impl<'i> Parts<'_, '_, 'i> {
         Ok([self.expression()?, self.expression()?, self.expression()?])
     }
 
+    /// A word with the values behind it.
+    fn attribute(&mut self) -> Built<Attribute> {
+        let pair = self.pair();
+        let span = self.builder.span(&pair);
+        let mut inner = pair.into_inner().peekable();
+        let word = inner.next().expect("the grammar has a word here");
+        let choice = inner.next_if(|pair| pair.as_rule() == Rule::kolmogorov);
+        let word = self.builder.name(&word);
+        let choice = choice.map(|choice| self.builder.name(&choice));
+        let values = inner.map(|value| self.builder.expression(value)).collect::<Built<_>>()?;
+        Ok(Attribute { word, choice, values, span })
+    }
+
+    fn attributes(&mut self) -> Built<Vec<Attribute>> {
+        let mut all = Vec::new();
+        while !self.pairs.as_slice().is_empty() {
+            all.push(self.attribute()?);
+        }
+        Ok(all)
+    }
+
     fn assignments(&mut self) -> Built<Vec<(Name, Expression)>> {
         let mut all = Vec::new();
         while let Some(pair) = self.pair_if(Rule::assignment) {
@@ -263,6 +302,18 @@ fn sort_word(sort: Sort, default: Sort) -> &'static str {
 fn triple(expressions: &Expressions, [x, y, z]: &[Expression; 3]) -> String {
     let show = |x: &Expression| print::expression(expressions, x.root);
     format!("{}, {}, {}", show(x), show(y), show(z))
+}
+
+fn attribute(expressions: &Expressions, Attribute { word, choice, values, .. }: &Attribute) -> String {
+    let words = std::iter::once(word).chain(choice).map(|word| word.text.to_string());
+    let values: Vec<String> = values.iter().map(|x| print::expression(expressions, x.root)).collect();
+    let values = (!values.is_empty()).then(|| values.join(", "));
+    words.chain(values).collect::<Vec<_>>().join(" ")
+}
+
+fn written(expressions: &Expressions, attributes: &[Attribute], separator: &str) -> String {
+    let all: Vec<String> = attributes.iter().map(|one| attribute(expressions, one)).collect();
+    all.join(separator)
 }
 
 fn ending(periodic: bool) -> &'static str {

@@ -42,7 +42,7 @@ pub struct Builder<'d> {
 }
 
 impl Builder<'_> {
-    pub(super) fn span(&self, pair: &Pair) -> Span {
+    pub(crate) fn span(&self, pair: &Pair) -> Span {
         let span = pair.as_span();
         // pest's spans of non-atomic rules may include trailing white space.
         let len = span.as_str().trim_end().len();

@@ -1,0 +1,81 @@
+//! Checks of the modules that need a declaration of the scene: `@G` a ground, `@E(NAME)` a tissue.
+
+use std::collections::HashMap;
+
+use dlsys_diagnostic::{Diagnostic, Span};
+use dlsys_model::{ELASTIC, GROUND, Kind, KindId, Model};
+
+/// The argument of a module that names a tissue, if it is a constant.
+pub struct TissueNumber {
+    /// The module.
+    pub kind: KindId,
+    /// The value of the argument.
+    pub value: f64,
+    /// The place of the argument.
+    pub span: Span,
+}
+
+/// True if a model draws a module in another way than the command of its name: by an interpretation, or by a surface or a
+/// plant that it declares.
+pub fn is_hidden(model: &Model, kind: &Kind) -> bool {
+    kind.interpretation.is_some()
+        || model.appearance.surfaces.iter().any(|shape| shape.name == kind.name)
+        || model.scenery.plants.iter().any(|plant| plant.name == kind.name)
+}
+
+/// Reports `@G` in a model without a ground.
+pub fn ground(model: &Model, places: &HashMap<KindId, Span>, diagnostics: &mut Vec<Diagnostic>) {
+    if model.scenery.ground.is_some() {
+        return;
+    }
+    let stands = |kind: &Kind| kind.name == GROUND && !is_hidden(model, kind);
+    for (id, _) in model.kinds.iter().filter(|(_, kind)| stands(kind)) {
+        if let Some(span) = places.get(&id) {
+            diagnostics.push(
+                Diagnostic::error("`@G` sets the turtle on the ground, and there is none")
+                    .at(*span, "the model declares no ground")
+                    .help("declare one: `ground 0`"),
+            );
+        }
+    }
+}
+
+/// Reports `@E(…)` in a model without a tissue, and arguments that are the number of none.
+pub fn tissues(
+    model: &Model,
+    places: &HashMap<KindId, Span>,
+    numbers: &[TissueNumber],
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    let is_command = |kind: &Kind| kind.base() == ELASTIC && !is_hidden(model, kind);
+    let tissues = &model.scenery.tissues;
+    if tissues.is_empty() {
+        for (id, kind) in model.kinds.iter() {
+            if let Some(span) = places.get(&id).filter(|_| is_command(kind) && kind.arity > 0) {
+                diagnostics.push(
+                    Diagnostic::error("stems behind `@E` are made of a tissue, and there is none")
+                        .at(*span, "the model declares no tissue")
+                        .help("declare one: `tissue stalk = stiffness 2e8, density 900, damping 0.05`; then `@E(stalk)`"),
+                );
+            }
+        }
+        return;
+    }
+    for number in numbers.iter().filter(|number| is_command(model.kinds.get(number.kind))) {
+        let is_one = number.value.fract() == 0.0 && (0.0..=tissues.len() as f64).contains(&number.value);
+        if is_one {
+            continue;
+        }
+        let known: Vec<String> =
+            tissues.iter().take(8).map(|tissue| format!("`@E({})`", tissue.name)).collect();
+        let more = if tissues.len() > 8 { ", …" } else { "" };
+        diagnostics.push(
+            Diagnostic::error("this is no tissue").at(number.span, format!("it is {}", number.value)).help(
+                format!(
+                    "write the name of a tissue: {}{more}; or `@E(0)`: rigid from here",
+                    known.join(", ")
+                ),
+            ),
+        );
+    }
+}
