@@ -1,0 +1,14 @@
+//! Prints the statistics of the turbulence next to theory: `cargo run --release -p dlsys-wind --example statistics -- [SEEDS]`.
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let seeds = std::env::args().nth(1).map_or(Ok(32), |text| text.parse())?;
+    println!("{:<68} {:>12} {:>12} {:>10} {:>8}", "statistic", "value", "expected", "error", "bound");
+    for row in dlsys_wind::study::statistics(seeds)? {
+        let mark = if row.holds() { "" } else { "  FAILS" };
+        println!(
+            "{:<68} {:>12.6} {:>12.6} {:>10.2e} {:>8.0e}{mark}",
+            row.name, row.value, row.expected, row.error, row.bound
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,259 @@
+//! A periodic vector potential as a cubic B-spline, and its derivatives.
+//!
+//! All derivatives are those of one function, so the divergence of the curl is zero to rounding everywhere, not only at
+//! lattice points; the curl is continuous with its first derivatives. (Four-linear interpolation of velocities, as in Stam and Fiume
+//! 1993, section 3.3, keeps 44 % of the energy in the middle of a cell of a 16⁴ lattice and brings 7 % of divergence.)
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::fourier::{Grid, MODES, N};
+use crate::modes::{Band, Instant, Lap};
+use crate::turns::cos_sin;
+
+/// The potential, its first and its second derivatives at a point, in the axes of the lattice or of the world.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Jet {
+    /// A, in m²/s.
+    pub(crate) value: Vector3<f64>,
+    /// Row i, column j: ∂A_i/∂x_j.
+    pub(crate) first: Matrix3<f64>,
+    /// For each component i the matrix ∂²A_i/∂x_j∂x_k.
+    pub(crate) second: [Matrix3<f64>; 3],
+}
+
+/// The curl of a vector field with this matrix of derivatives.
+#[inline]
+pub(crate) fn curl(first: &Matrix3<f64>) -> Vector3<f64> {
+    Vector3::new(
+        first[(2, 1)] - first[(1, 2)],
+        first[(0, 2)] - first[(2, 0)],
+        first[(1, 0)] - first[(0, 1)],
+    )
+}
+
+/// The derivatives of the curl, from the second derivatives.
+pub(crate) fn curl_gradient(second: &[Matrix3<f64>; 3]) -> Matrix3<f64> {
+    Matrix3::from_fn(|i, j| {
+        let (a, b) = ((i + 1) % 3, (i + 2) % 3);
+        second[b][(a, j)] - second[a][(b, j)]
+    })
+}
+
+/// Coefficients of a potential at an instant.
+#[derive(Clone, Debug)]
+pub(crate) struct Lattice {
+    /// Three components and a fourth number that is 0, for alignment; divided by the spacing, so that differences of coefficients
+    /// are velocities.
+    coefficients: Box<[[f32; 4]]>,
+    /// From the axes of the world, in metres, to those of the lattice, in spacings.
+    to_lattice: Matrix3<f64>,
+    /// From the axes of the lattice to those of the world.
+    to_world: Matrix3<f64>,
+    /// The distance between neighbouring points in metres.
+    spacing: f64,
+}
+
+/// Weights of the four nearest points along an axis: of the value, the first and the second derivative.
+type Weights = [[f64; 4]; 3];
+
+/// Weights at a share `t` of the way from the second point to the third.
+#[inline]
+fn weights(t: f64) -> Weights {
+    let s = 1.0 - t;
+    let (t2, s2) = (t * t, s * s);
+    [
+        [s2 * s / 6.0, (4.0 - 3.0 * t2 * (2.0 - t)) / 6.0, (4.0 - 3.0 * s2 * (2.0 - s)) / 6.0, t2 * t / 6.0],
+        [-0.5 * s2, 0.5 * t * (3.0 * t - 4.0), -0.5 * s * (3.0 * s - 4.0), 0.5 * t2],
+        [s, 3.0 * t - 2.0, 3.0 * s - 2.0, t],
+    ]
+}
+
+/// `sum += weight * point`, in four lanes.
+#[inline(always)]
+fn add(sum: &mut [f64; 4], weight: f64, point: [f64; 4]) {
+    for (sum, point) in sum.iter_mut().zip(point) {
+        *sum += weight * point;
+    }
+}
+
+impl Lattice {
+    /// The potential of a band at an instant, for velocities of `amplitude` times those of the band.
+    pub(crate) fn new(band: &Band, at: Instant, lap: Option<Lap>, amplitude: f64, work: &mut [Grid; 2]) -> Lattice {
+        let spacing = band.period / N as f64;
+        // The transform of the coefficients is that of the values divided by this, for each axis.
+        let filter: [f64; MODES as usize + 1] = std::array::from_fn(|m| 3.0 / (2.0 + cos_sin(m as f64 / N as f64).0));
+        let [xy, z] = work;
+        xy.clear();
+        z.clear();
+        band.amplitudes(at, lap, |mode, re, im| {
+            let size = mode.m.iter().fold(amplitude / (mode.k * spacing), |size, m| size * filter[m.unsigned_abs() as usize]);
+            let (re, im) = (re * size, im * size);
+            let [here, there] = Band::indices(mode.m);
+            // Two real fields in one complex transform: x + iy.
+            (xy.re[here], xy.im[here]) = (re.x - im.y, im.x + re.y);
+            (xy.re[there], xy.im[there]) = (re.x + im.y, re.y - im.x);
+            (z.re[here], z.im[here]) = (re.z, im.z);
+            (z.re[there], z.im[there]) = (re.z, -im.z);
+        });
+        xy.invert();
+        z.invert();
+        let coefficients = (0..N * N * N).map(|i| [xy.re[i] as f32, xy.im[i] as f32, z.re[i] as f32, 0.0]).collect();
+        let rotation = band.rotation.into_inner();
+        Lattice { coefficients, to_lattice: rotation / spacing, to_world: rotation.transpose(), spacing }
+    }
+
+    /// The cell of a point and the share of the way through it, along each axis. Reduced by the period before anything is rounded
+    /// to a whole number: far points lose no more than their coordinates have.
+    #[inline]
+    fn locate(&self, x: Vector3<f64>) -> ([usize; 3], [f64; 3]) {
+        let q = self.to_lattice * x;
+        let mut cell = [0; 3];
+        let mut share = [0.0; 3];
+        for j in 0..3 {
+            let reduced = q[j] - N as f64 * (q[j] * (1.0 / N as f64)).floor();
+            let floor = reduced.floor();
+            // Points that are not finite are at index 0.
+            cell[j] = floor as usize;
+            share[j] = reduced - floor;
+        }
+        (cell, share)
+    }
+
+    /// The four numbers of consecutive points along the last axis.
+    #[inline(always)]
+    fn row(&self, a: usize, b: usize, c: &[usize; 4]) -> [[f64; 4]; 4] {
+        let at = (a * N + b) * N;
+        let plane = &self.coefficients[at..at + N];
+        c.map(|c| plane[c % N].map(f64::from))
+    }
+
+    /// Indices of the four nearest points along an axis.
+    #[inline]
+    fn neighbours(cell: usize) -> [usize; 4] {
+        [(cell + N - 1) % N, cell % N, (cell + 1) % N, (cell + 2) % N]
+    }
+
+    /// The first derivatives in the axes of the lattice, and the value if `VALUE`; the rest is left at 0.
+    #[inline(always)]
+    fn first<const VALUE: bool>(&self, x: Vector3<f64>) -> (Matrix3<f64>, Vector3<f64>) {
+        let (cell, share) = self.locate(x);
+        let [wa, wb, wc] = share.map(weights);
+        let [ia, ib, ic] = cell.map(Self::neighbours);
+        let (mut value, mut da, mut db, mut dc) = ([0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4]);
+        for i in 0..4 {
+            let (mut plain, mut along_b, mut along_c) = ([0.0; 4], [0.0; 4], [0.0; 4]);
+            for j in 0..4 {
+                let row = self.row(ia[i], ib[j], &ic);
+                let (mut s, mut d) = ([0.0; 4], [0.0; 4]);
+                for k in 0..4 {
+                    add(&mut s, wc[0][k], row[k]);
+                    add(&mut d, wc[1][k], row[k]);
+                }
+                add(&mut plain, wb[0][j], s);
+                add(&mut along_b, wb[1][j], s);
+                add(&mut along_c, wb[0][j], d);
+            }
+            if VALUE {
+                add(&mut value, wa[0][i], plain);
+            }
+            add(&mut da, wa[1][i], plain);
+            add(&mut db, wa[0][i], along_b);
+            add(&mut dc, wa[0][i], along_c);
+        }
+        let first = Matrix3::from_fn(|i, j| [da, db, dc][j][i]);
+        (first, Vector3::new(value[0], value[1], value[2]))
+    }
+
+    /// The distance between neighbouring points in metres.
+    pub(crate) fn spacing(&self) -> f64 {
+        self.spacing
+    }
+
+    /// The curl at a point in m.
+    #[inline]
+    pub(crate) fn velocity(&self, x: Vector3<f64>) -> Vector3<f64> {
+        let (first, _) = self.first::<false>(x);
+        self.to_world * curl(&first)
+    }
+
+    /// The potential and its first derivatives at a point in m.
+    pub(crate) fn potential(&self, x: Vector3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
+        let (first, value) = self.first::<true>(x);
+        (self.to_world * value * self.spacing, self.to_world * first * self.to_world.transpose())
+    }
+
+    /// The potential with first and second derivatives at a point in m.
+    pub(crate) fn jet(&self, x: Vector3<f64>) -> Jet {
+        let (cell, share) = self.locate(x);
+        let [wa, wb, wc] = share.map(weights);
+        let [ia, ib, ic] = cell.map(Self::neighbours);
+        // Sums of products of derivatives of orders (a, b, c), whose sum is at most 2.
+        let mut sums = [[[[0.0; 4]; 3]; 3]; 3];
+        for i in 0..4 {
+            let mut planes = [[[0.0; 4]; 3]; 3];
+            for j in 0..4 {
+                let row = self.row(ia[i], ib[j], &ic);
+                for c in 0..3 {
+                    let mut s = [0.0; 4];
+                    for k in 0..4 {
+                        add(&mut s, wc[c][k], row[k]);
+                    }
+                    for b in 0..3 - c {
+                        add(&mut planes[b][c], wb[b][j], s);
+                    }
+                }
+            }
+            for a in 0..3 {
+                for b in 0..3 - a {
+                    for c in 0..3 - a - b {
+                        add(&mut sums[a][b][c], wa[a][i], planes[b][c]);
+                    }
+                }
+            }
+        }
+        let order = |j: usize, k: usize| {
+            let mut order = [0; 3];
+            order[j] += 1;
+            order[k] += 1;
+            order
+        };
+        let value = Vector3::from_fn(|i, _| sums[0][0][0][i]);
+        let first = Matrix3::from_fn(|i, j| [sums[1][0][0], sums[0][1][0], sums[0][0][1]][j][i]);
+        let second: [Matrix3<f64>; 3] = std::array::from_fn(|i| {
+            Matrix3::from_fn(|j, k| {
+                let [a, b, c] = order(j, k);
+                sums[a][b][c][i]
+            })
+        });
+        self.jet_in_world(value, first, second)
+    }
+
+    fn jet_in_world(&self, value: Vector3<f64>, first: Matrix3<f64>, second: [Matrix3<f64>; 3]) -> Jet {
+        let r = self.to_world;
+        let turned = second.map(|m| r * m * r.transpose() / self.spacing);
+        let second = std::array::from_fn(|i| turned[0] * r[(i, 0)] + turned[1] * r[(i, 1)] + turned[2] * r[(i, 2)]);
+        Jet { value: r * value * self.spacing, first: r * first * r.transpose(), second }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weights_are_derivatives_of_each_other_and_sum_to_one() {
+        for i in 0..=16 {
+            let t = f64::from(i) / 16.0;
+            let w = weights(t);
+            assert!((w[0].iter().sum::<f64>() - 1.0).abs() < 1e-15);
+            assert!(w[1].iter().sum::<f64>().abs() < 1e-15 && w[2].iter().sum::<f64>().abs() < 1e-15);
+            let (after, before) = (weights(t + 1e-5), weights(t - 1e-5));
+            for order in 0..2 {
+                for k in 0..4 {
+                    let slope = (after[order][k] - before[order][k]) / 2e-5;
+                    assert!((slope - w[order + 1][k]).abs() < 1e-9, "order {order}, weight {k} at {t}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,263 @@
+//! The turbulence as a sum of modes: random amplitudes over wave vectors and frequencies, and their sum over frequencies at an
+//! instant.
+//!
+//! The wave vectors of one band are the points m of a cubic lattice, k = 2π R m/P with the rotation R and the period P of the
+//! band. A mode has a number of frequencies of its own, drawn from the paper's Gaussian of deviation kσ, instead of those of a
+//! lattice in time: the correlation of a mode is exp(-k²σ²τ²/2) for the largest and the smallest eddies alike, and the field never
+//! repeats in time unless it has a period.
+
+use std::f64::consts::{PI, TAU};
+
+use nalgebra::{Rotation3, Unit, UnitQuaternion, Vector3};
+
+use crate::fourier::{MODES, N};
+use crate::random::{Draw, normal_quantile};
+use crate::spectrum::Energy;
+use crate::turns::cos_sin;
+
+/// The number of lattices, each with a band of k.
+pub(crate) const BANDS: usize = 3;
+
+/// The number of frequencies of a mode.
+pub(crate) const FREQUENCIES: usize = 16;
+
+/// The ratio of the periods of two neighbouring lattices: irrational, 3 + √5.
+pub(crate) const RATIO: f64 = 5.236_067_977_499_79;
+
+/// Wave vectors of a lattice are at most this long, in units of its smallest.
+pub(crate) const CUT: f64 = 10.5;
+
+/// Axes of the lattices, as quaternions (w, i, j, k) of any length: no axis, edge diagonal or space diagonal of one of the cubes
+/// lies within three degrees of an axis of the world.
+const TURNS: [[f64; 4]; BANDS] =
+    [[1.0, 0.414_213_56, 0.732_050_81, -0.236_067_98], [1.0, -0.645_751_31, 0.316_624_79, 0.605_551_28], [
+        1.0,
+        0.123_105_63,
+        -0.358_898_94,
+        0.795_831_52,
+    ]];
+
+/// Where the eddies are at an instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Instant {
+    /// The share of the period that has passed, from 0 to 1; 0 for a wind without a period.
+    pub(crate) share: f64,
+    /// The path of the wind in metres, without its mean over the period: all of it for a wind without one.
+    pub(crate) drift: f64,
+    /// The path that eddies have decorrelated over, in metres, likewise.
+    pub(crate) swept: f64,
+}
+
+/// What a wind with a period covers in one: metres of drift, and metres of decorrelation.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Lap {
+    pub(crate) drift: f64,
+    pub(crate) swept: f64,
+}
+
+/// One of a mode's frequencies: turns per metre, and the complex amplitudes of both polarisations.
+#[derive(Clone, Copy, Debug)]
+struct Line {
+    turns: f64,
+    amplitude: [f32; 4],
+}
+
+/// A pair of modes, m and -m.
+#[derive(Clone, Debug)]
+pub(crate) struct Mode {
+    /// m, with the first component that is not 0 positive.
+    pub(crate) m: [i32; 3],
+    /// |k| in rad/m.
+    pub(crate) k: f64,
+    /// Turns of phase per metre that the wind travels.
+    drift: f64,
+    /// Two directions at right angles to k and to each other, in the axes of the lattice.
+    polarisation: [Vector3<f64>; 2],
+    /// The expected square of the velocity's amplitude in each of the two polarisations.
+    pub(crate) power: f64,
+}
+
+/// A band of k: its lattice and its modes.
+#[derive(Debug)]
+pub(crate) struct Band {
+    /// The period P of the lattice in metres.
+    pub(crate) period: f64,
+    /// From the axes of the world to those of the lattice.
+    pub(crate) rotation: Rotation3<f64>,
+    /// The wave numbers between which its modes lie; 0 for the lower end of the first.
+    pub(crate) range: [f64; 2],
+    pub(crate) modes: Vec<Mode>,
+    lines: Vec<[Line; FREQUENCIES]>,
+}
+
+/// The bands of a spectrum. `direction` is that of the wind, by which eddies travel; zero if they stay.
+pub(crate) fn bands(energy: Energy, direction: Vector3<f64>, seed: u64) -> [Band; BANDS] {
+    let quantiles = Quantiles::new();
+    std::array::from_fn(|i| Band::new(i, energy, direction, Draw::new(seed).of(i as u64), &quantiles))
+}
+
+impl Band {
+    fn new(i: usize, energy: Energy, direction: Vector3<f64>, draw: Draw, quantiles: &Quantiles) -> Band {
+        let unit = energy.smallest() * RATIO.powi(i as i32);
+        let end = CUT * unit;
+        let [w, a, b, c] = TURNS[i];
+        let rotation =
+            UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, a, b, c)).to_rotation_matrix();
+        let lowest = if i == 0 { 0.0 } else { end / RATIO };
+        let heading = rotation * direction;
+        let (mut modes, mut lines) = (Vec::new(), Vec::new());
+        for m in half_space() {
+            let wave = Vector3::from(m.map(f64::from));
+            let k = unit * wave.norm();
+            // Half-open, so that neighbouring bands leave nothing out and have nothing twice.
+            if !(k > lowest && k <= end) || energy.at(k) == 0.0 {
+                continue;
+            }
+            modes.push(Mode {
+                m,
+                k,
+                drift: -unit / TAU * wave.dot(&heading),
+                polarisation: polarisation(wave),
+                power: energy.at(k) / (4.0 * PI * k * k),
+            });
+        }
+        // The sum over points of the lattice becomes the integral over the band: each component has a third of 2∫E dk. A mode and
+        // its conjugate have two polarisations each.
+        let total: f64 = modes.iter().map(|mode| 4.0 * mode.power).sum();
+        let scale = if total > 0.0 { 2.0 * energy.integral(lowest, end) / total } else { 0.0 };
+        for mode in &mut modes {
+            mode.power *= scale;
+            let size = (mode.power / (2.0 * FREQUENCIES as f64)).sqrt();
+            let draw = mode.m.iter().fold(draw, |draw, m| draw.of(i64::from(*m) as u64));
+            lines.push(std::array::from_fn(|j| {
+                let draw = draw.of(j as u64);
+                let ([a, b], [c, d]) = (draw.of(1).normal_pair(), draw.of(2).normal_pair());
+                let turns = quantiles.draw(j, draw.of(3).unit()) * mode.k / TAU;
+                Line { turns, amplitude: [a, b, c, d].map(|x| (x * size) as f32) }
+            }));
+        }
+        Band { period: TAU / unit, rotation, range: [lowest, end], modes, lines }
+    }
+
+    /// The expected variance of each component of the velocity.
+    pub(crate) fn variance(&self) -> f64 {
+        self.modes.iter().map(|mode| 4.0 * mode.power).sum::<f64>() / 3.0
+    }
+
+    /// The size of the eddies in metres: the root of the mean of 1/k², weighted by the energy.
+    pub(crate) fn eddy_size(&self) -> f64 {
+        let sum = |f: fn(&Mode) -> f64| self.modes.iter().map(f).sum::<f64>();
+        let total = sum(|mode| mode.power);
+        if total > 0.0 { (sum(|mode| mode.power / (mode.k * mode.k)) / total).sqrt() } else { 0.0 }
+    }
+
+    /// The complex amplitude of the velocity of each mode at an instant, in the axes of the lattice: real and imaginary part of the
+    /// factor of exp(i k·x). Potential and velocity have the same amplitudes up to 1/k, since i k × turns one polarisation into the
+    /// other and both are alike; so the amplitude of the potential is this divided by k, and that of the velocity is its curl.
+    pub(crate) fn amplitudes(
+        &self,
+        at: Instant,
+        lap: Option<Lap>,
+        mut each: impl FnMut(&Mode, Vector3<f64>, Vector3<f64>),
+    ) {
+        for (mode, lines) in self.modes.iter().zip(&self.lines) {
+            // Over a period, phases turn a whole number of times.
+            let turned = |lap: f64| (lap + 0.5).floor() * at.share;
+            let mut drift = mode.drift * at.drift;
+            if let Some(lap) = lap {
+                drift += turned(mode.drift * lap.drift);
+            }
+            let mut sum = [0.0f64; 4];
+            for line in lines {
+                let mut phase = drift + line.turns * at.swept;
+                if let Some(lap) = lap {
+                    phase += turned(line.turns * lap.swept);
+                }
+                let (c, s) = cos_sin(phase);
+                let [a, b, d, e] = line.amplitude.map(f64::from);
+                sum[0] += a * c - b * s;
+                sum[1] += a * s + b * c;
+                sum[2] += d * c - e * s;
+                sum[3] += d * s + e * c;
+            }
+            let [p, q] = mode.polarisation;
+            each(mode, p * sum[0] + q * sum[2], p * sum[1] + q * sum[3]);
+        }
+    }
+
+    /// The index of a mode and of its conjugate on the lattice.
+    pub(crate) fn indices(m: [i32; 3]) -> [usize; 2] {
+        let index = |sign: i32| m.iter().fold(0, |at, m| at * N + (sign * m).rem_euclid(N as i32) as usize);
+        [index(1), index(-1)]
+    }
+}
+
+/// One of each pair m, -m, but not zero, up to the cut.
+fn half_space() -> impl Iterator<Item = [i32; 3]> {
+    let axis = || -MODES..=MODES;
+    axis()
+        .flat_map(move |a| axis().flat_map(move |b| axis().map(move |c| [a, b, c])))
+        .filter(|m| *m > [0, 0, 0])
+        .filter(|m| f64::from(m.iter().map(|m| m * m).sum::<i32>()) <= CUT * CUT)
+}
+
+/// Two unit vectors at right angles to a wave vector and to each other.
+fn polarisation(wave: Vector3<f64>) -> [Vector3<f64>; 2] {
+    let axis = Vector3::ith(wave.iamin(), 1.0);
+    let first = Unit::new_normalize(wave.cross(&axis)).into_inner();
+    [first, wave.normalize().cross(&first)]
+}
+
+/// Normally distributed numbers, one from each of as many intervals of equal probability as a mode has frequencies.
+struct Quantiles(Vec<f64>);
+
+/// Points of the table for each interval.
+const STEPS: usize = 256;
+
+impl Quantiles {
+    fn new() -> Quantiles {
+        let points = STEPS * FREQUENCIES;
+        Quantiles((0..points).map(|i| normal_quantile((i as f64 + 0.5) / points as f64)).collect())
+    }
+
+    /// A number of the interval `j`, by a number from 0 to 1.
+    fn draw(&self, j: usize, unit: f64) -> f64 {
+        self.0[j * STEPS + ((unit * STEPS as f64) as usize).min(STEPS - 1)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Spectrum;
+
+    #[test]
+    fn sums_of_modes_are_the_integrals_of_their_bands() {
+        let energy = Energy::new(Spectrum::VonKarman, 3.0);
+        let bands = bands(energy, Vector3::x(), 1);
+        let mut end = 0.0;
+        for band in &bands {
+            assert_eq!(band.range[0], end, "bands meet");
+            end = band.range[1];
+            let exact = 2.0 / 3.0 * energy.integral(band.range[0], band.range[1]);
+            assert!((band.variance() / exact - 1.0).abs() < 1e-12);
+            // Without the correction, the sum over the points of the lattice is the integral within a few per cent already.
+            let unit = TAU / band.period;
+            let raw: f64 =
+                band.modes.iter().map(|mode| energy.at(mode.k) / (PI * mode.k.powi(2)) / 3.0).sum::<f64>() * unit.powi(3);
+            assert!((raw / exact - 1.0).abs() < 0.05, "{raw} for {exact}");
+        }
+    }
+
+    #[test]
+    fn no_diagonal_of_a_lattice_lies_along_an_axis_of_the_world() {
+        let bands = bands(Energy::new(Spectrum::VonKarman, 3.0), Vector3::x(), 1);
+        for band in &bands {
+            for m in half_space().filter(|m| m.iter().all(|m| m.abs() <= 1)) {
+                let direction = band.rotation.inverse() * Vector3::from(m.map(f64::from)).normalize();
+                let cosine = direction.amax();
+                assert!(cosine < 3f64.to_radians().cos(), "{m:?} of {}: {direction:?}", band.period);
+            }
+        }
+    }
+}
