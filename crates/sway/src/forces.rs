@@ -1,0 +1,269 @@
+//! Forces on one segment and what it carries, and its own quadratic forms of mass and damping, in its base frame.
+
+use crate::form::{Form, Inertia, Wrench, ZEROS, cross_columns};
+use crate::place::{Local, Motion, Place};
+use crate::{Air, Load, Matrix, Plate, Segment, Vector};
+
+/// Gauss points on a segment: fractions of its length. Each has half of it.
+pub(crate) const GAUSS: [f64; 2] = [0.211_324_865_405_187_12, 0.788_675_134_594_812_9];
+/// Where the matrix sees the drag of a segment: the point that has the right damping of its own bending, ∫₀¹ (ξ²/2)² dξ = 1/20.
+const DRAG: f64 = 0.668_740_304_976_422;
+
+/// A segment with what it carries.
+#[derive(Clone, Copy)]
+pub(crate) struct Part<'a> {
+    pub segment: &'a Segment,
+    pub loads: &'a [Load],
+    pub plates: &'a [Plate],
+    pub air: &'a Air,
+}
+
+/// Forces on a segment.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Forces {
+    /// About the base.
+    pub wrench: Wrench,
+    /// On the strain, divided by the length: a moment.
+    pub pull: Vector,
+    /// Sum of place times force, for the whole (about the base), and for the mean joint of the segment, once and weighted by
+    /// twice the fraction.
+    pub virial: Matrix,
+    pub mean: Matrix,
+    pub late: Matrix,
+    /// Power of the drag, in W.
+    pub power: f64,
+}
+
+impl Forces {
+    pub(crate) const ZERO: Forces = Forces {
+        wrench: Wrench::ZERO,
+        pull: Vector::new(0.0, 0.0, 0.0),
+        virial: ZEROS,
+        mean: ZEROS,
+        late: ZEROS,
+        power: 0.0,
+    };
+
+    /// A force at a place that the strain moves by `shift`.
+    #[inline(always)]
+    fn push(&mut self, place: &Vector, shift: &Matrix, force: &Vector) {
+        self.wrench.push(place, force);
+        self.pull += shift.tr_mul(force);
+    }
+
+    /// A moment on a section that the strain turns by `turning`.
+    #[inline(always)]
+    fn twist(&mut self, turning: &Matrix, moment: &Vector) {
+        self.wrench.moment += moment;
+        self.pull += turning.tr_mul(moment);
+    }
+
+    /// Geometric terms of a force at a place behind a section.
+    #[inline(always)]
+    fn stretch(&mut self, place: &Vector, tip: &Vector, xi: f64, force: &Vector) {
+        let row = force.transpose();
+        self.virial += place * row;
+        self.mean += (place * xi - tip * (0.5 * xi * xi)) * row;
+        self.late += (place * (xi * xi) - tip * (2.0 / 3.0 * xi * xi * xi)) * row;
+    }
+}
+
+/// The two Gauss points of a segment.
+pub(crate) struct Stretch {
+    pub points: [Motion; 2],
+}
+
+impl Stretch {
+    #[inline(always)]
+    pub(crate) fn new(local: &Local) -> Stretch {
+        Stretch { points: GAUSS.map(|xi| local.motion(xi)) }
+    }
+
+    /// Place and velocity of the middle, in the base frame: where wind is sampled.
+    #[inline(always)]
+    pub(crate) fn middle(&self) -> (Vector, Vector) {
+        let [a, b] = &self.points;
+        ((a.place + b.place) * 0.5, (a.velocity + b.velocity) * 0.5)
+    }
+}
+
+impl Part<'_> {
+    /// Whether air acts on the part.
+    #[inline(always)]
+    pub(crate) fn feels_air(&self) -> bool {
+        self.segment.drag_diameter > 0.0 || !self.plates.is_empty()
+    }
+
+    /// Moment of inertia of half the segment's sections, about a tangent: across, then the excess along it.
+    #[inline(always)]
+    fn section_inertia(&self) -> f64 {
+        let segment = self.segment;
+        segment.mass * segment.length * segment.diameter * segment.diameter / 32.0
+    }
+
+    /// Weight, inertial force, and drag in a wind (base frame).
+    #[inline(always)]
+    pub(crate) fn forces(&self, local: &Local, place: &Place, stretch: &Stretch, wind: &Vector) -> Forces {
+        let mut forces = Forces::ZERO;
+        let segment = self.segment;
+        let mass = 0.5 * segment.mass * segment.length;
+        let area = 0.5 * segment.drag_diameter * segment.length;
+        let spin = self.section_inertia();
+        let mut sum = Vector::zeros();
+        for point in &stretch.points {
+            let tangent = point.section.tangent();
+            let mut force = point.acceleration * -mass;
+            if area > 0.0 {
+                let drag = self.air.cylinder_drag(area, &tangent, &(point.velocity - wind));
+                forces.power += drag.dot(&point.velocity);
+                force += drag;
+            }
+            forces.push(&point.place, &point.shift, &force);
+            forces.virial += point.place * force.transpose();
+            sum += force;
+            let (omega, alpha) = (&point.angular, &point.angular_acceleration);
+            let along = tangent * tangent.dot(omega);
+            let moment = (alpha + tangent * tangent.dot(alpha) + omega.cross(&along)) * -spin;
+            forces.twist(&point.turning, &moment);
+        }
+        let own = place.tip * sum.transpose();
+        forces.mean = own * (1.0 / 6.0);
+        forces.late = own * (1.0 / 12.0);
+        self.carried(local, place, wind, &mut forces);
+        forces
+    }
+
+    fn carried(&self, local: &Local, place: &Place, wind: &Vector, forces: &mut Forces) {
+        for load in self.loads {
+            let motion = local.motion(load.at);
+            let axes = motion.section.rotation();
+            let arm = axes * load.centre;
+            let force = motion.acceleration_at(&arm) * -load.mass;
+            forces.push(&(motion.place + arm), &motion.shift_at(&arm), &force);
+            forces.stretch(&(motion.place + arm), &place.tip, load.at, &force);
+            let inertia = axes * load.inertia * axes.transpose();
+            let turn =
+                inertia * motion.angular_acceleration + motion.angular.cross(&(inertia * motion.angular));
+            forces.twist(&motion.turning, &-turn);
+        }
+        for plate in self.plates {
+            let motion = local.motion(plate.at);
+            let axes = motion.section.rotation();
+            let arm = axes * plate.centre;
+            let velocity = motion.velocity_at(&arm);
+            let force = self.air.plate_drag(plate.area, &(axes * plate.normal), &(velocity - wind));
+            forces.power += force.dot(&velocity);
+            forces.push(&(motion.place + arm), &motion.shift_at(&arm), &force);
+            forces.stretch(&(motion.place + arm), &place.tip, plate.at, &force);
+        }
+    }
+
+    /// Drag alone: wrench and pull of a second wind minus those of the first, at the same place and velocity.
+    #[inline(always)]
+    pub(crate) fn gust(&self, local: &Local, stretch: &Stretch, winds: [&Vector; 2]) -> (Wrench, Vector) {
+        let mut forces = Forces::ZERO;
+        let area = 0.5 * self.segment.drag_diameter * self.segment.length;
+        if area > 0.0 {
+            for point in &stretch.points {
+                let tangent = point.section.tangent();
+                let [before, after] =
+                    winds.map(|wind| self.air.cylinder_drag(area, &tangent, &(point.velocity - wind)));
+                forces.push(&point.place, &point.shift, &(after - before));
+            }
+        }
+        for plate in self.plates {
+            let motion = local.motion(plate.at);
+            let axes = motion.section.rotation();
+            let arm = axes * plate.centre;
+            let (normal, velocity) = (axes * plate.normal, motion.velocity_at(&arm));
+            let [before, after] =
+                winds.map(|wind| self.air.plate_drag(plate.area, &normal, &(velocity - wind)));
+            forces.push(&(motion.place + arm), &motion.shift_at(&arm), &(after - before));
+        }
+        (forces.wrench, forces.pull)
+    }
+
+    /// The form of mass.
+    #[inline(always)]
+    pub(crate) fn mass_form(&self, local: &Local, stretch: &Stretch) -> Form {
+        let mut form = Form::ZERO;
+        let mass = 0.5 * self.segment.mass * self.segment.length;
+        let spin = self.section_inertia();
+        for point in &stretch.points {
+            form.mass(mass, &point.place, &point.shift);
+            let tangent = point.section.tangent();
+            let mut round = tangent * (tangent * spin).transpose();
+            for k in 0..3 {
+                round[(k, k)] += spin;
+            }
+            form.spin(&round, &point.turning);
+        }
+        for load in self.loads {
+            let motion = local.motion(load.at);
+            let axes = motion.section.rotation();
+            let arm = axes * load.centre;
+            form.mass(load.mass, &(motion.place + arm), &motion.shift_at(&arm));
+            form.spin(&(axes * load.inertia * axes.transpose()), &motion.turning);
+        }
+        form
+    }
+
+    /// What stands for the drag of the segment in the matrix.
+    #[inline(always)]
+    pub(crate) fn damper(&self, local: &Local, stretch: &Stretch, wind: &Vector) -> Damper {
+        let area = self.segment.drag_diameter * self.segment.length;
+        if !(area > 0.0) {
+            return Damper::ZERO;
+        }
+        let section = local.section(DRAG);
+        let velocity = stretch.points[0].velocity * (1.0 - DRAG) + stretch.points[1].velocity * DRAG;
+        Damper {
+            place: section.place() * local.length,
+            shift: section.shift() * local.length,
+            damping: self.air.cylinder_damping(area, &section.tangent(), &(velocity - wind)),
+        }
+    }
+
+    /// What stands for the drag of a plate in the matrix.
+    pub(crate) fn plate_damper(&self, local: &Local, plate: &Plate, wind: &Vector) -> Damper {
+        let motion = local.motion(plate.at);
+        let axes = motion.section.rotation();
+        let arm = axes * plate.centre;
+        let velocity = motion.velocity_at(&arm) - wind;
+        Damper {
+            place: motion.place + arm,
+            shift: motion.shift_at(&arm),
+            damping: self.air.plate_damping(plate.area, &(axes * plate.normal), &velocity),
+        }
+    }
+}
+
+/// Linear drag on a point of a segment.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Damper {
+    pub place: Vector,
+    pub shift: Matrix,
+    pub damping: Matrix,
+}
+
+impl Damper {
+    pub(crate) const ZERO: Damper =
+        Damper { place: Vector::new(0.0, 0.0, 0.0), shift: ZEROS, damping: ZEROS };
+}
+
+/// The form that a child shows to its parent, and where: the end of the parent's section that carries it.
+#[inline(always)]
+pub(crate) fn hang(form: &mut Form, parent: &Place, child: &Place, carried: &Inertia) {
+    let shift = attachment(parent, child);
+    form.carry(&carried.turned(&child.turn), &child.reach, &parent.turning, &shift);
+}
+
+/// Derivative by the parent's strain, divided by its length, of the origin of a child.
+#[inline(always)]
+pub(crate) fn attachment(parent: &Place, child: &Place) -> Matrix {
+    let arm = child.reach - parent.tip;
+    if arm == Vector::zeros() {
+        return parent.shift;
+    }
+    parent.shift - cross_columns(&arm, &parent.turning)
+}
