@@ -8,13 +8,14 @@
 //! begins anew.
 
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use dlsys_diagnostic::Diagnostic;
 use dlsys_geometry::scene::{Bounds, Plant, Scene, Seedling, Width};
 use dlsys_geometry::turtle;
 use dlsys_model::{self as model, Model};
 use dlsys_sim::{self as sim, Settings, Simulation, brief};
+use dlsys_surround::{self as surround, Motion, Weather};
 use dlsys_tree::ModuleString;
 
 /// Most simulations that are kept from one scene to the next.
@@ -34,6 +35,9 @@ pub enum DrawError {
     /// A plant of another model cannot be drawn.
     #[error("{}", .0.message)]
     Plant(Box<Diagnostic>),
+    /// What is passive in the scene cannot be followed: stems in the wind.
+    #[error(transparent)]
+    Surround(#[from] surround::Error),
 }
 
 impl DrawError {
@@ -42,6 +46,7 @@ impl DrawError {
         match self {
             DrawError::Turtle(error) => error.diagnostic(),
             DrawError::Plant(diagnostic) => (**diagnostic).clone(),
+            DrawError::Surround(error) => error.diagnostic(),
         }
     }
 }
@@ -65,6 +70,8 @@ pub struct Nursery<'m> {
     below: Vec<Nursery<'m>>,
     /// One set of simulations for each thread that draws.
     pool: Mutex<Vec<Growing<'m>>>,
+    /// The stems in the wind, once a string has been drawn.
+    motion: OnceLock<Result<Option<Motion<'m>>, surround::Error>>,
 }
 
 impl<'m> Nursery<'m> {
@@ -83,7 +90,7 @@ impl<'m> Nursery<'m> {
         let blank = blanks.next().unwrap_or_default();
         let plants = model.scenery.plants.iter();
         let below = plants.map(|plant| Nursery::with_blanks(&plant.model, settings, blanks)).collect();
-        Nursery { model, settings, blank, below, pool: Mutex::default() }
+        Nursery { model, settings, blank, below, pool: Mutex::default(), motion: OnceLock::new() }
     }
 
     /// An empty scene with the materials of the model and of its plants, to be drawn into.
@@ -96,12 +103,36 @@ impl<'m> Nursery<'m> {
     /// # Errors
     /// A module that cannot be drawn, or a plant whose run or drawing fails.
     pub fn draw(&self, string: &ModuleString, scene: &mut Scene) -> Result<(), DrawError> {
-        self.draw_with(self.settings.seed, string, scene)
+        match self.motion()? {
+            Some(motion) => {
+                self.dress(scene);
+                turtle::draw_bent(self.model, string, &motion.at(string)?, scene)?;
+                self.fill(self.settings.seed, scene)
+            }
+            None => self.draw_with(self.settings.seed, string, scene),
+        }
+    }
+
+    /// The passive motion of the scene, if there is any.
+    fn motion(&self) -> Result<Option<&Motion<'m>>, surround::Error> {
+        let start = || {
+            let weather = Weather::of(&self.model.scenery)?;
+            Motion::new(self.model, self.settings, weather, [0.0; 3], Default::default())
+        };
+        match self.motion.get_or_init(start) {
+            Ok(motion) => Ok(motion.as_ref()),
+            Err(error) => Err(error.clone()),
+        }
     }
 
     fn draw_with(&self, seed: u64, string: &ModuleString, scene: &mut Scene) -> Result<(), DrawError> {
         self.dress(scene);
         turtle::draw(self.model, string, scene)?;
+        self.fill(seed, scene)
+    }
+
+    /// Puts the plants of other models into a scene.
+    fn fill(&self, seed: u64, scene: &mut Scene) -> Result<(), DrawError> {
         if scene.seedlings.is_empty() {
             return Ok(());
         }

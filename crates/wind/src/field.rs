@@ -215,11 +215,7 @@ impl Field {
                 // u = i k × A, with |A| = |u|/k.
                 let [real, imaginary] = [-direction.cross(&im), direction.cross(&re)];
                 let back = band.rotation.inverse();
-                each(
-                    i,
-                    back * direction * mode.k,
-                    [back * real * amplitude, back * imaginary * amplitude],
-                );
+                each(i, back * direction * mode.k, [back * real * amplitude, back * imaginary * amplitude]);
             });
         }
         Ok(())

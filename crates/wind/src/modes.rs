@@ -29,13 +29,11 @@ pub(crate) const CUT: f64 = 10.5;
 
 /// Axes of the lattices, as quaternions (w, i, j, k) of any length: no axis, edge diagonal or space diagonal of one of the cubes
 /// lies within three degrees of an axis of the world.
-const TURNS: [[f64; 4]; BANDS] =
-    [[1.0, 0.414_213_56, 0.732_050_81, -0.236_067_98], [1.0, -0.645_751_31, 0.316_624_79, 0.605_551_28], [
-        1.0,
-        0.123_105_63,
-        -0.358_898_94,
-        0.795_831_52,
-    ]];
+const TURNS: [[f64; 4]; BANDS] = [
+    [1.0, 0.414_213_56, 0.732_050_81, -0.236_067_98],
+    [1.0, -0.645_751_31, 0.316_624_79, 0.605_551_28],
+    [1.0, 0.123_105_63, -0.358_898_94, 0.795_831_52],
+];
 
 /// Where the eddies are at an instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -244,7 +242,8 @@ mod tests {
             // Without the correction, the sum over the points of the lattice is the integral within a few per cent already.
             let unit = TAU / band.period;
             let raw: f64 =
-                band.modes.iter().map(|mode| energy.at(mode.k) / (PI * mode.k.powi(2)) / 3.0).sum::<f64>() * unit.powi(3);
+                band.modes.iter().map(|mode| energy.at(mode.k) / (PI * mode.k.powi(2)) / 3.0).sum::<f64>()
+                    * unit.powi(3);
             assert!((raw / exact - 1.0).abs() < 0.05, "{raw} for {exact}");
         }
     }

@@ -1,0 +1,239 @@
+//! Stems that bend: their motion from tick to tick of a global clock, over a structure that productions change.
+//!
+//! At a tick `t_n` the skeleton of the present string takes over the strains of the one before, by descent: a stem that is there
+//! still, or whose module has replaced one outside brackets, has the strain of that one, turned by the roll between their frames.
+//! Strain is intensive (radians per length), so a division changes neither shape nor velocity. Then the stems are advanced to the
+//! next tick, while growth goes on at its present rates.
+
+use std::sync::Arc;
+
+use dlsys_diagnostic::Span;
+use dlsys_geometry::scene::Scene;
+use dlsys_geometry::turtle::{self, Stem, StemKey, Strains};
+use dlsys_model::Model;
+use dlsys_sway::{self as sway, Solver, State, Vector, hermite};
+use dlsys_tree::ModuleString;
+
+use crate::body::{Body, roll, rolled};
+use crate::descent::Descent;
+use crate::weather::Sampler;
+use crate::{CLOCK, Error};
+
+/// The strains of all stems at an instant within a tick.
+#[derive(Clone, Debug)]
+struct Knot {
+    /// In s.
+    time: f64,
+    strain: Vec<Vector>,
+    rate: Vec<Vector>,
+}
+
+/// The motion of the stems from one tick to the next. Times are in s.
+#[derive(Clone, Debug)]
+pub(crate) struct Tick {
+    body: Body,
+    /// In the order of time, from the tick to the next; none where nothing has moved.
+    knots: Vec<Knot>,
+}
+
+impl Tick {
+    /// The strain of a stem and its rate at a time within the tick, per metre.
+    fn strain(&self, stem: usize, time: f64) -> (Vector, Vector) {
+        let after = self.knots.partition_point(|knot| knot.time <= time);
+        let of = |knot: &Knot| (knot.time, knot.strain[stem], knot.rate[stem]);
+        match (after.checked_sub(1).map(|i| &self.knots[i]), self.knots.get(after)) {
+            (Some(before), Some(after)) => hermite(time, of(before), of(after)),
+            (Some(knot), None) | (None, Some(knot)) => (knot.strain[stem], knot.rate[stem]),
+            (None, None) => (Vector::zeros(), Vector::zeros()),
+        }
+    }
+
+    /// Number of strains that are kept.
+    pub(crate) fn size(&self) -> usize {
+        self.body.stems.len() * (1 + self.knots.len())
+    }
+
+    /// The strain that a stem of a later string has at a time: its own, or that of the stem of the module from which its module
+    /// descends. `None` for what is new.
+    fn inherited(&self, stem: &Stem, descent: &Descent, time: f64) -> Option<(Vector, Vector)> {
+        for module in descent.line(stem.key.module) {
+            let known = (0..=stem.key.number)
+                .rev()
+                .find_map(|number| self.body.numbers.get(&StemKey { module, number }));
+            let Some(&known) = known else { continue };
+            let before = &self.body.stems[known];
+            let (strain, rate) = self.strain(known, time);
+            if module == stem.key.module {
+                // The stem itself; one more of the same module is new.
+                return (before.key == stem.key).then_some((strain, rate));
+            }
+            // A module that a production puts into a bracket begins anew.
+            let angle = roll(before, stem);
+            return (before.depth == stem.depth).then(|| (rolled(strain, angle), rolled(rate, angle)));
+        }
+        None
+    }
+}
+
+/// The strains of a string, for the turtle.
+#[derive(Clone, Debug)]
+pub struct BentStems {
+    tick: Arc<Tick>,
+    /// In s.
+    time: f64,
+    /// Metres in a unit of length.
+    metre: f64,
+    /// Stems that the tick does not know, with their strains per metre; `None` if there are none.
+    new: Option<std::collections::HashMap<StemKey, Vector>>,
+}
+
+impl Strains for BentStems {
+    fn strain(&self, stem: StemKey) -> Vector {
+        let strain = match &self.new {
+            Some(new) => new.get(&stem).copied().unwrap_or_else(Vector::zeros),
+            None => match self.tick.body.numbers.get(&stem) {
+                Some(&known) => self.tick.strain(known, self.time).0,
+                None => Vector::zeros(),
+            },
+        };
+        strain * self.metre
+    }
+}
+
+/// Work of the surroundings so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Effort {
+    /// Ticks of the clock.
+    pub ticks: u64,
+    /// Steps of the solver that were accepted.
+    pub steps: u64,
+    /// Sum of the number of stems over these steps.
+    pub stem_steps: u64,
+}
+
+/// The stems of a model in motion.
+#[derive(Clone)]
+pub(crate) struct Bending<'m> {
+    model: &'m Model,
+    wind: Arc<Sampler>,
+    solver: Solver,
+    state: State,
+    /// The body at the last tick.
+    body: Body,
+    scene: Scene,
+    pub(crate) effort: Effort,
+}
+
+impl<'m> Bending<'m> {
+    pub(crate) fn new(model: &'m Model, wind: Arc<Sampler>, settings: sway::Settings) -> Bending<'m> {
+        Bending {
+            model,
+            wind,
+            solver: Solver::new(settings),
+            state: State::default(),
+            body: Body::default(),
+            scene: turtle::blank(model),
+            effort: Effort::default(),
+        }
+    }
+
+    pub(crate) fn model(&self) -> &'m Model {
+        self.model
+    }
+
+    fn body(&mut self, string: &ModuleString) -> Result<Body, Error> {
+        let noted = turtle::skeleton(self.model, string, &mut self.scene)?;
+        Ok(Body::new(noted, self.model, self.model.scenery.units.length))
+    }
+
+    /// The motion from the tick of this number, with the string at that time, to the next. `before` is the tick before, with the
+    /// productions since then, and the string a little earlier than this one, for the rates of growth.
+    pub(crate) fn advance(
+        &mut self,
+        number: u64,
+        string: &ModuleString,
+        before: Option<(&Tick, &Descent, &ModuleString)>,
+    ) -> Result<Tick, Error> {
+        let [from, to] = [number, number + 1].map(|n| n as f64 * CLOCK);
+        let mut body = self.body(string)?;
+        let mut state = State::at_rest(&body.skeleton);
+        state.level = self.state.level;
+        if let Some((tick, descent, earlier)) = before {
+            let earlier_body = self.body(earlier)?;
+            body.move_from(&earlier_body, (string.time - earlier.time) * self.model.scenery.units.time);
+            body.accelerate_from(&self.body, CLOCK);
+            for (i, stem) in body.stems.iter().enumerate() {
+                if let Some(inherited) = tick.inherited(stem, descent, from) {
+                    (state.strain[i], state.rate[i]) = inherited;
+                }
+            }
+        }
+        self.effort.ticks += 1;
+        let mut knots = Vec::new();
+        if self.is_due(&body, &state) {
+            let knot =
+                |time, state: &State| Knot { time, strain: state.strain.clone(), rate: state.rate.clone() };
+            knots.push(knot(from, &state));
+            let mut given = f64::NAN;
+            let moves = body.moves();
+            let mut growth = |time: f64, out: &mut sway::Skeleton| {
+                if !out.is_empty() && (!moves || time == given) {
+                    return false;
+                }
+                given = time;
+                body.later(time - from, out);
+                true
+            };
+            let mut note = |step: &sway::Step<'_>| knots.push(knot(step.to, step.after));
+            let done = self.solver.advance(&mut state, from, to, &mut growth, &*self.wind, &mut note);
+            done.map_err(|error| failure(self.model, &body, error, string.time))?;
+            let steps = knots.len() as u64 - 1;
+            (self.effort.steps, self.effort.stem_steps) =
+                (self.effort.steps + steps, self.effort.stem_steps + steps * body.stems.len() as u64);
+        }
+        (self.body, self.state) = (body.clone(), state);
+        Ok(Tick { body, knots })
+    }
+
+    /// False if stems at rest stay at rest: no wind, no weight that is not balanced, no motion of growth.
+    fn is_due(&self, body: &Body, state: &State) -> bool {
+        let zero = Vector::zeros();
+        !body.stems.is_empty()
+            && (self.wind.blows()
+                || body.moves()
+                || body.skeleton.segments().iter().any(|segment| segment.sag)
+                || state.strain.iter().chain(&state.rate).any(|value| *value != zero))
+    }
+}
+
+fn failure(model: &Model, body: &Body, error: sway::Error, time: f64) -> Error {
+    let at = match &error {
+        sway::Error::Value { segment, .. }
+        | sway::Error::Step { segment, .. }
+        | sway::Error::Equilibrium { segment, .. } => body.stems.get(*segment),
+        _ => None,
+    };
+    let span =
+        at.or(body.stems.first()).map_or(Span::default(), |stem| model.scenery.tissues[stem.tissue].span);
+    let module = at.map_or(String::new(), |stem| format!("{:x}", stem.key.module));
+    Error::Bending { error, module, span, time }
+}
+
+/// The strains of a string at a time within a tick, from the productions since then.
+pub(crate) fn bent(
+    tick: &Arc<Tick>,
+    descent: &Descent,
+    model: &Model,
+    string: &ModuleString,
+    scene: &mut Scene,
+) -> Result<BentStems, Error> {
+    let units = model.scenery.units;
+    let time = string.time * units.time;
+    let mut stems = BentStems { tick: tick.clone(), time, metre: units.length, new: None };
+    if !descent.is_empty() {
+        let noted = turtle::skeleton(model, string, scene)?;
+        let strain = |stem: &Stem| tick.inherited(stem, descent, time).map(|(strain, _)| (stem.key, strain));
+        stems.new = Some(noted.stems.iter().filter_map(strain).collect());
+    }
+    Ok(stems)
+}

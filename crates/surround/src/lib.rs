@@ -1,0 +1,29 @@
+//! The surroundings of a growing plant: wind, and the stems that bend in it.
+//!
+//! ```text
+//! growth (sim) ──string──▶ turtle ──skeleton──▶ body ──▶ stems in the wind (sway, wind) ──strains──▶ turtle ──▶ scene
+//! ```
+//!
+//! Growth is active and the surroundings are passive (O'Brien, Zordan and Hodgins): they change what is seen. They advance on a clock of
+//! their own, the same for every frame rate, and hang on the descent of modules, so that a production changes neither shape
+//! nor velocity.
+//!
+//! - [`Weather`]: the wind that a model declares.
+//! - [`Motion`]: the stems of a model at any time, as [`BentStems`] for [`draw_bent`](dlsys_geometry::turtle::draw_bent).
+
+#![warn(missing_docs)]
+
+mod bending;
+mod body;
+mod descent;
+mod error;
+mod motion;
+mod weather;
+
+pub use bending::{BentStems, Effort};
+pub use error::Error;
+pub use motion::Motion;
+pub use weather::{Sampler, Weather};
+
+/// Seconds from one tick of the clock to the next.
+pub const CLOCK: f64 = 1.0 / 30.0;

@@ -1,0 +1,144 @@
+//! The wind that a model declares, as a field in SI.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use dlsys_expr::Program;
+use dlsys_model::{self as model, Primitive, Scenery, Units};
+use dlsys_sway as sway;
+use dlsys_wind::{Description, Field, Flow, Ground, Signal, Snapshot, Spectrum};
+use nalgebra::Vector3;
+
+use crate::Error;
+
+/// The wind of a scene: a pure function of place and time.
+#[derive(Debug)]
+pub struct Weather {
+    field: Field,
+}
+
+/// Number of instants that are kept: the stages of a step and of its halves.
+const KEPT: usize = 6;
+
+impl Weather {
+    /// The wind and the flows that a model declares; `None` if it declares neither.
+    ///
+    /// # Errors
+    /// A value that is out of range, with the place of its declaration.
+    pub fn of(scenery: &Scenery) -> Result<Option<Arc<Weather>>, Error> {
+        let Scenery { units, wind, flows, ground, .. } = scenery;
+        let span = wind.as_ref().map(|wind| wind.span).or(flows.first().map(|flow| flow.span));
+        let Some(span) = span else { return Ok(None) };
+        let mut description = match wind {
+            Some(wind) => of_wind(wind, *units),
+            None => Description::new(Vector3::x(), 0.0),
+        };
+        description.flows = flows.iter().map(|flow| of_flow(flow, *units)).collect();
+        description.ground = ground.map(|height| Ground::Flat(height * units.length));
+        let field = Field::new(description).map_err(|error| Error::Wind { error, span })?;
+        Ok(Some(Arc::new(Weather { field })))
+    }
+
+    /// The field.
+    pub fn field(&self) -> &Field {
+        &self.field
+    }
+}
+
+/// A function of the model's time as a signal in seconds, times a factor.
+fn signal(program: &Program, output: usize, units: Units, factor: f64) -> Signal {
+    if let Some(values) = program.constants() {
+        return Signal::Constant(values[output] * factor);
+    }
+    let program = program.clone();
+    Signal::function(move |seconds| {
+        let mut values = vec![0.0; program.outputs()];
+        program.eval(&[seconds / units.time], &mut Vec::new(), &mut values);
+        values[output] * factor
+    })
+}
+
+fn of_wind(wind: &model::Wind, units: Units) -> Description {
+    let spectrum = match wind.spectrum {
+        model::Spectrum::VonKarman => Spectrum::VonKarman,
+        model::Spectrum::Kolmogorov([dissipation, inertial, sigma]) => {
+            Spectrum::Kolmogorov { dissipation, inertial, sigma }
+        }
+    };
+    Description {
+        turbulence: wind.turbulence,
+        scale: wind.scale,
+        roughness: wind.roughness,
+        period: wind.period.map(|period| period * units.time),
+        seed: wind.seed,
+        spectrum,
+        ..Description::new(Vector3::from(wind.direction), signal(&wind.speed, 0, units, 1.0))
+    }
+}
+
+fn of_flow(flow: &model::Flow, units: Units) -> Flow {
+    let value = |output, factor| signal(&flow.program, output, units, factor);
+    let at = || [1, 2, 3].map(|output| value(output, units.length));
+    let decay = flow.decay.map(|decay| decay * units.length);
+    let core = CORE;
+    match flow.primitive {
+        Primitive::Uniform => Flow::Uniform([0, 1, 2].map(|output| value(output, 1.0))),
+        Primitive::Source => Flow::Source { strength: value(0, 1.0), at: at(), decay, core },
+        Primitive::Sink => Flow::Source { strength: value(0, -1.0), at: at(), decay, core },
+        Primitive::Vortex => {
+            let mut values = vec![0.0; flow.program.outputs()];
+            flow.program.eval(&[0.0], &mut Vec::new(), &mut values);
+            let axis = Vector3::new(values[4], values[5], values[6]);
+            Flow::Vortex { circulation: value(0, 1.0), at: at(), axis, decay, core }
+        }
+    }
+}
+
+/// Radius of the core of sources and vortices, in m.
+const CORE: f64 = 0.1;
+
+/// The wind at a place, for a solver that asks for a few instants many times.
+pub struct Sampler {
+    weather: Option<Arc<Weather>>,
+    recent: Mutex<Vec<(f64, Arc<Snapshot>)>>,
+    /// Where the origin of the model stands, in m.
+    origin: Vector3<f64>,
+}
+
+impl Sampler {
+    /// The wind for a model whose origin stands at this place, in m; without weather the air is still.
+    pub fn new(weather: Option<Arc<Weather>>, origin: Vector3<f64>) -> Sampler {
+        Sampler { weather, recent: Mutex::default(), origin }
+    }
+
+    /// True if the air moves somewhere at some time.
+    pub fn blows(&self) -> bool {
+        self.weather.is_some()
+    }
+
+    /// The wind at an instant, in s.
+    fn at(&self, time: f64) -> Option<Arc<Snapshot>> {
+        let weather = self.weather.as_ref()?;
+        let mut recent = self.recent.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = recent.iter().position(|(at, _)| *at == time) {
+            let known = recent.remove(known);
+            recent.push(known.clone());
+            return Some(known.1);
+        }
+        let new = Arc::new(weather.field.at(time).ok()?);
+        if recent.len() >= KEPT {
+            recent.remove(0);
+        }
+        recent.push((time, new.clone()));
+        Some(new)
+    }
+}
+
+impl sway::Wind for Sampler {
+    fn velocity(&self, point: sway::Vector, time: f64) -> sway::Vector {
+        match self.at(time) {
+            Some(snapshot) => snapshot.velocity(point + self.origin),
+            None if self.blows() => sway::Vector::repeat(f64::NAN),
+            None => sway::Vector::zeros(),
+        }
+    }
+}
