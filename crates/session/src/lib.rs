@@ -22,6 +22,7 @@
 
 mod nursery;
 pub mod replay;
+mod swaying;
 
 pub use nursery::{DrawError, Nursery};
 

@@ -10,12 +10,13 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
+use crate::swaying::{Around, Swaying, sways};
 use dlsys_diagnostic::Diagnostic;
 use dlsys_geometry::scene::{Bounds, Plant, Scene, Seedling, Width};
-use dlsys_geometry::turtle;
+use dlsys_geometry::turtle::{self, Strains};
 use dlsys_model::{self as model, Model};
 use dlsys_sim::{self as sim, Settings, Simulation, brief};
-use dlsys_surround::{self as surround, Motion, Weather};
+use dlsys_surround::{self as surround, Motion, Place, Weather};
 use dlsys_tree::ModuleString;
 
 /// Most simulations that are kept from one scene to the next.
@@ -55,6 +56,17 @@ impl DrawError {
 struct Kept<'m> {
     simulation: Simulation<'m>,
     time: f64,
+    /// The string at that time.
+    string: ModuleString,
+}
+
+impl Kept<'_> {
+    /// Goes on to an age.
+    fn reach(&mut self, plant: &model::Plant, age: f64) -> Result<(), DrawError> {
+        self.simulation.at(age, &mut self.string).map_err(|error| fault(plant, age, &error))?;
+        self.time = age;
+        Ok(())
+    }
 }
 
 /// Simulations by plant and seed.
@@ -70,8 +82,16 @@ pub struct Nursery<'m> {
     below: Vec<Nursery<'m>>,
     /// One set of simulations for each thread that draws.
     pool: Mutex<Vec<Growing<'m>>>,
-    /// The stems in the wind, once a string has been drawn.
-    motion: OnceLock<Result<Option<Motion<'m>>, surround::Error>>,
+    /// The wind, and the stems of the model in it, once a string has been drawn.
+    passive: OnceLock<Result<Passive<'m>, surround::Error>>,
+    /// The plants in the wind.
+    swaying: Swaying<'m>,
+}
+
+/// What is passive in a scene.
+struct Passive<'m> {
+    around: Around,
+    motion: Option<Motion<'m>>,
 }
 
 impl<'m> Nursery<'m> {
@@ -90,7 +110,15 @@ impl<'m> Nursery<'m> {
         let blank = blanks.next().unwrap_or_default();
         let plants = model.scenery.plants.iter();
         let below = plants.map(|plant| Nursery::with_blanks(&plant.model, settings, blanks)).collect();
-        Nursery { model, settings, blank, below, pool: Mutex::default(), motion: OnceLock::new() }
+        Nursery {
+            model,
+            settings,
+            blank,
+            below,
+            pool: Mutex::default(),
+            passive: OnceLock::new(),
+            swaying: Swaying::default(),
+        }
     }
 
     /// An empty scene with the materials of the model and of its plants, to be drawn into.
@@ -103,42 +131,46 @@ impl<'m> Nursery<'m> {
     /// # Errors
     /// A module that cannot be drawn, or a plant whose run or drawing fails.
     pub fn draw(&self, string: &ModuleString, scene: &mut Scene) -> Result<(), DrawError> {
-        match self.motion()? {
-            Some(motion) => {
-                self.dress(scene);
-                turtle::draw_bent(self.model, string, &motion.at(string)?, scene)?;
-                self.fill(self.settings.seed, scene)
-            }
-            None => self.draw_with(self.settings.seed, string, scene),
-        }
-    }
-
-    /// The passive motion of the scene, if there is any.
-    fn motion(&self) -> Result<Option<&Motion<'m>>, surround::Error> {
-        let start = || {
-            let weather = Weather::of(&self.model.scenery)?;
-            Motion::new(self.model, self.settings, weather, [0.0; 3], Default::default())
+        let Passive { around, motion } = self.passive()?;
+        let bent = match motion {
+            Some(motion) => Some(motion.at(string)?),
+            None => None,
         };
-        match self.motion.get_or_init(start) {
-            Ok(motion) => Ok(motion.as_ref()),
-            Err(error) => Err(error.clone()),
-        }
+        let strains = bent.as_ref().map(|bent| bent as &dyn Strains);
+        self.draw_with((self.settings.seed, around), string, strains, scene)
     }
 
-    fn draw_with(&self, seed: u64, string: &ModuleString, scene: &mut Scene) -> Result<(), DrawError> {
+    /// What is passive in the scene.
+    fn passive(&self) -> Result<&Passive<'m>, surround::Error> {
+        let start = || {
+            let model = self.model;
+            let sways = sways(model);
+            let weather = if sways { Weather::of(&model.scenery)? } else { None };
+            let around = Around { place: Place::of_scene(model.scenery.units), weather: weather.clone() };
+            let motion = Motion::new(model, self.settings, weather, around.place, Default::default())?;
+            Ok(Passive { around, motion })
+        };
+        self.passive.get_or_init(start).as_ref().map_err(Clone::clone)
+    }
+
+    fn draw_with(
+        &self,
+        (seed, around): (u64, &Around),
+        string: &ModuleString,
+        strains: Option<&dyn Strains>,
+        scene: &mut Scene,
+    ) -> Result<(), DrawError> {
         self.dress(scene);
-        turtle::draw(self.model, string, scene)?;
-        self.fill(seed, scene)
-    }
-
-    /// Puts the plants of other models into a scene.
-    fn fill(&self, seed: u64, scene: &mut Scene) -> Result<(), DrawError> {
+        match strains {
+            Some(strains) => turtle::draw_bent(self.model, string, strains, scene)?,
+            None => turtle::draw(self.model, string, scene)?,
+        }
         if scene.seedlings.is_empty() {
             return Ok(());
         }
         let pool = || self.pool.lock().unwrap_or_else(PoisonError::into_inner);
         let mut growing = pool().pop().unwrap_or_default();
-        let grown = self.grow(seed, scene, &mut growing);
+        let grown = self.grow((seed, around, string.time), scene, &mut growing);
         pool().push(growing);
         grown
     }
@@ -156,7 +188,12 @@ impl<'m> Nursery<'m> {
     }
 
     /// Puts plants in the place of seedlings.
-    fn grow(&self, seed: u64, scene: &mut Scene, growing: &mut Growing<'m>) -> Result<(), DrawError> {
+    fn grow(
+        &self,
+        (seed, around, time): (u64, &Around, f64),
+        scene: &mut Scene,
+        growing: &mut Growing<'m>,
+    ) -> Result<(), DrawError> {
         let seedlings = std::mem::take(&mut scene.seedlings);
         let plants = &self.model.scenery.plants;
         if scene.plants.len() + seedlings.len() > MOST_PLANTS {
@@ -172,29 +209,39 @@ impl<'m> Nursery<'m> {
             key(a).cmp(&key(b)).then(a.age.total_cmp(&b.age))
         });
         let mut drawn: Vec<Option<Plant>> = vec![None; seedlings.len()];
+        let motions = self.motions((seed, around, time), &seedlings)?;
         let mut elements = 0;
         for group in order.chunk_by(|a, b| key(&seedlings[*a]) == key(&seedlings[*b])) {
             let first = &seedlings[group[0]];
             let (key, plant) = (key(first), &plants[first.plant]);
             let mut kept = match growing.remove(&key).filter(|kept| kept.time <= first.age) {
                 Some(kept) => kept,
-                None => Kept { simulation: self.start(plant, key.1)?, time: 0.0 },
+                None => {
+                    Kept { simulation: self.start(plant, key.1)?, time: 0.0, string: ModuleString::default() }
+                }
             };
             for twins in group.chunk_by(|a, b| seedlings[*a].age == seedlings[*b].age) {
                 let age = seedlings[twins[0]].age;
-                let grown = self.look(first.plant, (key.1, age), &mut kept, scene)?;
-                elements += count(&grown);
-                if elements > MOST_ELEMENTS {
-                    let what = format!("the plants of this scene have more than {MOST_ELEMENTS} pieces");
-                    return Err(too_many(plant, what));
-                }
-                if grown.is_empty() {
-                    continue;
-                }
-                let Seedling { placement, owner, .. } = seedlings[twins[0]];
-                let grown = Plant::new(Arc::new(grown), placement, owner);
-                for &i in twins {
-                    drawn[i] = Some(grown.twin(seedlings[i].placement, seedlings[i].owner));
+                kept.reach(plant, age)?;
+                // Plants that sway have shapes of their own.
+                let alike = if motions.is_some() && sways(&plant.model) { 1 } else { twins.len() };
+                for twins in twins.chunks(alike) {
+                    let seedling = &seedlings[twins[0]];
+                    let around = around.within(seedling, &plant.model);
+                    let motion = motions.as_ref().and_then(|motions| motions[twins[0]].as_deref());
+                    let grown = self.look(seedling, (key.1, &around), (&kept, motion), scene)?;
+                    elements += count(&grown);
+                    if elements > MOST_ELEMENTS {
+                        let what = format!("the plants of this scene have more than {MOST_ELEMENTS} pieces");
+                        return Err(too_many(plant, what));
+                    }
+                    if grown.is_empty() {
+                        continue;
+                    }
+                    let grown = Plant::new(Arc::new(grown), seedling.placement, seedling.owner);
+                    for &i in twins {
+                        drawn[i] = Some(grown.twin(seedlings[i].placement, seedlings[i].owner));
+                    }
                 }
             }
             if growing.len() < MOST_KEPT {
@@ -210,31 +257,59 @@ impl<'m> Nursery<'m> {
         Simulation::new(&plant.model, settings).map_err(|error| fault(plant, 0.0, &error))
     }
 
-    /// What a plant draws at an age.
+    /// The motions of the plants, in their order; `None` if none of them sways.
+    #[allow(clippy::type_complexity)]
+    fn motions<'s>(
+        &self,
+        (seed, around, time): (u64, &Around, f64),
+        seedlings: &'s [Seedling],
+    ) -> Result<Option<Vec<Option<Arc<Motion<'m>>>>>, DrawError> {
+        let plants = &self.model.scenery.plants;
+        if !seedlings.iter().any(|seedling| sways(&plants[seedling.plant].model)) {
+            return Ok(None);
+        }
+        let of = |seedling: &'s Seedling| {
+            let Seedling { plant, seed: own, .. } = *seedling;
+            (seedling, &plants[plant].model, own.map_or(seed, number_of))
+        };
+        let all: Vec<(&Seedling, &'m Model, u64)> = seedlings.iter().map(of).collect();
+        let now = around.place.birth + time * around.place.units.time;
+        let motions = self.swaying.of(around, &all, self.settings, now);
+        motions.map(Some).map_err(|(i, error)| {
+            let plant = &plants[seedlings[i].plant];
+            let message = format!("the plant `{}` cannot move in the wind", plant.name);
+            let error = Diagnostic::error(message).at(plant.span, "this plant").note(error.to_string());
+            DrawError::Plant(Box::new(error))
+        })
+    }
+
+    /// What a plant draws at its age.
     fn look(
         &self,
-        number: usize,
-        (seed, age): (u64, f64),
-        kept: &mut Kept<'m>,
-        around: &mut Scene,
+        &Seedling { plant: number, age, .. }: &Seedling,
+        (seed, around): (u64, &Around),
+        (kept, motion): (&Kept<'m>, Option<&Motion<'m>>),
+        outer: &mut Scene,
     ) -> Result<Scene, DrawError> {
         let plant = &self.model.scenery.plants[number];
-        let mut string = ModuleString::default();
-        kept.simulation.at(age, &mut string).map_err(|error| fault(plant, age, &error))?;
-        kept.time = age;
         let mut scene = self.below[number].blank();
-        scene.accuracy = around.accuracy;
-        if let Err(error) = self.below[number].draw_with(seed, &string, &mut scene) {
+        scene.accuracy = outer.accuracy;
+        let bent = match motion {
+            Some(motion) => Some(motion.at(&kept.string)?),
+            None => None,
+        };
+        let strains = bent.as_ref().map(|bent| bent as &dyn Strains);
+        if let Err(error) = self.below[number].draw_with((seed, around), &kept.string, strains, &mut scene) {
             let inner = error.diagnostic();
             let message = format!("the plant `{}` cannot be drawn at its age {}", plant.name, brief(age, 6));
             let error = Diagnostic::error(message).at(plant.span, "this plant").note(inner.message);
             return Err(DrawError::Plant(Box::new(error)));
         }
         if let Some(warning) = scene.warnings.first()
-            && !around.warnings.iter().any(|known| known.labels.first().is_some_and(|l| l.0 == plant.span))
+            && !outer.warnings.iter().any(|known| known.labels.first().is_some_and(|l| l.0 == plant.span))
         {
             let message = format!("in the plant `{}`: {}", plant.name, warning.message);
-            around.warnings.push(Diagnostic::warning(message).at(plant.span, "this plant"));
+            outer.warnings.push(Diagnostic::warning(message).at(plant.span, "this plant"));
         }
         scene.warnings.clear();
         // The surroundings are those of the outermost scene.

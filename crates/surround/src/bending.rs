@@ -16,6 +16,7 @@ use dlsys_tree::ModuleString;
 
 use crate::body::{Body, roll, rolled};
 use crate::descent::Descent;
+use crate::place::Place;
 use crate::weather::Sampler;
 use crate::{CLOCK, Error};
 
@@ -87,6 +88,14 @@ pub struct BentStems {
     new: Option<std::collections::HashMap<StemKey, Vector>>,
 }
 
+impl BentStems {
+    /// No strain anywhere.
+    pub(crate) fn at_rest() -> BentStems {
+        let tick = Arc::new(Tick { body: Body::default(), knots: Vec::new() });
+        BentStems { tick, time: 0.0, metre: 1.0, new: None }
+    }
+}
+
 impl Strains for BentStems {
     fn strain(&self, stem: StemKey) -> Vector {
         let strain = match &self.new {
@@ -115,6 +124,7 @@ pub struct Effort {
 #[derive(Clone)]
 pub(crate) struct Bending<'m> {
     model: &'m Model,
+    place: Place,
     wind: Arc<Sampler>,
     solver: Solver,
     state: State,
@@ -125,11 +135,17 @@ pub(crate) struct Bending<'m> {
 }
 
 impl<'m> Bending<'m> {
-    pub(crate) fn new(model: &'m Model, wind: Arc<Sampler>, settings: sway::Settings) -> Bending<'m> {
+    pub(crate) fn new(
+        model: &'m Model,
+        wind: Arc<Sampler>,
+        place: Place,
+        settings: sway::Settings,
+    ) -> Bending<'m> {
         Bending {
             model,
+            place,
             wind,
-            solver: Solver::new(settings),
+            solver: Solver::new(place.settings(settings)),
             state: State::default(),
             body: Body::default(),
             scene: turtle::blank(model),
@@ -141,9 +157,13 @@ impl<'m> Bending<'m> {
         self.model
     }
 
+    pub(crate) fn place(&self) -> &Place {
+        &self.place
+    }
+
     fn body(&mut self, string: &ModuleString) -> Result<Body, Error> {
         let noted = turtle::skeleton(self.model, string, &mut self.scene)?;
-        Ok(Body::new(noted, self.model, self.model.scenery.units.length))
+        Ok(Body::new(noted, self.model, self.place.units.length))
     }
 
     /// The motion from the tick of this number, with the string at that time, to the next. `before` is the tick before, with the
@@ -160,7 +180,7 @@ impl<'m> Bending<'m> {
         state.level = self.state.level;
         if let Some((tick, descent, earlier)) = before {
             let earlier_body = self.body(earlier)?;
-            body.move_from(&earlier_body, (string.time - earlier.time) * self.model.scenery.units.time);
+            body.move_from(&earlier_body, (string.time - earlier.time) * self.place.units.time);
             body.accelerate_from(&self.body, CLOCK);
             for (i, stem) in body.stems.iter().enumerate() {
                 if let Some(inherited) = tick.inherited(stem, descent, from) {
@@ -223,15 +243,14 @@ fn failure(model: &Model, body: &Body, error: sway::Error, time: f64) -> Error {
 pub(crate) fn bent(
     tick: &Arc<Tick>,
     descent: &Descent,
-    model: &Model,
+    bending: &Bending,
     string: &ModuleString,
     scene: &mut Scene,
 ) -> Result<BentStems, Error> {
-    let units = model.scenery.units;
-    let time = string.time * units.time;
-    let mut stems = BentStems { tick: tick.clone(), time, metre: units.length, new: None };
+    let time = bending.place.seconds(string.time);
+    let mut stems = BentStems { tick: tick.clone(), time, metre: bending.place.units.length, new: None };
     if !descent.is_empty() {
-        let noted = turtle::skeleton(model, string, scene)?;
+        let noted = turtle::skeleton(bending.model, string, scene)?;
         let strain = |stem: &Stem| tick.inherited(stem, descent, time).map(|(strain, _)| (stem.key, strain));
         stems.new = Some(noted.stems.iter().filter_map(strain).collect());
     }

@@ -18,11 +18,13 @@ mod body;
 mod descent;
 mod error;
 mod motion;
+mod place;
 mod weather;
 
 pub use bending::{BentStems, Effort};
 pub use error::Error;
-pub use motion::Motion;
+pub use motion::{Motion, Passive};
+pub use place::Place;
 pub use weather::{Sampler, Weather};
 
 /// Seconds from one tick of the clock to the next.

@@ -20,6 +20,7 @@ use dlsys_tree::ModuleString;
 
 use crate::bending::{Bending, BentStems, Effort, Tick, bent};
 use crate::descent::Descent;
+use crate::place::Place;
 use crate::weather::{Sampler, Weather};
 use crate::{CLOCK, Error};
 
@@ -33,6 +34,27 @@ const MOST_MARKS: usize = 24;
 const FIRST_SPACING: u64 = 64;
 /// Part of a tick over which the rates of growth are taken.
 const LOOK_BACK: f64 = 1.0 / 1024.0;
+
+/// How passive motion is computed and kept.
+#[derive(Clone, Copy, Debug)]
+pub struct Passive {
+    /// The solver of stems: method, tolerance, air.
+    pub solver: sway::Settings,
+    /// Number of strains of past ticks that are kept for times that come late.
+    pub kept: usize,
+    /// Copies are kept, so that a time far back does not mean to begin anew.
+    pub marks: bool,
+}
+
+impl Default for Passive {
+    fn default() -> Passive {
+        Passive {
+            solver: sway::Settings { longest: CLOCK, ..Default::default() },
+            kept: MOST_KEPT,
+            marks: true,
+        }
+    }
+}
 
 /// A run of growth with the motion of its stems, at a tick and up to the next.
 #[derive(Clone)]
@@ -49,27 +71,27 @@ struct Course<'m> {
 }
 
 impl<'m> Course<'m> {
-    /// From t = 0.
+    /// From the first tick.
     fn new(mut growth: Simulation<'m>, mut bending: Bending<'m>) -> Result<Course<'m>, Error> {
         let mut string = ModuleString::default();
-        growth.at(0.0, &mut string)?;
+        let number = bending.place().first_tick();
+        growth.at(bending.place().time_of(number).max(0.0), &mut string)?;
         growth.take_events();
-        let tick = Arc::new(bending.advance(0, &string, None)?);
+        let tick = Arc::new(bending.advance(number, &string, None)?);
         let descent = Arc::default();
-        let mut course = Course { growth, bending, number: 0, tick, descent, ahead: Ok(Arc::default()) };
+        let mut course = Course { growth, bending, number, tick, descent, ahead: Ok(Arc::default()) };
         course.look_ahead();
         Ok(course)
     }
 
     /// Lets growth go on to the next tick. It may fail there, after a time that is asked for.
     fn look_ahead(&mut self) {
-        let model = self.bending.model();
-        let unit = model.scenery.units.time;
-        let next = (self.number + 1) as f64 * CLOCK / unit;
+        let (model, place) = (self.bending.model(), *self.bending.place());
+        let next = place.time_of(self.number + 1);
+        let before = next - LOOK_BACK * CLOCK / place.units.time;
         let mut strings = <[ModuleString; 2]>::default();
-        let [before, now] = &mut strings;
-        let gone = self.growth.at(next - LOOK_BACK * CLOCK / unit, before);
-        let gone = gone.and_then(|()| self.growth.at(next, now));
+        let [earlier, now] = &mut strings;
+        let gone = self.growth.at(before, earlier).and_then(|()| self.growth.at(next, now));
         let mut descent = Descent::default();
         descent.add(model, &self.growth.take_events());
         self.descent = Arc::new(descent);
@@ -109,11 +131,12 @@ struct Courses<'m> {
     past: VecDeque<Past>,
     marks: Vec<Course<'m>>,
     spacing: u64,
+    passive: Passive,
     scene: Scene,
 }
 
 impl<'m> Motion<'m> {
-    /// The motion of a model whose origin stands at a place (in m, for the wind), from t = 0. `None` if nothing in it is passive.
+    /// The motion of a model at a place of a scene with this weather. `None` if nothing in it is passive.
     ///
     /// # Errors
     /// A wind without meaning, or the first instant fails.
@@ -121,17 +144,19 @@ impl<'m> Motion<'m> {
         model: &'m Model,
         settings: Settings,
         weather: Option<Arc<Weather>>,
-        origin: [f64; 3],
-        passive: sway::Settings,
+        place: Place,
+        passive: Passive,
     ) -> Result<Option<Motion<'m>>, Error> {
         if model.scenery.tissues.is_empty() {
             return Ok(None);
         }
         let growth = Simulation::new(model, Settings { log: true, transitions: false, ..settings })?;
-        let sampler = Arc::new(Sampler::new(weather, origin.into()));
-        let present = Course::new(growth, Bending::new(model, sampler, passive))?;
+        let sampler = Arc::new(Sampler::new(weather, place));
+        let present = Course::new(growth, Bending::new(model, sampler, place, passive.solver))?;
         let courses = Courses {
+            // Without marks the whole is begun anew where time goes back.
             marks: vec![present.clone()],
+            passive,
             present,
             past: VecDeque::new(),
             spacing: FIRST_SPACING,
@@ -149,6 +174,24 @@ impl<'m> Motion<'m> {
         courses.at(self.model, string)
     }
 
+    /// Goes on to the tick at or before a time of the scene, in s. Motions in one wind that take turns share its instants.
+    ///
+    /// # Errors
+    /// As of [`Motion::at`].
+    pub fn advance(&self, seconds: f64) -> Result<(), Error> {
+        let mut courses = self.courses.lock().unwrap_or_else(PoisonError::into_inner);
+        while courses.present.number as f64 + 1.0 <= Place::tick_at(seconds) {
+            courses.tick()?;
+        }
+        Ok(())
+    }
+
+    /// The time of the scene, in s, of the present tick.
+    pub fn reached(&self) -> f64 {
+        let courses = self.courses.lock().unwrap_or_else(PoisonError::into_inner);
+        courses.present.number as f64 * CLOCK
+    }
+
     /// Work of the present course from t = 0.
     pub fn effort(&self) -> Effort {
         self.courses.lock().unwrap_or_else(PoisonError::into_inner).present.bending.effort
@@ -157,13 +200,18 @@ impl<'m> Motion<'m> {
 
 impl<'m> Courses<'m> {
     fn at(&mut self, model: &'m Model, string: &ModuleString) -> Result<BentStems, Error> {
-        let units = model.scenery.units;
-        let number = (string.time * units.time / CLOCK).floor();
+        let place = *self.present.bending.place();
+        let seconds = place.seconds(string.time);
+        let number = Place::tick_at(seconds);
         if number > MOST_TICKS {
-            let span = model.scenery.tissues[0].span;
-            return Err(Error::TooLong { most: MOST_TICKS, time: string.time, seconds: units.time, span });
+            let (span, seconds) = (model.scenery.tissues[0].span, place.units.time);
+            return Err(Error::TooLong { most: MOST_TICKS, time: string.time, seconds, span });
         }
-        let number = number.max(0.0) as u64;
+        // Before the first tick nothing has moved.
+        if number < place.first_tick() as f64 {
+            return Ok(BentStems::at_rest());
+        }
+        let number = number as u64;
         if number < self.present.number && !self.past.front().is_some_and(|past| past.number <= number) {
             let mark = self.marks.iter().rev().find(|mark| mark.number <= number);
             let mark = mark.or(self.marks.first()).cloned();
@@ -176,11 +224,11 @@ impl<'m> Courses<'m> {
                 self.tick()?;
             }
             let Course { tick, descent, .. } = &self.present;
-            return bent(tick, descent, model, string, &mut self.scene);
+            return bent(tick, descent, &self.present.bending, string, &mut self.scene);
         }
         let first = self.past.front().map_or(0, |past| past.number);
         let Past { tick, descent, .. } = &self.past[(number - first) as usize];
-        bent(tick, descent, model, string, &mut self.scene)
+        bent(tick, descent, &self.present.bending, string, &mut self.scene)
     }
 
     /// Goes on to the next tick.
@@ -189,7 +237,7 @@ impl<'m> Courses<'m> {
         self.past.push_back(past);
         let size = |past: &Past| past.tick.size() + 1;
         let mut kept: usize = self.past.iter().map(size).sum();
-        while kept > MOST_KEPT && self.past.len() > 1 {
+        while kept > self.passive.kept && self.past.len() > 1 {
             kept -= self.past.pop_front().map_or(0, |past| size(&past));
         }
         self.mark();
@@ -199,14 +247,17 @@ impl<'m> Courses<'m> {
     /// Sets a mark where one is due.
     fn mark(&mut self) {
         let number = self.present.number;
-        if number % self.spacing != 0 || self.marks.last().is_some_and(|mark| mark.number >= number) {
+        if !self.passive.marks
+            || number % self.spacing != 0
+            || self.marks.last().is_some_and(|mark| mark.number >= number)
+        {
             return;
         }
         self.marks.push(self.present.clone());
         if self.marks.len() > MOST_MARKS {
             self.spacing *= 2;
-            let spacing = self.spacing;
-            self.marks.retain(|mark| mark.number % spacing == 0);
+            let (spacing, first) = (self.spacing, self.marks[0].number);
+            self.marks.retain(|mark| mark.number % spacing == 0 || mark.number == first);
         }
     }
 }

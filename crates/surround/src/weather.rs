@@ -8,16 +8,18 @@ use dlsys_sway as sway;
 use dlsys_wind::{Description, Field, Flow, Ground, Signal, Snapshot, Spectrum};
 use nalgebra::Vector3;
 
-use crate::Error;
+use crate::{Error, Place};
 
 /// The wind of a scene: a pure function of place and time.
 #[derive(Debug)]
 pub struct Weather {
     field: Field,
+    /// The last instants that were asked for; many plants stand in one wind.
+    recent: Mutex<Vec<(f64, Arc<Snapshot>)>>,
 }
 
-/// Number of instants that are kept: the stages of a step and of its halves.
-const KEPT: usize = 6;
+/// Number of instants that are kept: the stages of some ticks, as plants that are drawn one after another read them.
+const KEPT: usize = 24;
 
 impl Weather {
     /// The wind and the flows that a model declares; `None` if it declares neither.
@@ -35,12 +37,27 @@ impl Weather {
         description.flows = flows.iter().map(|flow| of_flow(flow, *units)).collect();
         description.ground = ground.map(|height| Ground::Flat(height * units.length));
         let field = Field::new(description).map_err(|error| Error::Wind { error, span })?;
-        Ok(Some(Arc::new(Weather { field })))
+        Ok(Some(Arc::new(Weather { field, recent: Mutex::default() })))
     }
 
     /// The field.
     pub fn field(&self) -> &Field {
         &self.field
+    }
+
+    /// The wind at an instant, in s; `None` if a value of it is not finite then.
+    fn at(&self, time: f64) -> Option<Arc<Snapshot>> {
+        let recent = || self.recent.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, known)) = recent().iter().find(|(at, _)| *at == time) {
+            return Some(known.clone());
+        }
+        let new = Arc::new(self.field.at(time).ok()?);
+        let mut recent = recent();
+        if recent.len() >= KEPT {
+            recent.remove(0);
+        }
+        recent.push((time, new.clone()));
+        Some(new)
     }
 }
 
@@ -99,15 +116,15 @@ const CORE: f64 = 0.1;
 /// The wind at a place, for a solver that asks for a few instants many times.
 pub struct Sampler {
     weather: Option<Arc<Weather>>,
-    recent: Mutex<Vec<(f64, Arc<Snapshot>)>>,
-    /// Where the origin of the model stands, in m.
-    origin: Vector3<f64>,
+    /// The last instant.
+    last: Mutex<Option<(f64, Arc<Snapshot>)>>,
+    place: Place,
 }
 
 impl Sampler {
-    /// The wind for a model whose origin stands at this place, in m; without weather the air is still.
-    pub fn new(weather: Option<Arc<Weather>>, origin: Vector3<f64>) -> Sampler {
-        Sampler { weather, recent: Mutex::default(), origin }
+    /// The wind for a model at a place; without weather the air is still.
+    pub fn new(weather: Option<Arc<Weather>>, place: Place) -> Sampler {
+        Sampler { weather, last: Mutex::default(), place }
     }
 
     /// True if the air moves somewhere at some time.
@@ -118,17 +135,14 @@ impl Sampler {
     /// The wind at an instant, in s.
     fn at(&self, time: f64) -> Option<Arc<Snapshot>> {
         let weather = self.weather.as_ref()?;
-        let mut recent = self.recent.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(known) = recent.iter().position(|(at, _)| *at == time) {
-            let known = recent.remove(known);
-            recent.push(known.clone());
-            return Some(known.1);
+        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((at, known)) = &*last
+            && *at == time
+        {
+            return Some(known.clone());
         }
-        let new = Arc::new(weather.field.at(time).ok()?);
-        if recent.len() >= KEPT {
-            recent.remove(0);
-        }
-        recent.push((time, new.clone()));
+        let new = weather.at(time)?;
+        *last = Some((time, new.clone()));
         Some(new)
     }
 }
@@ -136,7 +150,7 @@ impl Sampler {
 impl sway::Wind for Sampler {
     fn velocity(&self, point: sway::Vector, time: f64) -> sway::Vector {
         match self.at(time) {
-            Some(snapshot) => snapshot.velocity(point + self.origin),
+            Some(snapshot) => self.place.turn.transpose() * snapshot.velocity(self.place.point(point)),
             None if self.blows() => sway::Vector::repeat(f64::NAN),
             None => sway::Vector::zeros(),
         }

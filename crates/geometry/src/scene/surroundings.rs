@@ -33,6 +33,8 @@ pub struct Viewpoint {
 pub struct Seedling {
     /// Its index among the plants that the model declares.
     pub plant: usize,
+    /// The time of the scene at which its own time begins.
+    pub birth: f64,
     /// Its age: the time of its own model.
     pub age: f64,
     /// Its seed as given, any finite number; `None` for the seed of the scene.

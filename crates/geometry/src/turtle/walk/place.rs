@@ -98,14 +98,15 @@ impl Walk<'_> {
 
     /// Puts a plant of another model, born at the time given first, at the turtle's position. Its axes follow the turtle's.
     pub(super) fn plant(&mut self, plant: usize, parameters: &[f64]) {
-        let age = self.time - parameters.first().copied().unwrap_or(0.0);
+        let birth = parameters.first().copied().unwrap_or(0.0);
+        let age = self.time - birth;
         if age < 0.0 {
             return;
         }
         let [heading, left, up] = self.seen_axes();
         let placement = Placement::uniform(self.seen(self.state.position), [-left, heading, up], 1.0);
         let (seed, owner) = (parameters.get(1).copied(), self.owner());
-        self.scene.seedlings.push(Seedling { plant, age, seed, placement, owner });
+        self.scene.seedlings.push(Seedling { plant, birth, age, seed, placement, owner });
     }
 
     /// Moves to the ground below or above, without a vertex of a polygon.

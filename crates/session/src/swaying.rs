@@ -1,0 +1,116 @@
+//! Plants of other models that sway, each at its own place in the wind of the scene.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use dlsys_geometry::scene::Seedling;
+use dlsys_model::{Model, Units};
+use dlsys_sim::Settings;
+use dlsys_surround::{Error, Motion, Passive, Place, Weather};
+use nalgebra::Matrix3;
+
+/// Most motions that are kept from one scene to the next.
+const MOST_KEPT: usize = 100_000;
+/// Strains of past ticks that a motion keeps, for scenes that are drawn a little late.
+const KEPT: usize = 2000;
+/// Seconds by which motions go on in turn, so that they read the same instants of the wind.
+const TURN: f64 = 0.2;
+
+/// A model in the scene: where it stands, and in which wind.
+#[derive(Clone)]
+pub struct Around {
+    pub place: Place,
+    pub weather: Option<Arc<Weather>>,
+}
+
+impl Around {
+    /// The place of a plant that stands in this model.
+    fn of(&self, seedling: &Seedling, inner: &Model) -> Place {
+        let outer = &self.place;
+        let units = if outer.units == Units::default() { inner.scenery.units } else { outer.units };
+        let turn = outer.turn * Matrix3::from_columns(&seedling.placement.axes);
+        let at = outer.turn * seedling.placement.origin.coords * outer.units.length;
+        Place {
+            units,
+            birth: outer.birth + seedling.birth * outer.units.time,
+            origin: outer.origin + at,
+            turn,
+        }
+    }
+
+    /// A plant as the model around the plants in it.
+    pub fn within(&self, seedling: &Seedling, inner: &Model) -> Around {
+        Around { place: self.of(seedling, inner), weather: self.weather.clone() }
+    }
+}
+
+/// True if something in a model, or in the plants in it, is passive.
+pub fn sways(model: &Model) -> bool {
+    !model.scenery.tissues.is_empty() || model.scenery.plants.iter().any(|plant| sways(&plant.model))
+}
+
+/// A plant at its place: its number, its seed, its birth and its placement.
+type Key = (usize, u64, [u64; 13]);
+
+/// The motions of the plants of a model.
+#[derive(Default)]
+pub struct Swaying<'m> {
+    kept: Mutex<HashMap<Key, Arc<Motion<'m>>>>,
+}
+
+impl<'m> Swaying<'m> {
+    /// The motions of these plants, all advanced to the present of the scene, in s. Each comes with its model and its seed;
+    /// `None` for a plant without stems that give way.
+    ///
+    /// # Errors
+    /// The first failure in the order of the plants, with its index.
+    pub fn of(
+        &self,
+        around: &Around,
+        plants: &[(&Seedling, &'m Model, u64)],
+        settings: Settings,
+        now: f64,
+    ) -> Result<Vec<Option<Arc<Motion<'m>>>>, (usize, Error)> {
+        let passive = Passive { kept: KEPT, marks: false, ..Passive::default() };
+        let mut motions = Vec::with_capacity(plants.len());
+        for (i, &(seedling, model, seed)) in plants.iter().enumerate() {
+            let place = around.of(seedling, model);
+            let key = (seedling.plant, seed, bits(&place));
+            let kept = || self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some(known) = kept().get(&key) {
+                motions.push(Some(known.clone()));
+                continue;
+            }
+            let settings = Settings { seed, ..settings };
+            let new = Motion::new(model, settings, around.weather.clone(), place, passive);
+            let new = new.map_err(|error| (i, error))?.map(Arc::new);
+            if let Some(new) = &new {
+                let mut kept = kept();
+                if kept.len() >= MOST_KEPT {
+                    kept.clear();
+                }
+                kept.insert(key, new.clone());
+            }
+            motions.push(new);
+        }
+        let first = motions.iter().flatten().map(|motion| motion.reached()).fold(now, f64::min);
+        let mut until = first;
+        while until < now {
+            until = (until + TURN).min(now);
+            for (i, motion) in motions.iter().enumerate() {
+                if let Some(motion) = motion {
+                    motion.advance(until).map_err(|error| (i, error))?;
+                }
+            }
+        }
+        Ok(motions)
+    }
+}
+
+fn bits(place: &Place) -> [u64; 13] {
+    let mut numbers = [place.birth; 13];
+    numbers[1..4].copy_from_slice(place.origin.coords.as_slice());
+    numbers[4..].copy_from_slice(place.turn.as_slice());
+    // Both zeros are one place.
+    numbers.map(|x| (x + 0.0).to_bits())
+}
