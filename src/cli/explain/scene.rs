@@ -2,7 +2,6 @@
 
 use serde::Serialize;
 
-use crate::expr::Program;
 use crate::model::{Flow, Model, Primitive, Scenery, Spectrum, Tissue, Units, Wind};
 use crate::sim::brief;
 
@@ -142,42 +141,29 @@ fn wind(wind: &Wind, units: Units, parts: &mut Vec<ScenePart>) {
 }
 
 fn flow(flow: &Flow) -> ScenePart {
-    let constants = flow.program.constants();
-    let (name, values) = match (flow.primitive, constants) {
+    let name = match flow.primitive {
+        Primitive::Uniform => "uniform",
+        Primitive::Source => "source",
+        Primitive::Sink => "sink",
+        Primitive::Vortex => "vortex",
+    };
+    let values = match (flow.primitive, flow.program.constants()) {
+        (_, None) => "its values follow t".to_owned(),
         (Primitive::Uniform, Some(velocity)) => {
-            ("uniform", format!("the velocity {} m/s everywhere", triple(velocity)))
+            format!("the velocity is {} m/s everywhere", triple(velocity))
         }
-        (Primitive::Uniform, None) => ("uniform", "the same velocity everywhere".to_owned()),
-        (primitive, constants) => {
-            let name = match primitive {
-                Primitive::Source => "source",
-                Primitive::Sink => "sink",
-                _ => "vortex",
+        (_, Some(values)) => {
+            let (strength, place) = (digits(values[0]), triple(&values[1..4]));
+            let axis = match &values[4..] {
+                [] => String::new(),
+                axis => format!(", around the axis {}", triple(axis)),
             };
-            let values = match constants {
-                Some([strength, at @ ..]) if at.len() > 3 => {
-                    let (place, axis) = (triple(&at[..3]), triple(&at[3..]));
-                    format!("strength {}, at {place}, around the axis {axis}", digits(*strength))
-                }
-                Some([strength, place @ ..]) => {
-                    format!("strength {}, at {}", digits(*strength), triple(place))
-                }
-                _ => "its values follow t".to_owned(),
-            };
-            let decay = match flow.decay {
-                Some(distance) => format!(", decays to 1/e within {}", digits(distance)),
-                None => String::new(),
-            };
-            (name, values + &decay)
+            format!("strength {strength}, at {place}{axis}")
         }
     };
-    let follows = reads_time(&flow.program) && flow.primitive == Primitive::Uniform;
-    let values = if follows { values + ", which follows t" } else { values };
-    ScenePart::new(format!("flow {name}"), FORMULA, values)
-}
-
-fn reads_time(program: &Program) -> bool {
-    !program.reads().is_empty()
+    let decay =
+        flow.decay.map_or(String::new(), |distance| format!("; decays to 1/e within {}", digits(distance)));
+    ScenePart::new(format!("flow {name}"), FORMULA, values + &decay)
 }
 
 fn tissue(tissue: &Tissue, number: usize) -> ScenePart {
@@ -187,12 +173,11 @@ fn tissue(tissue: &Tissue, number: usize) -> ScenePart {
     let bending = stiffness * std::f64::consts::PI * STEM.powi(4) / 64.0;
     let shape = if *sag { "without weight, which bends it" } else { "at rest under its weight" };
     ScenePart::new(
-        format!("tissue {name}, {number}"),
+        format!("tissue {name} ({number})"),
         CONSTANT,
         format!(
-            "{} Pa, {} kg/m³, damping ratio {} at 1 Hz; surfaces are {} mm thick; the drawing is the shape {shape}; \
+            "{stiffness:e} Pa, {} kg/m³, damping ratio {} at 1 Hz; surfaces are {} mm thick; the drawing is the shape {shape}; \
             a stem of 1 mm has the bending stiffness {} N·m²",
-            digits(*stiffness),
             digits(*density),
             digits(*damping),
             digits(thickness * 1e3),
