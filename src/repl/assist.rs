@@ -108,9 +108,9 @@ impl Assistant {
             return None;
         }
         let mut all = owned(
-            &mut words::CLAUSES.into_iter().chain(crate::compile::functions()).chain(words::particles()),
+            &mut words::CLAUSES.into_iter().chain(crate::compile::functions()).chain(words::particles(word)),
         );
-        all.extend(owned(&mut words::endings()));
+        all.extend(owned(&mut words::endings(word)));
         all.extend(names.kinds.iter().chain(&names.others).cloned());
         all.extend(owned(&mut words::declarations()));
         Some((word_start("@"), all))
@@ -311,6 +311,9 @@ mod tests {
         assert_eq!(completed("F_a(x): solve dx/dt = lim"), ["F_a(x): solve dx/dt = limit"]);
         assert_eq!(completed("F_a(x):\n  pro"), ["F_a(x):\n  produce"]);
         assert_eq!(completed("help pl"), ["help plot"]);
+        assert_eq!(completed("wind 1, 0, 0 speed 3 tu"), ["wind 1, 0, 0 speed 3 turbulence"]);
+        assert_eq!(completed("tissue wood = stif"), ["tissue wood = stiffness"]);
+        assert_eq!(completed("F_a(x): solve dx/dt = tu"), [""; 0]);
         assert!(completed("load Cargo.t").contains(&"load Cargo.toml".to_owned()));
     }
 

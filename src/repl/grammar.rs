@@ -98,7 +98,8 @@ pub fn is_open(text: &str) -> bool {
     }
     let end = body.trim_end();
     let last = end.rsplit(|c: char| !(c.is_alphanumeric() || c == '_')).next().unwrap_or("");
-    let waits = words::CLAUSES.contains(&last) || words::particles().any(|word| word == last);
+    let waits =
+        words::CLAUSES.contains(&last) || words::particles(first_word(&body).0).any(|word| word == last);
     // Symbols of the turtle may end a string; other operators need an operand.
     let operator = end.ends_with([':', ',', '=', '*', '<', '>', '≤', '≥', '≠']) || end.ends_with("..");
     let clause = body.rmatch_indices(|c: char| !(c.is_alphanumeric() || c == '_')).count() > 0 && {
@@ -239,6 +240,9 @@ mod tests {
         assert!(is_complete("F(x):\n  solve dx/dt = 1\n"));
         assert!(is_complete("const a = (1 +\n2)"));
         assert!(is_complete("run 5"));
+        assert!(is_complete("const a = speed"));
+        assert!(!is_complete("wind 1, 0, 0 speed"));
+        assert!(is_complete("wind 1, 0, 0 speed 3"));
         assert!(is_complete("nonsense"));
         assert!(is_complete(""));
     }

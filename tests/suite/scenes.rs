@@ -1,6 +1,7 @@
 //! Plants of other models in a scene, and the words of scenes: what a plant draws is what its model draws at its age, whatever was drawn
 //! before; names of older models that are words now stay names.
 
+use dlsys::model::{Primitive, Spectrum, Tissue, Units};
 use dlsys::scene::{Scene, Surroundings};
 use dlsys::session::{Nursery, Session};
 use dlsys::sim::Settings;
@@ -202,4 +203,90 @@ fn words_of_scenes_stay_names_where_a_declaration_cannot_begin() {
     assert_eq!(session.model.axiom.kinds().count(), 6);
     assert_eq!(session.model.rules.len(), 5);
     assert!(session.model.scenery.light.is_none() && session.model.scenery.ground.is_none());
+}
+
+const STALK: &str = "tissue stalk = stiffness 2e8, density 900, damping 0.05\n";
+
+#[test]
+fn wind_and_tissues_have_the_values_that_are_written() {
+    let text = "units time 3600, length 0.1\nparam u = 3\nconst soft = 1e7\n\
+        wind 0, 0, -2 speed u + sin(t) turbulence 0.3 scale 4 seed 7 roughness 0.03\nflow uniform -1, 0, t\n\
+        flow vortex 2*t axis 0, 1, 0 at 1, 2, -3 decay 3\nflow sink 4 at 0, 1, 0\n\
+        tissue stalk = stiffness 2e8, density 900, damping 0.05\n\
+        tissue leaf = sag, thickness 1e-4, damping 0, stiffness 3*soft, density 800\n\
+        initial string: @E(leaf) F(stalk) @E(0) F(1)\n";
+    let session = crate::common::session(text);
+    assert!(session.warnings.is_empty(), "{:?}", session.warnings);
+    let scenery = &session.model.scenery;
+    assert_eq!(scenery.units, Units { length: 0.1, time: 3600.0 });
+    let wind = scenery.wind.as_ref().expect("a wind");
+    assert_eq!((wind.direction, wind.speed.eval_one(&[0.5])), ([0.0, 0.0, -2.0], 3.0 + 0.5_f64.sin()));
+    assert_eq!((wind.turbulence, wind.scale, wind.roughness), (0.3, 4.0, Some(0.03)));
+    assert_eq!((wind.period, wind.seed, wind.spectrum), (None, 7, Spectrum::VonKarman));
+    let values: Vec<(Primitive, Vec<f64>, Option<f64>)> = (scenery.flows.iter())
+        .map(|flow| {
+            let mut out = vec![0.0; flow.program.outputs()];
+            flow.program.eval(&[5.0], &mut Vec::new(), &mut out);
+            (flow.primitive, out, flow.decay)
+        })
+        .collect();
+    assert_eq!(values[0], (Primitive::Uniform, vec![-1.0, 0.0, 5.0], None));
+    assert_eq!(values[1], (Primitive::Vortex, vec![10.0, 1.0, 2.0, -3.0, 0.0, 1.0, 0.0], Some(3.0)));
+    assert_eq!(values[2], (Primitive::Sink, vec![4.0, 0.0, 1.0, 0.0], None));
+    let [stalk, leaf] = &scenery.tissues[..] else { panic!("two tissues") };
+    assert_eq!((stalk.stiffness, stalk.density, stalk.damping), (2e8, 900.0, 0.05));
+    assert_eq!((stalk.thickness, stalk.sag), (Tissue::THICKNESS, false));
+    assert_eq!((leaf.stiffness, leaf.damping, leaf.thickness, leaf.sag), (3e7, 0.0, 1e-4, true));
+    let mut string = ModuleString::default();
+    session.simulate(Settings::default()).and_then(|mut run| run.at(0.0, &mut string)).expect("it grows");
+    let parameters: Vec<f64> = string.iter().map(|module| module.parameters[0]).collect();
+    assert_eq!(parameters, [2.0, 1.0, 0.0, 1.0], "names are numbers in the order written");
+}
+
+#[test]
+fn a_wind_may_have_a_period_that_its_speed_has() {
+    for speed in ["3", "3 + sin(2*pi*t/8)", "2 + cos(pi*t/2)^2", "if t/8 - floor(t/8) < 0.5 then 1 else 2"] {
+        let text =
+            format!("wind 1, 0, 0 speed {speed} turbulence 0.1 scale 1 period 8\ninitial string: F(1)\n");
+        let model = crate::common::session(&text).model;
+        assert_eq!(model.scenery.wind.expect("a wind").period, Some(8.0), "{speed}");
+    }
+    let text = "wind 1, 0, 0 speed 1 spectrum kolmogorov 1, 4, 0.5\ninitial string: F(1)\n";
+    let wind = crate::common::session(text).model.scenery.wind.expect("a wind");
+    assert_eq!(wind.spectrum, Spectrum::Kolmogorov([1.0, 4.0, 0.5]));
+}
+
+#[test]
+fn names_hide_the_command_of_tissues() {
+    let file = "initial string: F(1)\n";
+    let drawing = "initial string: @E(7) @E_x(1.5)\ninterpret @E(x): F(x)\ninterpret @E_x(x): F(x)\n";
+    let plant = "plant @E from \"stem.dls\"\ninitial string: @E(7) @E\n";
+    let tissue = format!("{STALK}interpret @E(x): F(x)\ninitial string: F(stalk) @E(7)\n");
+    let here = folder(&[
+        ("drawing.dls", drawing),
+        ("plant.dls", plant),
+        ("tissue.dls", &tissue),
+        ("stem.dls", file),
+    ]);
+    for name in ["drawing.dls", "plant.dls", "tissue.dls"] {
+        assert!(open(here.path(), name).warnings.is_empty(), "{name}");
+    }
+    let other = format!("{STALK}initial string: @E(2) F(stalk)\n");
+    let here = folder(&[("bad.dls", &other), ("subscript.dls", "initial string: @E_x(1)")]);
+    assert!(refusal(here.path(), "bad.dls").contains("bad.dls:2:20"));
+    assert!(refusal(here.path(), "subscript.dls").contains("there is none"));
+}
+
+#[test]
+fn words_of_wind_and_bending_stay_names_where_a_declaration_cannot_begin() {
+    let text = "const wind = 2\nparam flow = 3\nconst units = 1\nconst tissue = 4\nconst speed = 5\nconst at = 1\n\
+        def scale(length, axis) = length*axis\ncurve sag = (0, 0) (1, 1)\n\
+        initial string: wind(1) flow(units) units(speed) tissue(flow) speed\n  wind(2) flow(tissue) length(at)\n\
+        wind(x): if x < 5 solve dx/dt = 1\n if x = 5 produce flow(wind) units(1)\nflow(x) < units(y): solve dy/dt = scale(x, sag(0.5))\n\
+        tissue(density): if age = 1 produce wind(4)\nspeed: if age = 1 produce ε\nlength(time): solve dtime/dt = 1\n\
+        interpret flow(x): ε\ninterpret tissue(x): ε\n";
+    let session = crate::common::session(text);
+    assert_eq!(session.model.axiom.kinds().count(), 8);
+    let scenery = &session.model.scenery;
+    assert!(scenery.wind.is_none() && scenery.flows.is_empty() && scenery.tissues.is_empty());
 }

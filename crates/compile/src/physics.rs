@@ -66,7 +66,7 @@ const DAMPING: Quantity = Quantity {
     )
 };
 const THICKNESS: Quantity =
-    positive("thickness", " m", "it is greater than 0: about `thickness 0.0002` for a leaf");
+    positive("thickness", " m", "a thickness is greater than 0: about `thickness 0.0002` for a leaf");
 const SPEED: Quantity = Quantity {
     zero: true,
     ..positive("speed", " m/s", "a speed is 0 or greater; the direction says where the wind goes")
@@ -76,18 +76,21 @@ const TURBULENCE: Quantity = Quantity {
     ..positive(
         "turbulence",
         "",
-        "it is 0 or greater: the root mean square of the turbulence relative to the speed, `turbulence 0.2` for example",
+        "it is the root mean square of the fluctuations relative to the speed, 0 or greater: `turbulence 0.2` for example",
     )
 };
 const SCALE: Quantity =
-    positive("scale", " m", "it is greater than 0: the size of the eddies in m, `scale 5` for example");
+    positive("scale", " m", "a scale is greater than 0: the size of the eddies in m, `scale 5` for example");
 const ROUGHNESS: Quantity = positive(
     "roughness",
     " m",
     "a roughness length is greater than 0: about `roughness 0.03` for short grass, `1` for a forest",
 );
-const PERIOD: Quantity =
-    positive("period", "", "it is greater than 0: the time after which the wind repeats, in units of t");
+const PERIOD: Quantity = positive(
+    "period",
+    "",
+    "a period is greater than 0: the time after which the wind repeats, in units of t",
+);
 const DISSIPATION: Quantity = positive("rate of dissipation", " m²/s³", KOLMOGOROV);
 const WAVE_NUMBER: Quantity = positive("wave number", " per metre", KOLMOGOROV);
 const SPREAD: Quantity = positive("spread of frequencies", " m/s", KOLMOGOROV);
@@ -95,7 +98,7 @@ const KOLMOGOROV: &str = "all three values are greater than 0: rate of dissipati
 const DECAY: Quantity = positive(
     "distance",
     "",
-    "it is greater than 0: the distance in units of the model within which the flow decays to 1/e; without `decay` it does not",
+    "a distance is greater than 0, in units of the model: the flow decays to 1/e within it; without `decay` it does not decay",
 );
 
 /// A number in a message; very large and very small ones with an exponent.
@@ -104,6 +107,12 @@ fn shown(value: f64) -> String {
         0.0 | 1e-4..1e6 => value.to_string(),
         _ => format!("{value:e}"),
     }
+}
+
+/// A computed number in a message: four digits.
+fn rounded(value: f64) -> String {
+    let short: f64 = format!("{value:.3e}").parse().unwrap_or(value);
+    shown(short)
 }
 
 impl Builder<'_> {
@@ -272,7 +281,12 @@ impl Builder<'_> {
             Diagnostic::error("the speed does not repeat with the period of the wind")
                 .at(
                     speed.span,
-                    format!("at t = {time:.4} it is {now:.4}, one period later it is {later:.4}"),
+                    format!(
+                        "at t = {} it is {}, one period later it is {}",
+                        rounded(time),
+                        rounded(now),
+                        rounded(later)
+                    ),
                 )
                 .at(period.span, "the period, in units of t")
                 .help(format!(

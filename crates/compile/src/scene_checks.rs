@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use dlsys_diagnostic::{Diagnostic, Span};
+use dlsys_diagnostic::{Diagnostic, Severity, Span};
 use dlsys_model::{ELASTIC, GROUND, Kind, KindId, Model};
 
 /// The argument of a module that names a tissue, if it is a constant.
@@ -59,6 +59,10 @@ pub fn tissues(
                 );
             }
         }
+        return;
+    }
+    // A name that is declared twice has the number of another declaration.
+    if diagnostics.iter().any(|said| said.severity == Severity::Error) {
         return;
     }
     for number in numbers.iter().filter(|number| is_command(model.kinds.get(number.kind))) {

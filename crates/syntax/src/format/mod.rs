@@ -109,6 +109,20 @@ mod tests {
             ("light   -1,2 , -3", "light -1, 2, -3"),
             ("ground -0.5", "ground -0.5"),
             ("camera at 0,1,-5 towards -x,0 , 0 angle 30", "camera at 0, 1, -5 towards -x, 0, 0 angle 30"),
+            ("units  time 86400 ,length 0.01", "units time 86400, length 0.01"),
+            (
+                "wind 1,-0.2 , 0 speed 3+sin( t ) turbulence 0.3 scale -x period 8 seed 7 spectrum kolmogorov 1,4,-y",
+                "wind 1, -0.2, 0 speed 3 + sin(t) turbulence 0.3 scale -x period 8 seed 7 spectrum kolmogorov 1, 4, -y",
+            ),
+            ("flow uniform -1,0 , t", "flow uniform -1, 0, t"),
+            (
+                "flow vortex -2 axis -1,0,0 at 0,-1,0 decay 3",
+                "flow vortex -2 axis -1, 0, 0 at 0, -1, 0 decay 3",
+            ),
+            (
+                "tissue a=stiffness 2*e ,density 900, damping 0.05,sag,thickness 1e-4",
+                "tissue a = stiffness 2*e, density 900, damping 0.05, sag, thickness 1e-4",
+            ),
             ("axiom: for(1) if(x):( for(2) )", "axiom: for(1) if (x): ( for(2) )"),
             ("interpret @L(s) :;(2)F( s )@L(s)", "interpret @L(s): ;(2)F(s)@L(s)"),
         ] {

@@ -2,6 +2,7 @@
 
 use crate::declarations::Declaration;
 use crate::grammar::Rule;
+use crate::suggest::nearest;
 
 /// Advice for curves, tables, arrays and names within rules, given the text before the error and the token there.
 pub fn for_block(item: Rule, before: &str, found: &str) -> Option<&'static str> {
@@ -37,6 +38,42 @@ pub fn for_block(item: Rule, before: &str, found: &str) -> Option<&'static str> 
         }
         _ => None,
     }
+}
+
+/// Advice for units, wind, flows and tissues, given the text before the error, the token there, and the text from it on.
+pub fn for_scene(item: Rule, before: &str, found: &str, rest: &str) -> Option<String> {
+    if !matches!(item, Rule::units_item | Rule::wind_item | Rule::flow_item | Rule::tissue_item) {
+        return None;
+    }
+    let options = Declaration::of_rule(item)?.options.iter().map(|option| option.word);
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    let said: Vec<&str> = before.split(|c| !is_word(c)).filter(|word| !word.is_empty()).collect();
+    let kind = said.get(1).copied().unwrap_or_default();
+    let advice = match item {
+        Rule::wind_item if before.trim_end().ends_with("spectrum") => {
+            "a spectrum is written `spectrum kolmogorov 1, 4, 1`; without one it is von Kármán's"
+        }
+        Rule::wind_item if said.contains(&"kolmogorov") => {
+            "it has three values: rate of dissipation, smallest wave number, spread of frequencies, as in `spectrum kolmogorov 1, 4, 1`"
+        }
+        Rule::wind_item if found == "," && rest[1..].trim_start().starts_with(char::is_alphabetic) => {
+            "no comma stands before `speed` and the other options: `wind 1, 0, 0 speed 3 turbulence 0.2 scale 5`"
+        }
+        Rule::wind_item if before.matches(',').count() < 2 && found != "," => {
+            "the direction is three numbers: `wind 1, 0, 0 speed 3`"
+        }
+        Rule::flow_item if found == "," && matches!(kind, "source" | "sink" | "vortex") => {
+            "its strength is one number, and its place stands behind `at`: `flow source 2 at 0, 1, 0 decay 3`"
+        }
+        Rule::flow_item if before.matches(',').count() < 2 && kind == "uniform" => {
+            "its velocity is three numbers: `flow uniform 1, 0, 0`"
+        }
+        Rule::tissue_item | Rule::units_item if options.clone().any(|word| word == found) => {
+            return Some(format!("its parts are separated by commas: {}", usage(item)));
+        }
+        _ => return nearest(found, options).map(|word| format!("did you mean `{word}`?")),
+    };
+    Some(advice.to_owned())
 }
 
 /// The notation of a declaration or rule, for errors without a specific hint.

@@ -7,7 +7,7 @@ use pest::error::{Error, ErrorVariant, InputLocation};
 use super::advice;
 use super::build::keyword;
 use super::hints::{hint, is_derivative, keyword_hint};
-use crate::declarations::{self, Declaration};
+use crate::declarations::{self, DECLARATIONS, Declaration};
 use crate::foreign_syntax;
 use crate::grammar::Rule;
 use crate::layout::RawItem;
@@ -51,7 +51,7 @@ fn words(rule: Rule) -> Option<&'static str> {
         wind_part | wind_word | spectrum => "an option such as `speed`",
         kolmogorov => "`kolmogorov` and three values",
         flow_kind | uniform | flow_word => "`uniform`, `source`, `sink` or `vortex`",
-        flow_part | flow_place | decay => "`at`, `axis` or `decay`",
+        flow_part | flow_place | decay => "an option such as `at`",
         tissue_part | tissue_word | sag => "`stiffness`, `density`, `damping`, `thickness` or `sag`",
         point => "a point such as `(1, 0.5)`",
         equation | derivative | rate | zero => "an equation such as `dx/dt = …`, `x = …` or `0 = …`",
@@ -183,6 +183,13 @@ pub fn unknown_line(text: &str, item: &RawItem) -> Diagnostic {
         return Diagnostic::error(format!("`{first}` is not complete"))
             .at(span, "expected its value behind it")
             .help(declaration.written);
+    }
+    let mut owners = DECLARATIONS.iter().filter(|known| known.options.iter().any(|o| o.word == first));
+    if let (Some(owner), None) = (owners.next(), owners.next()) {
+        return diagnostic.help(format!(
+            "`{first}` is a part of `{}`, which ends with its line: write it on the same line",
+            owner.word
+        ));
     }
     if let Some(help) = keyword_hint(first, &names) {
         return diagnostic.help(help);

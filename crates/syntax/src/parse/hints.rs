@@ -20,6 +20,9 @@ pub(super) fn hint(item: Rule, text: &str, at: usize, found: &str) -> Option<Str
     if let Some(advice) = advice::for_block(item, &text[..at], found) {
         return Some(advice.to_owned());
     }
+    if let Some(advice) = advice::for_scene(item, &text[..at], found, &text[at..]) {
+        return Some(advice);
+    }
     if let Some(advice) = hint_of_group(item, &text[..at], found) {
         return Some(advice.to_owned());
     }
