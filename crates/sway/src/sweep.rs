@@ -20,12 +20,19 @@ pub(crate) struct Workspace {
 }
 
 /// When and for how long the wind is sampled.
-#[derive(Clone, Copy)]
 pub(crate) struct Instant<'a, W> {
     pub wind: &'a W,
     pub from: f64,
     pub to: f64,
 }
+
+impl<W> Clone for Instant<'_, W> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<W> Copy for Instant<'_, W> {}
 
 /// Strain and rate of all segments.
 #[derive(Clone, Copy)]
