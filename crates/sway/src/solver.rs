@@ -129,7 +129,7 @@ impl Solver {
     }
 
     /// Takes the skeleton of a time over.
-    fn renew(&mut self, state: &State, time: f64, growth: &mut impl Growth) -> Result<(), Error> {
+    pub(crate) fn renew(&mut self, state: &State, time: f64, growth: &mut impl Growth) -> Result<(), Error> {
         if !growth.skeleton(time, &mut self.skeleton) {
             return Ok(());
         }
