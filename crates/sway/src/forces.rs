@@ -208,6 +208,31 @@ impl Part<'_> {
         form
     }
 
+    /// Kinetic energy; mass, and mass times place in the base frame.
+    pub(crate) fn motion(&self, local: &Local, stretch: &Stretch) -> (f64, (f64, Vector)) {
+        let half = 0.5 * self.segment.mass * self.segment.length;
+        let spin = self.section_inertia();
+        let (mut energy, mut mass, mut first) = (0.0, 0.0, Vector::zeros());
+        for point in &stretch.points {
+            let along = point.section.tangent().dot(&point.angular);
+            energy += 0.5 * half * point.velocity.norm_squared();
+            energy += 0.5 * spin * (point.angular.norm_squared() + along * along);
+            mass += half;
+            first += point.place * half;
+        }
+        for load in self.loads {
+            let motion = local.motion(load.at);
+            let axes = motion.section.rotation();
+            let arm = axes * load.centre;
+            let omega = axes.tr_mul(&motion.angular);
+            energy += 0.5 * load.mass * motion.velocity_at(&arm).norm_squared();
+            energy += 0.5 * omega.dot(&(load.inertia * omega));
+            mass += load.mass;
+            first += (motion.place + arm) * load.mass;
+        }
+        (energy, (mass, first))
+    }
+
     /// What stands for the drag of the segment in the matrix.
     #[inline(always)]
     pub(crate) fn damper(&self, local: &Local, stretch: &Stretch, wind: &Vector) -> Damper {

@@ -35,21 +35,6 @@ impl Wrench {
         self.moment += place.cross(force);
         self.force += force;
     }
-
-    /// The same wrench in a frame that sees this one turned by `turn` and shifted to `place`.
-    #[inline(always)]
-    pub(crate) fn carried(&self, turn: &Matrix, place: &Vector) -> Wrench {
-        let force = turn * self.force;
-        Wrench { moment: turn * self.moment + place.cross(&force), force }
-    }
-}
-
-impl std::ops::AddAssign for Wrench {
-    #[inline(always)]
-    fn add_assign(&mut self, other: Wrench) {
-        self.moment += other.moment;
-        self.force += other.force;
-    }
 }
 
 const ZERO: Vector = Vector::new(0.0, 0.0, 0.0);
@@ -84,15 +69,6 @@ fn times_cross(matrix: &Matrix, place: &Vector) -> Matrix {
 
 impl Inertia {
     pub(crate) const ZERO: Inertia = Inertia { aa: ZEROS, al: ZEROS, ll: ZEROS };
-
-    /// The wrench of the form on a twist.
-    #[inline(always)]
-    pub(crate) fn times(&self, twist: &Twist) -> Wrench {
-        Wrench {
-            moment: self.aa * twist.angular + self.al * twist.linear,
-            force: self.al.tr_mul(&twist.angular) + self.ll * twist.linear,
-        }
-    }
 
     /// The same form in the axes of a frame that sees this one turned.
     #[inline(always)]

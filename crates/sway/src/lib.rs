@@ -9,7 +9,7 @@
 //! - [`Growth`]: gives the skeleton at any time; [`Wind`]: gives the velocity of the air.
 //! - [`Solver`]: advances a state with controlled error; [`Step`] is the solution within a step; [`Method`] lists the methods.
 //! - [`Pose`]: the frames of all segments under a strain.
-//! - [`Solver::equilibrium`], [`vibration`], [`buckling`]: natural frequencies, Greenhill's ratio, static load.
+//! - [`Solver::equilibrium`], [`Solver::modes`], [`Solver::buckling`], [`Solver::energy`]: static load, natural frequencies, Greenhill's ratio.
 //! - [`study`]: exact cases with their errors and orders.
 //!
 //! All values are in SI units. The crate knows nothing of turtles and productions.
@@ -56,10 +56,14 @@
 #![warn(missing_docs)]
 
 mod air;
+mod analysis;
 mod arc;
+mod energy;
+mod equilibrium;
 mod error;
 mod forces;
 mod form;
+mod krylov;
 mod link;
 mod place;
 mod pose;
@@ -71,6 +75,8 @@ mod solver;
 mod state;
 mod sweep;
 
+pub use analysis::{Mode, cauchy_number};
+pub use energy::Energy;
 pub use air::{Air, Still, Wind};
 pub use error::Error;
 pub use pose::{Frame, Pose};

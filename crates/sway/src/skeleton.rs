@@ -115,6 +115,21 @@ impl Segment {
     }
 }
 
+impl Segment {
+    /// The same segment without prescribed motion.
+    pub fn held(&self) -> Segment {
+        let zero = Vector::zeros();
+        Segment {
+            joint: Joint::fixed(self.joint.rotation, self.joint.offset),
+            length_rate: 0.0,
+            length_acceleration: 0.0,
+            rest_rate: zero,
+            rest_acceleration: zero,
+            ..*self
+        }
+    }
+}
+
 /// Poisson's ratio of all tissues.
 const POISSON: f64 = 0.3;
 
@@ -264,6 +279,35 @@ impl Skeleton {
             extent = extent.max(before + segment.length);
         }
         extent
+    }
+
+    /// The segment `root` and all that it carries, as a skeleton of its own whose root is clamped where `base` says (world coordinates), with
+    /// the indices of its segments in this skeleton.
+    pub fn subtree(&self, root: usize, base: Joint) -> (Skeleton, Vec<usize>) {
+        let mut part = Skeleton::new();
+        let mut members = Vec::new();
+        let mut places = vec![None; self.len()];
+        for (index, segment) in self.segments.iter().enumerate().skip(root) {
+            let parent = segment.parent.and_then(|parent| places[parent]);
+            let joint = if index == root { base } else { segment.joint };
+            if index != root && parent.is_none() {
+                continue;
+            }
+            places[index] = Some(part.push(Segment { parent, joint, ..*segment }));
+            members.push(index);
+            self.loads(index).iter().for_each(|load| part.load(*load));
+            self.plates(index).iter().for_each(|plate| part.plate(*plate));
+        }
+        (part, members)
+    }
+
+    /// The same skeleton without prescribed motion.
+    pub fn held(&self) -> Skeleton {
+        let mut held = self.clone();
+        for segment in &mut held.segments {
+            *segment = segment.held();
+        }
+        held
     }
 
     /// Checks that parents come before children and that every value is finite and in its range.

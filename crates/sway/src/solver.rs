@@ -2,7 +2,8 @@
 
 use crate::air::Wind;
 use crate::ros2::StepError;
-use crate::sweep::{Instant, Workspace};
+use crate::link::Weights;
+use crate::sweep::{Bend, Instant, Workspace};
 use crate::{Error, Growth, Method, Settings, Skeleton, State, Step};
 
 /// Advances states of one skeleton, or of several in turn. Holds working memory only: results do not depend on what it did before.
@@ -68,6 +69,31 @@ impl Solver {
         Ok(())
     }
 
+    /// Second derivatives of all strains at an instant, in 1/(m s²). Zero for rigid segments, and for those without inertia, whose strain
+    /// follows its forces at once.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Length`] and [`Error::Value`] as in [`advance`](Solver::advance).
+    pub fn accelerations(
+        &mut self,
+        skeleton: &Skeleton,
+        state: &State,
+        wind: &impl Wind,
+        time: f64,
+    ) -> Result<Vec<crate::Vector>, Error> {
+        self.skeleton.clear();
+        self.renew(state, time, &mut crate::Fixed(skeleton))?;
+        let (skeleton, air) = (&self.skeleton, &self.settings.air);
+        let explicit = Weights { mass: 1.0, damping: 0.0, stiffness: 0.0 };
+        let bend = Bend { strain: &state.strain, rate: &state.rate };
+        let now = Instant { wind, from: time, to: time };
+        self.work.spread(skeleton, air, bend, now, (1.0, 0.0), &explicit);
+        self.work.gather(skeleton, &state.rate, &explicit, 0.0);
+        self.work.resolve(skeleton);
+        Ok(self.work.links.iter().map(|link| link.x).collect())
+    }
+
     /// One accepted step, at most to `limit`; the new state is in `trial`. Returns its end.
     fn step(
         &mut self,
@@ -103,7 +129,7 @@ impl Solver {
     }
 
     /// Takes the skeleton of a time over.
-    fn renew(&mut self, state: &State, time: f64, growth: &mut impl Growth) -> Result<(), Error> {
+    pub(crate) fn renew(&mut self, state: &State, time: f64, growth: &mut impl Growth) -> Result<(), Error> {
         if !growth.skeleton(time, &mut self.skeleton) {
             return Ok(());
         }

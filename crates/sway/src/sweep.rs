@@ -20,7 +20,6 @@ pub(crate) struct Workspace {
 }
 
 /// When and for how long the wind is sampled.
-
 pub(crate) struct Instant<'a, W> {
     pub wind: &'a W,
     pub from: f64,
@@ -36,7 +35,7 @@ impl<W> Clone for Instant<'_, W> {
 impl<W> Copy for Instant<'_, W> {}
 
 /// Strain and rate of all segments.
-
+#[derive(Clone, Copy)]
 pub(crate) struct Bend<'a> {
     pub strain: &'a [Vector],
     pub rate: &'a [Vector],
@@ -112,12 +111,8 @@ impl Workspace {
         let zero = Vector::zeros();
         for index in 0..skeleton.len() {
             let whole = part(skeleton, air, index);
-            let mut segment = *whole.segment;
-            let joint = &mut segment.joint;
-            (joint.angular_velocity, joint.velocity) = (zero, zero);
-            (joint.angular_acceleration, joint.acceleration) = (zero, zero);
-            (segment.length_rate, segment.length_acceleration) = (0.0, 0.0);
-            (segment.rest_rate, segment.rest_acceleration, segment.drag_diameter) = (zero, zero, 0.0);
+            let mut segment = whole.segment.held();
+            segment.drag_diameter = 0.0;
             let (value, acceleration) = strain(index);
             let strain = Strain { value, rate: zero, acceleration };
             let parent = segment.parent.map(|parent| &self.later[parent]);
@@ -215,8 +210,15 @@ impl Workspace {
     }
 
     /// Second pass: eliminates matrix and right-hand side towards the roots. The right-hand side loses `pressed` times the stiffness times the
-    /// rate of strain.
-    pub(crate) fn gather(&mut self, skeleton: &Skeleton, rate: &[Vector], weights: &Weights, pressed: f64) {
+    /// rate of strain. Returns whether the matrix has the geometric stiffness of every segment.
+    pub(crate) fn gather(
+        &mut self,
+        skeleton: &Skeleton,
+        rate: &[Vector],
+        weights: &Weights,
+        pressed: f64,
+    ) -> bool {
+        let mut whole = true;
         for index in (0..skeleton.len()).rev() {
             let segment = &skeleton.segments()[index];
             let place = &self.places[index];
@@ -226,7 +228,7 @@ impl Workspace {
                 link.stiffen(place);
             }
             let material = rigidity * (weights.damping * segment.damping + weights.stiffness);
-            link.eliminate(segment.length, &material, weights.stiffness, segment.rigid);
+            whole &= link.eliminate(segment.length, &material, weights.stiffness, segment.rigid);
             if pressed != 0.0 && !segment.rigid {
                 let x = &rate[index];
                 let turn = place.spin - place.turning * (x * segment.length);
@@ -241,6 +243,7 @@ impl Workspace {
                 Link::hand(&wrench, (&mut onto.wrench, &mut onto.pull), &self.places[parent], place);
             }
         }
+        whole
     }
 
     /// Eliminates another right-hand side, that of `wrench` and `pull`.
