@@ -233,7 +233,9 @@ fn failure(model: &Model, body: &Body, error: sway::Error, time: f64) -> Error {
         | sway::Error::Equilibrium { segment, .. } => body.stems.get(*segment),
         _ => None,
     };
-    if std::env::var("SWAY_DEBUG").is_ok() && let sway::Error::Step { segment, .. } = &error {
+    if std::env::var("SWAY_DEBUG").is_ok()
+        && let sway::Error::Step { segment, .. } = &error
+    {
         let mut i = Some(*segment);
         while let Some(k) = i {
             eprintln!("{k} {:?} loads {:?}", body.skeleton.segments()[k], body.skeleton.loads(k));
