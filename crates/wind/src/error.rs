@@ -25,10 +25,14 @@ pub enum Error {
         value: f64,
     },
     /// The roughness length is not between 0 and the 10 m at which the speed is given.
-    #[error("the roughness is {0} m, and must be greater than 0 and less than 10 m, the height at which the speed is given")]
+    #[error(
+        "the roughness is {0} m, and must be greater than 0 and less than 10 m, the height at which the speed is given"
+    )]
     Roughness(f64),
     /// A quantity of a wind with a period does not have that period.
-    #[error("{name} does not repeat after the period of {period} s: it is {first} at {time} s and {second} one period later")]
+    #[error(
+        "{name} does not repeat after the period of {period} s: it is {first} at {time} s and {second} one period later"
+    )]
     NotPeriodic {
         /// The name of the quantity.
         name: String,
@@ -52,7 +56,9 @@ pub enum Error {
         value: f64,
     },
     /// The path of the wind up to an instant cannot be computed: the time is not finite, or too far from 0.
-    #[error("the wind has no value at {time} s: times must be finite, and within {limit:e} s of 0 where the speed varies")]
+    #[error(
+        "the wind has no value at {time} s: times must be finite, and within {limit:e} s of 0 where the speed varies"
+    )]
     Time {
         /// The time in seconds.
         time: f64,

@@ -58,9 +58,9 @@ enum Kind {
     Still(f64),
 }
 
-/// The steps into which a period is divided, so that rounding of t/T does not break the repetition: a trillionth of a period
-/// is shorter than anything in the wind.
-const TICKS: f64 = (1u64 << 40) as f64;
+/// The steps into which a period is divided, so that rounding of t/T does not break the repetition. Their number has many divisors:
+/// times of frames at common rates are steps of common periods, far from where rounding could go either way.
+const TICKS: f64 = ((1u64 << 24) * 9 * 125 * 7) as f64;
 
 /// The thickness of a layer over the ground relative to the size of its eddies, the root of the mean of 1/k²: with it, the
 /// variance of horizontal components at the ground is 1.5 times that far above, as at a wall in the theory of rapid distortion
@@ -215,11 +215,7 @@ impl Field {
                 // u = i k × A, with |A| = |u|/k.
                 let [real, imaginary] = [-direction.cross(&im), direction.cross(&re)];
                 let back = band.rotation.inverse();
-                each(
-                    i,
-                    back * direction * mode.k,
-                    [back * real * amplitude, back * imaginary * amplitude],
-                );
+                each(i, back * direction * mode.k, [back * real * amplitude, back * imaginary * amplitude]);
             });
         }
         Ok(())

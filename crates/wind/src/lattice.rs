@@ -24,11 +24,7 @@ pub(crate) struct Jet {
 /// The curl of a vector field with this matrix of derivatives.
 #[inline]
 pub(crate) fn curl(first: &Matrix3<f64>) -> Vector3<f64> {
-    Vector3::new(
-        first[(2, 1)] - first[(1, 2)],
-        first[(0, 2)] - first[(2, 0)],
-        first[(1, 0)] - first[(0, 1)],
-    )
+    Vector3::new(first[(2, 1)] - first[(1, 2)], first[(0, 2)] - first[(2, 0)], first[(1, 0)] - first[(0, 1)])
 }
 
 /// The derivatives of the curl, from the second derivatives.
@@ -78,15 +74,25 @@ fn add(sum: &mut [f64; 4], weight: f64, point: [f64; 4]) {
 
 impl Lattice {
     /// The potential of a band at an instant, for velocities of `amplitude` times those of the band.
-    pub(crate) fn new(band: &Band, at: Instant, lap: Option<Lap>, amplitude: f64, work: &mut [Grid; 2]) -> Lattice {
+    pub(crate) fn new(
+        band: &Band,
+        at: Instant,
+        lap: Option<Lap>,
+        amplitude: f64,
+        work: &mut [Grid; 2],
+    ) -> Lattice {
         let spacing = band.period / N as f64;
         // The transform of the coefficients is that of the values divided by this, for each axis.
-        let filter: [f64; MODES as usize + 1] = std::array::from_fn(|m| 3.0 / (2.0 + cos_sin(m as f64 / N as f64).0));
+        let filter: [f64; MODES as usize + 1] =
+            std::array::from_fn(|m| 3.0 / (2.0 + cos_sin(m as f64 / N as f64).0));
         let [xy, z] = work;
         xy.clear();
         z.clear();
         band.amplitudes(at, lap, |mode, re, im| {
-            let size = mode.m.iter().fold(amplitude / (mode.k * spacing), |size, m| size * filter[m.unsigned_abs() as usize]);
+            let size = mode
+                .m
+                .iter()
+                .fold(amplitude / (mode.k * spacing), |size, m| size * filter[m.unsigned_abs() as usize]);
             let (re, im) = (re * size, im * size);
             let [here, there] = Band::indices(mode.m);
             // Two real fields in one complex transform: x + iy.
@@ -97,7 +103,8 @@ impl Lattice {
         });
         xy.invert();
         z.invert();
-        let coefficients = (0..N * N * N).map(|i| [xy.re[i] as f32, xy.im[i] as f32, z.re[i] as f32, 0.0]).collect();
+        let coefficients =
+            (0..N * N * N).map(|i| [xy.re[i] as f32, xy.im[i] as f32, z.re[i] as f32, 0.0]).collect();
         let rotation = band.rotation.into_inner();
         Lattice { coefficients, to_lattice: rotation / spacing, to_world: rotation.transpose(), spacing }
     }
@@ -231,7 +238,8 @@ impl Lattice {
     fn jet_in_world(&self, value: Vector3<f64>, first: Matrix3<f64>, second: [Matrix3<f64>; 3]) -> Jet {
         let r = self.to_world;
         let turned = second.map(|m| r * m * r.transpose() / self.spacing);
-        let second = std::array::from_fn(|i| turned[0] * r[(i, 0)] + turned[1] * r[(i, 1)] + turned[2] * r[(i, 2)]);
+        let second =
+            std::array::from_fn(|i| turned[0] * r[(i, 0)] + turned[1] * r[(i, 1)] + turned[2] * r[(i, 2)]);
         Jet { value: r * value * self.spacing, first: r * first * r.transpose(), second }
     }
 }

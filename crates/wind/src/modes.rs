@@ -29,13 +29,11 @@ pub(crate) const CUT: f64 = 10.5;
 
 /// Axes of the lattices, as quaternions (w, i, j, k) of any length: no axis, edge diagonal or space diagonal of one of the cubes
 /// lies within three degrees of an axis of the world.
-const TURNS: [[f64; 4]; BANDS] =
-    [[1.0, 0.414_213_56, 0.732_050_81, -0.236_067_98], [1.0, -0.645_751_31, 0.316_624_79, 0.605_551_28], [
-        1.0,
-        0.123_105_63,
-        -0.358_898_94,
-        0.795_831_52,
-    ]];
+const TURNS: [[f64; 4]; BANDS] = [
+    [1.0, 0.414_213_56, 0.732_050_81, -0.236_067_98],
+    [1.0, -0.645_751_31, 0.316_624_79, 0.605_551_28],
+    [1.0, 0.123_105_63, -0.358_898_94, 0.795_831_52],
+];
 
 /// Where the eddies are at an instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -98,12 +96,13 @@ pub(crate) fn bands(energy: Energy, direction: Vector3<f64>, seed: u64) -> [Band
 
 impl Band {
     fn new(i: usize, energy: Energy, direction: Vector3<f64>, draw: Draw, quantiles: &Quantiles) -> Band {
-        let unit = energy.smallest() * RATIO.powi(i as i32);
+        let scaled = |times: usize| (0..times).fold(energy.smallest(), |unit, _| unit * RATIO);
+        let unit = scaled(i);
         let end = CUT * unit;
         let [w, a, b, c] = TURNS[i];
         let rotation =
             UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, a, b, c)).to_rotation_matrix();
-        let lowest = if i == 0 { 0.0 } else { end / RATIO };
+        let lowest = if i == 0 { 0.0 } else { CUT * scaled(i - 1) };
         let heading = rotation * direction;
         let (mut modes, mut lines) = (Vec::new(), Vec::new());
         for m in half_space() {
@@ -244,7 +243,8 @@ mod tests {
             // Without the correction, the sum over the points of the lattice is the integral within a few per cent already.
             let unit = TAU / band.period;
             let raw: f64 =
-                band.modes.iter().map(|mode| energy.at(mode.k) / (PI * mode.k.powi(2)) / 3.0).sum::<f64>() * unit.powi(3);
+                band.modes.iter().map(|mode| energy.at(mode.k) / (PI * mode.k.powi(2)) / 3.0).sum::<f64>()
+                    * unit.powi(3);
             assert!((raw / exact - 1.0).abs() < 0.05, "{raw} for {exact}");
         }
     }

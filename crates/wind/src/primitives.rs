@@ -62,9 +62,16 @@ impl Flow {
     /// All signals with their names.
     fn signals(&self) -> Vec<(&'static str, &Signal)> {
         match self {
-            Flow::Uniform([x, y, z]) => vec![("the x component", x), ("the y component", y), ("the z component", z)],
+            Flow::Uniform([x, y, z]) => {
+                vec![("the x component", x), ("the y component", y), ("the z component", z)]
+            }
             Flow::Source { strength, at: [x, y, z], .. } => {
-                vec![("the strength", strength), ("the x coordinate", x), ("the y coordinate", y), ("the z coordinate", z)]
+                vec![
+                    ("the strength", strength),
+                    ("the x coordinate", x),
+                    ("the y coordinate", y),
+                    ("the z coordinate", z),
+                ]
             }
             Flow::Vortex { circulation, at: [x, y, z], .. } => vec![
                 ("the circulation", circulation),
@@ -101,9 +108,8 @@ impl Flow {
 
     /// The flow at an instant.
     pub(crate) fn at(&self, time: f64, index: usize) -> Result<Primitive, Error> {
-        let value = |name: &str, signal: &Signal| {
-            signal.finite_at(time, || format!("{name} of flow {}", index + 1))
-        };
+        let value =
+            |name: &str, signal: &Signal| signal.finite_at(time, || format!("{name} of flow {}", index + 1));
         let vector = |name: &str, [x, y, z]: &[Signal; 3]| {
             Ok::<_, Error>(Vector3::new(value(name, x)?, value(name, y)?, value(name, z)?))
         };
@@ -140,9 +146,20 @@ fn check_lengths(decay: Option<f64>, core: f64) -> Result<(), Error> {
 pub(crate) enum Primitive {
     Uniform(Vector3<f64>),
     /// `strength` is per 4π, `core` squared, `rate` the inverse of the length of decay.
-    Source { strength: f64, at: Vector3<f64>, rate: f64, core: f64 },
+    Source {
+        strength: f64,
+        at: Vector3<f64>,
+        rate: f64,
+        core: f64,
+    },
     /// `strength` is per 2π, `core` squared, `rate` the inverse of the length of decay.
-    Vortex { strength: f64, at: Vector3<f64>, axis: Vector3<f64>, rate: f64, core: f64 },
+    Vortex {
+        strength: f64,
+        at: Vector3<f64>,
+        axis: Vector3<f64>,
+        rate: f64,
+        core: f64,
+    },
 }
 
 impl Primitive {

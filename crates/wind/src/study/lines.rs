@@ -54,7 +54,12 @@ pub(super) fn rows(fields: &[Field], rows: &mut Vec<Row>) -> Result<(), Error> {
     let count = fields.len() as f64 * LINES as f64;
     let [along, across, other] = sums.spectrum.map(|sum| sum / count);
     let ratio = 0.5 * (across + other) / along;
-    rows.push(Row::relative("spectra across to along a line, kL from 5.5 to 15, sampled", ratio, 4.0 / 3.0, 0.05));
+    rows.push(Row::relative(
+        "spectra across to along a line, kL from 5.5 to 15, sampled",
+        ratio,
+        4.0 / 3.0,
+        0.05,
+    ));
     rows.push(Row::relative(
         "spectrum along a line, kL from 5.5 to 15, sampled, m³/s²",
         along,
@@ -66,9 +71,19 @@ pub(super) fn rows(fields: &[Field], rows: &mut Vec<Row>) -> Result<(), Error> {
         let r = lag as f64 * STEP;
         let (f, g) = correlations(r);
         let [along, across, other] = sums.products.map(|sums| sums[i] / count / variance);
-        rows.push(Row::absolute(format!("longitudinal correlation f at r = {r:.2} L, sampled"), along, f, 0.03));
+        rows.push(Row::absolute(
+            format!("longitudinal correlation f at r = {r:.2} L, sampled"),
+            along,
+            f,
+            0.03,
+        ));
         let across = 0.5 * (across + other);
-        rows.push(Row::absolute(format!("transverse correlation g at r = {r:.2} L, sampled"), across, g, 0.03));
+        rows.push(Row::absolute(
+            format!("transverse correlation g at r = {r:.2} L, sampled"),
+            across,
+            g,
+            0.03,
+        ));
     }
     Ok(())
 }

@@ -110,7 +110,12 @@ fn variance(fields: &[Field], rows: &mut Vec<Row>) -> Result<(), Error> {
     }
     let n = fields.len() as f64;
     for (i, name) in ["x", "y", "z"].iter().enumerate() {
-        rows.push(Row::relative(format!("variance of u_{name}, modes, m²/s²"), square[i] / n, expected, 0.02));
+        rows.push(Row::relative(
+            format!("variance of u_{name}, modes, m²/s²"),
+            square[i] / n,
+            expected,
+            0.02,
+        ));
     }
     for (i, name) in ["xy", "yz", "zx"].iter().enumerate() {
         rows.push(Row::absolute(

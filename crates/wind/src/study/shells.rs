@@ -28,7 +28,9 @@ fn slope(fields: &[Field], rows: &mut Vec<Row>) -> Result<(), Error> {
             }
             // A mode stands for the cube of the smallest wave vector of its lattice, whose 10.5-fold is the end of the band.
             let cell = (ends[band] / crate::modes::CUT).powi(3);
-            let energy = 2.0 * std::f64::consts::PI * k.norm_squared() * (re.norm_squared() + im.norm_squared()) / cell;
+            let energy =
+                2.0 * std::f64::consts::PI * k.norm_squared() * (re.norm_squared() + im.norm_squared())
+                    / cell;
             let (n, sum, total) = &mut shells[shell as usize];
             *n += 1.0;
             *sum += k.norm().ln();
@@ -37,7 +39,12 @@ fn slope(fields: &[Field], rows: &mut Vec<Row>) -> Result<(), Error> {
     }
     let points: Vec<(f64, f64)> =
         shells.iter().map(|(n, sum, energy)| (sum / n, (energy / n).ln())).collect();
-    rows.push(Row::relative("slope of the spectrum, kL from 11 to 110, modes", fit(&points), -5.0 / 3.0, 0.03));
+    rows.push(Row::relative(
+        "slope of the spectrum, kL from 11 to 110, modes",
+        fit(&points),
+        -5.0 / 3.0,
+        0.03,
+    ));
     Ok(())
 }
 
