@@ -141,7 +141,8 @@ impl Field {
     ///
     /// # Errors
     ///
-    /// A time that is not finite; a speed or a flow that is not finite at that time; a speed that varies, more than 10⁷ s from 0.
+    /// A time that is not finite; a speed, a flow or an obstacle that is not finite at that time; a speed that varies, more than
+    /// 10⁷ s from 0.
     pub fn at(&self, time: f64) -> Result<Snapshot, Error> {
         let (time, instant) = self.instant(time)?;
         let speed = self.speed.finite_at(time, || "the speed of the wind".to_owned())?;
@@ -155,6 +156,13 @@ impl Field {
                     .iter()
                     .map(|band| Lattice::new(band, instant, self.lap, amplitude, &mut work)),
             );
+        }
+        for (i, obstacle) in self.setting.obstacles.iter().enumerate() {
+            let (centre, velocity) = (obstacle.centre(time), obstacle.velocity(time));
+            if let Some(value) = centre.iter().chain(velocity.iter()).copied().find(|v| !v.is_finite()) {
+                let name = format!("the centre or the velocity of obstacle {}", i + 1);
+                return Err(Error::NotFinite { name, time, value });
+            }
         }
         let flows = self.flows.iter().enumerate().map(|(i, flow)| flow.at(time, i));
         let flows = flows.collect::<Result<Vec<_>, _>>()?;

@@ -1,6 +1,6 @@
 //! The field as a function: the same bits for every thread and order, exact repetition, reference values, far places, errors.
 
-use dlsys_wind::{Description, Error, Field, Flow, Signal, Spectrum, grid};
+use dlsys_wind::{Description, Error, Field, Flow, Ground, Obstacle, Signal, Spectrum, Sphere, grid};
 use nalgebra::Vector3;
 
 fn gusty() -> Description {
@@ -207,6 +207,13 @@ fn what_is_no_wind_is_refused() {
         Description { flows: vec![flow], period: Some(8.0), ..gusty() },
         "the strength of flow 1 does not repeat",
     );
+    let obstacles: Vec<Box<dyn Obstacle>> = vec![Box::new(Sphere::fixed(Vector3::x(), 0.0))];
+    refused(Description { obstacles, ..gusty() }, "the thickness of the layer around an obstacle is 0");
+    let ground = Ground::Uneven { height: Box::new(|_, _, _| [0.0; 3]), fading: -1.0 };
+    refused(
+        Description { ground: Some(ground), ..gusty() },
+        "the height over which the wind forgets the ground is -1",
+    );
     let flow = Flow::source(1.0, Vector3::x(), Some(0.0));
     refused(Description { flows: vec![flow], ..gusty() }, "the length of decay of a flow is 0");
 }
@@ -221,6 +228,14 @@ fn instants_without_a_wind_are_errors() {
     assert!(root.at(1.0).is_ok());
     let error = root.at(3.0).unwrap_err();
     assert!(error.to_string().starts_with("the speed of the wind is NaN at "), "{error}");
+    let centre = [Signal::function(|t| 1.0 / t), 0.0.into(), 0.0.into()];
+    let ball = Sphere { centre, velocity: [0.0.into(), 0.0.into(), 0.0.into()], radius: 1.0 };
+    let lost = Field::new(Description { obstacles: vec![Box::new(ball)], ..gusty() }).unwrap();
+    let error = lost.at(0.0).unwrap_err();
+    assert!(
+        error.to_string().starts_with("the centre or the velocity of obstacle 1 is inf at 0 s"),
+        "{error}"
+    );
     // A place that is not finite has no velocity, and nothing panics.
     assert!(field.at(0.0).unwrap().velocity(Vector3::new(f64::NAN, 0.0, f64::INFINITY)).x.is_nan());
 }
