@@ -12,7 +12,7 @@ fn statistics_agree_with_theory() {
 }
 
 #[test]
-#[ignore = "a thousand fields take a minute"]
+#[ignore = "a thousand fields take two minutes"]
 fn statistics_of_a_thousand_seeds_agree_with_theory() {
     for row in statistics(1000).unwrap() {
         assert!(row.holds(), "{row:?}");
