@@ -14,6 +14,7 @@ use crate::declared::DeclaredRule;
 use crate::rules::RuleBuilder;
 use crate::scenery::Nesting;
 use crate::scope::{Scope, Variables};
+use crate::strain::{self, Strains};
 use crate::{Setting, appearance, check, contexts, dead_rules, globals, porting, scenery};
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{
@@ -36,16 +37,18 @@ pub fn build(
 ) -> Option<Model> {
     let parameters = globals::declare(document, settings, scope, files);
     let appearance = appearance::build(document, scope, files);
-    let scenery = scenery::build(document, &appearance, scope, files, nesting);
+    let mut scenery = scenery::build(document, &appearance, scope, files, nesting);
+    scenery.tissues.extend(nesting.tissue.clone());
     let mut kinds = Kinds::default();
-    let mut builder = RuleBuilder::new(document, scope, &mut kinds, Clocks::new(document));
+    let hidden = (Clocks::new(document), Strains::new(document, scope));
+    let mut builder = RuleBuilder::new(document, scope, &mut kinds, hidden);
     let mut parts = Parts::default();
     for (item, span) in &document.items {
         parts.item(item, *span, &mut builder);
     }
     parts.check_strings(&mut builder, unread);
     porting::comments(document, &mut builder.scope.diagnostics);
-    let RuleBuilder { occurs, drawn, clocks, .. } = builder;
+    let RuleBuilder { occurs, drawn, clocks, strains, .. } = builder;
     if !parts.singles.seen(INITIAL_STRING) && !unread {
         scope.diagnostics.push(
             Diagnostic::error("the model has no initial string")
@@ -63,7 +66,7 @@ pub fn build(
     }
     let places = Places { occurs, drawn };
     let looks = Looks { parameters, appearance, scenery };
-    Some(parts.model(document, kinds, &clocks, &places, looks, scope))
+    Some(parts.model(document, kinds, (&clocks, &strains), &places, looks, scope))
 }
 
 /// Declarations that were lowered before the rules.
@@ -190,7 +193,7 @@ impl<'d> Parts<'d> {
         self,
         document: &Document,
         mut kinds: Kinds,
-        clocks: &Clocks,
+        (clocks, strains): (&Clocks, &Strains),
         places: &Places,
         looks: Looks,
         scope: &mut Scope,
@@ -204,6 +207,7 @@ impl<'d> Parts<'d> {
             }
         }
         clocks.assign(&mut kinds);
+        strains.assign(&mut kinds);
         let diagnostics = &mut scope.diagnostics;
         let interpretations = assign_interpretations(self.interpretations, &mut kinds, diagnostics);
         contexts::filter(&mut kinds, &self.ignored, &self.considered, diagnostics);
@@ -230,6 +234,7 @@ impl<'d> Parts<'d> {
             check::reachability(&model, &self.written, occurs, diagnostics);
         }
         check::period(self.period, &model, diagnostics);
+        strain::check(&model, strains.first, diagnostics);
         check::coverage(&model, diagnostics);
         dead_rules::rules(&model, &self.written, document, diagnostics);
         check::inert_modules(&model, occurs, diagnostics);

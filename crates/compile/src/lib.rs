@@ -34,6 +34,7 @@ mod rules;
 mod scenery;
 mod scope;
 mod smooth;
+mod strain;
 mod strings;
 mod surface;
 mod table;
@@ -76,6 +77,12 @@ pub fn load(source: &Source, settings: &[Setting]) -> Loaded {
 /// Parses, checks and compiles a model. Included texts, surfaces, tables and plants are read from `files`.
 pub fn load_with(source: &Source, settings: &[Setting], files: &dyn Files) -> Loaded {
     load_nested(source, settings, files, &scenery::Nesting::default())
+}
+
+/// As [`load`], as if the text declared this tissue: for tests of rules that read `strain`.
+#[doc(hidden)]
+pub fn load_with_tissue(source: &Source, settings: &[Setting], tissue: dlsys_model::Tissue) -> Loaded {
+    load_nested(source, settings, &NoFiles, &scenery::Nesting::with_tissue(tissue))
 }
 
 /// As [`load_with`], of a model that may be a plant of others.

@@ -9,7 +9,7 @@ use crate::scope::{Scope, Variables};
 use crate::{Setting, advice, load_nested};
 use dlsys_diagnostic::{Diagnostic, Severity, Source, Span};
 use dlsys_expr::Program;
-use dlsys_model::{Appearance, COMMAND_SURFACES, Camera, Plant, Scenery};
+use dlsys_model::{Appearance, COMMAND_SURFACES, Camera, Plant, Scenery, Tissue};
 use dlsys_syntax::Files;
 use dlsys_syntax::ast::{Document, Expression, Item, Name, Text};
 use dlsys_syntax::is_inside;
@@ -27,6 +27,15 @@ const UNREADABLE: &str = "the plant";
 pub(crate) struct Nesting<'n> {
     chain: Vec<PathBuf>,
     models: Option<&'n Cell<usize>>,
+    /// A tissue besides those of the text, for tests.
+    pub tissue: Option<Tissue>,
+}
+
+impl Nesting<'_> {
+    /// A model of its own, with a tissue besides those of its text.
+    pub fn with_tissue(tissue: Tissue) -> Self {
+        Nesting { tissue: Some(tissue), ..Nesting::default() }
+    }
 }
 
 /// The files of a plant's model: paths begin at its own folder, which is below that of the model around it.
@@ -243,7 +252,8 @@ impl Builder<'_> {
             .map_err(|bad| fault(bad.diagnostic.message).help("save the file as UTF-8"))?;
         let chain = nesting.chain.iter().cloned().chain([full]).collect();
         let below = Below { files: self.files, folder: path.parent().unwrap_or(Path::new("")).to_owned() };
-        let loaded = load_nested(&source, values, &below, &Nesting { chain, models: Some(models) });
+        let loaded =
+            load_nested(&source, values, &below, &Nesting { chain, models: Some(models), tissue: None });
         let source = loaded.source.unwrap_or(source);
         let Some(model) = loaded.model else {
             let error = loaded.diagnostics.iter().find(|d| d.severity == Severity::Error);

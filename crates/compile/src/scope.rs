@@ -428,6 +428,8 @@ impl Scope {
             Diagnostic::error(format!("`{name}` has no meaning here"))
                 .at(span, "time is known in rules only")
                 .help(variables.no_time.unwrap_or("use it in a rule"))
+        } else if &**name == crate::strain::NAME {
+            crate::strain::misplaced(span)
         } else if self.curves.contains_key(name) {
             Diagnostic::error(format!("`{name}` is a curve"))
                 .at(span, "a function of one number")
