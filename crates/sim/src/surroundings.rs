@@ -169,6 +169,9 @@ impl<'m> Simulation<'m> {
     /// Puts the next tick into the schedule; returns the time until then from a tick now. `before` is the last one.
     fn schedule_tick(&mut self, link: &Link, before: Option<SimTime>) -> Result<f64, Error> {
         let next = link.source.next_tick();
+        if next == f64::INFINITY {
+            return Ok(next);
+        }
         let ahead = SimTime::new(next).since(before.unwrap_or_default());
         let is_later = match before {
             Some(before) => ahead > before.resolution(),
@@ -178,9 +181,7 @@ impl<'m> Simulation<'m> {
             let why = format!("their next tick would be at t = {}, which is not later", brief(next, 12));
             return Err(self.failure(Failure::new(why), link));
         }
-        if next.is_finite() {
-            self.schedule.schedule(Owner::Tick, SimTime::new(next));
-        }
+        self.schedule.schedule(Owner::Tick, SimTime::new(next));
         Ok(ahead)
     }
 
