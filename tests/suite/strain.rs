@@ -9,6 +9,7 @@ use dlsys::sim::{Error, Event, Failure, Inputs, Method, Scheduler, Settings, Sim
 use dlsys::tree::{Lineage, ModuleString};
 
 use crate::common::{Plain, plain};
+use crate::dice::Dice;
 
 /// Strains that are a function of time and lineage, at the multiples of a tick.
 #[derive(Clone)]
@@ -352,6 +353,128 @@ fn ways_to_run_agree() {
             assert!((event.time - other.time).abs() < 1e-7, "{settings:?}: {} {}", event.time, other.time);
         }
     }
+}
+
+#[test]
+fn lazy_modules_may_end_at_ticks() {
+    // A lives from tick to tick and reads nothing; what it makes is born at a tick, and reads the strain.
+    let text = "initial string: A\n\
+        A: if age = 0.25 produce A [ B(0) ] B(1)\n\
+        B(x): solve dx/dt = (if strain > 0.01 then 2 else strain) if strain = 0.024 produce C(x)";
+    let model = model(text);
+    let known = Known::new(0.25, by_lineage);
+    let run = |slow: bool| {
+        let mut simulation = start(&model, Settings { slow, ..Settings::default() }, &known);
+        let mut string = ModuleString::default();
+        simulation.at(4.0, &mut string).expect("it runs");
+        (bits(&string), simulation.take_events())
+    };
+    let (fast, slow) = (run(false), run(true));
+    assert!(fast == slow);
+    assert!(fast.1.iter().filter(|event| model.kinds.get(event.kind).name == "B").count() > 10);
+    // The times at which the strain begins to matter, by quadrature of the same polygon.
+    let mut string = ModuleString::default();
+    start(&model, Settings::default(), &known).at(3.9, &mut string).expect("it runs");
+    let modules: Vec<_> = string.iter().filter(|m| model.kinds.get(m.kind).name == "B").collect();
+    assert!(modules.len() > 3);
+    for module in modules {
+        let birth = 3.9 - module.age;
+        let first = if module.lineage.place() == Some(1) { 0.0 } else { 1.0 };
+        // Born at a tick: from 0 there to the value of the next.
+        let strain = |t: f64| match t - birth {
+            since if since < 0.25 => since / 0.25 * by_lineage(birth + 0.25, module.lineage),
+            _ => known.at(t, module.lineage).0,
+        };
+        let rate = |t: f64| if strain(t) > 0.01 { 2.0 } else { strain(t) };
+        let n = 100_000;
+        let h = module.age / f64::from(n);
+        let integral: f64 = (0..n).map(|i| h * rate(birth + (f64::from(i) + 0.5) * h)).sum();
+        let error = (module.parameters[0] - first - integral).abs();
+        assert!(error < 4.0 * h * 2.0, "{error:e}");
+    }
+}
+
+#[test]
+fn neighbours_follow_values_that_read_the_strain() {
+    let text = "initial string: G(0, 0.1) F(0) F(1) F(2) F(0)\n\
+        G(z, w): solve z = 3*strain, 0 = w^3 + w - 20*strain\n\
+        G(z, w) < F(x): solve dx/dt = z + w - x\n\
+        F(y) < F(x) > F(z): solve dx/dt = y - 2*x + z + 5*strain\n\
+        F(y) < F(x): solve dx/dt = y - x + strain";
+    let known = Known::new(0.15, by_lineage);
+    let run =
+        |method, tolerance| string(text, Settings { method, tolerance, ..Settings::default() }, &known, 2.5);
+    let reference = run(Method::Radau, 1e-12);
+    for method in [Method::Auto, Method::Dopri5, Method::Dop853, Method::Radau] {
+        for (own, exact) in run(method, 1e-9).iter().zip(&reference) {
+            for (x, y) in own.1.iter().zip(&exact.1) {
+                assert!((x - y).abs() < 2e-9, "{method:?}: {own:?}, not {exact:?}");
+            }
+        }
+    }
+    let root = (reference[0].1[1], known.at(2.5, Lineage::of_axiom(0)).0);
+    assert!((root.0.powi(3) + root.0 - 20.0 * root.1).abs() < 1e-10);
+}
+
+/// A filament of cells that grow, divide, exchange and snap, all of them under strain.
+fn filament(seed: u64) -> String {
+    let mut dice = Dice(seed);
+    let growth =
+        dice.pick(&["0.2*x*(1 + 20*strain)", "0.3 - 4*strain", "0.1*x*(2 - x) + strain", "0.2*x + 0.001*c"]);
+    let exchange = dice.pick(&[
+        "D*(l + r - 2*c) - 4*strain*c",
+        "D*(l - c) + strain",
+        "D*(l^2 + r^2 - 2*c^2) + (if strain < 0.02 then 0.2 else -c)",
+    ]);
+    let successor = dice.pick(&[
+        "F(0.4*x, c) F(0.6*x, c)",
+        "F(x/2, 1.5*c) [ F(0.3, c) ] F(x/2, c/2)",
+        "F(x/2, c + strain)",
+    ]);
+    let limit = dice.between(0.02, 0.045);
+    let mut cells = String::new();
+    for _ in 0..dice.between(5.0, 30.0) as usize {
+        cells += &format!("F({:.4}, {:.4}) ", dice.between(0.4, 1.0), dice.between(0.6, 3.0));
+    }
+    format!(
+        "const D = {:.3}\ninitial string: H(2) {cells} H(1)\n\
+         F(y, l) < F(x, c) > F(z, r):\n  if x < 1 & strain <= {limit:.4} solve dx/dt = {growth}, dc/dt = {exchange}\n  \
+         if x = 1 produce {successor}\n  if strain > {limit:.4} produce H(c)\n\
+         F(x, c): if x < 1 solve dx/dt = {growth}, dc/dt = -0.1*c if x = 1 produce H(c)\n\
+         H(h): solve dh/dt = 0.5*(2 - h)",
+        dice.between(0.05, 0.6)
+    )
+}
+
+#[test]
+fn local_and_global_schedulers_agree_and_frames_change_nothing() {
+    let mut productions = 0;
+    for seed in 0..40 {
+        let text = filament(seed);
+        let model = model(&text);
+        let known = Known::new([0.05, 0.125, 0.3][seed as usize % 3], by_lineage);
+        let run = |scheduler, frames: u32| {
+            let settings = Settings { scheduler, tolerance: 1e-9, ..Settings::default() };
+            let mut simulation = start(&model, settings, &known);
+            let mut string = ModuleString::default();
+            for i in 1..=frames {
+                simulation.at(2.0 * f64::from(i) / f64::from(frames), &mut string).expect("it runs");
+            }
+            (string, simulation.take_events())
+        };
+        let (local, seen, global) =
+            (run(Scheduler::Auto, 1), run(Scheduler::Auto, 80), run(Scheduler::Global, 1));
+        assert!(bits(&local.0) == bits(&seen.0) && local.1 == seen.1, "{text}");
+        productions += local.1.len();
+        assert_eq!(local.1.len(), global.1.len(), "{text}");
+        for (a, b) in plain(&model, &local.0).iter().zip(&plain(&model, &global.0)) {
+            assert_eq!(a.0, b.0, "{text}");
+            for (x, y) in a.1.iter().zip(&b.1) {
+                assert!((x - y).abs() < 1e-7 * y.abs().max(1.0), "{a:?} {b:?}\n{text}");
+            }
+        }
+    }
+    assert!(productions > 400, "{productions}");
 }
 
 #[test]

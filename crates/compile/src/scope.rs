@@ -450,7 +450,7 @@ impl Scope {
                 .chain(self.constants.keys().filter(|_| self.suggests()))
                 .map(|n| &**n)
                 .chain(RESERVED.into_iter().filter(|_| variables.no_time.is_none()))
-                .chain(["pi"]);
+                .chain(["pi", crate::strain::NAME]);
             let what = match variables.no_time {
                 None => "this is no parameter of the rule and no constant",
                 Some(_) => "this is no constant",
