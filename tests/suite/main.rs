@@ -42,6 +42,7 @@ mod semantics;
 mod shadows;
 mod signals;
 mod strain;
+mod strain_runs;
 mod verify;
 mod view;
 mod wild;

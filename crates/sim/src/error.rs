@@ -345,7 +345,10 @@ impl Error {
             Error::NegativeRate { .. } => {
                 d.help("a rate is at least 0: bound it, as in `at rate max(0, …)`, or say when there is none: `if … at rate … produce …`")
             }
-            Error::Surroundings { failure, .. } => d.help_opt(failure.help.clone()),
+            Error::Surroundings { failure, .. } => match &failure.help {
+                Some(help) => d.help(help.clone()),
+                None => d.help("compare stiffness, widths and loads of the stems, and the units of the model"),
+            },
             Error::InDoubt { near, .. } => d
                 .note(format!(
                     "the two sides are {} apart there, and may be wrong by {}",

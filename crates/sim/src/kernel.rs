@@ -74,7 +74,8 @@ const MAX_STALLED: usize = 100;
 const MAX_STANDING: usize = 1000;
 
 impl<'m> Simulation<'m> {
-    /// Makes the initial string at t = 0 and lets everything happen that happens there.
+    /// Makes the initial string at t = 0 and lets everything happen that happens there. Without surroundings
+    /// ([`Simulation::with_surroundings`]) every `strain` is 0.
     ///
     /// # Errors
     /// If the initial string has no parameters, or what happens at t = 0 fails.

@@ -37,6 +37,11 @@ pub trait Surroundings: Send + Sync {
 
     /// Bytes that a copy takes, about.
     fn size(&self) -> usize;
+
+    /// The work done so far, in units of very roughly a tenth of a microsecond: as [`Simulation::work`], of which it is a part.
+    fn work(&self) -> u64 {
+        0
+    }
 }
 
 /// The values that the surroundings give at a tick.
@@ -109,17 +114,26 @@ pub(super) struct Link {
     /// The modules that read `strain`, in string order, in the structure of some version.
     readers: Vec<ModuleId>,
     version: Option<Version>,
+    /// How often a module has begun new trajectories because of a tick.
+    restarts: u64,
 }
 
 impl Link {
     fn new(source: Box<dyn Surroundings>) -> Link {
         let (string, inputs, readers) = Default::default();
-        Link { source, string, inputs, readers, version: None }
+        Link { source, string, inputs, readers, version: None, restarts: 0 }
     }
 
     /// Bytes that a copy takes, about.
     pub fn size(&self) -> usize {
         self.source.size()
+    }
+
+    /// As [`Surroundings::work`], with that of the modules concerned.
+    pub fn work(&self) -> u64 {
+        /// The cost of a module that begins new trajectories.
+        const RESTART: u64 = 10;
+        self.source.work() + RESTART * self.restarts
     }
 
     /// Finds the modules that read `strain`, if the structure has changed.
@@ -143,7 +157,7 @@ impl Link {
 /// The string of a copy is empty: it is formed anew at the next tick.
 impl Clone for Link {
     fn clone(&self) -> Link {
-        Link::new(self.source.boxed_clone())
+        Link { restarts: self.restarts, ..Link::new(self.source.boxed_clone()) }
     }
 }
 
@@ -207,18 +221,18 @@ impl<'m> Simulation<'m> {
         let Link { source, string, inputs, .. } = link;
         source.tick(string, inputs).map_err(|failure| self.failure(failure, link))?;
         let duration = self.schedule_tick(link, Some(now))?;
-        let mut changed = false;
+        let before = link.restarts;
         for i in 0..link.readers.len() {
             let (index, strain) = (link.inputs.readers[i], link.inputs.strain[i]);
             match self.bend(link.readers[i], strain, duration, now) {
-                Some(bent) => changed |= bent,
+                Some(bent) => link.restarts += u64::from(bent),
                 None => {
                     let why = format!("the strain at the next tick is {}", brief(strain, 6));
                     return Err(self.failure(Failure::new(why).of(index), link));
                 }
             }
         }
-        if changed { self.event_stage().iterate() } else { Ok(()) }
+        if link.restarts > before { self.event_stage().iterate() } else { Ok(()) }
     }
 
     /// Gives a module the slope with which its strain reaches a value after a time; true if that is another slope than before, None if
