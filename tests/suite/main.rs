@@ -42,6 +42,8 @@ mod semantics;
 mod shadows;
 mod signals;
 mod sway;
+mod strain;
+mod strain_runs;
 mod verify;
 mod view;
 mod wild;

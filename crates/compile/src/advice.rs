@@ -79,6 +79,9 @@ pub fn not_a_parameter(name: &Name, head: &HeadModule, variables: &Variables) ->
     if variables.lets.contains_key(&name.text) {
         return error.help("a `let` names an expression; nothing is stored that could be solved");
     }
+    if &*name.text == crate::strain::NAME {
+        return error.help("`strain` follows from the bending of stems; to compute one of your own, give the module a parameter of that name");
+    }
     if variables.names.contains_key(&name.text) && !RESERVED.contains(&&*name.text) {
         return error
             .help("this is a parameter of a neighbour; its equation belongs in the neighbour's rule");

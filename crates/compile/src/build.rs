@@ -15,6 +15,7 @@ use crate::rules::RuleBuilder;
 use crate::scene_checks::TissueNumber;
 use crate::scenery::Nesting;
 use crate::scope::{Scope, Variables};
+use crate::strain::{self, Strains};
 use crate::{Setting, appearance, check, contexts, dead_rules, globals, porting, scene_checks, scenery};
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{
@@ -39,14 +40,15 @@ pub fn build(
     let appearance = appearance::build(document, scope, files);
     let scenery = scenery::build(document, &appearance, scope, files, nesting);
     let mut kinds = Kinds::default();
-    let mut builder = RuleBuilder::new(document, scope, &mut kinds, Clocks::new(document));
+    let hidden = (Clocks::new(document), Strains::new(document, scope));
+    let mut builder = RuleBuilder::new(document, scope, &mut kinds, hidden);
     let mut parts = Parts::default();
     for (item, span) in &document.items {
         parts.item(item, *span, &mut builder);
     }
     parts.check_strings(&mut builder, unread);
     porting::comments(document, &mut builder.scope.diagnostics);
-    let RuleBuilder { occurs, drawn, clocks, tissues, .. } = builder;
+    let RuleBuilder { occurs, drawn, clocks, strains, tissues, .. } = builder;
     if !parts.singles.seen(INITIAL_STRING) && !unread {
         scope.diagnostics.push(
             Diagnostic::error("the model has no initial string")
@@ -64,7 +66,7 @@ pub fn build(
     }
     let places = Places { occurs, drawn, tissues };
     let looks = Looks { parameters, appearance, scenery };
-    Some(parts.model(document, kinds, &clocks, &places, looks, scope))
+    Some(parts.model(document, kinds, (&clocks, &strains), &places, looks, scope))
 }
 
 /// Declarations that were lowered before the rules.
@@ -192,7 +194,7 @@ impl<'d> Parts<'d> {
         self,
         document: &Document,
         mut kinds: Kinds,
-        clocks: &Clocks,
+        (clocks, strains): (&Clocks, &Strains),
         places: &Places,
         looks: Looks,
         scope: &mut Scope,
@@ -206,6 +208,7 @@ impl<'d> Parts<'d> {
             }
         }
         clocks.assign(&mut kinds);
+        strains.assign(&mut kinds);
         let diagnostics = &mut scope.diagnostics;
         let interpretations = assign_interpretations(self.interpretations, &mut kinds, diagnostics);
         contexts::filter(&mut kinds, &self.ignored, &self.considered, diagnostics);
@@ -232,6 +235,7 @@ impl<'d> Parts<'d> {
             check::reachability(&model, &self.written, occurs, diagnostics);
         }
         check::period(self.period, &model, diagnostics);
+        strain::check(&model, strains.first, diagnostics);
         check::coverage(&model, diagnostics);
         dead_rules::rules(&model, &self.written, document, diagnostics);
         check::inert_modules(&model, occurs, diagnostics);

@@ -192,14 +192,15 @@ pub struct Clocks {
 }
 
 /// The name under which clocks are collected: `+`, `-` and `±` share their rules, and so do `+_l`, `-_l` and `±_l`.
-fn sort(name: &str) -> Cow<'_, str> {
+pub(super) fn sort(name: &str) -> Cow<'_, str> {
     match name.strip_prefix(['+', '-']) {
         Some(subscript) => format!("±{subscript}").into(),
         None => name.into(),
     }
 }
 
-fn group(name: &str) -> Cow<'_, str> {
+/// The name under which the kinds are collected that one context pattern may match.
+pub(super) fn group(name: &str) -> Cow<'_, str> {
     if class_of(name) == Class::Word { base_of(name).into() } else { sort(name) }
 }
 

@@ -62,13 +62,17 @@ impl RuleBuilder<'_> {
         let written = self.aggregates_in(rule);
         let own = rule.predecessor.parameters.len() + self.hidden(&rule.predecessor);
         let (mut variables, count) = self.variables(&rule.predecessor, &rule.left, &rule.right, written);
+        self.name_strain(rule, &mut variables);
         self.scope.comparisons.clear();
         self.scope.gathered.clear();
         good &= self.locals(rule, &mut variables);
         let frame = Frame { rule, variables, own, count };
         let mut atoms = Atoms::default();
         let guards = self.guards(&frame, &mut atoms, &mut good);
-        let productions = self.productions(&frame, &guards, &mut atoms, &mut good)?;
+        self.parent_strain = self.strain_parameter(&rule.predecessor);
+        let productions = self.productions(&frame, &guards, &mut atoms, &mut good);
+        self.parent_strain = None;
+        let productions = productions?;
         let smooth = self.smooth_clauses(&frame, &guards, &productions, &mut atoms, &mut good)?;
         if !good {
             return None;
@@ -176,14 +180,18 @@ impl RuleBuilder<'_> {
                 continue;
             };
             equations.rates.extend(hazards.iter().filter_map(|hazard| self.clock_rate(hazard, guard.node)));
+            equations.rates.extend(self.strain_rate(rule));
             let (smooth, switches) = self.smooth(equations.all(), own, count, clause.span, atoms)?;
             equations.set_all(smooth);
             all.push(Smooth { guard: guard.condition.clone(), span: clause.span, equations, switches });
         }
-        if let (true, true, Some(first)) = (*good, all.is_empty(), productions.clocks.first()) {
-            // Clocks run even if the clause has no other equation.
-            let span = productions.produces[first.produce].span;
-            let rates = hazards.iter().filter_map(|hazard| self.clock_rate(hazard, None)).collect();
+        let clock = productions.clocks.first();
+        let strain = self.strain_rate(rule);
+        if *good && all.is_empty() && (clock.is_some() || strain.is_some()) {
+            // Clocks and strains go on even if the rule has no other equation.
+            let span = clock.map_or(rule.head, |first| productions.produces[first.produce].span);
+            let clocks = hazards.iter().filter_map(|hazard| self.clock_rate(hazard, None));
+            let rates = clocks.collect::<Vec<_>>().into_iter().chain(strain).collect();
             let (rates, switches) = self.smooth(rates, own, count, span, atoms)?;
             let equations = Equations { rates, algebraic: Vec::new() };
             all.push(Smooth { guard: Condition::default(), span, equations, switches });
@@ -215,8 +223,11 @@ impl RuleBuilder<'_> {
 
     /// The names of a module's parameters, hidden ones last.
     fn names(&self, module: &HeadModule) -> Vec<String> {
-        let clocks = std::iter::repeat_n("clock".to_owned(), self.hidden(module));
-        module.parameters.iter().map(|p| p.text.to_string()).chain(clocks).collect()
+        let (name, arity) = (&module.name.text, module.parameters.len());
+        let clocks = std::iter::repeat_n("clock", self.clocks.width(name, arity));
+        let strain = ["strain", "slope of the strain"].into_iter().take(self.strains.of(name, arity).width());
+        let hidden = clocks.chain(strain).map(str::to_owned);
+        module.parameters.iter().map(|p| p.text.to_string()).chain(hidden).collect()
     }
 }
 

@@ -102,14 +102,15 @@ fn births(model: &Model, index: usize) -> Option<Vec<Vec<f64>>> {
         let mut next = 0;
         for &kind in &successor.kinds {
             let first = next;
-            next += model.kinds.get(kind).arity;
+            next += model.kinds.get(kind).computed();
             if !is_own(kind) {
                 continue;
             }
             if births.len() == MOST {
                 return None;
             }
-            births.push((first..next).map(|o| constant(successor, o)).collect::<Option<_>>()?);
+            let arity = model.kinds.get(kind).arity;
+            births.push((first..first + arity).map(|o| constant(successor, o)).collect::<Option<_>>()?);
         }
     }
     Some(births)

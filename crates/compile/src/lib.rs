@@ -36,6 +36,7 @@ mod scene_checks;
 mod scenery;
 mod scope;
 mod smooth;
+mod strain;
 mod strings;
 mod surface;
 mod table;

@@ -1,6 +1,5 @@
 //! Measures of a model's strings, written as the head of a rule and an expression: `F(x): x`.
 
-use crate::chance::Clocks;
 use crate::rules::RuleBuilder;
 use crate::scope::{Scope, plural};
 use crate::{Setting, globals};
@@ -25,7 +24,7 @@ pub fn measure(
     globals::declare(&read(&own, files).1, settings, &mut scope, files);
     scope.diagnostics.clear();
     let mut kinds = model.kinds.clone();
-    let mut builder = RuleBuilder::new(&document, &mut scope, &mut kinds, Clocks::default());
+    let mut builder = RuleBuilder::new(&document, &mut scope, &mut kinds, Default::default());
     let (mut variables, count) = builder.variables(&head, &[], &[], 0);
     variables.aggregates = None;
     let value = match expression {

@@ -8,6 +8,7 @@ use crate::chance::Clocks;
 use crate::declared::DeclaredPattern;
 use crate::scene_checks::TissueNumber;
 use crate::scope::{RESERVED, Scope, Variables};
+use crate::strain::Strains;
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_expr::NodeId;
 use dlsys_model::{CUT, Class, DRAWN_WORDS, Interpretation, KindId, Kinds, base_of, class_of};
@@ -20,6 +21,11 @@ pub struct RuleBuilder<'b> {
     pub scope: &'b mut Scope,
     pub kinds: &'b mut Kinds,
     pub clocks: Clocks,
+    pub strains: Strains,
+    /// The number of the strain among the variables of the rule that is being lowered, if its predecessor has one.
+    pub(super) parent_strain: Option<usize>,
+    /// Number of brackets that are open around the part of a string that is being lowered.
+    pub(super) open_around: usize,
     /// Each kind that occurs in a string, with its first place.
     pub occurs: HashMap<KindId, Span>,
     /// Each kind that occurs in the drawing of another kind, with its first place.
@@ -34,22 +40,28 @@ impl<'b> RuleBuilder<'b> {
         document: &'b Document,
         scope: &'b mut Scope,
         kinds: &'b mut Kinds,
-        clocks: Clocks,
+        (clocks, strains): (Clocks, Strains),
     ) -> RuleBuilder<'b> {
+        let (occurs, drawn, tissues) = Default::default();
+        let (parent_strain, open_around) = (None, 0);
         RuleBuilder {
             document,
             scope,
             kinds,
             clocks,
-            occurs: HashMap::new(),
-            drawn: HashMap::new(),
-            tissues: Vec::new(),
+            strains,
+            parent_strain,
+            open_around,
+            occurs,
+            drawn,
+            tissues,
         }
     }
 
     /// Number of hidden parameters of a module.
     pub(super) fn hidden(&self, module: &HeadModule) -> usize {
-        self.clocks.width(&module.name.text, module.parameters.len())
+        let (name, arity) = (&module.name.text, module.parameters.len());
+        self.clocks.width(name, arity) + self.strains.of(name, arity).width()
     }
 
     /// A module of a context by name; its kinds are resolved later.
@@ -144,8 +156,8 @@ impl<'b> RuleBuilder<'b> {
         if !self.not_a_bracket(head, false) {
             return None;
         }
-        // Drawings and measures read the written parameters only, without clocks.
-        let clocks = std::mem::take(&mut self.clocks);
+        // Drawings and measures read the written parameters only.
+        let (clocks, strains) = (std::mem::take(&mut self.clocks), std::mem::take(&mut self.strains));
         let (mut variables, count) = self.variables(head, &[], &[], 0);
         // They have no aggregates.
         variables.aggregates = None;
@@ -162,7 +174,7 @@ impl<'b> RuleBuilder<'b> {
         // A module that is only drawn does not develop and makes no rule reachable.
         let before = std::mem::take(&mut self.occurs);
         let drawn = self.string(drawn, &variables, count, false);
-        self.clocks = clocks;
+        (self.clocks, self.strains) = (clocks, strains);
         let inside = std::mem::replace(&mut self.occurs, before);
         let kind = self.kinds.intern(&head.name.text, head.parameters.len());
         self.drawn.extend(inside.into_iter().filter(|(other, _)| *other != kind));

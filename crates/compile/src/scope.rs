@@ -428,6 +428,8 @@ impl Scope {
             Diagnostic::error(format!("`{name}` has no meaning here"))
                 .at(span, "time is known in rules only")
                 .help(variables.no_time.unwrap_or("use it in a rule"))
+        } else if &**name == crate::strain::NAME {
+            crate::strain::misplaced(span)
         } else if self.curves.contains_key(name) {
             Diagnostic::error(format!("`{name}` is a curve"))
                 .at(span, "a function of one number")
@@ -448,7 +450,7 @@ impl Scope {
                 .chain(self.constants.keys().filter(|_| self.suggests()))
                 .map(|n| &**n)
                 .chain(RESERVED.into_iter().filter(|_| variables.no_time.is_none()))
-                .chain(["pi"]);
+                .chain(["pi", crate::strain::NAME]);
             let what = match variables.no_time {
                 None => "this is no parameter of the rule and no constant",
                 Some(_) => "this is no constant",

@@ -102,7 +102,11 @@ impl RuleBuilder<'_> {
         let mut lowered = Vec::new();
         let mut open = Vec::new();
         let is_module = |part: &ast::Part| matches!(part, ast::Part::Module(_));
+        let around = self.open_around;
         for run in parts.chunk_by(|a, b| is_module(a) && is_module(b)) {
+            if !is_module(&run[0]) {
+                self.open_around = around + open.len();
+            }
             lowered.push(match &run[0] {
                 ast::Part::Module(_) => {
                     let modules: Vec<&ast::Module> = modules_of(run).collect();
@@ -111,6 +115,7 @@ impl RuleBuilder<'_> {
                 ast::Part::Repeat(of) => self.repetition(of, variables, count, draws).map(Part::Repeat),
                 ast::Part::If(of) => self.conditional(of, variables, count, draws).map(Part::Choice),
             });
+            self.open_around = around;
         }
         let lowered: Option<Vec<Part>> = lowered.into_iter().collect();
         let help = "brackets must match within each string, and within each repetition and condition";
@@ -230,6 +235,8 @@ impl RuleBuilder<'_> {
                 drawn.modules.push((place, draws));
             }
             clocks.extend(self.clocks.for_new(&module.name, module.arguments.len(), place, roots.len()));
+            let in_branch = !open.is_empty() || self.open_around > 0;
+            roots.extend(self.strain_of_new(module, in_branch));
             place += usize::from(!kind.is_bracket());
             if !kind.is_bracket() && places.len() < Stretch::PLACES {
                 places.push((kind, module.span));

@@ -54,12 +54,44 @@ pub struct Kind {
     /// The hidden parameters, which follow the written ones: the clocks of events at a rate, by the keys of their clauses.
     /// Kinds with the same base name and number of parameters have the same number of them.
     pub clocks: Vec<u64>,
+    /// The hidden parameters behind the clocks: `strain` and its rate of change.
+    pub strain: Strain,
+}
+
+/// The hidden parameters for `strain` of a kind: its value, and the slope with which it goes on until the surroundings give the
+/// next value. Kinds with the same base name and number of parameters have the same number of them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Strain {
+    /// It has none.
+    #[default]
+    Absent,
+    /// It has them because another kind that the same context patterns match reads them; they stay 0.
+    Unread,
+    /// Some rule of the kind reads `strain`.
+    Read,
+}
+
+impl Strain {
+    /// Number of hidden parameters that stand for it.
+    pub fn width(self) -> usize {
+        if self == Strain::Absent { 0 } else { 2 }
+    }
 }
 
 impl Kind {
     /// Number of parameters, hidden ones included.
     pub fn width(&self) -> usize {
-        self.arity + self.clocks.len()
+        self.computed() + self.clocks.len()
+    }
+
+    /// Number of parameters that a string computes for a new module: all but the clocks.
+    pub fn computed(&self) -> usize {
+        self.arity + self.strain.width()
+    }
+
+    /// Number of the hidden parameter `strain`, behind which its slope stands, if a rule reads it.
+    pub fn strain_parameter(&self) -> Option<usize> {
+        (self.strain == Strain::Read).then_some(self.arity + self.clocks.len())
     }
 
     /// Indices of its continuous and then its discrete rules.
@@ -162,6 +194,7 @@ impl Kinds {
             interpretation: None,
             skipped: class_of(name) != Class::Word,
             clocks: Vec::new(),
+            strain: Strain::Absent,
         });
         self.ids.insert((name.to_owned(), arity), id);
         id

@@ -54,7 +54,7 @@ pub use condition::{Condition, ConditionStep};
 pub use dlsys_expr::{Comparison, Fold, Sign, Truth};
 pub use kind::{
     BUILT_IN_SURFACES, COMMAND_SURFACES, CUT, Class, DRAWN_WORDS, ELASTIC, GROUND, Kind, KindId, Kinds,
-    SURFACE_SIZES, base_of, class_of,
+    SURFACE_SIZES, Strain, base_of, class_of,
 };
 pub use measure::Measure;
 pub use physics::{Flow, Primitive, Spectrum, Tissue, Units, Wind};
@@ -117,6 +117,11 @@ impl Model {
 }
 
 impl Model {
+    /// True if some rule reads `strain`, so that growth depends on how stems bend.
+    pub fn reads_strain(&self) -> bool {
+        self.kinds.iter().any(|(_, kind)| kind.strain == Strain::Read)
+    }
+
     /// The names of a kind's parameters: as in its first rule, or else their numbers.
     pub fn parameter_names(&self, kind: KindId) -> Vec<String> {
         let kind = self.kinds.get(kind);

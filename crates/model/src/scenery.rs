@@ -64,10 +64,8 @@ impl Model {
     /// True if a run of this model depends on the seed.
     pub fn is_random(&self) -> bool {
         !self.axiom.is_certain()
-            || self
-                .rules
-                .iter()
-                .any(|rule| rule.hidden > 0 || rule.produces.iter().any(|p| p.outcome.is_random()))
+            || self.kinds.iter().any(|(_, kind)| !kind.has_no_rules() && !kind.clocks.is_empty())
+            || self.rules.iter().any(|rule| rule.produces.iter().any(|p| p.outcome.is_random()))
             || self.scenery.plants.iter().any(|plant| plant.is_random)
     }
 }

@@ -38,7 +38,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use dlsys_model::Model;
-use dlsys_sim::{Error, Event, Passed, Settings, Simulation, happens_by};
+use dlsys_sim::{Error, Event, Passed, Settings, Simulation, Surroundings, happens_by};
 use dlsys_tree::{Lineage, ModuleString, SimTime};
 
 /// A model at a present time, which can be moved to any other time.
@@ -118,7 +118,23 @@ impl<'m> Replay<'m> {
     /// # Errors
     /// Those of [`Simulation::new`].
     pub fn new(model: &'m Model, settings: Settings) -> Result<Replay<'m>, Error> {
-        let live = Simulation::new(model, Settings { log: true, ..settings })?;
+        Replay::begin(Simulation::new(model, Settings { log: true, ..settings })?)
+    }
+
+    /// Starts a model at t = 0 in surroundings, as [`Simulation::with_surroundings`] does.
+    ///
+    /// # Errors
+    /// Those of [`Simulation::with_surroundings`].
+    pub fn with_surroundings(
+        model: &'m Model,
+        settings: Settings,
+        surroundings: Box<dyn Surroundings>,
+    ) -> Result<Replay<'m>, Error> {
+        let settings = Settings { log: true, ..settings };
+        Replay::begin(Simulation::with_surroundings(model, settings, surroundings)?)
+    }
+
+    fn begin(live: Simulation<'m>) -> Result<Replay<'m>, Error> {
         let mut replay = Replay {
             live,
             time: 0.0,

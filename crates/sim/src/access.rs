@@ -68,6 +68,7 @@ impl Simulation<'_> {
         const STEP: [u64; 2] = [10, 100];
         let stats = self.stats();
         let steps = STEP[usize::from(self.setup.looks_around)] * stats.steps;
-        4 * (stats.events + self.schedule.passed) + stats.rhs_evaluations / 8 + steps
+        let around = self.surroundings.as_ref().map_or(0, |link| link.work());
+        4 * (stats.events + self.schedule.passed) + stats.rhs_evaluations / 8 + steps + around
     }
 }

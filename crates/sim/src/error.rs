@@ -1,6 +1,7 @@
 //! Errors of a run, and the messages that explain them.
 
 use crate::memory::Shortage;
+use crate::surroundings::Failure;
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{Distribution, Remedy};
 use dlsys_tree::Lineage;
@@ -162,6 +163,14 @@ pub enum Error {
         /// The distance of the two sides.
         near: Box<Near>,
     },
+    /// The surroundings cannot go on: [`Failure`](crate::Failure).
+    #[error("the surroundings of {} fail at t = {}: {}", .site.module, .site.when(), .failure.why)]
+    Surroundings {
+        /// The module that the surroundings name, or the first one.
+        site: Site,
+        /// The reason.
+        failure: Box<Failure>,
+    },
     /// No step of the integration goes on.
     #[error("the step size fell to nothing at t = {}", .site.when())]
     StepTooSmall {
@@ -241,6 +250,7 @@ impl Error {
             Error::BadWeights { .. } => "BadWeights",
             Error::BadBounds { .. } => "BadBounds",
             Error::NegativeRate { .. } => "NegativeRate",
+            Error::Surroundings { .. } => "Surroundings",
             Error::StepTooSmall { .. } => "StepTooSmall",
             Error::InDoubt { .. } => "InDoubt",
             Error::Unsolved { .. } => "Unsolved",
@@ -265,6 +275,7 @@ impl Error {
             | Error::BadWeights { site, .. }
             | Error::BadBounds { site, .. }
             | Error::NegativeRate { site }
+            | Error::Surroundings { site, .. }
             | Error::StepTooSmall { site }
             | Error::InDoubt { site, .. }
             | Error::Unsolved { site, .. }
@@ -334,6 +345,10 @@ impl Error {
             Error::NegativeRate { .. } => {
                 d.help("a rate is at least 0: bound it, as in `at rate max(0, …)`, or say when there is none: `if … at rate … produce …`")
             }
+            Error::Surroundings { failure, .. } => match &failure.help {
+                Some(help) => d.help(help.clone()),
+                None => d.help("compare stiffness, widths and loads of the stems, and the units of the model"),
+            },
             Error::InDoubt { near, .. } => d
                 .note(format!(
                     "the two sides are {} apart there, and may be wrong by {}",
@@ -392,6 +407,7 @@ impl Error {
             Error::BadWeights { .. } => "by the weights of this clause",
             Error::BadBounds { .. } => "from the first to the second",
             Error::NegativeRate { .. } => "the rate of this clause",
+            Error::Surroundings { .. } => "computed for this",
             Error::StepTooSmall { .. } => "these equations",
             Error::InDoubt { .. } => "met, or only nearly?",
             Error::Unsolved { .. } => "solved for here",

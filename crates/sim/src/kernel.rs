@@ -21,6 +21,7 @@ use super::observe::cache::FrameCache;
 use super::schedule::{Entry, NextEvent, Owner, Schedule, is_before};
 use super::scratch::Scratch;
 use super::setup::Setup;
+use super::surroundings::Link;
 use super::world::neighbours::Neighbours;
 use super::world::new_modules::{NewModules, kinds_of};
 use super::world::state::NextKind;
@@ -49,6 +50,8 @@ pub struct Simulation<'m> {
     pub(super) log: Log,
     pub(super) frames: FrameCache,
     pub(super) scratch: Scratch,
+    /// None for a model that reads nothing of its surroundings.
+    pub(super) surroundings: Option<Box<Link>>,
     budget: Budget,
     progress: Progress,
     /// The error with which the simulation has ended.
@@ -71,7 +74,8 @@ const MAX_STALLED: usize = 100;
 const MAX_STANDING: usize = 1000;
 
 impl<'m> Simulation<'m> {
-    /// Makes the initial string at t = 0 and lets everything happen that happens there.
+    /// Makes the initial string at t = 0 and lets everything happen that happens there. Without surroundings
+    /// ([`Simulation::with_surroundings`]) every `strain` is 0.
     ///
     /// # Errors
     /// If the initial string has no parameters, or what happens at t = 0 fails.
@@ -88,6 +92,7 @@ impl<'m> Simulation<'m> {
             log: Log { stats: Stats::default(), events: settings.log.then(Vec::new) },
             frames: FrameCache::new(),
             scratch: Scratch::default(),
+            surroundings: None,
             budget: Budget::default(),
             progress: Progress::default(),
             fault: None,
@@ -137,7 +142,7 @@ impl<'m> Simulation<'m> {
     }
 
     /// The parts that event iteration works on.
-    fn event_stage(&mut self) -> EventStage<'_, 'm> {
+    pub(super) fn event_stage(&mut self) -> EventStage<'_, 'm> {
         EventStage {
             setup: &self.setup,
             instant: &mut self.instant,
@@ -233,6 +238,10 @@ impl<'m> Simulation<'m> {
                 self.schedule.take(&next);
                 self.go_on(entry)?;
             }
+            NextEvent::Other(Entry { owner: Owner::Tick, at, .. }) => {
+                self.schedule.take(&next);
+                self.pass_tick(at)?;
+            }
             _ => self.pass_event(next)?,
         }
         Ok(Some(event))
@@ -261,7 +270,7 @@ impl<'m> Simulation<'m> {
         self.progress.stalled = 0;
         match entry.owner {
             Owner::Coupled => self.flow_stage().pass_coupled_step(entry.at),
-            Owner::Derivation => unreachable!("a derivation step is an event"),
+            Owner::Derivation | Owner::Tick => unreachable!("they are events"),
             Owner::Module(slot) => {
                 let id = self.world.states[slot as usize].as_ref().expect("scheduled").id;
                 self.flow_stage().pass_window(id, entry.at)
@@ -308,6 +317,11 @@ impl<'m> Simulation<'m> {
             }
             self.schedule.take(&next);
             let id = match next {
+                // A tick comes after all that happens at its instant.
+                NextEvent::Other(Entry { owner: Owner::Tick, .. }) => {
+                    later.push(next);
+                    continue;
+                }
                 // The common step does not go on before what happens at this instant.
                 NextEvent::Other(Entry { owner: Owner::Coupled, .. }) if !batch.is_empty() => {
                     later.push(next);
@@ -398,7 +412,8 @@ impl<'m> Simulation<'m> {
 
     /// Bytes that a copy takes, about.
     pub fn size(&self) -> usize {
-        budget::size(&self.setup, &self.world, self.flows.coupled.members.len())
+        let around = self.surroundings.as_ref().map_or(0, |link| link.size());
+        budget::size(&self.setup, &self.world, self.flows.coupled.members.len()) + around
     }
 }
 
@@ -406,7 +421,7 @@ impl<'m> Simulation<'m> {
 fn is_event(world: &World, owner: Owner) -> bool {
     match owner {
         Owner::Coupled => false,
-        Owner::Derivation => true,
+        Owner::Derivation | Owner::Tick => true,
         Owner::Module(slot) => {
             world.states[slot as usize].as_ref().is_some_and(|s| s.next.kind != NextKind::Window)
         }
@@ -424,6 +439,7 @@ fn site_of_next(setup: &Setup, world: &World, flows: &Flows, events: &Events, ne
             },
             Owner::Derivation => events.steps.first().unwrap_or_else(|| flows.anyone(world)),
             Owner::Coupled => flows.anyone(world),
+            Owner::Tick => return world.site_of_first(setup.model, next.at()),
         },
     };
     world.site_of_module(setup.model, id, next.at())

@@ -13,6 +13,7 @@
 //! - `world`: the modules, their states and lives, contexts and neighbours.
 //! - `schedule`: one order of time. `event`: event iteration at one instant.
 //! - `flow`: from one instant to the next; `trajectory`: closed forms. `detect`: zero crossings, doubts, pulses.
+//! - `surroundings`: what acts on the modules from outside, on a grid of time of its own.
 //! - `observe`: frames and inspection; `access`: random access in time. `log`, `budget`, `memory`: records and limits.
 //!
 //! Imports point from `kernel` to `event` to `flow` to `detect` and `schedule` to `world`; a stage is handed the parts that
@@ -79,6 +80,7 @@ mod schedule;
 mod scratch;
 mod settings;
 mod setup;
+mod surroundings;
 mod trajectory;
 mod world;
 
@@ -90,4 +92,5 @@ pub use kernel::Simulation;
 pub use log::{Event, ModuleState, Transition};
 pub use observe::inspect::{InspectedModule, Inspection};
 pub use settings::{Scheduler, Settings, Stats};
+pub use surroundings::{Failure, Inputs, Surroundings};
 pub use world::{brief, describe};

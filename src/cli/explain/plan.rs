@@ -284,11 +284,18 @@ impl Facts<'_> {
         let mut kinds = model.kinds.iter().filter(|(_, kind)| kind.rules.contains(&rule));
         let coupled = kinds.any(|(id, _)| self.work[id.index()] == Work::Coupled);
         let shown = compiled.parameters.len() - compiled.hidden;
-        let is_named = |v: usize| v < shown || self.clock(compiled, v).is_some();
+        let strain = self.strain(rule);
+        let is_named = |v: usize| v < shown || self.clock(compiled, v).is_some() || Some(v) == strain;
         (0..compiled.parameters.len())
             .filter(|v| is_named(*v))
             .map(|parameter| {
                 let name = self.name(compiled, parameter).unwrap_or_default();
+                if Some(parameter) == strain {
+                    let why =
+                        "follows from the bending of the stem, at the ticks of its grid of time".to_owned();
+                    let law = Some("linear from tick to tick".to_owned());
+                    return ParameterPlan { name, class: "given", law, why, reads: Vec::new() };
+                }
                 if let Some(place) = solve.algebraic.of.iter().position(|p| *p == parameter) {
                     return given::parameter(self, compiled, solve, place);
                 }
@@ -342,6 +349,12 @@ impl Facts<'_> {
             boundary = format!("{clock} = 0");
         }
         ConditionPlan { boundary, line, decides, found }
+    }
+
+    /// The number of `strain` among the parameters of a rule, if its modules have one.
+    fn strain(&self, rule: usize) -> Option<usize> {
+        let mut kinds = self.model.kinds.iter().filter(|(_, kind)| kind.rules.contains(&rule));
+        kinds.find_map(|(_, kind)| kind.strain_parameter())
     }
 
     /// The name of a variable of a rule; None for truth values.

@@ -50,7 +50,8 @@ impl Steps {
         };
         let has_rules = model.kinds.iter().map(|(_, kind)| !kind.steps.is_empty());
         let is_settled = (model.kinds.iter()).map(|(_, kind)| {
-            kind.rules.is_empty() && kind.steps.iter().all(|r| reads_itself(&model.rules[*r]))
+            let rests = kind.rules.is_empty() && kind.strain_parameter().is_none();
+            rests && kind.steps.iter().all(|r| reads_itself(&model.rules[*r]))
         });
         let exact = exact_atoms(model);
         Steps { has_rules: has_rules.collect(), is_settled: is_settled.collect(), exact, ..Steps::default() }

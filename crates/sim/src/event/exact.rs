@@ -31,6 +31,10 @@ fn inexact(model: &Model) -> Vec<Vec<bool>> {
             for solve in kind.all_rules().flat_map(|rule| &model.rules[rule].solves) {
                 solve.of.iter().chain(&solve.algebraic.of).for_each(|p| moves[*p] = true);
             }
+            // Where there are discrete rules only, the strain moves without an equation.
+            if let Some(strain) = kind.strain_parameter() {
+                moves[strain] = true;
+            }
             moves
         })
         .collect();
@@ -43,14 +47,14 @@ fn inexact(model: &Model) -> Vec<Vec<bool>> {
                 let mut output = 0;
                 for &kind in &stretch.kinds {
                     for parameter in 0..model.kinds.get(kind).arity {
-                        let read = stretch.arguments.output_reads(output);
-                        output += 1;
+                        let read = stretch.arguments.output_reads(output + parameter);
                         if !inexact[kind.index()][parameter]
                             && read.iter().any(|v| reads(model, &inexact, rule, *v))
                         {
                             news.push((kind, parameter));
                         }
                     }
+                    output += model.kinds.get(kind).computed();
                 }
             }
         }

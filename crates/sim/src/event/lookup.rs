@@ -37,6 +37,8 @@ impl EventStage<'_, '_> {
                 && !self.begin_predicted(id, rule)
             {
                 self.take_up(id, rule, &Context::default());
+            } else if self.setup.reads_strain && model.kinds.get(kind).rules.is_empty() {
+                self.world.bend_at_rest(model, id, self.instant.at);
             }
         }
         clear(&mut fresh);
@@ -73,6 +75,7 @@ impl EventStage<'_, '_> {
                     self.world.rebase(id, self.instant.at);
                     self.flow().forget(id);
                     self.world.new_state(id).restarted = self.instant.number;
+                    self.world.bend_at_rest(model, id, self.instant.at);
                     self.events.ready.push(id);
                 }
                 continue;

@@ -35,7 +35,8 @@ impl EventStage<'_, '_> {
                 NextEvent::Other(entry) => entry.owner,
             };
             let first = match owner {
-                Owner::Coupled => None,
+                // Ticks are not in a batch.
+                Owner::Coupled | Owner::Tick => None,
                 Owner::Derivation => {
                     self.begin_step();
                     None

@@ -14,7 +14,6 @@ use crate::error::Error;
 use crate::kernel::Simulation;
 use crate::trajectory::{AutonomousFlow, Riccati};
 use crate::world::life::LifeClass;
-use crate::world::site_of_axiom;
 use cache::{Column, FrameCache};
 use dlsys_expr::{LANES, Lanes, Program};
 use dlsys_model::{DrivenGrowth, SolutionForm};
@@ -30,16 +29,7 @@ impl Simulation<'_> {
         if again {
             out.show(t, now);
         } else {
-            let site = || {
-                let first = self.world.tree.walk().find_map(|visit| match visit {
-                    Visit::Module(id) => Some(id),
-                    _ => None,
-                });
-                match first {
-                    Some(id) => self.world.site_of_module(self.setup.model, id, self.instant.at),
-                    None => site_of_axiom(self.instant.at.to_f64()),
-                }
-            };
+            let site = || self.world.site_of_first(self.setup.model, self.instant.at);
             afford_string(&self.setup, &self.world, site)?;
             self.rebuild(&mut cache, t, now, out);
             cache.version = Some(version);

@@ -5,12 +5,14 @@ use std::collections::BinaryHeap;
 
 use dlsys_tree::SimTime;
 
-/// The subject of an entry: a slot of the tree, the coupled modules together, or all that discrete rules apply to.
+/// The subject of an entry: a slot of the tree, the coupled modules together, all that discrete rules apply to, or the
+/// surroundings, which come last at an instant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Owner {
     Module(u32),
     Coupled,
     Derivation,
+    Tick,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -50,6 +52,7 @@ pub struct IndexedQueue {
     serials: Vec<u32>,
     coupled: u32,
     step: u32,
+    tick: u32,
 }
 
 impl IndexedQueue {
@@ -57,6 +60,7 @@ impl IndexedQueue {
         match owner {
             Owner::Coupled => &mut self.coupled,
             Owner::Derivation => &mut self.step,
+            Owner::Tick => &mut self.tick,
             Owner::Module(slot) => {
                 let slot = slot as usize;
                 if self.serials.len() <= slot {
@@ -96,6 +100,7 @@ impl IndexedQueue {
         let serial = |owner| match owner {
             Owner::Coupled => Some(self.coupled),
             Owner::Derivation => Some(self.step),
+            Owner::Tick => Some(self.tick),
             Owner::Module(slot) => self.serials.get(slot as usize).copied(),
         };
         self.heap.iter().filter(move |entry| serial(entry.owner) == Some(entry.serial))

@@ -157,8 +157,8 @@ pub struct Lives {
 }
 
 impl Lives {
-    /// No classes yet. A kind can have some if its rule needs no context and has rates only, and no rule looks for it as
-    /// a context.
+    /// No classes yet. A kind can have some if its rule needs no context, has rates only and does not read `strain`, and no
+    /// rule looks for it as a context.
     pub fn new(model: &Model, kinds_with_context: &[bool]) -> Lives {
         let mut seen = vec![false; model.kinds.len()];
         for rule in &model.rules {
@@ -170,6 +170,8 @@ impl Lives {
         let rules = (model.kinds.iter())
             .map(|(id, kind)| {
                 let alone = !kinds_with_context[id.index()] && !seen[id.index()] && kind.steps.is_empty();
+                // The surroundings change the strain at any time.
+                let alone = alone && kind.strain_parameter().is_none();
                 // Algebraic parameters must be made consistent first.
                 kind.rules.first().copied().filter(|rule| alone && !model.rules[*rule].is_algebraic())
             })

@@ -274,6 +274,18 @@ impl World {
         self.site(model, id, rule, span, at)
     }
 
+    /// The place of an error that concerns no module in particular: the first one, if there is one.
+    pub fn site_of_first(&self, model: &Model, at: SimTime) -> Site {
+        let first = self.tree.walk().find_map(|visit| match visit {
+            Visit::Module(id) => Some(id),
+            _ => None,
+        });
+        match first {
+            Some(id) => self.site_of_module(model, id, at),
+            None => site_of_axiom(at.to_f64()),
+        }
+    }
+
     /// The place of an error in the rule that a module lives under.
     pub fn site_of_rule(&self, model: &Model, id: ModuleId, at: SimTime) -> Site {
         let rule = self.rule_and_clause(id).0.unwrap_or(0);

@@ -198,6 +198,9 @@ fn hint_by_symbol(item: Rule, text: &str, at: usize, found: &str) -> Option<Stri
         {
             "a number begins and ends with a digit: `0.5`, `2`"
         }
+        (_, ".") if text[at + 1..].starts_with("strain") => {
+            "a rule reads its own `strain` only: let the neighbour hold its own in a parameter, `solve s = strain`, and read that"
+        }
         (Some(')'), ":") if in_rule && !before.contains(':') => {
             "a rule has one predecessor; modules around it are its context: `A(x) < B(y) > C(z):`"
         }
