@@ -101,7 +101,7 @@ impl Solver {
 
     /// Factorises stiffness plus `shift` times mass. Returns whether it is positive.
     fn factor(&mut self, skeleton: &Skeleton, state: &State, shift: f64) -> bool {
-        let weights = Weights { mass: shift, damping: 0.0, stiffness: 1.0 };
+        let weights = Weights { mass: shift, damping: 0.0, stiffness: 1.0, extra: 0.0, blur: 0.0 };
         let bend = Bend { strain: &state.strain, rate: &state.rate };
         let now = Instant { wind: &Still, from: 0.0, to: 0.0 };
         self.work.spread(skeleton, &self.settings.air, bend, now, (1.0, 0.0), &weights);
@@ -154,9 +154,8 @@ impl Solver {
             let free = |index: usize| soft(&held, index).map(|rigidity| rigidity.map(|value| 1.0 / value));
             (0..n)
                 .map(|index| {
-                    free(index).map_or_else(Vector::zeros, |inverse| {
-                        work.links[index].pull.component_mul(&inverse)
-                    })
+                    free(index)
+                        .map_or_else(Vector::zeros, |inverse| work.links[index].pull.component_mul(&inverse))
                 })
                 .collect()
         };

@@ -73,11 +73,12 @@ mod settings;
 mod skeleton;
 mod solver;
 mod state;
+pub mod study;
 mod sweep;
 
+pub use air::{Air, Still, Wind};
 pub use analysis::{Mode, cauchy_number};
 pub use energy::Energy;
-pub use air::{Air, Still, Wind};
 pub use error::Error;
 pub use pose::{Frame, Pose};
 pub use settings::{Fixed, Growth, Method, Settings};

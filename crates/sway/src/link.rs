@@ -11,6 +11,10 @@ pub(crate) struct Weights {
     pub mass: f64,
     pub damping: f64,
     pub stiffness: f64,
+    /// Elastic stiffness in addition, without the geometric one.
+    pub extra: f64,
+    /// Square of the time for which levers of masses are unsure, in s².
+    pub blur: f64,
 }
 
 /// The working memory of one segment.

@@ -1,8 +1,8 @@
 //! The solver: steps on a global grid, of controlled error.
 
 use crate::air::Wind;
-use crate::ros2::StepError;
 use crate::link::Weights;
+use crate::ros2::StepError;
 use crate::sweep::{Bend, Instant, Workspace};
 use crate::{Error, Growth, Method, Settings, Skeleton, State, Step};
 
@@ -85,7 +85,7 @@ impl Solver {
         self.skeleton.clear();
         self.renew(state, time, &mut crate::Fixed(skeleton))?;
         let (skeleton, air) = (&self.skeleton, &self.settings.air);
-        let explicit = Weights { mass: 1.0, damping: 0.0, stiffness: 0.0 };
+        let explicit = Weights { mass: 1.0, damping: 0.0, stiffness: 0.0, extra: 0.0, blur: 0.0 };
         let bend = Bend { strain: &state.strain, rate: &state.rate };
         let now = Instant { wind, from: time, to: time };
         self.work.spread(skeleton, air, bend, now, (1.0, 0.0), &explicit);
