@@ -41,7 +41,7 @@ fn lengthen(skeleton: &Skeleton, values: &mut [Vector]) {
 
 impl Solver {
     /// The `count` slowest vibrations about a strain, with the geometric stiffness of the weight, slowest first. Stems with round sections
-    /// have them in pairs.
+    /// have them in pairs. Pure torsion, which moves no centre line, is left out.
     ///
     /// # Errors
     ///

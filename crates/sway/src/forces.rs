@@ -5,7 +5,7 @@ use crate::place::{Local, Motion, Place};
 use crate::{Air, Load, Matrix, Plate, Segment, Vector};
 
 /// Gauss points on a segment: fractions of its length. Each has half of it.
-pub(crate) const GAUSS: [f64; 2] = [0.211_324_865_405_187_12, 0.788_675_134_594_812_9];
+pub(crate) const GAUSS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 /// Where the matrix sees the drag of a segment: the point that has the right damping of its own bending, ∫₀¹ (ξ²/2)² dξ = 1/20.
 const DRAG: f64 = 0.668_740_304_976_422;
 
@@ -252,7 +252,7 @@ impl Part<'_> {
     #[inline(always)]
     pub(crate) fn damper(&self, local: &Local, stretch: &Stretch, wind: &Vector) -> Damper {
         let area = self.segment.drag_diameter * self.segment.length;
-        if !(area > 0.0) {
+        if area <= 0.0 {
             return Damper::ZERO;
         }
         let section = local.section(DRAG);

@@ -40,7 +40,7 @@ impl StepError {
     /// Takes a displacement into account. The first that is not a number stays.
     #[inline(always)]
     pub(crate) fn meet(&mut self, displacement: f64, segment: usize) {
-        if !self.displacement.is_nan() && !(displacement <= self.displacement) {
+        if !self.displacement.is_nan() && (displacement.is_nan() || displacement > self.displacement) {
             *self = StepError { displacement, segment };
         }
     }

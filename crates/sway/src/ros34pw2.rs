@@ -58,7 +58,7 @@ impl Workspace {
         let step = GAMMA * h;
         aside.fit(skeleton);
         aside.rest_moments.clone_from(&self.rest_moments);
-        let weights = Weights { mass: 1.0, damping: step, stiffness: step * step, extra: 0.0, blur: h * h };
+        let weights = Weights { mass: 1.0, damping: step, stiffness: step * step, extra: 0.0, blur: 0.0 };
         let bend = Bend { strain: &before.strain, rate: &before.rate };
         self.spread(skeleton, air, bend, instant, (0.0, 0.0), &weights);
         self.gather(skeleton, &before.rate, &weights, 0.0);

@@ -172,7 +172,7 @@ impl Solver {
 
     /// The level of the next step: one less if the error leaves room for it and the grid of longer steps has a point at `end`.
     fn next_level(&self, level: u32, excess: f64, end: f64) -> u32 {
-        if level == 0 || self.settings.fixed || !(excess * self.exponent().exp2() * 1.6 < 1.0) {
+        if level == 0 || self.settings.fixed || excess * self.exponent().exp2() * 1.6 >= 1.0 {
             return level;
         }
         let longer = self.settings.longest / f64::from(level - 1).exp2();
