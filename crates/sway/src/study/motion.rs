@@ -254,8 +254,8 @@ pub struct WorkRow {
     pub error: f64,
 }
 
-/// The implicit methods side by side: error of a stem in gusts against work, by tolerance. The reference is the method of order 3 at a
-/// tolerance of 1e-9.
+/// The implicit methods side by side: error of a stem in gusts against work, by tolerance. The reference is ROS2 at a
+/// tolerance of 1e-7. A method that fails at a tolerance has no row.
 ///
 /// # Errors
 ///
@@ -286,11 +286,11 @@ pub fn methods() -> Result<Vec<WorkRow>, Error> {
         let counts = solver.counts();
         Ok((frames, counts.steps + counts.rejected))
     };
-    let reference = run(Method::Ros34Pw2, 1e-9)?.0;
+    let reference = run(Method::Ros2, 1e-7)?.0;
     let mut all = Vec::new();
     for (method, evaluations) in [(Method::Euler, 1), (Method::Ros2, 2), (Method::Ros34Pw2, 4)] {
         for tolerance in [1e-2, 1e-3, 1e-4, 1e-5] {
-            let (frames, steps) = run(method, tolerance)?;
+            let Ok((frames, steps)) = run(method, tolerance) else { continue };
             let error = frames.iter().zip(&reference).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
             all.push(WorkRow { method, tolerance, steps, evaluations: steps * evaluations, error });
         }
