@@ -13,7 +13,7 @@ const DIVIDING: &str = "units length 0.1, time 1\n\
     tissue stalk = stiffness 6e7, density 900, damping 0.05\n\
     wind 1, 0, 0.3 speed 4 turbulence 0.4 scale 2\n\
     initial string: @E(stalk) S(1) /(20) S(1.3) [ +(40) S(0.5) @L(1) ] /(50) S(0.9) @K(1.5)\n\
-    S(x): if x < 2 solve dx/dt = 0.4x if x = 2 produce S(0.8) /(33) S(1.2)\n\
+    S(x): if x < 2 solve dx/dt = 0.4x if x = 2 produce S(0.8) /(33) S(1.2) \\(33)\n\
     interpret S(x): !(0.06) F(x)\n";
 
 fn read(name: &str, text: &str) -> Session {
@@ -62,19 +62,20 @@ fn instants(session: &Session, end: f64) -> Vec<f64> {
 
 /// The largest jumps of position and of velocity of what is there before and after an instant.
 fn jumps(session: &Session, at: f64) -> (f64, f64, f64) {
-    const H: f64 = 1e-5;
-    let times = [at - 2.0 * H, at - H, at.next_down().next_down(), at, at + H, at + 2.0 * H];
+    const H: f64 = 2e-6;
+    let times = [-3.0, -2.0, -1.0, 1.0, 2.0, 3.0].map(|i| at + i * H);
     let points: Vec<_> = scenes(session, &times).iter().map(points).collect();
     let (mut position, mut velocity, mut speed) = (0.0_f64, 0.0_f64, 0.0_f64);
     for key in points[0].keys() {
         let there: Option<Vec<_>> = points.iter().map(|frame| frame.get(key).map(|p| p.coords)).collect();
         let Some(x) = there else { continue };
-        position = position.max((x[3] - x[2]).norm());
-        // One-sided differences of order 2.
-        let before = (x[2] * 3.0 - x[1] * 4.0 + x[0]) / (2.0 * H);
-        let after = (x[4] * 4.0 - x[5] - x[3] * 3.0) / (2.0 * H);
-        velocity = velocity.max((after - before).norm());
-        speed = speed.max(before.norm());
+        // Extrapolated from three times on each side.
+        let limit = |[near, next, far]: [usize; 3]| (x[near] - x[next]) * 3.0 + x[far];
+        let slope =
+            |[near, next, far]: [usize; 3]| (x[near] * 5.0 - x[next] * 8.0 + x[far] * 3.0) / (2.0 * H);
+        position = position.max((limit([3, 4, 5]) - limit([2, 1, 0])).norm());
+        velocity = velocity.max((slope([3, 4, 5]) + slope([2, 1, 0])).norm());
+        speed = speed.max(slope([2, 1, 0]).norm());
     }
     (position, velocity, speed)
 }

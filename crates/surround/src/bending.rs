@@ -206,6 +206,9 @@ impl<'m> Bending<'m> {
             };
             let mut note = |step: &sway::Step<'_>| knots.push(knot(step.to, step.after));
             let done = self.solver.advance(&mut state, from, to, &mut growth, &*self.wind, &mut note);
+            if std::env::var("SWAY_DEBUG").is_ok() && done.is_err() {
+                eprintln!("{state:?}");
+            }
             done.map_err(|error| failure(self.model, &body, error, string.time))?;
             let steps = knots.len() as u64 - 1;
             (self.effort.steps, self.effort.stem_steps) =
@@ -238,7 +241,12 @@ fn failure(model: &Model, body: &Body, error: sway::Error, time: f64) -> Error {
     {
         let mut i = Some(*segment);
         while let Some(k) = i {
-            eprintln!("{k} {:?} loads {:?}", body.skeleton.segments()[k], body.skeleton.loads(k));
+            eprintln!(
+                "{k} {:?} loads {:?} plates {:?}",
+                body.skeleton.segments()[k],
+                body.skeleton.loads(k),
+                body.skeleton.plates(k)
+            );
             i = body.skeleton.segments()[k].parent;
         }
     }
