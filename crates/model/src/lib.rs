@@ -57,7 +57,7 @@ pub use kind::{
     SURFACE_SIZES, Strain, base_of, class_of,
 };
 pub use measure::Measure;
-pub use physics::{Flow, Primitive, Spectrum, Tissue, Units, Wind};
+pub use physics::{FieldCache, Flow, Primitive, Spectrum, Tissue, Units, Wind};
 pub use remedy::{Boundary, Remedy};
 pub use rule::{Interpretation, Outcome, Pattern, Produce, Rule, Solve, Switch};
 pub use scenery::{Camera, Plant, Scenery};

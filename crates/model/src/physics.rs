@@ -1,6 +1,7 @@
 //! The physics of a scene: units, wind, and the tissues that give way in it. All values but those of `units` are in SI.
 
-use std::sync::Arc;
+use std::any::Any;
+use std::sync::{Arc, OnceLock};
 
 use dlsys_diagnostic::Span;
 use dlsys_expr::Program;
@@ -104,4 +105,26 @@ pub enum Primitive {
     Sink,
     /// Around an axis.
     Vortex,
+}
+
+/// A place for the field that is made of the declarations of the wind, once for the model and its copies.
+#[derive(Clone, Debug, Default)]
+pub struct FieldCache(Arc<OnceLock<Arc<dyn Any + Send + Sync>>>);
+
+impl FieldCache {
+    /// The field, made by a function if it has not been made; `None` if it is of another type.
+    ///
+    /// # Errors
+    /// That of the function. Nothing is kept then.
+    pub fn get_or_make<T: Any + Send + Sync, E>(
+        &self,
+        make: impl FnOnce() -> Result<Arc<T>, E>,
+    ) -> Result<Option<Arc<T>>, E> {
+        if self.0.get().is_none() {
+            let made: Arc<dyn Any + Send + Sync> = make()?;
+            // Another thread may have been faster; both have made the same.
+            let _ = self.0.set(made);
+        }
+        Ok(self.0.get().cloned().and_then(|made| made.downcast().ok()))
+    }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::{Flow, Model, Rgb, Tissue, Units, Wind};
+use crate::{FieldCache, Flow, Model, Rgb, Tissue, Units, Wind};
 use dlsys_diagnostic::{Source, Span};
 use dlsys_expr::Program;
 
@@ -27,6 +27,8 @@ pub struct Scenery {
     pub flows: Vec<Flow>,
     /// In the order written; their names stand for their numbers, from 1.
     pub tissues: Vec<Tissue>,
+    /// The field of the wind.
+    pub field: FieldCache,
 }
 
 /// `camera at X, Y, Z towards X, Y, Z angle A`

@@ -35,6 +35,7 @@ use dlsys_compile::{Files, NoFiles, Setting};
 use dlsys_diagnostic::{Diagnostic, Source};
 use dlsys_model::{Measure, Model};
 use dlsys_sim::{self as sim, Simulation};
+use dlsys_surround::Place;
 
 /// A model that has been read and checked, with its text.
 #[derive(Clone, Debug)]
@@ -226,7 +227,7 @@ impl Session {
     /// # Errors
     /// A module of the initial string is outside its domain, or an equation has no finite value there.
     pub fn simulate(&self, settings: sim::Settings) -> Result<Simulation<'_>, sim::Error> {
-        Simulation::new(&self.model, settings)
+        dlsys_surround::start(&self.model, settings, Place::of_scene(self.model.scenery.units))
     }
 }
 

@@ -254,6 +254,13 @@ impl<'m> Nursery<'m> {
 
     fn start(&self, plant: &'m model::Plant, seed: u64) -> Result<Simulation<'m>, DrawError> {
         let settings = Settings { seed, ..self.settings };
+        if plant.model.reads_strain() {
+            // Each would grow in another way, at its own place.
+            let error = Diagnostic::error(format!("the rules of the plant `{}` read `strain`", plant.name))
+                .at(plant.span, "a plant in another model bends, but its rules cannot read that yet")
+                .help("draw it as a model of its own, or let its rules do without `strain`");
+            return Err(DrawError::Plant(Box::new(error)));
+        }
         Simulation::new(&plant.model, settings).map_err(|error| fault(plant, 0.0, &error))
     }
 

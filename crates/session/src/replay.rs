@@ -39,6 +39,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use dlsys_model::Model;
 use dlsys_sim::{Error, Event, Passed, Settings, Simulation, Surroundings, happens_by};
+use dlsys_surround::Place;
 use dlsys_tree::{Lineage, ModuleString, SimTime};
 
 /// A model at a present time, which can be moved to any other time.
@@ -113,12 +114,13 @@ impl<'m> Replay<'m> {
     /// Default memory for marks in bytes.
     pub const MEMORY: usize = 256 << 20;
 
-    /// Starts a model at t = 0. At most 500,000 productions are kept for [`Replay::events`].
+    /// Starts a model at t = 0, with its stems in the wind if its rules read them. At most 500,000 productions are kept for [`Replay::events`].
     ///
     /// # Errors
     /// Those of [`Simulation::new`].
     pub fn new(model: &'m Model, settings: Settings) -> Result<Replay<'m>, Error> {
-        Replay::begin(Simulation::new(model, Settings { log: true, ..settings })?)
+        let place = Place::of_scene(model.scenery.units);
+        Replay::begin(dlsys_surround::start(model, Settings { log: true, ..settings }, place)?)
     }
 
     /// Starts a model at t = 0 in surroundings, as [`Simulation::with_surroundings`] does.

@@ -89,7 +89,7 @@ impl<'m> Simulation<'m> {
             flows: Flows::new(model),
             detector: Detector::default(),
             events: Events::new(&setup),
-            log: Log { stats: Stats::default(), events: settings.log.then(Vec::new) },
+            log: Log { events: settings.log.then(Vec::new), ..Log::default() },
             frames: FrameCache::new(),
             scratch: Scratch::default(),
             surroundings: None,

@@ -10,9 +10,26 @@ pub struct Log {
     pub stats: Stats,
     /// Productions since they were last taken, if they are recorded.
     pub events: Option<Vec<Event>>,
+    /// Productions since the last tick of surroundings, if there are any: descent matters to them.
+    pub descent: Option<Vec<Event>>,
 }
 
 impl Log {
+    /// True if productions are recorded.
+    pub fn records(&self) -> bool {
+        self.events.is_some() || self.descent.is_some()
+    }
+
+    /// Records a production.
+    pub fn add(&mut self, event: Event) {
+        if let Some(descent) = &mut self.descent {
+            descent.push(event.clone());
+        }
+        if let Some(events) = &mut self.events {
+            events.push(event);
+        }
+    }
+
     /// Discards productions beyond the first `known`: they do not take place.
     pub fn take_back(&mut self, known: usize) {
         if let Some(events) = &mut self.events {

@@ -9,6 +9,7 @@
 
 use crate::error::{Error, Site};
 use crate::kernel::Simulation;
+use crate::log::Event;
 use crate::schedule::Owner;
 use crate::trajectory::Trajectory;
 use crate::world::{World, describe, site_of_axiom};
@@ -49,6 +50,7 @@ pub trait Surroundings: Send + Sync {
 pub struct Inputs {
     readers: Vec<usize>,
     strain: Vec<f64>,
+    productions: Vec<Event>,
 }
 
 impl Inputs {
@@ -61,6 +63,11 @@ impl Inputs {
     /// of a module that draws no stem.
     pub fn strain_mut(&mut self) -> &mut [f64] {
         &mut self.strain
+    }
+
+    /// The productions since the last tick, or since t = 0, in the order of time.
+    pub fn productions(&self) -> &[Event] {
+        &self.productions
     }
 
     /// Sets the strain of each reader to a function of the module.
@@ -176,6 +183,7 @@ impl<'m> Simulation<'m> {
             let link = Link::new(surroundings);
             simulation.schedule_tick(&link, None)?;
             simulation.surroundings = Some(Box::new(link));
+            simulation.log.descent = Some(Vec::new());
         }
         Ok(simulation)
     }
@@ -218,6 +226,9 @@ impl<'m> Simulation<'m> {
         link.find_readers(self.setup.model, &self.world);
         link.inputs.strain.clear();
         link.inputs.strain.resize(link.readers.len(), 0.0);
+        let productions = &mut link.inputs.productions;
+        productions.clear();
+        productions.append(self.log.descent.get_or_insert_default());
         let Link { source, string, inputs, .. } = link;
         source.tick(string, inputs).map_err(|failure| self.failure(failure, link))?;
         let duration = self.schedule_tick(link, Some(now))?;

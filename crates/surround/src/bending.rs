@@ -5,6 +5,7 @@
 //! Strain is intensive (radians per length), so a division changes neither shape nor velocity. Then the stems are advanced to the
 //! next tick, while growth goes on at its present rates.
 
+use std::ops::Deref;
 use std::sync::Arc;
 
 use dlsys_diagnostic::Span;
@@ -52,6 +53,26 @@ impl Tick {
     /// Number of strains that are kept.
     pub(crate) fn size(&self) -> usize {
         self.body.stems.len() * (1 + self.knots.len())
+    }
+
+    /// The largest bending strain of the stems of a module at a time, without unit: curvature times half the diameter. `depth` is the
+    /// number of brackets around the module.
+    pub(crate) fn largest(&self, module: u64, depth: usize, descent: &Descent, time: f64) -> f64 {
+        let mut largest = 0.0_f64;
+        for module in descent.line(module) {
+            let stems = (0..).map_while(|number| self.body.numbers.get(&StemKey { module, number }));
+            let mut known = false;
+            for &stem in stems.filter(|stem| self.body.stems[**stem].depth == depth) {
+                let (strain, _) = self.strain(stem, time);
+                let radius = self.body.skeleton.segments()[stem].diameter / 2.0;
+                largest = largest.max(strain.y.hypot(strain.z) * radius);
+                known = true;
+            }
+            if known {
+                break;
+            }
+        }
+        largest
     }
 
     /// The strain that a stem of a later string has at a time: its own, or that of the stem of the module from which its module
@@ -122,8 +143,8 @@ pub struct Effort {
 
 /// The stems of a model in motion.
 #[derive(Clone)]
-pub(crate) struct Bending<'m> {
-    model: &'m Model,
+pub(crate) struct Bending<M> {
+    model: M,
     place: Place,
     wind: Arc<Sampler>,
     solver: Solver,
@@ -134,27 +155,22 @@ pub(crate) struct Bending<'m> {
     pub(crate) effort: Effort,
 }
 
-impl<'m> Bending<'m> {
-    pub(crate) fn new(
-        model: &'m Model,
-        wind: Arc<Sampler>,
-        place: Place,
-        settings: sway::Settings,
-    ) -> Bending<'m> {
+impl<M: Deref<Target = Model>> Bending<M> {
+    pub(crate) fn new(model: M, wind: Arc<Sampler>, place: Place, settings: sway::Settings) -> Bending<M> {
         Bending {
-            model,
             place,
             wind,
             solver: Solver::new(place.settings(settings)),
             state: State::default(),
             body: Body::default(),
-            scene: turtle::blank(model),
+            scene: turtle::blank(&model),
             effort: Effort::default(),
+            model,
         }
     }
 
-    pub(crate) fn model(&self) -> &'m Model {
-        self.model
+    pub(crate) fn model(&self) -> &Model {
+        &self.model
     }
 
     pub(crate) fn place(&self) -> &Place {
@@ -162,8 +178,8 @@ impl<'m> Bending<'m> {
     }
 
     fn body(&mut self, string: &ModuleString) -> Result<Body, Error> {
-        let noted = turtle::skeleton(self.model, string, &mut self.scene)?;
-        Ok(Body::new(noted, self.model, self.place.units.length))
+        let noted = turtle::skeleton(&self.model, string, &mut self.scene)?;
+        Ok(Body::new(noted, &self.model, self.place.units.length))
     }
 
     /// The motion from the tick of this number, with the string at that time, to the next. `before` is the tick before, with the
@@ -209,7 +225,7 @@ impl<'m> Bending<'m> {
             if std::env::var("SWAY_DEBUG").is_ok() && done.is_err() {
                 eprintln!("{state:?}");
             }
-            done.map_err(|error| failure(self.model, &body, error, string.time))?;
+            done.map_err(|error| failure(&self.model, &body, error, string.time))?;
             let steps = knots.len() as u64 - 1;
             (self.effort.steps, self.effort.stem_steps) =
                 (self.effort.steps + steps, self.effort.stem_steps + steps * body.stems.len() as u64);
@@ -260,14 +276,14 @@ fn failure(model: &Model, body: &Body, error: sway::Error, time: f64) -> Error {
 pub(crate) fn bent(
     tick: &Arc<Tick>,
     descent: &Descent,
-    bending: &Bending,
+    bending: &Bending<impl Deref<Target = Model>>,
     string: &ModuleString,
     scene: &mut Scene,
 ) -> Result<BentStems, Error> {
-    let time = bending.place.seconds(string.time);
-    let mut stems = BentStems { tick: tick.clone(), time, metre: bending.place.units.length, new: None };
+    let time = bending.place().seconds(string.time);
+    let mut stems = BentStems { tick: tick.clone(), time, metre: bending.place().units.length, new: None };
     if !descent.is_empty() {
-        let noted = turtle::skeleton(bending.model, string, scene)?;
+        let noted = turtle::skeleton(bending.model(), string, scene)?;
         let strain = |stem: &Stem| tick.inherited(stem, descent, time).map(|(strain, _)| (stem.key, strain));
         stems.new = Some(noted.stems.iter().filter_map(strain).collect());
     }

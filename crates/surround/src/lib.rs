@@ -15,6 +15,7 @@
 
 mod bending;
 mod body;
+mod coupled;
 mod descent;
 mod error;
 mod motion;
@@ -22,6 +23,7 @@ mod place;
 mod weather;
 
 pub use bending::{BentStems, Effort};
+pub use coupled::start;
 pub use error::Error;
 pub use motion::{Motion, Passive};
 pub use place::Place;

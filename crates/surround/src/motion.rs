@@ -19,6 +19,7 @@ use dlsys_sway as sway;
 use dlsys_tree::ModuleString;
 
 use crate::bending::{Bending, BentStems, Effort, Tick, bent};
+use crate::coupled;
 use crate::descent::Descent;
 use crate::place::Place;
 use crate::weather::{Sampler, Weather};
@@ -33,7 +34,7 @@ const MOST_MARKS: usize = 24;
 /// The first distance between marks, in ticks.
 const FIRST_SPACING: u64 = 64;
 /// Part of a tick over which the rates of growth are taken.
-const LOOK_BACK: f64 = 1.0 / 1024.0;
+pub(crate) const LOOK_BACK: f64 = 1.0 / 1024.0;
 
 /// How passive motion is computed and kept.
 #[derive(Clone, Copy, Debug)]
@@ -60,7 +61,7 @@ impl Default for Passive {
 #[derive(Clone)]
 struct Course<'m> {
     growth: Simulation<'m>,
-    bending: Bending<'m>,
+    bending: Bending<&'m Model>,
     /// The number of the present tick.
     number: u64,
     tick: Arc<Tick>,
@@ -72,7 +73,7 @@ struct Course<'m> {
 
 impl<'m> Course<'m> {
     /// From the first tick.
-    fn new(mut growth: Simulation<'m>, mut bending: Bending<'m>) -> Result<Course<'m>, Error> {
+    fn new(mut growth: Simulation<'m>, mut bending: Bending<&'m Model>) -> Result<Course<'m>, Error> {
         let mut string = ModuleString::default();
         let number = bending.place().first_tick();
         growth.at(bending.place().time_of(number).max(0.0), &mut string)?;
@@ -86,14 +87,14 @@ impl<'m> Course<'m> {
 
     /// Lets growth go on to the next tick. It may fail there, after a time that is asked for.
     fn look_ahead(&mut self) {
-        let (model, place) = (self.bending.model(), *self.bending.place());
+        let place = *self.bending.place();
         let next = place.time_of(self.number + 1);
         let before = next - LOOK_BACK * CLOCK / place.units.time;
         let mut strings = <[ModuleString; 2]>::default();
         let [earlier, now] = &mut strings;
         let gone = self.growth.at(before, earlier).and_then(|()| self.growth.at(next, now));
         let mut descent = Descent::default();
-        descent.add(model, &self.growth.take_events());
+        descent.add(self.bending.model(), &self.growth.take_events());
         self.descent = Arc::new(descent);
         self.ahead = gone.map(|()| Arc::new(strings)).map_err(Error::from);
     }
@@ -150,7 +151,8 @@ impl<'m> Motion<'m> {
         if model.scenery.tissues.is_empty() {
             return Ok(None);
         }
-        let growth = Simulation::new(model, Settings { log: true, transitions: false, ..settings })?;
+        let settings = Settings { log: true, transitions: false, ..settings };
+        let growth = coupled::start(model, settings, place)?;
         let sampler = Arc::new(Sampler::new(weather, place));
         let present = Course::new(growth, Bending::new(model, sampler, place, passive.solver))?;
         let courses = Courses {

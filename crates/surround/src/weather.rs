@@ -19,7 +19,7 @@ pub struct Weather {
 }
 
 /// Number of instants that are kept: the stages of some ticks, as plants that are drawn one after another read them.
-const KEPT: usize = 24;
+const KEPT: usize = 48;
 
 impl Weather {
     /// The wind and the flows that a model declares; `None` if it declares neither.
@@ -30,14 +30,17 @@ impl Weather {
         let Scenery { units, wind, flows, ground, .. } = scenery;
         let span = wind.as_ref().map(|wind| wind.span).or(flows.first().map(|flow| flow.span));
         let Some(span) = span else { return Ok(None) };
-        let mut description = match wind {
-            Some(wind) => of_wind(wind, *units),
-            None => Description::new(Vector3::x(), 0.0),
+        let make = || {
+            let mut description = match wind {
+                Some(wind) => of_wind(wind, *units),
+                None => Description::new(Vector3::x(), 0.0),
+            };
+            description.flows = flows.iter().map(|flow| of_flow(flow, *units)).collect();
+            description.ground = ground.map(|height| Ground::Flat(height * units.length));
+            let field = Field::new(description).map_err(|error| Error::Wind { error, span })?;
+            Ok(Arc::new(Weather { field, recent: Mutex::default() }))
         };
-        description.flows = flows.iter().map(|flow| of_flow(flow, *units)).collect();
-        description.ground = ground.map(|height| Ground::Flat(height * units.length));
-        let field = Field::new(description).map_err(|error| Error::Wind { error, span })?;
-        Ok(Some(Arc::new(Weather { field, recent: Mutex::default() })))
+        scenery.field.get_or_make(make)
     }
 
     /// The field.

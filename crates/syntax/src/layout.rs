@@ -307,8 +307,9 @@ impl Scanner<'_> {
             self.token(token);
         }
         self.run_of_angles = match (self.last, self.run_of_angles) {
-            (Last::Angle, None) => Some(first.1),
-            (Last::Angle, run) => run,
+            // A run does not reach back beyond the item that is open.
+            (Last::Angle, Some(run)) if starts.is_none() => Some(run),
+            (Last::Angle, _) => Some(first.1),
             _ => None,
         };
         self.line_break(end);

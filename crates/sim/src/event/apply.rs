@@ -134,11 +134,21 @@ impl EventStage<'_, '_> {
         (successor, made): (Option<usize>, &[KindId]),
         residual: f64,
     ) {
-        let Some(log) = &mut self.log.events else { return };
         let (time, group) = (self.instant.at.to_f64(), self.instant.number);
         let made = made.iter().filter(|kind| !kind.is_bracket()).count() as u32;
         let transition = None;
-        log.push(Event { time, lineage, kind, rule, clause, successor, made, residual, group, transition });
+        self.log.add(Event {
+            time,
+            lineage,
+            kind,
+            rule,
+            clause,
+            successor,
+            made,
+            residual,
+            group,
+            transition,
+        });
     }
 
     /// Replaces all modules in parallel: every successor is computed before any is put in.
@@ -161,7 +171,7 @@ impl EventStage<'_, '_> {
             let around = context_of(model, self.world, &self.events.steps.contexts, fire, &mut contexts);
             self.world.variables(rule, fire.id, around, self.instant.at, &mut self.scratch.variables);
             let lineage = self.world.tree.lineage(fire.id);
-            let residual = if self.log.events.is_some() { self.residual(fire) } else { 0.0 };
+            let residual = if self.log.records() { self.residual(fire) } else { 0.0 };
             let made = match clause.is_fault {
                 true => Err(Refusal::NegativeRate),
                 false => chance::successor(self.setup.seed, clause, lineage, self.scratch, &mut new)
@@ -171,7 +181,7 @@ impl EventStage<'_, '_> {
                 Ok((which, family)) => {
                     let first = ends.last().map_or(0, |(end, ..): &([usize; 2], _, _)| end[0]);
                     ends.push(([new.kinds.len(), new.arguments.len()], which, family));
-                    if self.log.events.is_some() {
+                    if self.log.records() {
                         let (kind, chosen) = (
                             self.world.tree.kind(fire.id),
                             clause.outcome.weights.is_some().then_some(which),

@@ -89,7 +89,7 @@ impl EventStage<'_, '_> {
             let site = self.site(&Firing { id, rule, produce });
             return Err(refusal.error(self.world, site));
         }
-        if self.log.events.is_some() {
+        if self.log.records() {
             let which = clause.outcome.weights.is_some().then_some(life.successor);
             let kinds = kinds_of(&clause.outcome.successors[life.successor], &life.new.kinds);
             self.record((kind, lineage), (rule, produce), (which, kinds), life.residual);
