@@ -122,6 +122,11 @@ JSON fields:
   curves      a list of name, sort (linear | monotone | spline), points,
               from, to (arguments), least, greatest (values), periodic,
               inverse (it rises throughout, or falls throughout)
+  scene       if declared, a list of part, class, why
+  bending     with tissues: t, ticks (steps of the clock up to t), wind (m/s), and
+    axes        a list of kinds, tissue, count, measured; as least and greatest
+                values in SI: segments, length, width, mass, carried,
+                frequency, damping, cauchy, greenhill
   summary     kinds by work; closed_form: nothing is ever integrated";
 
 #[derive(Debug, Args)]
@@ -195,7 +200,14 @@ pub struct RunArgs {
     pub shared: SharedArgs,
     #[command(flatten)]
     pub verify: VerifyArgs,
-    /// Output format of strings or measures
+    /// Instead of running the model, sample its wind at the places of a CSV file; - is standard input
+    ///
+    /// The first line of the file is `x,y,z`, or `t,x,y,z` for places with times of their own; without t every place is
+    /// sampled at every observed time. Places and times are in units of the model. As text: CSV with the columns
+    /// t,x,y,z,u,v,w; as JSON: a line for each sample with these fields. u, v and w are the velocity of the air along x, y and z in m/s.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["seeds", "events", "stats", "verify"])]
+    pub field: Option<PathBuf>,
+    /// Output format of strings, measures or samples
     #[arg(long, value_enum, default_value_t = TextFormat::Text)]
     pub format: TextFormat,
     /// Run specimens with these seeds, both ends included, and print the distributions of their measures at each

@@ -25,7 +25,8 @@ fn tree(n: usize) -> Skeleton {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let mut sizes: Vec<usize> = std::env::args().skip(1).map(|text| text.parse()).collect::<Result<_, _>>()?;
+    let mut sizes: Vec<usize> =
+        std::env::args().skip(1).map(|text| text.parse()).collect::<Result<_, _>>()?;
     if sizes.is_empty() {
         sizes = vec![100, 1_000, 10_000, 100_000, 1_000_000];
     }

@@ -154,9 +154,8 @@ impl Solver {
             let free = |index: usize| soft(&held, index).map(|rigidity| rigidity.map(|value| 1.0 / value));
             (0..n)
                 .map(|index| {
-                    free(index).map_or_else(Vector::zeros, |inverse| {
-                        work.links[index].pull.component_mul(&inverse)
-                    })
+                    free(index)
+                        .map_or_else(Vector::zeros, |inverse| work.links[index].pull.component_mul(&inverse))
                 })
                 .collect()
         };

@@ -1,8 +1,8 @@
 //! Energy of a state.
 
+use crate::forces::Stretch;
 use crate::place::{Local, Place, Strain};
 use crate::sweep::part;
-use crate::forces::Stretch;
 use crate::{Error, Fixed, Skeleton, Solver, State, Vector};
 
 /// Energy of a state, in J.

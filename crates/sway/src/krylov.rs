@@ -52,7 +52,11 @@ pub(crate) fn largest(
         images.push(applied);
     }
     let m = basis.len();
-    let matrix = DMatrix::from_fn(m, m, |i, j| 0.5 * (dot(&duals[i], &images[j]) + dot(&duals[j], &images[i])));
+    if m == 0 {
+        return Pairs { values: Vec::new(), vectors: Vec::new() };
+    }
+    let matrix =
+        DMatrix::from_fn(m, m, |i, j| 0.5 * (dot(&duals[i], &images[j]) + dot(&duals[j], &images[i])));
     let eigen = SymmetricEigen::new(matrix);
     let mut order: Vec<usize> = (0..m).collect();
     order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));

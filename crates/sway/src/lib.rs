@@ -75,9 +75,9 @@ mod solver;
 mod state;
 mod sweep;
 
+pub use air::{Air, Still, Wind};
 pub use analysis::{Mode, cauchy_number};
 pub use energy::Energy;
-pub use air::{Air, Still, Wind};
 pub use error::Error;
 pub use pose::{Frame, Pose};
 pub use settings::{Fixed, Growth, Method, Settings};

@@ -1,8 +1,8 @@
 //! The solver: steps on a global grid, of controlled error.
 
 use crate::air::Wind;
-use crate::ros2::StepError;
 use crate::link::Weights;
+use crate::ros2::StepError;
 use crate::sweep::{Bend, Instant, Workspace};
 use crate::{Error, Growth, Method, Settings, Skeleton, State, Step};
 

@@ -34,8 +34,9 @@ fn later(skeleton: &Skeleton, t: f64) -> Skeleton {
 fn random_tree(draws: &mut Draws, n: usize) -> Skeleton {
     let mut skeleton = Skeleton::new();
     for index in 0..n {
-        let parent =
-            (index > 0).then(|| ((draws.one() * 0.5 + 0.5) * index as f64) as usize).map(|p| p.min(index - 1));
+        let parent = (index > 0)
+            .then(|| ((draws.one() * 0.5 + 0.5) * index as f64) as usize)
+            .map(|p| p.min(index - 1));
         let mut segment = Segment::solid(parent, 0.3 + 0.1 * draws.one(), 0.05, 1e5, 900.0);
         segment.joint.rotation = Rotation3::from_scaled_axis(draws.vector(0.5)).into_inner();
         segment.joint.offset = draws.vector(0.05);
@@ -86,11 +87,7 @@ fn bodies(skeleton: &Skeleton, strain: &[Vector]) -> Bodies {
             let frame = pose.at(index, 0.5 + sign * 0.5 / 3.0_f64.sqrt());
             let tangent = frame.axes.column(0).into_owned();
             let area = 0.5 * segment.length * segment.drag_diameter;
-            all.points.push((
-                frame.origin,
-                0.5 * segment.mass * segment.length,
-                Air3::Rod(tangent, area),
-            ));
+            all.points.push((frame.origin, 0.5 * segment.mass * segment.length, Air3::Rod(tangent, area)));
             let round = segment.mass * segment.length * segment.diameter.powi(2) / 32.0;
             all.spins.push((frame.axes, Matrix::from_diagonal(&Vector::new(2.0, 1.0, 1.0)) * round));
         }
@@ -114,7 +111,8 @@ where
     T: Clone + std::ops::Sub<Output = T> + std::ops::Add<Output = T> + std::ops::Mul<f64, Output = T>,
 {
     let [m2, m1, o, p1, p2] = [-2.0, -1.0, 0.0, 1.0, 2.0].map(|k| sample(k * h));
-    let first = (p1.clone() - m1.clone()) * (8.0 / (12.0 * h)) - (p2.clone() - m2.clone()) * (1.0 / (12.0 * h));
+    let first =
+        (p1.clone() - m1.clone()) * (8.0 / (12.0 * h)) - (p2.clone() - m2.clone()) * (1.0 / (12.0 * h));
     let second = ((p1 + m1) * 16.0 - p2 - m2 - o * 30.0) * (1.0 / (12.0 * h * h));
     (first, second)
 }
@@ -146,8 +144,7 @@ fn accelerations_are_those_of_lagrange() {
             }
         }
         let mut solver = Solver::new(Settings::default());
-        let found =
-            solver.accelerations(&skeleton, &state, &|_: Vector, _: f64| wind_speed, 0.0).unwrap();
+        let found = solver.accelerations(&skeleton, &state, &|_: Vector, _: f64| wind_speed, 0.0).unwrap();
         let expected = brute_force(&skeleton, &state, &air, &wind_speed);
         let scale = expected.iter().map(|a| a.norm()).fold(0.0, f64::max);
         for (index, (a, b)) in found.iter().zip(&expected).enumerate() {
@@ -168,10 +165,8 @@ fn brute_force(skeleton: &Skeleton, state: &State, air: &Air, wind: &Vector) -> 
     let now = along(0.0);
     let (velocity, bias) = derivatives(|t| flat(&along(t)), 1e-3);
     // Jacobians of points and of turns.
-    let free: Vec<(usize, usize)> = (0..n)
-        .filter(|&i| !skeleton.segments()[i].rigid)
-        .flat_map(|i| (0..3).map(move |k| (i, k)))
-        .collect();
+    let free: Vec<(usize, usize)> =
+        (0..n).filter(|&i| !skeleton.segments()[i].rigid).flat_map(|i| (0..3).map(move |k| (i, k))).collect();
     let nudged = |column: (usize, usize), t: f64| {
         let mut strain = state.strain.clone();
         strain[column.0][column.1] += t;
