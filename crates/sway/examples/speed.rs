@@ -10,8 +10,9 @@ fn tree(n: usize) -> Skeleton {
     let mut skeleton = Skeleton::new();
     for index in 0..n {
         let parent = (index > 0).then(|| if index % 20 == 0 { index - 10 } else { index - 1 });
-        let depth = (index / 20 % 10) as f64;
-        let mut segment = Segment::solid(parent, 0.05, 0.02 / (1.0 + depth), 1e9, 900.0);
+        let depth = (index / 20) as f64;
+        let mut segment = Segment::solid(parent, 0.05, 0.02 / (1.0 + depth), 5e9, 900.0);
+        segment.sag = false;
         segment.damping = 0.01;
         if parent.is_none() {
             segment.joint.rotation = upright();
@@ -33,9 +34,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let wind = |point: Vector, time: f64| Vector::new(2.0 + (time + point.x).sin(), 0.0, 0.3 * point.y);
     println!("{:>9} {:>22}", "segments", "µs a segment and step");
     for n in sizes {
-        // Many plants of 1000 segments: a tree of a million is not a thing.
+        // Many plants of 100 segments.
         let mut skeleton = Skeleton::new();
-        let plant = tree(n.min(1000));
+        let plant = tree(n.min(100));
         for _ in 0..n / plant.len() {
             let first = skeleton.len();
             for segment in plant.segments() {

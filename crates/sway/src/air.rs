@@ -66,7 +66,7 @@ impl Air {
         let across = velocity - tangent * tangent.dot(velocity);
         let speed = across.norm();
         let coefficient = 0.5 * self.density * self.cylinder * area;
-        if !(speed > 0.0) {
+        if speed <= 0.0 {
             return Matrix::zeros();
         }
         let mut damping = Matrix::from_diagonal_element(coefficient * speed);
@@ -87,7 +87,7 @@ impl Air {
     /// It is exact for flow along the normal and along the surface.
     pub(crate) fn plate_damping(&self, area: f64, normal: &Vector, velocity: &Vector) -> Matrix {
         let speed = velocity.norm();
-        if !(speed > 0.0) {
+        if speed <= 0.0 {
             return Matrix::zeros();
         }
         let scale = 0.5 * self.density * area * speed;

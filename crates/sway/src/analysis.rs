@@ -41,7 +41,7 @@ fn lengthen(skeleton: &Skeleton, values: &mut [Vector]) {
 
 impl Solver {
     /// The `count` slowest vibrations about a strain, with the geometric stiffness of the weight, slowest first. Stems with round sections
-    /// have them in pairs.
+    /// have them in pairs. Pure torsion, which moves no centre line, is left out.
     ///
     /// # Errors
     ///
@@ -101,7 +101,7 @@ impl Solver {
 
     /// Factorises stiffness plus `shift` times mass. Returns whether it is positive.
     fn factor(&mut self, skeleton: &Skeleton, state: &State, shift: f64) -> bool {
-        let weights = Weights { mass: shift, damping: 0.0, stiffness: 1.0 };
+        let weights = Weights { mass: shift, damping: 0.0, stiffness: 1.0, extra: 0.0, blur: 0.0 };
         let bend = Bend { strain: &state.strain, rate: &state.rate };
         let now = Instant { wind: &Still, from: 0.0, to: 0.0 };
         self.work.spread(skeleton, &self.settings.air, bend, now, (1.0, 0.0), &weights);

@@ -133,7 +133,6 @@ impl Section {
         let mut shift = slope * self.theta.transpose();
         let (u, t) = (&self.across, &self.theta);
         // b (x × e) + c (x × u + x (θ·e) - e (θ·x)), column by column of x.
-        shift[(0, 0)] += c * (t.x - t.x);
         shift[(0, 1)] += c * (u.z - t.y);
         shift[(0, 2)] += c * (-u.y - t.z);
         shift[(1, 0)] += -c * u.z;

@@ -24,6 +24,24 @@ impl Energy {
 }
 
 impl Solver {
+    /// Velocities of the ends of all segments (world coordinates, m/s), with the prescribed motion.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Length`] and [`Error::Value`] as in [`advance`](Solver::advance).
+    pub fn velocities(&mut self, skeleton: &Skeleton, state: &State) -> Result<Vec<Vector>, Error> {
+        self.skeleton.clear();
+        self.renew(state, 0.0, &mut Fixed(skeleton))?;
+        let mut places: Vec<Place> = Vec::with_capacity(skeleton.len());
+        for (index, segment) in skeleton.segments().iter().enumerate() {
+            let rate = if segment.rigid { Vector::zeros() } else { state.rate[index] };
+            let strain = Strain { value: state.strain[index], rate, acceleration: Vector::zeros() };
+            let parent = segment.parent.map(|parent| &places[parent]);
+            places.push(Local::new(segment, parent, &Vector::zeros(), &strain).1);
+        }
+        Ok(places.iter().map(|place| place.axes * place.twist.linear).collect())
+    }
+
     /// Energy of a state of a skeleton.
     ///
     /// # Errors

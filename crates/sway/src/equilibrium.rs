@@ -18,8 +18,8 @@ impl Solver {
     /// Changes the strain of a state into the equilibrium under weight and a steady wind, as sampled at `time`; its rates become zero.
     /// Prescribed motion of the skeleton does not count. Returns the number of iterations.
     ///
-    /// The strain that the state has is the start of the search. Where it is not stable (a stem longer than Greenhill's length), mass is
-    /// added to the matrix until the step goes downhill, so the search ends in a stable equilibrium, but a start that is exactly
+    /// The strain that the state has is the start of the search. Where it is not stable (a stem longer than Greenhill's length), the matrix
+    /// is made stiffer until the step goes downhill, so the search ends in a stable equilibrium, but a start that is exactly
     /// symmetric stays so.
     ///
     /// # Errors
@@ -38,29 +38,29 @@ impl Solver {
         self.renew(state, time, &mut Fixed(&held))?;
         state.rate.fill(Vector::zeros());
         let extent = held.extent().max(f64::MIN_POSITIVE);
-        // Weight of the mass in the matrix, in 1/s².
-        let mut inertia = 0.0;
+        // How much stiffer the matrix is than the tissue.
+        let mut extra = 0.0_f64;
         let mut moved = StepError::ZERO;
         for iteration in 1..=MOST {
             let now = Instant { wind, from: time, to: time };
             let bend = Bend { strain: &state.strain, rate: &state.rate };
-            let weights = Weights { mass: inertia, damping: 0.0, stiffness: 1.0 };
+            let weights = Weights { mass: 0.0, damping: 0.0, stiffness: 1.0, extra, blur: 0.0 };
             self.work.spread(&held, &self.settings.air, bend, now, (1.0, 0.0), &weights);
             let whole = self.work.gather(&held, &state.rate, &weights, 0.0);
             self.work.resolve(&held);
             moved = self.displacements(&held);
             let stride = moved.displacement / extent;
-            if !(whole && stride <= STRIDE) && inertia < 1e12 {
-                inertia = (inertia * 8.0).max(1e-3);
+            if !(whole && stride <= STRIDE) && extra < 1e12 {
+                extra = (extra * 4.0).max(0.25);
                 continue;
             }
             for (strain, link) in state.strain.iter_mut().zip(&self.work.links) {
                 *strain += link.x;
             }
-            if inertia == 0.0 && stride < CLOSE {
+            if extra == 0.0 && stride < CLOSE {
                 return Ok(iteration);
             }
-            inertia = if inertia < 1e-4 { 0.0 } else { inertia / 16.0 };
+            extra = if extra < 0.02 { 0.0 } else { extra / 4.0 };
         }
         Err(Error::Equilibrium { iterations: MOST, segment: moved.segment, moved: moved.displacement })
     }

@@ -39,7 +39,7 @@ pub(crate) fn largest(
         }
         let mut image = dual(&vector);
         let norm = dot(&vector, &image).max(0.0).sqrt();
-        if !(norm > 1e-10 * before) || !norm.is_finite() {
+        if norm <= 1e-10 * before || !norm.is_finite() {
             continue;
         }
         for value in vector.iter_mut().chain(&mut image) {
@@ -55,6 +55,8 @@ pub(crate) fn largest(
     if m == 0 {
         return Pairs { values: Vec::new(), vectors: Vec::new() };
     }
+    let matrix =
+        DMatrix::from_fn(m, m, |i, j| 0.5 * (dot(&duals[i], &images[j]) + dot(&duals[j], &images[i])));
     let matrix =
         DMatrix::from_fn(m, m, |i, j| 0.5 * (dot(&duals[i], &images[j]) + dot(&duals[j], &images[i])));
     let eigen = SymmetricEigen::new(matrix);
@@ -74,10 +76,10 @@ pub(crate) fn largest(
     Pairs { values: order.iter().map(|&k| eigen.eigenvalues[k]).collect(), vectors }
 }
 
-/// A start that no symmetry makes orthogonal to a mode: fixed numbers without a pattern.
+/// A start that no symmetry makes orthogonal to a bending mode: fixed numbers without a pattern. Twist comes in where it is coupled with bending.
 fn start(size: usize, seed: usize) -> Vec<Vector> {
     let draw = |k: usize| ((k * BLOCK + seed + 1) as f64 * 12.9898).sin() * 43758.5453 % 1.0;
-    (0..size).map(|i| Vector::new(draw(3 * i), draw(3 * i + 1), draw(3 * i + 2))).collect()
+    (0..size).map(|i| Vector::new(0.0, draw(2 * i), draw(2 * i + 1))).collect()
 }
 
 fn dot(a: &[Vector], b: &[Vector]) -> f64 {

@@ -73,6 +73,7 @@ mod settings;
 mod skeleton;
 mod solver;
 mod state;
+pub mod study;
 mod sweep;
 
 pub use air::{Air, Still, Wind};

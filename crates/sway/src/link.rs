@@ -11,6 +11,10 @@ pub(crate) struct Weights {
     pub mass: f64,
     pub damping: f64,
     pub stiffness: f64,
+    /// Elastic stiffness in addition, without the geometric one.
+    pub extra: f64,
+    /// Square of the time for which levers of masses are unsure, in s².
+    pub blur: f64,
 }
 
 /// The working memory of one segment.
@@ -190,25 +194,31 @@ pub(crate) fn transport(twist: &Twist, x: &Vector, length: f64, behind: &Place, 
     Twist { angular: own.turn.tr_mul(&angular), linear: own.turn.tr_mul(&linear) }
 }
 
+/// Whether a value is a number above a bound.
+#[inline(always)]
+fn above(value: f64, bound: f64) -> bool {
+    value > bound
+}
+
 /// Inverse of a symmetric matrix by Cholesky's decomposition, if its pivots are positive and not much below the diagonal of `scale`.
 #[inline(always)]
 fn invert(matrix: &Matrix, scale: &Matrix) -> Option<Matrix> {
     const SMALL: f64 = 1e-13;
     let m = |i: usize, j: usize| matrix[(i, j)];
     let d0 = m(0, 0);
-    if !(d0 > SMALL * scale[(0, 0)]) {
+    if !above(d0, SMALL * scale[(0, 0)]) {
         return None;
     }
     let l10 = m(1, 0) / d0;
     let d1 = m(1, 1) - l10 * m(1, 0);
-    if !(d1 > SMALL * scale[(1, 1)]) {
+    if !above(d1, SMALL * scale[(1, 1)]) {
         return None;
     }
     let l20 = m(2, 0) / d0;
     let t21 = m(2, 1) - l20 * m(1, 0);
     let l21 = t21 / d1;
     let d2 = m(2, 2) - l20 * m(2, 0) - l21 * t21;
-    if !(d2 > SMALL * scale[(2, 2)]) {
+    if !above(d2, SMALL * scale[(2, 2)]) {
         return None;
     }
     // L⁻¹ has these entries below its unit diagonal; the inverse is L⁻ᵀ D⁻¹ L⁻¹.

@@ -25,8 +25,8 @@ pub(crate) struct Place {
     /// Velocity and acceleration of the end frame.
     pub twist: Twist,
     pub rate: Twist,
-    /// Turn of the end since the roots by rates of strain only: what the elastic forces of the matrix see.
-    pub spin: Vector,
+    /// Velocity of the end frame by rates of strain only, as if joints and lengths stood still.
+    pub flow: Twist,
 }
 
 impl Place {
@@ -41,7 +41,7 @@ impl Place {
         shift: ZEROS,
         twist: Twist::ZERO,
         rate: Twist::ZERO,
-        spin: Vector::new(0.0, 0.0, 0.0),
+        flow: Twist::ZERO,
     };
 }
 
@@ -152,8 +152,15 @@ impl Local {
         place.shift = end.shift;
         place.twist = Twist { angular: end.angular, linear: end.velocity };
         place.rate = Twist { angular: end.angular_acceleration, linear: end.acceleration };
-        let before = parent.map_or_else(Vector::zeros, |parent| place.turn.tr_mul(&parent.spin));
-        place.spin = before + place.turning * (strain.rate * segment.length);
+        let mut flow = Twist::ZERO;
+        if let Some(parent) = parent {
+            let arm = place.reach - parent.tip;
+            flow.angular = place.turn.tr_mul(&parent.flow.angular);
+            flow.linear = place.turn.tr_mul(&parent.flow.at(&arm));
+        }
+        let swing = strain.rate * segment.length;
+        place.flow.linear = flow.at(&place.tip) + place.shift * swing;
+        place.flow.angular = flow.angular + place.turning * swing;
         (local, place)
     }
 

@@ -1,13 +1,23 @@
-//! One step of ROS2, and of the linearly implicit Euler method, which is its first stage with γ = 1.
+//! One step of ROS2 with its second stage in the middle, and of the linearly implicit Euler method, which is its first stage with γ = 1.
+//!
+//! All methods of two stages and order 2 for any matrix W have the same stability function; they differ in the place of the second stage,
+//! y + α k. With α = 1 the stage multiplies stiff motion by 1 - 1/γ = -2.4, and the centrifugal forces of that are larger than what the step
+//! damps: thin stems that twist blow up. With α = ½ it is -0.7. So
+//!
+//! ```text
+//! (1 - γhW) k₁ = h f(t, y) + γh² f_t
+//! (1 - γhW) k₂ = h f(t + h/2, y + k₁/2) - γhW k₁
+//! y₁ = y + k₂,  error: k₂ - k₁
+//! ```
 //!
 //! With u' = w and M w' = Q, the first stage solves `(M + γhD + γ²h²K) k = h Q + γh² Q_t - γh K h w`. The second would take the acceleration at
-//! the predicted state from the mass matrix there, which would be another factorisation. Instead the equation is written for the
-//! difference from k/h: with the residual `r = Q₁ - M₁ k/h` (inverse dynamics, in linear time), `M₀ a₁ = M₀ k/h + r` up to
-//! `(M₁ - M₀)(a₁ - k/h)`, second order in h, so the step stays of order 2. And M₀ k follows from the first stage:
-//! the second right-hand side for `k₂ + k` is `h r + γh D k + γh² K (w + (3γ - 1) k) - γh² Q_t`.
+//! its state from the mass matrix there, which would be another factorisation. Instead it is written for the difference z = k₂ - k₁:
+//! with the residual `r = Q₁ - M₁ k/h` (inverse dynamics, in linear time), `M₀ a₁ = M₀ k/h + r` up to `(M₁ - M₀)(a₁ - k/h)`, of second order
+//! in h, so the step stays of order 2. All products with D cancel: `(M + γhD + γ²h²K) z = h r - γ(½ - γ) h² K k`.
 
 use crate::air::Wind;
-use crate::forces::{Part, Stretch};
+use crate::forces::Stretch;
+use crate::form::Wrench;
 use crate::link::{Link, Weights, pair, transport};
 use crate::place::{Local, Strain};
 use crate::sweep::{Bend, Instant, Power, Workspace, heat, part};
@@ -30,7 +40,7 @@ impl StepError {
     /// Takes a displacement into account. The first that is not a number stays.
     #[inline(always)]
     pub(crate) fn meet(&mut self, displacement: f64, segment: usize) {
-        if !self.displacement.is_nan() && !(displacement <= self.displacement) {
+        if !self.displacement.is_nan() && (displacement.is_nan() || displacement > self.displacement) {
             *self = StepError { displacement, segment };
         }
     }
@@ -48,22 +58,23 @@ impl Workspace {
     ) -> StepError {
         let h = instant.to - instant.from;
         let step = GAMMA * h;
-        let weights = Weights { mass: 1.0, damping: step, stiffness: step * step };
+        let weights =
+            Weights { mass: 1.0, damping: step, stiffness: step * step, extra: 0.0, blur: 2.0 * h * h };
         let bend = Bend { strain: &before.strain, rate: &before.rate };
-        let early = self.spread(skeleton, air, bend, instant, (h, step), &weights);
+        let middle = Instant { to: instant.from + 0.5 * h, ..instant };
+        self.spread(skeleton, air, bend, middle, (h, 2.0 * step), &weights);
         self.gather(skeleton, &before.rate, &weights, step * h);
-        let late = self.predict(skeleton, air, h, before);
+        let power = self.predict(skeleton, air, h, before);
         self.gather_difference(skeleton, h);
         after.work = before.work;
-        after.work.wind += 0.5 * h * (early.wind + late.wind);
-        after.work.dissipated += 0.5 * h * (early.dissipated + late.dissipated);
+        after.work.wind += h * power.wind;
+        after.work.dissipated += h * power.dissipated;
         self.finish(skeleton, h, before, after)
     }
 
     /// Solution of the first stage, places and residual forces at the predicted state, and the second right-hand side.
     fn predict(&mut self, skeleton: &Skeleton, air: &Air, h: f64, before: &State) -> Power {
         let segments = skeleton.segments();
-        let step = GAMMA * h;
         let upwards = -air.gravity;
         let mut power = Power::default();
         for (index, segment) in segments.iter().enumerate() {
@@ -74,8 +85,8 @@ impl Workspace {
             link.first = k;
             let w = if segment.rigid { Vector::zeros() } else { before.rate[index] };
             let strain = Strain {
-                value: before.strain[index] + (w + k * GAMMA) * h,
-                rate: w + k,
+                value: before.strain[index] + (w + k * GAMMA) * (0.5 * h),
+                rate: w + k * 0.5,
                 acceleration: k / h,
             };
             let parent = segment.parent.map(|parent| &self.later[parent]);
@@ -90,36 +101,15 @@ impl Workspace {
             let elastic = rigidity.component_mul(&(strain.value + strain.rate * segment.damping));
             link.late_wrench = forces.wrench;
             link.late_pull = forces.pull;
-            // What of the right-hand side belongs to the first geometry.
-            link.wrench.moment = link.gust.0.moment * -step;
-            link.wrench.force = link.gust.0.force * -step;
-            link.pull = link.gust.1 * -step - (elastic + self.rest_moments[index]) * h;
-            link.pull += rigidity.component_mul(&k) * (step * segment.damping);
-            let x = w + k * (3.0 * GAMMA - 1.0);
-            link.pull += rigidity.component_mul(&x) * (step * h);
-            let here = &self.places[index];
-            let turn =
-                here.spin - here.turning * (w * segment.length) + link.twist.angular * (3.0 * GAMMA - 1.0);
-            link.press(step * h, segment.length, &turn, &x);
-            self.drag_again(index, skeleton.first_plate(index), &part, step);
+            // The part of the right-hand side that belongs to the first geometry.
+            let pressed = GAMMA * (0.5 - GAMMA) * h * h;
+            link.wrench = Wrench::ZERO;
+            link.pull = (elastic + self.rest_moments[index]) * -h - rigidity.component_mul(&k) * pressed;
+            let turn = link.twist.angular;
+            link.press(-pressed, segment.length, &turn, &k);
             self.later[index] = place;
         }
         power
-    }
-
-    /// Adds the product of the drag's matrix with the solution of the first stage.
-    #[inline(always)]
-    fn drag_again(&mut self, index: usize, first_plate: usize, part: &Part<'_>, step: f64) {
-        let link = &mut self.links[index];
-        let long = link.x * part.segment.length;
-        let plates = &self.plate_dampers[first_plate..first_plate + part.plates.len()];
-        let own = (part.segment.drag_diameter > 0.0).then_some(link.damper);
-        for damper in own.iter().chain(plates) {
-            let velocity = link.twist.at(&damper.place) + damper.shift * long;
-            let force = damper.damping * velocity * step;
-            link.wrench.push(&damper.place, &force);
-            link.pull += damper.shift.tr_mul(&force);
-        }
     }
 
     /// Sums residual forces in the second geometry, and eliminates the second right-hand side in the first.
@@ -151,12 +141,12 @@ impl Workspace {
             let link = &mut self.links[index];
             let w = if segment.rigid { Vector::zeros() } else { before.rate[index] };
             let first = link.first;
-            let second = link.x - first;
+            let second = link.x + first;
             let first_strain = w * h + first * step;
-            let second_strain = (w + first) * h - first_strain * 2.0 + second * step;
-            after.strain[index] = before.strain[index] + first_strain * 1.5 + second_strain * 0.5;
-            after.rate[index] = w + first * 1.5 + second * 0.5;
-            let x = [(first_strain + second_strain) * 0.5, (first + second) * (0.5 * h)];
+            let second_strain = (w + first * (0.5 - GAMMA)) * h + second * step;
+            after.strain[index] = before.strain[index] + second_strain;
+            after.rate[index] = w + second;
+            let x = [second_strain - first_strain, link.x * h];
             self.measure(index, segment.parent, segments, x, &mut error);
         }
         error
@@ -198,7 +188,7 @@ impl Workspace {
         after: &mut State,
     ) -> StepError {
         let h = instant.to - instant.from;
-        let weights = Weights { mass: 1.0, damping: h, stiffness: h * h };
+        let weights = Weights { mass: 1.0, damping: h, stiffness: h * h, extra: 0.0, blur: 2.0 * h * h };
         let bend = Bend { strain: &before.strain, rate: &before.rate };
         let power = self.spread(skeleton, air, bend, instant, (h, h), &weights);
         self.gather(skeleton, &before.rate, &weights, h * h);

@@ -58,7 +58,7 @@ impl Workspace {
         let step = GAMMA * h;
         aside.fit(skeleton);
         aside.rest_moments.clone_from(&self.rest_moments);
-        let weights = Weights { mass: 1.0, damping: step, stiffness: step * step };
+        let weights = Weights { mass: 1.0, damping: step, stiffness: step * step, extra: 0.0, blur: 0.0 };
         let bend = Bend { strain: &before.strain, rate: &before.rate };
         self.spread(skeleton, air, bend, instant, (0.0, 0.0), &weights);
         self.gather(skeleton, &before.rate, &weights, 0.0);
@@ -76,7 +76,7 @@ impl Workspace {
             }
             let at = instant.from + h * ALPHA[i].iter().sum::<f64>();
             let now = Instant { wind: instant.wind, from: at, to: at };
-            let explicit = Weights { mass: 1.0, damping: 0.0, stiffness: 0.0 };
+            let explicit = Weights { mass: 1.0, damping: 0.0, stiffness: 0.0, extra: 0.0, blur: 0.0 };
             let bend = Bend { strain: &bent.strain, rate: &bent.rate };
             let power = aside.spread(skeleton, air, bend, now, (1.0, 0.0), &explicit);
             aside.gather(skeleton, &bent.rate, &explicit, 0.0);

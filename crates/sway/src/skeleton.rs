@@ -335,7 +335,7 @@ impl Skeleton {
             }
             let joint = &segment.joint;
             let turned = joint.rotation.transpose() * joint.rotation - Matrix::identity();
-            if !(turned.norm() < 1e-6) {
+            if turned.norm().is_nan() || turned.norm() >= 1e-6 {
                 return fail("the rotation of its joint is not a rotation");
             }
             let motion = [

@@ -85,7 +85,7 @@ impl Solver {
         self.skeleton.clear();
         self.renew(state, time, &mut crate::Fixed(skeleton))?;
         let (skeleton, air) = (&self.skeleton, &self.settings.air);
-        let explicit = Weights { mass: 1.0, damping: 0.0, stiffness: 0.0 };
+        let explicit = Weights { mass: 1.0, damping: 0.0, stiffness: 0.0, extra: 0.0, blur: 0.0 };
         let bend = Bend { strain: &state.strain, rate: &state.rate };
         let now = Instant { wind, from: time, to: time };
         self.work.spread(skeleton, air, bend, now, (1.0, 0.0), &explicit);
@@ -172,7 +172,7 @@ impl Solver {
 
     /// The level of the next step: one less if the error leaves room for it and the grid of longer steps has a point at `end`.
     fn next_level(&self, level: u32, excess: f64, end: f64) -> u32 {
-        if level == 0 || self.settings.fixed || !(excess * self.exponent().exp2() * 1.6 < 1.0) {
+        if level == 0 || self.settings.fixed || excess * self.exponent().exp2() * 1.6 >= 1.0 {
             return level;
         }
         let longer = self.settings.longest / f64::from(level - 1).exp2();

@@ -192,6 +192,7 @@ impl Workspace {
             if weights.mass != 1.0 {
                 link.form.scale(weights.mass);
             }
+            part.blur(&mut link.form, &stretch, weights.blur * place.flow.linear.norm_squared());
             link.damper = Damper::ZERO;
             if blown && weights.damping != 0.0 {
                 link.damper = part.damper(&local, &stretch, &wind);
@@ -227,11 +228,11 @@ impl Workspace {
             if weights.stiffness != 0.0 && !segment.rigid {
                 link.stiffen(place);
             }
-            let material = rigidity * (weights.damping * segment.damping + weights.stiffness);
+            let material = rigidity * (weights.damping * segment.damping + weights.stiffness + weights.extra);
             whole &= link.eliminate(segment.length, &material, weights.stiffness, segment.rigid);
             if pressed != 0.0 && !segment.rigid {
                 let x = &rate[index];
-                let turn = place.spin - place.turning * (x * segment.length);
+                let turn = place.flow.angular - place.turning * (x * segment.length);
                 link.pull -= rigidity.component_mul(x) * pressed;
                 link.press(-pressed, segment.length, &turn, x);
             }
