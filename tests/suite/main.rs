@@ -41,6 +41,7 @@ mod schedulers;
 mod semantics;
 mod shadows;
 mod signals;
+mod sway;
 mod verify;
 mod view;
 mod wild;

@@ -233,6 +233,15 @@ fn failure(model: &Model, body: &Body, error: sway::Error, time: f64) -> Error {
         | sway::Error::Equilibrium { segment, .. } => body.stems.get(*segment),
         _ => None,
     };
+    if std::env::var("SWAY_DEBUG").is_ok()
+        && let sway::Error::Step { segment, .. } = &error
+    {
+        let mut i = Some(*segment);
+        while let Some(k) = i {
+            eprintln!("{k} {:?} loads {:?}", body.skeleton.segments()[k], body.skeleton.loads(k));
+            i = body.skeleton.segments()[k].parent;
+        }
+    }
     let span =
         at.or(body.stems.first()).map_or(Span::default(), |stem| model.scenery.tissues[stem.tissue].span);
     let module = at.map_or(String::new(), |stem| format!("{:x}", stem.key.module));

@@ -57,8 +57,6 @@ pub(crate) fn largest(
     }
     let matrix =
         DMatrix::from_fn(m, m, |i, j| 0.5 * (dot(&duals[i], &images[j]) + dot(&duals[j], &images[i])));
-    let matrix =
-        DMatrix::from_fn(m, m, |i, j| 0.5 * (dot(&duals[i], &images[j]) + dot(&duals[j], &images[i])));
     let eigen = SymmetricEigen::new(matrix);
     let mut order: Vec<usize> = (0..m).collect();
     order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));

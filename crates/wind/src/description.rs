@@ -129,9 +129,8 @@ impl Description {
         if !(length.is_finite() && length > 0.0) {
             return Err(Error::Direction(self.direction.into()));
         }
-        if let Signal::Constant(speed) = self.speed {
+        if let Signal::Constant(_) = self.speed {
             self.speed.finite_at(0.0, || "the speed of the wind".to_owned())?;
-            debug_assert!(speed.is_finite());
         }
         not_negative("the turbulence intensity", self.turbulence)?;
         positive("the integral scale of the turbulence", self.scale)?;
@@ -148,6 +147,15 @@ impl Description {
         if let Some(period) = self.period {
             positive("the period of the wind", period)?;
             self.speed.check_period(period, || "the speed of the wind".to_owned())?;
+        }
+        if let Some(Ground::Uneven { fading, .. }) = self.ground
+            && (fading.is_nan() || fading <= 0.0)
+        {
+            let name = "the height over which the wind forgets the ground";
+            return Err(Error::NotPositive { name, value: fading });
+        }
+        for obstacle in &self.obstacles {
+            positive("the thickness of the layer around an obstacle", obstacle.layer())?;
         }
         self.flows.iter().enumerate().try_for_each(|(i, flow)| flow.check(i, self.period))
     }

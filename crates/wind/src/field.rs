@@ -58,9 +58,9 @@ enum Kind {
     Still(f64),
 }
 
-/// The steps into which a period is divided, so that rounding of t/T does not break the repetition: a trillionth of a period
-/// is shorter than anything in the wind.
-const TICKS: f64 = (1u64 << 40) as f64;
+/// The steps into which a period is divided, so that rounding of t/T does not break the repetition. Their number has many divisors:
+/// times of frames at common rates are steps of common periods, far from where rounding could go either way.
+const TICKS: f64 = ((1u64 << 24) * 9 * 125 * 7) as f64;
 
 /// The thickness of a layer over the ground relative to the size of its eddies, the root of the mean of 1/k²: with it, the
 /// variance of horizontal components at the ground is 1.5 times that far above, as at a wall in the theory of rapid distortion
@@ -141,7 +141,8 @@ impl Field {
     ///
     /// # Errors
     ///
-    /// A time that is not finite; a speed or a flow that is not finite at that time; a speed that varies, more than 10⁷ s from 0.
+    /// A time that is not finite; a speed, a flow or an obstacle that is not finite at that time; a speed that varies, more than
+    /// 10⁷ s from 0.
     pub fn at(&self, time: f64) -> Result<Snapshot, Error> {
         let (time, instant) = self.instant(time)?;
         let speed = self.speed.finite_at(time, || "the speed of the wind".to_owned())?;
@@ -155,6 +156,13 @@ impl Field {
                     .iter()
                     .map(|band| Lattice::new(band, instant, self.lap, amplitude, &mut work)),
             );
+        }
+        for (i, obstacle) in self.setting.obstacles.iter().enumerate() {
+            let (centre, velocity) = (obstacle.centre(time), obstacle.velocity(time));
+            if let Some(value) = centre.iter().chain(velocity.iter()).copied().find(|v| !v.is_finite()) {
+                let name = format!("the centre or the velocity of obstacle {}", i + 1);
+                return Err(Error::NotFinite { name, time, value });
+            }
         }
         let flows = self.flows.iter().enumerate().map(|(i, flow)| flow.at(time, i));
         let flows = flows.collect::<Result<Vec<_>, _>>()?;

@@ -37,7 +37,7 @@ impl Grid {
         for a in (0..N).filter(|&a| used(a)) {
             for b in (0..N).filter(|&b| used(b)) {
                 let at = (a * N + b) * N;
-                line(&self.twiddles, &mut self.re[at..at + N], &mut self.im[at..at + N], 1);
+                single(&self.twiddles, &mut self.re[at..at + N], &mut self.im[at..at + N]);
             }
             let at = a * N * N;
             line(&self.twiddles, &mut self.re[at..at + N * N], &mut self.im[at..at + N * N], N);
@@ -79,6 +79,28 @@ fn line(twiddles: &[(f64, f64); N / 2], re: &mut [f64], im: &mut [f64], width: u
             }
         }
     }
+}
+
+/// The same for one line of numbers: decimation in time, in local arrays of a known length.
+fn single(twiddles: &[(f64, f64); N / 2], re: &mut [f64], im: &mut [f64]) {
+    let reversed = |i: usize| (i as u8).reverse_bits() as usize >> 3;
+    let mut x: [f64; N] = std::array::from_fn(|i| re[reversed(i)]);
+    let mut y: [f64; N] = std::array::from_fn(|i| im[reversed(i)]);
+    let mut half = 1;
+    while half < N {
+        for start in (0..N).step_by(2 * half) {
+            for j in 0..half {
+                let (c, s) = twiddles[j * (N / 2 / half)];
+                let (upper, lower) = (start + j, start + j + half);
+                let (dx, dy) = (x[lower] * c - y[lower] * s, x[lower] * s + y[lower] * c);
+                (x[lower], y[lower]) = (x[upper] - dx, y[upper] - dy);
+                (x[upper], y[upper]) = (x[upper] + dx, y[upper] + dy);
+            }
+        }
+        half *= 2;
+    }
+    re.copy_from_slice(&x);
+    im.copy_from_slice(&y);
 }
 
 #[cfg(test)]

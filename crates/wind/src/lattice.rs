@@ -247,6 +247,54 @@ impl Lattice {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Spectrum;
+    use crate::modes::bands;
+    use crate::spectrum::Energy;
+
+    fn first_band() -> (Band, Lattice, Instant) {
+        let [band, ..] = bands(Energy::new(Spectrum::VonKarman, 3.0), Vector3::x(), 1);
+        let at = Instant { share: 0.0, drift: 3.5, swept: 0.7 };
+        let lattice = Lattice::new(&band, at, None, 1.0, &mut [Grid::new(), Grid::new()]);
+        (band, lattice, at)
+    }
+
+    #[test]
+    fn potentials_at_points_of_the_lattice_are_sums_of_modes() {
+        let (band, lattice, at) = first_band();
+        for point in [[0.0, 0.0, 0.0], [1.0, 2.0, 3.0], [31.0, 17.0, -5.0], [12.0, 40.0, 7.0]] {
+            let point = Vector3::from(point);
+            let mut exact = Vector3::zeros();
+            band.amplitudes(at, None, |mode, re, im| {
+                let turns = Vector3::from(mode.m.map(f64::from)).dot(&point) / N as f64;
+                let (c, s) = cos_sin(turns);
+                exact += (re * c - im * s) * (2.0 / mode.k);
+            });
+            // From the axes of the lattice to those of the world, as a place in metres.
+            let x = lattice.to_world * point * lattice.spacing;
+            let (value, _) = lattice.potential(x);
+            // Coefficients have 24 bits.
+            let error = (value - lattice.to_world * exact).norm();
+            assert!(error < 1e-6 * (1.0 + exact.norm()), "{point}: {value}, {exact}");
+        }
+    }
+
+    #[test]
+    fn jets_are_derivatives_of_potentials() {
+        let (_, lattice, _) = first_band();
+        for x in [Vector3::new(0.3, 1.7, -2.9), Vector3::new(17.0, -40.0, 3.0)] {
+            let jet = lattice.jet(x);
+            assert!((curl(&jet.first) - lattice.velocity(x)).norm() < 1e-12);
+            for j in 0..3 {
+                let step = Vector3::ith(j, 1e-5);
+                let (after, before) = (lattice.potential(x + step), lattice.potential(x - step));
+                assert!(((after.0 - before.0) / 2e-5 - jet.first.column(j)).norm() < 1e-7);
+                for i in 0..3 {
+                    let slope = (after.1.row(i) - before.1.row(i)) / 2e-5;
+                    assert!((slope - jet.second[i].row(j)).norm() < 1e-4, "{i} {j}");
+                }
+            }
+        }
+    }
 
     #[test]
     fn weights_are_derivatives_of_each_other_and_sum_to_one() {

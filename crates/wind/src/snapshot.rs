@@ -206,10 +206,10 @@ impl Snapshot {
         let velocity = self.velocity(x);
         let flat = self.setting.ground.as_ref().is_none_or(|ground| ground.is_flat());
         let step = self.step();
-        let near = |(obstacle, body): (&Box<dyn crate::Obstacle>, &Body)| {
-            obstacle.distance(x, self.time) < body.layer + step
-        };
-        if flat && !self.setting.obstacles.iter().zip(&self.bodies).any(near) {
+        let near =
+            |body: &Body, obstacle: &dyn crate::Obstacle| obstacle.distance(x, self.time) < body.layer + step;
+        let mut bodies = self.bodies.iter().zip(&self.setting.obstacles);
+        if flat && !bodies.any(|(body, obstacle)| near(body, obstacle.as_ref())) {
             return (velocity, self.free_gradient(x));
         }
         let columns: [Vector3<f64>; 3] = std::array::from_fn(|j| {

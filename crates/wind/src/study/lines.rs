@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::Vector3;
 
-use super::{INTENSITY, Row, SCALE, SPEED, place};
+use super::{INTENSITY, Row, SCALE, SPEED, end, heading, place};
 use crate::random::Draw;
 use crate::spectrum::{Energy, correlations, von_karman_length};
 use crate::turns::cos_sin;
@@ -21,21 +21,22 @@ const WAVES: std::ops::RangeInclusive<usize> = 9..=24;
 /// Distances of the correlations, in steps: 0.1, 0.25, 0.5, 1 and 2 L.
 const LAGS: [usize; 5] = [5, 12, 25, 50, 100];
 
-/// Sums over all lines of the longitudinal component and of two transverse ones.
+/// Sums over fields of the longitudinal component and of two transverse ones.
 #[derive(Default)]
-struct Sums {
+pub(super) struct Lines {
+    fields: f64,
     spectrum: [f64; 3],
     products: [[f64; LAGS.len()]; 3],
 }
 
-pub(super) fn rows(fields: &[Field], rows: &mut Vec<Row>) -> Result<(), Error> {
-    let length = von_karman_length(SCALE);
-    let mut sums = Sums::default();
-    for (seed, field) in fields.iter().enumerate() {
+impl Lines {
+    pub(super) fn add(&mut self, field: &Field, seed: u64) -> Result<(), Error> {
+        self.fields += 1.0;
+        let length = von_karman_length(SCALE);
         let wind = field.at(3.0)?;
-        let mean = Vector3::new(2.0, 1.0, -0.5).normalize() * SPEED;
+        let mean = heading() * SPEED;
         for line in 0..LINES {
-            let draw = Draw::new(4).of(seed as u64).of(line);
+            let draw = Draw::new(4).of(seed).of(line);
             let axes = axes(draw.of(1));
             let start = place(draw.of(2));
             let velocities: Vec<Vector3<f64>> = (0..PLACES)
@@ -43,49 +44,37 @@ pub(super) fn rows(fields: &[Field], rows: &mut Vec<Row>) -> Result<(), Error> {
                 .collect();
             for (i, axis) in axes.iter().enumerate() {
                 let values: Vec<f64> = velocities.iter().map(|u| u.dot(axis)).collect();
-                sums.spectrum[i] += spectrum(&values, length);
-                for (sum, lag) in sums.products[i].iter_mut().zip(LAGS) {
+                self.spectrum[i] += spectrum(&values, length);
+                for (sum, lag) in self.products[i].iter_mut().zip(LAGS) {
                     let pairs = values.iter().zip(&values[lag..]);
                     *sum += pairs.map(|(a, b)| a * b).sum::<f64>() / (PLACES - lag) as f64;
                 }
             }
         }
+        Ok(())
     }
-    let count = fields.len() as f64 * LINES as f64;
-    let [along, across, other] = sums.spectrum.map(|sum| sum / count);
-    let ratio = 0.5 * (across + other) / along;
-    rows.push(Row::relative(
-        "spectra across to along a line, kL from 5.5 to 15, sampled",
-        ratio,
-        4.0 / 3.0,
-        0.05,
-    ));
-    rows.push(Row::relative(
-        "spectrum along a line, kL from 5.5 to 15, sampled, m³/s²",
-        along,
-        theory(fields, length),
-        0.05,
-    ));
-    let variance = (INTENSITY * SPEED).powi(2);
-    for (i, lag) in LAGS.into_iter().enumerate() {
-        let r = lag as f64 * STEP;
-        let (f, g) = correlations(r);
-        let [along, across, other] = sums.products.map(|sums| sums[i] / count / variance);
-        rows.push(Row::absolute(
-            format!("longitudinal correlation f at r = {r:.2} L, sampled"),
-            along,
-            f,
-            0.03,
-        ));
-        let across = 0.5 * (across + other);
-        rows.push(Row::absolute(
-            format!("transverse correlation g at r = {r:.2} L, sampled"),
-            across,
-            g,
-            0.03,
-        ));
+
+    pub(super) fn rows(&self, field: &Field, rows: &mut Vec<Row>) {
+        let length = von_karman_length(SCALE);
+        let count = self.fields * LINES as f64;
+        let [along, across, other] = self.spectrum.map(|sum| sum / count);
+        let ratio = 0.5 * (across + other) / along;
+        let name = "spectra across to along a line, kL from 5.5 to 15, sampled";
+        rows.push(Row::relative(name, ratio, 4.0 / 3.0, 0.05));
+        let name = "spectrum along a line, kL from 5.5 to 15, sampled, m³/s²";
+        rows.push(Row::relative(name, along, theory(end(field), length), 0.05));
+        let variance = (INTENSITY * SPEED).powi(2);
+        for (i, lag) in LAGS.into_iter().enumerate() {
+            let r = lag as f64 * STEP;
+            let (f, g) = correlations(r);
+            let [along, across, other] = self.products.map(|sums| sums[i] / count / variance);
+            let across = 0.5 * (across + other);
+            let name = format!("longitudinal correlation f at r = {r:.2} L, sampled");
+            rows.push(Row::absolute(name, along, f, 0.03));
+            let name = format!("transverse correlation g at r = {r:.2} L, sampled");
+            rows.push(Row::absolute(name, across, g, 0.03));
+        }
     }
-    Ok(())
 }
 
 /// A random direction, and two at right angles to it.
@@ -115,9 +104,8 @@ fn spectrum(values: &[f64], length: f64) -> f64 {
 }
 
 /// The same of von Kármán's spectrum as far as it is resolved: ∫E/k (1 - k₁²/k²) dk from k₁ on.
-fn theory(fields: &[Field], length: f64) -> f64 {
+fn theory(end: f64, length: f64) -> f64 {
     let energy = Energy::new(Spectrum::VonKarman, SCALE);
-    let end = fields[0].bands().last().map_or(0.0, |band| band.range[1]);
     let at = |wave: usize| {
         let first = wave as f64 * TAU / (PLACES as f64 * STEP * length);
         // The trapezoidal rule over ln k.

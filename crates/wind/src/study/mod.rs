@@ -5,7 +5,9 @@
 mod lines;
 mod shells;
 
+use lines::Lines;
 use nalgebra::Vector3;
+use shells::Shells;
 
 use crate::random::Draw;
 use crate::spectrum::Energy;
@@ -55,7 +57,7 @@ fn von_karman(seed: u64) -> Result<Field, Error> {
         turbulence: INTENSITY,
         scale: SCALE,
         seed,
-        ..Description::new(Vector3::new(2.0, 1.0, -0.5), SPEED)
+        ..Description::new(heading(), SPEED)
     })
 }
 
@@ -67,6 +69,16 @@ fn von_karman(seed: u64) -> Result<Field, Error> {
 pub fn paper(seed: u64) -> Result<Field, Error> {
     let spectrum = Spectrum::Kolmogorov { dissipation: 1.0, inertial: 4.0, sigma: 1.0 };
     Field::new(Description { turbulence: 1.0, seed, spectrum, ..Description::new(Vector3::x(), 1.0) })
+}
+
+/// The direction of the wind in the fields that are measured: along no axis.
+fn heading() -> Vector3<f64> {
+    Vector3::new(2.0, 1.0, -0.5).normalize()
+}
+
+/// The largest wave number of a field in rad/m.
+fn end(field: &Field) -> f64 {
+    field.bands().last().map_or(0.0, |band| band.range[1])
 }
 
 /// A place at random within 100 m of the origin, along each axis.
@@ -82,60 +94,70 @@ fn place(draw: Draw) -> Vector3<f64> {
 /// None; the fields that it builds are valid.
 pub fn statistics(seeds: u64) -> Result<Vec<Row>, Error> {
     let seeds = seeds.max(1);
-    let fields = (0..seeds).map(von_karman).collect::<Result<Vec<_>, _>>()?;
-    let mut rows = Vec::new();
-    variance(&fields, &mut rows)?;
-    shells::rows(&fields, &mut rows)?;
-    lines::rows(&fields, &mut rows)?;
-    divergence(&fields[0], &mut rows)?;
+    let (mut rows, first) = (Vec::new(), von_karman(0)?);
+    // One field at a time: each takes some megabytes.
+    let (mut variances, mut shells, mut lines) =
+        (Variances::default(), Shells::new(&first), Lines::default());
+    for seed in 0..seeds {
+        let field = von_karman(seed)?;
+        variances.add(&field, seed)?;
+        shells.add(&field)?;
+        lines.add(&field, seed)?;
+    }
+    variances.rows(&first, &mut rows)?;
+    shells.rows(&mut rows);
+    lines.rows(&first, &mut rows);
+    divergence(&first, &mut rows)?;
     of_paper(seeds, &mut rows)?;
     Ok(rows)
 }
 
-/// Variances of components and products of different ones, over whole boxes and at random places.
-fn variance(fields: &[Field], rows: &mut Vec<Row>) -> Result<(), Error> {
-    let full = (INTENSITY * SPEED).powi(2);
-    let expected = fields[0].variance(0.0)?;
-    let energy = Energy::new(Spectrum::VonKarman, SCALE);
-    let end = fields[0].bands().last().map_or(0.0, |band| band.range[1]);
-    let share = energy.integral(0.0, end) / energy.integral(0.0, f64::INFINITY);
-    rows.push(Row::relative("share of the variance that is resolved", expected / full, share, 1e-9));
-    let (mut square, mut cross) = (Vector3::zeros(), Vector3::zeros());
-    for field in fields {
+/// Variances of components and products of different ones, over whole boxes and at random places: sums over fields.
+#[derive(Default)]
+struct Variances {
+    fields: f64,
+    square: Vector3<f64>,
+    cross: Vector3<f64>,
+    sampled: f64,
+}
+
+/// Places at which each field is sampled.
+const PLACES: u64 = 4000;
+
+impl Variances {
+    fn add(&mut self, field: &Field, seed: u64) -> Result<(), Error> {
+        self.fields += 1.0;
         field.modes(0.0, |_, _, [re, im]| {
             // A mode and its conjugate.
-            square += (re.component_mul(&re) + im.component_mul(&im)) * 2.0;
-            cross += (re.component_mul(&re.yzx()) + im.component_mul(&im.yzx())) * 2.0;
+            self.square += (re.component_mul(&re) + im.component_mul(&im)) * 2.0;
+            self.cross += (re.component_mul(&re.yzx()) + im.component_mul(&im.yzx())) * 2.0;
         })?;
-    }
-    let n = fields.len() as f64;
-    for (i, name) in ["x", "y", "z"].iter().enumerate() {
-        rows.push(Row::relative(
-            format!("variance of u_{name}, modes, m²/s²"),
-            square[i] / n,
-            expected,
-            0.02,
-        ));
-    }
-    for (i, name) in ["xy", "yz", "zx"].iter().enumerate() {
-        rows.push(Row::absolute(
-            format!("correlation of components {name}, modes"),
-            cross[i] / n / expected,
-            0.0,
-            0.02,
-        ));
-    }
-    let points = 4000;
-    let mean = Vector3::new(2.0, 1.0, -0.5).normalize() * SPEED;
-    let mut square = 0.0;
-    for (i, field) in fields.iter().enumerate() {
+        let mean = heading() * SPEED;
         let wind = field.at(0.0)?;
-        let draw = Draw::new(1).of(i as u64);
-        square += (0..points).map(|i| (wind.velocity(place(draw.of(i))) - mean).norm_squared()).sum::<f64>();
+        let draw = Draw::new(1).of(seed);
+        self.sampled +=
+            (0..PLACES).map(|i| (wind.velocity(place(draw.of(i))) - mean).norm_squared()).sum::<f64>();
+        Ok(())
     }
-    let value = square / (3 * points * fields.len() as u64) as f64;
-    rows.push(Row::relative("variance of a component, sampled, m²/s²", value, expected, 0.02));
-    Ok(())
+
+    fn rows(&self, field: &Field, rows: &mut Vec<Row>) -> Result<(), Error> {
+        let expected = field.variance(0.0)?;
+        let energy = Energy::new(Spectrum::VonKarman, SCALE);
+        let share = energy.integral(0.0, end(field)) / energy.integral(0.0, f64::INFINITY);
+        let full = (INTENSITY * SPEED).powi(2);
+        rows.push(Row::relative("share of the variance that is resolved", expected / full, share, 1e-9));
+        for (i, name) in ["x", "y", "z"].iter().enumerate() {
+            let name = format!("variance of u_{name}, modes, m²/s²");
+            rows.push(Row::relative(name, self.square[i] / self.fields, expected, 0.02));
+        }
+        for (i, name) in ["xy", "yz", "zx"].iter().enumerate() {
+            let name = format!("correlation of components {name}, modes");
+            rows.push(Row::absolute(name, self.cross[i] / self.fields / expected, 0.0, 0.02));
+        }
+        let sampled = self.sampled / (3.0 * PLACES as f64 * self.fields);
+        rows.push(Row::relative("variance of a component, sampled, m²/s²", sampled, expected, 0.02));
+        Ok(())
+    }
 }
 
 /// The largest divergence at 10⁵ random places.

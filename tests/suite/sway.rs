@@ -1,0 +1,209 @@
+//! Stems that bend in the wind: no production can be seen, frames observe and never steer, and what does not move is drawn as ever.
+
+use std::collections::HashMap;
+
+use dlsys::scene::{Point, Scene};
+use dlsys::session::{Nursery, Session};
+use dlsys::sim::Settings;
+use dlsys::tree::ModuleString;
+
+use super::common;
+
+const DIVIDING: &str = "units length 0.1, time 1\n\
+    tissue stalk = stiffness 6e7, density 900, damping 0.05\n\
+    wind 1, 0, 0.3 speed 4 turbulence 0.4 scale 2\n\
+    initial string: @E(stalk) S(1) /(20) S(1.3) [ +(40) S(0.5) @L(1) ] /(50) S(0.9) @K(1.5)\n\
+    S(x): if x < 2 solve dx/dt = 0.4x if x = 2 produce S(0.8) /(33) S(1.2)\n\
+    interpret S(x): !(0.06) F(x)\n";
+
+fn read(name: &str, text: &str) -> Session {
+    Session::from_text(name, text, &[]).unwrap_or_else(|refused| panic!("{refused}"))
+}
+
+/// The scenes of a model at some times, which need not be in order.
+fn scenes(session: &Session, times: &[f64]) -> Vec<Scene> {
+    let nursery = Nursery::new(&session.model, Settings::default());
+    let draw = |&t: &f64| {
+        let mut string = ModuleString::default();
+        let mut simulation = session.simulate(Settings::default()).expect("it starts");
+        simulation.at(t, &mut string).unwrap_or_else(|error| panic!("{error}"));
+        let mut scene = nursery.blank();
+        nursery.draw(&string, &mut scene).unwrap_or_else(|error| panic!("{error}"));
+        scene
+    };
+    times.iter().map(draw).collect()
+}
+
+/// Where things are, by the module that draws them and their number among its things.
+fn points(scene: &Scene) -> HashMap<(u64, usize), Point> {
+    let mut count: HashMap<u64, usize> = HashMap::new();
+    let mut found = HashMap::new();
+    let surfaces = scene.surfaces.iter().map(|surface| (surface.owner, surface.placement.origin, false));
+    let polygons = scene.polygons.iter().map(|polygon| (polygon.owner, polygon.vertices[0], false));
+    let segments = scene.segments.iter().map(|segment| (segment.owner, segment.start, true));
+    for (owner, point, stems) in surfaces.chain(polygons).chain(segments) {
+        let module = scene.owner(owner).lineage.id;
+        let number = count.entry(module).or_insert(0);
+        // Of stems the first piece: the number of pieces of a bent stem follows its curvature.
+        found.entry((module, if stems { usize::MAX } else { *number })).or_insert(point);
+        *number += usize::from(!stems);
+    }
+    found
+}
+
+/// The instants of productions up to a time.
+fn instants(session: &Session, end: f64) -> Vec<f64> {
+    let mut simulation = session.simulate(Settings { log: true, ..Settings::default() }).expect("it starts");
+    let _ = simulation.pass(end);
+    let mut times: Vec<f64> = simulation.take_events().iter().map(|event| event.time).collect();
+    times.dedup();
+    times
+}
+
+/// The largest jumps of position and of velocity of what is there before and after an instant.
+fn jumps(session: &Session, at: f64) -> (f64, f64, f64) {
+    const H: f64 = 1e-5;
+    let times = [at - 2.0 * H, at - H, at.next_down().next_down(), at, at + H, at + 2.0 * H];
+    let points: Vec<_> = scenes(session, &times).iter().map(points).collect();
+    let (mut position, mut velocity, mut speed) = (0.0_f64, 0.0_f64, 0.0_f64);
+    for key in points[0].keys() {
+        let there: Option<Vec<_>> = points.iter().map(|frame| frame.get(key).map(|p| p.coords)).collect();
+        let Some(x) = there else { continue };
+        position = position.max((x[3] - x[2]).norm());
+        // One-sided differences of order 2.
+        let before = (x[2] * 3.0 - x[1] * 4.0 + x[0]) / (2.0 * H);
+        let after = (x[4] * 4.0 - x[5] - x[3] * 3.0) / (2.0 * H);
+        velocity = velocity.max((after - before).norm());
+        speed = speed.max(before.norm());
+    }
+    (position, velocity, speed)
+}
+
+#[test]
+fn divisions_cannot_be_seen_in_the_wind() {
+    let session = read("dividing.dls", DIVIDING);
+    let times = instants(&session, 6.0);
+    assert!(times.len() >= 6, "{times:?}");
+    for at in times {
+        let (position, velocity, speed) = jumps(&session, at);
+        assert!(speed > 0.01, "the wind blows at {at}: {speed}");
+        assert!(position < 1e-9, "at {at}: {position:e}");
+        assert!(velocity < 1e-6 * speed.max(1.0), "at {at}: {velocity:e} of {speed}");
+    }
+}
+
+#[test]
+fn the_clock_cannot_be_seen() {
+    let session = read("dividing.dls", DIVIDING);
+    for tick in [30.0, 31.0, 77.0] {
+        let at: f64 = tick / 30.0;
+        let (position, velocity, speed) = jumps(&session, at);
+        assert!(
+            position < 1e-9 && velocity < 1e-6 * speed.max(1.0),
+            "{tick}: {position:e} {velocity:e} {speed}"
+        );
+    }
+}
+
+#[test]
+fn the_order_of_times_does_not_matter() {
+    let session = read("dividing.dls", DIVIDING);
+    let times: Vec<f64> = (0..40).map(|i| f64::from(i) * 0.1237).collect();
+    let straight = scenes(&session, &times);
+    let mut order: Vec<usize> = (0..times.len()).collect();
+    order.sort_by_key(|i| i * 17 % 41);
+    let mixed = scenes(&session, &order.iter().map(|i| times[*i]).collect::<Vec<_>>());
+    for (scene, &i) in mixed.iter().zip(&order) {
+        assert_eq!(points(scene), points(&straight[i]), "{}", times[i]);
+        let alone = &scenes(&session, &[times[i]])[0];
+        assert_eq!(points(alone), points(scene), "{}", times[i]);
+    }
+}
+
+#[test]
+fn at_rest_nothing_changes() {
+    let rigid = DIVIDING.replace("@E(stalk) ", "");
+    let still: String =
+        DIVIDING.lines().filter(|line| !line.starts_with("wind")).map(|l| format!("{l}\n")).collect();
+    let upright = still.replace("+(40) S(0.5)", "+(0) S(0.5)").replace("@L(1)", "");
+    let [rigid, still] = [rigid, upright].map(|text| {
+        scenes(
+            &read("rest.dls", &text.replace("+(40) S(0.5)", "+(0) S(0.5)").replace("@L(1)", "")),
+            &[0.5, 3.3],
+        )
+    });
+    for (a, b) in rigid.iter().zip(&still) {
+        assert_eq!(a.segments.len(), b.segments.len());
+        for (a, b) in a.segments.iter().zip(&b.segments) {
+            assert!((a.end - b.end).norm() < 1e-12, "growth along the stem moves nothing aside");
+        }
+    }
+}
+
+#[test]
+fn a_plant_sways_as_its_model_does_alone() {
+    let here = tempfile::tempdir().expect("a folder");
+    let write = |name: &str, text: &str| std::fs::write(here.path().join(name), text).expect("written");
+    write("stalk.dls", DIVIDING);
+    write(
+        "scene.dls",
+        "units length 0.1, time 1\nwind 1, 0, 0.3 speed 4 turbulence 0.4 scale 2\nplant @S from \"stalk.dls\"\n\
+         initial string: [ -(90) f(0) +(90) -(90) +(90) ] @S(0) [ f(5) @S(0) ] [ f(5) /(90) @S(-0.7) ]\n",
+    );
+    let open = |name: &str| Session::open(&here.path().join(name), &[]).unwrap_or_else(|e| panic!("{e}"));
+    let (alone, scene) = (open("stalk.dls"), open("scene.dls"));
+    let (alone, scene) = (scenes(&alone, &[2.0, 4.0]), scenes(&scene, &[2.0, 4.0]));
+    for (alone, scene) in alone.iter().zip(&scene) {
+        let flower = |scene: &Scene| scene.surfaces.last().expect("a flower").placement.origin;
+        let plants: Vec<_> =
+            scene.plants.iter().map(|plant| plant.placement.point(flower(&plant.scene))).collect();
+        // The plant's axes are those of the scene.
+        assert!((plants[0] - flower(alone)).norm() < 1e-9, "{:?} {:?}", plants[0], flower(alone));
+        let higher = plants[1] - dlsys::scene::Vector::new(0.0, 5.0, 0.0);
+        assert!((higher - plants[0]).norm() > 1e-3, "another place, another wind");
+    }
+}
+
+/// The models of the repository with everything that they draw made of a soft tissue, in a wind.
+#[test]
+#[ignore = "takes minutes"]
+fn nothing_pops_in_any_model() {
+    let mut seen = 0;
+    for path in common::models().into_iter().filter(|path| path.to_string_lossy().contains("/models/")) {
+        let text = std::fs::read_to_string(&path).expect("readable");
+        let (head, tail) = text.split_once("initial string:").unwrap_or(("", ""));
+        if head.contains("tissue ") || tail.is_empty() {
+            continue;
+        }
+        let folder = path.parent().expect("a folder");
+        let dressed = |words: &str, first: &str| {
+            let text = format!("{words}\n{head}initial string: {first} {tail}");
+            Session::from_text_in(folder, &[], "dressed.dls", &text, &[])
+        };
+        let words = "units length 0.05, time 1\ntissue zz = stiffness 2e8, density 900, damping 0.2\n\
+             wind 1, 0, 0.3 speed 2 turbulence 0.3 scale 2";
+        let (Ok(bent), Ok(rigid)) = (dressed(words, "@E(zz) !(0.1)"), dressed("", "!(0.1)")) else {
+            continue;
+        };
+        let end = bent.model.frames.map_or(5.0, |frames| frames.to.min(8.0));
+        let times = instants(&rigid, end);
+        let some: Vec<f64> =
+            times.iter().copied().step_by(times.len() / 4 + 1).filter(|t| *t > 0.1).collect();
+        for at in some {
+            let (position, velocity, speed) = jumps(&bent, at);
+            let (without, slower, _) = jumps(&rigid, at);
+            assert!(
+                position <= without + 1e-9 * 20.0,
+                "{} at {at}: {position:e} {without:e}",
+                path.display()
+            );
+            assert!(
+                velocity <= 1.1 * slower + 2e-6 * speed.max(1.0),
+                "{} at {at}: {velocity:e} {slower:e} of {speed}",
+                path.display()
+            );
+            seen += 1;
+        }
+    }
+    assert!(seen > 30, "{seen}");
+}
