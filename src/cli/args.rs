@@ -73,6 +73,9 @@ pub enum Action {
     /// the slowest. The observed order is the slope of error against step size or, for methods with step
     /// control, against evaluations of the right-hand side.
     ///
+    /// For a model with tissues, a second table has the error of drawn positions against work, for each method and tolerance
+    /// of bending.
+    ///
     /// With --hard, models that state their exact answers in their first lines are run and checked.
     Report(ReportArgs),
     /// Print a script that completes commands and flags in a shell
@@ -124,7 +127,7 @@ JSON fields:
               inverse (it rises throughout, or falls throughout)
   scene       if declared, a list of part, class, why
   bending     with tissues: t, ticks (steps of the clock up to t), wind (m/s), and
-    axes        a list of kinds, tissue, count, measured; as least and greatest
+    axes        a list of kinds, tissue, depth (brackets), count, measured; as least and greatest
                 values in SI: segments, length, width, mass, carried,
                 frequency, damping, cauchy, greenhill
   summary     kinds by work; closed_form: nothing is ever integrated";
@@ -373,10 +376,10 @@ pub struct GalleryArgs {
 #[derive(Debug, Args)]
 pub struct ReportArgs {
     /// Model files (*.dls)
-    #[arg(value_name = "MODEL", required_unless_present = "hard", conflicts_with = "hard")]
+    #[arg(value_name = "MODEL", required_unless_present_any = ["hard", "surroundings"], conflicts_with_all = ["hard", "surroundings"])]
     pub models: Vec<PathBuf>,
-    /// Directory for NAME.csv, NAME.json and the plot NAME.svg (with --hard: hard.csv, hard.json); made if it
-    /// is not there
+    /// Directory for NAME.csv, NAME.json and the plot NAME.svg, with tissues also NAME-stems.csv (with --hard: hard.csv,
+    /// hard.json; with --surroundings: surroundings.csv); made if it is not there
     #[arg(short, long = "out", value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Methods to compare, in this order [default: all; with --hard those that each case names]
@@ -427,6 +430,10 @@ pub struct ReportArgs {
     /// status 1 if any fails
     #[arg(long, value_name = "DIR", num_args = 0..=1)]
     pub hard: Option<Option<PathBuf>>,
+    /// Exact cases of the wind and of stems that bend (statistics of turbulence, beams, buckling, vibrations, energy) with errors and orders,
+    /// hard cases, error against work of the implicit methods, and speed. Exit status 1 if a statistic is out of its bound or a hard case fails
+    #[arg(long, conflicts_with_all = ["hard", "verify", "methods", "tolerances", "step_sizes", "slices", "at", "from", "settings"])]
+    pub surroundings: bool,
     /// With --hard, run only the case of this name; can be repeated
     #[arg(long = "case", value_name = "ID")]
     pub cases: Vec<String>,

@@ -20,6 +20,8 @@ pub struct Axis {
     pub kinds: Vec<KindId>,
     /// Number of the tissue at its base among those of the model, from 0.
     pub tissue: usize,
+    /// Number of brackets of the string around its first module.
+    pub depth: usize,
     /// Number of segments.
     pub segments: usize,
     /// Length in m.
@@ -83,6 +85,7 @@ impl Survey {
                 axes.push(Axis {
                     kinds: Vec::new(),
                     tissue: stem.tissue,
+                    depth: stem.depth,
                     segments: 0,
                     length: 0.0,
                     width: segment.diameter,

@@ -50,6 +50,8 @@ type Range = [f64; 2];
 pub struct AxisPlan {
     pub kinds: Vec<String>,
     pub tissue: String,
+    /// Number of brackets around the first module.
+    pub depth: usize,
     pub count: usize,
     /// Number of axes of which the last four values are known.
     pub measured: usize,
@@ -113,11 +115,16 @@ impl AxisPlan {
     fn text(&self, out: &mut String) {
         let segments = values(self.segments, 1.0);
         let pieces = if self.segments == [1.0, 1.0] { "segment" } else { "segments" };
+        let depth = match self.depth {
+            0 => String::new(),
+            1 => " in a bracket".to_owned(),
+            n => format!(" in {n} brackets"),
+        };
         let each = if self.count == 1 { String::new() } else { format!(", {} axes", self.count) };
         let carries =
             if self.carried[1] > 0.0 { format!(", carries {}", mass(self.carried)) } else { String::new() };
         let line = format!(
-            "{}{each} of {segments} {pieces}: {} long, {} wide at the base, {}{carries}",
+            "{}{depth}{each} of {segments} {pieces}: {} long, {} wide at the base, {}{carries}",
             self.kinds.join(" "),
             length(self.length),
             length(self.width),
@@ -163,8 +170,17 @@ fn values([least, greatest]: Range, unit: f64) -> String {
 }
 
 fn with_unit(range: Range, units: &[(f64, &str)]) -> String {
-    let fits = units.iter().find(|(unit, _)| range[1] >= *unit).or(units.last());
-    fits.map_or(String::new(), |(unit, name)| format!("{} {name}", values(range, *unit)))
+    let shown = |range: Range| {
+        // The unit of what is not there is that of a hundredth.
+        let large = if range[1] > 0.0 { range[1] } else { 1e-2 };
+        let fits = units.iter().find(|(unit, _)| large >= *unit).or(units.last());
+        fits.map_or(String::new(), |(unit, name)| format!("{} {name}", values(range, *unit)))
+    };
+    let [least, greatest] = range;
+    if least > 0.0 && greatest > 100.0 * least {
+        return format!("{} to {}", shown([least; 2]), shown([greatest; 2]));
+    }
+    shown(range)
 }
 
 /// A length from m, as people read it.
@@ -205,7 +221,7 @@ fn axes(model: &Model, survey: &Survey, wind: Option<f64>) -> Vec<AxisPlan> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
     let mut known = HashMap::new();
     for (i, axis) in survey.axes().iter().enumerate() {
-        let group = *known.entry((&axis.kinds, axis.tissue)).or_insert_with(|| {
+        let group = *known.entry((&axis.kinds, axis.tissue, axis.depth)).or_insert_with(|| {
             groups.push(Vec::new());
             groups.len() - 1
         });
@@ -235,6 +251,7 @@ fn plan(model: &Model, survey: &Survey, group: &[usize], wind: Option<f64>) -> A
     AxisPlan {
         kinds: first.kinds.iter().map(|kind| model.kinds.get(*kind).name.clone()).collect(),
         tissue: tissue.name.to_string(),
+        depth: first.depth,
         count: group.len(),
         measured: measured.len(),
         segments: of(|axis| axis.segments as f64),
