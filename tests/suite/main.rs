@@ -41,6 +41,7 @@ mod schedulers;
 mod semantics;
 mod shadows;
 mod signals;
+mod surroundings;
 mod sway;
 mod verify;
 mod view;
