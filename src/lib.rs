@@ -48,6 +48,9 @@
 //! | [`session`] | from a file to a simulation |
 //! | [`replay`] | random access to simulated time |
 //! | [`repl`] | the interactive session |
+//! | [`surround`] | wind and stems that bend, around a growing plant |
+//! | [`sway`] | mechanics of stems that bend |
+//! | [`wind`] | the velocity of the air, as a function of place and time |
 //! | [`study`] | accuracy and cost of methods; verification |
 //! | [`cli`] | the command line |
 //! | [`rescue`] | report and recovery after a bug in the program |
@@ -79,8 +82,11 @@ pub use dlsys_render as render;
 pub use dlsys_session::{self as session, replay};
 pub use dlsys_sim as sim;
 pub use dlsys_study as study;
+pub use dlsys_surround as surround;
+pub use dlsys_sway as sway;
 pub use dlsys_syntax as syntax;
 pub use dlsys_tree as tree;
+pub use dlsys_wind as wind;
 
 /// Compiles and runs the listings of the book's chapter about the library.
 #[cfg(doctest)]

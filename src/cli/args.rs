@@ -73,6 +73,9 @@ pub enum Action {
     /// the slowest. The observed order is the slope of error against step size or, for methods with step
     /// control, against evaluations of the right-hand side.
     ///
+    /// For a model with tissues, a second table has the error of drawn positions against work, for each method and tolerance
+    /// of bending.
+    ///
     /// With --hard, models that state their exact answers in their first lines are run and checked.
     Report(ReportArgs),
     /// Print a script that completes commands and flags in a shell
@@ -122,6 +125,11 @@ JSON fields:
   curves      a list of name, sort (linear | monotone | spline), points,
               from, to (arguments), least, greatest (values), periodic,
               inverse (it rises throughout, or falls throughout)
+  scene       if declared, a list of part, class, why
+  bending     with tissues: t, ticks (steps of the clock up to t), wind (m/s), and
+    axes        a list of kinds, tissue, depth (brackets), count, measured; as least and greatest
+                values in SI: segments, length, width, mass, carried,
+                frequency, damping, cauchy, greenhill
   summary     kinds by work; closed_form: nothing is ever integrated";
 
 #[derive(Debug, Args)]
@@ -195,7 +203,14 @@ pub struct RunArgs {
     pub shared: SharedArgs,
     #[command(flatten)]
     pub verify: VerifyArgs,
-    /// Output format of strings or measures
+    /// Instead of running the model, sample its wind at the places of a CSV file; - is standard input
+    ///
+    /// The first line of the file is `x,y,z`, or `t,x,y,z` for places with times of their own; without t every place is
+    /// sampled at every observed time. Places and times are in units of the model. As text: CSV with the columns
+    /// t,x,y,z,u,v,w; as JSON: a line for each sample with these fields. u, v and w are the velocity of the air along x, y and z in m/s.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["seeds", "events", "stats", "verify"])]
+    pub field: Option<PathBuf>,
+    /// Output format of strings, measures or samples
     #[arg(long, value_enum, default_value_t = TextFormat::Text)]
     pub format: TextFormat,
     /// Run specimens with these seeds, both ends included, and print the distributions of their measures at each
@@ -361,10 +376,10 @@ pub struct GalleryArgs {
 #[derive(Debug, Args)]
 pub struct ReportArgs {
     /// Model files (*.dls)
-    #[arg(value_name = "MODEL", required_unless_present = "hard", conflicts_with = "hard")]
+    #[arg(value_name = "MODEL", required_unless_present_any = ["hard", "surroundings"], conflicts_with_all = ["hard", "surroundings"])]
     pub models: Vec<PathBuf>,
-    /// Directory for NAME.csv, NAME.json and the plot NAME.svg (with --hard: hard.csv, hard.json); made if it
-    /// is not there
+    /// Directory for NAME.csv, NAME.json and the plot NAME.svg, with tissues also NAME-stems.csv (with --hard: hard.csv,
+    /// hard.json; with --surroundings: surroundings.csv); made if it is not there
     #[arg(short, long = "out", value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Methods to compare, in this order [default: all; with --hard those that each case names]
@@ -415,6 +430,10 @@ pub struct ReportArgs {
     /// status 1 if any fails
     #[arg(long, value_name = "DIR", num_args = 0..=1)]
     pub hard: Option<Option<PathBuf>>,
+    /// Exact cases of the wind and of stems that bend (statistics of turbulence, beams, buckling, vibrations, energy) with errors and orders,
+    /// hard cases, error against work of the implicit methods, and speed. Exit status 1 if a statistic is out of its bound or a hard case fails
+    #[arg(long, conflicts_with_all = ["hard", "verify", "methods", "tolerances", "step_sizes", "slices", "at", "from", "settings"])]
+    pub surroundings: bool,
     /// With --hard, run only the case of this name; can be repeated
     #[arg(long = "case", value_name = "ID")]
     pub cases: Vec<String>,

@@ -334,7 +334,7 @@ impl ModelRun {
 }
 
 /// The observed times, in ascending order without duplicates.
-fn times(args: &SharedArgs, session: &Session) -> Result<Vec<f64>, Failure> {
+pub fn times(args: &SharedArgs, session: &Session) -> Result<Vec<f64>, Failure> {
     if let Some(at) = &args.at {
         let mut times = at.clone();
         times.sort_by(f64::total_cmp);

@@ -9,6 +9,7 @@ mod continuity;
 pub(crate) mod embedded;
 mod events;
 mod explain;
+mod field;
 mod fmt;
 mod frame_source;
 mod gallery;

@@ -20,6 +20,9 @@ pub fn report(args: &ReportArgs) -> Result<(), Failure> {
     if let Some(folder) = &args.hard {
         return hard(args, folder.as_deref());
     }
+    if args.surroundings {
+        return surroundings(args);
+    }
     // A conflict would lift clap's own requirement.
     if !args.cases.is_empty() {
         return Err(Failure::Usage("error: --case is for --hard\n".to_owned()));
@@ -92,11 +95,72 @@ pub fn study(args: &ReportArgs, session: &Session, name: &str) -> Result<(), Fai
             session.source.name
         ))
     })?;
+    stems(args, session, name, &plan)?;
     print("\n")?;
     let Some(out) = &args.out else { return Ok(()) };
     write(out, &format!("{name}.csv"), &study::csv(&study))?;
     write(out, &format!("{name}.json"), &study::json(&study))?;
     write(out, &format!("{name}.svg"), &study::svg(&study))
+}
+
+/// Studies the methods of bending on a model with tissues.
+fn stems(args: &ReportArgs, session: &Session, name: &str, plan: &Plan) -> Result<(), Failure> {
+    let mut progress = Progress::new("stems", 16);
+    let study = study::stem_study(session, &plan.times, plan.base, plan.time_limit, &mut |what| {
+        progress.say(format!("{name}: stems by {what}"));
+        progress.inc();
+    });
+    drop(progress);
+    let study = study.map_err(|why| {
+        Failure::Model(format!("error: {}: its stems cannot be followed\n  {why}\n", session.source.name))
+    })?;
+    let Some(study) = study else { return Ok(()) };
+    print(&study::stem_table(&study))?;
+    match &args.out {
+        Some(out) => write(out, &format!("{name}-stems.csv"), &study::stem_csv(&study)),
+        None => Ok(()),
+    }
+}
+
+/// Seeds over which statistics of the wind are averaged.
+const SEEDS: u64 = 32;
+/// Segments of the longest chain among the hard cases.
+const CHAIN: usize = 10_000;
+
+/// Exact cases, hard cases and speed of wind and stems. Each table is printed when it is complete.
+fn surroundings(args: &ReportArgs) -> Result<(), Failure> {
+    let defect = |error: String| Failure::Model(format!("error: {error}\n"));
+    let mut progress = Progress::of_printed("surroundings", 5);
+    let mut show = |table: String| {
+        progress.inc();
+        progress.suspend(|| print(&format!("{table}\n")))
+    };
+    let mut stems = Vec::new();
+    for case in crate::sway::study::EXACT_CASES {
+        stems.extend(case().map_err(|error| defect(error.to_string()))?);
+    }
+    show(study::exact_stem_table(&stems))?;
+    let hard = crate::sway::study::hard_cases(CHAIN);
+    show(study::hard_stem_table(&hard))?;
+    let methods = crate::sway::study::methods().map_err(|error| defect(error.to_string()))?;
+    show(study::method_table(&methods))?;
+    let wind = crate::wind::study::statistics(SEEDS).map_err(|error| defect(error.to_string()))?;
+    show(study::wind_table(&wind))?;
+    show(study::speed_table().map_err(defect)?)?;
+    drop(progress);
+    if let Some(out) = &args.out {
+        write(out, "surroundings.csv", &study::surroundings_csv(&wind, &stems))?;
+    }
+    let bad = wind.iter().filter(|row| !row.holds()).count();
+    let failed = hard.iter().filter(|case| case.failure.is_some()).count();
+    match bad + failed {
+        0 => Ok(()),
+        _ => Err(Failure::Model(format!(
+            "error: {} out of bounds, {} failed\n",
+            count_of(bad, "statistic"),
+            count_of(failed, "hard case")
+        ))),
+    }
 }
 
 /// Runs the hard cases of a folder, or the built-in ones.

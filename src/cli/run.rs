@@ -37,6 +37,9 @@ const STRIDE: usize = 1000;
 
 /// Runs a model and prints its strings.
 pub fn run(args: &RunArgs) -> Result<(), Failure> {
+    if let Some(path) = &args.field {
+        return super::field::sample(args, path);
+    }
     let run = ModelRun::start(&args.shared)?;
     if let Some(seeds) = args.seeds {
         return super::specimens::summarise(args, &run, seeds);

@@ -6,9 +6,9 @@ use clap::{Args, ValueEnum};
 
 use super::args::IncludeArgs;
 use super::common::Failure;
-use super::values::{bytes, events, method, positive, setting, time, tolerance};
+use super::values::{bend_method, bend_tolerance, bytes, events, method, positive, setting, time, tolerance};
 use crate::compile::Setting;
-use crate::sim::{Method, Settings};
+use crate::sim::{BendMethod, BendSettings, Method, Settings};
 use crate::study::method_name;
 
 /// Limits of a run, so that a run that would not end stops with a message.
@@ -59,6 +59,12 @@ pub struct SolverArgs {
     /// Seed of random numbers, for models that draw them: the same seed gives the same plant
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
+    /// Largest error of a step of stems that bend (`tissue`), relative to the size of the plant
+    #[arg(long, value_name = "TOL", allow_negative_numbers = true, default_value = "1e-3", value_parser = bend_tolerance)]
+    pub bend_tolerance: f64,
+    /// Method of integration of stems that bend: ros2, ros34pw2 (faster below tolerances of about 1e-5), euler (for comparison)
+    #[arg(long, value_name = "METHOD", default_value = "ros2", value_parser = bend_method)]
+    pub bend_method: BendMethod,
 }
 
 impl SolverArgs {
@@ -84,6 +90,7 @@ impl SolverArgs {
             tolerance: self.tolerance,
             step_size: self.step_size.unwrap_or(settings.step_size),
             seed: self.seed,
+            bending: BendSettings { method: self.bend_method, tolerance: self.bend_tolerance },
             ..settings
         })
     }

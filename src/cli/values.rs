@@ -5,7 +5,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use crate::compile::Setting;
 use crate::render::{Camera, Format, Layout, Page};
 use crate::scene::{Color, Point, Vector, Viewpoint};
-use crate::sim::Method;
+use crate::sim::{BendMethod, Method};
 
 /// A format for frames.
 pub(super) fn frame_format() -> impl TypedValueParser<Value = Format> {
@@ -254,4 +254,22 @@ pub(super) fn method(text: &str) -> Result<Method, String> {
     let names: Vec<&str> = Method::NAMED.iter().map(|(name, _)| *name).collect();
     let found = Method::NAMED.iter().find(|(name, _)| *name == text);
     found.map(|(_, method)| *method).ok_or_else(|| format!("methods are {}", names.join(", ")))
+}
+
+pub(super) fn bend_method(text: &str) -> Result<BendMethod, String> {
+    let found = BendMethod::NAMED.iter().find(|(name, _)| *name == text);
+    found.map(|(_, method)| *method).ok_or_else(|| {
+        let names: Vec<&str> = BendMethod::NAMED.iter().map(|(name, _)| *name).collect();
+        format!("methods of bending are {}", names.join(", "))
+    })
+}
+
+/// Smallest tolerance of bending: below it, rounding is what remains of the error of a step.
+const FINEST_BEND: f64 = 1e-9;
+
+pub(super) fn bend_tolerance(text: &str) -> Result<f64, String> {
+    match number(text)? {
+        x if (FINEST_BEND..=0.1).contains(&x) => Ok(x),
+        _ => Err(format!("must be between {FINEST_BEND:e} and 0.1")),
+    }
 }

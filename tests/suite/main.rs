@@ -43,6 +43,7 @@ mod shadows;
 mod signals;
 mod strain;
 mod strain_runs;
+mod surroundings;
 mod sway;
 mod verify;
 mod view;

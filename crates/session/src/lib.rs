@@ -25,6 +25,7 @@ pub mod replay;
 mod swaying;
 
 pub use nursery::{DrawError, Nursery};
+pub use swaying::sways;
 
 use std::cell::RefCell;
 use std::io::Read;

@@ -16,7 +16,7 @@ use dlsys_geometry::scene::{Bounds, Plant, Scene, Seedling, Width};
 use dlsys_geometry::turtle::{self, Strains};
 use dlsys_model::{self as model, Model};
 use dlsys_sim::{self as sim, Settings, Simulation, brief};
-use dlsys_surround::{self as surround, Motion, Place, Weather};
+use dlsys_surround::{self as surround, Motion, Passive as Following, Place, Weather};
 use dlsys_tree::ModuleString;
 
 /// Most simulations that are kept from one scene to the next.
@@ -147,7 +147,8 @@ impl<'m> Nursery<'m> {
             let sways = sways(model);
             let weather = if sways { Weather::of(&model.scenery)? } else { None };
             let around = Around { place: Place::of_scene(model.scenery.units), weather: weather.clone() };
-            let motion = Motion::new(model, self.settings, weather, around.place, Default::default())?;
+            let following = Following::of(self.settings.bending);
+            let motion = Motion::new(model, self.settings, weather, around.place, following)?;
             Ok(Passive { around, motion })
         };
         self.passive.get_or_init(start).as_ref().map_err(Clone::clone)

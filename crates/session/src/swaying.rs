@@ -71,7 +71,7 @@ impl<'m> Swaying<'m> {
         settings: Settings,
         now: f64,
     ) -> Result<Vec<Option<Arc<Motion<'m>>>>, (usize, Error)> {
-        let passive = Passive { kept: KEPT, marks: false, ..Passive::default() };
+        let passive = Passive { kept: KEPT, marks: false, ..Passive::of(settings.bending) };
         let mut motions = Vec::with_capacity(plants.len());
         for (i, &(seedling, model, seed)) in plants.iter().enumerate() {
             let place = around.of(seedling, model);

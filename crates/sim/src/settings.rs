@@ -25,6 +25,45 @@ pub enum Scheduler {
     },
 }
 
+/// A method by which stems that bend are advanced in time; the crate `dlsys-sway` describes them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BendMethod {
+    /// ROS2: order 2, two solutions with one matrix a step.
+    #[default]
+    Ros2,
+    /// ROS34PW2: order 3, four stages; for small tolerances.
+    Ros34Pw2,
+    /// The implicit Euler method: order 1, for comparison.
+    Euler,
+}
+
+impl BendMethod {
+    /// The methods with their names on the command line.
+    pub const NAMED: [(&'static str, BendMethod); 3] =
+        [("ros2", BendMethod::Ros2), ("ros34pw2", BendMethod::Ros34Pw2), ("euler", BendMethod::Euler)];
+
+    /// The name on the command line.
+    pub fn name(self) -> &'static str {
+        BendMethod::NAMED.iter().find(|(_, method)| *method == self).map_or("", |(name, _)| name)
+    }
+}
+
+/// How the surroundings of a simulation are computed: stems that bend in the wind.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BendSettings {
+    /// The method.
+    pub method: BendMethod,
+    /// Largest error of a step: displacement of any point of the stems, relative to the longest path along them.
+    pub tolerance: f64,
+}
+
+impl Default for BendSettings {
+    /// ROS2 with a tolerance of 1e-3.
+    fn default() -> BendSettings {
+        BendSettings { method: BendMethod::Ros2, tolerance: 1e-3 }
+    }
+}
+
 /// How a simulation is run.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
@@ -56,6 +95,8 @@ pub struct Settings {
     /// With `log`: the change that each production makes is recorded, too ([`Event::transition`]). Every event then costs work
     /// for all modules whose rules have a context.
     pub transitions: bool,
+    /// How stems that bend are followed. Growth that reads nothing of them does not depend on it.
+    pub bending: BendSettings,
 }
 
 impl Default for Settings {
@@ -73,6 +114,7 @@ impl Default for Settings {
             log: false,
             slow: false,
             transitions: false,
+            bending: BendSettings::default(),
         }
     }
 }

@@ -13,6 +13,7 @@
 //! - `table`, `files`, `plot`: a study as text, as CSV and JSON, and as a picture; `axis`, `diagram`: parts that plots share.
 //! - `spread`, `band`: the distribution of measures over many specimens, as tables and as a plot.
 //! - `verify`: a run computed again in an independent way.
+//! - `stems`: error of drawn positions against work for stems that bend; `surroundings`: exact cases and speed of wind and stems.
 //! - `case`, `hard`, `cases`: models with exact answers in their first lines.
 //!
 //! Runs are made one after another, never in parallel, because they are timed.
@@ -33,7 +34,9 @@ mod plot;
 mod record;
 mod reference;
 mod spread;
+mod stems;
 mod study;
+mod surroundings;
 mod table;
 mod verify;
 
@@ -50,7 +53,11 @@ pub use plot::svg;
 pub use record::{Accuracy, EarlyEnd, Record, Setup, Task, method_name};
 pub use reference::{Reference, References};
 pub use spread::{QUANTILES, Spread, SpreadSeries, spread_csv, spread_table};
+pub use stems::{StemOutcome, StemPoint, StemStudy, stem_csv, stem_study, stem_table};
 pub use study::{Outcome, Plan, Point, Series, Study, Wall, default_times, study};
+pub use surroundings::{
+    exact_stem_table, hard_stem_table, method_table, speed_table, surroundings_csv, wind_table,
+};
 pub use table::{hard_table, mismatches, series_table, study_head, study_table};
 pub use verify::{
     Gap, PROMISED, Pair, Productions, Split, Verification, complaint, unverified, verification_rows,

@@ -127,7 +127,7 @@ pub(crate) fn rolled(strain: Vector, angle: f64) -> Vector {
     Vector::new(strain.x, cos * strain.y + sin * strain.z, cos * strain.z - sin * strain.y)
 }
 
-fn frame(axes: [Vector; 3]) -> Matrix {
+pub(crate) fn frame(axes: [Vector; 3]) -> Matrix {
     Matrix::from_columns(&axes)
 }
 

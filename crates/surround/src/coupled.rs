@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use dlsys_model::Model;
 use dlsys_sim::{self as sim, Failure, Inputs, Settings, Simulation, Surroundings};
-use dlsys_sway::Vector;
+use dlsys_sway::{self as sway, Vector};
 use dlsys_tree::ModuleString;
 
 use crate::bending::{Bending, Tick};
@@ -37,6 +37,7 @@ pub fn start<'m>(model: &'m Model, settings: Settings, place: Place) -> Result<S
 struct Coupled {
     model: Arc<Model>,
     place: Place,
+    solver: sway::Settings,
     /// The stems, once the first tick has passed.
     course: Option<Course>,
     /// The time of the next tick, in units of the model.
@@ -62,7 +63,7 @@ impl Coupled {
 
     fn begin(&self, string: &ModuleString) -> Result<Course, Error> {
         let sampler = Arc::new(Sampler::new(Weather::of(&self.model.scenery)?, self.place));
-        let mut bending = Bending::new(self.model.clone(), sampler, self.place, Passive::default().solver);
+        let mut bending = Bending::new(self.model.clone(), sampler, self.place, self.solver);
         let number = self.place.first_tick();
         let tick = Arc::new(bending.advance(number, string, None)?);
         Ok(Course { bending, number, tick, descent: Descent::default(), earlier: None })

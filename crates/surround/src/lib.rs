@@ -9,6 +9,7 @@
 //! nor velocity.
 //!
 //! - [`Weather`]: the wind that a model declares.
+//! - [`Survey`]: axes of a string with their natural frequencies, before anything is simulated.
 //! - [`Motion`]: the stems of a model at any time, as [`BentStems`] for [`draw_bent`](dlsys_geometry::turtle::draw_bent).
 
 #![warn(missing_docs)]
@@ -20,13 +21,15 @@ mod descent;
 mod error;
 mod motion;
 mod place;
+mod survey;
 mod weather;
 
 pub use bending::{BentStems, Effort};
 pub use coupled::start;
 pub use error::Error;
-pub use motion::{Motion, Passive};
+pub use motion::{MOST_TICKS, Motion, Passive};
 pub use place::Place;
+pub use survey::{Axis, Survey, Vibration, moves};
 pub use weather::{Sampler, Weather};
 
 /// Seconds from one tick of the clock to the next.

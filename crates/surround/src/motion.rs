@@ -14,7 +14,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use dlsys_geometry::scene::Scene;
 use dlsys_geometry::turtle;
 use dlsys_model::Model;
-use dlsys_sim::{Settings, Simulation};
+use dlsys_sim::{self as sim, Settings, Simulation};
 use dlsys_sway as sway;
 use dlsys_tree::ModuleString;
 
@@ -26,7 +26,7 @@ use crate::weather::{Sampler, Weather};
 use crate::{CLOCK, Error};
 
 /// Most ticks up to a time that is asked for.
-const MOST_TICKS: f64 = 1e7;
+pub const MOST_TICKS: f64 = 1e7;
 /// Most stems of the ticks that are kept.
 const MOST_KEPT: usize = 1_000_000;
 /// Largest number of marks.
@@ -45,6 +45,22 @@ pub struct Passive {
     pub kept: usize,
     /// Copies are kept, so that a time far back does not mean to begin anew.
     pub marks: bool,
+}
+
+impl Passive {
+    /// With the method and the tolerance of the settings of a run.
+    pub fn of(bending: sim::BendSettings) -> Passive {
+        let method = match bending.method {
+            sim::BendMethod::Ros2 => sway::Method::Ros2,
+            sim::BendMethod::Ros34Pw2 => sway::Method::Ros34Pw2,
+            sim::BendMethod::Euler => sway::Method::Euler,
+        };
+        let default = Passive::default();
+        Passive {
+            solver: sway::Settings { method, tolerance: bending.tolerance, ..default.solver },
+            ..default
+        }
+    }
 }
 
 impl Default for Passive {

@@ -22,7 +22,7 @@ pub enum Error {
     },
     /// The error is too large even with the shortest step.
     #[error(
-        "at {time} s, steps of {step} s are not short enough for segment {segment}, which moves by {excess} times the tolerance too much"
+        "at {time:.6} s, steps of {step:.1e} s are not short enough for segment {segment}, whose error is {excess:.1e} times the tolerance"
     )]
     Step {
         /// Time at which the step begins, in s.

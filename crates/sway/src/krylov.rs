@@ -52,6 +52,9 @@ pub(crate) fn largest(
         images.push(applied);
     }
     let m = basis.len();
+    if m == 0 {
+        return Pairs { values: Vec::new(), vectors: Vec::new() };
+    }
     let matrix =
         DMatrix::from_fn(m, m, |i, j| 0.5 * (dot(&duals[i], &images[j]) + dot(&duals[j], &images[i])));
     let eigen = SymmetricEigen::new(matrix);

@@ -17,7 +17,7 @@
 
 use crate::air::Wind;
 use crate::forces::Stretch;
-use crate::form::Wrench;
+use crate::form::{Twist, Wrench};
 use crate::link::{Link, Weights, pair, transport};
 use crate::place::{Local, Strain};
 use crate::sweep::{Bend, Instant, Power, Workspace, heat, part};
@@ -172,7 +172,7 @@ impl Workspace {
             }
         } else {
             // Of another skeleton, this may have been a branch.
-            self.links[index].errors = [crate::form::Twist::ZERO; 2];
+            self.links[index].errors = [Twist::ZERO; 2];
         }
         let link = &mut self.links[index];
         link.error_x = x;

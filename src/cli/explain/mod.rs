@@ -22,8 +22,15 @@
 //! - `curves`: a list of `{name, sort, points, from, to, least, greatest, periodic, inverse}`; `sort` is `linear`,
 //!   `monotone` or `spline`; `from` and `to` are arguments, `least` and `greatest` values; `inverse` tells whether it is strictly
 //!   monotone;
+//! - `scene`, for what stands around a plant: a list of `{part, class, why}`; `class` is `constant`, `closed form`, `in steps`,
+//!   `nothing to do`, `evaluated at frames`, `one simulation` or `one simulation a seed`;
+//! - `bending`, for a model with tissues: `{t, ticks, wind, axes}`; `t` is the time at which axes are listed, `ticks` the number of steps of
+//!   the clock up to it, `wind` the mean speed in m/s or null; an axis is `{kinds, tissue, depth, count, measured, segments, length, width, mass,
+//!   carried, frequency, damping, cauchy, greenhill}`: `count` axes of the same kinds, least and greatest values in SI, of `measured` of
+//!   them for the last four; null where there is none;
 //! - `summary`: names of kinds by `work`, and `closed_form`: true if nothing is ever integrated numerically.
 
+mod bending;
 mod curves;
 mod given;
 mod plan;

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::bending::BendingPlan;
 use super::curves::CurvePlan;
 use super::scene::{self, ScenePart};
 use super::{given, words};
@@ -22,6 +23,9 @@ pub struct Explanation {
     /// What stands around the plant; empty for a plant alone.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub scene: Vec<ScenePart>,
+    /// The stems that bend, if the model has tissues.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bending: Option<BendingPlan>,
     pub summary: Summary,
 }
 
@@ -166,13 +170,16 @@ impl Explanation {
                 drawn_only: if kind.rules.is_empty() { Vec::new() } else { drawn_only.collect() },
             });
         }
+        let (mut scene, bending) = (scene::parts(model), BendingPlan::new(model));
+        scene.extend(bending.as_ref().map(|bending| bending.part.clone()));
         Explanation {
             model: session.source.name.clone(),
             title: model.title.clone(),
             kinds,
             rules: (0..model.rules.len()).map(|rule| facts.rule(rule)).collect(),
             curves: model.curves.iter().map(|curve| CurvePlan::new(curve)).collect(),
-            scene: scene::parts(model),
+            scene,
+            bending,
             summary,
         }
     }

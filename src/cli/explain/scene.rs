@@ -6,7 +6,7 @@ use crate::model::{Flow, Model, Primitive, Scenery, Spectrum, Tissue, Units, Win
 use crate::sim::brief;
 
 /// A part of a scene that is declared.
-#[derive(Serialize)]
+#[derive(Clone, Serialize)]
 pub struct ScenePart {
     pub part: String,
     /// How it is computed.
@@ -15,7 +15,7 @@ pub struct ScenePart {
 }
 
 impl ScenePart {
-    fn new(part: impl Into<String>, class: &'static str, why: impl Into<String>) -> ScenePart {
+    pub fn new(part: impl Into<String>, class: &'static str, why: impl Into<String>) -> ScenePart {
         ScenePart { part: part.into(), class, why: why.into() }
     }
 

@@ -39,6 +39,23 @@ impl Table {
     }
 }
 
+/// Words in lines of the width of the page; those after the first are indented by two more.
+pub fn wrapped(indent: usize, text: &str, out: &mut String) {
+    let mut line = " ".repeat(indent);
+    let mut is_empty = true;
+    for word in text.split(' ') {
+        if !is_empty && line.chars().count() + 1 + word.chars().count() > COLUMNS {
+            let _ = writeln!(out, "{line}");
+            line = " ".repeat(indent + 2);
+            is_empty = true;
+        }
+        line += if is_empty { "" } else { " " };
+        line += word;
+        is_empty = false;
+    }
+    let _ = writeln!(out, "{line}");
+}
+
 fn padded(text: &str, width: usize) -> String {
     text.to_owned() + &" ".repeat(width.saturating_sub(text.chars().count()))
 }
@@ -160,6 +177,9 @@ pub fn show(plan: &Explanation) -> String {
         let _ = writeln!(out, "Scene");
         Table(plan.scene.iter().map(ScenePart::row).collect()).show(2, &mut out);
         out.push('\n');
+    }
+    if let Some(bending) = &plan.bending {
+        out += &bending.text();
     }
     let _ = writeln!(out, "Summary");
     let summary = &plan.summary;

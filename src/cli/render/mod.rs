@@ -335,6 +335,10 @@ impl Render<'_> {
         } else {
             described["tolerance"] = settings.tolerance.into();
         }
+        if crate::session::sways(model) {
+            described["bend_method"] = settings.bending.method.name().into();
+            described["bend_tolerance"] = settings.bending.tolerance.into();
+        }
         if format.content() != Content::Mesh {
             described["size"] = json!(page.pixels);
             described["background"] = page.background.map(|color| color.to_string()).into();
