@@ -27,8 +27,9 @@ pub fn start<'m>(model: &'m Model, settings: Settings, place: Place) -> Result<S
         return Simulation::new(model, settings);
     }
     let shared = Arc::new(model.clone());
-    let coupled =
-        Coupled { model: shared, place, course: None, time: place.time_of(place.first_tick()).max(0.0) };
+    let solver = Passive::of(settings.bending).solver;
+    let time = place.time_of(place.first_tick()).max(0.0);
+    let coupled = Coupled { model: shared, place, solver, course: None, time };
     Simulation::with_surroundings(model, settings, Box::new(coupled))
 }
 
