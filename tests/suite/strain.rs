@@ -63,15 +63,17 @@ impl Surroundings for Known {
     }
 }
 
+/// The text with a tissue, behind it, so that places of messages stay.
+fn with_tissue(text: &str) -> Source {
+    Source::new("test.dls", format!("{text}\ntissue wood = stiffness 1e9, density 800, damping 0.05\n"))
+}
+
 fn load(text: &str) -> Loaded {
-    // Behind the text, so that places of messages stay.
-    let text = format!("{text}\ntissue wood = stiffness 1e9, density 800, damping 0.05\n");
-    dlsys::compile::load(&Source::new("test.dls", &text), &[])
+    dlsys::compile::load(&with_tissue(text), &[])
 }
 
 pub fn model(text: &str) -> Model {
-    let loaded = load(text);
-    let source = Source::new("test.dls", text);
+    let (source, loaded) = (with_tissue(text), load(text));
     let all: String = loaded.diagnostics.iter().map(|d| d.render(&source, false)).collect();
     loaded.model.unwrap_or_else(|| panic!("{all}"))
 }

@@ -111,6 +111,12 @@ impl Diagnostic {
         let mut excerpts = Vec::new();
         let mut labels: Vec<&(Span, String)> = self.labels.iter().collect();
         while let Some((span, remark)) = labels.first().copied() {
+            if span.range().end > source.text.len() {
+                // A place outside the text: the message is about another one.
+                excerpts.push(remark.clone());
+                labels.remove(0);
+                continue;
+            }
             let last = source.line_of(span.end.saturating_sub(1).max(span.start));
             let mut range = source.line_range(source.line_of(span.start));
             range.end = range.end.max(source.line_range(last).end).min(source.text.len());
