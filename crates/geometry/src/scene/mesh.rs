@@ -1,5 +1,7 @@
 //! Triangle meshes in coordinates of their own.
 
+use std::sync::OnceLock;
+
 use super::{MaterialId, Point, Vector};
 
 /// A triangle mesh with smooth normals. Its axes are the turtle's: heading, left, up.
@@ -11,6 +13,8 @@ pub struct Mesh {
     pub normals: Vec<Vector>,
     /// The triangles.
     pub faces: Vec<Face>,
+    /// The box around it, once that was needed.
+    bounds: OnceLock<Option<[Point; 2]>>,
 }
 
 /// A triangle, counter-clockwise seen from the side to which its normals point.
@@ -27,7 +31,20 @@ pub struct Face {
 impl Mesh {
     /// A mesh without faces.
     pub fn new() -> Mesh {
-        Mesh { vertices: Vec::new(), normals: Vec::new(), faces: Vec::new() }
+        Mesh { vertices: Vec::new(), normals: Vec::new(), faces: Vec::new(), bounds: OnceLock::new() }
+    }
+
+    /// Opposite corners of a box around all vertices, wider than them by more than rounding; `None` if there are none. It is computed once:
+    /// vertices must not change afterwards.
+    pub fn bounds(&self) -> Option<[Point; 2]> {
+        const MARGIN: f64 = 1e-9;
+        *self.bounds.get_or_init(|| {
+            let first = self.vertices.first()?;
+            let (low, high) =
+                self.vertices.iter().fold((*first, *first), |(low, high), p| (low.inf(p), high.sup(p)));
+            let margin = Vector::repeat(MARGIN * low.coords.amax().max(high.coords.amax()));
+            Some([low - margin, high + margin])
+        })
     }
 
     /// Adds a grid of vertices, `rows` of equal length, as two triangles to each square. Seen with rows
@@ -90,7 +107,8 @@ impl Mesh {
         normals: &[Vector],
         triangles: impl IntoIterator<Item = ([u32; 3], MaterialId)>,
     ) -> Mesh {
-        let mut mesh = Mesh { normals: vec![Vector::zeros(); vertices.len()], vertices, faces: Vec::new() };
+        let normals_of = vec![Vector::zeros(); vertices.len()];
+        let mut mesh = Mesh { normals: normals_of, vertices, ..Mesh::new() };
         for (corners, material) in triangles {
             let [p, q, r] = corners.map(|i| mesh.vertices[i as usize]);
             let area = (q - p).cross(&(r - p));

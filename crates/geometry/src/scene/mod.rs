@@ -23,6 +23,7 @@ mod flat;
 mod material;
 mod mesh;
 mod patch;
+mod pieces;
 mod surroundings;
 
 pub use bounds::Bounds;
@@ -193,8 +194,9 @@ impl Scene {
     }
 
     /// The surfaces and patches as meshes for a picture, in the order of [`tessellated`](Scene::tessellated): each within
-    /// `accuracy` (scene units) of its shape, which may depend on its place.
-    pub fn drafted(&self, accuracy: impl Fn(Point) -> f64) -> Cow<'_, [Surface]> {
+    /// `accuracy` (scene units) of its shape, which may depend on its place. Deviations of patches `towards` the viewer, a unit vector or
+    /// zero, count for less.
+    pub fn drafted(&self, towards: Vector, accuracy: impl Fn(Point) -> f64) -> Cow<'_, [Surface]> {
         if self.patches.is_empty() && self.surfaces.iter().all(|surface| surface.patches.is_none()) {
             return Cow::Borrowed(&self.surfaces);
         }
@@ -206,7 +208,7 @@ impl Scene {
             }
             surface
         });
-        let patches = self.patches.iter().map(|patch| patch.draft(accuracy(patch.net[0][0])));
+        let patches = self.patches.iter().map(|patch| patch.draft(accuracy(patch.net[0][0]), towards));
         Cow::Owned(placed.chain(patches).collect())
     }
 
@@ -222,10 +224,16 @@ impl Scene {
             reach.include(segment.start, segment.widths[0]);
             reach.include(segment.end, segment.widths[1]);
         }
-        let mut include = |point| reach.include(point, Width::Set(0.0));
-        self.polygons.iter().flat_map(|polygon| polygon.vertices.iter().copied()).for_each(&mut include);
+        let vertices = self.polygons.iter().flat_map(|polygon| polygon.vertices.iter().copied());
+        vertices.for_each(|point| reach.include(point, Width::Set(0.0)));
         for surface in &self.surfaces {
-            surface.mesh.vertices.iter().for_each(|&v| include(surface.placement.point(v)));
+            let corners = surface.mesh.bounds().map(|bounds| surface.placement.corners(bounds));
+            if corners.is_some_and(|corners| reach.covers(corners.into_iter())) {
+                continue;
+            }
+            for &vertex in &surface.mesh.vertices {
+                reach.include(surface.placement.point(vertex), Width::Set(0.0));
+            }
         }
         for patch in &self.patches {
             if !reach.covers(patch.net.iter().flatten().copied()) {

@@ -11,6 +11,8 @@
 
 mod band;
 pub(super) mod cells;
+mod fragments;
+mod plane;
 
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
