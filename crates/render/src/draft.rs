@@ -34,8 +34,6 @@ pub(super) struct Detail<S> {
     /// Triangles are no nearer to curved surfaces than this, in the plane of focus where a scene unit has `scale` pixels.
     pub(super) accuracy: f64,
     pub(super) scale: f64,
-    /// The direction to the viewer; zero if the scene is drawn from several sides.
-    pub(super) towards: Vector,
     /// The drawing has no depth: every stem is a tube with an outline of exact width.
     pub(super) is_flat: bool,
 }
@@ -98,7 +96,7 @@ impl<'s> Draft<'s> {
             steady: false,
         };
         let tubes = Tubes::of(scene, style, sides, |i| !is_thin[i]);
-        let solid = Solid::of(scene, tubes, scene.drafted(detail.towards, accuracy));
+        let solid = Solid::of(scene, tubes, scene.drafted(accuracy));
         let mesh = Triangles::of(&solid, |_| true);
         let thin: Vec<u32> = (0..scene.segments.len() as u32).filter(|i| is_thin[*i as usize]).collect();
         let mut next = vec![NONE; if thin.is_empty() { 0 } else { scene.segments.len() }];

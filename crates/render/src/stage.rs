@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use super::Fit;
 use super::draft::{Detail, Draft};
 use super::lens::Lens;
-use dlsys_geometry::scene::{Color, Placement, Plant, Point, Scene, Vector};
+use dlsys_geometry::scene::{Color, Placement, Plant, Point, Scene};
 
 /// A draft in its place.
 pub(super) struct Part {
@@ -45,8 +45,7 @@ impl<'s> Stage<'s> {
     /// For a picture.
     pub(super) fn new(scene: &'s Scene, fit: &Fit, lens: &Lens) -> Stage<'s> {
         let scale_at = |p: Point| lens.scale_at(p);
-        let towards = lens.camera.view().towards();
-        let mut stage = Stage::of(scene, fit, fit.light.is_flat(), lens.scale(), towards, scale_at);
+        let mut stage = Stage::of(scene, fit, fit.light.is_flat(), lens.scale(), scale_at);
         stage.add_plants(scene, None, fit, lens.scale(), &|centre, radius| {
             let towards = lens.camera.towards(centre) * radius;
             let nearest = lens.scale_at(centre + towards).max(lens.scale_at(centre));
@@ -59,7 +58,7 @@ impl<'s> Stage<'s> {
 
     /// For shadows: everything at one scale, in pixels for a scene unit.
     pub(super) fn of_all(scene: &'s Scene, fit: &Fit, scale: f64) -> Stage<'s> {
-        let mut stage = Stage::of(scene, fit, false, scale, Vector::zeros(), |_| scale);
+        let mut stage = Stage::of(scene, fit, false, scale, |_| scale);
         stage.add_plants(scene, None, fit, scale, &|_, _| Some(scale));
         stage
     }
@@ -74,10 +73,9 @@ impl<'s> Stage<'s> {
         fit: &Fit,
         is_flat: bool,
         scale: f64,
-        towards: Vector,
         scale_at: impl Fn(Point) -> f64,
     ) -> Stage<'s> {
-        let detail = Detail { scale_at, accuracy: fit.accuracy, scale, towards, is_flat };
+        let detail = Detail { scale_at, accuracy: fit.accuracy, scale, is_flat };
         Stage {
             drafts: vec![Draft::new(scene, fit.default_width, &detail)],
             parts: vec![Part { draft: 0, place: None, colors: 0 }],
@@ -112,13 +110,8 @@ impl<'s> Stage<'s> {
             let exponent = (seen * placement.largest()).log2().ceil().clamp(-60.0, 60.0) as i32;
             let draft = *self.drafted.entry((key, exponent)).or_insert_with(|| {
                 let scale_there = 2_f64.powi(exponent);
-                let detail = Detail {
-                    scale_at: |_| scale_there,
-                    accuracy: fit.accuracy,
-                    scale,
-                    towards: Vector::zeros(),
-                    is_flat: false,
-                };
+                let detail =
+                    Detail { scale_at: |_| scale_there, accuracy: fit.accuracy, scale, is_flat: false };
                 self.drafts.push(Draft::new(&plant.scene, look.default_width, &detail));
                 self.drafts.len() - 1
             });

@@ -206,6 +206,7 @@ impl<'m> Nursery<'m> {
             around.warnings.push(Diagnostic::warning(message).at(plant.span, "this plant"));
         }
         scene.warnings.clear();
+        around.lacked_accuracy |= scene.lacked_accuracy;
         // The surroundings are those of the outermost scene.
         scene.surroundings = Default::default();
         set_widths(&mut scene);

@@ -35,6 +35,7 @@ pub use patch::{Net, Patch, PatchFace, PatchSet};
 pub use surroundings::{Plant, Seedling, Surroundings, Viewpoint};
 
 use std::borrow::Cow;
+use std::collections::HashSet;
 use std::sync::Arc;
 
 use dlsys_diagnostic::Diagnostic;
@@ -115,6 +116,8 @@ pub struct Scene {
     /// Greatest distance between a curve and the segments drawn for it, in scene units, if that is known when the turtle
     /// draws; 0 if not. Bent segments are drawn in pieces; see [`Fit::accuracy`](dlsys_render::Fit::accuracy).
     pub accuracy: f64,
+    /// The turtle would have drawn something else, had it known an accuracy.
+    pub lacked_accuracy: bool,
     owners: Vec<Owner>,
     /// Pieces of stems, in string order.
     pub segments: Vec<Segment>,
@@ -166,6 +169,31 @@ impl Scene {
         self.plants.clear();
         self.surroundings = Surroundings::default();
         self.warnings.clear();
+        self.lacked_accuracy = false;
+    }
+
+    /// Roughly the memory of all elements, in bytes; plants that share a scene count it once.
+    pub fn footprint(&self) -> usize {
+        let mut known = HashSet::new();
+        self.footprint_beside(&mut known)
+    }
+
+    /// Recursion is bounded by the depth of plants in plants.
+    fn footprint_beside(&self, known: &mut HashSet<*const Scene>) -> usize {
+        let vertices: usize = self.polygons.iter().map(|polygon| polygon.vertices.len()).sum();
+        let own = size_of_val(&*self.owners)
+            + size_of_val(&*self.segments)
+            + size_of_val(&*self.polygons)
+            + vertices * size_of::<Point>()
+            + size_of_val(&*self.surfaces)
+            + size_of_val(&*self.patches)
+            + size_of_val(&*self.plants);
+        let looks = self.plants.iter().map(|plant| &plant.scene);
+        let others = looks.map(|scene| match known.insert(Arc::as_ptr(scene)) {
+            true => size_of::<Scene>() + scene.footprint_beside(known),
+            false => 0,
+        });
+        own + others.sum::<usize>()
     }
 
     /// True if there are no elements.
@@ -194,9 +222,8 @@ impl Scene {
     }
 
     /// The surfaces and patches as meshes for a picture, in the order of [`tessellated`](Scene::tessellated): each within
-    /// `accuracy` (scene units) of its shape, which may depend on its place. Deviations of patches `towards` the viewer, a unit vector or
-    /// zero, count for less.
-    pub fn drafted(&self, towards: Vector, accuracy: impl Fn(Point) -> f64) -> Cow<'_, [Surface]> {
+    /// `accuracy` (scene units) of its shape, which may depend on its place.
+    pub fn drafted(&self, accuracy: impl Fn(Point) -> f64) -> Cow<'_, [Surface]> {
         if self.patches.is_empty() && self.surfaces.iter().all(|surface| surface.patches.is_none()) {
             return Cow::Borrowed(&self.surfaces);
         }
@@ -208,7 +235,7 @@ impl Scene {
             }
             surface
         });
-        let patches = self.patches.iter().map(|patch| patch.draft(accuracy(patch.net[0][0]), towards));
+        let patches = self.patches.iter().map(|patch| patch.draft(accuracy(patch.net[0][0])));
         Cow::Owned(placed.chain(patches).collect())
     }
 

@@ -47,10 +47,10 @@ impl Patch {
         self.placed(accuracy, Steps::Powers)
     }
 
-    /// The same for a picture, of fewer triangles: pieces are any number, not a power of two. Deviations `towards` the viewer, a unit vector
-    /// or zero, count for less.
-    pub fn draft(&self, accuracy: f64, towards: Vector) -> Surface {
-        self.placed(accuracy, Steps::Whole(towards))
+    /// The same for a picture, of fewer triangles: pieces are any number, not a power of two, and their
+    /// deviation is an estimate.
+    pub fn draft(&self, accuracy: f64) -> Surface {
+        self.placed(accuracy, Steps::Whole)
     }
 
     fn placed(&self, accuracy: f64, steps: Steps) -> Surface {
@@ -116,7 +116,7 @@ impl PatchSet {
     pub fn draft(&self, accuracy: f64) -> Arc<Mesh> {
         let exponent = (4.0 * accuracy.log2()).floor().clamp(-160.0, 12.0);
         let accuracy = (exponent / 4.0).exp2();
-        self.kept(&self.drafts, exponent as i32, accuracy, Steps::Whole(Vector::zeros()))
+        self.kept(&self.drafts, exponent as i32, accuracy, Steps::Whole)
     }
 
     fn kept(

@@ -1,41 +1,27 @@
 //! How many pieces the edges and the grid of a patch have, by accuracy.
 
+use super::Point;
 use super::patch::{Net, column, slopes, sum, weights};
-use super::{Point, Vector};
 
 /// Most pieces along an edge.
 pub(super) const FINEST: usize = 64;
 /// Parameters at which second derivatives of patches for pictures are taken: the middles of the first, the middle and the last of about four
 /// pieces.
 const PROBES: [f64; 3] = [0.125, 0.5, 0.875];
-/// The part that a deviation along the line of sight counts for in pictures. It moves nothing in the picture, but decides which of two
-/// surfaces is in front, and where surfaces meet.
-const DEEP: f64 = 0.4;
-/// The part that a deviation along the surface, or along an edge, counts for in pictures: it moves shading and not the outline.
-const SLIDE: f64 = 0.25;
-
 /// The numbers of pieces that an edge may have.
 #[derive(Clone, Copy)]
 pub(super) enum Steps {
     /// Powers of two: few numbers, so that the mesh of a growing patch does not change all the time. Deviations have strict bounds.
     Powers,
     /// Any, so that there are no more triangles than the accuracy asks for: for pictures. Deviations are estimated from second derivatives
-    /// at a few places. The vector is the direction to the viewer, zero if there is none.
-    Whole(Vector),
+    /// at a few places.
+    Whole,
 }
 
 impl Steps {
-    /// The length of a displacement, as far as it counts.
-    fn length(self, v: Vector) -> f64 {
-        match self {
-            Steps::Powers => v.norm(),
-            Steps::Whole(towards) => (v - towards * (v.dot(&towards) * (1.0 - DEEP))).norm(),
-        }
-    }
-
     /// The least number of pieces whose square is at least this.
     fn pieces(self, square: f64) -> usize {
-        if let Steps::Whole(_) = self {
+        if let Steps::Whole = self {
             return (square.sqrt().ceil() as usize).clamp(1, FINEST);
         }
         let mut n = 1;
@@ -51,8 +37,8 @@ impl Steps {
         let bend = match self {
             // A cubic's second derivative is at most 6 times its second differences, and changes evenly between these.
             Steps::Powers => second[0].norm().max(second[1].norm()),
-            Steps::Whole(_) => {
-                PROBES.map(|t| self.edge_bend(edge, second, t)).into_iter().fold(0.0, f64::max)
+            Steps::Whole => {
+                PROBES.map(|t| (second[0] * (1.0 - t) + second[1] * t).norm()).into_iter().fold(0.0, f64::max)
             }
         };
         self.pieces(6.0 * bend / (8.0 * accuracy))
@@ -62,47 +48,28 @@ impl Steps {
     pub(super) fn of_grid(self, net: &Net, accuracy: f64) -> (usize, usize) {
         match self {
             Steps::Powers => powers(strict_derivatives(net), accuracy),
-            Steps::Whole(_) => fewest(self.derivatives(net), accuracy),
+            Steps::Whole => fewest(probed_derivatives(net), accuracy),
         }
     }
+}
 
-    /// A sixth of the second derivative of an edge, as far as it counts.
-    fn edge_bend(self, edge: &[Point; 4], second: [Vector; 2], t: f64) -> f64 {
-        let bend = second[0] * (1.0 - t) + second[1] * t;
-        let along =
-            edge.iter().zip(slopes(t)).fold(Vector::zeros(), |sum, (p, slope)| sum + p.coords * slope);
-        let Some(along) = along.try_normalize(1e-9) else { return self.length(bend) };
-        let slide = along * bend.dot(&along);
-        self.length(bend - slide).hypot(SLIDE * self.length(slide))
-    }
-
-    /// The greatest second derivatives at the probes, as far as they count: along rows, mixed, along columns.
-    fn derivatives(self, net: &Net) -> [f64; 3] {
-        let mut greatest = [0.0_f64; 3];
-        let at = PROBES.map(|t| (weights(t), slopes(t), bends(t)));
-        for (values_u, slopes_u, bends_u) in &at {
-            for (values_v, slopes_v, bends_v) in &at {
-                let second = [
-                    sum(net, *bends_u, *values_v),
-                    sum(net, *slopes_u, *slopes_v),
-                    sum(net, *values_u, *bends_v),
-                ];
-                let normal = sum(net, *slopes_u, *values_v).cross(&sum(net, *values_u, *slopes_v));
-                let normal = normal.try_normalize(1e-9);
-                for (greatest, second) in greatest.iter_mut().zip(second) {
-                    let counted = match normal {
-                        None => self.length(second),
-                        Some(normal) => {
-                            let rise = normal * second.dot(&normal);
-                            self.length(rise).hypot(SLIDE * self.length(second - rise))
-                        }
-                    };
-                    *greatest = greatest.max(counted);
-                }
+/// The greatest second derivatives at the probes: along rows, mixed, along columns.
+fn probed_derivatives(net: &Net) -> [f64; 3] {
+    let mut greatest = [0.0_f64; 3];
+    let at = PROBES.map(|t| (weights(t), slopes(t), bends(t)));
+    for (values_u, slopes_u, bends_u) in &at {
+        for (values_v, slopes_v, bends_v) in &at {
+            let second = [
+                sum(net, *bends_u, *values_v),
+                sum(net, *slopes_u, *slopes_v),
+                sum(net, *values_u, *bends_v),
+            ];
+            for (greatest, second) in greatest.iter_mut().zip(second) {
+                *greatest = greatest.max(second.norm());
             }
         }
-        greatest
     }
+    greatest
 }
 
 /// The second derivatives of Bernstein's polynomials of degree three.

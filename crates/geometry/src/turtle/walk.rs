@@ -297,6 +297,7 @@ impl<'a> Walk<'a> {
         let length = self.in_range(length)?;
         let bend = Bend::new(heading, self.target, self.state.strength).filter(|_| length != 0.0);
         if let Some(bend) = bend {
+            self.scene.lacked_accuracy |= self.scene.accuracy <= 0.0;
             let pieces = bend.pieces(length, self.scene.accuracy);
             let mut before = Vector::zeros();
             for i in 1..=pieces {
