@@ -89,3 +89,43 @@ impl<'a> Keeping<'a> {
         if let Keeping::Use(album) = self { Some(album) } else { None }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{MaterialId, Owner, Point, Polygon};
+    use crate::tree::Lineage;
+
+    fn scene(vertices: usize) -> Scene {
+        let mut scene = Scene::default();
+        let owner = scene.add_owner(Owner { name: "P".into(), lineage: Lineage::of_axiom(0) });
+        let vertices = vec![Point::origin(); vertices];
+        scene.polygons.push(Polygon { vertices, material: MaterialId::LEAF, owner });
+        scene
+    }
+
+    fn keep(album: &Album, index: usize, count: usize, scene: Scene) -> bool {
+        album.keep(index, count, Kept { scene, modules: 7 }).is_none()
+    }
+
+    #[test]
+    fn scenes_are_kept_while_there_is_room() {
+        let (small, large) = (ROOM / 24 / 4, ROOM / 24 * 2);
+        let album = Album::default();
+        assert!(keep(&album, 2, 6, scene(small)) && keep(&album, 0, 6, scene(small)));
+        assert!(keep(&album, 1, 6, scene(small)));
+        assert!(!keep(&album, 3, 6, scene(large)) && !keep(&album, 4, 6, scene(small)), "full");
+        album.finish(Stats::default());
+        assert!(album.stats_of_all(6).is_none() && album.stats_of_all(3).is_some());
+        assert_eq!((album.modules(2), album.modules(5)), (Some(7), None));
+        assert!(album.take(2).is_some() && album.take(2).is_none());
+        assert!(keep(&Album::default(), 0, 1, scene(large)), "alone");
+    }
+
+    #[test]
+    fn a_scene_that_an_accuracy_would_change_is_not_kept() {
+        let mut bent = scene(3);
+        bent.lacked_accuracy = true;
+        assert!(!keep(&Album::default(), 0, 1, bent));
+    }
+}

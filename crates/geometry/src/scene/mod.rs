@@ -224,14 +224,16 @@ impl Scene {
     /// The surfaces and patches as meshes for a picture, in the order of [`tessellated`](Scene::tessellated): each within
     /// `accuracy` (scene units) of its shape, which may depend on its place.
     pub fn drafted(&self, accuracy: impl Fn(Point) -> f64) -> Cow<'_, [Surface]> {
-        if self.patches.is_empty() && self.surfaces.iter().all(|surface| surface.patches.is_none()) {
+        if self.patches.is_empty() && self.surfaces.is_empty() {
             return Cow::Borrowed(&self.surfaces);
         }
         let placed = self.surfaces.iter().map(|surface| {
             let mut surface = surface.clone();
-            if let Some(patches) = surface.patches.take() {
-                let place = surface.placement;
-                surface.mesh = patches.draft(accuracy(place.origin) / place.largest());
+            let place = surface.placement;
+            let accuracy = accuracy(place.origin) / place.largest();
+            match surface.patches.take() {
+                Some(patches) => surface.mesh = patches.draft(accuracy),
+                None => surface.mesh = surface.mesh.draft(accuracy).unwrap_or(surface.mesh),
             }
             surface
         });

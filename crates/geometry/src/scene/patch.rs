@@ -436,4 +436,23 @@ mod tests {
         assert!(set.mesh(f64::INFINITY).faces.len() >= 2);
         assert!(set.mesh(1e-3).faces.len() > set.mesh(1e-1).faces.len());
     }
+
+    #[test]
+    fn drafts_are_as_near_as_they_should_with_fewer_triangles() {
+        let net = raised(|c, r| 0.3 * (c * 1.7).sin() + 0.2 * c * r - 0.15 * r * r);
+        for accuracy in [0.1, 1e-2, 1e-3] {
+            let mut draft = Mesh::new();
+            tessellate(&net, accuracy, Steps::Whole, MaterialId::LEAF, true, &mut draft);
+            assert!(draft.faces.len() < mesh(&net, accuracy).faces.len());
+            for face in &draft.faces {
+                let [a, b, c] = face.corners.map(|i| draft.vertices[i as usize]);
+                for at in [[1.0, 1.0, 1.0], [1.0, 1.0, 0.0], [0.0, 1.0, 1.0], [1.0, 0.0, 1.0]] {
+                    let [u, v, w] = at.map(|part| part / at.iter().sum::<f64>());
+                    let middle = Point::from(a.coords * u + b.coords * v + c.coords * w);
+                    let away = (point(&net, middle.x, middle.y) - middle).norm();
+                    assert!(away <= accuracy, "{away} > {accuracy}");
+                }
+            }
+        }
+    }
 }

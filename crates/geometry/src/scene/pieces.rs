@@ -8,6 +8,9 @@ pub(super) const FINEST: usize = 64;
 /// Parameters at which second derivatives of patches for pictures are taken: the middles of the first, the middle and the last of about four
 /// pieces.
 const PROBES: [f64; 3] = [0.125, 0.5, 0.875];
+/// Between the probes derivatives may be larger: the part of the accuracy that the estimate uses.
+const CAUTION: f64 = 0.85;
+
 /// The numbers of pieces that an edge may have.
 #[derive(Clone, Copy)]
 pub(super) enum Steps {
@@ -48,7 +51,7 @@ impl Steps {
     pub(super) fn of_grid(self, net: &Net, accuracy: f64) -> (usize, usize) {
         match self {
             Steps::Powers => powers(strict_derivatives(net), accuracy),
-            Steps::Whole => fewest(probed_derivatives(net), accuracy),
+            Steps::Whole => fewest(probed_derivatives(net), CAUTION * accuracy),
         }
     }
 }
