@@ -32,9 +32,6 @@ pub(super) struct Stage<'s> {
     drafted: HashMap<(*const Scene, i32), usize>,
 }
 
-/// A plant is drafted for no more than so many times the size of its middle in the picture, however near its parts are to the viewer.
-const NEAR: f64 = 2.0;
-
 /// A ball around all that one look has.
 #[derive(Clone, Copy)]
 struct Look {
@@ -51,14 +48,9 @@ impl<'s> Stage<'s> {
         let mut stage = Stage::of(scene, fit, fit.light.is_flat(), lens.scale(), scale_at);
         stage.add_plants(scene, None, fit, lens.scale(), &|centre, radius| {
             let towards = lens.camera.towards(centre) * radius;
-            let [nearest, middle, farthest] =
-                [centre + towards, centre, centre - towards].map(|p| lens.scale_at(p));
+            let nearest = lens.scale_at(centre + towards).max(lens.scale_at(centre));
             // Within the ball around it, the viewer sees it at any size.
-            let scale = match (nearest > 0.0, middle > 0.0) {
-                (true, _) => nearest.clamp(middle, NEAR * middle),
-                (false, true) => NEAR * middle,
-                (false, false) => farthest,
-            };
+            let scale = if nearest > 0.0 { nearest } else { lens.scale_at(centre - towards) };
             (!lens.misses(centre, radius)).then_some(scale)
         });
         stage
