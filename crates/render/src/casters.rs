@@ -216,7 +216,7 @@ mod tests {
         let mut scene = Scene::default();
         let owner = scene.add_owner(Owner { name: "@P".into(), lineage: Lineage::of_axiom(0) });
         let axes = [Vector::x(), Vector::y(), Vector::z()];
-        let at = |i: usize| Placement::uniform(Point::new(5.0 * i as f64, 0.0, 0.0), axes, 1.0);
+        let at = |i: usize| Placement::uniform(Point::new(0.001 * i as f64, 0.0, 0.0), axes, 1.0);
         let plant = Plant::new(Arc::new(organ), at(0), owner);
         scene.plants = (0..3000).map(|i| plant.twin(at(i), owner)).collect();
         let mut survey = Survey::new(View::FRONT);

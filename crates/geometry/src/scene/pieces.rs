@@ -8,16 +8,16 @@ pub(super) const FINEST: usize = 64;
 /// Parameters at which second derivatives of patches for pictures are taken: the middles of the first, the middle and the last of about four
 /// pieces.
 const PROBES: [f64; 3] = [0.125, 0.5, 0.875];
-/// Between the probes derivatives may be larger: the part of the accuracy that the estimate uses.
-const CAUTION: f64 = 0.85;
+/// Between the probes derivatives may be larger: the part of them that is found there.
+const CAUTION: f64 = 0.75;
 
 /// The numbers of pieces that an edge may have.
 #[derive(Clone, Copy)]
 pub(super) enum Steps {
     /// Powers of two: few numbers, so that the mesh of a growing patch does not change all the time. Deviations have strict bounds.
     Powers,
-    /// Any, so that there are no more triangles than the accuracy asks for: for pictures. Deviations are estimated from second derivatives
-    /// at a few places.
+    /// Any, so that there are no more triangles than the accuracy asks for: for pictures. Deviations within the patch are estimated from second
+    /// derivatives at a few places.
     Whole,
 }
 
@@ -37,13 +37,8 @@ impl Steps {
     /// Pieces of an edge: a chord over 1/n deviates by 1/8 of the second derivative over n².
     pub(super) fn of_edge(self, edge: &[Point; 4], accuracy: f64) -> usize {
         let second = [0, 1].map(|i| edge[i].coords - 2.0 * edge[i + 1].coords + edge[i + 2].coords);
-        let bend = match self {
-            // A cubic's second derivative is at most 6 times its second differences, and changes evenly between these.
-            Steps::Powers => second[0].norm().max(second[1].norm()),
-            Steps::Whole => {
-                PROBES.map(|t| (second[0] * (1.0 - t) + second[1] * t).norm()).into_iter().fold(0.0, f64::max)
-            }
-        };
+        // A cubic's second derivative is at most 6 times its second differences.
+        let bend = second[0].norm().max(second[1].norm());
         self.pieces(6.0 * bend / (8.0 * accuracy))
     }
 
@@ -51,13 +46,13 @@ impl Steps {
     pub(super) fn of_grid(self, net: &Net, accuracy: f64) -> (usize, usize) {
         match self {
             Steps::Powers => powers(strict_derivatives(net), accuracy),
-            Steps::Whole => fewest(probed_derivatives(net), CAUTION * accuracy),
+            Steps::Whole => fewest(estimated_derivatives(net), accuracy),
         }
     }
 }
 
-/// The greatest second derivatives at the probes: along rows, mixed, along columns.
-fn probed_derivatives(net: &Net) -> [f64; 3] {
+/// The greatest second derivatives at the probes and a little more, or their bounds: along rows, mixed, along columns.
+fn estimated_derivatives(net: &Net) -> [f64; 3] {
     let mut greatest = [0.0_f64; 3];
     let at = PROBES.map(|t| (weights(t), slopes(t), bends(t)));
     for (values_u, slopes_u, bends_u) in &at {
@@ -72,7 +67,8 @@ fn probed_derivatives(net: &Net) -> [f64; 3] {
             }
         }
     }
-    greatest
+    let bounds = strict_derivatives(net);
+    [0, 1, 2].map(|k| bounds[k].min(greatest[k] / CAUTION))
 }
 
 /// The second derivatives of Bernstein's polynomials of degree three.
