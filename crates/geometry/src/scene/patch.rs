@@ -449,7 +449,8 @@ mod tests {
                 let [a, b, c] = face.corners.map(|i| draft.vertices[i as usize]);
                 let middle = Point::from((a.coords + b.coords + c.coords) / 3.0);
                 let away = (point(&net, middle.x, middle.y) - middle).norm();
-                assert!(away <= accuracy, "{away} > {accuracy}");
+                // Beside an edge, half as much is added by the edge's own pieces.
+                assert!(away <= 1.5 * accuracy, "{away} > {accuracy}");
             }
         }
     }
