@@ -49,6 +49,7 @@
 #![warn(missing_docs)]
 
 mod camera;
+mod casters;
 mod crowd;
 mod draft;
 mod error;

@@ -3,10 +3,10 @@
 //! Light has one strength at each place, from which its colour follows: what is dark is in the light of the sky, what is bright in that of the
 //! sun. So pictures of pixels and of regions have the same shading.
 
+use super::casters::Casters;
 use super::lens::Lens;
 use super::light::{GLOSS, SHARPNESS, Spot, TRANSMITTED};
-use super::shadow::{Casters, Maps};
-use super::stage::Stage;
+use super::shadow::Maps;
 use super::{Fit, Page, floor};
 use dlsys_geometry::scene::{Color, MaterialId, Point, Scene, Vector};
 
@@ -74,9 +74,9 @@ impl<'a> Lighting<'a> {
         let maps = (declared.is_some() || floor.is_some()).then(|| {
             let extent = if fit.extent > 0.0 { fit.extent } else { 1.0 };
             // Details beyond the maps' cells cast no shadows of their own.
-            let stage = Stage::of_all(scene, fit, scale.min(1500.0 / extent));
-            let casters = Casters::of(&stage, ground);
-            let maps = (!casters.is_empty()).then(|| Maps::new(&casters, sun, scale, threads))?;
+            let seen = |p| fit.camera.ahead(p).map_or(0.0, |p| scale * fit.camera.magnification(p.z));
+            let casters = Casters::new(scene, fit, scale.min(1500.0 / extent), seen, ground);
+            let maps = (casters.count() > 0).then(|| Maps::new(&casters, sun, scale, threads))?;
             open_sky = floor.map(|height| OpenSky::new(&maps, casters.around(), height));
             Some(maps)
         });

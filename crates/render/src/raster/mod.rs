@@ -11,6 +11,8 @@
 
 mod band;
 pub(super) mod cells;
+mod fragments;
+mod plane;
 
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
@@ -370,5 +372,41 @@ mod tests {
         let line = [corner(0.0, 0.0, 0.0), corner(1.0, 1.0, 0.0), corner(2.0, 2.0, 0.0)];
         let undefined = [corner(f64::NAN, 0.0, f64::NAN); 3];
         assert_eq!(drawn([3, 3], &[(far, RED), (line, BLUE), (undefined, BLUE)]).pixels.len(), 9);
+    }
+
+    #[test]
+    fn every_sample_has_the_triangle_that_a_plain_search_finds() {
+        let size = [24, 20];
+        let mut state = 1_u64;
+        let mut random = |most: f64| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64 * most
+        };
+        for round in 0..200 {
+            // Small ones and large ones, which pass through one another.
+            let reach = if round % 2 == 0 { 3.0 } else { 30.0 };
+            let triangles: Vec<([Corner; 3], [u8; 3])> = (0..40_u8)
+                .map(|i| {
+                    let (x, y) = (random(24.0), random(20.0));
+                    let corners = [(); 3].map(|()| corner(x + random(reach), y + random(reach), random(1.0)));
+                    (corners, [i, 255 - i, 3 * i])
+                })
+                .collect();
+            let image = drawn(size, &triangles);
+            let places = size[0] * size[1];
+            let found = cells::nearest(&SIXTEEN, size, triangles.len(), |n| triangles[n].0, places, |at| at);
+            let mut differing = 0;
+            for (pixel, numbers) in image.pixels.iter().zip(&found.numbers) {
+                let mean = |channel: &dyn Fn([u8; 3]) -> u8| {
+                    let seen = numbers.iter().filter(|number| **number > 0);
+                    let sum: u32 = seen.map(|n| u32::from(channel(triangles[*n as usize - 1].1))).sum();
+                    ((sum + 8) / 16) as u8
+                };
+                let expected = [mean(&|c| c[0]), mean(&|c| c[1]), mean(&|c| c[2]), mean(&|_| 255)];
+                // At depths that are equal but for rounding, the two may differ.
+                differing += usize::from(*pixel != expected);
+            }
+            assert!(differing <= 1, "round {round}: {differing} pixels differ");
+        }
     }
 }

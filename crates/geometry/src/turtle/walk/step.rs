@@ -30,6 +30,8 @@ impl Walk<'_> {
             }
         };
         let bend = Bend::new(heading, self.target, self.state.strength).filter(|_| length != 0.0);
+        let is_curved = bend.is_some() || strain.is_some_and(|strain| strain != Vector::zeros());
+        self.scene.lacked_accuracy |= is_curved && self.scene.accuracy <= 0.0;
         if let Some(bend) = bend {
             let mut pieces = bend.pieces(length, self.scene.accuracy);
             if let Some(strain) = strain {
