@@ -50,20 +50,26 @@ struct Piece {
 }
 
 impl Regions {
-    /// Gives cells that stand alone among others of their item to a neighbour, so that noise of shading makes no outlines.
+    /// Gives cells that stand alone among others of their item to a neighbour, so that noise of shading makes no outlines. A narrow
+    /// strip that runs aslant is no such cell: its cells touch in their corners.
     pub fn without_specks(&mut self) {
-        let item = |items: &[u32], label: u32| items.get(label as usize).copied();
-        for cell in 0..self.labels.len() {
-            let label = self.labels[cell];
-            let around = || neighbours(cell, self.width, self.labels.len()).map(|other| self.labels[other]);
-            if label >= COVERED || around().any(|other| other == label) {
-                continue;
-            }
-            let own = item(&self.items, label);
-            if let Some(other) = around().find(|other| item(&self.items, *other) == own) {
-                self.labels[cell] = other;
+        let item = |label: u32| self.items.get(label as usize).copied();
+        let is_alone = |cell: &usize| {
+            let label = self.labels[*cell];
+            label < COVERED
+                && neighbours(*cell, self.width, self.labels.len()).all(|other| self.labels[other] != label)
+                && corners(*cell, self.width, self.labels.len()).all(|other| self.labels[other] != label)
+        };
+        // All at once, so that one label does not spread from cell to cell.
+        let mut changes = Vec::new();
+        for cell in (0..self.labels.len()).filter(is_alone) {
+            let own = item(self.labels[cell]);
+            let around = neighbours(cell, self.width, self.labels.len()).map(|other| self.labels[other]);
+            if let Some(other) = around.into_iter().find(|other| item(*other) == own) {
+                changes.push((cell, other));
             }
         }
+        changes.into_iter().for_each(|(cell, label)| self.labels[cell] = label);
     }
 
     /// The outlines of `count` regions, by number, in cells from the upper left corner.
@@ -92,12 +98,14 @@ impl Regions {
                     piece.low[k] = piece.low[k].min(at);
                     piece.high[k] = piece.high[k].max(at + 1);
                 }
-                for other in neighbours(cell, self.width, self.labels.len()) {
+                let mut visit = |other: usize| {
                     if !seen[other] && self.labels[other] == self.labels[first] {
                         seen[other] = true;
                         stack.push(other);
                     }
-                }
+                };
+                neighbours(cell, self.width, self.labels.len()).for_each(&mut visit);
+                corners(cell, self.width, self.labels.len()).for_each(&mut visit);
             }
             pieces.push(piece);
         }
@@ -122,14 +130,17 @@ impl Regions {
         inside[first] = true;
         let mut edge = vec![first];
         let mut own = edge.clone();
+        let count = inside.len();
         while let Some(cell) = edge.pop() {
-            for other in neighbours(cell, width, inside.len()) {
+            let mut visit = |other: usize| {
                 if !inside[other] && self.labels[cell_at(other)] == label {
                     inside[other] = true;
                     edge.push(other);
                     own.push(other);
                 }
-            }
+            };
+            neighbours(cell, width, count).for_each(&mut visit);
+            corners(cell, width, count).for_each(&mut visit);
         }
         spread(&mut inside, &free, width, own);
         fill_holes(&mut inside, &free, width);
@@ -215,6 +226,15 @@ fn neighbours(cell: usize, width: usize, count: usize) -> impl Iterator<Item = u
     ]
     .into_iter()
     .flatten()
+}
+
+/// The cells that touch one in a corner only, of a rectangle of `count` cells.
+fn corners(cell: usize, width: usize, count: usize) -> impl Iterator<Item = usize> {
+    let x = cell % width;
+    let beside = [(x > 0).then(|| cell.wrapping_sub(1)), (x + 1 < width).then_some(cell + 1)];
+    beside.into_iter().flatten().flat_map(move |beside| {
+        [beside.checked_sub(width), Some(beside + width).filter(|below| *below < count)].into_iter().flatten()
+    })
 }
 
 #[cfg(test)]
