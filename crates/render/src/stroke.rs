@@ -7,6 +7,7 @@
 use std::collections::HashMap;
 use std::fmt::Write;
 
+use super::lighting::Lighting;
 use super::number;
 use super::painter::{DECIMALS, SHADES, Style, text};
 use dlsys_geometry::scene::{Color, Point, Scene, Segment};
@@ -74,6 +75,8 @@ pub(super) struct Strokes<'a> {
     scene: &'a Scene,
     style: Style<'a>,
     prefix: &'a str,
+    /// The light, unless that is the default one.
+    lighting: Option<&'a Lighting<'a>>,
     /// Shapes of the ends of each segment.
     ends: Vec<[End; 2]>,
     /// Numbers of colours across, and of gradients.
@@ -101,11 +104,24 @@ impl<'a> Strokes<'a> {
             scene,
             style,
             prefix,
+            lighting: None,
             ends,
             profiles: HashMap::new(),
             gradients: HashMap::new(),
             definitions: String::new(),
         }
+    }
+
+    /// In this light.
+    pub(super) fn lit(self, lighting: &'a Lighting<'a>) -> Strokes<'a> {
+        Strokes { lighting: Some(lighting).filter(|lighting| lighting.is_declared()), ..self }
+    }
+
+    /// The paint of what is seen of a segment: a colour, or a gradient across it.
+    pub(super) fn fill(&mut self, segment: &Segment) -> String {
+        let ends = [segment.start, segment.end].map(|p| self.style.project(p));
+        let width = pixels_across(segment, self.style) / self.style.pixels * self.style.scale;
+        self.paint(segment, ends, width)
     }
 
     /// The gradients that were used.
@@ -169,8 +185,19 @@ impl<'a> Strokes<'a> {
         let color = self.scene.palette.get(segment.material).color;
         let depth = (a.z + b.z) / 2.0 / self.style.scale;
         let along = self.style.fit.camera.direction(segment.direction);
-        let strengths = light.across(along, depth, PLACES);
-        let lit = |strength: f64| color.lit((strength * SHADES).round() / SHADES);
+        let strengths = match self.lighting {
+            None => light.across(along, depth, PLACES),
+            Some(lighting) => {
+                let middle = nalgebra::center(&segment.start, &segment.end);
+                let radius = segment.widths.map(|width| width.resolve(self.style.fit.default_width));
+                let seen = self.style.fit.camera.project(middle);
+                lighting.across(along, (seen, (radius[0] + radius[1]) / 4.0), PLACES)
+            }
+        };
+        let lit = |strength: f64| {
+            let strength = (strength * SHADES).round() / SHADES;
+            self.lighting.map_or_else(|| color.lit(strength), |lighting| lighting.color(color, strength))
+        };
         let (dx, dy) = (b.x - a.x, b.y - a.y);
         let length = dx.hypot(dy);
         if light.is_flat() || width * self.style.pixels < HAIR * self.style.scale || length < 1e-3 * width {

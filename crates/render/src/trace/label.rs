@@ -12,11 +12,10 @@ use dlsys_geometry::scene::{MaterialId, OwnerId};
 /// Shades between black and a colour as it is.
 const SHADES: f64 = 20.0;
 
-/// A region: cells of one module, one material and one shade.
+/// A region: cells of one item and one shade.
 pub struct Shade {
-    pub owner: OwnerId,
-    pub material: MaterialId,
-    /// The shade, in steps of 1/[`SHADES`].
+    pub item: Item,
+    /// The shade, in steps of 1/[`SHADES`]; 0 for all of a stem that is painted with a gradient.
     step: i32,
     /// The sum of the strengths of light in its cells, and their number.
     sum: f64,
@@ -24,8 +23,8 @@ pub struct Shade {
 }
 
 impl Shade {
-    fn key(&self) -> (OwnerId, MaterialId, i32) {
-        (self.owner, self.material, self.step)
+    fn key(&self) -> (Item, i32) {
+        (self.item, self.step)
     }
 
     /// The mean strength of light in its cells.
@@ -35,7 +34,33 @@ impl Shade {
 }
 
 /// A module and a material.
-pub type Item = (OwnerId, MaterialId);
+pub type Look = (OwnerId, MaterialId);
+
+/// What is painted at once: all of one look, or of that a segment which is painted with a gradient.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Item {
+    pub look: Look,
+    pub stem: Option<u32>,
+}
+
+/// The stems that are not painted by their shades: the looks that will be drawn as strokes over everything else, and the segments that
+/// are painted with gradients.
+#[derive(Default)]
+pub struct Stems {
+    pub strokes: HashSet<Look>,
+    pub gradients: HashSet<u32>,
+}
+
+impl Stems {
+    /// The item of a triangle; `None` if that is a part of a stroke.
+    fn item(&self, mesh: &Triangles, n: usize) -> Option<Item> {
+        let face = &mesh.faces[n];
+        let look = (face.owner, face.material);
+        let segment = mesh.segments.get(face.surface as usize).copied().flatten();
+        let stem = segment.filter(|segment| self.gradients.contains(segment));
+        (segment.is_none() || !self.strokes.contains(&look)).then_some(Item { look, stem })
+    }
+}
 
 /// The number of the nearest triangle in the middle of each cell plus 1, or 0; and its depth.
 pub fn nearest(mesh: &Triangles, lit: &Lit, [width, height]: [usize; 2]) -> Nearest<1> {
@@ -43,41 +68,37 @@ pub fn nearest(mesh: &Triangles, lit: &Lit, [width, height]: [usize; 2]) -> Near
     cells::nearest(&cells::MIDDLE, [width, height], count, |n| lit.corners(n), width * height, |cell| cell)
 }
 
-/// The raster of regions, and their shades by number. Regions are painted in the order of modules, materials and shades; `strokes` are the
-/// items that will be drawn over them.
+/// The raster of regions, and their shades by number. Regions are painted in the order of modules, materials and shades.
 pub fn label(
     mesh: &Triangles,
     lit: &Lit,
     numbers: &[[u32; 1]],
     [width, height]: [usize; 2],
-    strokes: &HashSet<Item>,
+    stems: &Stems,
 ) -> (Regions, Vec<Shade>) {
     let corners = |n: usize| lit.corners(n);
     // Regions are numbered as they are found, then in the order of painting.
     let mut weights = cells::Weights::default();
     let mut shades: Vec<Shade> = Vec::new();
-    let mut known: HashMap<(OwnerId, MaterialId, i32), u32> = HashMap::new();
+    let mut known: HashMap<(Item, i32), u32> = HashMap::new();
     let mut last = None;
     let mut labels = vec![NOTHING; numbers.len()];
-    let strengths = strengths(lit, numbers, width);
-    let mut at_strokes = (usize::MAX, false);
+    let item_of: Vec<Option<Item>> = (0..mesh.faces.len()).map(|n| stems.item(mesh, n)).collect();
+    let has_shades = |n: usize| item_of[n].is_some_and(|item| item.stem.is_none());
+    let strengths = strengths(lit, numbers, width, has_shades);
     for (cell, label) in labels.iter_mut().enumerate() {
         let Some(n) = (numbers[cell][0] as usize).checked_sub(1) else { continue };
-        if at_strokes.0 != n {
-            at_strokes = (n, strokes.contains(&(mesh.faces[n].owner, mesh.faces[n].material)));
-        }
-        if at_strokes.1 {
+        let Some(item) = item_of[n] else {
             *label = COVERED;
             continue;
-        }
+        };
         let strength = f64::from(strengths[cell]);
-        let (owner, material) = (mesh.faces[n].owner, mesh.faces[n].material);
         let step = step_of(strength);
-        let key = (owner, material, step);
+        let key = (item, step);
         let number = match last {
             Some((same, number)) if same == key => number,
             _ => *known.entry(key).or_insert_with(|| {
-                shades.push(Shade { owner, material, step, sum: 0.0, count: 0 });
+                shades.push(Shade { item, step, sum: 0.0, count: 0 });
                 shades.len() as u32 - 1
             }),
         };
@@ -99,13 +120,14 @@ pub fn label(
     let seen = cells::nearest(&SIXTEEN, [width, height], mesh.faces.len(), corners, chosen, place).numbers;
     let sample = |number: u32, cell: usize, weights: &mut cells::Weights| {
         let Some(n) = (number as usize).checked_sub(1) else { return Sample { item: NOTHING, step: 0 } };
-        let item = (mesh.faces[n].owner, mesh.faces[n].material);
-        match of_item.get(&item) {
+        let Some(known) = item_of[n] else { return Sample { item: COVERED, step: 0 } };
+        match of_item.get(&known) {
+            Some(&item) if known.stem.is_some() => Sample { item, step: 0 },
             Some(&item) => {
                 let weights = weights.at(n, || corners(n), [cell % width, cell / width]);
                 Sample { item, step: step_of(lit.strength(n, weights)) }
             }
-            None => Sample { item: if strokes.contains(&item) { COVERED } else { NOTHING }, step: 0 },
+            None => Sample { item: NOTHING, step: 0 },
         }
     };
     let cells = (0..labels.len()).filter(|cell| place(*cell) < chosen);
@@ -124,8 +146,8 @@ pub fn label(
     (Regions { width, height, labels, places, samples, items, steps, strengths, least }, shades)
 }
 
-/// The strengths of light in the middles of cells. Between two cells of one triangle it is their mean.
-fn strengths(lit: &Lit, numbers: &[[u32; 1]], width: usize) -> Vec<f32> {
+/// The strengths of light in the middles of cells whose triangles have shades, else 0. Between two cells of one triangle it is their mean.
+fn strengths(lit: &Lit, numbers: &[[u32; 1]], width: usize, has_shades: impl Fn(usize) -> bool) -> Vec<f32> {
     let mut weights = cells::Weights::default();
     let mut strengths = vec![0.0_f32; numbers.len()];
     let exact = |cell: usize, n: u32, weights: &mut cells::Weights| {
@@ -139,7 +161,7 @@ fn strengths(lit: &Lit, numbers: &[[u32; 1]], width: usize) -> Vec<f32> {
                 // Of an even row every second cell lies between two; of an odd row all do.
                 for cell in (row + offset..row + width).step_by(2) {
                     let n = numbers[cell][0];
-                    if n == 0 {
+                    if n == 0 || !has_shades(n as usize - 1) {
                         continue;
                     }
                     let is_between = apart > 1 || offset == 1;
@@ -170,7 +192,7 @@ fn items(shades: &[Shade]) -> (Vec<u32>, HashMap<Item, u32>) {
     let mut numbers: HashMap<Item, u32> = HashMap::new();
     let number = |shade: &Shade| {
         let next = numbers.len() as u32;
-        *numbers.entry((shade.owner, shade.material)).or_insert(next)
+        *numbers.entry(shade.item).or_insert(next)
     };
     let items = shades.iter().map(number).collect();
     (items, numbers)
