@@ -1,6 +1,6 @@
 //! Which triangle is the nearest in pixels, at one sample or at several: for the outlines of visible regions.
 
-use super::{Corner, EQUAL, FARTHEST, Pattern, STEPS, Triangle};
+use super::{Corner, EQUAL, Pattern, STEPS, Triangle};
 
 /// The pattern of one sample, in the middle of a pixel.
 pub(crate) const MIDDLE: Pattern<1> = [(0, 0)];
@@ -25,7 +25,11 @@ pub(crate) fn nearest<const N: usize>(
     let mut numbers = vec![[0; N]; places];
     let mut depths = vec![[f32::NEG_INFINITY; N]; places];
     for number in 0..count {
-        let Some(triangle) = Triangle::new(pattern, number, corners(number), width, height) else { continue };
+        let corners = corners(number);
+        if !touches(pattern, &corners, [width, height], |cell| place(cell) < places) {
+            continue;
+        }
+        let Some(triangle) = Triangle::new(pattern, corners, width, height) else { continue };
         let [least, greatest] = triangle.depths;
         let [origin, right, down] = triangle.depth;
         let at = &triangle.at_samples;
@@ -64,28 +68,37 @@ pub(crate) fn nearest<const N: usize>(
     Nearest { numbers, depths }
 }
 
-/// Weights of corners in the middle of pixels, of one triangle after another.
-#[derive(Default)]
-pub(crate) struct Weights {
-    triangle: Option<Triangle<1>>,
+/// Whether a triangle may touch a sample of a pixel that is to be drawn. Most of the small ones do not.
+fn touches<const N: usize>(
+    pattern: &Pattern<N>,
+    corners: &[Corner; 3],
+    [width, height]: [usize; 2],
+    is_drawn: impl Fn(usize) -> bool,
+) -> bool {
+    // The samples of a pixel begin and end so far from its sides; corners are rounded.
+    let (first, last) = if pattern.len() == 1 { (0.48, 0.52) } else { (0.0, 1.0) };
+    let range = |at: [f64; 3], end: usize| {
+        let low = at[0].min(at[1]).min(at[2]) - last;
+        let high = at[0].max(at[1]).max(at[2]) - first;
+        (low.ceil().max(0.0) as usize, (high.floor().min(end as f64 - 1.0) + 1.0) as usize)
+    };
+    let (left, right) = range(corners.each_ref().map(|corner| corner.x), width);
+    let (top, bottom) = range(corners.each_ref().map(|corner| corner.y), height);
+    if left >= right || top >= bottom {
+        return false;
+    }
+    // Of a large one it is not worth the search.
+    let is_large = (right - left) * (bottom - top) > 256;
+    is_large || (top..bottom).any(|row| (left..right).any(|column| is_drawn(row * width + column)))
 }
 
-impl Weights {
-    /// The weights of a triangle's corners in the middle of a pixel, or near it if that is outside.
-    pub(crate) fn at(
-        &mut self,
-        number: usize,
-        corners: impl FnOnce() -> [Corner; 3],
-        [column, row]: [usize; 2],
-    ) -> [f64; 3] {
-        if self.triangle.as_ref().is_none_or(|triangle| triangle.number != number) {
-            let far = FARTHEST as usize;
-            self.triangle = Triangle::new(&MIDDLE, number, corners(), far, far);
-        }
-        let middle = |at: usize| at as i64 * STEPS + STEPS / 2;
-        match &self.triangle {
-            Some(triangle) => triangle.weights(middle(column), middle(row)),
-            None => [1.0 / 3.0; 3],
-        }
-    }
+/// The weights of a triangle's corners in the middle of a pixel, or near it if that is outside.
+pub(crate) fn weights([p, q, r]: [Corner; 3], [column, row]: [usize; 2]) -> [f64; 3] {
+    let (x, y) = (column as f64 + 0.5, row as f64 + 0.5);
+    let wide = |a: &Corner, b: &Corner| (a.x - x) * (b.y - y) - (a.y - y) * (b.x - x);
+    let raw = [wide(&q, &r), wide(&r, &p), wide(&p, &q)];
+    let area: f64 = raw.iter().sum();
+    let inner = raw.map(|w| (w / area).max(0.0));
+    let sum: f64 = inner.iter().sum();
+    if sum.is_finite() && sum > 0.0 { inner.map(|w| w / sum) } else { [1.0 / 3.0; 3] }
 }

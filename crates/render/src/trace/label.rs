@@ -78,7 +78,6 @@ pub fn label(
 ) -> (Regions, Vec<Shade>) {
     let corners = |n: usize| lit.corners(n);
     // Regions are numbered as they are found, then in the order of painting.
-    let mut weights = cells::Weights::default();
     let mut shades: Vec<Shade> = Vec::new();
     let mut known: HashMap<(Item, i32), u32> = HashMap::new();
     let mut last = None;
@@ -107,6 +106,7 @@ pub fn label(
         (shade.sum, shade.count) = (shade.sum + strength, shade.count + 1);
         *label = number;
     }
+    clear_rim(&mut labels, width);
     let mut order: Vec<u32> = (0..shades.len() as u32).collect();
     order.sort_by_key(|number| shades[*number as usize].key());
     let mut ranks = vec![0; order.len()];
@@ -118,13 +118,13 @@ pub fn label(
     let (places, chosen) = edges(&labels, &items, &shades, width);
     let place = |cell: usize| places[cell] as usize;
     let seen = cells::nearest(&SIXTEEN, [width, height], mesh.faces.len(), corners, chosen, place).numbers;
-    let sample = |number: u32, cell: usize, weights: &mut cells::Weights| {
+    let sample = |number: u32, cell: usize| {
         let Some(n) = (number as usize).checked_sub(1) else { return Sample { item: NOTHING, step: 0 } };
         let Some(known) = item_of[n] else { return Sample { item: COVERED, step: 0 } };
         match of_item.get(&known) {
             Some(&item) if known.stem.is_some() => Sample { item, step: 0 },
             Some(&item) => {
-                let weights = weights.at(n, || corners(n), [cell % width, cell / width]);
+                let weights = cells::weights(corners(n), [cell % width, cell / width]);
                 Sample { item, step: step_of(lit.strength(n, weights)) }
             }
             None => Sample { item: NOTHING, step: 0 },
@@ -133,47 +133,56 @@ pub fn label(
     let cells = (0..labels.len()).filter(|cell| place(*cell) < chosen);
     let mut samples = Vec::with_capacity(chosen);
     for (cell, numbers) in cells.zip(&seen) {
-        let mut last = (numbers[0], sample(numbers[0], cell, &mut weights));
+        let mut last = (numbers[0], sample(numbers[0], cell));
         samples.push(numbers.map(|number| {
             if last.0 != number {
-                last = (number, sample(number, cell, &mut weights));
+                last = (number, sample(number, cell));
             }
             last.1
         }));
     }
     let least = shades.iter().map(|shade| (f64::from(shade.step) - 0.5) / SHADES).collect();
     let steps = shades.iter().map(|shade| shade.step).collect();
-    (Regions { width, height, labels, places, samples, items, steps, strengths, least }, shades)
+    (Regions { width, labels, places, samples, items, steps, strengths, least }, shades)
+}
+
+/// Leaves the cells around a raster empty: none of them is in the picture.
+fn clear_rim(labels: &mut [u32], width: usize) {
+    let last = labels.len().saturating_sub(width);
+    labels[last..].fill(NOTHING);
+    for row in labels.chunks_mut(width) {
+        (row[0], row[width - 1]) = (NOTHING, NOTHING);
+    }
+    labels[..width].fill(NOTHING);
 }
 
 /// The strengths of light in the middles of cells whose triangles have shades, else 0. Between two cells of one triangle it is their mean.
 fn strengths(lit: &Lit, numbers: &[[u32; 1]], width: usize, has_shades: impl Fn(usize) -> bool) -> Vec<f32> {
-    let mut weights = cells::Weights::default();
     let mut strengths = vec![0.0_f32; numbers.len()];
-    let exact = |cell: usize, n: u32, weights: &mut cells::Weights| {
-        let n = n as usize - 1;
-        lit.strength(n, weights.at(n, || lit.corners(n), [cell % width, cell / width])) as f32
-    };
+    let height = numbers.len() / width.max(1);
     // Rows with even numbers first, then those between.
-    for (first, apart) in [(0, 1), (width, width)] {
-        for row in (first..numbers.len()).step_by((2 * width).max(1)) {
+    for first in [0, 1] {
+        for y in (first..height).step_by(2) {
+            let apart = if first == 0 { 1 } else { width };
             for offset in [0, 1] {
                 // Of an even row every second cell lies between two; of an odd row all do.
-                for cell in (row + offset..row + width).step_by(2) {
+                for x in (offset..width).step_by(2) {
+                    let cell = y * width + x;
                     let n = numbers[cell][0];
                     if n == 0 || !has_shades(n as usize - 1) {
                         continue;
                     }
-                    let is_between = apart > 1 || offset == 1;
-                    let after = cell + apart;
-                    let both = is_between
-                        && (apart > 1 || after < row + width)
-                        && after < numbers.len()
-                        && numbers[cell - apart][0] == n
-                        && numbers[after][0] == n;
+                    let is_between = match first {
+                        0 => offset == 1 && x + 1 < width,
+                        _ => y + 1 < height,
+                    };
+                    let both = is_between && numbers[cell - apart][0] == n && numbers[cell + apart][0] == n;
                     strengths[cell] = match both {
-                        true => (strengths[cell - apart] + strengths[after]) / 2.0,
-                        false => exact(cell, n, &mut weights),
+                        true => (strengths[cell - apart] + strengths[cell + apart]) / 2.0,
+                        false => {
+                            let n = n as usize - 1;
+                            lit.strength(n, cells::weights(lit.corners(n), [x, y])) as f32
+                        }
                     };
                 }
             }
@@ -211,13 +220,12 @@ fn edges(labels: &[u32], items: &[u32], shades: &[Shade], width: usize) -> (Vec<
             (places[a], places[b]) = (0, 0);
         }
     };
-    for cell in 0..labels.len() {
-        if cell % width > 0 {
-            mark(cell - 1, cell);
-        }
-        if cell >= width {
-            mark(cell - width, cell);
-        }
+    // The cells around the raster are empty, so the first of a row may be compared with the last of the row before.
+    for cell in 1..labels.len() {
+        mark(cell - 1, cell);
+    }
+    for cell in width..labels.len() {
+        mark(cell - width, cell);
     }
     let mut count = 0;
     for place in places.iter_mut().filter(|place| **place == 0) {

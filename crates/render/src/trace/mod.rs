@@ -99,7 +99,8 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
     page.with_strokes(scene, order, strokes, &visible)
 }
 
-/// The rectangle of cells that triangles touch, within a picture of this size: its first column and row, and its size.
+/// The rectangle of cells that triangles touch, within a picture of this size, and a cell around it, which may be outside of the picture:
+/// its first column and row, and its size.
 fn drawn(mesh: &Triangles, lit: &Lit, size: [f64; 2]) -> [[f64; 2]; 2] {
     let (mut low, mut high) = (size, [0.0; 2]);
     for corner in (0..mesh.faces.len()).flat_map(|n| lit.corners(n)) {
@@ -108,8 +109,8 @@ fn drawn(mesh: &Triangles, lit: &Lit, size: [f64; 2]) -> [[f64; 2]; 2] {
             high[k] = at.max(high[k]);
         }
     }
-    let low = [0, 1].map(|k| (low[k].floor() - 1.0).clamp(0.0, size[k] - 1.0));
-    let high = [0, 1].map(|k| (high[k].ceil() + 1.0).clamp(low[k] + 1.0, size[k]));
+    let low = [0, 1].map(|k| low[k].floor().clamp(0.0, size[k] - 1.0) - 1.0);
+    let high = [0, 1].map(|k| high[k].ceil().clamp(low[k] + 2.0, size[k]) + 1.0);
     [low, [0, 1].map(|k| high[k] - low[k])]
 }
 
