@@ -14,6 +14,8 @@ use dlsys_geometry::scene::{Color, Point, Scene, Segment};
 
 /// Stems thinner than this many pixels of the page have one colour.
 const HAIR: f64 = 0.8;
+/// Stems thinner than this many pixels of the page have half as many shades.
+const NARROW: f64 = 6.0;
 /// Stems thinner than this many pixels of the page are strokes, wherever they are visible, and never regions.
 const THIN: f64 = 2.5;
 /// Places across a stem at which its colour is given: its edges are at -1 and 1.
@@ -194,8 +196,11 @@ impl<'a> Strokes<'a> {
                 lighting.across(along, (seen, (radius[0] + radius[1]) / 4.0), PLACES)
             }
         };
+        // Of narrow stems so few shades that many share their colours.
+        let is_narrow = width * self.style.pixels < NARROW * self.style.scale;
+        let shades = if is_narrow { SHADES / 2.0 } else { SHADES };
         let lit = |strength: f64| {
-            let strength = (strength * SHADES).round() / SHADES;
+            let strength = (strength * shades).round() / shades;
             self.lighting.map_or_else(|| color.lit(strength), |lighting| lighting.color(color, strength))
         };
         let (dx, dy) = (b.x - a.x, b.y - a.y);
@@ -209,7 +214,15 @@ impl<'a> Strokes<'a> {
         // itself: further away its rounded direction would lead past it.
         let middle = nalgebra::center(&a, &b);
         let aside = [dy / length * width / 2.0, -dx / length * width / 2.0];
-        let place = |side: f64| [middle.x + side * aside[0], middle.y + side * aside[1]].map(text);
+        // Within a hundredth of the width.
+        let decimals = (-(width / 100.0).log10()).ceil().clamp(0.0, DECIMALS as f64) as usize;
+        let place = |side: f64| {
+            [middle.x + side * aside[0], middle.y + side * aside[1]].map(|x| {
+                let mut out = String::new();
+                number::push(&mut out, x, decimals);
+                out
+            })
+        };
         let ([x1, y1], [x2, y2]) = (place(1.0), place(-1.0));
         let profile = self.profile(strengths.map(lit));
         let prefix = self.prefix;
@@ -236,8 +249,16 @@ impl<'a> Strokes<'a> {
         let (prefix, definitions) = (self.prefix, &mut self.definitions);
         *self.profiles.entry(colors).or_insert_with(|| {
             let _ = write!(definitions, "<linearGradient id=\"{prefix}s{next}\">");
-            for (place, color) in PLACES.iter().zip(colors) {
-                let offset = text((place + 1.0) / 2.0);
+            for (i, (place, color)) in PLACES.iter().zip(colors).enumerate() {
+                // Between two of its colour, and at the edge beside one, a stop changes nothing.
+                let is_same = |other: Option<&Color>| other.is_none_or(|other| *other == color);
+                if i > 0 && is_same(colors.get(i - 1)) && is_same(colors.get(i + 1)) {
+                    continue;
+                }
+                let mut offset = String::new();
+                number::push(&mut offset, (place + 1.0) / 2.0, 2);
+                let offset = offset.trim_start_matches('0');
+                let offset = if offset.is_empty() { "0" } else { offset };
                 let _ = write!(definitions, "<stop offset=\"{offset}\" stop-color=\"{color}\"/>");
             }
             definitions.push_str("</linearGradient>\n");

@@ -12,24 +12,52 @@ pub(crate) struct Nearest<const N: usize> {
 }
 
 /// Finds the nearest of `count` triangles at each sample of the pixels that have a `place` below `places`. Of two at the same
-/// depth it is the later.
+/// depth it is the later. Triangles that are known to be `seen` come first, so that most others are hidden by then.
 pub(crate) fn nearest<const N: usize>(
     pattern: &Pattern<N>,
-    [width, height]: [usize; 2],
-    count: usize,
-    corners: impl Fn(usize) -> [Corner; 3],
-    places: usize,
-    place: impl Fn(usize) -> usize,
+    size: [usize; 2],
+    (count, corners): (usize, impl Fn(usize) -> [Corner; 3]),
+    (places, place): (usize, impl Fn(usize) -> usize),
+    seen: impl Fn(usize) -> bool,
 ) -> Nearest<N> {
-    let offset = |k: i64| (k as f64 + 8.5) / 16.0;
-    let mut numbers = vec![[0; N]; places];
-    let mut depths = vec![[f32::NEG_INFINITY; N]; places];
-    for number in 0..count {
-        let corners = corners(number);
-        if !touches(pattern, &corners, [width, height], |cell| place(cell) < places) {
-            continue;
+    let mut nearest = Nearest { numbers: vec![[0; N]; places], depths: vec![[f32::NEG_INFINITY; N]; places] };
+    for number in (0..count).filter(|number| seen(*number)) {
+        nearest.add(pattern, size, (number, corners(number)), &place, |_, _| true);
+    }
+    if (0..count).all(&seen) {
+        return nearest;
+    }
+    let farthest = |depths: &[f32; N]| depths.iter().copied().fold(f32::INFINITY, f32::min);
+    let far: Vec<f32> = nearest.depths.iter().map(farthest).collect();
+    let is_open = |place: usize, depth: f64| far.get(place).is_some_and(|far| depth as f32 + EQUAL >= *far);
+    for number in (0..count).filter(|number| !seen(*number)) {
+        nearest.add(pattern, size, (number, corners(number)), &place, is_open);
+    }
+    nearest
+}
+
+impl<const N: usize> Nearest<N> {
+    /// Adds a triangle where it is in front. `is_open` tells whether something at this depth may be seen at a place.
+    fn add(
+        &mut self,
+        pattern: &Pattern<N>,
+        [width, height]: [usize; 2],
+        (number, corners): (usize, [Corner; 3]),
+        place: impl Fn(usize) -> usize,
+        is_open: impl Fn(usize, f64) -> bool,
+    ) {
+        let offset = |k: i64| (k as f64 + 8.5) / 16.0;
+        let front = corners[0].depth.max(corners[1].depth).max(corners[2].depth);
+        let places = self.numbers.len();
+        let is_drawn = |cell: usize| {
+            let at = place(cell);
+            at < places && is_open(at, front)
+        };
+        if !touches(pattern, &corners, [width, height], is_drawn) {
+            return;
         }
-        let Some(triangle) = Triangle::new(pattern, corners, width, height) else { continue };
+        let Some(triangle) = Triangle::new(pattern, corners, width, height) else { return };
+        let number = number as u32 + 1;
         let [least, greatest] = triangle.depths;
         let [origin, right, down] = triangle.depth;
         let at = &triangle.at_samples;
@@ -47,7 +75,11 @@ pub(crate) fn nearest<const N: usize>(
                     continue;
                 }
                 let place = place(row * width + column);
-                let (Some(numbers), Some(depths)) = (numbers.get_mut(place), depths.get_mut(place)) else {
+                if !is_open(place, front) {
+                    continue;
+                }
+                let (Some(numbers), Some(depths)) = (self.numbers.get_mut(place), self.depths.get_mut(place))
+                else {
                     continue;
                 };
                 for (s, &(x, y)) in pattern.iter().enumerate() {
@@ -57,15 +89,15 @@ pub(crate) fn nearest<const N: usize>(
                     let depth =
                         origin + right * (column as f64 + offset(x)) + down * (row as f64 + offset(y));
                     let depth = depth.clamp(least, greatest) as f32;
-                    if depth + EQUAL >= depths[s] {
+                    let is_later = number > numbers[s];
+                    if depth > depths[s] + EQUAL || is_later && depth + EQUAL >= depths[s] {
                         depths[s] = depth.max(depths[s]);
-                        numbers[s] = number as u32 + 1;
+                        numbers[s] = number;
                     }
                 }
             }
         }
     }
-    Nearest { numbers, depths }
 }
 
 /// Whether a triangle may touch a sample of a pixel that is to be drawn. Most of the small ones do not.

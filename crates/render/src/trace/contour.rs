@@ -42,10 +42,11 @@ struct Place {
     tolerance: f64,
 }
 
-/// The greatest distance of outlines, in cells, from the edges of items, and from those between two shades of one item or under what
-/// is painted later.
+/// The greatest distance of outlines, in cells, from the edges of items, from those between two shades of one item, and from where
+/// they should run under what is painted later.
 const TOLERANCE: f64 = 0.25;
 const TOLERANCE_INSIDE: f64 = 0.9;
+const TOLERANCE_HIDDEN: f64 = 1.5;
 
 /// A corner of an outline, in cells from the upper left corner of the mask.
 pub type Corner = [f64; 2];
@@ -69,6 +70,8 @@ where
         };
         let covered = |cell: usize, part: Part| (self.covered)(cell, part);
         let (t, tolerance) = match ((self.shade)(inner), (self.shade)(outer)) {
+            // A lighter shade is painted over it.
+            (_, Some(low)) if low >= 0.0 => (0.5, TOLERANCE_HIDDEN),
             (Some(high), Some(low)) => {
                 let (a, b) = (covered(inner, Part::Shade), covered(outer, Part::Shade));
                 match high > 0.0 && low < 0.0 && a == 1.0 && b == 0.0 {
@@ -80,7 +83,7 @@ where
             }
             _ => match (covered(inner, Part::Item), covered(outer, Part::Item)) {
                 // Where both are covered, it ends under what is painted later.
-                (_, b) if b > 0.99 => (0.5, TOLERANCE_INSIDE),
+                (_, b) if b > 0.99 => (0.5, TOLERANCE_HIDDEN),
                 (a, b) => (between(a, b), TOLERANCE),
             },
         };

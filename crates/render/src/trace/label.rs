@@ -65,7 +65,8 @@ impl Stems {
 /// The number of the nearest triangle in the middle of each cell plus 1, or 0; and its depth.
 pub fn nearest(mesh: &Triangles, lit: &Lit, [width, height]: [usize; 2]) -> Nearest<1> {
     let count = mesh.faces.len();
-    cells::nearest(&cells::MIDDLE, [width, height], count, |n| lit.corners(n), width * height, |cell| cell)
+    let triangles = (count, |n| lit.corners(n));
+    cells::nearest(&cells::MIDDLE, [width, height], triangles, (width * height, |cell| cell), |_| true)
 }
 
 /// The raster of regions, and their shades by number. Regions are painted in the order of modules, materials and shades.
@@ -117,7 +118,11 @@ pub fn label(
     let (items, of_item) = items(&shades);
     let (places, chosen) = edges(&labels, &items, &shades, width);
     let place = |cell: usize| places[cell] as usize;
-    let seen = cells::nearest(&SIXTEEN, [width, height], mesh.faces.len(), corners, chosen, place).numbers;
+    let mut in_front = vec![false; mesh.faces.len() + 1];
+    numbers.iter().for_each(|[number]| in_front[*number as usize] = true);
+    let triangles = (mesh.faces.len(), corners);
+    let seen = cells::nearest(&SIXTEEN, [width, height], triangles, (chosen, place), |n| in_front[n + 1]);
+    let seen = seen.numbers;
     let sample = |number: u32, cell: usize| {
         let Some(n) = (number as usize).checked_sub(1) else { return Sample { item: NOTHING, step: 0 } };
         let Some(known) = item_of[n] else { return Sample { item: COVERED, step: 0 } };

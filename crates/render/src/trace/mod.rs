@@ -37,6 +37,8 @@ const CELLS_PER_PIXEL: f64 = 2.0;
 /// Least and most cells on the larger side of a picture.
 const LEAST_CELLS: f64 = 1000.0;
 const MOST_CELLS: f64 = 4000.0;
+/// A scene of so few triangles has no small parts, so one cell for each pixel of the page is enough.
+const PLAIN: usize = 2000;
 /// Stems wider than this many pixels of the page are regions, because their bends and domes have shades of their own.
 const WIDEST_STROKE: f64 = 16.0;
 /// A stem whose visible length is less than this many widths is painted by its shades: its ends are much of it.
@@ -48,10 +50,15 @@ const LEAST_PIXELS: f64 = 1.5;
 pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -> String {
     let [left, bottom, width, height] = style.fit.picture.area;
     let larger = width.max(height);
-    let cell = larger / (CELLS_PER_PIXEL * larger * style.pixels).clamp(LEAST_CELLS, MOST_CELLS);
-    let [a, b, c] = [1.0 / cell, -left / cell, (bottom + height) / cell];
+    let cell_of = |per_pixel: f64| {
+        let least = LEAST_CELLS * per_pixel / CELLS_PER_PIXEL;
+        larger / (per_pixel * larger * style.pixels).clamp(least, MOST_CELLS)
+    };
+    let finest = cell_of(CELLS_PER_PIXEL);
     let has_triangles = |segment: &Segment| pixels_across(segment, style) >= LEAST_PIXELS;
-    let mesh = triangles::triangles(scene, style.fit, sides(scene, style.fit, a), has_triangles);
+    let mesh = triangles::triangles(scene, style.fit, sides(scene, style.fit, 1.0 / finest), has_triangles);
+    let cell = if mesh.faces.len() <= PLAIN { cell_of(1.0) } else { finest };
+    let [a, b, c] = [1.0 / cell, -left / cell, (bottom + height) / cell];
     let mut lit = Lit::new(scene, &mesh, style.fit, [a, b, c], style.floor);
     // Of the raster only the part in which something is drawn.
     let [low, size] = drawn(&mesh, &lit, [width, height].map(|side| (side / cell).ceil().max(1.0)));
