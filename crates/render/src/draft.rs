@@ -67,9 +67,7 @@ impl<'s> Draft<'s> {
     ) -> Draft<'s> {
         let accuracy = |at: Point| {
             let scale = (detail.scale_at)(at).max(f64::MIN_POSITIVE);
-            let wanted = (SLACK / scale).max(detail.accuracy * detail.scale / scale);
-            // Few values, so that patches that meet have the same pieces.
-            2_f64.powf((2.0 * wanted.log2()).floor() / 2.0)
+            rounded((SLACK / scale).max(detail.accuracy * detail.scale / scale))
         };
         let is_few = detail.is_flat && scene.segments.len() <= MOST_FLAT;
         let is_thin: Vec<bool> = (scene.segments.iter())
@@ -176,6 +174,16 @@ impl<'s> Draft<'s> {
             Some(Ribbon { corners, side, facing, material: segment.material })
         })
     }
+}
+
+/// The greatest distance of triangles from curved surfaces where a scene unit has so many pixels.
+pub(super) fn accuracy(scale: f64) -> f64 {
+    rounded(SLACK / scale)
+}
+
+/// One of few values, so that patches that meet have the same pieces.
+fn rounded(accuracy: f64) -> f64 {
+    2_f64.powf((2.0 * accuracy.log2()).floor() / 2.0)
 }
 
 /// Sides of tubes in a drawing without depth, of which the widest has this radius in pixels: a multiple of four, so that both edges have

@@ -5,6 +5,9 @@ use super::{Corner, EQUAL, Pattern, STEPS, Triangle};
 /// The pattern of one sample, in the middle of a pixel.
 pub(crate) const MIDDLE: Pattern<1> = [(0, 0)];
 
+/// Eight samples, no two in a row or column.
+pub(crate) const EIGHT: Pattern<8> = [(1, -3), (-1, 3), (5, 1), (-3, -5), (-5, 5), (-7, -1), (3, 7), (7, -7)];
+
 /// The nearest triangles at the samples of some pixels, one after another: the number of each plus 1, or 0, and its depth.
 pub(crate) struct Nearest<const N: usize> {
     pub(crate) numbers: Vec<[u32; N]>,

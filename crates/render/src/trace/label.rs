@@ -4,8 +4,8 @@ use std::collections::{HashMap, HashSet};
 
 use super::regions::{COVERED, NOTHING, Regions, Sample};
 use crate::formats::png::Lit;
-use crate::raster::SIXTEEN;
 use crate::raster::cells::{self, Nearest};
+use crate::raster::{Pattern, SIXTEEN};
 use crate::triangles::Triangles;
 use dlsys_geometry::scene::{MaterialId, OwnerId};
 
@@ -70,14 +70,15 @@ pub fn nearest(mesh: &Triangles, lit: &Lit, [width, height]: [usize; 2]) -> Near
 }
 
 /// The raster of regions, and their shades by number. Regions are painted in the order of modules, materials and shades.
+/// Of cells finer than pixels edges have fewer samples.
 pub fn label(
     mesh: &Triangles,
     lit: &Lit,
     numbers: &[[u32; 1]],
     [width, height]: [usize; 2],
     stems: &Stems,
+    is_fine: bool,
 ) -> (Regions, Vec<Shade>) {
-    let corners = |n: usize| lit.corners(n);
     // Regions are numbered as they are found, then in the order of painting.
     let mut shades: Vec<Shade> = Vec::new();
     let mut known: HashMap<(Item, i32), u32> = HashMap::new();
@@ -117,38 +118,72 @@ pub fn label(
 
     let (items, of_item) = items(&shades);
     let (places, chosen) = edges(&labels, &items, &shades, width);
-    let place = |cell: usize| places[cell] as usize;
-    let mut in_front = vec![false; mesh.faces.len() + 1];
-    numbers.iter().for_each(|[number]| in_front[*number as usize] = true);
-    let triangles = (mesh.faces.len(), corners);
-    let seen = cells::nearest(&SIXTEEN, [width, height], triangles, (chosen, place), |n| in_front[n + 1]);
-    let seen = seen.numbers;
-    let sample = |number: u32, cell: usize| {
-        let Some(n) = (number as usize).checked_sub(1) else { return Sample { item: NOTHING, step: 0 } };
-        let Some(known) = item_of[n] else { return Sample { item: COVERED, step: 0 } };
-        match of_item.get(&known) {
-            Some(&item) if known.stem.is_some() => Sample { item, step: 0 },
-            Some(&item) => {
-                let weights = cells::weights(corners(n), [cell % width, cell / width]);
-                Sample { item, step: step_of(lit.strength(n, weights)) }
+    let at_edges = Edges { lit, numbers, width, height, places: &places, count: chosen };
+    // Faces of one item follow one another.
+    let mut last = (None, NOTHING);
+    let face_items: Vec<(u32, bool)> = (item_of.iter())
+        .map(|item| {
+            let Some(known) = item else { return (COVERED, false) };
+            if last.0 != *item {
+                last = (*item, of_item.get(known).copied().unwrap_or(NOTHING));
             }
-            None => Sample { item: NOTHING, step: 0 },
-        }
+            (last.1, known.stem.is_none())
+        })
+        .collect();
+    let samples = match is_fine {
+        true => at_edges.samples(&cells::EIGHT, &face_items),
+        false => at_edges.samples(&SIXTEEN, &face_items),
     };
-    let cells = (0..labels.len()).filter(|cell| place(*cell) < chosen);
-    let mut samples = Vec::with_capacity(chosen);
-    for (cell, numbers) in cells.zip(&seen) {
-        let mut last = (numbers[0], sample(numbers[0], cell));
-        samples.push(numbers.map(|number| {
-            if last.0 != number {
-                last = (number, sample(number, cell));
-            }
-            last.1
-        }));
-    }
+    let per_cell = if is_fine { cells::EIGHT.len() } else { SIXTEEN.len() };
     let least = shades.iter().map(|shade| (f64::from(shade.step) - 0.5) / SHADES).collect();
     let steps = shades.iter().map(|shade| shade.step).collect();
-    (Regions { width, labels, places, samples, items, steps, strengths, least }, shades)
+    (Regions { width, labels, places, samples, per_cell, items, steps, strengths, least }, shades)
+}
+
+/// Cells at the edges of items and at creases: those that have a place below `count`.
+struct Edges<'a> {
+    lit: &'a Lit<'a>,
+    /// The nearest triangle in the middle of each cell, by number plus 1.
+    numbers: &'a [[u32; 1]],
+    width: usize,
+    height: usize,
+    places: &'a [u32],
+    count: usize,
+}
+
+impl Edges<'_> {
+    /// What is seen at the samples of these cells, one cell after another. Of each triangle its item is given, and whether it has shades.
+    fn samples<const N: usize>(&self, pattern: &Pattern<N>, items: &[(u32, bool)]) -> Vec<Sample> {
+        let place = |cell: usize| self.places[cell] as usize;
+        let corners = |n: usize| self.lit.corners(n);
+        let mut in_front = vec![false; items.len() + 1];
+        self.numbers.iter().for_each(|[number]| in_front[*number as usize] = true);
+        let (triangles, size) = ((items.len(), corners), [self.width, self.height]);
+        let seen = cells::nearest(pattern, size, triangles, (self.count, place), |n| in_front[n + 1]).numbers;
+        let sample = |number: u32, cell: usize| {
+            let Some(n) = (number as usize).checked_sub(1) else { return Sample { item: NOTHING, step: 0 } };
+            let (item, has_shades) = items[n];
+            if item >= COVERED || !has_shades {
+                return Sample { item, step: 0 };
+            }
+            let weights = cells::weights(corners(n), [cell % self.width, cell / self.width]);
+            Sample { item, step: step_of(self.lit.strength(n, weights)) }
+        };
+        let mut samples = Vec::with_capacity(self.count * N);
+        let mut known: Vec<(u32, Sample)> = Vec::with_capacity(N);
+        let cells = (0..self.places.len()).filter(|cell| place(*cell) < self.count);
+        for (cell, numbers) in cells.zip(&seen) {
+            known.clear();
+            samples.extend(numbers.map(|number| match known.iter().find(|known| known.0 == number) {
+                Some(&(_, sample)) => sample,
+                None => {
+                    known.push((number, sample(number, cell)));
+                    known[known.len() - 1].1
+                }
+            }));
+        }
+        samples
+    }
 }
 
 /// Leaves the cells around a raster empty: none of them is in the picture.

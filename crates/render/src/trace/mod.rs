@@ -57,7 +57,8 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
     let finest = cell_of(CELLS_PER_PIXEL);
     let has_triangles = |segment: &Segment| pixels_across(segment, style) >= LEAST_PIXELS;
     let mesh = triangles::triangles(scene, style.fit, sides(scene, style.fit, 1.0 / finest), has_triangles);
-    let cell = if mesh.faces.len() <= PLAIN { cell_of(1.0) } else { finest };
+    let is_fine = mesh.faces.len() > PLAIN;
+    let cell = if is_fine { finest } else { cell_of(1.0) };
     let [a, b, c] = [1.0 / cell, -left / cell, (bottom + height) / cell];
     let mut lit = Lit::new(scene, &mesh, style.fit, [a, b, c], style.floor);
     // Of the raster only the part in which something is drawn.
@@ -68,7 +69,7 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
     let nearest = label::nearest(&mesh, &lit, size);
     let mut visible = Visible { style, depths: &nearest.depths, labels: &[], size, placement };
     let stems = stems(scene, style, &visible, lit.lighting().is_declared());
-    let (mut regions, shades) = label::label(&mesh, &lit, &nearest.numbers, size, &stems);
+    let (mut regions, shades) = label::label(&mesh, &lit, &nearest.numbers, size, &stems, is_fine);
     regions.without_specks();
     let outlines = regions.outlines(shades.len());
     visible.labels = &regions.labels;

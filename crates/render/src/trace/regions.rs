@@ -28,9 +28,10 @@ pub struct Regions {
     pub width: usize,
     /// By cell; [`NOTHING`] for the background, [`COVERED`] where something else is drawn.
     pub labels: Vec<u32>,
-    /// By cell: its place in `samples`, if it is at the edge of an item or at a crease; or anything greater.
+    /// By cell: its place among those with `per_cell` samples, if it is at the edge of an item or at a crease; or anything greater.
     pub places: Vec<u32>,
-    pub samples: Vec<[Sample; 16]>,
+    pub samples: Vec<Sample>,
+    pub per_cell: usize,
     /// By region: its item (module and material), in the order of painting, and its shade.
     pub items: Vec<u32>,
     pub steps: Vec<i32>,
@@ -174,7 +175,11 @@ impl Regions {
         for &cell in piece {
             let Marks { inside, begun, .. } = marks;
             // The part of a cell that this region covers, or one that is painted later.
-            let covered = |cell: usize, part: Part| match self.samples.get(self.places[cell] as usize) {
+            let samples_of = |cell: usize| {
+                let first = self.places[cell] as usize * self.per_cell;
+                self.samples.get(first..first + self.per_cell)
+            };
+            let covered = |cell: usize, part: Part| match samples_of(cell) {
                 Some(samples) => {
                     let least = if part == Part::Shade { step } else { i32::MIN };
                     let is_covered = |at: &&Sample| at.item != NOTHING && (at.item, at.step) >= (item, least);
@@ -230,6 +235,7 @@ mod tests {
             labels,
             places,
             samples: Vec::new(),
+            per_cell: 1,
             items,
             strengths,
             least: vec![0.0; 10],
