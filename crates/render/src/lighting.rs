@@ -7,7 +7,7 @@ use super::casters::Casters;
 use super::lens::Lens;
 use super::light::{GLOSS, SHARPNESS, Spot, TRANSMITTED};
 use super::shadow::Maps;
-use super::{Fit, Page, floor};
+use super::{Fit, Page, floor, light};
 use dlsys_geometry::scene::{Color, MaterialId, Point, Scene, Vector};
 
 /// Strengths of light on what is fully exposed to it: the sky's beside a sun and alone, the sun's, and what the ground throws back.
@@ -113,6 +113,25 @@ impl<'a> Lighting<'a> {
         // As the drawing gains depth.
         let relief = self.fit.light.relief();
         1.0 + relief * (strength - 1.0)
+    }
+
+    /// Whether the light is a declared one, which casts shadows.
+    pub(super) fn is_declared(&self) -> bool {
+        self.declared.is_some()
+    }
+
+    /// Strengths of light across a stem of this radius at a place on its axis, as [`Light::across`](super::Light::across).
+    pub(super) fn across<const N: usize>(
+        &self,
+        along: Vector,
+        (seen, radius): (Point, f64),
+        places: [f64; N],
+    ) -> [f64; N] {
+        match self.declared {
+            None => self.fit.light.across(along, seen.z, places),
+            Some(_) => light::normals_across(along, places)
+                .map(|normal| self.strength(&Spot { normal, seen: seen + normal * radius, is_thin: false })),
+        }
     }
 
     /// A colour in light of this strength.

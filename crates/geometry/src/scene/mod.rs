@@ -241,6 +241,14 @@ impl Scene {
         Cow::Owned(placed.chain(patches).collect())
     }
 
+    /// The scene with meshes in place of everything curved, as detailed as a picture needs: see [`drafted`](Scene::drafted).
+    pub fn drafted_scene(&self, accuracy: impl Fn(Point) -> f64) -> Cow<'_, Scene> {
+        match self.drafted(accuracy) {
+            Cow::Borrowed(_) => Cow::Borrowed(self),
+            Cow::Owned(surfaces) => Cow::Owned(Scene { surfaces, patches: Vec::new(), ..self.clone() }),
+        }
+    }
+
     /// Visits points whose hull contains all elements, each with the width of the line there; corners of surfaces
     /// and polygons have the width 0.
     pub fn each_point(&self, mut visit: impl FnMut(Point, Width)) {

@@ -173,7 +173,6 @@ fn range(at: [i64; 3], end: usize) -> Option<[usize; 2]> {
 
 /// A triangle, made ready.
 struct Triangle<const N: usize> {
-    number: usize,
     /// First and last column and row of pixels that it may touch.
     columns: [usize; 2],
     rows: [usize; 2],
@@ -183,24 +182,14 @@ struct Triangle<const N: usize> {
     bias: [i64; 3],
     /// Value of each side's function at the samples, beside that at the upper left corner of the pixel.
     at_samples: [[i64; N]; 3],
-    /// Twice the area.
-    area: f64,
     /// Depth at the upper left corner of the picture, its growth for a pixel to the right and down, and its bounds.
     depth: [f64; 3],
     depths: [f64; 2],
-    /// The corners were given in the other sense of rotation.
-    turned: bool,
 }
 
 impl<const N: usize> Triangle<N> {
     /// `None` if no sample can be in it.
-    fn new(
-        pattern: &Pattern<N>,
-        number: usize,
-        corners: [Corner; 3],
-        width: usize,
-        height: usize,
-    ) -> Option<Triangle<N>> {
+    fn new(pattern: &Pattern<N>, corners: [Corner; 3], width: usize, height: usize) -> Option<Triangle<N>> {
         let mut at = corners.map(|corner| [snap(corner.x), snap(corner.y)]);
         let mut depths = corners.map(|corner| corner.depth);
         let [[ax, ay], [bx, by], [cx, cy]] = at;
@@ -208,8 +197,7 @@ impl<const N: usize> Triangle<N> {
         if area == 0 {
             return None;
         }
-        let turned = area < 0;
-        if turned {
+        if area < 0 {
             at.swap(1, 2);
             depths.swap(1, 2);
         }
@@ -237,25 +225,14 @@ impl<const N: usize> Triangle<N> {
             .iter()
             .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &z| [low.min(z), high.max(z)]);
         Some(Triangle {
-            number,
             columns,
             rows,
             sides,
             bias,
             at_samples,
-            area,
             depth: [depths[0] - right * x - down * y, right, down],
             depths: [least, greatest],
-            turned,
         })
-    }
-
-    /// Weights of the corners, in their given order, at a place in steps, or near it if that is outside.
-    fn weights(&self, x: i64, y: i64) -> [f64; 3] {
-        let raw = self.sides.map(|[a, b, c]| ((a * x + b * y + c) as f64 / self.area).max(0.0));
-        let sum: f64 = raw.iter().sum();
-        let [a, b, c] = raw.map(|w| w / sum);
-        if self.turned { [a, c, b] } else { [a, b, c] }
     }
 }
 
@@ -393,8 +370,9 @@ mod tests {
                 })
                 .collect();
             let image = drawn(size, &triangles);
-            let places = size[0] * size[1];
-            let found = cells::nearest(&SIXTEEN, size, triangles.len(), |n| triangles[n].0, places, |at| at);
+            let (places, corners) = (size[0] * size[1], |n: usize| triangles[n].0);
+            let all = (triangles.len(), corners);
+            let found = cells::nearest(&SIXTEEN, size, all, (places, |at| at), |_| true);
             let mut differing = 0;
             for (pixel, numbers) in image.pixels.iter().zip(&found.numbers) {
                 let mean = |channel: &dyn Fn([u8; 3]) -> u8| {
