@@ -3,6 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use super::album::{Album, Keeping, Kept};
 use super::common::{Clock, Failure, ModelRun};
 use super::events::EventLog;
 use super::parallel;
@@ -19,14 +20,14 @@ pub struct Frame {
     pub time: f64,
     /// Productions since the frame before.
     events: Vec<Event>,
+    modules: usize,
     string: Result<ModuleString, Failure>,
 }
 
 impl Frame {
     /// Number of modules, brackets not counted.
     pub fn modules(&self) -> usize {
-        let string = self.string.as_ref().ok();
-        string.map_or(0, |string| string.iter().filter(|m| !m.kind.is_bracket()).count())
+        self.modules
     }
 
     /// Productions since the frame before, if the settings include the log.
@@ -35,18 +36,43 @@ impl Frame {
     }
 }
 
-/// A simulation and the times at which it is observed.
+/// Where the frames of a pass come from.
+enum Origin<'r> {
+    Simulation(Box<Simulation<'r>>),
+    /// All scenes are kept from a pass before, which had these statistics.
+    Album(&'r Album, Stats),
+}
+
+/// Frames at the times at which a model is observed.
 struct FrameSource<'r> {
     run: &'r ModelRun,
-    simulation: Simulation<'r>,
+    origin: Origin<'r>,
     next: usize,
     failed: bool,
 }
 
 impl<'r> FrameSource<'r> {
-    fn start(run: &'r ModelRun, settings: Settings) -> Result<FrameSource<'r>, Failure> {
-        let simulation = run.session.simulate(settings).map_err(|error| run.fault(&error))?;
-        Ok(FrameSource { run, simulation, next: 0, failed: false })
+    fn start(
+        run: &'r ModelRun,
+        settings: Settings,
+        album: Option<&'r Album>,
+    ) -> Result<FrameSource<'r>, Failure> {
+        let kept = album.and_then(|album| Some((album, album.stats_of_all(run.times.len())?)));
+        let origin = match kept {
+            Some((album, stats)) => Origin::Album(album, stats),
+            None => {
+                let simulation = run.session.simulate(settings).map_err(|error| run.fault(&error))?;
+                Origin::Simulation(Box::new(simulation))
+            }
+        };
+        Ok(FrameSource { run, origin, next: 0, failed: false })
+    }
+
+    fn stats(&self) -> Stats {
+        match &self.origin {
+            Origin::Simulation(simulation) => simulation.stats(),
+            Origin::Album(_, stats) => *stats,
+        }
     }
 
     /// The frame at the next time; `None` after the last, or after an error.
@@ -57,19 +83,29 @@ impl<'r> FrameSource<'r> {
         if interrupt::asked() {
             self.failed = true;
             let string = Err(Failure::Model(format!("stopped before t = {time}\n")));
-            return Some(Frame { index, time, events: Vec::new(), string });
+            return Some(Frame { index, time, events: Vec::new(), modules: 0, string });
         }
         let mut string = ModuleString::default();
-        let wound = self.simulation.at(time, &mut string).map_err(|error| self.run.fault(&error));
+        let simulation = match &mut self.origin {
+            Origin::Simulation(simulation) => simulation,
+            Origin::Album(album, _) => {
+                let modules = album.modules(index).unwrap_or(0);
+                return Some(Frame { index, time, events: Vec::new(), modules, string: Ok(string) });
+            }
+        };
+        let wound = simulation.at(time, &mut string).map_err(|error| self.run.fault(&error));
         self.failed = wound.is_err();
-        Some(Frame { index, time, events: self.simulation.take_events(), string: wound.map(|()| string) })
+        let modules = string.iter().filter(|m| !m.kind.is_bracket()).count();
+        let events = simulation.take_events();
+        Some(Frame { index, time, events, modules, string: wound.map(|()| string) })
     }
 }
 
 /// Settings of one pass through the animation.
 #[derive(Clone, Copy)]
-pub struct Pass {
+pub struct Pass<'a> {
     pub settings: Settings,
+    pub keeping: Keeping<'a>,
     /// See [`Scene::accuracy`].
     pub accuracy: f64,
 }
@@ -81,14 +117,14 @@ pub struct Pass {
 /// The first error in the order of time, of the run, of drawing, or of `take`.
 pub fn play<Done: Send>(
     run: &ModelRun,
-    pass: Pass,
+    pass: Pass<'_>,
     threads: usize,
     clock: &mut Clock,
     mut log: Option<&mut EventLog>,
     work: impl Fn(&Frame, &Scene) -> Done + Sync,
     mut take: impl FnMut(Done) -> Result<(), Failure>,
 ) -> Result<Stats, Failure> {
-    let mut source = FrameSource::start(run, pass.settings)?;
+    let mut source = FrameSource::start(run, pass.settings, pass.keeping.used())?;
     let nursery = run.nursery();
     let mut blank = nursery.blank();
     blank.accuracy = pass.accuracy;
@@ -104,26 +140,42 @@ pub fn play<Done: Send>(
     };
     let draw = |mut frame: Frame| -> (Vec<Event>, Vec<Diagnostic>, Result<Done, Failure>, Duration) {
         let before = Instant::now();
-        let pooled = pool().pop();
+        let kept = pass.keeping.used().and_then(|album| album.take(frame.index));
+        let is_kept = kept.is_some();
+        let pooled = kept.or_else(|| pool().pop());
         let mut scene = pooled.unwrap_or_else(|| blank.clone());
-        let done = draw_frame(run, &nursery, &mut frame, &mut scene).map(|()| work(&frame, &scene));
+        scene.accuracy = pass.accuracy;
+        let drawn = if is_kept { Ok(()) } else { draw_frame(run, &nursery, &mut frame, &mut scene) };
+        let is_whole = drawn.is_ok();
+        let done = drawn.map(|()| work(&frame, &scene));
         let warnings = std::mem::take(&mut scene.warnings);
-        pool().push(scene);
+        let unkept = match pass.keeping.filled().filter(|_| is_whole) {
+            Some(album) => album.keep(frame.index, run.times.len(), Kept { scene, modules: frame.modules }),
+            None => Some(scene).filter(|_| !is_kept),
+        };
+        pool().extend(unkept);
         (frame.events, warnings, done, before.elapsed())
     };
-    let taken = parallel::in_order(threads, make, draw, |(events, warnings, done, spent)| {
-        if let Some(log) = &mut log {
-            log.write(&events)?;
-        }
-        run.note(warnings);
-        let before = Instant::now();
-        take(done?)?;
-        output += spent + before.elapsed();
-        Ok(())
-    });
+    let taken: Result<(), Failure> =
+        parallel::in_order(threads, make, draw, |(events, warnings, done, spent)| {
+            if let Some(log) = &mut log {
+                log.write(&events)?;
+            }
+            run.note(warnings);
+            let before = Instant::now();
+            take(done?)?;
+            output += spent + before.elapsed();
+            Ok(())
+        });
     (clock.simulate, clock.output) = (simulate, output);
-    run.note(source.simulation.remarks());
-    taken.map(|()| source.simulation.stats())
+    if let Origin::Simulation(simulation) = &source.origin {
+        run.note(simulation.remarks());
+    }
+    taken?;
+    if let Some(album) = pass.keeping.filled() {
+        album.finish(source.stats());
+    }
+    Ok(source.stats())
 }
 
 /// Draws a frame.

@@ -3,6 +3,7 @@
 //!
 //! Exit status: 0 success; 1 an error in the model or the run; 2 an error in the command line; 101 a bug in dlsys.
 
+mod album;
 pub(crate) mod args;
 pub(crate) mod common;
 mod continuity;

@@ -3,6 +3,7 @@
 use std::io::Write;
 use std::path::Path;
 
+use super::album::Keeping;
 use super::args::ViewArgs;
 use super::common::{Failure, ModelRun, count_of, out_error};
 use super::frame_source::{Frame, Pass, play};
@@ -116,7 +117,8 @@ fn record(run: &ModelRun, accuracy: Option<f64>) -> Result<Recording, Failure> {
     let mut clock = run.clock;
     let nothing = Survey::new(View::FRONT);
     let mut survey = nothing.clone();
-    let pass = Pass { settings: Settings { log: false, ..run.settings }, accuracy: 0.0 };
+    let pass =
+        Pass { settings: Settings { log: false, ..run.settings }, keeping: Keeping::Nothing, accuracy: 0.0 };
     let mut progress = Progress::new("measuring", run.times.len());
     let of_frame = |_: &Frame, scene: &Scene| {
         let mut survey = nothing.clone();
@@ -140,7 +142,11 @@ fn record(run: &ModelRun, accuracy: Option<f64>) -> Result<Recording, Failure> {
         Path::new(&source.name).file_name().map_or(source.name.clone(), |n| n.to_string_lossy().into());
     let mut recorder = Recorder::new(model, &run.nursery().blank(), &name, &fit);
     recorder.surround(&survey.first_surroundings());
-    let pass = Pass { settings: Settings { log: true, ..run.settings }, accuracy: fit.accuracy };
+    let pass = Pass {
+        settings: Settings { log: true, ..run.settings },
+        keeping: Keeping::Nothing,
+        accuracy: fit.accuracy,
+    };
     let mut progress = Progress::new("recording", run.times.len());
     let staged = |frame: &Frame, scene: &Scene| {
         let mut stage = Stage::default();

@@ -266,6 +266,9 @@ fn flags_that_do_not_go_together_say_so() {
         (&["--size", "10x10", "--width", "10"], "cannot be used with"),
         (&["--background", "white"], "a colour like #ffffff"),
         (&["--threads", "0"], "between 1 and 256"),
+        (&["--line-width", "0px"], "must be greater than 0"),
+        (&["--line-width", "thin"], "expected pixels of the page, such as 1px"),
+        (&["--line-width", "1px", "--format", "obj"], "--line-width is for pictures"),
     ] {
         let folder = tempfile::tempdir().expect("a folder");
         let out = folder.path().join("out");
@@ -275,4 +278,36 @@ fn flags_that_do_not_go_together_say_so() {
         assert!(status == 2 && message.contains(says), "{flags:?}: {status}, {message}");
         assert!(!out.exists(), "{flags:?}: nothing is written");
     }
+}
+
+/// The values of an attribute in an SVG.
+fn values(svg: &str, attribute: &str) -> Vec<f64> {
+    let begin = format!(" {attribute}=\"");
+    let parts = svg.split(&begin).skip(1).filter_map(|rest| rest.split('"').next());
+    parts.map(|value| value.split(' ').nth(2).unwrap_or(value).parse().expect("a number")).collect()
+}
+
+#[test]
+fn lines_have_the_width_that_was_asked_for_in_pixels_and_in_units() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let drawn = |name: &str, flags: &[&str]| {
+        let out = folder.path().join(name);
+        let path = out.to_str().expect("UTF-8");
+        let model = "models/abop/plant.dls";
+        good(&[&["render", model, "--at", "3", "--quiet", "-o", path], flags].concat());
+        std::fs::read_to_string(out.join("frame-0000.svg")).expect("a picture")
+    };
+    for (pixels, width) in [(1.0, "300"), (4.0, "300"), (4.0, "1200")] {
+        let svg = drawn("pixels", &["--line-width", &format!("{pixels}px"), "--width", width]);
+        // The third number of `viewBox` is the width of the page.
+        let page = values(&svg, "viewBox")[0];
+        let drawn = values(&svg, "stroke-width");
+        let pixel = page / width.parse::<f64>().expect("a number");
+        assert!(drawn.len() > 20, "{}", drawn.len());
+        let far = drawn.iter().map(|x| (x / pixel - pixels).abs()).fold(0.0, f64::max);
+        assert!(far < 0.01 * pixels + 0.001 / pixel, "{pixels} at {width}: {far}");
+    }
+    let [narrow, wide] =
+        ["0.02", "0.08"].map(|units| values(&drawn("units", &["--line-width", units]), "stroke-width")[0]);
+    assert!((wide / narrow - 4.0).abs() < 0.1, "{narrow} {wide}");
 }

@@ -65,11 +65,9 @@ impl<'s> Draft<'s> {
         default_width: f64,
         detail: &Detail<S>,
     ) -> Draft<'s> {
-        let accuracy = |at: Point| {
+        let wanted = |at: Point| {
             let scale = (detail.scale_at)(at).max(f64::MIN_POSITIVE);
-            let wanted = (SLACK / scale).max(detail.accuracy * detail.scale / scale);
-            // Few values, so that patches that meet have the same pieces.
-            2_f64.powf((2.0 * wanted.log2()).floor() / 2.0)
+            accuracy(scale, detail.accuracy * detail.scale)
         };
         let is_few = detail.is_flat && scene.segments.len() <= MOST_FLAT;
         let is_thin: Vec<bool> = (scene.segments.iter())
@@ -96,7 +94,7 @@ impl<'s> Draft<'s> {
             steady: false,
         };
         let tubes = Tubes::of(scene, style, sides, |i| !is_thin[i]);
-        let solid = Solid::of(scene, tubes, scene.drafted(accuracy));
+        let solid = Solid::of(scene, tubes, scene.drafted(wanted));
         let mesh = Triangles::of(&solid, |_| true);
         let thin: Vec<u32> = (0..scene.segments.len() as u32).filter(|i| is_thin[*i as usize]).collect();
         let mut next = vec![NONE; if thin.is_empty() { 0 } else { scene.segments.len() }];
@@ -176,6 +174,13 @@ impl<'s> Draft<'s> {
             Some(Ribbon { corners, side, facing, material: segment.material })
         })
     }
+}
+
+/// The greatest distance of triangles from curved surfaces where a scene unit has so many pixels, given the least one in pixels. It is
+/// one of few values, so that patches that meet have the same pieces.
+pub(super) fn accuracy(scale: f64, least: f64) -> f64 {
+    let accuracy = SLACK.max(least) / scale;
+    2_f64.powf((2.0 * accuracy.log2()).floor() / 2.0)
 }
 
 /// Sides of tubes in a drawing without depth, of which the widest has this radius in pixels: a multiple of four, so that both edges have

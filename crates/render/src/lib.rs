@@ -49,6 +49,7 @@
 #![warn(missing_docs)]
 
 mod camera;
+mod casters;
 mod crowd;
 mod draft;
 mod error;
@@ -106,6 +107,9 @@ use dlsys_geometry::scene::Scene;
 /// Name and version of the program, for the header of files.
 pub const GENERATOR: &str = concat!("dlsys ", env!("CARGO_PKG_VERSION"));
 
+/// How much larger or smaller than in the plane of focus surfaces are drawn with more or less detail.
+const MOST_MAGNIFIED: f64 = 100.0;
+
 /// The second pass: one frame after another, each as the bytes of its file.
 #[derive(Clone, Debug)]
 pub struct FrameWriter {
@@ -150,6 +154,17 @@ impl FrameWriter {
         };
         let scene = match self.format.content() {
             Content::Pixels => self.fit.drawn(Cow::Borrowed(scene)),
+            // Nor do regions of them.
+            Content::Vectors if self.fit.has_visible_regions() => {
+                let (fit, page) = self.fit.for_frame(&flattened, &self.page);
+                let [pixels, ..] = page.placement();
+                let scale = |at| {
+                    let nearer = fit.camera.magnification(fit.camera.project(at).z);
+                    pixels * nearer.clamp(1.0 / MOST_MAGNIFIED, MOST_MAGNIFIED)
+                };
+                let accuracy = |at| draft::accuracy(scale(at), fit.accuracy * pixels);
+                self.fit.drawn(flattened.drafted_scene(accuracy))
+            }
             Content::Vectors | Content::Mesh => self.fit.drawn(flattened.tessellated(self.fit.accuracy)),
         };
         self.format.exporter().write(Drawing { scene: &scene, writer: self, title }, out)

@@ -99,12 +99,17 @@ impl Light {
     /// Strength of light across a stem that runs in this direction (to the right, up, towards the viewer; any length)
     /// from its left edge, looking along it, to its right edge, at places from -1 to 1.
     pub(super) fn across<const N: usize>(&self, along: Vector, depth: f64, places: [f64; N]) -> [f64; N] {
-        let left = Vector::new(-along.y, along.x, 0.0).try_normalize(1e-9).unwrap_or_else(Vector::y);
-        // Towards the viewer, across the stem and its left.
-        let facing = along.cross(&left).try_normalize(0.0).unwrap_or_else(Vector::z);
-        let facing = if facing.z < 0.0 { -facing } else { facing };
-        places.map(|s| self.strength(left * -s + facing * (1.0 - s * s).max(0.0).sqrt(), depth))
+        normals_across(along, places).map(|normal| self.strength(normal, depth))
     }
+}
+
+/// Unit normals of the visible side of a stem that runs in this direction, at places from -1, its left edge, to 1.
+pub(super) fn normals_across<const N: usize>(along: Vector, places: [f64; N]) -> [Vector; N] {
+    let left = Vector::new(-along.y, along.x, 0.0).try_normalize(1e-9).unwrap_or_else(Vector::y);
+    // Towards the viewer, across the stem and its left.
+    let facing = along.cross(&left).try_normalize(0.0).unwrap_or_else(Vector::z);
+    let facing = if facing.z < 0.0 { -facing } else { facing };
+    places.map(|s| left * -s + facing * (1.0 - s * s).max(0.0).sqrt())
 }
 
 #[cfg(test)]

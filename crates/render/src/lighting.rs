@@ -3,11 +3,11 @@
 //! Light has one strength at each place, from which its colour follows: what is dark is in the light of the sky, what is bright in that of the
 //! sun. So pictures of pixels and of regions have the same shading.
 
+use super::casters::Casters;
 use super::lens::Lens;
 use super::light::{GLOSS, SHARPNESS, Spot, TRANSMITTED};
-use super::shadow::{Casters, Maps};
-use super::stage::Stage;
-use super::{Fit, Page, floor};
+use super::shadow::Maps;
+use super::{Fit, Page, floor, light};
 use dlsys_geometry::scene::{Color, MaterialId, Point, Scene, Vector};
 
 /// Strengths of light on what is fully exposed to it: the sky's beside a sun and alone, the sun's, and what the ground throws back.
@@ -74,9 +74,9 @@ impl<'a> Lighting<'a> {
         let maps = (declared.is_some() || floor.is_some()).then(|| {
             let extent = if fit.extent > 0.0 { fit.extent } else { 1.0 };
             // Details beyond the maps' cells cast no shadows of their own.
-            let stage = Stage::of_all(scene, fit, scale.min(1500.0 / extent));
-            let casters = Casters::of(&stage, ground);
-            let maps = (!casters.is_empty()).then(|| Maps::new(&casters, sun, scale, threads))?;
+            let seen = |p| fit.camera.ahead(p).map_or(0.0, |p| scale * fit.camera.magnification(p.z));
+            let casters = Casters::new(scene, fit, scale.min(1500.0 / extent), seen, ground);
+            let maps = (casters.count() > 0).then(|| Maps::new(&casters, sun, scale, threads))?;
             open_sky = floor.map(|height| OpenSky::new(&maps, casters.around(), height));
             Some(maps)
         });
@@ -113,6 +113,25 @@ impl<'a> Lighting<'a> {
         // As the drawing gains depth.
         let relief = self.fit.light.relief();
         1.0 + relief * (strength - 1.0)
+    }
+
+    /// Whether the light is a declared one, which casts shadows.
+    pub(super) fn is_declared(&self) -> bool {
+        self.declared.is_some()
+    }
+
+    /// Strengths of light across a stem of this radius at a place on its axis, as [`Light::across`](super::Light::across).
+    pub(super) fn across<const N: usize>(
+        &self,
+        along: Vector,
+        (seen, radius): (Point, f64),
+        places: [f64; N],
+    ) -> [f64; N] {
+        match self.declared {
+            None => self.fit.light.across(along, seen.z, places),
+            Some(_) => light::normals_across(along, places)
+                .map(|normal| self.strength(&Spot { normal, seen: seen + normal * radius, is_thin: false })),
+        }
     }
 
     /// A colour in light of this strength.

@@ -8,12 +8,10 @@
 //! price of no self-shadowing on slopes). The cell of the sun's map is a pixel of the picture, or a [`FINEST`]th of the scene where that is more; that
 //! of the sky's maps is a [`COARSE`]th of the scene, so crevices narrower than a fiftieth of the scene are not darkened.
 
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
-use super::stage::Stage;
-use super::triangles::Triangle;
-use dlsys_geometry::scene::{MaterialId, Point, Vector};
+use super::casters::{Batch, Casters};
+use dlsys_geometry::scene::Vector;
 
 /// Places of the sky from which light comes; fewer where there are more triangles than [`MANY`].
 const PLACES: usize = 128;
@@ -26,65 +24,6 @@ const COARSE: f64 = 128.0;
 /// Bias of depths, in cells: on a surface that faces the light, and at most.
 const BIAS: f32 = 1.0;
 const SLOPE: f32 = 8.0;
-
-/// Triangles and thin stems that cast shadows, relative to the middle of the box around them.
-#[derive(Default)]
-pub(super) struct Casters {
-    middle: Vector,
-    /// Half of the sides of the box.
-    half: Vector,
-    triangles: Vec<[[f32; 3]; 3]>,
-    lines: Vec<([[f32; 3]; 2], [f32; 2])>,
-}
-
-impl Casters {
-    /// All that a stage has, but for what is of this material of its scene.
-    pub(super) fn of(stage: &Stage, without: Option<MaterialId>) -> Casters {
-        let mut all = Casters::default();
-        let (mut low, mut high) = (Vector::repeat(f64::INFINITY), Vector::repeat(f64::NEG_INFINITY));
-        let mut placed: Vec<Point> = Vec::new();
-        for (pass, part) in
-            [0, 1].into_iter().flat_map(|pass| stage.parts.iter().map(move |part| (pass, part)))
-        {
-            let (draft, place) = (&stage.drafts[part.draft], part.place.as_ref());
-            placed.clear();
-            placed.extend(draft.mesh.vertices.iter().map(|&p| place.map_or(p, |place| place.point(p))));
-            let is_caster = |face: &&Triangle| place.is_some() || Some(face.material) != without;
-            let faces = draft.mesh.faces.iter().filter(is_caster);
-            if pass == 0 {
-                let ends = draft.lines(place).flat_map(|(ends, _)| ends);
-                let corners = faces.flat_map(|face| face.corners).map(|(v, _)| placed[v as usize]);
-                for p in corners.chain(ends) {
-                    (low, high) = (low.inf(&p.coords), high.sup(&p.coords));
-                }
-                continue;
-            }
-            if all.half == Vector::zeros() && low.x <= high.x {
-                (all.middle, all.half) = ((low + high) / 2.0, (high - low) / 2.0);
-            }
-            let middle = all.middle;
-            let relative = |p: Point| {
-                let p = p.coords - middle;
-                [p.x as f32, p.y as f32, p.z as f32]
-            };
-            all.triangles.extend(faces.map(|face| face.corners.map(|(v, _)| relative(placed[v as usize]))));
-            all.lines.extend(
-                draft.lines(place).map(|(ends, radii)| (ends.map(relative), radii.map(|r| r as f32))),
-            );
-        }
-        all
-    }
-
-    /// The middle of the box around everything, and half of its sides.
-    pub(super) fn around(&self) -> [Vector; 2] {
-        [self.middle, self.half]
-    }
-
-    /// True if nothing casts a shadow.
-    pub(super) fn is_empty(&self) -> bool {
-        self.triangles.is_empty() && self.lines.is_empty()
-    }
-}
 
 /// Depths towards a light.
 struct Map {
@@ -100,40 +39,37 @@ struct Map {
 }
 
 impl Map {
-    /// Of light from a direction, with so many cells for a scene unit, as far as `most` cells on a side allow.
-    fn new(casters: &Casters, towards: Vector, scale: f64, most: f64) -> Map {
+    /// Of light from a direction, with so many cells for a scene unit, as far as `most` cells on a side allow; nothing is in it.
+    fn new([middle, half]: [Vector; 2], towards: Vector, scale: f64, most: f64) -> Map {
         let towards = towards.normalize();
         let aside = if towards.y.abs() < 0.9 { Vector::y() } else { Vector::z() };
         let right = aside.cross(&towards).normalize();
         let axes = [right, towards.cross(&right), towards];
-        let reach = [0, 1].map(|k: usize| axes[k].abs().dot(&casters.half));
+        let reach = [0, 1].map(|k: usize| axes[k].abs().dot(&half));
         let larger = (2.0 * reach[0].max(reach[1])).max(f64::MIN_POSITIVE);
         let scale = (larger * scale).clamp(LEAST.min(most), most) / larger;
         // Two cells all round.
         let size = reach.map(|reach| (2.0 * reach * scale).ceil() as usize + 4);
         let low = reach.map(|reach| -reach - 2.0 / scale);
-        let mut map = Map {
-            axes,
-            middle: casters.middle,
-            low,
-            scale,
-            size,
-            depths: vec![f32::NEG_INFINITY; size[0] * size[1]],
-        };
+        Map { axes, middle, low, scale, size, depths: vec![f32::NEG_INFINITY; size[0] * size[1]] }
+    }
+
+    /// Adds triangles and thin stems.
+    fn add(&mut self, batch: &Batch) {
+        let Map { axes, low, scale, .. } = *self;
         let scaled = axes.map(|axis| [axis.x, axis.y, axis.z].map(|x| (x * scale) as f32));
         let from = [(low[0] * scale) as f32, (low[1] * scale) as f32, 0.0];
         let place = |p: &[f32; 3]| {
             [0, 1, 2].map(|k| scaled[k][0] * p[0] + scaled[k][1] * p[1] + scaled[k][2] * p[2] - from[k])
         };
-        for [p, q, r] in &casters.triangles {
-            map.fill([place(p), place(q), place(r)]);
+        for [p, q, r] in &batch.triangles {
+            self.fill([place(p), place(q), place(r)]);
         }
-        for ([a, b], radii) in &casters.lines {
+        for ([a, b], radii) in &batch.lines {
             let [a, b] = [place(a), place(b)];
             let radii = radii.map(|radius| (radius * scale as f32).max(0.5));
-            map.line([a, b], radii);
+            self.line([a, b], radii);
         }
-        map
     }
 
     /// Cells to the right and up, and depth, of a point relative to the middle.
@@ -250,34 +186,26 @@ pub(super) struct Maps {
 impl Maps {
     /// Maps of the sun, if there is one in this direction, with so many cells for a scene unit, and of the sky.
     pub(super) fn new(casters: &Casters, sun: Option<Vector>, scale: f64, threads: usize) -> Maps {
-        let count = if casters.triangles.len() + casters.lines.len() > MANY { FEW_PLACES } else { PLACES };
-        let make = |i: usize| match (i.checked_sub(count), sun) {
-            (None, _) => Some(Map::new(casters, place_of_sky(i, count), 0.0, COARSE)),
-            (Some(_), Some(sun)) => Some(Map::new(casters, sun, scale, FINEST)),
-            (Some(_), None) => None,
-        };
-        let next = AtomicUsize::new(0);
-        let made = Mutex::new(Vec::new());
-        let work = || {
-            loop {
-                // The sun's map is the largest, and first.
-                let i = count.wrapping_sub(next.fetch_add(1, Ordering::Relaxed));
-                if i > count {
-                    return;
+        let (around, places) = (casters.around(), if casters.count() > MANY { FEW_PLACES } else { PLACES });
+        let sky = (0..places).map(|i| Map::new(around, place_of_sky(i, places), 0.0, COARSE));
+        // The sun's map is the largest, and first.
+        let mut maps: Vec<Map> =
+            sun.map(|sun| Map::new(around, sun, scale, FINEST)).into_iter().chain(sky).collect();
+        casters.each_batch(|batch| {
+            let next = Mutex::new(maps.iter_mut());
+            let work = || {
+                let take = || next.lock().unwrap_or_else(PoisonError::into_inner).next();
+                while let Some(map) = take() {
+                    map.add(batch);
                 }
-                let map = make(i);
-                made.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((i, map));
-            }
-        };
-        std::thread::scope(|scope| {
-            (1..threads).for_each(|_| drop(scope.spawn(work)));
-            work();
+            };
+            std::thread::scope(|scope| {
+                (1..threads).for_each(|_| drop(scope.spawn(work)));
+                work();
+            });
         });
-        let mut made = made.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
-        made.sort_by_key(|(i, _)| *i);
-        let mut maps: Vec<Option<Map>> = made.into_iter().map(|(_, map)| map).collect();
-        let sun = maps.pop().flatten();
-        Maps { sun, sky: maps.into_iter().flatten().collect() }
+        let sky = maps.split_off(usize::from(sun.is_some()));
+        Maps { sun: maps.pop(), sky }
     }
 
     /// The part of the sun's light that comes to a point on a surface whose lit side has this normal.

@@ -14,6 +14,11 @@ use dlsys_geometry::scene::{Color, Vector};
 const MOST: usize = 4_000_000;
 /// How far the edges of a ribbon are turned away, as those of a stem: sine and cosine.
 const TURNED: (f32, f32) = (0.866, 0.5);
+/// The same of a hair, a ribbon of less than two pixels: the middle of a pixel is often beside it, and the light is then that on an edge.
+/// So the edges have about the mean of what is between.
+const TURNED_OF_HAIR: (f32, f32) = (0.5, 0.866);
+/// Ribbons of fewer pixels are hairs.
+const HAIR: f64 = 2.0;
 
 /// A triangle in pixels.
 struct Face {
@@ -105,7 +110,10 @@ impl Shot<'_> {
             let (vertex, normal) = (self.places.len() as u32, self.normals.len() as u32);
             self.places.extend(ribbon.corners.iter().flatten().map(|&p| lens.place(p)));
             let [side, facing] = [ribbon.side, ribbon.facing].map(|v| lens.normal(v));
-            let turned = |sign: f32| [0, 1, 2].map(|k| sign * TURNED.0 * side[k] + TURNED.1 * facing[k]);
+            let [p, q] = [vertex, vertex + 1].map(|corner| self.places[corner as usize]);
+            let across = f64::from(q.x - p.x).hypot(f64::from(q.y - p.y));
+            let (aside, ahead) = if across < HAIR * raster::STEPS as f64 { TURNED_OF_HAIR } else { TURNED };
+            let turned = |sign: f32| [0, 1, 2].map(|k| sign * aside * side[k] + ahead * facing[k]);
             self.normals.extend([turned(-1.0), turned(1.0)]);
             let look = (part.colors + ribbon.material.index() as u32) << 1;
             let count = self.faces.len();

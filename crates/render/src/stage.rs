@@ -56,13 +56,6 @@ impl<'s> Stage<'s> {
         stage
     }
 
-    /// For shadows: everything at one scale, in pixels for a scene unit.
-    pub(super) fn of_all(scene: &'s Scene, fit: &Fit, scale: f64) -> Stage<'s> {
-        let mut stage = Stage::of(scene, fit, false, scale, |_| scale);
-        stage.add_plants(scene, None, fit, scale, &|_, _| Some(scale));
-        stage
-    }
-
     /// Number of triangles.
     pub(super) fn len(&self) -> usize {
         self.parts.iter().map(|part| self.drafts[part.draft].len()).sum()

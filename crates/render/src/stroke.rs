@@ -7,12 +7,15 @@
 use std::collections::HashMap;
 use std::fmt::Write;
 
+use super::lighting::Lighting;
 use super::number;
 use super::painter::{DECIMALS, SHADES, Style, text};
 use dlsys_geometry::scene::{Color, Point, Scene, Segment};
 
 /// Stems thinner than this many pixels of the page have one colour.
 const HAIR: f64 = 0.8;
+/// Stems thinner than this many pixels of the page have half as many shades.
+const NARROW: f64 = 6.0;
 /// Stems thinner than this many pixels of the page are strokes, wherever they are visible, and never regions.
 const THIN: f64 = 2.5;
 /// Places across a stem at which its colour is given: its edges are at -1 and 1.
@@ -74,6 +77,8 @@ pub(super) struct Strokes<'a> {
     scene: &'a Scene,
     style: Style<'a>,
     prefix: &'a str,
+    /// The light, unless that is the default one.
+    lighting: Option<&'a Lighting<'a>>,
     /// Shapes of the ends of each segment.
     ends: Vec<[End; 2]>,
     /// Numbers of colours across, and of gradients.
@@ -101,11 +106,24 @@ impl<'a> Strokes<'a> {
             scene,
             style,
             prefix,
+            lighting: None,
             ends,
             profiles: HashMap::new(),
             gradients: HashMap::new(),
             definitions: String::new(),
         }
+    }
+
+    /// In this light.
+    pub(super) fn lit(self, lighting: &'a Lighting<'a>) -> Strokes<'a> {
+        Strokes { lighting: Some(lighting).filter(|lighting| lighting.is_declared()), ..self }
+    }
+
+    /// The paint of what is seen of a segment: a colour, or a gradient across it.
+    pub(super) fn fill(&mut self, segment: &Segment) -> String {
+        let ends = [segment.start, segment.end].map(|p| self.style.project(p));
+        let width = pixels_across(segment, self.style) / self.style.pixels * self.style.scale;
+        self.paint(segment, ends, width)
     }
 
     /// The gradients that were used.
@@ -169,8 +187,22 @@ impl<'a> Strokes<'a> {
         let color = self.scene.palette.get(segment.material).color;
         let depth = (a.z + b.z) / 2.0 / self.style.scale;
         let along = self.style.fit.camera.direction(segment.direction);
-        let strengths = light.across(along, depth, PLACES);
-        let lit = |strength: f64| color.lit((strength * SHADES).round() / SHADES);
+        let strengths = match self.lighting {
+            None => light.across(along, depth, PLACES),
+            Some(lighting) => {
+                let middle = nalgebra::center(&segment.start, &segment.end);
+                let radius = segment.widths.map(|width| width.resolve(self.style.fit.default_width));
+                let seen = self.style.fit.camera.project(middle);
+                lighting.across(along, (seen, (radius[0] + radius[1]) / 4.0), PLACES)
+            }
+        };
+        // Of narrow stems so few shades that many share their colours.
+        let is_narrow = width * self.style.pixels < NARROW * self.style.scale;
+        let shades = if is_narrow { SHADES / 2.0 } else { SHADES };
+        let lit = |strength: f64| {
+            let strength = (strength * shades).round() / shades;
+            self.lighting.map_or_else(|| color.lit(strength), |lighting| lighting.color(color, strength))
+        };
         let (dx, dy) = (b.x - a.x, b.y - a.y);
         let length = dx.hypot(dy);
         if light.is_flat() || width * self.style.pixels < HAIR * self.style.scale || length < 1e-3 * width {
@@ -182,7 +214,15 @@ impl<'a> Strokes<'a> {
         // itself: further away its rounded direction would lead past it.
         let middle = nalgebra::center(&a, &b);
         let aside = [dy / length * width / 2.0, -dx / length * width / 2.0];
-        let place = |side: f64| [middle.x + side * aside[0], middle.y + side * aside[1]].map(text);
+        // Within a hundredth of the width.
+        let decimals = (-(width / 100.0).log10()).ceil().clamp(0.0, DECIMALS as f64) as usize;
+        let place = |side: f64| {
+            [middle.x + side * aside[0], middle.y + side * aside[1]].map(|x| {
+                let mut out = String::new();
+                number::push(&mut out, x, decimals);
+                out
+            })
+        };
         let ([x1, y1], [x2, y2]) = (place(1.0), place(-1.0));
         let profile = self.profile(strengths.map(lit));
         let prefix = self.prefix;
@@ -209,8 +249,16 @@ impl<'a> Strokes<'a> {
         let (prefix, definitions) = (self.prefix, &mut self.definitions);
         *self.profiles.entry(colors).or_insert_with(|| {
             let _ = write!(definitions, "<linearGradient id=\"{prefix}s{next}\">");
-            for (place, color) in PLACES.iter().zip(colors) {
-                let offset = text((place + 1.0) / 2.0);
+            for (i, (place, color)) in PLACES.iter().zip(colors).enumerate() {
+                // Between two of its colour, and at the edge beside one, a stop changes nothing.
+                let is_same = |other: Option<&Color>| other.is_none_or(|other| *other == color);
+                if i > 0 && is_same(colors.get(i - 1)) && is_same(colors.get(i + 1)) {
+                    continue;
+                }
+                let mut offset = String::new();
+                number::push(&mut offset, (place + 1.0) / 2.0, 2);
+                let offset = offset.trim_start_matches('0');
+                let offset = if offset.is_empty() { "0" } else { offset };
                 let _ = write!(definitions, "<stop offset=\"{offset}\" stop-color=\"{color}\"/>");
             }
             definitions.push_str("</linearGradient>\n");

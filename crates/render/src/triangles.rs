@@ -216,13 +216,13 @@ impl<'s> Solid<'s> {
     }
 
     /// Makes the triangles of items that are given [by owner](Solid::by_owner), by material within an owner: `begin`
-    /// is told the owner and the material before those that have them, and whether they are of a stem. All of an owner must be given
-    /// at once.
+    /// is told the owner and the material before those that have them, and the number of their segment if they are of a stem. All of an
+    /// owner must be given at once.
     pub(super) fn faces<Out: Faces>(
         &self,
         items: &[u32],
         out: &mut Out,
-        mut begin: impl FnMut(&mut Out, OwnerId, MaterialId, bool),
+        mut begin: impl FnMut(&mut Out, OwnerId, MaterialId, Option<usize>),
     ) {
         let owner = |n: u32| self.owner_of(n as usize);
         let mut runs: Vec<Run> = Vec::new();
@@ -236,7 +236,11 @@ impl<'s> Solid<'s> {
                 runs.sort_by_key(|run| run.material);
             }
             for run in &runs {
-                begin(out, owner(group[0]), run.material, matches!(run.item, Item::Stem(_)));
+                let segment = match run.item {
+                    Item::Stem(piece) => Some(self.tubes.segment_number(piece)),
+                    Item::Polygon(_) | Item::Surface(_) => None,
+                };
+                begin(out, owner(group[0]), run.material, segment);
                 self.faces_of(run, out);
             }
         }
@@ -296,6 +300,8 @@ pub(super) struct Triangles {
     pub(super) vertices: Vec<Point>,
     pub(super) normals: Vec<Vector>,
     pub(super) faces: Vec<Triangle>,
+    /// By number of a surface: the segment that it is a part of.
+    pub(super) segments: Vec<Option<u32>>,
     /// Of the triangles that come next.
     owner: OwnerId,
     material: MaterialId,
@@ -328,6 +334,7 @@ impl Triangles {
             vertices: Vec::with_capacity(vertices),
             normals: Vec::with_capacity(normals),
             faces: Vec::with_capacity(2 * vertices),
+            segments: vec![None],
             owner: OwnerId::default(),
             material: MaterialId::STEM,
             surface: 0,
@@ -339,9 +346,10 @@ impl Triangles {
             Item::Stem(piece) => kept(solid.tubes.segment(piece)),
             _ => true,
         });
-        solid.faces(&items, &mut mesh, |mesh, owner, material, is_stem| {
-            (mesh.owner, mesh.material, mesh.is_thin) = (owner, material, !is_stem);
+        solid.faces(&items, &mut mesh, |mesh, owner, material, segment| {
+            (mesh.owner, mesh.material, mesh.is_thin) = (owner, material, segment.is_none());
             mesh.surface += 1;
+            mesh.segments.push(segment.map(|segment| segment as u32));
         });
         mesh
     }

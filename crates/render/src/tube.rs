@@ -196,7 +196,12 @@ impl<'s> Tubes<'s> {
 
     /// The segment that a piece is made of.
     pub(super) fn segment(&self, piece: usize) -> &Segment {
-        &self.segments[self.pieces[piece].part.segment]
+        &self.segments[self.segment_number(piece)]
+    }
+
+    /// The number of that segment.
+    pub(super) fn segment_number(&self, piece: usize) -> usize {
+        self.pieces[piece].part.segment
     }
 
     fn collar(&self, piece: &Piece) -> Option<&Collar> {

@@ -320,6 +320,7 @@ impl<'m> Nursery<'m> {
             outer.warnings.push(Diagnostic::warning(message).at(plant.span, "this plant"));
         }
         scene.warnings.clear();
+        outer.lacked_accuracy |= scene.lacked_accuracy;
         // The surroundings are those of the outermost scene.
         scene.surroundings = Default::default();
         set_widths(&mut scene);

@@ -15,6 +15,7 @@ use std::time::Instant;
 
 use serde_json::json;
 
+use super::album::{Album, Keeping};
 use super::args::RenderArgs;
 use super::common::{Clock, Failure, ModelRun, count_of, out_error, size_of};
 use super::events::EventLog;
@@ -53,8 +54,15 @@ fn specimens(args: &RenderArgs, mut run: ModelRun, seeds: Seeds) -> Result<(), F
     let mut parts = Vec::new();
     for seed in seeds.iter() {
         run.settings.seed = seed;
-        let mut render =
-            Render { args, run: &run, out: &args.out, threads, frames: Vec::new(), stale: &never };
+        let mut render = Render {
+            args,
+            run: &run,
+            out: &args.out,
+            threads,
+            frames: Vec::new(),
+            album: None,
+            stale: &never,
+        };
         survey = render.measure(survey, &mut Clock::default()).map_err(|why| why.of_seed(seed))?;
         parts.push(render.frames);
     }
@@ -64,7 +72,7 @@ fn specimens(args: &RenderArgs, mut run: ModelRun, seeds: Seeds) -> Result<(), F
     for (seed, frames) in seeds.iter().zip(parts) {
         run.settings.seed = seed;
         let out = args.out.join(format!("seed-{seed:0width$}"));
-        let render = Render { args, run: &run, out: &out, threads, frames, stale: &never };
+        let render = Render { args, run: &run, out: &out, threads, frames, album: None, stale: &never };
         bytes += render.write(fit.clone(), &mut Clock::default())?.1.bytes;
     }
     if args.quiet {
@@ -92,7 +100,8 @@ pub fn render_run(
     flags::agree(args)?;
     let mut clock = run.clock;
     let threads = flags::threads(args);
-    let mut render = Render { args, run: &run, out: &args.out, threads, frames: Vec::new(), stale };
+    let album = Some(Album::default());
+    let mut render = Render { args, run: &run, out: &args.out, threads, frames: Vec::new(), album, stale };
     let survey = render.measure(survey, &mut clock)?;
     let fit = flags::fit(args, &survey, |fit| picture(args, &run, &render.frames, fit))?;
     let (stats, written) = render.write(fit, &mut clock)?;
@@ -152,6 +161,8 @@ struct Render<'r> {
     threads: usize,
     /// The survey of every frame, if the layout needs it.
     frames: Vec<Survey>,
+    /// Scenes of the first pass, if the second one follows at once.
+    album: Option<Album>,
     /// Whether a file of the model has changed since it was read.
     stale: &'r (dyn Fn() -> bool + Sync),
 }
@@ -175,7 +186,8 @@ impl Render<'_> {
             survey.add(scene);
             survey
         };
-        let pass = Pass { settings: self.run.settings, accuracy: 0.0 };
+        let keeping = self.album.as_ref().map_or(Keeping::Nothing, Keeping::Fill);
+        let pass = Pass { settings: self.run.settings, keeping, accuracy: 0.0 };
         let measured = play(self.run, pass, self.threads, clock, events.as_mut(), of_frame, |frame| {
             survey.merge(&frame);
             if self.args.layout != Layout::Frames {
@@ -308,8 +320,9 @@ impl Render<'_> {
     }
 
     /// Settings of the second pass: without the log, and with the accuracy that follows from the extent.
-    fn writing(&self, fit: &Fit) -> Pass {
-        Pass { settings: Settings { log: false, ..self.run.settings }, accuracy: fit.accuracy }
+    fn writing(&self, fit: &Fit) -> Pass<'_> {
+        let keeping = self.album.as_ref().map_or(Keeping::Nothing, Keeping::Use);
+        Pass { settings: Settings { log: false, ..self.run.settings }, keeping, accuracy: fit.accuracy }
     }
 
     fn manifest(&self, fit: &Fit, page: &Page) -> Manifest {

@@ -124,6 +124,14 @@ impl Placement {
         self.origin + self.turned(Vector::new(x * p.x, y * p.y, z * p.z))
     }
 
+    /// The places of the corners of an upright box, given two opposite ones.
+    pub fn corners(&self, [low, high]: [Point; 2]) -> [Point; 8] {
+        [0, 1, 2, 3, 4, 5, 6, 7].map(|i| {
+            let side = |k: usize| if i >> k & 1 == 0 { low[k] } else { high[k] };
+            self.point(Point::new(side(0), side(1), side(2)))
+        })
+    }
+
     /// A unit normal of the mesh as a unit normal in the scene. Normals transform by the inverse of the scales.
     pub fn normal(&self, n: Vector) -> Vector {
         if self.is_uniform() {

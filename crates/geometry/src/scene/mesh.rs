@@ -1,5 +1,8 @@
 //! Triangle meshes in coordinates of their own.
 
+use std::collections::{BTreeMap, HashMap};
+use std::sync::{Arc, Mutex, OnceLock};
+
 use super::{MaterialId, Point, Vector};
 
 /// A triangle mesh with smooth normals. Its axes are the turtle's: heading, left, up.
@@ -11,6 +14,20 @@ pub struct Mesh {
     pub normals: Vec<Vector>,
     /// The triangles.
     pub faces: Vec<Face>,
+    /// The box around it, once that was needed.
+    bounds: OnceLock<Option<[Point; 2]>>,
+    /// Coarser ones that were made so far, by the exponent of their accuracy.
+    coarser: Coarser,
+}
+
+/// Meshes that stand for a finer one; a copy of that begins without them.
+#[derive(Debug, Default)]
+struct Coarser(Mutex<BTreeMap<i32, Arc<Mesh>>>);
+
+impl Clone for Coarser {
+    fn clone(&self) -> Coarser {
+        Coarser::default()
+    }
 }
 
 /// A triangle, counter-clockwise seen from the side to which its normals point.
@@ -27,7 +44,70 @@ pub struct Face {
 impl Mesh {
     /// A mesh without faces.
     pub fn new() -> Mesh {
-        Mesh { vertices: Vec::new(), normals: Vec::new(), faces: Vec::new() }
+        Mesh {
+            vertices: Vec::new(),
+            normals: Vec::new(),
+            faces: Vec::new(),
+            bounds: OnceLock::new(),
+            coarser: Coarser::default(),
+        }
+    }
+
+    /// Opposite corners of a box around all vertices, wider than them by more than rounding; `None` if there are none. It is computed once:
+    /// vertices must not change afterwards.
+    pub fn bounds(&self) -> Option<[Point; 2]> {
+        const MARGIN: f64 = 1e-9;
+        *self.bounds.get_or_init(|| {
+            let first = self.vertices.first()?;
+            let (low, high) =
+                self.vertices.iter().fold((*first, *first), |(low, high), p| (low.inf(p), high.sup(p)));
+            let margin = Vector::repeat(MARGIN * low.coords.amax().max(high.coords.amax()));
+            Some([low - margin, high + margin])
+        })
+    }
+
+    /// The mesh for a picture in which it may be small: of vertices nearer to one another than `accuracy`, in its own units, one is left, and triangles
+    /// with two corners in one are gone. `None` if that would be hardly fewer triangles. Meshes are kept: accuracies within a factor of two share one.
+    pub fn draft(&self, accuracy: f64) -> Option<Arc<Mesh>> {
+        /// Parts of the extent: with finer cells than this, hardly any vertices fall together.
+        const FINEST: f64 = 1.0 / 256.0;
+        let [low, high] = self.bounds()?;
+        if accuracy.is_nan() || accuracy < FINEST * (high - low).max() {
+            return None;
+        }
+        let exponent = accuracy.log2().floor().min(60.0) as i32;
+        let make = || Arc::new(self.clustered(2_f64.powi(exponent)));
+        let coarse = match self.coarser.0.lock() {
+            Ok(mut known) => known.entry(exponent).or_insert_with(make).clone(),
+            Err(_) => make(),
+        };
+        (coarse.faces.len() * 4 <= self.faces.len() * 3).then_some(coarse)
+    }
+
+    /// One vertex for each cell of a grid whose diagonal is at most `accuracy`: the first one there, with the mean of the normals.
+    fn clustered(&self, accuracy: f64) -> Mesh {
+        let side = accuracy / 3_f64.sqrt();
+        let mut mesh = Mesh::new();
+        let mut cells: HashMap<[i64; 3], u32> = HashMap::new();
+        let numbers: Vec<u32> = (self.vertices.iter().zip(&self.normals))
+            .map(|(vertex, normal)| {
+                let cell = [0, 1, 2].map(|k| (vertex[k] / side).floor() as i64);
+                let number = *cells.entry(cell).or_insert(mesh.vertices.len() as u32);
+                if number as usize == mesh.vertices.len() {
+                    mesh.vertices.push(*vertex);
+                    mesh.normals.push(Vector::zeros());
+                }
+                mesh.normals[number as usize] += normal;
+                number
+            })
+            .collect();
+        for face in &self.faces {
+            let corners @ [a, b, c] = face.corners.map(|corner| numbers[corner as usize]);
+            if a != b && b != c && c != a {
+                mesh.faces.push(Face { corners, ..*face });
+            }
+        }
+        mesh.finish()
     }
 
     /// Adds a grid of vertices, `rows` of equal length, as two triangles to each square. Seen with rows
@@ -90,7 +170,8 @@ impl Mesh {
         normals: &[Vector],
         triangles: impl IntoIterator<Item = ([u32; 3], MaterialId)>,
     ) -> Mesh {
-        let mut mesh = Mesh { normals: vec![Vector::zeros(); vertices.len()], vertices, faces: Vec::new() };
+        let normals_of = vec![Vector::zeros(); vertices.len()];
+        let mut mesh = Mesh { normals: normals_of, vertices, ..Mesh::new() };
         for (corners, material) in triangles {
             let [p, q, r] = corners.map(|i| mesh.vertices[i as usize]);
             let area = (q - p).cross(&(r - p));
@@ -121,5 +202,36 @@ impl Mesh {
 impl Default for Mesh {
     fn default() -> Mesh {
         Mesh::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_small_mesh_is_few_triangles_no_further_away_than_asked() {
+        let rows: Vec<Vec<Point>> = (0..=20)
+            .map(|i| {
+                let u = f64::from(i) / 20.0;
+                (0..=20).map(|j| Point::new(u, f64::from(j) / 20.0, 0.2 * (3.0 * u).sin())).collect()
+            })
+            .collect();
+        let mut mesh = Mesh::new();
+        mesh.add_grid(&rows, MaterialId::LEAF, true);
+        let mesh = mesh.finish();
+        assert!(mesh.draft(1e-3).is_none(), "nothing falls together");
+        let mut before = mesh.faces.len();
+        for accuracy in [0.13, 0.26, 0.52] {
+            let coarse = mesh.draft(accuracy).expect("coarser");
+            assert!(coarse.faces.len() < before && !coarse.faces.is_empty());
+            before = coarse.faces.len();
+            let distance =
+                |p: &Point| coarse.vertices.iter().map(|q| (p - q).norm()).fold(f64::MAX, f64::min);
+            assert!(mesh.vertices.iter().all(|p| distance(p) <= accuracy));
+            assert!(coarse.normals.iter().all(|n| (n.norm() - 1.0).abs() < 1e-12 && n.z < 0.0));
+            assert!(Arc::ptr_eq(&coarse, &mesh.draft(accuracy * 1.01).expect("kept")));
+        }
+        assert!(mesh.draft(f64::INFINITY).expect("coarser").faces.is_empty());
     }
 }

@@ -23,6 +23,7 @@ mod flat;
 mod material;
 mod mesh;
 mod patch;
+mod pieces;
 mod surroundings;
 
 pub use bounds::Bounds;
@@ -34,6 +35,7 @@ pub use patch::{Net, Patch, PatchFace, PatchSet};
 pub use surroundings::{Plant, Seedling, Surroundings, Viewpoint};
 
 use std::borrow::Cow;
+use std::collections::HashSet;
 use std::sync::Arc;
 
 use dlsys_diagnostic::Diagnostic;
@@ -114,6 +116,8 @@ pub struct Scene {
     /// Greatest distance between a curve and the segments drawn for it, in scene units, if that is known when the turtle
     /// draws; 0 if not. Bent segments are drawn in pieces; see [`Fit::accuracy`](dlsys_render::Fit::accuracy).
     pub accuracy: f64,
+    /// The turtle would have drawn something else, had it known an accuracy.
+    pub lacked_accuracy: bool,
     owners: Vec<Owner>,
     /// Pieces of stems, in string order.
     pub segments: Vec<Segment>,
@@ -165,6 +169,31 @@ impl Scene {
         self.plants.clear();
         self.surroundings = Surroundings::default();
         self.warnings.clear();
+        self.lacked_accuracy = false;
+    }
+
+    /// Roughly the memory of all elements, in bytes; plants that share a scene count it once.
+    pub fn footprint(&self) -> usize {
+        let mut known = HashSet::new();
+        self.footprint_beside(&mut known)
+    }
+
+    /// Recursion is bounded by the depth of plants in plants.
+    fn footprint_beside(&self, known: &mut HashSet<*const Scene>) -> usize {
+        let vertices: usize = self.polygons.iter().map(|polygon| polygon.vertices.len()).sum();
+        let own = size_of_val(&*self.owners)
+            + size_of_val(&*self.segments)
+            + size_of_val(&*self.polygons)
+            + vertices * size_of::<Point>()
+            + size_of_val(&*self.surfaces)
+            + size_of_val(&*self.patches)
+            + size_of_val(&*self.plants);
+        let looks = self.plants.iter().map(|plant| &plant.scene);
+        let others = looks.map(|scene| match known.insert(Arc::as_ptr(scene)) {
+            true => size_of::<Scene>() + scene.footprint_beside(known),
+            false => 0,
+        });
+        own + others.sum::<usize>()
     }
 
     /// True if there are no elements.
@@ -195,19 +224,29 @@ impl Scene {
     /// The surfaces and patches as meshes for a picture, in the order of [`tessellated`](Scene::tessellated): each within
     /// `accuracy` (scene units) of its shape, which may depend on its place.
     pub fn drafted(&self, accuracy: impl Fn(Point) -> f64) -> Cow<'_, [Surface]> {
-        if self.patches.is_empty() && self.surfaces.iter().all(|surface| surface.patches.is_none()) {
+        if self.patches.is_empty() && self.surfaces.is_empty() {
             return Cow::Borrowed(&self.surfaces);
         }
         let placed = self.surfaces.iter().map(|surface| {
             let mut surface = surface.clone();
-            if let Some(patches) = surface.patches.take() {
-                let place = surface.placement;
-                surface.mesh = patches.draft(accuracy(place.origin) / place.largest());
+            let place = surface.placement;
+            let accuracy = accuracy(place.origin) / place.largest();
+            match surface.patches.take() {
+                Some(patches) => surface.mesh = patches.draft(accuracy),
+                None => surface.mesh = surface.mesh.draft(accuracy).unwrap_or(surface.mesh),
             }
             surface
         });
         let patches = self.patches.iter().map(|patch| patch.draft(accuracy(patch.net[0][0])));
         Cow::Owned(placed.chain(patches).collect())
+    }
+
+    /// The scene with meshes in place of everything curved, as detailed as a picture needs: see [`drafted`](Scene::drafted).
+    pub fn drafted_scene(&self, accuracy: impl Fn(Point) -> f64) -> Cow<'_, Scene> {
+        match self.drafted(accuracy) {
+            Cow::Borrowed(_) => Cow::Borrowed(self),
+            Cow::Owned(surfaces) => Cow::Owned(Scene { surfaces, patches: Vec::new(), ..self.clone() }),
+        }
     }
 
     /// Visits points whose hull contains all elements, each with the width of the line there; corners of surfaces
@@ -222,10 +261,16 @@ impl Scene {
             reach.include(segment.start, segment.widths[0]);
             reach.include(segment.end, segment.widths[1]);
         }
-        let mut include = |point| reach.include(point, Width::Set(0.0));
-        self.polygons.iter().flat_map(|polygon| polygon.vertices.iter().copied()).for_each(&mut include);
+        let vertices = self.polygons.iter().flat_map(|polygon| polygon.vertices.iter().copied());
+        vertices.for_each(|point| reach.include(point, Width::Set(0.0)));
         for surface in &self.surfaces {
-            surface.mesh.vertices.iter().for_each(|&v| include(surface.placement.point(v)));
+            let corners = surface.mesh.bounds().map(|bounds| surface.placement.corners(bounds));
+            if corners.is_some_and(|corners| reach.covers(corners.into_iter())) {
+                continue;
+            }
+            for &vertex in &surface.mesh.vertices {
+                reach.include(surface.placement.point(vertex), Width::Set(0.0));
+            }
         }
         for patch in &self.patches {
             if !reach.covers(patch.net.iter().flatten().copied()) {

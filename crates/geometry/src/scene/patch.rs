@@ -9,14 +9,12 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
+use super::pieces::{FINEST, Steps};
 use super::{MaterialId, Mesh, OwnerId, Placement, Point, Surface, Vector, ball};
 
 /// Control points by row and column. Seen with rows going up and columns going right, the front is towards
 /// the viewer.
 pub type Net = [[Point; 4]; 4];
-
-/// Most pieces along an edge.
-const FINEST: usize = 64;
 
 /// A patch in space.
 #[derive(Clone, Debug)]
@@ -65,7 +63,8 @@ impl Patch {
         self.placed(accuracy, Steps::Powers)
     }
 
-    /// The same for a picture, of fewer triangles: pieces are any number, not a power of two.
+    /// The same for a picture, of fewer triangles: pieces are any number, not a power of two, and their
+    /// deviation is an estimate.
     pub fn draft(&self, accuracy: f64) -> Surface {
         self.placed(accuracy, Steps::Whole)
     }
@@ -133,11 +132,12 @@ impl PatchSet {
         self.kept(&self.meshes, exponent, 4_f64.powi(exponent), Steps::Powers)
     }
 
-    /// The same for a picture, where the surface may be small: accuracies within a factor of two share a mesh, and a
+    /// The same for a picture, where the surface may be small: accuracies within a factor of the fourth root of two share a mesh, and a
     /// surface that is less than `accuracy` in size is a few triangles.
     pub fn draft(&self, accuracy: f64) -> Arc<Mesh> {
-        let exponent = accuracy.log2().floor().clamp(-40.0, 3.0) as i32;
-        self.kept(&self.drafts, exponent, 2_f64.powi(exponent), Steps::Whole)
+        let exponent = (4.0 * accuracy.log2()).floor().clamp(-160.0, 12.0);
+        let accuracy = (exponent / 4.0).exp2();
+        self.kept(&self.drafts, exponent as i32, accuracy, Steps::Whole)
     }
 
     fn kept(
@@ -172,78 +172,8 @@ fn edges(net: &Net) -> [[Point; 4]; 4] {
     [net[0], net[3], net.map(|row| row[0]), net.map(|row| row[3])]
 }
 
-fn column(net: &Net, c: usize) -> [Point; 4] {
+pub(super) fn column(net: &Net, c: usize) -> [Point; 4] {
     net.map(|row| row[c])
-}
-
-/// A greatest second difference of four points.
-fn bend(p: &[Point; 4]) -> f64 {
-    let second = |i: usize| (p[i].coords - 2.0 * p[i + 1].coords + p[i + 2].coords).norm();
-    second(0).max(second(1))
-}
-
-/// The numbers of pieces that an edge may have.
-#[derive(Clone, Copy, PartialEq)]
-enum Steps {
-    /// Powers of two: few numbers, so that the mesh of a growing patch does not change all the time.
-    Powers,
-    /// Any, so that there are no more triangles than the accuracy asks for.
-    Whole,
-}
-
-/// The least number of pieces whose square is at least this.
-fn pieces(square: f64, steps: Steps) -> usize {
-    if steps == Steps::Whole {
-        return (square.sqrt().ceil() as usize).clamp(1, FINEST);
-    }
-    let mut n = 1;
-    while n < FINEST && ((n * n) as f64) < square {
-        n *= 2;
-    }
-    n
-}
-
-/// Pieces of an edge: a cubic's second derivative is at most 6 times its second differences, a chord over
-/// 1/n deviates by 1/8 of that over n².
-fn edge_pieces(edge: &[Point; 4], accuracy: f64, steps: Steps) -> usize {
-    pieces(6.0 * bend(edge) / (8.0 * accuracy), steps)
-}
-
-/// Pieces along rows (from column to column) and along columns that keep the whole patch accurate, as few as
-/// will do.
-fn grid_pieces(net: &Net, accuracy: f64, steps: Steps) -> (usize, usize) {
-    let along = |of: &dyn Fn(usize) -> [Point; 4]| (0..4).map(|i| bend(&of(i))).fold(0.0, f64::max);
-    let (uu, vv) = (6.0 * along(&|r| net[r]), 6.0 * along(&|c| column(net, c)));
-    let twist = (0..9)
-        .map(|i| {
-            let (r, c) = (i / 3, i % 3);
-            ((net[r + 1][c + 1] - net[r + 1][c]) - (net[r][c + 1] - net[r][c])).norm()
-        })
-        .fold(0.0, f64::max);
-    let uv = 9.0 * twist;
-    if steps == Steps::Whole {
-        // For each number of rows the least number of columns: where a quadratic in one over it is zero.
-        let columns = |rows: usize| {
-            let v = rows as f64;
-            let (half, rest) = (uv / v, 8.0 * accuracy - vv / (v * v));
-            let root = half + (half * half + uu * rest).sqrt();
-            let columns = if root > 0.0 { root / rest } else { 1.0 };
-            (rest > 0.0 && columns <= FINEST as f64).then(|| ((columns.ceil() as usize).max(1), rows))
-        };
-        let pairs = (1..=FINEST).filter_map(columns);
-        return pairs
-            .min_by_key(|(columns, rows)| (columns * rows, columns.abs_diff(*rows)))
-            .unwrap_or((FINEST, FINEST));
-    }
-    let exponents = 0..=FINEST.trailing_zeros();
-    let pairs = exponents.clone().flat_map(|i| exponents.clone().map(move |j| (1_usize << i, 1_usize << j)));
-    pairs
-        .filter(|&(columns, rows)| {
-            let (u, v) = (columns as f64, rows as f64);
-            uu / (u * u) + 2.0 * uv / (u * v) + vv / (v * v) <= 8.0 * accuracy
-        })
-        .min_by_key(|(columns, rows)| (columns * rows, columns.abs_diff(*rows)))
-        .unwrap_or((FINEST, FINEST))
 }
 
 /// Adds the triangles of a patch.
@@ -257,8 +187,8 @@ fn tessellate(
 ) {
     let accuracy = if accuracy > 0.0 { accuracy } else { f64::MIN_POSITIVE };
     // Half of the deviation for the edge, half for the triangles that lead to it.
-    let [bottom, top, left, right] = edges(net).map(|edge| edge_pieces(&edge, accuracy / 2.0, steps));
-    let (columns, rows) = grid_pieces(net, accuracy, steps);
+    let [bottom, top, left, right] = edges(net).map(|edge| steps.of_edge(&edge, accuracy / 2.0));
+    let (columns, rows) = steps.of_grid(net, accuracy);
     let (columns, rows) = (columns.max(bottom).max(top), rows.max(left).max(right));
     // On an edge the grid's vertices fall upon the nearest of those that the edge has: the number of that one, the first vertex of the
     // grid that falls upon it, and its parameter.
@@ -267,6 +197,8 @@ fn tessellate(
         ((nearest * count).div_ceil(kept), nearest as f64 / kept as f64)
     };
     let first = mesh.vertices.len() as u32;
+    let columns_of: Vec<Column> =
+        (0..=columns).map(|i| Column::new(net, i as f64 / columns as f64)).collect();
     let mut numbers = vec![u32::MAX; (columns + 1) * (rows + 1)];
     let mut number = |i: usize, j: usize, mesh: &mut Mesh| {
         let ((mut i, mut u), (mut j, mut v)) = ((i, i as f64 / columns as f64), (j, j as f64 / rows as f64));
@@ -279,8 +211,12 @@ fn tessellate(
         let place = &mut numbers[j * (columns + 1) + i];
         if *place == u32::MAX {
             *place = mesh.vertices.len() as u32;
-            mesh.vertices.push(point(net, u, v));
-            mesh.normals.push(normal(net, u, v));
+            // Within the grid, u is that of the column.
+            let column = columns_of.get(i).filter(|_| j > 0 && j < rows);
+            let found = column.map(|column| column.at(net, u, v));
+            let (point, normal) = found.unwrap_or_else(|| (point(net, u, v), normal(net, u, v)));
+            mesh.vertices.push(point);
+            mesh.normals.push(normal);
         }
         *place
     };
@@ -303,6 +239,33 @@ fn tessellate(
     mesh.orient(first);
 }
 
+/// The curve of a patch at one parameter along its rows: the control points of the curve, and of its slope across. Sums are those of
+/// [`point`] and [`normal`], to the last bit.
+struct Column {
+    points: [Vector; 4],
+    slopes: [Vector; 4],
+}
+
+impl Column {
+    fn new(net: &Net, u: f64) -> Column {
+        let of = |weights: [f64; 4]| {
+            net.map(|row| row.iter().zip(weights).fold(Vector::zeros(), |along, (p, u)| along + p.coords * u))
+        };
+        Column { points: of(weights(u)), slopes: of(slopes(u)) }
+    }
+
+    /// Place and normal at a parameter along the curve.
+    fn at(&self, net: &Net, u: f64, v: f64) -> (Point, Vector) {
+        let sum = |points: &[Vector; 4], weights: [f64; 4]| {
+            points.iter().zip(weights).fold(Vector::zeros(), |sum, (p, v)| sum + p * v)
+        };
+        let values = weights(v);
+        let across = sum(&self.slopes, values).cross(&sum(&self.points, slopes(v)));
+        let normal = across.try_normalize(1e-9).unwrap_or_else(|| normal(net, u, v));
+        (Point::from(sum(&self.points, values)), normal)
+    }
+}
+
 /// The least of the areas of two triangles, as far as they face as the first normal says; triangles with two
 /// corners in one do not count.
 fn quality(mesh: &Mesh, triangles: &[[u32; 3]; 2]) -> f64 {
@@ -315,18 +278,18 @@ fn quality(mesh: &Mesh, triangles: &[[u32; 3]; 2]) -> f64 {
 }
 
 /// Bernstein's polynomials of degree three.
-fn weights(t: f64) -> [f64; 4] {
+pub(super) fn weights(t: f64) -> [f64; 4] {
     let s = 1.0 - t;
     [s * s * s, 3.0 * s * s * t, 3.0 * s * t * t, t * t * t]
 }
 
 /// Their derivatives.
-fn slopes(t: f64) -> [f64; 4] {
+pub(super) fn slopes(t: f64) -> [f64; 4] {
     let s = 1.0 - t;
     [-3.0 * s * s, 3.0 * s * s - 6.0 * s * t, 6.0 * s * t - 3.0 * t * t, 3.0 * t * t]
 }
 
-fn sum(net: &Net, of_columns: [f64; 4], of_rows: [f64; 4]) -> Vector {
+pub(super) fn sum(net: &Net, of_columns: [f64; 4], of_rows: [f64; 4]) -> Vector {
     let mut sum = Vector::zeros();
     for (row, v) in net.iter().zip(of_rows) {
         let mut along = Vector::zeros();
@@ -493,5 +456,23 @@ mod tests {
         assert!(set.mesh(0.0).faces.len() <= 2 * FINEST * FINEST);
         assert!(set.mesh(f64::INFINITY).faces.len() >= 2);
         assert!(set.mesh(1e-3).faces.len() > set.mesh(1e-1).faces.len());
+    }
+
+    #[test]
+    fn drafts_are_as_near_as_they_should_with_fewer_triangles() {
+        let net = raised(|c, r| 0.3 * (c * 1.7).sin() + 0.2 * c * r - 0.15 * r * r);
+        for accuracy in [0.1, 1e-2, 1e-3] {
+            let mut draft = Mesh::new();
+            tessellate(&net, accuracy, Steps::Whole, MaterialId::LEAF, true, &mut draft);
+            let strict = mesh(&net, accuracy).faces.len();
+            assert!(draft.faces.len() <= strict && (accuracy > 5e-3 || draft.faces.len() < strict));
+            for face in &draft.faces {
+                let [a, b, c] = face.corners.map(|i| draft.vertices[i as usize]);
+                let middle = Point::from((a.coords + b.coords + c.coords) / 3.0);
+                let away = (point(&net, middle.x, middle.y) - middle).norm();
+                // Beside an edge, half as much is added by the edge's own pieces.
+                assert!(away <= 1.5 * accuracy, "{away} > {accuracy}");
+            }
+        }
     }
 }

@@ -83,10 +83,6 @@ impl Plant {
 
     /// The corners of that box in the scene.
     pub fn corners(&self) -> impl Iterator<Item = Point> {
-        let corner = |[low, high]: [Point; 2], i: usize| {
-            let side = |k: usize| if i >> k & 1 == 0 { low[k] } else { high[k] };
-            self.placement.point(Point::new(side(0), side(1), side(2)))
-        };
-        self.bounds.into_iter().flat_map(move |bounds| (0..8).map(move |i| corner(bounds, i)))
+        self.bounds.into_iter().flat_map(|bounds| self.placement.corners(bounds))
     }
 }

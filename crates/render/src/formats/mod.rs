@@ -43,7 +43,7 @@ pub struct Description {
 /// One frame to be written.
 #[derive(Clone, Copy)]
 pub struct Drawing<'a> {
-    /// The scene. Except for formats of pixels its surfaces are meshes of the accuracy that the writer asks for, and there are no patches.
+    /// The scene. Except for formats of pixels its surfaces are meshes of the accuracy that the format needs, and there are no patches.
     pub scene: &'a Scene,
     /// Scale, page, and settings of meshes.
     pub writer: &'a FrameWriter,

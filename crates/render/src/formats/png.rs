@@ -129,6 +129,11 @@ impl<'m> Lit<'m> {
         self.lighting.strength(&Spot { normal, seen: Point::from(seen), is_thin: face.is_thin })
     }
 
+    /// The light on the triangles.
+    pub(crate) fn lighting(&self) -> &Lighting<'m> {
+        &self.lighting
+    }
+
     /// The colour of a material in light of this strength, before a background.
     pub(crate) fn color(
         &self,

@@ -11,6 +11,8 @@
 
 mod band;
 pub(super) mod cells;
+mod fragments;
+mod plane;
 
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
@@ -171,7 +173,6 @@ fn range(at: [i64; 3], end: usize) -> Option<[usize; 2]> {
 
 /// A triangle, made ready.
 struct Triangle<const N: usize> {
-    number: usize,
     /// First and last column and row of pixels that it may touch.
     columns: [usize; 2],
     rows: [usize; 2],
@@ -181,24 +182,14 @@ struct Triangle<const N: usize> {
     bias: [i64; 3],
     /// Value of each side's function at the samples, beside that at the upper left corner of the pixel.
     at_samples: [[i64; N]; 3],
-    /// Twice the area.
-    area: f64,
     /// Depth at the upper left corner of the picture, its growth for a pixel to the right and down, and its bounds.
     depth: [f64; 3],
     depths: [f64; 2],
-    /// The corners were given in the other sense of rotation.
-    turned: bool,
 }
 
 impl<const N: usize> Triangle<N> {
     /// `None` if no sample can be in it.
-    fn new(
-        pattern: &Pattern<N>,
-        number: usize,
-        corners: [Corner; 3],
-        width: usize,
-        height: usize,
-    ) -> Option<Triangle<N>> {
+    fn new(pattern: &Pattern<N>, corners: [Corner; 3], width: usize, height: usize) -> Option<Triangle<N>> {
         let mut at = corners.map(|corner| [snap(corner.x), snap(corner.y)]);
         let mut depths = corners.map(|corner| corner.depth);
         let [[ax, ay], [bx, by], [cx, cy]] = at;
@@ -206,8 +197,7 @@ impl<const N: usize> Triangle<N> {
         if area == 0 {
             return None;
         }
-        let turned = area < 0;
-        if turned {
+        if area < 0 {
             at.swap(1, 2);
             depths.swap(1, 2);
         }
@@ -235,25 +225,14 @@ impl<const N: usize> Triangle<N> {
             .iter()
             .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &z| [low.min(z), high.max(z)]);
         Some(Triangle {
-            number,
             columns,
             rows,
             sides,
             bias,
             at_samples,
-            area,
             depth: [depths[0] - right * x - down * y, right, down],
             depths: [least, greatest],
-            turned,
         })
-    }
-
-    /// Weights of the corners, in their given order, at a place in steps, or near it if that is outside.
-    fn weights(&self, x: i64, y: i64) -> [f64; 3] {
-        let raw = self.sides.map(|[a, b, c]| ((a * x + b * y + c) as f64 / self.area).max(0.0));
-        let sum: f64 = raw.iter().sum();
-        let [a, b, c] = raw.map(|w| w / sum);
-        if self.turned { [a, c, b] } else { [a, b, c] }
     }
 }
 
@@ -370,5 +349,42 @@ mod tests {
         let line = [corner(0.0, 0.0, 0.0), corner(1.0, 1.0, 0.0), corner(2.0, 2.0, 0.0)];
         let undefined = [corner(f64::NAN, 0.0, f64::NAN); 3];
         assert_eq!(drawn([3, 3], &[(far, RED), (line, BLUE), (undefined, BLUE)]).pixels.len(), 9);
+    }
+
+    #[test]
+    fn every_sample_has_the_triangle_that_a_plain_search_finds() {
+        let size = [24, 20];
+        let mut state = 1_u64;
+        let mut random = |most: f64| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64 * most
+        };
+        for round in 0..200 {
+            // Small ones and large ones, which pass through one another.
+            let reach = if round % 2 == 0 { 3.0 } else { 30.0 };
+            let triangles: Vec<([Corner; 3], [u8; 3])> = (0..40_u8)
+                .map(|i| {
+                    let (x, y) = (random(24.0), random(20.0));
+                    let corners = [(); 3].map(|()| corner(x + random(reach), y + random(reach), random(1.0)));
+                    (corners, [i, 255 - i, 3 * i])
+                })
+                .collect();
+            let image = drawn(size, &triangles);
+            let (places, corners) = (size[0] * size[1], |n: usize| triangles[n].0);
+            let all = (triangles.len(), corners);
+            let found = cells::nearest(&SIXTEEN, size, all, (places, |at| at), |_| true);
+            let mut differing = 0;
+            for (pixel, numbers) in image.pixels.iter().zip(&found.numbers) {
+                let mean = |channel: &dyn Fn([u8; 3]) -> u8| {
+                    let seen = numbers.iter().filter(|number| **number > 0);
+                    let sum: u32 = seen.map(|n| u32::from(channel(triangles[*n as usize - 1].1))).sum();
+                    ((sum + 8) / 16) as u8
+                };
+                let expected = [mean(&|c| c[0]), mean(&|c| c[1]), mean(&|c| c[2]), mean(&|_| 255)];
+                // At depths that are equal but for rounding, the two may differ.
+                differing += usize::from(*pixel != expected);
+            }
+            assert!(differing <= 1, "round {round}: {differing} pixels differ");
+        }
     }
 }

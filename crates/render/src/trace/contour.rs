@@ -1,14 +1,29 @@
 //! Outlines of sets of cells: followed along the edges of cells, then simplified.
 
-/// A rectangle of cells, each inside or outside of a set.
-pub struct Mask<'a, F, G> {
+/// A set of cells of a raster. None is at the rim of the raster.
+pub struct Mask<I, F, G> {
+    /// Cells in a row of the raster.
     pub width: usize,
-    pub height: usize,
-    pub inside: &'a [bool],
+    /// Whether a cell belongs to the set.
+    pub inside: I,
     /// The part of a cell that the set covers, from 0 to 1, or that its item does.
     pub covered: F,
     /// Of a cell of the same item: how much lighter it is than the darkest that belong to the set.
     pub shade: G,
+}
+
+/// An outline of a set, as it is followed.
+pub struct Outline {
+    places: Vec<Place>,
+    /// It goes around a hole of the set.
+    pub is_hole: bool,
+}
+
+impl Outline {
+    /// Its corners; none if it is too small to be seen.
+    pub fn simplified(&self) -> Option<Vec<Corner>> {
+        Some(simplified(&self.places)).filter(|corners| corners.len() >= 3)
+    }
 }
 
 /// What is counted of a cell.
@@ -27,57 +42,36 @@ struct Place {
     tolerance: f64,
 }
 
-/// The greatest distance of outlines, in cells, from the edges of items, and from those between two shades of one item or under what
-/// is painted later.
+/// The greatest distance of outlines, in cells, from the edges of items, from those between two shades of one item, and from where
+/// they should run under what is painted later.
 const TOLERANCE: f64 = 0.25;
 const TOLERANCE_INSIDE: f64 = 0.9;
+const TOLERANCE_HIDDEN: f64 = 1.5;
 
 /// A corner of an outline, in cells from the upper left corner of the mask.
 pub type Corner = [f64; 2];
 
-impl<F: Fn(usize, Part) -> f64, G: Fn(usize) -> Option<f64>> Mask<'_, F, G> {
-    fn at(&self, x: i64, y: i64) -> bool {
-        (0..self.width as i64).contains(&x)
-            && (0..self.height as i64).contains(&y)
-            && self.inside[y as usize * self.width + x as usize]
+impl<I, F, G> Mask<I, F, G>
+where
+    I: Fn(usize) -> bool,
+    F: Fn(usize, Part) -> f64,
+    G: Fn(usize) -> Option<f64>,
+{
+    /// Whether an outline passes above a cell, to the right.
+    pub fn is_top(&self, cell: usize) -> bool {
+        (self.inside)(cell) && !(self.inside)(cell - self.width)
     }
 
-    /// All outlines of the set, those of holes included: between the centres of cells inside and outside, where the set ends by
-    /// the parts that it covers; each simplified.
-    pub fn outlines(&self) -> Vec<Vec<Corner>> {
-        // An edge below a cell outside and above one inside, by cell: the outline goes to the right there.
-        let mut begun = vec![false; self.width * (self.height + 1)];
-        let mut outlines = Vec::new();
-        for y in 0..=self.height as i64 {
-            for x in 0..self.width as i64 {
-                let is_top = self.at(x, y) && !self.at(x, y - 1);
-                if is_top && !begun[y as usize * self.width + x as usize] {
-                    outlines.push(simplified(&self.follow(x, y, &mut begun)));
-                }
-            }
-        }
-        outlines.retain(|outline| outline.len() >= 3);
-        outlines
-    }
-
-    /// Where the set ends between the centres of the two cells beside an edge, which goes from a lattice point in a direction.
-    fn crossing(&self, [x, y]: [i64; 2], [dx, dy]: [i64; 2]) -> Place {
-        let cell = |side: i64| {
-            let (cx, cy) = (dx - dy * side, dy + dx * side);
-            [x + (cx - 1).div_euclid(2), y + (cy - 1).div_euclid(2)]
-        };
-        let (inner, outer) = (cell(1), cell(-1));
-        let number = |[x, y]: [i64; 2]| {
-            let within = (0..self.width as i64).contains(&x) && (0..self.height as i64).contains(&y);
-            within.then(|| y as usize * self.width + x as usize)
-        };
-        let covered = |cell: [i64; 2], of| number(cell).map_or(0.0, |i| (self.covered)(i, of));
-        let shade = |cell: [i64; 2]| number(cell).and_then(&self.shade);
+    /// Where the set ends between the centres of two neighbours.
+    fn crossing(&self, inner: usize, outer: usize) -> Place {
         let between = |a: f64, b: f64| {
             let (high, low) = (a.max(0.5), b.min(0.5));
             if high == low { 0.5 } else { (high - 0.5) / (high - low) }
         };
-        let (t, tolerance) = match (shade(inner), shade(outer)) {
+        let covered = |cell: usize, part: Part| (self.covered)(cell, part);
+        let (t, tolerance) = match ((self.shade)(inner), (self.shade)(outer)) {
+            // A lighter shade is painted over it.
+            (_, Some(low)) if low >= 0.0 => (0.5, TOLERANCE_HIDDEN),
             (Some(high), Some(low)) => {
                 let (a, b) = (covered(inner, Part::Shade), covered(outer, Part::Shade));
                 match high > 0.0 && low < 0.0 && a == 1.0 && b == 0.0 {
@@ -89,41 +83,50 @@ impl<F: Fn(usize, Part) -> f64, G: Fn(usize) -> Option<f64>> Mask<'_, F, G> {
             }
             _ => match (covered(inner, Part::Item), covered(outer, Part::Item)) {
                 // Where both are covered, it ends under what is painted later.
-                (_, b) if b > 0.99 => (0.5, TOLERANCE_INSIDE),
+                (_, b) if b > 0.99 => (0.5, TOLERANCE_HIDDEN),
                 (a, b) => (between(a, b), TOLERANCE),
             },
         };
-        let at = [0, 1].map(|k| inner[k] as f64 + 0.5 + t * (outer[k] - inner[k]) as f64);
+        let [p, q] = [inner, outer].map(|cell| [cell % self.width, cell / self.width].map(|x| x as f64));
+        let at = [0, 1].map(|k| p[k] + 0.5 + t * (q[k] - p[k]));
         Place { at, tolerance }
     }
 
-    /// The middles of the edges of the outline that begins with the upper edge of a cell, the set being on the right.
-    fn follow(&self, x: i64, y: i64, begun: &mut [bool]) -> Vec<Place> {
-        let start = (x, y, (1, 0));
-        let (mut x, mut y, mut direction) = start;
-        let mut middles = Vec::new();
+    /// The outline that begins with the upper edge of a cell, the set being on its right: between the centres of cells inside and
+    /// outside, where the set ends by the parts that it covers. `pass` takes the cells below whose upper edges it goes to the right.
+    pub fn follow(&self, start: usize, mut pass: impl FnMut(usize)) -> Outline {
+        // Right, down, left, up, as differences of cells; they wrap around.
+        let steps = [1, self.width, 1_usize.wrapping_neg(), self.width.wrapping_neg()];
+        // The cells on the right of an edge that begins at the upper left corner of a cell, and on its left, by direction.
+        let up_left = (self.width + 1).wrapping_neg();
+        let right_of = [0, steps[2], up_left, steps[3]];
+        let left_of = [steps[3], 0, steps[2], up_left];
+        let (mut at, mut direction) = (start, 0);
+        let mut places = Vec::new();
+        // Of what it surrounds, in cells; negative if that is on its left.
+        let mut area = 0_i64;
         loop {
-            // The edge goes from the lattice point (x, y) in the direction; the cell on its right is inside.
-            let (dx, dy): (i64, i64) = direction;
-            if direction == (1, 0) {
-                begun[y as usize * self.width + x as usize] = true;
+            let row = (at / self.width) as i64;
+            match direction {
+                0 => {
+                    pass(at);
+                    area -= row;
+                }
+                2 => area += row,
+                _ => {}
             }
-            middles.push(self.crossing([x, y], [dx, dy]));
-            (x, y) = (x + dx, y + dy);
-            // The two cells ahead, on the left and on the right of the direction.
-            let ahead = |side: i64| {
-                let (cx, cy) = (dx - dy * side, dy + dx * side);
-                // Of the four cells around the lattice point.
-                self.at(x + (cx - 1).div_euclid(2), y + (cy - 1).div_euclid(2))
-            };
-            direction = match (ahead(-1), ahead(1)) {
+            let beside = |by: [usize; 4]| at.wrapping_add(by[direction]);
+            places.push(self.crossing(beside(right_of), beside(left_of)));
+            at = at.wrapping_add(steps[direction]);
+            let ahead = |by: [usize; 4]| (self.inside)(at.wrapping_add(by[direction]));
+            direction = match (ahead(left_of), ahead(right_of)) {
                 // Cells that touch in a corner only are apart.
-                (_, false) => (-dy, dx),
-                (false, true) => (dx, dy),
-                (true, true) => (dy, -dx),
+                (_, false) => (direction + 1) % 4,
+                (false, true) => direction,
+                (true, true) => (direction + 3) % 4,
             };
-            if (x, y, direction) == start {
-                return middles;
+            if (at, direction) == (start, 0) {
+                return Outline { places, is_hole: area < 0 };
             }
         }
     }
@@ -168,11 +171,28 @@ fn simplified(points: &[Place]) -> Vec<Corner> {
 mod tests {
     use super::*;
 
+    /// The outlines of a set in a raster of so many columns, whose rim is empty.
+    fn outlines<I, F, G>(mask: &Mask<I, F, G>, count: usize) -> Vec<Vec<Corner>>
+    where
+        I: Fn(usize) -> bool,
+        F: Fn(usize, Part) -> f64,
+        G: Fn(usize) -> Option<f64>,
+    {
+        let mut begun = vec![false; count];
+        let mut outlines = Vec::new();
+        for cell in mask.width..count - mask.width {
+            if mask.is_top(cell) && !begun[cell] {
+                outlines.extend(mask.follow(cell, |cell| begun[cell] = true).simplified());
+            }
+        }
+        outlines
+    }
+
     fn mask(rows: &[&str]) -> Vec<Vec<Corner>> {
         let inside: Vec<bool> = rows.iter().flat_map(|row| row.bytes().map(|b| b == b'#')).collect();
         let covered = |i: usize, _| f64::from(u8::from(inside[i]));
-        Mask { width: rows[0].len(), height: rows.len(), inside: &inside, covered, shade: |_| None }
-            .outlines()
+        let mask = Mask { width: rows[0].len(), inside: |i: usize| inside[i], covered, shade: |_| None };
+        outlines(&mask, inside.len())
     }
 
     fn area(outline: &[Corner]) -> f64 {
@@ -183,7 +203,16 @@ mod tests {
     #[test]
     fn a_square_keeps_its_place_and_its_hole() {
         let outlines = mask(&[
-            "########", "########", "##....##", "##....##", "##....##", "##....##", "########", "########",
+            "..........",
+            ".########.",
+            ".########.",
+            ".##....##.",
+            ".##....##.",
+            ".##....##.",
+            ".##....##.",
+            ".########.",
+            ".########.",
+            "..........",
         ]);
         assert_eq!(outlines.len(), 2);
         // The corners of a cell are cut.
@@ -192,26 +221,37 @@ mod tests {
     }
 
     #[test]
+    fn holes_are_told_from_outlines() {
+        let inside = |i: usize| (1..6).contains(&(i % 7)) && (1..6).contains(&(i / 7)) && i != 24;
+        let mask = Mask { width: 7, inside, covered: |_, _| 0.0, shade: |_| None };
+        assert!(!mask.follow(8, |_| ()).is_hole);
+        assert!(mask.follow(24 + 7, |_| ()).is_hole);
+    }
+
+    #[test]
     fn cells_that_touch_in_a_corner_are_two_outlines() {
-        assert_eq!(mask(&["##..", "##..", "..##", "..##"]).len(), 2);
+        assert_eq!(mask(&["......", ".##...", ".##...", "...##.", "...##.", "......"]).len(), 2);
     }
 
     #[test]
     fn an_edge_is_where_the_covered_parts_say() {
-        let inside = [true, true, false, true, true, false];
-        let covered = |i: usize, _| [1.0, 0.75, 0.0][i % 3];
-        let outlines = Mask { width: 3, height: 2, inside: &inside, covered, shade: |_| None }.outlines();
+        let parts = [0.0, 1.0, 0.75, 0.0, 0.0];
+        let inside = |i: usize| (1..3).contains(&(i / 5)) && parts[i % 5] > 0.5;
+        let covered = |i: usize, _| if inside(i) { parts[i % 5] } else { 0.0 };
+        let outlines = outlines(&Mask { width: 5, inside, covered, shade: |_| None }, 20);
         let right = outlines[0].iter().fold(0.0_f64, |right, p| right.max(p[0]));
-        assert!((right - 1.75).abs() < 0.1, "{outlines:?}");
+        assert!((right - 2.75).abs() < 0.1, "{outlines:?}");
     }
 
     #[test]
     fn a_slanted_edge_is_one_line() {
-        let covered = |i: usize| (20.0 + ((i / 40) as f64 + 0.5) / 4.0 - (i % 40) as f64).clamp(0.0, 1.0);
-        let inside: Vec<bool> = (0..1600).map(|i| covered(i) >= 0.5).collect();
-        let mask =
-            Mask { width: 40, height: 40, inside: &inside, covered: |i, _| covered(i), shade: |_| None };
-        let outlines = mask.outlines();
+        let is_rim = |i: usize| [i % 40, i / 40].into_iter().any(|x| x == 0 || x == 39);
+        let covered = |i: usize, _| {
+            let part = (20.0 + ((i / 40) as f64 + 0.5) / 4.0 - (i % 40) as f64).clamp(0.0, 1.0);
+            if is_rim(i) { 0.0 } else { part }
+        };
+        let inside = |i: usize| covered(i, Part::Item) >= 0.5;
+        let outlines = outlines(&Mask { width: 40, inside, covered, shade: |_| None }, 1600);
         // The corners are cut; the edge itself has a corner at most.
         assert!(outlines.len() == 1 && outlines[0].len() <= 9, "{outlines:?}");
     }
@@ -219,11 +259,11 @@ mod tests {
     #[test]
     fn a_shade_ends_where_the_light_passes_its_limit() {
         let shade = |i: usize| 2.2 - ((i % 5) as f64 + 0.5);
-        let inside: Vec<bool> = (0..25).map(|i| shade(i) > 0.0).collect();
-        let covered = |i: usize, part| if part == Part::Item || inside[i] { 1.0 } else { 0.0 };
-        let mask = Mask { width: 5, height: 5, inside: &inside, covered, shade: |i| Some(shade(i)) };
-        // Down between the second and the third column.
-        let [x, y] = mask.crossing([2, 2], [0, 1]).at;
+        let inside = |i: usize| shade(i) > 0.0;
+        let covered = |i: usize, part| if part == Part::Item || inside(i) { 1.0 } else { 0.0 };
+        let mask = Mask { width: 5, inside, covered, shade: |i| Some(shade(i)) };
+        // Between the second and the third column.
+        let [x, y] = mask.crossing(11, 12).at;
         assert!((x - 2.2).abs() < 1e-9 && y == 2.5, "{x} {y}");
     }
 }

@@ -18,6 +18,8 @@ const ACROSS: [f64; 5] = [0.0, -0.4, 0.4, -0.8, 0.8];
 const SHORTEST: f64 = 2.0;
 /// How far from the end of a stem its dome is examined, in radii.
 const DOME: f64 = 0.6;
+/// Most of the steps along a thin stem at which only a part of its width may be hidden.
+const MOST_CUT: f64 = 0.2;
 /// Most of the places on a stem that may be hidden though it counts as one that nothing hides.
 const MOST_HIDDEN: f64 = 0.06;
 
@@ -42,9 +44,7 @@ struct Seen {
 impl Visible<'_> {
     /// Whether nothing hides a segment, but for its ends, and it looks like a stem. A segment that is hidden altogether is not visible.
     pub fn is_clear(&self, segment: &Segment) -> bool {
-        let [from, to] = [segment.start, segment.end].map(|p| self.style.fit.camera.project(p));
-        let length = (to - from).xy().norm() * self.style.pixels;
-        if length < SHORTEST * pixels_across(segment, self.style) {
+        if self.length(segment) < SHORTEST * pixels_across(segment, self.style) {
             return false;
         }
         let seen = self.seen(segment, &ACROSS);
@@ -53,6 +53,19 @@ impl Visible<'_> {
         let visible: usize = steps.iter().map(|(count, _)| count).sum();
         let all = steps.len() * ACROSS.len();
         (all - visible) as f64 <= MOST_HIDDEN * all as f64
+    }
+
+    /// The length that a segment has in the picture, in pixels of the page.
+    pub fn length(&self, segment: &Segment) -> f64 {
+        let [from, to] = [segment.start, segment.end].map(|p| self.style.fit.camera.project(p));
+        (to - from).xy().norm() * self.style.pixels
+    }
+
+    /// Whether what hides a thin segment hides its whole width, but for a few places: its visible parts are then strokes.
+    pub fn is_cut_across(&self, segment: &Segment) -> bool {
+        let seen = self.seen(segment, &ACROSS);
+        let cut = |(count, _): &&(usize, bool)| (1..ACROSS.len()).contains(count);
+        seen.steps.iter().filter(cut).count() as f64 <= MOST_CUT * seen.steps.len() as f64
     }
 
     /// The parts of a segment that nothing hides, and the shapes of their ends: those of the segment where they are its own. A wide

@@ -4,19 +4,18 @@ use std::collections::{HashMap, HashSet};
 
 use super::regions::{COVERED, NOTHING, Regions, Sample};
 use crate::formats::png::Lit;
-use crate::raster::SIXTEEN;
 use crate::raster::cells::{self, Nearest};
+use crate::raster::{Pattern, SIXTEEN};
 use crate::triangles::Triangles;
 use dlsys_geometry::scene::{MaterialId, OwnerId};
 
 /// Shades between black and a colour as it is.
 const SHADES: f64 = 20.0;
 
-/// A region: cells of one module, one material and one shade.
+/// A region: cells of one item and one shade.
 pub struct Shade {
-    pub owner: OwnerId,
-    pub material: MaterialId,
-    /// The shade, in steps of 1/[`SHADES`].
+    pub item: Item,
+    /// The shade, in steps of 1/[`SHADES`]; 0 for all of a stem that is painted with a gradient.
     step: i32,
     /// The sum of the strengths of light in its cells, and their number.
     sum: f64,
@@ -24,8 +23,8 @@ pub struct Shade {
 }
 
 impl Shade {
-    fn key(&self) -> (OwnerId, MaterialId, i32) {
-        (self.owner, self.material, self.step)
+    fn key(&self) -> (Item, i32) {
+        (self.item, self.step)
     }
 
     /// The mean strength of light in its cells.
@@ -35,49 +34,72 @@ impl Shade {
 }
 
 /// A module and a material.
-pub type Item = (OwnerId, MaterialId);
+pub type Look = (OwnerId, MaterialId);
+
+/// What is painted at once: all of one look, or of that a segment which is painted with a gradient.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Item {
+    pub look: Look,
+    pub stem: Option<u32>,
+}
+
+/// The stems that are not painted by their shades: the looks that will be drawn as strokes over everything else, and the segments that
+/// are painted with gradients.
+#[derive(Default)]
+pub struct Stems {
+    pub strokes: HashSet<Look>,
+    pub gradients: HashSet<u32>,
+}
+
+impl Stems {
+    /// The item of a triangle; `None` if that is a part of a stroke.
+    fn item(&self, mesh: &Triangles, n: usize) -> Option<Item> {
+        let face = &mesh.faces[n];
+        let look = (face.owner, face.material);
+        let segment = mesh.segments.get(face.surface as usize).copied().flatten();
+        let stem = segment.filter(|segment| self.gradients.contains(segment));
+        (segment.is_none() || !self.strokes.contains(&look)).then_some(Item { look, stem })
+    }
+}
 
 /// The number of the nearest triangle in the middle of each cell plus 1, or 0; and its depth.
 pub fn nearest(mesh: &Triangles, lit: &Lit, [width, height]: [usize; 2]) -> Nearest<1> {
     let count = mesh.faces.len();
-    cells::nearest(&cells::MIDDLE, [width, height], count, |n| lit.corners(n), width * height, |cell| cell)
+    let triangles = (count, |n| lit.corners(n));
+    cells::nearest(&cells::MIDDLE, [width, height], triangles, (width * height, |cell| cell), |_| true)
 }
 
-/// The raster of regions, and their shades by number. Regions are painted in the order of modules, materials and shades; `strokes` are the
-/// items that will be drawn over them.
+/// The raster of regions, and their shades by number. Regions are painted in the order of modules, materials and shades.
+/// Of cells finer than pixels edges have fewer samples.
 pub fn label(
     mesh: &Triangles,
     lit: &Lit,
     numbers: &[[u32; 1]],
     [width, height]: [usize; 2],
-    strokes: &HashSet<Item>,
+    stems: &Stems,
+    is_fine: bool,
 ) -> (Regions, Vec<Shade>) {
-    let corners = |n: usize| lit.corners(n);
     // Regions are numbered as they are found, then in the order of painting.
-    let mut weights = cells::Weights::default();
     let mut shades: Vec<Shade> = Vec::new();
-    let mut known: HashMap<(OwnerId, MaterialId, i32), u32> = HashMap::new();
+    let mut known: HashMap<(Item, i32), u32> = HashMap::new();
     let mut last = None;
     let mut labels = vec![NOTHING; numbers.len()];
-    let strengths = strengths(lit, numbers, width);
-    let mut at_strokes = (usize::MAX, false);
+    let item_of: Vec<Option<Item>> = (0..mesh.faces.len()).map(|n| stems.item(mesh, n)).collect();
+    let has_shades = |n: usize| item_of[n].is_some_and(|item| item.stem.is_none());
+    let strengths = strengths(lit, numbers, width, has_shades);
     for (cell, label) in labels.iter_mut().enumerate() {
         let Some(n) = (numbers[cell][0] as usize).checked_sub(1) else { continue };
-        if at_strokes.0 != n {
-            at_strokes = (n, strokes.contains(&(mesh.faces[n].owner, mesh.faces[n].material)));
-        }
-        if at_strokes.1 {
+        let Some(item) = item_of[n] else {
             *label = COVERED;
             continue;
-        }
+        };
         let strength = f64::from(strengths[cell]);
-        let (owner, material) = (mesh.faces[n].owner, mesh.faces[n].material);
         let step = step_of(strength);
-        let key = (owner, material, step);
+        let key = (item, step);
         let number = match last {
             Some((same, number)) if same == key => number,
             _ => *known.entry(key).or_insert_with(|| {
-                shades.push(Shade { owner, material, step, sum: 0.0, count: 0 });
+                shades.push(Shade { item, step, sum: 0.0, count: 0 });
                 shades.len() as u32 - 1
             }),
         };
@@ -86,6 +108,7 @@ pub fn label(
         (shade.sum, shade.count) = (shade.sum + strength, shade.count + 1);
         *label = number;
     }
+    clear_rim(&mut labels, width);
     let mut order: Vec<u32> = (0..shades.len() as u32).collect();
     order.sort_by_key(|number| shades[*number as usize].key());
     let mut ranks = vec![0; order.len()];
@@ -95,63 +118,111 @@ pub fn label(
 
     let (items, of_item) = items(&shades);
     let (places, chosen) = edges(&labels, &items, &shades, width);
-    let place = |cell: usize| places[cell] as usize;
-    let seen = cells::nearest(&SIXTEEN, [width, height], mesh.faces.len(), corners, chosen, place).numbers;
-    let sample = |number: u32, cell: usize, weights: &mut cells::Weights| {
-        let Some(n) = (number as usize).checked_sub(1) else { return Sample { item: NOTHING, step: 0 } };
-        let item = (mesh.faces[n].owner, mesh.faces[n].material);
-        match of_item.get(&item) {
-            Some(&item) => {
-                let weights = weights.at(n, || corners(n), [cell % width, cell / width]);
-                Sample { item, step: step_of(lit.strength(n, weights)) }
+    let at_edges = Edges { lit, numbers, width, height, places: &places, count: chosen };
+    // Faces of one item follow one another.
+    let mut last = (None, NOTHING);
+    let face_items: Vec<(u32, bool)> = (item_of.iter())
+        .map(|item| {
+            let Some(known) = item else { return (COVERED, false) };
+            if last.0 != *item {
+                last = (*item, of_item.get(known).copied().unwrap_or(NOTHING));
             }
-            None => Sample { item: if strokes.contains(&item) { COVERED } else { NOTHING }, step: 0 },
-        }
+            (last.1, known.stem.is_none())
+        })
+        .collect();
+    let samples = match is_fine {
+        true => at_edges.samples(&cells::EIGHT, &face_items),
+        false => at_edges.samples(&SIXTEEN, &face_items),
     };
-    let cells = (0..labels.len()).filter(|cell| place(*cell) < chosen);
-    let mut samples = Vec::with_capacity(chosen);
-    for (cell, numbers) in cells.zip(&seen) {
-        let mut last = (numbers[0], sample(numbers[0], cell, &mut weights));
-        samples.push(numbers.map(|number| {
-            if last.0 != number {
-                last = (number, sample(number, cell, &mut weights));
-            }
-            last.1
-        }));
-    }
+    let per_cell = if is_fine { cells::EIGHT.len() } else { SIXTEEN.len() };
     let least = shades.iter().map(|shade| (f64::from(shade.step) - 0.5) / SHADES).collect();
     let steps = shades.iter().map(|shade| shade.step).collect();
-    (Regions { width, height, labels, places, samples, items, steps, strengths, least }, shades)
+    (Regions { width, labels, places, samples, per_cell, items, steps, strengths, least }, shades)
 }
 
-/// The strengths of light in the middles of cells. Between two cells of one triangle it is their mean.
-fn strengths(lit: &Lit, numbers: &[[u32; 1]], width: usize) -> Vec<f32> {
-    let mut weights = cells::Weights::default();
+/// Cells at the edges of items and at creases: those that have a place below `count`.
+struct Edges<'a> {
+    lit: &'a Lit<'a>,
+    /// The nearest triangle in the middle of each cell, by number plus 1.
+    numbers: &'a [[u32; 1]],
+    width: usize,
+    height: usize,
+    places: &'a [u32],
+    count: usize,
+}
+
+impl Edges<'_> {
+    /// What is seen at the samples of these cells, one cell after another. Of each triangle its item is given, and whether it has shades.
+    fn samples<const N: usize>(&self, pattern: &Pattern<N>, items: &[(u32, bool)]) -> Vec<Sample> {
+        let place = |cell: usize| self.places[cell] as usize;
+        let corners = |n: usize| self.lit.corners(n);
+        let mut in_front = vec![false; items.len() + 1];
+        self.numbers.iter().for_each(|[number]| in_front[*number as usize] = true);
+        let (triangles, size) = ((items.len(), corners), [self.width, self.height]);
+        let seen = cells::nearest(pattern, size, triangles, (self.count, place), |n| in_front[n + 1]).numbers;
+        let sample = |number: u32, cell: usize| {
+            let Some(n) = (number as usize).checked_sub(1) else { return Sample { item: NOTHING, step: 0 } };
+            let (item, has_shades) = items[n];
+            if item >= COVERED || !has_shades {
+                return Sample { item, step: 0 };
+            }
+            let weights = cells::weights(corners(n), [cell % self.width, cell / self.width]);
+            Sample { item, step: step_of(self.lit.strength(n, weights)) }
+        };
+        let mut samples = Vec::with_capacity(self.count * N);
+        let mut known: Vec<(u32, Sample)> = Vec::with_capacity(N);
+        let cells = (0..self.places.len()).filter(|cell| place(*cell) < self.count);
+        for (cell, numbers) in cells.zip(&seen) {
+            known.clear();
+            samples.extend(numbers.map(|number| match known.iter().find(|known| known.0 == number) {
+                Some(&(_, sample)) => sample,
+                None => {
+                    known.push((number, sample(number, cell)));
+                    known[known.len() - 1].1
+                }
+            }));
+        }
+        samples
+    }
+}
+
+/// Leaves the cells around a raster empty: none of them is in the picture.
+fn clear_rim(labels: &mut [u32], width: usize) {
+    let last = labels.len().saturating_sub(width);
+    labels[last..].fill(NOTHING);
+    for row in labels.chunks_mut(width) {
+        (row[0], row[width - 1]) = (NOTHING, NOTHING);
+    }
+    labels[..width].fill(NOTHING);
+}
+
+/// The strengths of light in the middles of cells whose triangles have shades, else 0. Between two cells of one triangle it is their mean.
+fn strengths(lit: &Lit, numbers: &[[u32; 1]], width: usize, has_shades: impl Fn(usize) -> bool) -> Vec<f32> {
     let mut strengths = vec![0.0_f32; numbers.len()];
-    let exact = |cell: usize, n: u32, weights: &mut cells::Weights| {
-        let n = n as usize - 1;
-        lit.strength(n, weights.at(n, || lit.corners(n), [cell % width, cell / width])) as f32
-    };
+    let height = numbers.len() / width.max(1);
     // Rows with even numbers first, then those between.
-    for (first, apart) in [(0, 1), (width, width)] {
-        for row in (first..numbers.len()).step_by((2 * width).max(1)) {
+    for first in [0, 1] {
+        for y in (first..height).step_by(2) {
+            let apart = if first == 0 { 1 } else { width };
             for offset in [0, 1] {
                 // Of an even row every second cell lies between two; of an odd row all do.
-                for cell in (row + offset..row + width).step_by(2) {
+                for x in (offset..width).step_by(2) {
+                    let cell = y * width + x;
                     let n = numbers[cell][0];
-                    if n == 0 {
+                    if n == 0 || !has_shades(n as usize - 1) {
                         continue;
                     }
-                    let is_between = apart > 1 || offset == 1;
-                    let after = cell + apart;
-                    let both = is_between
-                        && (apart > 1 || after < row + width)
-                        && after < numbers.len()
-                        && numbers[cell - apart][0] == n
-                        && numbers[after][0] == n;
+                    let is_between = match first {
+                        0 => offset == 1 && x + 1 < width,
+                        _ => y + 1 < height,
+                    };
+                    let both = is_between && numbers[cell - apart][0] == n && numbers[cell + apart][0] == n;
                     strengths[cell] = match both {
-                        true => (strengths[cell - apart] + strengths[after]) / 2.0,
-                        false => exact(cell, n, &mut weights),
+                        true => (strengths[cell - apart] + strengths[cell + apart]) / 2.0,
+                        false => {
+                            let n = n as usize - 1;
+                            lit.strength(n, cells::weights(lit.corners(n), [x, y])) as f32
+                        }
                     };
                 }
             }
@@ -170,7 +241,7 @@ fn items(shades: &[Shade]) -> (Vec<u32>, HashMap<Item, u32>) {
     let mut numbers: HashMap<Item, u32> = HashMap::new();
     let number = |shade: &Shade| {
         let next = numbers.len() as u32;
-        *numbers.entry((shade.owner, shade.material)).or_insert(next)
+        *numbers.entry(shade.item).or_insert(next)
     };
     let items = shades.iter().map(number).collect();
     (items, numbers)
@@ -189,13 +260,12 @@ fn edges(labels: &[u32], items: &[u32], shades: &[Shade], width: usize) -> (Vec<
             (places[a], places[b]) = (0, 0);
         }
     };
-    for cell in 0..labels.len() {
-        if cell % width > 0 {
-            mark(cell - 1, cell);
-        }
-        if cell >= width {
-            mark(cell - width, cell);
-        }
+    // The cells around the raster are empty, so the first of a row may be compared with the last of the row before.
+    for cell in 1..labels.len() {
+        mark(cell - 1, cell);
+    }
+    for cell in width..labels.len() {
+        mark(cell - width, cell);
     }
     let mut count = 0;
     for place in places.iter_mut().filter(|place| **place == 0) {

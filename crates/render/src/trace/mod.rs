@@ -30,15 +30,19 @@ use super::triangles::{self, Triangles};
 use contour::Corner;
 use dlsys_geometry::scene::{Face, OwnerId, Scene, Segment};
 use hidden::Visible;
-use label::Item;
+use label::{Look, Stems};
 
 /// Cells for each pixel of the page, along a side.
 const CELLS_PER_PIXEL: f64 = 2.0;
 /// Least and most cells on the larger side of a picture.
 const LEAST_CELLS: f64 = 1000.0;
 const MOST_CELLS: f64 = 4000.0;
+/// A scene of so few triangles has no small parts, so one cell for each pixel of the page is enough.
+const PLAIN: usize = 2000;
 /// Stems wider than this many pixels of the page are regions, because their bends and domes have shades of their own.
 const WIDEST_STROKE: f64 = 16.0;
+/// A stem whose visible length is less than this many widths is painted by its shades: its ends are much of it.
+const SHORTEST_GRADIENT: f64 = 1.0;
 /// Stems thinner than this many pixels of the page hide nothing: between the middles of cells they would have gaps.
 const LEAST_PIXELS: f64 = 1.5;
 
@@ -46,10 +50,16 @@ const LEAST_PIXELS: f64 = 1.5;
 pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -> String {
     let [left, bottom, width, height] = style.fit.picture.area;
     let larger = width.max(height);
-    let cell = larger / (CELLS_PER_PIXEL * larger * style.pixels).clamp(LEAST_CELLS, MOST_CELLS);
-    let [a, b, c] = [1.0 / cell, -left / cell, (bottom + height) / cell];
+    let cell_of = |per_pixel: f64| {
+        let least = LEAST_CELLS * per_pixel / CELLS_PER_PIXEL;
+        larger / (per_pixel * larger * style.pixels).clamp(least, MOST_CELLS)
+    };
+    let finest = cell_of(CELLS_PER_PIXEL);
     let has_triangles = |segment: &Segment| pixels_across(segment, style) >= LEAST_PIXELS;
-    let mesh = triangles::triangles(scene, style.fit, sides(scene, style.fit, a), has_triangles);
+    let mesh = triangles::triangles(scene, style.fit, sides(scene, style.fit, 1.0 / finest), has_triangles);
+    let is_fine = mesh.faces.len() > PLAIN;
+    let cell = if is_fine { finest } else { cell_of(1.0) };
+    let [a, b, c] = [1.0 / cell, -left / cell, (bottom + height) / cell];
     let mut lit = Lit::new(scene, &mesh, style.fit, [a, b, c], style.floor);
     // Of the raster only the part in which something is drawn.
     let [low, size] = drawn(&mesh, &lit, [width, height].map(|side| (side / cell).ceil().max(1.0)));
@@ -58,8 +68,8 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
     let size = size.map(|side| side as usize);
     let nearest = label::nearest(&mesh, &lit, size);
     let mut visible = Visible { style, depths: &nearest.depths, labels: &[], size, placement };
-    let strokes = strokes(scene, style, &visible);
-    let (mut regions, shades) = label::label(&mesh, &lit, &nearest.numbers, size, &strokes);
+    let stems = stems(scene, style, &visible, lit.lighting().is_declared());
+    let (mut regions, shades) = label::label(&mesh, &lit, &nearest.numbers, size, &stems, is_fine);
     regions.without_specks();
     let outlines = regions.outlines(shades.len());
     visible.labels = &regions.labels;
@@ -69,12 +79,22 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
     let to_page = |[x, y]: Corner| [origin[0] + x * unit, origin[1] + y * unit];
     // A quarter of a cell.
     let decimals = (-(unit / 4.0).log10()).ceil().clamp(0.0, 6.0) as usize;
+    let is_stroke = |segment: &Segment| {
+        stems.strokes.contains(&(segment.owner, segment.material))
+            || pixels_across(segment, style) < LEAST_PIXELS
+    };
+    let parted = |a: usize, b: usize| is_stroke(&scene.segments[a]) && is_stroke(&scene.segments[b]);
+    let mut strokes = Strokes::new(scene, style, prefix, parted).lit(lit.lighting());
     let mut paths: Vec<(OwnerId, String)> = Vec::new();
     for (shade, outlines) in shades.iter().zip(&outlines).filter(|(_, outlines)| !outlines.is_empty()) {
-        let color = lit.color(scene, shade.material, shade.strength(), style.background);
+        let (owner, material) = shade.item.look;
+        let fill = match shade.item.stem.and_then(|stem| scene.segments.get(stem as usize)) {
+            Some(segment) => strokes.fill(segment),
+            None => lit.color(scene, material, shade.strength(), style.background).to_string(),
+        };
         let mut data = String::new();
         outlines.iter().for_each(|outline| push_outline(&mut data, outline, to_page, decimals));
-        paths.push((shade.owner, format!("<path fill=\"{color}\" d=\"{data}\"/>")));
+        paths.push((owner, format!("<path fill=\"{fill}\" d=\"{data}\"/>")));
     }
     let mut page = PageWriter {
         style,
@@ -83,10 +103,12 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
         out: String::new(),
     };
     page.groups(&paths);
-    page.with_strokes(scene, &strokes, &visible, prefix)
+    let order = (0..scene.segments.len()).filter(|i| is_stroke(&scene.segments[*i])).collect();
+    page.with_strokes(scene, order, strokes, &visible)
 }
 
-/// The rectangle of cells that triangles touch, within a picture of this size: its first column and row, and its size.
+/// The rectangle of cells that triangles touch, within a picture of this size, and a cell around it, which may be outside of the picture:
+/// its first column and row, and its size.
 fn drawn(mesh: &Triangles, lit: &Lit, size: [f64; 2]) -> [[f64; 2]; 2] {
     let (mut low, mut high) = (size, [0.0; 2]);
     for corner in (0..mesh.faces.len()).flat_map(|n| lit.corners(n)) {
@@ -95,14 +117,16 @@ fn drawn(mesh: &Triangles, lit: &Lit, size: [f64; 2]) -> [[f64; 2]; 2] {
             high[k] = at.max(high[k]);
         }
     }
-    let low = [0, 1].map(|k| (low[k].floor() - 1.0).clamp(0.0, size[k] - 1.0));
-    let high = [0, 1].map(|k| (high[k].ceil() + 1.0).clamp(low[k] + 1.0, size[k]));
+    let low = [0, 1].map(|k| low[k].floor().clamp(0.0, size[k] - 1.0) - 1.0);
+    let high = [0, 1].map(|k| high[k].ceil().clamp(low[k] + 2.0, size[k]) + 1.0);
     [low, [0, 1].map(|k| high[k] - low[k])]
 }
 
-/// The modules and materials that are strokes: all stems of theirs are thin, or nothing hides them; and they have nothing but stems.
-fn strokes(scene: &Scene, style: Style, visible: &Visible) -> HashSet<Item> {
-    let mut strokes: HashSet<Item> = scene.segments.iter().map(|s| (s.owner, s.material)).collect();
+/// The looks that are strokes: all stems of theirs are thin, or nothing hides them; and they have nothing but stems. And the other stems
+/// that are painted with gradients. The light of a declared sun changes along a stem, too, so there only thin ones are strokes.
+fn stems(scene: &Scene, style: Style, visible: &Visible, is_declared: bool) -> Stems {
+    let widest = if is_declared { LEAST_PIXELS } else { WIDEST_STROKE };
+    let mut strokes: HashSet<Look> = scene.segments.iter().map(|s| (s.owner, s.material)).collect();
     for polygon in &scene.polygons {
         strokes.remove(&(polygon.owner, polygon.material));
     }
@@ -112,14 +136,31 @@ fn strokes(scene: &Scene, style: Style, visible: &Visible) -> HashSet<Item> {
             strokes.remove(&(surface.owner, material(&run[0])));
         }
     }
-    for segment in scene.segments.iter().filter(|segment| !is_thin(segment, style)) {
-        let item = (segment.owner, segment.material);
-        let is_wide = pixels_across(segment, style) > WIDEST_STROKE;
-        if strokes.contains(&item) && (segment.contour.is_some() || is_wide || !visible.is_clear(segment)) {
-            strokes.remove(&item);
+    let is_wide = |segment: &Segment| pixels_across(segment, style) > widest;
+    for segment in &scene.segments {
+        let look = (segment.owner, segment.material);
+        let pixels = pixels_across(segment, style);
+        if pixels < LEAST_PIXELS || !strokes.contains(&look) {
+            continue;
+        }
+        let is_whole = || match is_thin(segment, style) {
+            true => visible.is_cut_across(segment),
+            false => visible.is_clear(segment),
+        };
+        if segment.contour.is_some() || is_wide(segment) || !is_whole() {
+            strokes.remove(&look);
         }
     }
-    strokes
+    let has_gradient = |segment: &Segment| {
+        let pixels = pixels_across(segment, style);
+        !strokes.contains(&(segment.owner, segment.material))
+            && segment.contour.is_none()
+            && (LEAST_PIXELS..=widest).contains(&pixels)
+            && visible.length(segment) >= SHORTEST_GRADIENT * pixels
+    };
+    let gradients = (0..).zip(&scene.segments).filter(|(_, segment)| has_gradient(segment));
+    let gradients = gradients.map(|(i, _)| i).collect();
+    Stems { strokes, gradients }
 }
 
 /// Appends a closed outline to path data, in relative coordinates of so many decimals.
@@ -202,23 +243,15 @@ impl PageWriter<'_> {
         }
     }
 
-    /// Adds the visible parts of stems that are strokes, from back to front, and completes the elements.
+    /// Adds the visible parts of stems that are strokes, by number, from back to front, and completes the elements.
     fn with_strokes(
         mut self,
         scene: &Scene,
-        items: &HashSet<Item>,
+        mut order: Vec<usize>,
+        mut strokes: Strokes,
         visible: &Visible,
-        prefix: &str,
     ) -> String {
         let style = self.style;
-        let is_stroke = |segment: &Segment| {
-            items.contains(&(segment.owner, segment.material)) || pixels_across(segment, style) < LEAST_PIXELS
-        };
-        let mut strokes = Strokes::new(scene, style, prefix, |a, b| {
-            is_stroke(&scene.segments[a]) && is_stroke(&scene.segments[b])
-        });
-        let mut order: Vec<usize> =
-            (0..scene.segments.len()).filter(|i| is_stroke(&scene.segments[*i])).collect();
         let depth = |i: usize| {
             let segment = &scene.segments[i];
             style.fit.camera.project(nalgebra::center(&segment.start, &segment.end)).z

@@ -30,6 +30,8 @@ impl Walk<'_> {
             }
         };
         let bend = Bend::new(heading, self.target, self.state.strength).filter(|_| length != 0.0);
+        let is_curved = bend.is_some() || strain.is_some_and(|strain| strain != Vector::zeros());
+        self.scene.lacked_accuracy |= is_curved && self.scene.accuracy <= 0.0;
         if let Some(bend) = bend {
             let mut pieces = bend.pieces(length, self.scene.accuracy);
             if let Some(strain) = strain {
@@ -89,23 +91,23 @@ impl Walk<'_> {
             }
         };
         let key = StemKey::of(module, number);
-        if let Some(recorder) = &mut self.recorder {
-            if self.state.joined.is_none() {
-                let (start, axes) = (self.state.position, self.state.frame.vectors());
-                recorder.stems.push(Stem {
-                    key,
-                    parent: self.state.stem,
-                    depth: self.depth,
-                    start,
-                    axes,
-                    end: start,
-                    end_axes: axes,
-                    length: 0.0,
-                    width,
-                    tissue,
-                });
-                self.state.stem = Some(recorder.stems.len() - 1);
-            }
+        if let Some(recorder) = &mut self.recorder
+            && self.state.joined.is_none()
+        {
+            let (start, axes) = (self.state.position, self.state.frame.vectors());
+            recorder.stems.push(Stem {
+                key,
+                parent: self.state.stem,
+                depth: self.depth,
+                start,
+                axes,
+                end: start,
+                end_axes: axes,
+                length: 0.0,
+                width,
+                tissue,
+            });
+            self.state.stem = Some(recorder.stems.len() - 1);
         }
         self.state.joined = Some(number);
         Ok(Some(self.strains.map_or_else(Vector::zeros, |strains| strains.strain(key))))

@@ -40,14 +40,16 @@ impl Walk<'_> {
         let (Width::Set(from), Width::Set(to)) = (segment.widths[1], self.state.width) else { return };
         let (thin, thick) = (from.min(to), from.max(to));
         let accuracy = self.scene.accuracy;
-        let seen = accuracy > 0.0 && thick - thin > VISIBLE * accuracy && thin > 0.0 && thick > RATIO * thin;
+        let is_step = thin > 0.0 && thick > RATIO * thin && segment.material == material;
+        let seen = is_step && accuracy > 0.0 && thick - thin > VISIBLE * accuracy;
+        self.scene.lacked_accuracy |= is_step && accuracy <= 0.0 && self.state.set_by.is_some();
         // A drawing that sets the width more than once is a shape with steps.
         let shaped = |inside: Option<(usize, KindId)>| {
             let Some((index, _)) = inside else { return false };
             let sets = |kind: &KindId| self.model.kinds.get(*kind).base() == "!";
             self.model.interpretations[index].drawn.kinds().filter(sets).count() > 1
         };
-        if let Some((inside, drawn)) = self.state.set_by.filter(|_| seen && segment.material == material)
+        if let Some((inside, drawn)) = self.state.set_by.filter(|_| seen)
             && !shaped(inside)
             && self.remarks.steps_are_new(inside, drawn.kind)
         {

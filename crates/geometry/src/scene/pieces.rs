@@ -1,0 +1,130 @@
+//! How many pieces the edges and the grid of a patch have, by accuracy.
+
+use super::Point;
+use super::patch::{Net, column, slopes, sum, weights};
+
+/// Most pieces along an edge.
+pub(super) const FINEST: usize = 64;
+/// Parameters at which second derivatives of patches for pictures are taken: the middles of the first, the middle and the last of about four
+/// pieces.
+const PROBES: [f64; 3] = [0.125, 0.5, 0.875];
+/// Between the probes derivatives may be larger: the part of them that is found there.
+const CAUTION: f64 = 0.75;
+
+/// The numbers of pieces that an edge may have.
+#[derive(Clone, Copy)]
+pub(super) enum Steps {
+    /// Powers of two: few numbers, so that the mesh of a growing patch does not change all the time. Deviations have strict bounds.
+    Powers,
+    /// Any, so that there are no more triangles than the accuracy asks for: for pictures. Deviations within the patch are estimated from second
+    /// derivatives at a few places.
+    Whole,
+}
+
+impl Steps {
+    /// The least number of pieces whose square is at least this.
+    fn pieces(self, square: f64) -> usize {
+        if let Steps::Whole = self {
+            return (square.sqrt().ceil() as usize).clamp(1, FINEST);
+        }
+        let mut n = 1;
+        while n < FINEST && ((n * n) as f64) < square {
+            n *= 2;
+        }
+        n
+    }
+
+    /// Pieces of an edge: a chord over 1/n deviates by 1/8 of the second derivative over n².
+    pub(super) fn of_edge(self, edge: &[Point; 4], accuracy: f64) -> usize {
+        let second = [0, 1].map(|i| edge[i].coords - 2.0 * edge[i + 1].coords + edge[i + 2].coords);
+        // A cubic's second derivative is at most 6 times its second differences.
+        let bend = second[0].norm().max(second[1].norm());
+        self.pieces(6.0 * bend / (8.0 * accuracy))
+    }
+
+    /// Pieces along rows (from column to column) and along columns that keep the whole patch accurate, as few as will do.
+    pub(super) fn of_grid(self, net: &Net, accuracy: f64) -> (usize, usize) {
+        match self {
+            Steps::Powers => powers(strict_derivatives(net), accuracy),
+            Steps::Whole => fewest(estimated_derivatives(net), accuracy),
+        }
+    }
+}
+
+/// The greatest second derivatives at the probes and a little more, or their bounds: along rows, mixed, along columns.
+fn estimated_derivatives(net: &Net) -> [f64; 3] {
+    let mut greatest = [0.0_f64; 3];
+    let at = PROBES.map(|t| (weights(t), slopes(t), bends(t)));
+    for (values_u, slopes_u, bends_u) in &at {
+        for (values_v, slopes_v, bends_v) in &at {
+            let second = [
+                sum(net, *bends_u, *values_v),
+                sum(net, *slopes_u, *slopes_v),
+                sum(net, *values_u, *bends_v),
+            ];
+            for (greatest, second) in greatest.iter_mut().zip(second) {
+                *greatest = greatest.max(second.norm());
+            }
+        }
+    }
+    let bounds = strict_derivatives(net);
+    [0, 1, 2].map(|k| bounds[k].min(greatest[k] / CAUTION))
+}
+
+/// The second derivatives of Bernstein's polynomials of degree three.
+fn bends(t: f64) -> [f64; 4] {
+    let s = 1.0 - t;
+    [6.0 * s, 6.0 * t - 12.0 * s, 6.0 * s - 12.0 * t, 6.0 * t]
+}
+
+/// Bounds of the second derivatives: along rows, mixed, along columns.
+fn strict_derivatives(net: &Net) -> [f64; 3] {
+    let bend = |p: &[Point; 4]| {
+        let second = |i: usize| (p[i].coords - 2.0 * p[i + 1].coords + p[i + 2].coords).norm();
+        second(0).max(second(1))
+    };
+    let along = |of: &dyn Fn(usize) -> [Point; 4]| (0..4).map(|i| bend(&of(i))).fold(0.0, f64::max);
+    let twist = (0..9)
+        .map(|i| {
+            let (r, c) = (i / 3, i % 3);
+            ((net[r + 1][c + 1] - net[r + 1][c]) - (net[r][c + 1] - net[r][c])).norm()
+        })
+        .fold(0.0, f64::max);
+    [6.0 * along(&|r| net[r]), 9.0 * twist, 6.0 * along(&|c| column(net, c))]
+}
+
+/// The fewest pieces of any number.
+fn fewest([uu, uv, vv]: [f64; 3], accuracy: f64) -> (usize, usize) {
+    // For each number of rows the least number of columns: where a quadratic in one over it is zero.
+    let columns = |rows: usize| {
+        let v = rows as f64;
+        let (half, rest) = (uv / v, 8.0 * accuracy - vv / (v * v));
+        let root = half + (half * half + uu * rest).sqrt();
+        let columns = if root > 0.0 { root / rest } else { 1.0 };
+        (rest > 0.0 && columns <= FINEST as f64).then(|| ((columns.ceil() as usize).max(1), rows))
+    };
+    let mut best: Option<(usize, usize)> = None;
+    for rows in 1..=FINEST {
+        if best.is_some_and(|(columns, best)| rows > columns * best) {
+            break;
+        }
+        let key = |(columns, rows): (usize, usize)| (columns * rows, columns.abs_diff(rows));
+        if let Some(pair) = columns(rows).filter(|pair| best.is_none_or(|best| key(*pair) < key(best))) {
+            best = Some(pair);
+        }
+    }
+    best.unwrap_or((FINEST, FINEST))
+}
+
+/// The fewest pieces that are powers of two.
+fn powers([uu, uv, vv]: [f64; 3], accuracy: f64) -> (usize, usize) {
+    let exponents = 0..=FINEST.trailing_zeros();
+    let pairs = exponents.clone().flat_map(|i| exponents.clone().map(move |j| (1_usize << i, 1_usize << j)));
+    pairs
+        .filter(|&(columns, rows)| {
+            let (u, v) = (columns as f64, rows as f64);
+            uu / (u * u) + 2.0 * uv / (u * v) + vv / (v * v) <= 8.0 * accuracy
+        })
+        .min_by_key(|(columns, rows)| (columns * rows, columns.abs_diff(*rows)))
+        .unwrap_or((FINEST, FINEST))
+}

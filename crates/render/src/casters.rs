@@ -1,0 +1,244 @@
+//! What casts shadows: all triangles and thin stems of a scene and of the plants of other models in it, a batch at a time.
+//!
+//! Plants share drafts as in a picture ([`Stage`](super::stage::Stage)). A draft is made, all plants that share it are passed on, and it is dropped
+//! again: only [`KEPT`] triangles of drafts and one [`BATCH`] are in memory, however many plants there are. The order does not matter to
+//! shadow maps, which keep the nearest.
+
+use std::collections::HashMap;
+
+use super::Fit;
+use super::draft::{Detail, Draft};
+use super::triangles::Triangle;
+use dlsys_geometry::scene::{MaterialId, Placement, Point, Scene, Vector};
+
+/// Triangles and thin stems in a batch.
+const BATCH: usize = 1 << 16;
+/// Most triangles of drafts that are kept from the measuring of the scene to its shadows; the others are made twice.
+const KEPT: usize = 2_000_000;
+
+/// Triangles and thin stems, relative to the middle of the box around everything.
+#[derive(Default)]
+pub(super) struct Batch {
+    pub(super) triangles: Vec<[[f32; 3]; 3]>,
+    /// Ends and radii.
+    pub(super) lines: Vec<([[f32; 3]; 2], [f32; 2])>,
+}
+
+/// Plants that look the same, or the scene itself.
+struct Group<'s> {
+    scene: &'s Scene,
+    default_width: f64,
+    /// Pixels for a unit of the plant.
+    scale: f64,
+    /// `None`: the scene's own coordinates.
+    places: Vec<Option<Placement>>,
+}
+
+/// All that casts shadows in a frame.
+pub(super) struct Casters<'s> {
+    fit: &'s Fit,
+    scale: f64,
+    /// Of the scene's own elements, those of this material cast no shadows.
+    without: Option<MaterialId>,
+    groups: Vec<Group<'s>>,
+    numbers: HashMap<(*const Scene, i32), usize>,
+    /// By group, if it is kept.
+    drafts: Vec<Option<Draft<'s>>>,
+    middle: Vector,
+    half: Vector,
+    count: usize,
+}
+
+impl<'s> Casters<'s> {
+    /// All that a scene has, but for what is of a material of its own, at so many pixels for a scene unit; plants as coarse as they are seen
+    /// with `scale_at` pixels.
+    pub(super) fn new(
+        scene: &'s Scene,
+        fit: &'s Fit,
+        scale: f64,
+        scale_at: impl Fn(Point) -> f64,
+        without: Option<MaterialId>,
+    ) -> Casters<'s> {
+        let own = Group { scene, default_width: fit.default_width, scale, places: vec![None] };
+        let mut casters = Casters {
+            fit,
+            scale,
+            without,
+            groups: vec![own],
+            numbers: HashMap::new(),
+            drafts: Vec::new(),
+            middle: Vector::zeros(),
+            half: Vector::zeros(),
+            count: 0,
+        };
+        casters.gather(scene, None, &scale_at);
+        casters.measure();
+        casters
+    }
+
+    /// Sorts the plants of a scene in its place into groups. Recursion is bounded by the depth of plants in plants.
+    fn gather(&mut self, scene: &'s Scene, place: Option<&Placement>, scale_at: &dyn Fn(Point) -> f64) {
+        for plant in &scene.plants {
+            let Some([low, high]) = plant.bounds() else { continue };
+            let placement = match place {
+                None => plant.placement,
+                Some(outer) => plant.placement.within(outer),
+            };
+            // A plant behind the viewer is seen by its shadow only.
+            let seen =
+                Some(scale_at(placement.point(nalgebra::center(&low, &high)))).filter(|seen| *seen > 0.0);
+            let scale = seen.map_or(self.scale, |seen| seen.min(self.scale)) * placement.largest();
+            let exponent = scale.log2().ceil().clamp(-60.0, 60.0) as i32;
+            let number = *self.numbers.entry((&raw const *plant.scene, exponent)).or_insert_with(|| {
+                let scale = 2_f64.powi(exponent);
+                let default_width = plant.default_width();
+                self.groups.push(Group { scene: &plant.scene, default_width, scale, places: Vec::new() });
+                self.groups.len() - 1
+            });
+            self.groups[number].places.push(Some(placement));
+            self.gather(&plant.scene, Some(&placement), scale_at);
+        }
+    }
+
+    fn draft(&self, group: &Group<'s>) -> Draft<'s> {
+        let detail = Detail {
+            scale_at: |_| group.scale,
+            accuracy: self.fit.accuracy,
+            scale: self.scale,
+            is_flat: false,
+        };
+        Draft::new(group.scene, group.default_width, &detail)
+    }
+
+    /// The triangles of a draft that cast shadows where it has this place.
+    fn faces<'d>(
+        &self,
+        draft: &'d Draft,
+        place: Option<&Placement>,
+    ) -> impl Iterator<Item = &'d Triangle> + use<'d> {
+        let without = self.without.filter(|_| place.is_none());
+        draft.mesh.faces.iter().filter(move |face| Some(face.material) != without)
+    }
+
+    /// Finds the box around everything, and how much there is.
+    fn measure(&mut self) {
+        let (mut low, mut high) = (Vector::repeat(f64::INFINITY), Vector::repeat(f64::NEG_INFINITY));
+        let (mut count, mut kept) = (0, 0);
+        let mut drafts = Vec::with_capacity(self.groups.len());
+        for group in &self.groups {
+            let draft = self.draft(group);
+            for place in &group.places {
+                let place = place.as_ref();
+                let vertices = &draft.mesh.vertices;
+                for (v, _) in self.faces(&draft, place).flat_map(|face| face.corners) {
+                    let at = vertices[v as usize];
+                    let at = place.map_or(at, |place| place.point(at)).coords;
+                    (low, high) = (low.inf(&at), high.sup(&at));
+                }
+                for end in draft.lines(place).flat_map(|(ends, _)| ends) {
+                    (low, high) = (low.inf(&end.coords), high.sup(&end.coords));
+                }
+                count += self.faces(&draft, place).count() + draft.lines(place).count();
+            }
+            kept += draft.len();
+            drafts.push(Some(draft).filter(|_| kept <= KEPT));
+        }
+        (self.drafts, self.count) = (drafts, count);
+        if low.x <= high.x {
+            (self.middle, self.half) = ((low + high) / 2.0, (high - low) / 2.0);
+        }
+    }
+
+    /// Passes everything on, a batch at a time.
+    pub(super) fn each_batch(&self, mut visit: impl FnMut(&Batch)) {
+        let mut batch = Batch::default();
+        let relative = |p: Point| {
+            let p = p.coords - self.middle;
+            [p.x as f32, p.y as f32, p.z as f32]
+        };
+        let mut placed: Vec<[f32; 3]> = Vec::new();
+        for (group, kept) in self.groups.iter().zip(&self.drafts) {
+            let made = kept.is_none().then(|| self.draft(group));
+            let Some(draft) = kept.as_ref().or(made.as_ref()) else { continue };
+            for place in &group.places {
+                let place = place.as_ref();
+                let full = |batch: &Batch| batch.triangles.len() + batch.lines.len() >= BATCH;
+                placed.clear();
+                let vertices = draft.mesh.vertices.iter();
+                placed.extend(vertices.map(|&p| relative(place.map_or(p, |place| place.point(p)))));
+                for face in self.faces(draft, place) {
+                    batch.triangles.push(face.corners.map(|(v, _)| placed[v as usize]));
+                    if full(&batch) {
+                        visit(&batch);
+                        batch.triangles.clear();
+                        batch.lines.clear();
+                    }
+                }
+                for (ends, radii) in draft.lines(place) {
+                    batch.lines.push((ends.map(relative), radii.map(|r| r as f32)));
+                    if full(&batch) {
+                        visit(&batch);
+                        batch.triangles.clear();
+                        batch.lines.clear();
+                    }
+                }
+            }
+        }
+        visit(&batch);
+    }
+
+    /// The middle of the box around everything, and half of its sides.
+    pub(super) fn around(&self) -> [Vector; 2] {
+        [self.middle, self.half]
+    }
+
+    /// Number of triangles and thin stems.
+    pub(super) fn count(&self) -> usize {
+        self.count
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Survey, View};
+    use dlsys_geometry::scene::{Owner, Patch, Plant};
+    use dlsys_tree::Lineage;
+    use std::sync::Arc;
+
+    #[test]
+    fn all_plants_come_in_batches_whether_their_drafts_are_kept_or_not() {
+        let mut organ = Scene::default();
+        let owner = organ.add_owner(Owner { name: "P".into(), lineage: Lineage::of_axiom(0) });
+        let place = |r: usize, c: usize| Point::new(c as f64, r as f64, (c * c + r) as f64 / 3.0);
+        let net = [0, 1, 2, 3].map(|r| [0, 1, 2, 3].map(|c| place(r, c)));
+        organ.patches.push(Patch { net, material: MaterialId::LEAF, owner });
+        let mut scene = Scene::default();
+        let owner = scene.add_owner(Owner { name: "@P".into(), lineage: Lineage::of_axiom(0) });
+        let axes = [Vector::x(), Vector::y(), Vector::z()];
+        let at = |i: usize| Placement::uniform(Point::new(0.001 * i as f64, 0.0, 0.0), axes, 1.0);
+        let plant = Plant::new(Arc::new(organ), at(0), owner);
+        scene.plants = (0..3000).map(|i| plant.twin(at(i), owner)).collect();
+        let mut survey = Survey::new(View::FRONT);
+        survey.add(&scene);
+        let fit = survey.fit();
+        let mut casters = Casters::new(&scene, &fit, 40.0, |_| 40.0, None);
+        let collect = |casters: &Casters| {
+            let (mut all, mut most) = (Vec::new(), 0);
+            casters.each_batch(|batch| {
+                all.extend_from_slice(&batch.triangles);
+                most = most.max(batch.triangles.len());
+            });
+            (all, most)
+        };
+        let (kept, most) = collect(&casters);
+        assert_eq!(kept.len(), casters.count());
+        assert!(kept.len() > BATCH && most <= BATCH, "{} {most}", kept.len());
+        assert_eq!(casters.groups.len(), 2, "one draft for all plants");
+        casters.drafts.iter_mut().for_each(|draft| *draft = None);
+        assert_eq!(collect(&casters).0, kept);
+        // Far away, a plant is two triangles.
+        let far = Casters::new(&scene, &fit, 40.0, |_| 1e-3, None);
+        assert_eq!(far.count(), 6000);
+    }
+}

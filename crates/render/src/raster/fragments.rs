@@ -1,0 +1,212 @@
+//! Pixels that several triangles share: which samples each of them has.
+//!
+//! Samples are bits of a mask. Most triangles in a pixel are neighbours on one surface, whose masks have no bit in common; so depths are
+//! looked at only where masks overlap, and sample by sample only where two triangles pass through one another in the pixel.
+
+use super::plane::Plane;
+use super::{EQUAL, STEPS};
+
+/// Sides with fewer steps along each axis are tested with floats, where all values are exact integers; and bound of a side's function,
+/// beyond which its value does not matter.
+const SHORTEST: i64 = 1 << 11;
+const FLOAT_LIMIT: i64 = 1 << 23;
+
+/// Places of the samples in a pixel, in steps from its upper left corner: all x, all y.
+pub(super) type Places<const N: usize> = [[f32; N]; 2];
+
+/// What the samples of a pixel add to the functions of a triangle's sides.
+pub(super) enum Cover<const N: usize> {
+    Short([[f32; N]; 3]),
+    Long([[i64; N]; 3]),
+}
+
+impl<const N: usize> Cover<N> {
+    /// For the growth of each side's function by a step to the right and down.
+    pub(super) fn new(sides: &[[i64; 3]; 3], [xs, ys]: &Places<N>) -> Cover<N> {
+        if sides.iter().all(|[_, a, b]| a.abs() < SHORTEST && b.abs() < SHORTEST) {
+            let mut added = [[0.0; N]; 3];
+            for (added, [_, a, b]) in added.iter_mut().zip(sides) {
+                let (a, b) = (*a as f32, *b as f32);
+                for ((added, x), y) in added.iter_mut().zip(xs).zip(ys) {
+                    *added = a * x + b * y;
+                }
+            }
+            return Cover::Short(added);
+        }
+        let added = sides.map(|[_, a, b]| std::array::from_fn(|s| a * xs[s] as i64 + b * ys[s] as i64));
+        Cover::Long(added)
+    }
+
+    /// The samples within all sides, given the values of the sides' functions at the pixel. The loop has no branches, so that the compiler
+    /// makes it work on several samples at a time.
+    pub(super) fn mask(&self, here: [i64; 3]) -> u32 {
+        let mut outside = 0;
+        match self {
+            Cover::Short([a, b, c]) => {
+                let [p, q, r] = here.map(|value| value.clamp(-FLOAT_LIMIT, FLOAT_LIMIT) as f32);
+                for s in 0..N {
+                    let negative = (p + a[s]).to_bits() | (q + b[s]).to_bits() | (r + c[s]).to_bits();
+                    outside |= ((negative as i32 >> 31) as u32) & (1 << s);
+                }
+            }
+            Cover::Long([a, b, c]) => {
+                let [p, q, r] = here;
+                for s in 0..N {
+                    let negative = (p + a[s]) | (q + b[s]) | (r + c[s]);
+                    outside |= ((negative >> 63) as u32) & (1 << s);
+                }
+            }
+        }
+        !outside & full::<N>()
+    }
+}
+
+/// All samples.
+const fn full<const N: usize>() -> u32 {
+    ((1_u64 << N) - 1) as u32
+}
+
+/// A triangle in a pixel.
+#[derive(Clone, Copy)]
+pub(super) struct Fragment {
+    /// Its place in the band's list.
+    pub(super) place: u32,
+    /// The samples that it has, or would have.
+    pub(super) mask: u32,
+    /// No place of it in the pixel is farther, none nearer.
+    pub(super) far: f32,
+    pub(super) near: f32,
+}
+
+/// The triangles that share a pixel; no sample belongs to two.
+#[derive(Clone, Copy)]
+pub(super) struct Fragments<const N: usize> {
+    count: u32,
+    places: [u32; N],
+    masks: [u32; N],
+    fars: [f32; N],
+}
+
+impl<const N: usize> Fragments<N> {
+    pub(super) const EMPTY: Fragments<N> =
+        Fragments { count: 0, places: [0; N], masks: [0; N], fars: [0.0; N] };
+
+    /// Forgets all triangles; of one that had the whole pixel its place and depth stay.
+    pub(super) fn begin(&mut self, whole: Option<(u32, f32)>) {
+        self.count = 0;
+        if let Some((place, far)) = whole {
+            self.push(place, full::<N>(), far);
+        }
+    }
+
+    fn push(&mut self, place: u32, mask: u32, far: f32) {
+        let i = self.count as usize;
+        (self.places[i], self.masks[i], self.fars[i]) = (place, mask, far);
+        self.count += 1;
+    }
+
+    /// Gives a triangle the samples of its mask at which it is in front, and returns a depth that no sample is behind.
+    pub(super) fn add(
+        &mut self,
+        new: Fragment,
+        planes: &[Plane],
+        places: &Places<N>,
+        pixel: [usize; 2],
+    ) -> Option<f32> {
+        let mut mask = new.mask;
+        let mut is_emptied = false;
+        for i in 0..self.count as usize {
+            let both = self.masks[i] & mask;
+            if both == 0 {
+                continue;
+            }
+            let won = self.won(i, Fragment { mask: both, ..new }, planes, places, pixel);
+            self.masks[i] &= !won;
+            mask &= !(both & !won);
+            is_emptied |= self.masks[i] == 0;
+        }
+        if mask == 0 {
+            return None;
+        }
+        if is_emptied {
+            let held = *self;
+            self.count = 0;
+            for i in (0..held.count as usize).filter(|&i| held.masks[i] != 0) {
+                self.push(held.places[i], held.masks[i], held.fars[i]);
+            }
+        }
+        // Masks have no sample in common, so there is room for one more.
+        self.push(new.place, mask, new.far);
+        let count = self.count as usize;
+        let covered = self.masks[..count].iter().fold(0, |all, mask| all | mask);
+        (covered == full::<N>())
+            .then(|| self.fars[..count].iter().fold(f32::INFINITY, |a, &b| if b < a { b } else { a }))
+    }
+
+    /// The samples of a mask at which a triangle is before the one of this number. Of two at one depth, the later one is.
+    fn won(&self, i: usize, new: Fragment, planes: &[Plane], places: &Places<N>, pixel: [usize; 2]) -> u32 {
+        let Some((held, plane)) = planes.get(self.places[i] as usize).zip(planes.get(new.place as usize))
+        else {
+            return new.mask;
+        };
+        let base = held.at(pixel);
+        let [lowest, highest] = held.reach();
+        if new.far > held.bounded(base + highest) + EQUAL {
+            return new.mask;
+        }
+        if held.bounded(base + lowest) > new.near + EQUAL {
+            return 0;
+        }
+        let is_later = new.place > self.places[i];
+        let own = plane.at(pixel);
+        let (mut won, mut left) = (0, new.mask);
+        while left != 0 {
+            let s = left.trailing_zeros() as usize;
+            left &= left - 1;
+            let at = [places[0][s], places[1][s]];
+            let (depth, behind) = (plane.sample(own, at), held.sample(base, at));
+            if depth > behind + EQUAL || (is_later && depth + EQUAL >= behind) {
+                won |= 1 << s;
+            }
+        }
+        won
+    }
+
+    /// The mean colour of the samples. Each surface is shaded where its first sample is: the first ones are in the middle.
+    pub(super) fn mean(
+        &self,
+        surface: impl Fn(u32) -> u32,
+        mut color: impl FnMut(u32) -> [u8; 4],
+    ) -> [u8; 4] {
+        let mut sum = [0_u32; 4];
+        let count = self.count as usize;
+        let surfaces: [u32; N] = {
+            let mut surfaces = [0; N];
+            (0..count).for_each(|i| surfaces[i] = surface(self.places[i]));
+            surfaces
+        };
+        for i in 0..count {
+            if surfaces[..i].contains(&surfaces[i]) {
+                continue;
+            }
+            let same = (i..count).filter(|&k| surfaces[k] == surfaces[i]);
+            let (mut first, mut mask) = (i, 0);
+            for k in same {
+                if self.masks[k].trailing_zeros() < self.masks[first].trailing_zeros() {
+                    first = k;
+                }
+                mask |= self.masks[k];
+            }
+            let painted = color(self.places[first]);
+            let weight = mask.count_ones();
+            sum.iter_mut().zip(painted).for_each(|(sum, channel)| *sum += weight * u32::from(channel));
+        }
+        sum.map(|total| ((total + N as u32 / 2) / N as u32) as u8)
+    }
+}
+
+/// Where the samples of a pattern are, given in sixteenths of a pixel from its middle.
+pub(super) fn places<const N: usize>(pattern: &super::Pattern<N>) -> Places<N> {
+    let place = |k: i64| ((k + 8) * (STEPS / 16) + STEPS / 32) as f32;
+    [pattern.map(|(x, _)| place(x)), pattern.map(|(_, y)| place(y))]
+}

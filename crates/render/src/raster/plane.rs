@@ -1,0 +1,105 @@
+//! A triangle made ready to be drawn: its sides as functions of a place, and the plane of its depth.
+
+use std::ops::Range;
+
+use super::{Place, STEPS, range};
+
+/// The depth of a triangle at the upper left corners of pixels: at one place, its growth to the right and down, and its bounds.
+#[derive(Clone, Copy)]
+pub(super) struct Plane {
+    column: f32,
+    row: f32,
+    depth: f32,
+    right: f32,
+    down: f32,
+    least: f32,
+    greatest: f32,
+}
+
+impl Plane {
+    /// Of a triangle that is not drawn.
+    pub(super) const NONE: Plane =
+        Plane { column: 0.0, row: 0.0, depth: 0.0, right: 0.0, down: 0.0, least: 0.0, greatest: 0.0 };
+
+    pub(super) fn at(&self, [column, row]: [usize; 2]) -> f32 {
+        self.depth + self.right * (column as f32 - self.column) + self.down * (row as f32 - self.row)
+    }
+
+    /// The least and the greatest that a sample adds, or less and more.
+    pub(super) fn reach(&self) -> [f32; 2] {
+        let range = |slope: f32| if slope < 0.0 { [slope, 0.0] } else { [0.0, slope] };
+        let ([a, b], [c, d]) = (range(self.right), range(self.down));
+        [a + c, b + d]
+    }
+
+    /// The depth at a sample, given that at the corner of its pixel; the sample's place is in steps.
+    pub(super) fn sample(&self, base: f32, [x, y]: [f32; 2]) -> f32 {
+        const STEP: f32 = 1.0 / STEPS as f32;
+        self.bounded(base + self.right * (x * STEP) + self.down * (y * STEP))
+    }
+
+    pub(super) fn bounded(&self, depth: f32) -> f32 {
+        let depth = if depth > self.least { depth } else { self.least };
+        if depth < self.greatest { depth } else { self.greatest }
+    }
+}
+
+/// A triangle, ready to be drawn.
+pub(super) struct Ready {
+    pub(super) columns: [usize; 2],
+    pub(super) rows: [usize; 2],
+    /// For each side the value of its function at the upper left corner of the first pixel, and its growth by a step to the right and
+    /// down. The function is not negative within.
+    pub(super) sides: [[i64; 3]; 3],
+    pub(super) plane: Plane,
+}
+
+impl Ready {
+    /// `None` if no sample of these rows can be in it.
+    pub(super) fn new(corners: [Place; 3], width: usize, band: &Range<usize>) -> Option<Ready> {
+        let mut at = corners.map(|corner| [i64::from(corner.x), i64::from(corner.y)]);
+        let mut depths = corners.map(|corner| f64::from(corner.depth));
+        let [[ax, ay], [bx, by], [cx, cy]] = at;
+        let area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax);
+        if area == 0 {
+            return None;
+        }
+        if area < 0 {
+            at.swap(1, 2);
+            depths.swap(1, 2);
+        }
+        let columns = range(at.map(|p| p[0]), width)?;
+        let [first, last] = range(at.map(|p| p[1]), band.end)?;
+        let rows = [first.max(band.start), last];
+        if rows[0] > rows[1] {
+            return None;
+        }
+        let (x, y) = (columns[0] as i64 * STEPS, rows[0] as i64 * STEPS);
+        // The side opposite of each corner; places on a side belong to one of the two triangles that meet there.
+        let lines = [0, 1, 2].map(|k| {
+            let ([px, py], [qx, qy]) = (at[(k + 1) % 3], at[(k + 2) % 3]);
+            let (a, b) = (py - qy, qx - px);
+            let bias = if a > 0 || (a == 0 && b > 0) { 0 } else { -1 };
+            [a * (x - px) + b * (y - py) + bias, a, b]
+        });
+        let scale = STEPS as f64 / area.unsigned_abs() as f64;
+        let slope = |i: usize| (0..3).map(|k| lines[k][i] as f64 * depths[k]).sum::<f64>() * scale;
+        let (right, down) = (slope(1), slope(2));
+        let steps = STEPS as f64;
+        let depth =
+            depths[0] + right * ((x - at[0][0]) as f64 / steps) + down * ((y - at[0][1]) as f64 / steps);
+        let (least, greatest) = depths
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &z| (low.min(z), high.max(z)));
+        let plane = Plane {
+            column: columns[0] as f32,
+            row: rows[0] as f32,
+            depth: depth as f32,
+            right: right as f32,
+            down: down as f32,
+            least: least as f32,
+            greatest: greatest as f32,
+        };
+        Some(Ready { columns, rows, sides: lines, plane })
+    }
+}
