@@ -1,4 +1,4 @@
-//! Measures what the wind costs: `cargo run --release -p dlsys-wind --example speed`.
+//! Measures what the wind costs: `cargo run --release -p dlsys-wind --example wind_speed`.
 //!
 //! Medians of 31 rounds. Places are random, so that every sample reads other coefficients; those along a stem are near each other, and
 //! cheaper.

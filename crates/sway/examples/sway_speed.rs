@@ -1,5 +1,5 @@
 //! Prints the cost of a step in µs a segment, for chains and trees of 100 to a million segments:
-//! `cargo run --release -p dlsys-sway --example speed`. Numbers of segments may be given as arguments.
+//! `cargo run --release -p dlsys-sway --example sway_speed`. Numbers of segments may be given as arguments.
 
 use std::time::Instant;
 
