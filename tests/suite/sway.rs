@@ -10,7 +10,7 @@ use dlsys::tree::ModuleString;
 use super::common;
 
 const DIVIDING: &str = "units length 0.1, time 1\n\
-    tissue stalk = stiffness 4e8, density 900, damping 0.05\n\
+    tissue stalk = stiffness 2e9, density 900, damping 0.05\n\
     wind 1, 0, 0.3 speed 4 turbulence 0.4 scale 2\n\
     initial string: @E(stalk) S(1) /(20) S(1.3) [ +(40) S(0.5) @L(1) ] /(50) S(0.9) @K(1.5)\n\
     S(x): if x < 2 solve dx/dt = 0.4x if x = 2 produce S(0.8) /(33) S(1.2) \\(33)\n\
@@ -87,7 +87,7 @@ fn divisions_cannot_be_seen_in_the_wind() {
     assert!(times.len() >= 6, "{times:?}");
     for at in times {
         let (position, velocity, speed) = jumps(&session, at);
-        assert!(speed > 1e-3, "the wind blows at {at}: {speed}");
+        assert!(speed > 1e-4, "the wind blows at {at}: {speed}");
         assert!(position < 1e-9, "at {at}: {position:e}");
         assert!(velocity < 1e-6 * speed.max(1.0), "at {at}: {velocity:e} of {speed}");
     }

@@ -255,8 +255,7 @@ impl Builder<'_> {
             .map_err(|bad| fault(bad.diagnostic.message).help("save the file as UTF-8"))?;
         let chain = nesting.chain.iter().cloned().chain([full]).collect();
         let below = Below { files: self.files, folder: path.parent().unwrap_or(Path::new("")).to_owned() };
-        let loaded =
-            load_nested(&source, values, &below, &Nesting { chain, models: Some(models) });
+        let loaded = load_nested(&source, values, &below, &Nesting { chain, models: Some(models) });
         let source = loaded.source.unwrap_or(source);
         let Some(model) = loaded.model else {
             let error = loaded.diagnostics.iter().find(|d| d.severity == Severity::Error);

@@ -222,9 +222,6 @@ impl<M: Deref<Target = Model>> Bending<M> {
             };
             let mut note = |step: &sway::Step<'_>| knots.push(knot(step.to, step.after));
             let done = self.solver.advance(&mut state, from, to, &mut growth, &*self.wind, &mut note);
-            if std::env::var("SWAY_DEBUG").is_ok() && done.is_err() {
-                eprintln!("{state:?}");
-            }
             done.map_err(|error| failure(&self.model, &body, error, string.time))?;
             let steps = knots.len() as u64 - 1;
             (self.effort.steps, self.effort.stem_steps) =
@@ -252,20 +249,6 @@ fn failure(model: &Model, body: &Body, error: sway::Error, time: f64) -> Error {
         | sway::Error::Equilibrium { segment, .. } => body.stems.get(*segment),
         _ => None,
     };
-    if std::env::var("SWAY_DEBUG").is_ok()
-        && let sway::Error::Step { segment, .. } = &error
-    {
-        let mut i = Some(*segment);
-        while let Some(k) = i {
-            eprintln!(
-                "{k} {:?} loads {:?} plates {:?}",
-                body.skeleton.segments()[k],
-                body.skeleton.loads(k),
-                body.skeleton.plates(k)
-            );
-            i = body.skeleton.segments()[k].parent;
-        }
-    }
     let span =
         at.or(body.stems.first()).map_or(Span::default(), |stem| model.scenery.tissues[stem.tissue].span);
     let module = at.map_or(String::new(), |stem| format!("{:x}", stem.key.module));

@@ -230,7 +230,7 @@ impl<'m> Courses<'m> {
             return Ok(BentStems::at_rest());
         }
         let number = number as u64;
-        if number < self.present.number && !self.past.front().is_some_and(|past| past.number <= number) {
+        if number < self.present.number && self.past.front().is_none_or(|past| past.number > number) {
             let mark = self.marks.iter().rev().find(|mark| mark.number <= number);
             let mark = mark.or(self.marks.first()).cloned();
             if let Some(mark) = mark {
@@ -266,7 +266,7 @@ impl<'m> Courses<'m> {
     fn mark(&mut self) {
         let number = self.present.number;
         if !self.passive.marks
-            || number % self.spacing != 0
+            || !number.is_multiple_of(self.spacing)
             || self.marks.last().is_some_and(|mark| mark.number >= number)
         {
             return;
@@ -275,7 +275,7 @@ impl<'m> Courses<'m> {
         if self.marks.len() > MOST_MARKS {
             self.spacing *= 2;
             let (spacing, first) = (self.spacing, self.marks[0].number);
-            self.marks.retain(|mark| mark.number % spacing == 0 || mark.number == first);
+            self.marks.retain(|mark| mark.number.is_multiple_of(spacing) || mark.number == first);
         }
     }
 }

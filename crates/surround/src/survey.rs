@@ -153,9 +153,7 @@ impl Survey {
         // A start that is exactly symmetric would stay upright where that is not stable.
         let aside = 1e-3 / self.axes[axis].length.max(f64::MIN_POSITIVE);
         state.strain.fill(sway::Vector::new(0.0, aside, aside));
-        if !part.segments().iter().any(sags) {
-            state = State::at_rest(&part);
-        } else if solver.equilibrium(&part, &mut state, &Still, 0.0).is_err() {
+        if !part.segments().iter().any(sags) || solver.equilibrium(&part, &mut state, &Still, 0.0).is_err() {
             state = State::at_rest(&part);
         }
         let mode = solver.modes(&part, &state.strain, 1).ok()?.into_iter().next()?;
