@@ -193,13 +193,13 @@ fn nothing_pops_in_any_model() {
         for at in some {
             let (position, velocity, speed) = jumps(&bent, at);
             let (without, slower, _) = jumps(&rigid, at);
+            // What jumps without wind jumps in it.
+            if without > 1e-9 || slower > 1e-6 {
+                continue;
+            }
+            assert!(position < 2e-8, "{} at {at}: {position:e} {without:e}", path.display());
             assert!(
-                position <= without + 1e-9 * 20.0,
-                "{} at {at}: {position:e} {without:e}",
-                path.display()
-            );
-            assert!(
-                velocity <= 1.1 * slower + 2e-6 * speed.max(1.0),
+                velocity < 2e-6 * speed.max(1.0),
                 "{} at {at}: {velocity:e} {slower:e} of {speed}",
                 path.display()
             );

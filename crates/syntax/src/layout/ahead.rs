@@ -56,10 +56,10 @@ impl Scanner<'_> {
 
     /// True if `NAME in` stands behind a `for` that ends at this byte.
     pub(super) fn is_repetition(&self, end: usize) -> bool {
-        let rest = self.text[end..].trim_start_matches([' ', '\t']);
+        let rest = self.text[end..].trim_start_matches([' ', '\t', '\r']);
         let after = rest.trim_start_matches(in_name);
         let name = &rest[..rest.len() - after.len()];
-        let next = after.trim_start_matches([' ', '\t']);
+        let next = after.trim_start_matches([' ', '\t', '\r']);
         name.starts_with(char::is_alphabetic)
             && next.len() < after.len()
             && next.strip_prefix("in").is_some_and(|rest| !rest.starts_with(in_name))
@@ -165,7 +165,7 @@ impl Scanner<'_> {
 
     /// True if the word at these bytes begins `at rate`.
     pub(super) fn is_at_rate(&self, start: usize, end: usize) -> bool {
-        let next = self.text[end..].trim_start_matches([' ', '\t']);
+        let next = self.text[end..].trim_start_matches([' ', '\t', '\r']);
         let in_rule = self.items.last().is_some_and(|i| i.kind == ItemKind::Rule && i.after_colon.is_some());
         in_rule
             && &self.text[start..end] == "at"
