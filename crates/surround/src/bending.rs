@@ -183,20 +183,27 @@ impl<M: Deref<Target = Model>> Bending<M> {
     }
 
     /// The motion from the tick of this number, with the string at that time, to the next. `before` is the tick before, with the
-    /// productions since then, and the string a little earlier than this one, for the rates of growth.
+    /// productions since then, and the string a little earlier than this one, for the rates of growth, unless there was a production
+    /// in between.
     pub(crate) fn advance(
         &mut self,
         number: u64,
         string: &ModuleString,
-        before: Option<(&Tick, &Descent, &ModuleString)>,
+        before: Option<(&Tick, &Descent, Option<&ModuleString>)>,
     ) -> Result<Tick, Error> {
         let [from, to] = [number, number + 1].map(|n| n as f64 * CLOCK);
         let mut body = self.body(string)?;
         let mut state = State::at_rest(&body.skeleton);
         state.level = self.state.level;
         if let Some((tick, descent, earlier)) = before {
-            let earlier_body = self.body(earlier)?;
-            body.move_from(&earlier_body, (string.time - earlier.time) * self.place.units.time);
+            match earlier {
+                Some(earlier) => {
+                    let seconds = (string.time - earlier.time) * self.place.units.time;
+                    body.move_from(&self.body(earlier)?, seconds);
+                }
+                // A production in between may be a jump, which is no motion.
+                None => body.move_as(&self.body),
+            }
             body.accelerate_from(&self.body, CLOCK);
             for (i, stem) in body.stems.iter().enumerate() {
                 if let Some(inherited) = tick.inherited(stem, descent, from) {

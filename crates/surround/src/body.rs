@@ -67,6 +67,18 @@ impl Body {
         }
     }
 
+    /// Sets the motion that growth prescribes to that of the same stems at the tick before.
+    pub(crate) fn move_as(&mut self, before: &Body) {
+        for (i, segment) in self.skeleton.segments_mut().iter_mut().enumerate() {
+            let Some(&known) = before.numbers.get(&self.stems[i].key) else { continue };
+            let before = &before.skeleton.segments()[known];
+            segment.joint.angular_velocity = before.joint.angular_velocity;
+            segment.joint.velocity = before.joint.velocity;
+            segment.length_rate = before.length_rate;
+            segment.rest_rate = before.rest_rate;
+        }
+    }
+
     /// Sets the accelerations that growth prescribes, from the motion of the same stems an interval earlier. What was not there has none.
     pub(crate) fn accelerate_from(&mut self, earlier: &Body, seconds: f64) {
         for (i, segment) in self.skeleton.segments_mut().iter_mut().enumerate() {

@@ -86,7 +86,8 @@ impl Coupled {
             }
             Some(earlier) => {
                 course.number += 1;
-                let before = Some((&*course.tick, &course.descent, &*earlier));
+                let earlier = inputs.productions().is_empty().then_some(&*earlier);
+                let before = Some((&*course.tick, &course.descent, earlier));
                 course.tick = Arc::new(course.bending.advance(course.number, string, before)?);
                 course.descent = Descent::default();
                 self.before(course.number + 1)

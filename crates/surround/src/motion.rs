@@ -85,6 +85,8 @@ struct Course<'m> {
     descent: Arc<Descent>,
     /// The strings a little before the next tick, and at the next tick, if growth gets there.
     ahead: Result<Arc<[ModuleString; 2]>, Error>,
+    /// There was a production between these two strings.
+    jumps: bool,
 }
 
 impl<'m> Course<'m> {
@@ -96,7 +98,8 @@ impl<'m> Course<'m> {
         growth.take_events();
         let tick = Arc::new(bending.advance(number, &string, None)?);
         let descent = Arc::default();
-        let mut course = Course { growth, bending, number, tick, descent, ahead: Ok(Arc::default()) };
+        let mut course =
+            Course { growth, bending, number, tick, descent, ahead: Ok(Arc::default()), jumps: false };
         course.look_ahead();
         Ok(course)
     }
@@ -108,9 +111,15 @@ impl<'m> Course<'m> {
         let before = next - LOOK_BACK * CLOCK / place.units.time;
         let mut strings = <[ModuleString; 2]>::default();
         let [earlier, now] = &mut strings;
-        let gone = self.growth.at(before, earlier).and_then(|()| self.growth.at(next, now));
+        let mut gone = self.growth.at(before, earlier);
         let mut descent = Descent::default();
         descent.add(self.bending.model(), &self.growth.take_events());
+        if gone.is_ok() {
+            gone = self.growth.at(next, now);
+        }
+        let last = self.growth.take_events();
+        self.jumps = !last.is_empty();
+        descent.add(self.bending.model(), &last);
         self.descent = Arc::new(descent);
         self.ahead = gone.map(|()| Arc::new(strings)).map_err(Error::from);
     }
@@ -119,6 +128,7 @@ impl<'m> Course<'m> {
     fn tick(&mut self) -> Result<Past, Error> {
         let ahead = self.ahead.clone()?;
         let [before, now] = &*ahead;
+        let before = (!self.jumps).then_some(before);
         let tick = self.bending.advance(self.number + 1, now, Some((&self.tick, &self.descent, before)))?;
         let tick = std::mem::replace(&mut self.tick, Arc::new(tick));
         let past = Past { number: self.number, tick, descent: self.descent.clone() };
