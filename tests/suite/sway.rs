@@ -7,8 +7,6 @@ use dlsys::session::{Nursery, Session};
 use dlsys::sim::Settings;
 use dlsys::tree::ModuleString;
 
-use super::common;
-
 const DIVIDING: &str = "units length 0.1, time 1\n\
     tissue stalk = stiffness 2e9, density 900, damping 0.05\n\
     wind 1, 0, 0.3 speed 4 turbulence 0.4 scale 2\n\
@@ -53,7 +51,10 @@ fn points(scene: &Scene) -> HashMap<(u64, usize), Point> {
 
 /// The instants of productions up to a time.
 fn instants(session: &Session, end: f64) -> Vec<f64> {
-    let mut simulation = session.simulate(Settings { log: true, ..Settings::default() }).expect("it starts");
+    // A model that fails has no instants beyond that.
+    let Ok(mut simulation) = session.simulate(Settings { log: true, ..Settings::default() }) else {
+        return Vec::new();
+    };
     let _ = simulation.pass(end);
     let mut times: Vec<f64> = simulation.take_events().iter().map(|event| event.time).collect();
     times.dedup();
@@ -166,57 +167,4 @@ fn a_plant_sways_as_its_model_does_alone() {
         let higher = plants[1] - dlsys::scene::Vector::new(0.0, 5.0, 0.0);
         assert!((higher - plants[0]).norm() > 1e-3, "another place, another wind");
     }
-}
-
-/// The models of the repository with everything that they draw made of a soft tissue, in a wind.
-#[test]
-#[ignore = "takes minutes"]
-fn nothing_pops_in_any_model() {
-    let (mut seen, mut refused) = (0, Vec::new());
-    for path in common::models().into_iter().filter(|path| path.to_string_lossy().contains("/models/")) {
-        let text = std::fs::read_to_string(&path).expect("readable");
-        let (head, tail) = text.split_once("initial string:").unwrap_or(("", ""));
-        if head.contains("tissue ") || tail.is_empty() {
-            continue;
-        }
-        let folder = path.parent().expect("a folder");
-        let dressed = |words: &str, first: &str| {
-            let text = format!("{words}\n{head}initial string: {first} {tail}");
-            Session::from_text_in(folder, &[], "dressed.dls", &text, &[])
-        };
-        let words = "units length 0.05, time 1\ntissue zz = stiffness 1e10, density 900, damping 0.2\n\
-             wind 1, 0, 0.3 speed 2 turbulence 0.3 scale 2";
-        let (Ok(bent), Ok(rigid)) = (dressed(words, "@E(zz) !(0.1)"), dressed("", "!(0.1)")) else {
-            continue;
-        };
-        let end = bent.model.frames.map_or(5.0, |frames| frames.to.min(8.0));
-        let times = instants(&rigid, end);
-        let some: Vec<f64> =
-            times.iter().copied().step_by(times.len() / 4 + 1).filter(|t| *t > 0.1).collect();
-        // The solver says so where it cannot follow: soft stems of these models, which were not made for wind.
-        let nursery = Nursery::new(&bent.model, Settings::default());
-        let mut string = ModuleString::default();
-        let Ok(mut simulation) = bent.simulate(Settings::default()) else { continue };
-        let last = some.last().copied().unwrap_or(0.0) + 0.1;
-        if simulation.at(last, &mut string).is_err() || nursery.draw(&string, &mut nursery.blank()).is_err() {
-            refused.push(path.display().to_string());
-            continue;
-        }
-        for at in some {
-            let (position, velocity, speed) = jumps(&bent, at);
-            let (without, slower, _) = jumps(&rigid, at);
-            // What jumps without wind jumps in it.
-            if without > 1e-9 || slower > 1e-6 {
-                continue;
-            }
-            assert!(position < 2e-8, "{} at {at}: {position:e} {without:e}", path.display());
-            assert!(
-                velocity < 2e-6 * speed.max(1.0),
-                "{} at {at}: {velocity:e} {slower:e} of {speed}",
-                path.display()
-            );
-            seen += 1;
-        }
-    }
-    assert!(seen > 30 && refused.len() < 8, "{seen}, {refused:?}");
 }
