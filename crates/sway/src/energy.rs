@@ -60,7 +60,7 @@ impl Solver {
             let parent = segment.parent.map(|parent| &places[parent]);
             let (local, place) = Local::new(segment, parent, &Vector::zeros(), &strain);
             let stretch = Stretch::new(&local);
-            let (kinetic, mass) = part(skeleton, &air, index).motion(&local, &stretch);
+            let (kinetic, mass) = part(skeleton, &air, &self.work.rotary, index).motion(&local, &stretch);
             energy.kinetic += kinetic;
             let centre = place.origin * mass.0 + place.axes * mass.1;
             energy.potential -= air.gravity.dot(&centre);

@@ -16,6 +16,8 @@ pub(crate) struct Part<'a> {
     pub loads: &'a [Load],
     pub plates: &'a [Plate],
     pub air: &'a Air,
+    /// Moment of inertia about the tangent in addition to that of the sections, in kg m².
+    pub rotary: f64,
 }
 
 /// Forces on a segment.
@@ -96,9 +98,10 @@ impl Part<'_> {
 
     /// Moment of inertia of half the segment's sections, about a tangent: across, then the excess along it.
     #[inline(always)]
-    fn section_inertia(&self) -> f64 {
+    fn section_inertia(&self) -> (f64, f64) {
         let segment = self.segment;
-        segment.mass * segment.length * segment.diameter * segment.diameter / 32.0
+        let spin = segment.mass * segment.length * segment.diameter * segment.diameter / 32.0;
+        (spin, spin + 0.5 * self.rotary)
     }
 
     /// Weight, inertial force, and drag in a wind (base frame).
@@ -108,7 +111,7 @@ impl Part<'_> {
         let segment = self.segment;
         let mass = 0.5 * segment.mass * segment.length;
         let area = 0.5 * segment.drag_diameter * segment.length;
-        let spin = self.section_inertia();
+        let (spin, polar) = self.section_inertia();
         let mut sum = Vector::zeros();
         for point in &stretch.points {
             let tangent = point.section.tangent();
@@ -123,7 +126,7 @@ impl Part<'_> {
             sum += force;
             let (omega, alpha) = (&point.angular, &point.angular_acceleration);
             let along = tangent * tangent.dot(omega);
-            let moment = (alpha + tangent * tangent.dot(alpha) + omega.cross(&along)) * -spin;
+            let moment = alpha * -spin - (tangent * tangent.dot(alpha) + omega.cross(&along)) * polar;
             forces.twist(&point.turning, &moment);
         }
         let own = place.tip * sum.transpose();
@@ -188,11 +191,11 @@ impl Part<'_> {
     pub(crate) fn mass_form(&self, local: &Local, stretch: &Stretch) -> Form {
         let mut form = Form::ZERO;
         let mass = 0.5 * self.segment.mass * self.segment.length;
-        let spin = self.section_inertia();
+        let (spin, polar) = self.section_inertia();
         for point in &stretch.points {
             form.mass(mass, &point.place, &point.shift);
             let tangent = point.section.tangent();
-            let mut round = tangent * (tangent * spin).transpose();
+            let mut round = tangent * (tangent * polar).transpose();
             for k in 0..3 {
                 round[(k, k)] += spin;
             }
@@ -226,12 +229,12 @@ impl Part<'_> {
     /// Kinetic energy; mass, and mass times place in the base frame.
     pub(crate) fn motion(&self, local: &Local, stretch: &Stretch) -> (f64, (f64, Vector)) {
         let half = 0.5 * self.segment.mass * self.segment.length;
-        let spin = self.section_inertia();
+        let (spin, polar) = self.section_inertia();
         let (mut energy, mut mass, mut first) = (0.0, 0.0, Vector::zeros());
         for point in &stretch.points {
             let along = point.section.tangent().dot(&point.angular);
             energy += 0.5 * half * point.velocity.norm_squared();
-            energy += 0.5 * spin * (point.angular.norm_squared() + along * along);
+            energy += 0.5 * (spin * point.angular.norm_squared() + polar * along * along);
             mass += half;
             first += point.place * half;
         }

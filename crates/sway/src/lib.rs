@@ -69,6 +69,7 @@ mod place;
 mod pose;
 mod ros2;
 mod ros34pw2;
+mod rotary;
 mod settings;
 mod skeleton;
 mod solver;

@@ -92,7 +92,7 @@ impl Workspace {
             let parent = segment.parent.map(|parent| &self.later[parent]);
             let (local, place) = Local::new(segment, parent, &upwards, &strain);
             let stretch = Stretch::new(&local);
-            let part = part(skeleton, air, index);
+            let part = part(skeleton, air, &self.rotary, index);
             let wind = place.axes.tr_mul(&link.wind);
             let forces = part.forces(&local, &place, &stretch, &wind);
             let rigidity = segment.rigidity();
@@ -135,6 +135,7 @@ impl Workspace {
         let segments = skeleton.segments();
         let step = GAMMA * h;
         let mut error = StepError::ZERO;
+        let horizon = self.horizon.max(h);
         for (index, segment) in segments.iter().enumerate() {
             let twist = self.base_twist(segment, index, segments);
             self.links[index].resolve(twist);
@@ -146,7 +147,7 @@ impl Workspace {
             let second_strain = (w + first * (0.5 - GAMMA)) * h + second * step;
             after.strain[index] = before.strain[index] + second_strain;
             after.rate[index] = w + second;
-            let x = [second_strain - first_strain, link.x * h];
+            let x = [second_strain - first_strain, link.x * horizon];
             self.measure(index, segment.parent, segments, x, &mut error);
         }
         error
@@ -206,7 +207,7 @@ impl Workspace {
             let w = if segment.rigid { Vector::zeros() } else { before.rate[index] };
             after.rate[index] = w + k;
             after.strain[index] = before.strain[index] + (w + k) * h;
-            let x = [k * (0.5 * h), k * (0.5 * h)];
+            let x = [k * (0.5 * h), k * (0.5 * self.horizon.max(h))];
             self.measure(index, segment.parent, segments, x, &mut error);
         }
         error

@@ -58,6 +58,7 @@ impl Workspace {
         let step = GAMMA * h;
         aside.fit(skeleton);
         aside.rest_moments.clone_from(&self.rest_moments);
+        aside.rotary.clone_from(&self.rotary);
         let weights = Weights { mass: 1.0, damping: step, stiffness: step * step, extra: 0.0, blur: 0.0 };
         let bend = Bend { strain: &before.strain, rate: &before.rate };
         self.spread(skeleton, air, bend, instant, (0.0, 0.0), &weights);
@@ -162,7 +163,7 @@ impl Workspace {
             let (other, other_rate) = sum(stages, &EMBEDDED, index);
             after.strain[index] = before.strain[index] + strain;
             after.rate[index] = before.rate[index] + rate;
-            let x = [strain - other, (rate - other_rate) * h];
+            let x = [strain - other, (rate - other_rate) * self.horizon.max(h)];
             self.measure(index, segment.parent, segments, x, &mut error);
         }
         error

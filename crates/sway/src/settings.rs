@@ -33,12 +33,15 @@ pub struct Settings {
     /// Method of integration.
     pub method: Method,
     /// Largest error of a step: displacement of any end of a segment relative to the extent of the skeleton. The error of the velocity counts
-    /// as the displacement that it makes in the step.
+    /// as the displacement that it makes in the longest step: on the scale of the step itself, any velocity would pass once steps are short.
     pub tolerance: f64,
     /// Longest step H, in s. Steps have the length H/2^m and end at multiples of it.
     pub longest: f64,
     /// Largest m.
     pub deepest: u32,
+    /// δ: the moment of inertia of a stem about its own axis is at least about δ² of that across its root. It bounds the frequency of torsion;
+    /// planar motion does not depend on it. 0 for the sections' own inertia alone.
+    pub rotary: f64,
     /// Air and gravity.
     pub air: Air,
     /// Whether steps are of one length H, whatever their error. For measurements of order.
@@ -53,6 +56,7 @@ impl Default for Settings {
             tolerance: 1e-3,
             longest: 1.0 / 30.0,
             deepest: 40,
+            rotary: 0.1,
             air: Air::default(),
             fixed: false,
         }

@@ -140,6 +140,8 @@ impl Solver {
         skeleton.check()?;
         self.extent = skeleton.extent();
         work.fit(skeleton);
+        work.flywheels(skeleton, self.settings.rotary);
+        work.horizon = self.settings.longest;
         work.weigh(skeleton, &self.settings.air);
         self.trial.strain.resize(skeleton.len(), crate::Vector::zeros());
         self.trial.rate.resize(skeleton.len(), crate::Vector::zeros());

@@ -5,6 +5,7 @@ use crate::forces::{Damper, Forces, Part, Stretch};
 use crate::form::{Twist, Wrench};
 use crate::link::{Link, Weights, pair, transport};
 use crate::place::{Local, Place, Strain};
+use crate::rotary::Beyond;
 use crate::{Air, Segment, Skeleton, Vector};
 
 /// Working memory for one skeleton.
@@ -17,6 +18,11 @@ pub(crate) struct Workspace {
     pub plate_dampers: Vec<Damper>,
     /// Moments of the weight on the rest shape, where that is an equilibrium.
     pub rest_moments: Vec<Vector>,
+    /// Moment of inertia of each segment about its tangent in addition to that of its sections, in kg m².
+    pub rotary: Vec<f64>,
+    pub beyond: Vec<Beyond>,
+    /// The time over which an error of a velocity counts as a displacement, in s.
+    pub horizon: f64,
 }
 
 /// When and for how long the wind is sampled.
@@ -50,12 +56,13 @@ pub(crate) struct Power {
 
 /// A segment with what it carries.
 #[inline(always)]
-pub(crate) fn part<'a>(skeleton: &'a Skeleton, air: &'a Air, index: usize) -> Part<'a> {
+pub(crate) fn part<'a>(skeleton: &'a Skeleton, air: &'a Air, rotary: &[f64], index: usize) -> Part<'a> {
     Part {
         segment: &skeleton.segments()[index],
         loads: skeleton.loads(index),
         plates: skeleton.plates(index),
         air,
+        rotary: rotary[index],
     }
 }
 
@@ -73,6 +80,7 @@ impl Workspace {
         self.places.resize(n, Place::ZERO);
         self.later.resize(n, Place::ZERO);
         self.rest_moments.resize(n, Vector::zeros());
+        self.rotary.resize(n, 0.0);
         self.plate_dampers.resize(skeleton.plate_count(), Damper::ZERO);
     }
 
@@ -110,7 +118,7 @@ impl Workspace {
     ) {
         let zero = Vector::zeros();
         for index in 0..skeleton.len() {
-            let whole = part(skeleton, air, index);
+            let whole = part(skeleton, air, &self.rotary, index);
             let mut segment = whole.segment.held();
             segment.drag_diameter = 0.0;
             let (value, acceleration) = strain(index);
@@ -155,7 +163,7 @@ impl Workspace {
         let upwards = -air.gravity;
         let mut power = Power::default();
         for index in 0..skeleton.len() {
-            let part = part(skeleton, air, index);
+            let part = part(skeleton, air, &self.rotary, index);
             let segment = part.segment;
             let rate = if segment.rigid { Vector::zeros() } else { bend.rate[index] };
             let strain = Strain { value: bend.strain[index], rate, acceleration: Vector::zeros() };

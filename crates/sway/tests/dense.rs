@@ -79,7 +79,34 @@ enum Air3 {
     Plate(Vector, f64),
 }
 
-fn bodies(skeleton: &Skeleton, strain: &[Vector]) -> Bodies {
+/// Moments of inertia of the flywheels, from masses and their distances along the tree: δ² l √(m m₂).
+fn flywheels(skeleton: &Skeleton, delta: f64) -> Vec<f64> {
+    let segments = skeleton.segments();
+    let mut sums = vec![(0.0, 0.0); segments.len()];
+    for (index, segment) in segments.iter().enumerate() {
+        // Simpson's rule is exact for the square of the distance along a rod.
+        let rod = segment.mass * segment.length / 6.0;
+        let mut parts = vec![(0.0, rod), (0.5 * segment.length, 4.0 * rod), (segment.length, rod)];
+        let arm = |load: &Load| load.at * segment.length + load.centre.norm();
+        parts.extend(skeleton.loads(index).iter().map(|load| (arm(load), load.mass)));
+        let (mut at, mut before) = (index, 0.0);
+        loop {
+            for (distance, mass) in &parts {
+                let place: f64 = before + distance;
+                sums[at].0 += mass;
+                sums[at].1 += mass * place * place;
+            }
+            let Some(parent) = segments[at].parent else { break };
+            before += segments[at].joint.offset.norm() + segments[parent].length;
+            at = parent;
+        }
+    }
+    let of =
+        |(segment, sum): (&Segment, &(f64, f64))| delta * delta * segment.length * (sum.0 * sum.1).sqrt();
+    segments.iter().zip(&sums).map(of).collect()
+}
+
+fn bodies(skeleton: &Skeleton, strain: &[Vector], flywheels: &[f64]) -> Bodies {
     let pose = Pose::new(skeleton, strain);
     let mut all = Bodies { points: Vec::new(), spins: Vec::new() };
     for (index, segment) in skeleton.segments().iter().enumerate() {
@@ -89,7 +116,8 @@ fn bodies(skeleton: &Skeleton, strain: &[Vector]) -> Bodies {
             let area = 0.5 * segment.length * segment.drag_diameter;
             all.points.push((frame.origin, 0.5 * segment.mass * segment.length, Air3::Rod(tangent, area)));
             let round = segment.mass * segment.length * segment.diameter.powi(2) / 32.0;
-            all.spins.push((frame.axes, Matrix::from_diagonal(&Vector::new(2.0, 1.0, 1.0)) * round));
+            let polar = 2.0 * round + 0.5 * flywheels[index];
+            all.spins.push((frame.axes, Matrix::from_diagonal(&Vector::new(polar, round, round))));
         }
         for load in skeleton.loads(index) {
             let frame = pose.at(index, load.at);
@@ -158,9 +186,10 @@ fn accelerations_are_those_of_lagrange() {
 
 fn brute_force(skeleton: &Skeleton, state: &State, air: &Air, wind: &Vector) -> Vec<Vector> {
     let n = skeleton.len();
+    let wheels = flywheels(skeleton, Settings::default().rotary);
     let along = |t: f64| {
         let strain: Vec<Vector> = (0..n).map(|i| state.strain[i] + state.rate[i] * t).collect();
-        bodies(&later(skeleton, t), &strain)
+        bodies(&later(skeleton, t), &strain, &wheels)
     };
     let now = along(0.0);
     let (velocity, bias) = derivatives(|t| flat(&along(t)), 1e-3);
@@ -170,7 +199,7 @@ fn brute_force(skeleton: &Skeleton, state: &State, air: &Air, wind: &Vector) -> 
     let nudged = |column: (usize, usize), t: f64| {
         let mut strain = state.strain.clone();
         strain[column.0][column.1] += t;
-        bodies(skeleton, &strain)
+        bodies(skeleton, &strain, &wheels)
     };
     let points: Vec<DVector<f64>> =
         free.iter().map(|&column| derivatives(|t| flat(&nudged(column, t)), 1e-3).0).collect();
@@ -244,7 +273,11 @@ fn brute_force(skeleton: &Skeleton, state: &State, air: &Air, wind: &Vector) -> 
 /// Minus the derivative of the weight's potential at the rest shape.
 fn rest_loads(skeleton: &Skeleton, air: &Air, free: &[(usize, usize)]) -> Vec<f64> {
     let lift = |strain: &[Vector]| -> f64 {
-        bodies(skeleton, strain).points.iter().map(|point| point.0.dot(&air.gravity) * point.1).sum()
+        bodies(skeleton, strain, &vec![0.0; skeleton.len()])
+            .points
+            .iter()
+            .map(|point| point.0.dot(&air.gravity) * point.1)
+            .sum()
     };
     free.iter()
         .map(|&(segment, axis)| {

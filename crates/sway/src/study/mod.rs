@@ -6,6 +6,7 @@ use crate::{Air, Error, Load, Segment, Settings, Skeleton, Vector, upright};
 
 mod hard;
 mod motion;
+mod random;
 mod statics;
 mod vibration;
 
@@ -14,6 +15,7 @@ pub use motion::{
     WorkRow, angular_momentum, decrement, energy_balance, methods, pendulum_on_a_cart, shaken_cantilever,
     splitting,
 };
+pub use random::{RandomCase, random_case, show_case};
 pub use statics::{elastica, end_load, greenhill, greenhill_settles, uniform_load};
 pub use vibration::{cantilever_modes, cone_modes, hanging_chain};
 
