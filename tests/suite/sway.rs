@@ -7,8 +7,10 @@ use dlsys::session::{Nursery, Session};
 use dlsys::sim::Settings;
 use dlsys::tree::ModuleString;
 
+use super::common;
+
 const DIVIDING: &str = "units length 0.1, time 1\n\
-    tissue stalk = stiffness 2e9, density 900, damping 0.05\n\
+    tissue stalk = stiffness 6e7, density 900, damping 0.05\n\
     wind 1, 0, 0.3 speed 4 turbulence 0.4 scale 2\n\
     initial string: @E(stalk) S(1) /(20) S(1.3) [ +(40) S(0.5) @L(1) ] /(50) S(0.9) @K(1.5)\n\
     S(x): if x < 2 solve dx/dt = 0.4x if x = 2 produce S(0.8) /(33) S(1.2) \\(33)\n\
@@ -61,24 +63,37 @@ fn instants(session: &Session, end: f64) -> Vec<f64> {
     times
 }
 
-/// The largest jumps of position and of velocity of what is there before and after an instant.
-fn jumps(session: &Session, at: f64) -> (f64, f64, f64) {
+/// What moves at an instant.
+#[derive(Clone, Copy, Debug)]
+struct Jump {
+    at: f64,
+    position: f64,
+    velocity: f64,
+    speed: f64,
+}
+
+/// The largest jumps of position and of velocity of what is there before and after some instants, in order.
+fn jumps(session: &Session, instants: &[f64]) -> Vec<Jump> {
     const H: f64 = 2e-6;
-    let times = [-3.0, -2.0, -1.0, 1.0, 2.0, 3.0].map(|i| at + i * H);
+    let times: Vec<f64> =
+        instants.iter().flat_map(|at| [-3.0, -2.0, -1.0, 1.0, 2.0, 3.0].map(|i| at + i * H)).collect();
     let points: Vec<_> = scenes(session, &times).iter().map(points).collect();
-    let (mut position, mut velocity, mut speed) = (0.0_f64, 0.0_f64, 0.0_f64);
-    for key in points[0].keys() {
-        let there: Option<Vec<_>> = points.iter().map(|frame| frame.get(key).map(|p| p.coords)).collect();
-        let Some(x) = there else { continue };
-        // Extrapolated from three times on each side.
-        let limit = |[near, next, far]: [usize; 3]| (x[near] - x[next]) * 3.0 + x[far];
-        let slope =
-            |[near, next, far]: [usize; 3]| (x[near] * 5.0 - x[next] * 8.0 + x[far] * 3.0) / (2.0 * H);
-        position = position.max((limit([3, 4, 5]) - limit([2, 1, 0])).norm());
-        velocity = velocity.max((slope([3, 4, 5]) + slope([2, 1, 0])).norm());
-        speed = speed.max(slope([2, 1, 0]).norm());
-    }
-    (position, velocity, speed)
+    let jump = |(at, points): (&f64, &[HashMap<(u64, usize), Point>])| {
+        let mut jump = Jump { at: *at, position: 0.0, velocity: 0.0, speed: 0.0 };
+        for key in points[0].keys() {
+            let there: Option<Vec<_>> = points.iter().map(|frame| frame.get(key).map(|p| p.coords)).collect();
+            let Some(x) = there else { continue };
+            // Extrapolated from three times on each side.
+            let limit = |[near, next, far]: [usize; 3]| (x[near] - x[next]) * 3.0 + x[far];
+            let slope =
+                |[near, next, far]: [usize; 3]| (x[near] * 5.0 - x[next] * 8.0 + x[far] * 3.0) / (2.0 * H);
+            jump.position = jump.position.max((limit([3, 4, 5]) - limit([2, 1, 0])).norm());
+            jump.velocity = jump.velocity.max((slope([3, 4, 5]) + slope([2, 1, 0])).norm());
+            jump.speed = jump.speed.max(slope([2, 1, 0]).norm());
+        }
+        jump
+    };
+    instants.iter().zip(points.chunks(6)).map(jump).collect()
 }
 
 #[test]
@@ -86,24 +101,18 @@ fn divisions_cannot_be_seen_in_the_wind() {
     let session = read("dividing.dls", DIVIDING);
     let times = instants(&session, 6.0);
     assert!(times.len() >= 6, "{times:?}");
-    for at in times {
-        let (position, velocity, speed) = jumps(&session, at);
-        assert!(speed > 1e-4, "the wind blows at {at}: {speed}");
-        assert!(position < 1e-9, "at {at}: {position:e}");
-        assert!(velocity < 1e-6 * speed.max(1.0), "at {at}: {velocity:e} of {speed}");
+    for jump in jumps(&session, &times) {
+        assert!(jump.speed > 0.01, "the wind blows: {jump:?}");
+        assert!(jump.position < 1e-9, "{jump:?}");
+        assert!(jump.velocity < 1e-6 * jump.speed.max(1.0), "{jump:?}");
     }
 }
 
 #[test]
 fn the_clock_cannot_be_seen() {
     let session = read("dividing.dls", DIVIDING);
-    for tick in [30.0, 31.0, 77.0] {
-        let at: f64 = tick / 30.0;
-        let (position, velocity, speed) = jumps(&session, at);
-        assert!(
-            position < 1e-9 && velocity < 1e-6 * speed.max(1.0),
-            "{tick}: {position:e} {velocity:e} {speed}"
-        );
+    for jump in jumps(&session, &[30.0, 31.0, 77.0].map(|tick| tick / 30.0)) {
+        assert!(jump.position < 1e-9 && jump.velocity < 1e-6 * jump.speed.max(1.0), "{jump:?}");
     }
 }
 
@@ -167,4 +176,53 @@ fn a_plant_sways_as_its_model_does_alone() {
         let higher = plants[1] - dlsys::scene::Vector::new(0.0, 5.0, 0.0);
         assert!((higher - plants[0]).norm() > 1e-3, "another place, another wind");
     }
+}
+
+/// The models of the repository with everything that they draw made of a soft tissue, in a wind.
+#[test]
+#[ignore = "takes minutes"]
+fn nothing_pops_in_any_model() {
+    let (mut seen, mut refused) = (0, Vec::new());
+    for path in common::models().into_iter().filter(|path| path.to_string_lossy().contains("/models/")) {
+        let text = std::fs::read_to_string(&path).expect("readable");
+        let begun = std::time::Instant::now();
+        let (head, tail) = text.split_once("initial string:").unwrap_or(("", ""));
+        if head.contains("tissue ") || tail.is_empty() {
+            continue;
+        }
+        let folder = path.parent().expect("a folder");
+        let dressed = |words: &str, first: &str| {
+            let text = format!("{words}\n{head}initial string: {first} {tail}");
+            Session::from_text_in(folder, &[], "dressed.dls", &text, &[])
+        };
+        let words = "units length 0.05, time 1\ntissue zz = stiffness 1e10, density 900, damping 0.2\n\
+             wind 1, 0, 0.3 speed 2 turbulence 0.3 scale 2";
+        let (Ok(bent), Ok(rigid)) = (dressed(words, "@E(zz) !(0.1)"), dressed("", "!(0.1)")) else {
+            continue;
+        };
+        let end = bent.model.frames.map_or(5.0, |frames| frames.to.min(8.0));
+        let times = instants(&rigid, end);
+        let some: Vec<f64> =
+            times.iter().copied().step_by(times.len() / 4 + 1).filter(|t| *t > 0.1).collect();
+        // The solver says so where it cannot follow: soft stems of these models, which were not made for wind.
+        let nursery = Nursery::new(&bent.model, Settings::default());
+        let mut string = ModuleString::default();
+        let Ok(mut simulation) = bent.simulate(Settings::default()) else { continue };
+        let last = some.last().copied().unwrap_or(0.0) + 0.1;
+        if simulation.at(last, &mut string).is_err() || nursery.draw(&string, &mut nursery.blank()).is_err() {
+            refused.push(path.display().to_string());
+            continue;
+        }
+        for (jump, without) in jumps(&bent, &some).into_iter().zip(jumps(&rigid, &some)) {
+            // What jumps without wind jumps in it.
+            if without.position > 1e-9 || without.velocity > 1e-6 {
+                continue;
+            }
+            assert!(jump.position < 2e-8, "{}: {jump:?} {without:?}", path.display());
+            assert!(jump.velocity < 2e-6 * jump.speed.max(1.0), "{}: {jump:?} {without:?}", path.display());
+            seen += 1;
+        }
+        eprintln!("{} {:?}", path.display(), begun.elapsed());
+    }
+    assert!(seen > 30 && refused.len() < 8, "{seen}, {refused:?}");
 }

@@ -1,5 +1,6 @@
 //! The exact cases: errors and orders of the study.
 
+use dlsys_sway::Method;
 use dlsys_sway::study::{self, Row};
 
 /// The last row of each case has an error below `most`; its order, where errors are not rounding, is 2.
@@ -49,16 +50,31 @@ fn motion() -> Result<(), dlsys_sway::Error> {
     let pendulum = study::pendulum_on_a_cart()?;
     assert!(pendulum.iter().all(|row| row.error < 1e-5), "{pendulum:?}");
     let energy = study::energy_balance()?;
-    assert!(energy.iter().all(|row| row.error < 1e-2), "{energy:?}");
+    assert!(energy.iter().all(|row| row.error < 1e-4), "{energy:?}");
+    let momentum = study::angular_momentum()?;
+    assert!(momentum.last().is_some_and(|row| row.error < 1e-2), "{momentum:?}");
+    // What the floor under the inertia against twist changes is below the tolerance.
+    let wheels = study::flywheels()?;
+    assert!(wheels.iter().all(|row| row.error < 1e-3), "{wheels:?}");
+    assert!(wheels.iter().all(|row| row.order.is_none_or(|order| order > 1.8)), "{wheels:?}");
     Ok(())
 }
 
-/// Every hard case but hairs of 1 µm in wind, which are far beyond what the matrix knows of drag, ends without an error.
 #[test]
 fn hard_cases_end() {
     for case in study::hard_cases(1000) {
-        if !case.case.starts_with("hairs") {
-            assert!(case.failure.is_none() && case.moved.is_finite(), "{case:?}");
-        }
+        assert!(case.failure.is_none() && case.moved.is_finite(), "{case:?}");
+        assert!(case.error.is_none_or(|error| error < 0.05), "{case:?}");
+    }
+}
+
+/// Trees up to twice as tall as they can carry themselves, in winds up to a hurricane that turns round at once. Without flywheels, or with
+/// errors of velocities on the scale of a step, one in five of these cases ends with an error.
+#[test]
+fn random_cases_end() {
+    for seed in 48..128 {
+        let case = study::random_case(seed, Method::Ros2, 1e-3);
+        assert!(case.failure.is_none(), "{case:?}");
+        assert!(case.gain.is_none_or(|gain| gain < 1.0), "{case:?}");
     }
 }

@@ -12,10 +12,10 @@ mod vibration;
 
 pub use hard::{HardCase, hard_cases};
 pub use motion::{
-    WorkRow, angular_momentum, decrement, energy_balance, methods, pendulum_on_a_cart, shaken_cantilever,
-    splitting,
+    WorkRow, angular_momentum, decrement, energy_balance, flywheels, methods, pendulum_on_a_cart,
+    shaken_cantilever, splitting,
 };
-pub use random::{RandomCase, random_case, show_case};
+pub use random::{RandomCase, random_case};
 pub use statics::{elastica, end_load, greenhill, greenhill_settles, uniform_load};
 pub use vibration::{cantilever_modes, cone_modes, hanging_chain};
 
@@ -54,8 +54,8 @@ pub(crate) fn rows(case: &'static str, expected: f64, found: &[(f64, f64)]) -> V
 /// A case: computes its rows.
 pub type Case = fn() -> Result<Vec<Row>, Error>;
 
-/// The exact cases that the solver meets; [`angular_momentum`] is not among them yet.
-pub const EXACT_CASES: [Case; 13] = [
+/// The exact cases.
+pub const EXACT_CASES: [Case; 15] = [
     end_load,
     uniform_load,
     elastica,
@@ -69,6 +69,8 @@ pub const EXACT_CASES: [Case; 13] = [
     splitting,
     shaken_cantilever,
     pendulum_on_a_cart,
+    angular_momentum,
+    flywheels,
 ];
 
 /// A straight stem of `n` equal segments, clamped upright or along +x at the origin, with sag and without drag.

@@ -197,7 +197,8 @@ fn pendulum_period(length: f64, gravity: f64, amplitude: f64) -> f64 {
     std::f64::consts::TAU * (length / gravity).sqrt() / a
 }
 
-/// A limp stem with weights that hangs and swings round: relative change of its angular momentum about the vertical in 2 s, by tolerance.
+/// A limp stem that hangs and swings round, with crosses of four weights: relative change of its angular momentum about the vertical in 2 s, by
+/// tolerance.
 ///
 /// # Errors
 ///
@@ -211,18 +212,25 @@ pub fn angular_momentum() -> Result<Vec<Row>, Error> {
             segment.joint.rotation = nalgebra::Matrix3::new(0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
         }
         skeleton.push(segment);
-        // The inertia of a ball: too small to count, large enough that twist has some.
-        let inertia = nalgebra::Matrix3::identity() * 1e-8;
-        skeleton.load(Load { inertia, ..Load::point(1.0, 0.02 + 0.01 * index as f64) });
+        for arm in [Vector::y(), -Vector::y(), Vector::z(), -Vector::z()] {
+            skeleton.load(Load { centre: arm * 0.04, ..Load::point(1.0, 0.005 + 0.0025 * index as f64) });
+        }
     }
-    let momentum = |solver: &mut Solver, state: &State| -> Result<f64, Error> {
-        let pose = Pose::new(&skeleton, &state.strain);
-        let velocities = solver.velocities(&skeleton, state)?;
-        let of = |index: usize| {
-            let load: f64 = skeleton.loads(index).iter().map(|load| load.mass).sum();
-            pose.point(index, 1.0).cross(&velocities[index]).y * load
+    // The weights' velocities are differences of their places a moment later and earlier.
+    let momentum = |state: &State| -> f64 {
+        const MOMENT: f64 = 1e-5;
+        let places = |time: f64| -> Vec<Vector> {
+            let strain = state.strain.iter().zip(&state.rate).map(|(strain, rate)| strain + rate * time);
+            let pose = Pose::new(&skeleton, &strain.collect::<Vec<_>>());
+            let of = |index: usize| {
+                let frame = pose.at(index, 1.0);
+                skeleton.loads(index).iter().map(move |load| frame.origin + frame.axes * load.centre)
+            };
+            (0..skeleton.len()).flat_map(of).collect()
         };
-        Ok((0..skeleton.len()).map(of).sum())
+        let masses = (0..skeleton.len()).flat_map(|index| skeleton.loads(index)).map(|load| load.mass);
+        let moving = places(MOMENT).into_iter().zip(places(-MOMENT)).zip(masses);
+        moving.map(|((after, before), mass)| before.cross(&after).y * mass / (2.0 * MOMENT)).sum()
     };
     let mut found = Vec::new();
     for tolerance in [1e-3, 1e-4, 1e-5] {
@@ -231,12 +239,72 @@ pub fn angular_momentum() -> Result<Vec<Row>, Error> {
             *rate = Vector::new(0.0, 1.0, 0.5 - 0.1 * index as f64);
             state.strain[index] = Vector::new(0.0, 0.5, -1.0);
         }
-        let mut solver = Solver::new(Settings { tolerance, ..Settings::default() });
-        let before = momentum(&mut solver, &state)?;
-        solver.advance(&mut state, 0.0, 2.0, &mut Fixed(&skeleton), &Still, |_| ())?;
-        found.push((tolerance, momentum(&mut solver, &state)? / before - 1.0));
+        let settings = Settings { tolerance, rotary: 0.0, ..Settings::default() };
+        let before = momentum(&state);
+        Solver::new(settings).advance(&mut state, 0.0, 2.0, &mut Fixed(&skeleton), &Still, |_| ())?;
+        found.push((tolerance, momentum(&state) / before - 1.0));
     }
     Ok(rows("angular momentum: relative change (tolerance)", 0.0, &found))
+}
+
+/// What the flywheels about the tangents change: largest distance of the tip of a stalk that hangs over, in gusts from its side, from that with
+/// smaller ones, relative to its length, by δ.
+///
+/// # Errors
+///
+/// An error of the solver, which is a defect.
+pub fn flywheels() -> Result<Vec<Row>, Error> {
+    let (mut skeleton, wind) = stalk_in_gusts();
+    for segment in skeleton.segments_mut() {
+        segment.rest.y = 1.0;
+    }
+    let run = |rotary: f64| {
+        let settings = Settings { tolerance: 1e-8, rotary, ..Settings::default() };
+        frames_of_tip(&skeleton, settings, &wind).map(|run| run.0)
+    };
+    let reference = run(0.0125)?;
+    let mut found = Vec::new();
+    for delta in [0.2, 0.1, 0.05] {
+        let tips = run(delta)?;
+        let most = tips.iter().zip(&reference).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        found.push((delta, most));
+    }
+    Ok(rows("flywheels of δ: tip of a stalk in gusts/L", 0.0, &found))
+}
+
+/// A stalk of 1 m, bent to and fro and sideways by gusts.
+fn stalk_in_gusts() -> (Skeleton, impl Fn(Vector, f64) -> Vector) {
+    let mut skeleton = stem(12, 1.0, 0.01, 5e8, 900.0, true);
+    for segment in skeleton.segments_mut() {
+        segment.damping = 0.01;
+        segment.drag_diameter = 0.03;
+    }
+    let wind = |point: Vector, time: f64| {
+        let gust = (3.0 * time).sin() + 0.5 * (11.0 * time - point.y).sin();
+        Vector::new(5.0 * gust, 0.0, 2.0 * (7.0 * time).cos())
+    };
+    (skeleton, wind)
+}
+
+/// Places of a tip at 60 frames a second during 2 s, and the steps tried.
+fn frames_of_tip(
+    skeleton: &Skeleton,
+    settings: Settings,
+    wind: &impl Fn(Vector, f64) -> Vector,
+) -> Result<(Vec<Vector>, u64), Error> {
+    let mut solver = Solver::new(settings);
+    let mut state = State::at_rest(skeleton);
+    let mut frames = Vec::new();
+    let tip = skeleton.len() - 1;
+    solver.advance(&mut state, 0.0, 2.0, &mut Fixed(skeleton), wind, |step| {
+        while frames.len() as f64 / 60.0 <= step.to {
+            let time = frames.len() as f64 / 60.0;
+            let strain: Vec<Vector> = (0..=tip).map(|index| step.strain(index, time)).collect();
+            frames.push(Pose::new(skeleton, &strain).point(tip, 1.0));
+        }
+    })?;
+    let counts = solver.counts();
+    Ok((frames, counts.steps + counts.rejected))
 }
 
 /// Work and error of a method at a tolerance.
@@ -261,30 +329,9 @@ pub struct WorkRow {
 ///
 /// An error of the solver, which is a defect.
 pub fn methods() -> Result<Vec<WorkRow>, Error> {
-    let mut skeleton = stem(12, 1.0, 0.01, 5e8, 900.0, true);
-    for segment in skeleton.segments_mut() {
-        segment.damping = 0.01;
-        segment.drag_diameter = 0.03;
-    }
-    let wind = |point: Vector, time: f64| {
-        let gust = (3.0 * time).sin() + 0.5 * (11.0 * time - point.y).sin();
-        Vector::new(5.0 * gust, 0.0, 2.0 * (7.0 * time).cos())
-    };
-    let run = |method: Method, tolerance: f64| -> Result<(Vec<Vector>, u64), Error> {
-        let settings = Settings { method, tolerance, air: Air::default(), ..Settings::default() };
-        let mut solver = Solver::new(settings);
-        let mut state = State::at_rest(&skeleton);
-        let mut frames = Vec::new();
-        let tip = skeleton.len() - 1;
-        solver.advance(&mut state, 0.0, 2.0, &mut Fixed(&skeleton), &wind, |step| {
-            while frames.len() as f64 / 60.0 <= step.to {
-                let time = frames.len() as f64 / 60.0;
-                let strain: Vec<Vector> = (0..=tip).map(|index| step.strain(index, time)).collect();
-                frames.push(Pose::new(&skeleton, &strain).point(tip, 1.0));
-            }
-        })?;
-        let counts = solver.counts();
-        Ok((frames, counts.steps + counts.rejected))
+    let (skeleton, wind) = stalk_in_gusts();
+    let run = |method: Method, tolerance: f64| {
+        frames_of_tip(&skeleton, Settings { method, tolerance, ..Settings::default() }, &wind)
     };
     let reference = run(Method::Ros2, 1e-7)?.0;
     let mut all = Vec::new();

@@ -197,26 +197,3 @@ pub fn random_case(seed: u64, method: crate::Method, tolerance: f64) -> RandomCa
         failure,
     }
 }
-
-/// Prints a case.
-pub fn show_case(seed: u64) {
-    let mut draws = Draws(seed);
-    let grows = draws.chance(0.25);
-    let skeleton = tree(&mut draws, grows);
-    let speed = draws.scale(0.3, 40.0);
-    println!("grows {grows} speed {speed}");
-    for (i, s) in skeleton.segments().iter().enumerate() {
-        println!(
-            "{i} <- {:?} l {:.2e} d {:.2e} E {:.1e} m {:.2e} tau {:.1e} rest {:.1?} loads {:?} plates {:?}",
-            s.parent,
-            s.length,
-            s.diameter,
-            s.stiffness,
-            s.mass * s.length,
-            s.damping,
-            s.rest.as_slice(),
-            skeleton.loads(i).iter().map(|l| (l.mass, l.centre.norm())).collect::<Vec<_>>(),
-            skeleton.plates(i).iter().map(|p| p.area).collect::<Vec<_>>()
-        );
-    }
-}
