@@ -163,18 +163,18 @@ struct Rod {
 }
 
 impl Rod {
-    fn from_axis(&self, point: Vector3<f64>) -> Vector3<f64> {
+    fn off_axis(&self, point: Vector3<f64>) -> Vector3<f64> {
         point - Vector3::new(0.0, 0.0, point.z.clamp(-self.half, self.half))
     }
 }
 
 impl Obstacle for Rod {
     fn distance(&self, point: Vector3<f64>, _: f64) -> f64 {
-        self.from_axis(point).norm() - self.radius
+        self.off_axis(point).norm() - self.radius
     }
 
     fn normal(&self, point: Vector3<f64>, _: f64) -> Vector3<f64> {
-        self.from_axis(point).normalize()
+        self.off_axis(point).normalize()
     }
 
     fn velocity(&self, _: f64) -> Vector3<f64> {
