@@ -86,6 +86,50 @@ fn places_may_have_times_and_come_through_a_pipe() {
     );
 }
 
+/// A vortex whose axis turns from the vertical to x: the air circles around the axis of each instant.
+#[test]
+fn the_axis_of_a_vortex_follows_t() {
+    let turning = "units length 1, time 2\nflow vortex 4 at 0, 0, 0 axis sin(pi*t/2), cos(pi*t/2), 0\ninitial string: F(1)\n";
+    let upright = turning.replace("sin(pi*t/2), cos(pi*t/2), 0", "0, 1, 0");
+    let lying = turning.replace("sin(pi*t/2), cos(pi*t/2), 0", "1, 0, 0");
+    let folder = folder(&[("turning.dls", turning), ("upright.dls", &upright), ("lying.dls", &lying)]);
+    let at = |name: &str, t: f64| {
+        let places = format!("t,x,y,z\n{t},0.5,0.25,1\n{t},2,-1,0.5\n");
+        let rows = numbers(&String::from_utf8_lossy(
+            &dlsys(&folder, &format!("run {name} --field -"), &places).stdout,
+        ));
+        assert_eq!(rows.len(), 2, "{name} at {t}");
+        rows.into_iter().flat_map(|row| row[4..].to_vec()).collect::<Vec<f64>>()
+    };
+    for (t, still) in [(0.0, "upright.dls"), (1.0, "lying.dls"), (2.0, "upright.dls")] {
+        let sign = if t == 2.0 { -1.0 } else { 1.0 };
+        for (turning, still) in at("turning.dls", t).into_iter().zip(at(still, t)) {
+            assert!((turning - sign * still).abs() < 1e-12, "t = {t}: {turning}, {still}");
+        }
+    }
+}
+
+/// Values that read `t` may have no meaning at some time: the message quotes their declaration, not that of a tissue.
+#[test]
+fn winds_without_a_value_at_some_time_are_shown_where_they_are_declared() {
+    let no_axis = format!("flow vortex 2 at 0, 1, 0 axis 0, max(0, 1 - t), 0\n{POLE}");
+    let no_speed = format!("wind 1, 0, 0 speed sqrt(1 - t)\n{POLE}");
+    for (text, message) in
+        [(&no_axis, "the axis of flow 1 is (0, 0, 0) at "), (&no_speed, "the speed of the wind is NaN at ")]
+    {
+        let folder = folder(&[("bad.dls", text)]);
+        for (arguments, place) in [
+            ("render bad.dls --at 3 -o out --format svg", "bad.dls:1:1"),
+            ("run bad.dls --field -", "standard input:2:1"),
+        ] {
+            let output = dlsys(&folder, arguments, "t,x,y,z\n3,0,1,0\n");
+            let error = String::from_utf8_lossy(&output.stderr);
+            assert!(error.contains(message) && error.contains(place), "{arguments}: {error}");
+            assert_eq!(output.status.code(), Some(1), "{arguments}");
+        }
+    }
+}
+
 #[test]
 fn mistakes_in_the_places_are_shown_with_their_line() {
     let folder = folder(&[("gusts.dls", GUSTS), ("pole.dls", POLE)]);

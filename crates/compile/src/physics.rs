@@ -34,6 +34,11 @@ const fn positive(name: &'static str, unit: &'static str, help: &'static str) ->
     Quantity { name, unit, zero: false, most: f64::MAX, help }
 }
 
+/// A quantity that is 0 or greater.
+const fn not_negative(name: &'static str, unit: &'static str, help: &'static str) -> Quantity {
+    Quantity { zero: true, ..positive(name, unit, help) }
+}
+
 const LENGTH: Quantity = positive(
     "unit of length",
     " m",
@@ -57,28 +62,20 @@ const DENSITY: Quantity = positive(
     " kg/m³",
     "a density is greater than 0: about `density 900` for fresh stems, `500` to `800` for dry wood",
 );
-const DAMPING: Quantity = Quantity {
-    zero: true,
-    ..positive(
-        "damping",
-        "",
-        "a damping ratio is 0 or greater: about `damping 0.02` for wood, `0.05` to `0.2` for stems with leaves",
-    )
-};
+const DAMPING: Quantity = not_negative(
+    "damping",
+    "",
+    "a damping ratio is 0 or greater: about `damping 0.02` for wood, `0.05` to `0.2` for stems with leaves",
+);
 const THICKNESS: Quantity =
     positive("thickness", " m", "a thickness is greater than 0: about `thickness 0.0002` for a leaf");
-const SPEED: Quantity = Quantity {
-    zero: true,
-    ..positive("speed", " m/s", "a speed is 0 or greater; the direction says where the wind goes")
-};
-const TURBULENCE: Quantity = Quantity {
-    zero: true,
-    ..positive(
-        "turbulence",
-        "",
-        "it is the root mean square of the fluctuations relative to the speed, 0 or greater: `turbulence 0.2` for example",
-    )
-};
+const SPEED: Quantity =
+    not_negative("speed", " m/s", "a speed is 0 or greater; the direction says where the wind goes");
+const TURBULENCE: Quantity = not_negative(
+    "turbulence",
+    "",
+    "it is the root mean square of the fluctuations relative to the speed, 0 or greater: `turbulence 0.2` for example",
+);
 const SCALE: Quantity =
     positive("scale", " m", "a scale is greater than 0: the size of the eddies in m, `scale 5` for example");
 const ROUGHNESS: Quantity = positive(

@@ -229,7 +229,9 @@ impl<M: Deref<Target = Model>> Bending<M> {
             };
             let mut note = |step: &sway::Step<'_>| knots.push(knot(step.to, step.after));
             let done = self.solver.advance(&mut state, from, to, &mut growth, &*self.wind, &mut note);
-            done.map_err(|error| failure(&self.model, &body, error, string.time))?;
+            done.map_err(|error| {
+                self.wind.failure().unwrap_or_else(|| failure(&self.model, &body, error, string.time))
+            })?;
             let steps = knots.len() as u64 - 1;
             (self.effort.steps, self.effort.stem_steps) =
                 (self.effort.steps + steps, self.effort.stem_steps + steps * body.stems.len() as u64);

@@ -2,10 +2,11 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use dlsys_diagnostic::Span;
 use dlsys_expr::Program;
 use dlsys_model::{self as model, Primitive, Scenery, Units};
 use dlsys_sway as sway;
-use dlsys_wind::{Description, Field, Flow, Ground, Signal, Snapshot, Spectrum};
+use dlsys_wind::{self as wind, Description, Field, Flow, Ground, Signal, Snapshot, Spectrum};
 use nalgebra::Vector3;
 
 use crate::{Error, Place};
@@ -16,6 +17,22 @@ pub struct Weather {
     field: Field,
     /// The last instants that were asked for; many plants stand in one wind.
     recent: Mutex<Vec<(f64, Arc<Snapshot>)>>,
+    spans: Spans,
+}
+
+/// The declarations of the wind and of the flows.
+#[derive(Debug)]
+struct Spans {
+    wind: Span,
+    flows: Vec<Span>,
+}
+
+impl Spans {
+    /// An error with the place of the declaration that it is about.
+    fn locate(&self, error: wind::Error) -> Error {
+        let flow = if let wind::Error::Flow { index, .. } = &error { self.flows.get(*index) } else { None };
+        Error::Wind { span: *flow.unwrap_or(&self.wind), error }
+    }
 }
 
 /// Number of instants that are kept: the stages of some ticks, as plants that are drawn one after another read them.
@@ -37,8 +54,11 @@ impl Weather {
             };
             description.flows = flows.iter().map(|flow| of_flow(flow, *units)).collect();
             description.ground = ground.map(|height| Ground::Flat(height * units.length));
-            let field = Field::new(description).map_err(|error| Error::Wind { error, span })?;
-            Ok(Arc::new(Weather { field, recent: Mutex::default() }))
+            let spans = Spans { wind: span, flows: flows.iter().map(|flow| flow.span).collect() };
+            match Field::new(description) {
+                Ok(field) => Ok(Arc::new(Weather { field, recent: Mutex::default(), spans })),
+                Err(error) => Err(spans.locate(error)),
+            }
         };
         scenery.field.get_or_make(make)
     }
@@ -48,19 +68,19 @@ impl Weather {
         &self.field
     }
 
-    /// The wind at an instant, in s; `None` if a value of it is not finite then.
-    fn at(&self, time: f64) -> Option<Arc<Snapshot>> {
+    /// The wind at an instant, in s.
+    fn at(&self, time: f64) -> Result<Arc<Snapshot>, wind::Error> {
         let recent = || self.recent.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, known)) = recent().iter().find(|(at, _)| *at == time) {
-            return Some(known.clone());
+            return Ok(known.clone());
         }
-        let new = Arc::new(self.field.at(time).ok()?);
+        let new = Arc::new(self.field.at(time)?);
         let mut recent = recent();
         if recent.len() >= KEPT {
             recent.remove(0);
         }
         recent.push((time, new.clone()));
-        Some(new)
+        Ok(new)
     }
 }
 
@@ -105,9 +125,7 @@ fn of_flow(flow: &model::Flow, units: Units) -> Flow {
         Primitive::Source => Flow::Source { strength: value(0, 1.0), at: at(), decay, core },
         Primitive::Sink => Flow::Source { strength: value(0, -1.0), at: at(), decay, core },
         Primitive::Vortex => {
-            let mut values = vec![0.0; flow.program.outputs()];
-            flow.program.eval(&[0.0], &mut Vec::new(), &mut values);
-            let axis = Vector3::new(values[4], values[5], values[6]);
+            let axis = [4, 5, 6].map(|output| value(output, 1.0));
             Flow::Vortex { circulation: value(0, 1.0), at: at(), axis, decay, core }
         }
     }
@@ -121,13 +139,15 @@ pub struct Sampler {
     weather: Option<Arc<Weather>>,
     /// The last instant.
     last: Mutex<Option<(f64, Arc<Snapshot>)>>,
+    /// The reason why the wind had no value at an instant.
+    failure: Mutex<Option<wind::Error>>,
     place: Place,
 }
 
 impl Sampler {
     /// The wind for a model at a place; without weather the air is still.
     pub fn new(weather: Option<Arc<Weather>>, place: Place) -> Sampler {
-        Sampler { weather, last: Mutex::default(), place }
+        Sampler { weather, last: Mutex::default(), failure: Mutex::default(), place }
     }
 
     /// True if the air moves somewhere at some time.
@@ -135,7 +155,14 @@ impl Sampler {
         self.weather.is_some()
     }
 
-    /// The wind at an instant, in s.
+    /// The reason why the wind had no value, if there was an instant without one: its velocities are not numbers then, and a solver
+    /// that depends on them fails.
+    pub(crate) fn failure(&self) -> Option<Error> {
+        let error = self.failure.lock().unwrap_or_else(PoisonError::into_inner).clone()?;
+        Some(self.weather.as_ref()?.spans.locate(error))
+    }
+
+    /// The wind at an instant, in s; `None` without weather, or if it has no value.
     fn at(&self, time: f64) -> Option<Arc<Snapshot>> {
         let weather = self.weather.as_ref()?;
         let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
@@ -144,7 +171,13 @@ impl Sampler {
         {
             return Some(known.clone());
         }
-        let new = weather.at(time)?;
+        let new = match weather.at(time) {
+            Ok(new) => new,
+            Err(error) => {
+                *self.failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+                return None;
+            }
+        };
         *last = Some((time, new.clone()));
         Some(new)
     }

@@ -5,6 +5,8 @@
 //! - `across.png`: the same for the component across the wind.
 //! - `streaks.png`: stream lines of the turbulence over 6 by 4 integral scales, by noise that is averaged along them.
 //! - `paper.png`: the same for the field of Stam and Fiume.
+//! - `square.png`: what becomes of a square of smoke in that field within 2.5 s, as in figure 1 of the paper: 4 m across, every half of a second. It shows
+//!   the eddies of the first of three lattices, down to 0.3 m, because smaller ones only blur it.
 //! - `ground.png`: stream lines over a hill, with a ball in the wind.
 
 use std::fs::File;
@@ -107,6 +109,46 @@ fn streaks(
     write(path, &pixels)
 }
 
+/// Panels of `square.png`, in two rows; the seconds between them; steps of the paths between them.
+const PANELS: usize = 6;
+const PAUSE: f64 = 0.5;
+const STEPS: usize = 10;
+
+/// A square of smoke that the turbulence of a field carries along: each pixel shows where its air was at the beginning.
+fn square(path: &Path, field: &Field, mean: Vector3<f64>) -> Result<()> {
+    let (columns, side) = (3, WIDTH / 3);
+    let step = PAUSE / STEPS as f64;
+    let instant = |i: usize| field.at(i as f64 * step).map(|wind| study::first_lattice(&wind));
+    let instants = (0..=(PANELS - 1) * STEPS).map(instant);
+    let instants = instants.collect::<std::result::Result<Vec<Snapshot>, _>>()?;
+    let scale = 4.0 / side as f64;
+    let pixels: Vec<[u8; 3]> = (0..WIDTH * HEIGHT)
+        .map(|i| {
+            let (column, row) = (i % WIDTH, i / WIDTH);
+            let panel = row / side * columns + column / side;
+            let place = |pixel: usize, part: f64| ((pixel % side) as f64 + part) * scale - 2.0;
+            // Four places a pixel.
+            let sum: f64 = [(0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.75, 0.75)]
+                .map(|(right, down)| {
+                    let mut x = Vector3::new(place(column, right), 0.0, place(row, down));
+                    // Heun's method, backwards.
+                    for pair in instants[..=panel * STEPS].windows(2).rev() {
+                        let [before, after] = pair else { continue };
+                        let late = after.velocity(x) - mean;
+                        let early = before.velocity(x - late * step) - mean;
+                        x -= (late + early) * (0.5 * step);
+                    }
+                    if x.x.abs().max(x.z.abs()) < 0.8 { 0.25 } else { 0.0 }
+                })
+                .iter()
+                .sum();
+            let frame = column % side == 0 || row % side == 0;
+            [if frame { 200 } else { (255.0 - 215.0 * sum) as u8 }; 3]
+        })
+        .collect();
+    write(path, &pixels)
+}
+
 fn main() -> Result<()> {
     let folder = std::env::args().nth(1).ok_or("usage: look FOLDER")?;
     let folder = Path::new(&folder);
@@ -124,8 +166,10 @@ fn main() -> Result<()> {
     slice(&folder.join("across.png"), &wide, |x| wind.velocity(x).z / 5.0)?;
     let close = Plane { scale: 6.0 / WIDTH as f64, ..wide };
     streaks(&folder.join("streaks.png"), &close, 5.0, |x| wind.velocity(x) - mean)?;
-    let paper: Snapshot = study::paper(0)?.at(0.0)?;
+    let field = study::paper(0)?;
+    let paper = field.at(0.0)?;
     streaks(&folder.join("paper.png"), &close, 1.8, |x| paper.velocity(x) - Vector3::x())?;
+    square(&folder.join("square.png"), &field, Vector3::x())?;
 
     // A hill 1 m high, seen from the side; a ball of 1 m above its slope.
     let hill = Ground::Uneven {

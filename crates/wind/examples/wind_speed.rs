@@ -6,7 +6,7 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use dlsys_wind::{Description, Error, Field, Ground, Signal, Snapshot, Spectrum, Sphere};
+use dlsys_wind::{Description, Error, Field, Ground, Signal, Snapshot, Spectrum, Sphere, study};
 use nalgebra::Vector3;
 
 const ROUNDS: usize = 31;
@@ -52,6 +52,9 @@ fn main() -> Result<(), Error> {
     sample("velocity, three lattices, random places", &wind, &random);
     let stem: Vec<_> = (0..20_000).map(|i| Vector3::new(1.0, i as f64 * 5e-5, 2.0)).collect();
     sample("velocity, three lattices, along a stem of 1 m", &wind, &stem);
+    let one = study::first_lattice(&wind);
+    sample("velocity, one lattice, random places", &one, &random);
+    sample("velocity, one lattice, along a stem of 1 m", &one, &stem);
     let gradients = || {
         black_box(random.iter().map(|x| wind.velocity_and_gradient(*x).1.trace()).sum::<f64>());
     };
@@ -71,14 +74,14 @@ fn main() -> Result<(), Error> {
             black_box(field.at(*time).is_ok());
         })
     };
-    print("snapshot", snapshot(&field, &mut time));
+    print("instant", snapshot(&field, &mut time));
     let varying = Field::new(gusty(Signal::function(|t| 5.0 + (0.3 * t).sin())))?;
-    print("snapshot, speed varies", snapshot(&varying, &mut time));
+    print("instant, speed varies", snapshot(&varying, &mut time));
     let period = Description { period: Some(8.0), ..gusty(5.0.into()) };
-    print("snapshot, period", snapshot(&Field::new(period)?, &mut time));
+    print("instant, period", snapshot(&Field::new(period)?, &mut time));
     let paper = Spectrum::Kolmogorov { dissipation: 1.0, inertial: 4.0, sigma: 1.0 };
     let paper = Field::new(Description { spectrum: paper, ..gusty(5.0.into()) })?;
-    print("snapshot, the paper's spectrum", snapshot(&paper, &mut time));
+    print("instant, the paper's spectrum", snapshot(&paper, &mut time));
     let build = || {
         black_box(Field::new(gusty(5.0.into())).is_ok());
     };

@@ -8,6 +8,22 @@ pub enum Error {
     /// The direction is zero or not finite.
     #[error("the direction of the wind is ({}, {}, {}), which is no direction: one component at least must differ from 0, and all must be finite", .0[0], .0[1], .0[2])]
     Direction([f64; 3]),
+    /// The axis of a vortex is zero at an instant. Flows are counted from 1.
+    #[error("the axis of flow {flow} is (0, 0, 0) at {time} s, which is no direction")]
+    Axis {
+        /// The number of the flow.
+        flow: usize,
+        /// The time in seconds.
+        time: f64,
+    },
+    /// One of the flows has no meaning, or no value at an instant.
+    #[error("{error}")]
+    Flow {
+        /// The number of the flow, from 0.
+        index: usize,
+        /// The reason, which names the flow.
+        error: Box<Error>,
+    },
     /// A number that must be greater than 0 is not.
     #[error("{name} is {value}, and must be a finite number greater than 0")]
     NotPositive {

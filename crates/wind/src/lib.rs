@@ -13,8 +13,9 @@
 //! - All of it has random access: the velocity at any place and time depends on the description alone, not on what was evaluated
 //!   before, and has the same bits on every thread and machine (as long as functions of the description do).
 //!
-//! [`Field::at`] sums over frequencies once for an instant (some milliseconds); [`Snapshot::velocity`] then takes less than a
-//! microsecond for a place.
+//! [`Field::at`] sums over frequencies once for an instant (0.6 ms on one core); [`Snapshot::velocity`] then takes about half a
+//! microsecond for a place. The sum is in single precision, with a root mean square error of 2.4e-7 of that of the turbulence;
+//! [`Field::sum_of_modes`] is the reference in double precision.
 //!
 //! # Examples
 //!
@@ -52,7 +53,9 @@ mod description;
 mod error;
 mod field;
 mod fourier;
+mod groups;
 mod journey;
+mod lanes;
 mod lattice;
 mod modes;
 mod obstacle;

@@ -10,7 +10,8 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Rotation3, Unit, UnitQuaternion, Vector3};
 
-use crate::fourier::{MODES, N};
+use crate::fourier::{LONGEST, MODES, N, index};
+use crate::groups::{GROUP, Group, Member};
 use crate::random::{Draw, normal_quantile};
 use crate::spectrum::Energy;
 use crate::turns::cos_sin;
@@ -24,7 +25,7 @@ pub(crate) const FREQUENCIES: usize = 16;
 /// The ratio of the periods of two neighbouring lattices: irrational, 3 + √5.
 pub(crate) const RATIO: f64 = 5.236_067_977_499_79;
 
-/// Wave vectors of a lattice are at most this long, in units of its smallest.
+/// Wave vectors of a lattice are at most this long, in units of its smallest: a little more than the root of [`LONGEST`].
 pub(crate) const CUT: f64 = 10.5;
 
 /// Axes of the lattices, as quaternions (w, i, j, k) of any length. A slice through a turned lattice nearly repeats itself where a
@@ -51,22 +52,13 @@ pub(crate) struct Lap {
     pub(crate) swept: f64,
 }
 
-/// One of a mode's frequencies: turns per metre, and the complex amplitudes of both polarisations.
-#[derive(Clone, Copy, Debug)]
-struct Line {
-    turns: f64,
-    amplitude: [f32; 4],
-}
-
 /// A pair of modes, m and -m.
 #[derive(Clone, Debug)]
 pub(crate) struct Mode {
-    /// m, with the first component that is not 0 positive.
+    /// m, with the last component that is not 0 positive.
     pub(crate) m: [i32; 3],
     /// |k| in rad/m.
     pub(crate) k: f64,
-    /// Turns of phase per metre that the wind travels.
-    drift: f64,
     /// Two directions at right angles to k and to each other, in the axes of the lattice.
     polarisation: [Vector3<f64>; 2],
     /// The expected square of the velocity's amplitude in each of the two polarisations.
@@ -83,7 +75,8 @@ pub(crate) struct Band {
     /// The wave numbers between which its modes lie; 0 for the lower end of the first.
     pub(crate) range: [f64; 2],
     pub(crate) modes: Vec<Mode>,
-    lines: Vec<[Line; FREQUENCIES]>,
+    /// The modes again, with their frequencies and amplitudes.
+    pub(crate) groups: Vec<Group>,
 }
 
 /// The bands of a spectrum. `direction` is that of the wind, by which eddies travel; zero if they stay.
@@ -102,21 +95,18 @@ impl Band {
             UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, a, b, c)).to_rotation_matrix();
         let lowest = if i == 0 { 0.0 } else { CUT * scaled(i - 1) };
         let heading = rotation * direction;
-        let (mut modes, mut lines) = (Vec::new(), Vec::new());
+        let mut modes = Vec::new();
         for m in half_space() {
-            let wave = Vector3::from(m.map(f64::from));
-            let k = unit * wave.norm();
+            let k = unit * Vector3::from(m.map(f64::from)).norm();
             // Half-open, so that neighbouring bands leave nothing out and have nothing twice.
-            if !(k > lowest && k <= end) || energy.at(k) == 0.0 {
-                continue;
+            if k > lowest && k <= end && energy.at(k) > 0.0 {
+                modes.push(Mode {
+                    m,
+                    k,
+                    polarisation: polarisation(m),
+                    power: energy.at(k) / (4.0 * PI * k * k),
+                });
             }
-            modes.push(Mode {
-                m,
-                k,
-                drift: -unit / TAU * wave.dot(&heading),
-                polarisation: polarisation(wave),
-                power: energy.at(k) / (4.0 * PI * k * k),
-            });
         }
         // The sum over points of the lattice becomes the integral over the band: each component has a third of 2∫E dk. A mode and
         // its conjugate have two polarisations each.
@@ -124,16 +114,11 @@ impl Band {
         let scale = if total > 0.0 { 2.0 * energy.integral(lowest, end) / total } else { 0.0 };
         for mode in &mut modes {
             mode.power *= scale;
-            let size = (mode.power / (2.0 * FREQUENCIES as f64)).sqrt();
-            let draw = mode.m.iter().fold(draw, |draw, m| draw.of(i64::from(*m) as u64));
-            lines.push(std::array::from_fn(|j| {
-                let draw = draw.of(j as u64);
-                let ([a, b], [c, d]) = (draw.of(1).normal_pair(), draw.of(2).normal_pair());
-                let turns = quantiles.draw(j, draw.of(3).unit()) * mode.k / TAU;
-                Line { turns, amplitude: [a, b, c, d].map(|x| (x * size) as f32) }
-            }));
         }
-        Band { period: TAU / unit, rotation, range: [lowest, end], modes, lines }
+        let period = TAU / unit;
+        let members: Vec<Member> =
+            modes.iter().map(|mode| mode.member(unit, heading, period / N as f64, draw, quantiles)).collect();
+        Band { period, rotation, range: [lowest, end], modes, groups: Group::of(&members) }
     }
 
     /// The expected variance of each component of the velocity.
@@ -157,35 +142,48 @@ impl Band {
         lap: Option<Lap>,
         mut each: impl FnMut(&Mode, Vector3<f64>, Vector3<f64>),
     ) {
-        for (mode, lines) in self.modes.iter().zip(&self.lines) {
-            // Over a period, phases turn a whole number of times.
-            let turned = |lap: f64| (lap + 0.5).floor() * at.share;
-            let mut drift = mode.drift * at.drift;
-            if let Some(lap) = lap {
-                drift += turned(mode.drift * lap.drift);
-            }
-            let mut sum = [0.0f64; 4];
-            for line in lines {
-                let mut phase = drift + line.turns * at.swept;
-                if let Some(lap) = lap {
-                    phase += turned(line.turns * lap.swept);
-                }
-                let (c, s) = cos_sin(phase);
-                let [a, b, d, e] = line.amplitude.map(f64::from);
-                sum[0] += a * c - b * s;
-                sum[1] += a * s + b * c;
-                sum[2] += d * c - e * s;
-                sum[3] += d * s + e * c;
-            }
+        for (i, mode) in self.modes.iter().enumerate() {
+            let sum = self.groups[i / GROUP].exact(i % GROUP, at, lap);
             let [p, q] = mode.polarisation;
             each(mode, p * sum[0] + q * sum[2], p * sum[1] + q * sum[3]);
         }
     }
+}
 
-    /// The index of a mode and of its conjugate on the lattice.
-    pub(crate) fn indices(m: [i32; 3]) -> [usize; 2] {
-        let index = |sign: i32| m.iter().fold(0, |at, m| at * N + (sign * m).rem_euclid(N as i32) as usize);
-        [index(1), index(-1)]
+impl Mode {
+    /// Draws frequencies and amplitudes of the mode of a lattice with this spacing and this smallest wave vector.
+    fn member(
+        &self,
+        unit: f64,
+        heading: Vector3<f64>,
+        spacing: f64,
+        draw: Draw,
+        quantiles: &Quantiles,
+    ) -> Member {
+        let size = (self.power / (2.0 * FREQUENCIES as f64)).sqrt();
+        // Numbers belong to the one of m and -m whose first component that is not 0 is positive.
+        let sign = if self.m > [0, 0, 0] { 1 } else { -1 };
+        let draw = self.m.iter().fold(draw, |draw, m| draw.of(i64::from(sign * m) as u64));
+        let (mut turns, mut amplitude) = ([0.0; FREQUENCIES], [[0.0; 4]; FREQUENCIES]);
+        for j in 0..FREQUENCIES {
+            let draw = draw.of(j as u64);
+            let ([a, b], [c, d]) = (draw.of(1).normal_pair(), draw.of(2).normal_pair());
+            let sign = f64::from(sign);
+            turns[j] = sign * quantiles.draw(j, draw.of(3).unit()) * self.k / TAU;
+            amplitude[j] = [a, sign * b, c, sign * d].map(|x| (x * size) as f32);
+        }
+        // The transform of the coefficients of the spline is that of the values divided by (2 + cos 2πm/32)/3 for each axis.
+        let filter = |size: f64, m: &i32| size * 3.0 / (2.0 + cos_sin(f64::from(*m) / N as f64).0);
+        let factor = self.m.iter().fold(1.0 / (self.k * spacing), filter);
+        let [a, b, c] = self.m;
+        let conjugate = if c == 0 { [-a, -b, 0] } else { self.m };
+        Member {
+            drift: -unit / TAU * Vector3::from(self.m.map(f64::from)).dot(&heading),
+            turns,
+            amplitude,
+            potential: self.polarisation.map(|direction| direction * factor),
+            indices: [self.m, conjugate].map(|m| index(m) as u32),
+        }
     }
 }
 
@@ -194,12 +192,14 @@ fn half_space() -> impl Iterator<Item = [i32; 3]> {
     let axis = || -MODES..=MODES;
     axis()
         .flat_map(move |a| axis().flat_map(move |b| axis().map(move |c| [a, b, c])))
-        .filter(|m| *m > [0, 0, 0])
-        .filter(|m| f64::from(m.iter().map(|m| m * m).sum::<i32>()) <= CUT * CUT)
+        .filter(|[a, b, c]| [c, b, a] > [&0, &0, &0])
+        .filter(|m| m.iter().map(|m| m * m).sum::<i32>() <= LONGEST)
 }
 
-/// Two unit vectors at right angles to a wave vector and to each other.
-fn polarisation(wave: Vector3<f64>) -> [Vector3<f64>; 2] {
+/// Two unit vectors at right angles to a wave vector and to each other, the same for m and -m.
+fn polarisation(m: [i32; 3]) -> [Vector3<f64>; 2] {
+    let sign = if m > [0, 0, 0] { 1.0 } else { -1.0 };
+    let wave = Vector3::from(m.map(f64::from)) * sign;
     let axis = Vector3::ith(wave.iamin(), 1.0);
     let first = Unit::new_normalize(wave.cross(&axis)).into_inner();
     [first, wave.normalize().cross(&first)]

@@ -33,7 +33,7 @@ pub enum Flow {
         /// A point of the axis, in metres.
         at: [Signal; 3],
         /// The direction of the axis, of any length but 0.
-        axis: Vector3<f64>,
+        axis: [Signal; 3],
         /// The length R of decay in metres; none: no decay.
         decay: Option<f64>,
         /// The radius c of the core in metres, within which the speed falls to 0.
@@ -44,7 +44,7 @@ pub enum Flow {
 impl Flow {
     /// A source that does not move, with a core of 0.1 m.
     pub fn source(strength: impl Into<Signal>, at: Vector3<f64>, decay: Option<f64>) -> Flow {
-        let at = [at.x.into(), at.y.into(), at.z.into()];
+        let at = fixed(at);
         Flow::Source { strength: strength.into(), at, decay, core: 0.1 }
     }
 
@@ -55,7 +55,7 @@ impl Flow {
         axis: Vector3<f64>,
         decay: Option<f64>,
     ) -> Flow {
-        let at = [at.x.into(), at.y.into(), at.z.into()];
+        let (at, axis) = (fixed(at), fixed(axis));
         Flow::Vortex { circulation: circulation.into(), at, axis, decay, core: 0.1 }
     }
 
@@ -73,17 +73,24 @@ impl Flow {
                     ("the z coordinate", z),
                 ]
             }
-            Flow::Vortex { circulation, at: [x, y, z], .. } => vec![
+            Flow::Vortex { circulation, at: [x, y, z], axis: [u, v, w], .. } => vec![
                 ("the circulation", circulation),
                 ("the x coordinate", x),
                 ("the y coordinate", y),
                 ("the z coordinate", z),
+                ("the x component of the axis", u),
+                ("the y component of the axis", v),
+                ("the z component of the axis", w),
             ],
         }
     }
 
     /// An error if a value is out of range, or lacks the period. Flows are counted from 0 here and from 1 in messages.
     pub(crate) fn check(&self, index: usize, period: Option<f64>) -> Result<(), Error> {
+        self.is_flow(index, period).map_err(|error| Error::Flow { index, error: Box::new(error) })
+    }
+
+    fn is_flow(&self, index: usize, period: Option<f64>) -> Result<(), Error> {
         for (name, signal) in self.signals() {
             let name = || format!("{name} of flow {}", index + 1);
             if let Signal::Constant(_) = signal {
@@ -97,9 +104,9 @@ impl Flow {
             Flow::Uniform(_) => Ok(()),
             Flow::Source { decay, core, .. } => check_lengths(*decay, *core),
             Flow::Vortex { decay, core, axis, .. } => {
-                let length = axis.norm();
-                if !(length.is_finite() && length > 0.0) {
-                    return Err(Error::Direction((*axis).into()));
+                // An axis that moves is looked at when it is needed.
+                if let [Signal::Constant(x), Signal::Constant(y), Signal::Constant(z)] = *axis {
+                    direction(Vector3::new(x, y, z), index, 0.0)?;
                 }
                 check_lengths(*decay, *core)
             }
@@ -108,6 +115,10 @@ impl Flow {
 
     /// The flow at an instant.
     pub(crate) fn at(&self, time: f64, index: usize) -> Result<Primitive, Error> {
+        self.primitive(time, index).map_err(|error| Error::Flow { index, error: Box::new(error) })
+    }
+
+    fn primitive(&self, time: f64, index: usize) -> Result<Primitive, Error> {
         let value =
             |name: &str, signal: &Signal| signal.finite_at(time, || format!("{name} of flow {}", index + 1));
         let vector = |name: &str, [x, y, z]: &[Signal; 3]| {
@@ -126,12 +137,24 @@ impl Flow {
             Flow::Vortex { circulation, at, axis, decay, core } => Primitive::Vortex {
                 strength: value("the circulation", circulation)? / (2.0 * PI),
                 at: vector("the position", at)?,
-                axis: axis.normalize(),
+                axis: direction(vector("the axis", axis)?, index, time)?,
                 rate: rate(decay),
                 core: core * core,
             },
         })
     }
+}
+
+/// Numbers that do not depend on time.
+fn fixed(vector: Vector3<f64>) -> [Signal; 3] {
+    [vector.x.into(), vector.y.into(), vector.z.into()]
+}
+
+/// The direction of the axis of a flow at an instant, of length 1.
+fn direction(axis: Vector3<f64>, index: usize, time: f64) -> Result<Vector3<f64>, Error> {
+    // Divided by its largest component, so that no square overflows or vanishes.
+    let largest = axis.amax();
+    if largest == 0.0 { Err(Error::Axis { flow: index + 1, time }) } else { Ok((axis / largest).normalize()) }
 }
 
 fn check_lengths(decay: Option<f64>, core: f64) -> Result<(), Error> {

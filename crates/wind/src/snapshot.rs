@@ -99,6 +99,11 @@ impl Snapshot {
         self.time
     }
 
+    /// The same with the first lattices only. The wind at the centres of bodies is that of all.
+    pub(crate) fn with_lattices(&self, count: usize) -> Snapshot {
+        Snapshot { lattices: self.lattices.iter().take(count).cloned().collect(), ..self.clone() }
+    }
+
     /// The level of a place over the ground; without ground, that over y = 0.
     fn level(&self, x: Vector3<f64>) -> Level {
         match &self.setting.ground {

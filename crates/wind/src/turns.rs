@@ -9,8 +9,8 @@ use std::f64::consts::TAU;
 const ROUND: f64 = 6_755_399_441_055_744.0; // 1.5 * 2^52
 
 /// The nearest whole number, for magnitudes less than 2^51.
-#[inline]
-fn nearest(x: f64) -> f64 {
+#[inline(always)]
+pub(crate) fn nearest(x: f64) -> f64 {
     (x + ROUND) - ROUND
 }
 
@@ -46,6 +46,24 @@ pub(crate) fn cos_sin(x: f64) -> (f64, f64) {
     (c, s)
 }
 
+/// Cosine and sine of angles from -1/2 to 1/2 turns in single precision, absolute error below 3e-7.
+///
+/// With v = |x| - 1/4, they are -sin(2πv) and ±cos(2πv), whose polynomials are fitted to have the smallest errors between -1/4 and 1/4
+/// (8e-9 and 5e-8 before rounding).
+#[inline(always)]
+pub(crate) fn cos_sin_single<const W: usize>(x: [f32; W]) -> ([f32; W], [f32; W]) {
+    const TURN: f32 = std::f32::consts::TAU;
+    let (mut cosine, mut sine) = ([0.0; W], [0.0; W]);
+    for l in 0..W {
+        let v = x[l].abs() - 0.25;
+        let w = v * v;
+        cosine[l] = -v * (TURN + w * (-41.341_713 + w * (81.604_004 + w * (-76.609_61 + w * 39.942_307))));
+        let size = 0.999_999_95 + w * (-19.739_17 + w * (64.934_59 + w * (-85.240_33 + w * 56.242_38)));
+        sine[l] = size.copysign(x[l]);
+    }
+    (cosine, sine)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -62,5 +80,16 @@ mod tests {
         }
         assert_eq!(cos_sin(0.25), (0.0, 1.0));
         assert_eq!(cos_sin(0.5).0, -1.0);
+    }
+
+    #[test]
+    fn single_precision_agrees_with_double() {
+        for i in -40_000..=40_000 {
+            let x = i as f32 / 80_000.0;
+            let ([c], [s]) = cos_sin_single([x]);
+            let (cosine, sine) = cos_sin(f64::from(x));
+            assert!((f64::from(c) - cosine).abs() < 3e-7, "cos at {x}: {c}, {cosine}");
+            assert!((f64::from(s) - sine).abs() < 3e-7, "sin at {x}: {s}, {sine}");
+        }
     }
 }

@@ -137,6 +137,40 @@ fn velocities_and_gradients_fit() {
 }
 
 #[test]
+fn the_axis_of_a_vortex_may_turn() {
+    let vortex = |axis: [Signal; 3]| Flow::Vortex {
+        circulation: 2.0.into(),
+        at: [1.0.into(), 2.0.into(), 3.0.into()],
+        axis,
+        decay: Some(4.0),
+        core: 0.1,
+    };
+    let calm = || Description::new(Vector3::x(), 0.0);
+    let turning =
+        vortex([Signal::function(|t: f64| t.sin()), Signal::function(|t: f64| t.cos()), 0.0.into()]);
+    let turning = Field::new(Description { flows: vec![turning], ..calm() }).unwrap();
+    for time in [0.0, 0.5, 3.0] {
+        let (s, c) = f64::sin_cos(time);
+        let flows = vec![vortex([s.into(), c.into(), 0.0.into()])];
+        let still = Field::new(Description { flows, ..calm() }).unwrap();
+        assert_eq!(
+            turning.at(time).unwrap().velocities(&places()),
+            still.at(0.0).unwrap().velocities(&places())
+        );
+    }
+    // An axis that vanishes, or that does not have the period of the wind.
+    let lost = |period| {
+        let flows = vec![vortex([Signal::function(|t: f64| (1.0 - t).max(0.0)), 0.0.into(), 0.0.into()])];
+        Field::new(Description { flows, period, ..calm() })
+    };
+    let error = lost(None).unwrap().at(1.5).unwrap_err();
+    assert_eq!(error.to_string(), "the axis of flow 1 is (0, 0, 0) at 1.5 s, which is no direction");
+    let error = lost(Some(8.0)).unwrap_err();
+    let expected = "the x component of the axis of flow 1 does not repeat after the period of 8 s";
+    assert!(error.to_string().starts_with(expected), "{error}");
+}
+
+#[test]
 fn far_places_and_late_times_keep_their_precision() {
     let field = Field::new(Description { speed: 5.0.into(), ..gusty() }).unwrap();
     let wind = field.at(1e6).unwrap();

@@ -1,6 +1,6 @@
 //! Ground and bodies: no air passes them, and the flow around them has no divergence.
 
-use dlsys_wind::{Description, Field, Flow, Ground, Signal, Snapshot, Sphere, grid};
+use dlsys_wind::{Description, Field, Flow, Ground, Obstacle, Signal, Snapshot, Sphere, grid};
 use nalgebra::Vector3;
 
 fn gusty() -> Description {
@@ -10,6 +10,20 @@ fn gusty() -> Description {
         seed: 5,
         ..Description::new(Vector3::new(1.0, 0.0, -0.3), 4.0)
     }
+}
+
+/// The wind of a description at an instant.
+fn at(time: f64, description: Description) -> Snapshot {
+    Field::new(description).unwrap().at(time).unwrap()
+}
+
+/// Directions that are spread evenly over a sphere.
+fn directions(count: u32) -> impl Iterator<Item = Vector3<f64>> {
+    (0..count).map(move |i| {
+        let (height, turn) = (1.0 - (2.0 * f64::from(i) + 1.0) / f64::from(count), 2.4 * f64::from(i));
+        let across = (1.0 - height * height).sqrt();
+        Vector3::new(across * turn.cos(), height, across * turn.sin())
+    })
 }
 
 /// The divergence by differences of fourth order, relative to the size of the derivatives.
@@ -59,9 +73,7 @@ fn no_air_passes_flat_ground_and_eddies_slide_along_it() {
 
 #[test]
 fn gradients_over_flat_ground_are_exact_and_their_trace_is_zero() {
-    let field = Field::new(Description { ground: Some(Ground::Flat(0.0)), roughness: Some(0.02), ..gusty() })
-        .unwrap();
-    let wind = field.at(0.5).unwrap();
+    let wind = at(0.5, Description { ground: Some(Ground::Flat(0.0)), roughness: Some(0.02), ..gusty() });
     for x in grid(Vector3::new(0.0, 0.01, 0.0), Vector3::new(9.0, 3.0, 7.0), [8, 30, 8]) {
         let (_, gradient) = wind.velocity_and_gradient(x);
         assert!(gradient.trace().abs() < 1e-13 * gradient.norm(), "{x}");
@@ -76,8 +88,7 @@ fn gradients_over_flat_ground_are_exact_and_their_trace_is_zero() {
 #[test]
 fn wind_follows_hills() {
     let ground = Some(hills());
-    let field = Field::new(Description { ground, roughness: Some(0.01), ..gusty() }).unwrap();
-    let wind = field.at(0.5).unwrap();
+    let wind = at(0.5, Description { ground, roughness: Some(0.01), ..gusty() });
     let Ground::Uneven { height, .. } = hills() else { unreachable!() };
     let mut largest = 0.0f64;
     for place in grid(Vector3::zeros(), Vector3::new(20.0, 0.0, 20.0), [30, 1, 30]) {
@@ -97,9 +108,8 @@ fn wind_follows_hills() {
 #[test]
 fn a_ball_in_a_steady_wind_has_the_flow_of_its_radius_and_no_more() {
     let ball = Sphere::fixed(Vector3::new(1.0, 2.0, 3.0), 0.5);
-    let field =
-        Field::new(Description { obstacles: vec![Box::new(ball)], ..Description::new(Vector3::x(), 4.0) });
-    let wind = field.unwrap().at(0.0).unwrap();
+    let wind =
+        at(0.0, Description { obstacles: vec![Box::new(ball)], ..Description::new(Vector3::x(), 4.0) });
     let at = |x: f64, y: f64, z: f64| wind.velocity(Vector3::new(1.0 + x, 2.0 + y, 3.0 + z));
     // Stagnation in front, 3/2 of the speed at the equator as in potential flow, undisturbed beyond the layer.
     assert!(at(-0.5, 0.0, 0.0).norm() < 1e-12);
@@ -118,14 +128,11 @@ fn no_air_passes_a_moving_ball_over_ground_in_gusts() {
     for (ground, tolerance) in [(None, 1e-6), (Some(Ground::Flat(0.0)), 1e-6), (Some(hills()), 1e-4)] {
         let roughness = ground.is_some().then_some(0.02);
         let flows = vec![Flow::vortex(1.0, Vector3::new(0.0, 1.0, 0.0), Vector3::y(), Some(3.0))];
-        let obstacles = vec![Box::new(ball()) as Box<dyn dlsys_wind::Obstacle>];
+        let obstacles = vec![Box::new(ball()) as Box<dyn Obstacle>];
         let with_flow = Description { flows, ground, roughness, obstacles, ..gusty() };
-        let wind = Field::new(with_flow).unwrap().at(0.25).unwrap();
+        let wind = at(0.25, with_flow);
         let (centre, velocity) = (Vector3::new(1.5, 1.2, 2.75), Vector3::new(2.0, 0.0, -1.0));
-        for i in 0..200 {
-            let (height, turn) = (1.0 - (f64::from(i) + 0.5) / 100.0, 2.4 * f64::from(i));
-            let across = (1.0 - height * height).sqrt();
-            let normal = Vector3::new(across * turn.cos(), height, across * turn.sin());
+        for normal in directions(200) {
             let relative = wind.velocity(centre + normal * (0.4 * (1.0 + 1e-12))) - velocity;
             let through = relative.dot(&normal).abs();
             assert!(through < tolerance, "{through} of {} with tolerance {tolerance}", relative.norm());
@@ -139,14 +146,74 @@ fn the_flow_around_a_ball_has_no_divergence() {
         let ball = Sphere::fixed(Vector3::new(1.0, 1.0, 3.0), 0.4);
         let description =
             Description { roughness: Some(0.02), obstacles: vec![Box::new(ball)], ground, ..gusty() };
-        let wind = Field::new(description).unwrap().at(0.25).unwrap();
-        for i in 0..100 {
-            let (height, turn) = (1.0 - (f64::from(i) + 0.5) / 50.0, 2.4 * f64::from(i));
-            let across = (1.0 - height * height).sqrt();
-            let direction = Vector3::new(across * turn.cos(), height, across * turn.sin());
-            let x = Vector3::new(1.0, 1.0, 3.0) + direction * (0.41 + 0.0023 * f64::from(i));
+        let wind = at(0.25, description);
+        for (i, direction) in directions(100).enumerate() {
+            let x = Vector3::new(1.0, 1.0, 3.0) + direction * (0.41 + 0.0023 * i as f64);
             let divergence = divergence(&wind, x, 2e-5);
             assert!(divergence < bound, "{x}: {divergence}");
         }
     }
+}
+
+/// A rod with round ends along z, without derivatives of its normal.
+#[derive(Debug)]
+struct Rod {
+    half: f64,
+    radius: f64,
+}
+
+impl Rod {
+    fn off_axis(&self, point: Vector3<f64>) -> Vector3<f64> {
+        point - Vector3::new(0.0, 0.0, point.z.clamp(-self.half, self.half))
+    }
+}
+
+impl Obstacle for Rod {
+    fn distance(&self, point: Vector3<f64>, _: f64) -> f64 {
+        self.off_axis(point).norm() - self.radius
+    }
+
+    fn normal(&self, point: Vector3<f64>, _: f64) -> Vector3<f64> {
+        self.off_axis(point).normalize()
+    }
+
+    fn velocity(&self, _: f64) -> Vector3<f64> {
+        Vector3::zeros()
+    }
+
+    fn centre(&self, _: f64) -> Vector3<f64> {
+        Vector3::zeros()
+    }
+
+    fn layer(&self) -> f64 {
+        self.radius
+    }
+}
+
+/// Bodies of other shapes need a distance and a normal only; derivatives of the normal are found by differences.
+#[test]
+fn a_body_of_any_shape_pushes_the_wind_aside() {
+    let rod = || Rod { half: 0.6, radius: 0.2 };
+    let wind = at(0.25, Description { obstacles: vec![Box::new(rod())], ..gusty() });
+    let free = at(0.25, gusty());
+    let mut changed = 0.0f64;
+    for (i, direction) in directions(300).enumerate() {
+        // The rod is the set of all points at its radius from its axis; ends and middle in turn, off the circles where they meet.
+        let axis =
+            Vector3::new(0.0, 0.0, if i % 2 == 0 { 0.6f64.copysign(direction.z) } else { 0.5 * direction.z });
+        let normal =
+            if i % 2 == 0 { direction } else { Vector3::new(direction.x, direction.y, 0.0).normalize() };
+        let surface = axis + normal * (0.2 * (1.0 + 1e-12));
+        let through = wind.velocity(surface).dot(&normal).abs();
+        assert!(through < 1e-6, "{through} at {surface}");
+        let near = axis + normal * (0.21 + 0.0006 * i as f64);
+        if normal.z == 0.0 || normal.z.abs() > 0.01 {
+            let divergence = divergence(&wind, near, 2e-5);
+            assert!(divergence < 1e-5, "{divergence} at {near}");
+        }
+        changed = changed.max((wind.velocity(near) - free.velocity(near)).norm());
+    }
+    assert!(changed > 1.0, "{changed}");
+    let far = Vector3::new(0.0, 0.41, 0.3);
+    assert_eq!(wind.velocity(far), free.velocity(far));
 }

@@ -11,7 +11,7 @@ use shells::Shells;
 
 use crate::random::Draw;
 use crate::spectrum::Energy;
-use crate::{Description, Error, Field, Spectrum};
+use crate::{Description, Error, Field, Snapshot, Spectrum};
 
 /// A measured number, and what it should be.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,6 +69,11 @@ fn von_karman(seed: u64) -> Result<Field, Error> {
 pub fn paper(seed: u64) -> Result<Field, Error> {
     let spectrum = Spectrum::Kolmogorov { dissipation: 1.0, inertial: 4.0, sigma: 1.0 };
     Field::new(Description { turbulence: 1.0, seed, spectrum, ..Description::new(Vector3::x(), 1.0) })
+}
+
+/// The same wind without the smaller eddies, which are in the second and the third lattice: for measurements of the cost of one lattice.
+pub fn first_lattice(wind: &Snapshot) -> Snapshot {
+    wind.with_lattices(1)
 }
 
 /// The direction of the wind in the fields that are measured: along no axis.
