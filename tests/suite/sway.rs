@@ -168,3 +168,27 @@ fn a_plant_sways_as_its_model_does_alone() {
         assert!((higher - plants[0]).norm() > 1e-3, "another place, another wind");
     }
 }
+
+/// Days instead of seconds: the wind of so long a film would take more than ten million ticks, for a plant from the first tick on, and
+/// for one that is born after so many.
+#[test]
+fn a_film_that_is_too_long_is_refused_at_once() {
+    const STALK: &str = "tissue wood = stiffness 1e9, density 500, damping 0.1\n\
+        initial string: @E(wood) !(0.1) F(1)\nframes 0 .. 1 step 1\n";
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("stalk.dls"), STALK).expect("written");
+    for birth in [-2, 30] {
+        let days = format!(
+            "units length 0.1, time 86400\ninitial string: @Stalk({birth})\nplant @Stalk from \"stalk.dls\"\n"
+        );
+        std::fs::write(folder.path().join("days.dls"), days).expect("written");
+        let session = Session::open(&folder.path().join("days.dls"), &[]).expect("a good model");
+        let nursery = Nursery::new(&session.model, Settings::default());
+        let mut string = ModuleString::default();
+        let mut simulation = session.simulate(Settings::default()).expect("it starts");
+        simulation.at(35.0, &mut string).expect("it grows");
+        let error = nursery.draw(&string, &mut nursery.blank()).expect_err("so long a film").diagnostic();
+        let text = format!("{} {:?}", error.message, error.notes);
+        assert!(text.contains("more than 1e7 steps"), "born at {birth}: {text}");
+    }
+}
