@@ -192,3 +192,24 @@ fn a_film_that_is_too_long_is_refused_at_once() {
         assert!(text.contains("more than 1e7 steps"), "born at {birth}: {text}");
     }
 }
+
+#[test]
+fn a_stem_that_cannot_be_followed_is_named_with_its_place() {
+    const STORM: &str = "units length 0.1, time 2\nwind 1, 0, 0 speed 1e200\n\
+        tissue stalk = stiffness 1e9, density 500, damping 0.1\ninitial string: @E(stalk) S(1)\n\
+        S(x): if x < 2 solve dx/dt = 0.7 if x = 2 produce S(0.8) S(1.2)\ninterpret S(x): !(0.05) F(x)\n";
+    let session = read("storm.dls", STORM);
+    let nursery = Nursery::new(&session.model, Settings::default());
+    let mut string = ModuleString::default();
+    let mut simulation = session.simulate(Settings::default()).expect("it starts");
+    simulation.at(0.5, &mut string).expect("it grows");
+    let error = nursery.draw(&string, &mut nursery.blank()).expect_err("a storm").diagnostic();
+    let message = "the stem of `S` (module 2) cannot be followed at t = 0: its motion is not finite";
+    assert!(error.message.starts_with(message), "{}", error.message);
+    let quoted: Vec<&str> =
+        error.labels.iter().map(|(span, _)| &STORM[span.start as usize..span.end as usize]).collect();
+    assert_eq!(quoted[0], "F(x)");
+    assert!(quoted[1].starts_with("tissue stalk"), "{quoted:?}");
+    assert!(error.notes[0].contains("10 cm long and 5 mm wide"), "{:?}", error.notes);
+    assert!(error.help.iter().any(|help| help.contains("`--bend-tolerance 0.01`")), "{:?}", error.help);
+}

@@ -8,18 +8,17 @@
 use std::ops::Deref;
 use std::sync::Arc;
 
-use dlsys_diagnostic::Span;
 use dlsys_geometry::scene::Scene;
 use dlsys_geometry::turtle::{self, Stem, StemKey, Strains};
 use dlsys_model::Model;
-use dlsys_sway::{self as sway, Solver, State, Vector, hermite};
+use dlsys_sway::{self as sway, Solver, State, Vector, Wind, hermite};
 use dlsys_tree::ModuleString;
 
 use crate::body::{Body, roll, rolled};
 use crate::descent::Descent;
 use crate::place::Place;
 use crate::weather::Sampler;
-use crate::{CLOCK, Error};
+use crate::{CLOCK, Error, FailedStem};
 
 /// The strains of all stems at an instant within a tick.
 #[derive(Clone, Debug)]
@@ -148,6 +147,7 @@ pub(crate) struct Bending<M> {
     place: Place,
     wind: Arc<Sampler>,
     solver: Solver,
+    tolerance: f64,
     state: State,
     /// The body at the last tick.
     body: Body,
@@ -161,6 +161,7 @@ impl<M: Deref<Target = Model>> Bending<M> {
             place,
             wind,
             solver: Solver::new(place.settings(settings)),
+            tolerance: settings.tolerance,
             state: State::default(),
             body: Body::default(),
             scene: turtle::blank(&model),
@@ -229,7 +230,7 @@ impl<M: Deref<Target = Model>> Bending<M> {
             };
             let mut note = |step: &sway::Step<'_>| knots.push(knot(step.to, step.after));
             let done = self.solver.advance(&mut state, from, to, &mut growth, &*self.wind, &mut note);
-            done.map_err(|error| failure(&self.model, &body, error, string.time))?;
+            done.map_err(|error| self.failure(&body, error, from))?;
             let steps = knots.len() as u64 - 1;
             (self.effort.steps, self.effort.stem_steps) =
                 (self.effort.steps + steps, self.effort.stem_steps + steps * body.stems.len() as u64);
@@ -247,19 +248,38 @@ impl<M: Deref<Target = Model>> Bending<M> {
                 || body.skeleton.segments().iter().any(|segment| segment.sag)
                 || state.strain.iter().chain(&state.rate).any(|value| *value != zero))
     }
-}
 
-fn failure(model: &Model, body: &Body, error: sway::Error, time: f64) -> Error {
-    let at = match &error {
-        sway::Error::Value { segment, .. }
-        | sway::Error::Step { segment, .. }
-        | sway::Error::Equilibrium { segment, .. } => body.stems.get(*segment),
-        _ => None,
-    };
-    let span =
-        at.or(body.stems.first()).map_or(Span::default(), |stem| model.scenery.tissues[stem.tissue].span);
-    let module = at.map_or(String::new(), |stem| format!("{:x}", stem.key.module));
-    Error::Bending { error, module, span, time }
+    /// The error of a tick that begins at a time in s.
+    fn failure(&self, body: &Body, error: sway::Error, from: f64) -> Error {
+        let (at, seconds) = match error {
+            sway::Error::Step { segment, time, .. } => (Some(segment), time),
+            sway::Error::Value { segment, .. } | sway::Error::Equilibrium { segment, .. } => {
+                (Some(segment), from)
+            }
+            _ => (None, from),
+        };
+        let describe = |segment: usize| {
+            let (stem, part) = (body.stems.get(segment)?, body.skeleton.segments().get(segment)?);
+            let tissue = &self.model.scenery.tissues[stem.tissue];
+            let place = stem.start.coords * self.place.units.length;
+            Some(Box::new(FailedStem {
+                kind: self.model.kinds.get(stem.origin.kind).name.clone(),
+                lineage: stem.origin.lineage,
+                drawn: stem.origin.span(&self.model),
+                length: part.length,
+                width: part.diameter,
+                stiffness: tissue.stiffness,
+                tissue: tissue.span,
+                wind: self.wind.velocity(place, seconds).norm(),
+            }))
+        };
+        Error::Bending {
+            stem: at.and_then(describe),
+            time: self.place.time_at(seconds),
+            tolerance: self.tolerance,
+            error,
+        }
+    }
 }
 
 /// The strains of a string at a time within a tick, from the productions since then.

@@ -230,6 +230,7 @@ mod tests {
             let (start, end) = (Point::origin(), Point::new(0.0, 1.0, 0.0));
             Stem {
                 key,
+                origin: turtle::Origin::new(dlsys_model::KindId::OPEN, dlsys_tree::Lineage::of_axiom(0)),
                 parent: None,
                 depth: 0,
                 start,

@@ -244,7 +244,7 @@ fn check(model: &Model, place: &Place, number: f64) -> Result<(), Error> {
         return Ok(());
     }
     let (seconds, span) = (place.units.time, model.scenery.tissues[0].span);
-    let time = (number * CLOCK - place.birth) / seconds;
+    let time = place.time_at(number * CLOCK);
     Err(Error::TooLong { most: MOST_TICKS, time, seconds, span })
 }
 

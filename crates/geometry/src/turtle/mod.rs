@@ -74,7 +74,7 @@ pub use bent::{StemKey, Strains};
 use dlsys_model::Model;
 use dlsys_tree::ModuleString;
 pub use error::{Error, ErrorKind};
-pub use skeleton::{Form, Load, Skeleton, Stem};
+pub use skeleton::{Form, Load, Origin, Skeleton, Stem};
 
 /// Most modules that one frame may draw, those that interpretations make included.
 pub const MODULE_LIMIT: usize = 10_000_000;
