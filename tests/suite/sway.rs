@@ -193,6 +193,29 @@ fn a_film_that_is_too_long_is_refused_at_once() {
     }
 }
 
+/// Of a stem that is born exactly at a tick, the velocity of growth is known one tick later. The difference is no acceleration: what the stem
+/// carries would be thrown sideways, and the trunk below would swing.
+#[test]
+fn a_birth_at_a_tick_is_no_blow() {
+    let model = |birth: f64| {
+        format!(
+            "units length 0.1, time 1\ntissue stalk = stiffness 1e9, density 500, damping 0.1\n\
+             initial string: @E(stalk) T A\nA: if age = {birth} produce S(0.1) K\nS(x): solve dx/dt = 1\n\
+             interpret T: !(0.05) F(3)\ninterpret S(x): &(90) !(0.05) F(x)\ninterpret K: @O(0.5)\ninterpret A: ε\n"
+        )
+    };
+    for birth in [0.99, 1.0] {
+        let session = read("blow.dls", &model(birth));
+        let times: Vec<f64> = (0..24).map(|i| 1.0 + f64::from(i) / 48.0).collect();
+        let aside = |scene: &Scene| {
+            let mut ends = scene.segments.iter().map(|segment| segment.end);
+            ends.find(|end| end.y > 2.0).expect("the upper part of the trunk").z.abs()
+        };
+        let swing = scenes(&session, &times).iter().map(aside).fold(0.0, f64::max);
+        assert!(swing < 1e-3, "born at {birth}, the trunk swings by {swing}");
+    }
+}
+
 #[test]
 fn a_stem_that_cannot_be_followed_is_named_with_its_place() {
     const STORM: &str = "units length 0.1, time 2\nwind 1, 0, 0 speed 1e200\n\
