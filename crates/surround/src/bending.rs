@@ -32,7 +32,7 @@ struct Knot {
 /// The motion of the stems from one tick to the next. Times are in s.
 #[derive(Clone, Debug)]
 pub(crate) struct Tick {
-    body: Body,
+    body: Arc<Body>,
     /// In the order of time, from the tick to the next; none where nothing has moved.
     knots: Vec<Knot>,
 }
@@ -111,7 +111,7 @@ pub struct BentStems {
 impl BentStems {
     /// No strain anywhere.
     pub(crate) fn at_rest() -> BentStems {
-        let tick = Arc::new(Tick { body: Body::default(), knots: Vec::new() });
+        let tick = Arc::new(Tick { body: Arc::default(), knots: Vec::new() });
         BentStems { tick, time: 0.0, metre: 1.0, new: None }
     }
 }
@@ -150,7 +150,11 @@ pub(crate) struct Bending<M> {
     tolerance: f64,
     state: State,
     /// The body at the last tick.
-    body: Body,
+    body: Arc<Body>,
+    /// The string at the last tick.
+    string: ModuleString,
+    /// The string alone decides the drawing.
+    timeless: bool,
     scene: Scene,
     pub(crate) effort: Effort,
 }
@@ -163,7 +167,9 @@ impl<M: Deref<Target = Model>> Bending<M> {
             solver: Solver::new(place.settings(settings)),
             tolerance: settings.tolerance,
             state: State::default(),
-            body: Body::default(),
+            body: Arc::default(),
+            string: ModuleString::default(),
+            timeless: turtle::is_timeless(&model),
             scene: turtle::blank(&model),
             effort: Effort::default(),
             model,
@@ -193,19 +199,14 @@ impl<M: Deref<Target = Model>> Bending<M> {
         before: Option<(&Tick, &Descent, Option<&ModuleString>)>,
     ) -> Result<Tick, Error> {
         let [from, to] = [number, number + 1].map(|n| n as f64 * CLOCK);
-        let mut body = self.body(string)?;
+        let body = match before {
+            None => Arc::new(self.body(string)?),
+            Some((.., earlier)) => self.moved(string, earlier)?,
+        };
+        self.string.clone_from(string);
         let mut state = State::at_rest(&body.skeleton);
         state.level = self.state.level;
-        if let Some((tick, descent, earlier)) = before {
-            match earlier {
-                Some(earlier) => {
-                    let seconds = (string.time - earlier.time) * self.place.units.time;
-                    body.move_from(&self.body(earlier)?, seconds);
-                }
-                // A production in between may be a jump, which is no motion.
-                None => body.move_as(&self.body),
-            }
-            body.accelerate_from(&self.body, CLOCK);
+        if let Some((tick, descent, _)) = before {
             for (i, stem) in body.stems.iter().enumerate() {
                 if let Some(inherited) = tick.inherited(stem, descent, from) {
                     (state.strain[i], state.rate[i]) = inherited;
@@ -235,8 +236,30 @@ impl<M: Deref<Target = Model>> Bending<M> {
             (self.effort.steps, self.effort.stem_steps) =
                 (self.effort.steps + steps, self.effort.stem_steps + steps * body.stems.len() as u64);
         }
-        (self.body, self.state) = (body.clone(), state);
+        (self.body, self.state) = (Arc::clone(&body), state);
         Ok(Tick { body, knots })
+    }
+
+    /// The body of a string with the motion that growth prescribes, from the string a little earlier, unless there was a production in between.
+    /// What is drawn from equal strings is not drawn again.
+    fn moved(&mut self, string: &ModuleString, earlier: Option<&ModuleString>) -> Result<Arc<Body>, Error> {
+        let is_known = self.timeless && string.has_same_modules(&self.string);
+        let stands = self.timeless && earlier.is_some_and(|earlier| earlier.has_same_modules(string));
+        if is_known && stands && self.body.stands() {
+            return Ok(Arc::clone(&self.body));
+        }
+        let mut body = if is_known { self.body.unmoved() } else { self.body(string)? };
+        match earlier {
+            Some(_) if stands => body.stand(),
+            Some(earlier) => {
+                let seconds = (string.time - earlier.time) * self.place.units.time;
+                body.move_from(&self.body(earlier)?, seconds);
+            }
+            // A production in between may be a jump, which is no motion.
+            None => body.move_as(&self.body),
+        }
+        body.accelerate_from(&self.body, CLOCK);
+        Ok(Arc::new(body))
     }
 
     /// False if stems at rest stay at rest: no wind, no weight that is not balanced, no motion of growth.

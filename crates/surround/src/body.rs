@@ -101,6 +101,37 @@ impl Body {
         }
     }
 
+    /// The same skeleton, of whose motion nothing is known.
+    pub(crate) fn unmoved(&self) -> Body {
+        let mut body = self.clone();
+        for segment in body.skeleton.segments_mut() {
+            segment.joint = Joint::fixed(segment.joint.rotation, segment.joint.offset);
+            (segment.length_rate, segment.length_acceleration) = (0.0, 0.0);
+            (segment.rest_rate, segment.rest_acceleration) = Default::default();
+        }
+        body.known.fill(false);
+        body
+    }
+
+    /// Notes that growth does not move it.
+    pub(crate) fn stand(&mut self) {
+        self.known.fill(true);
+    }
+
+    /// True if it is known that growth moves nothing, and begins to move nothing.
+    pub(crate) fn stands(&self) -> bool {
+        let zero = dlsys_sway::Vector::zeros();
+        self.known.iter().all(|known| *known)
+            && !self.moves()
+            && self.skeleton.segments().iter().all(|segment| {
+                let Joint { angular_acceleration, acceleration, .. } = segment.joint;
+                angular_acceleration == zero
+                    && acceleration == zero
+                    && segment.length_acceleration == 0.0
+                    && segment.rest_acceleration == zero
+            })
+    }
+
     /// True if growth moves anything.
     pub(crate) fn moves(&self) -> bool {
         self.skeleton.segments().iter().any(|segment| {

@@ -138,6 +138,16 @@ pub fn draw_bent(
     interpret::bent(model, string, strains, scene)
 }
 
+/// True if the string alone decides the drawing: no interpretation reads the time or the age of a module.
+pub fn is_timeless(model: &Model) -> bool {
+    model.kinds.iter().all(|(_, kind)| {
+        let drawing = kind.interpretation.map(|index| &model.interpretations[index].drawn);
+        // Behind the parameters are the time and the age.
+        let reads_time = |variable: &usize| [kind.arity, kind.arity + 1].contains(variable);
+        drawing.is_none_or(|drawn| !drawn.programs().flat_map(|program| program.reads()).any(reads_time))
+    })
+}
+
 /// The skeleton of a string: its stems that give way, and what they carry. `scene` is overwritten.
 ///
 /// # Errors
