@@ -48,3 +48,4 @@ mod sway;
 mod verify;
 mod view;
 mod wild;
+mod wilting;

@@ -212,6 +212,39 @@ fn explain_says_what_makes_stems_work() {
 }
 
 #[test]
+fn explain_tells_stems_that_act_on_growth_and_those_of_plants() {
+    let snapping = "tissue wood = stiffness 1e9, density 500, damping 0.1\nwind 1, 0, 0 speed 3\n\
+        initial string: @E(wood) S\nS: if strain >= 0.1 produce F\ninterpret S: !(0.01) F(1)\nframes 0 .. 4 step 1\n";
+    let meadow = "units length 0.1, time 1\nwind 0, 0, 1 speed 2 + t\nplant @Grass from \"gusts.dls\"\n\
+        initial string: @Grass\nframes 0 .. 3 step 1\n";
+    let garden = "plant @Meadow from \"meadow.dls\"\ninitial string: @Meadow\nframes 0 .. 3 step 1\n";
+    let folder = folder(&[
+        ("snapping.dls", snapping),
+        ("gusts.dls", GUSTS),
+        ("meadow.dls", meadow),
+        ("garden.dls", garden),
+    ]);
+    let told = |name: &str| {
+        good(&folder, &format!("explain {name}")).split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    let snapping = told("snapping.dls");
+    assert!(snapping.contains("two ways: rules of S read `strain`"), "{snapping}");
+    assert!(told("gusts.dls").contains("one way: no rule reads `strain`"));
+    let plan = explained(&folder, "meadow.dls");
+    let of_grass = &plan["bending_of_plants"][0];
+    assert_eq!(plan["bending"], Value::Null);
+    assert_eq!((of_grass["plant"].as_str(), of_grass["wind"].as_f64()), (Some("@Grass"), Some(5.0)));
+    let alone = explained(&folder, "gusts.dls");
+    assert_eq!(of_grass["axes"][0]["frequency"], alone["bending"]["axes"][0]["frequency"]);
+    let meadow = told("meadow.dls");
+    assert!(meadow.contains("stems of @Grass in steps the wind moves them"), "{meadow}");
+    assert!(meadow.contains("made of stalk"), "{meadow}");
+    // The wind of a plant's own model does not blow in the scene around it.
+    let garden = told("garden.dls");
+    assert!(garden.contains("stems of @Grass in @Meadow") && !garden.contains("mean wind"), "{garden}");
+}
+
+#[test]
 fn the_tolerance_of_bending_changes_stems_only() {
     let plain = GUSTS
         .replace("@E(stalk) ", "")

@@ -286,8 +286,7 @@ impl<'m> Nursery<'m> {
         motions.map(Some).map_err(|(i, error)| {
             let plant = &plants[seedlings[i].plant];
             let message = format!("the plant `{}` cannot move in the wind", plant.name);
-            let error = Diagnostic::error(message).at(plant.span, "this plant").note(error.to_string());
-            DrawError::Plant(Box::new(error))
+            DrawError::Plant(Box::new(within(plant, message, &error.diagnostic())))
         })
     }
 
@@ -358,18 +357,25 @@ fn number_of(seed: f64) -> u64 {
 }
 
 fn fault(plant: &model::Plant, age: f64, error: &sim::Error) -> DrawError {
-    let inner = error.diagnostic();
-    let line = inner.labels.first().map(|(span, _)| {
-        let at = (span.start as usize).min(plant.source.text.len());
-        plant.source.text.as_bytes()[..at].iter().filter(|byte| **byte == b'\n').count() + 1
-    });
-    let place = line.map_or(String::new(), |line| format!("{}:{line}: ", plant.source.name));
     let message = format!("the plant `{}` cannot grow to the age {}", plant.name, brief(age, 6));
-    let error = Diagnostic::error(message)
-        .at(plant.span, "this plant")
-        .note(format!("{place}{}", inner.message))
-        .help(format!("`dlsys run {} --at {}` shows the whole message", plant.source.name, brief(age, 6)));
+    let error = within(plant, message, &error.diagnostic()).help(format!(
+        "`dlsys run {} --at {}` shows the whole message",
+        plant.source.name,
+        brief(age, 6)
+    ));
     DrawError::Plant(Box::new(error))
+}
+
+/// A mistake in the model of a plant, with its place there as a note.
+fn within(plant: &model::Plant, message: String, inner: &Diagnostic) -> Diagnostic {
+    let place = inner.labels.first().map_or(String::new(), |(span, _)| {
+        let at = (span.start as usize).min(plant.source.text.len());
+        let before = plant.source.text.get(..at).unwrap_or_default();
+        let line = before.bytes().filter(|byte| *byte == b'\n').count() + 1;
+        let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
+        format!("{}:{line}:{column}: ", plant.source.name)
+    });
+    Diagnostic::error(message).at(plant.span, "this plant").note(format!("{place}{}", inner.message))
 }
 
 fn too_many(plant: &model::Plant, what: String) -> DrawError {

@@ -6,15 +6,16 @@ use std::sync::{Arc, Mutex, PoisonError};
 use dlsys_geometry::scene::Seedling;
 use dlsys_model::{Model, Units};
 use dlsys_sim::Settings;
-use dlsys_surround::{Error, Motion, Passive, Place, Weather};
+use dlsys_surround::{CLOCK, Error, Motion, Passive, Place, Weather};
 use nalgebra::Matrix3;
 
 /// Most motions that are kept from one scene to the next.
 const MOST_KEPT: usize = 100_000;
 /// Strains of past ticks that a motion keeps, for scenes that are drawn a little late.
 const KEPT: usize = 2000;
-/// Seconds by which motions go on in turn, so that they read the same instants of the wind.
-const TURN: f64 = 0.2;
+/// Seconds by which motions go on in turn: one tick. Their steps are parts of a tick by powers of 2, so they read the same instants of
+/// the wind, and few enough that all of them are kept until the last plant has read them.
+const TURN: f64 = CLOCK;
 
 /// A model in the scene: where it stands, and in which wind.
 #[derive(Clone)]

@@ -8,18 +8,17 @@
 use std::ops::Deref;
 use std::sync::Arc;
 
-use dlsys_diagnostic::Span;
 use dlsys_geometry::scene::Scene;
 use dlsys_geometry::turtle::{self, Stem, StemKey, Strains};
 use dlsys_model::Model;
-use dlsys_sway::{self as sway, Solver, State, Vector, hermite};
+use dlsys_sway::{self as sway, Solver, State, Vector, Wind, hermite};
 use dlsys_tree::ModuleString;
 
 use crate::body::{Body, roll, rolled};
 use crate::descent::Descent;
 use crate::place::Place;
 use crate::weather::Sampler;
-use crate::{CLOCK, Error};
+use crate::{CLOCK, Error, FailedStem};
 
 /// The strains of all stems at an instant within a tick.
 #[derive(Clone, Debug)]
@@ -33,7 +32,7 @@ struct Knot {
 /// The motion of the stems from one tick to the next. Times are in s.
 #[derive(Clone, Debug)]
 pub(crate) struct Tick {
-    body: Body,
+    body: Arc<Body>,
     /// In the order of time, from the tick to the next; none where nothing has moved.
     knots: Vec<Knot>,
 }
@@ -112,7 +111,7 @@ pub struct BentStems {
 impl BentStems {
     /// No strain anywhere.
     pub(crate) fn at_rest() -> BentStems {
-        let tick = Arc::new(Tick { body: Body::default(), knots: Vec::new() });
+        let tick = Arc::new(Tick { body: Arc::default(), knots: Vec::new() });
         BentStems { tick, time: 0.0, metre: 1.0, new: None }
     }
 }
@@ -148,9 +147,14 @@ pub(crate) struct Bending<M> {
     place: Place,
     wind: Arc<Sampler>,
     solver: Solver,
+    tolerance: f64,
     state: State,
     /// The body at the last tick.
-    body: Body,
+    body: Arc<Body>,
+    /// The string at the last tick.
+    string: ModuleString,
+    /// The string alone decides the drawing.
+    timeless: bool,
     scene: Scene,
     pub(crate) effort: Effort,
 }
@@ -161,8 +165,11 @@ impl<M: Deref<Target = Model>> Bending<M> {
             place,
             wind,
             solver: Solver::new(place.settings(settings)),
+            tolerance: settings.tolerance,
             state: State::default(),
-            body: Body::default(),
+            body: Arc::default(),
+            string: ModuleString::default(),
+            timeless: turtle::is_timeless(&model),
             scene: turtle::blank(&model),
             effort: Effort::default(),
             model,
@@ -192,19 +199,14 @@ impl<M: Deref<Target = Model>> Bending<M> {
         before: Option<(&Tick, &Descent, Option<&ModuleString>)>,
     ) -> Result<Tick, Error> {
         let [from, to] = [number, number + 1].map(|n| n as f64 * CLOCK);
-        let mut body = self.body(string)?;
+        let body = match before {
+            None => Arc::new(self.body(string)?),
+            Some((.., earlier)) => self.moved(string, earlier)?,
+        };
+        self.string.clone_from(string);
         let mut state = State::at_rest(&body.skeleton);
         state.level = self.state.level;
-        if let Some((tick, descent, earlier)) = before {
-            match earlier {
-                Some(earlier) => {
-                    let seconds = (string.time - earlier.time) * self.place.units.time;
-                    body.move_from(&self.body(earlier)?, seconds);
-                }
-                // A production in between may be a jump, which is no motion.
-                None => body.move_as(&self.body),
-            }
-            body.accelerate_from(&self.body, CLOCK);
+        if let Some((tick, descent, _)) = before {
             for (i, stem) in body.stems.iter().enumerate() {
                 if let Some(inherited) = tick.inherited(stem, descent, from) {
                     (state.strain[i], state.rate[i]) = inherited;
@@ -229,15 +231,35 @@ impl<M: Deref<Target = Model>> Bending<M> {
             };
             let mut note = |step: &sway::Step<'_>| knots.push(knot(step.to, step.after));
             let done = self.solver.advance(&mut state, from, to, &mut growth, &*self.wind, &mut note);
-            done.map_err(|error| {
-                self.wind.failure().unwrap_or_else(|| failure(&self.model, &body, error, string.time))
-            })?;
+            done.map_err(|error| self.wind.failure().unwrap_or_else(|| self.failure(&body, error, from)))?;
             let steps = knots.len() as u64 - 1;
             (self.effort.steps, self.effort.stem_steps) =
                 (self.effort.steps + steps, self.effort.stem_steps + steps * body.stems.len() as u64);
         }
-        (self.body, self.state) = (body.clone(), state);
+        (self.body, self.state) = (Arc::clone(&body), state);
         Ok(Tick { body, knots })
+    }
+
+    /// The body of a string with the motion that growth prescribes, from the string a little earlier, unless there was a production in between.
+    /// What is drawn from equal strings is not drawn again.
+    fn moved(&mut self, string: &ModuleString, earlier: Option<&ModuleString>) -> Result<Arc<Body>, Error> {
+        let is_known = self.timeless && string.has_same_modules(&self.string);
+        let stands = self.timeless && earlier.is_some_and(|earlier| earlier.has_same_modules(string));
+        if is_known && stands && self.body.stands() {
+            return Ok(Arc::clone(&self.body));
+        }
+        let mut body = if is_known { self.body.unmoved() } else { self.body(string)? };
+        match earlier {
+            Some(_) if stands => body.stand(),
+            Some(earlier) => {
+                let seconds = (string.time - earlier.time) * self.place.units.time;
+                body.move_from(&self.body(earlier)?, seconds);
+            }
+            // A production in between may be a jump, which is no motion.
+            None => body.move_as(&self.body),
+        }
+        body.accelerate_from(&self.body, CLOCK);
+        Ok(Arc::new(body))
     }
 
     /// False if stems at rest stay at rest: no wind, no weight that is not balanced, no motion of growth.
@@ -249,19 +271,38 @@ impl<M: Deref<Target = Model>> Bending<M> {
                 || body.skeleton.segments().iter().any(|segment| segment.sag)
                 || state.strain.iter().chain(&state.rate).any(|value| *value != zero))
     }
-}
 
-fn failure(model: &Model, body: &Body, error: sway::Error, time: f64) -> Error {
-    let at = match &error {
-        sway::Error::Value { segment, .. }
-        | sway::Error::Step { segment, .. }
-        | sway::Error::Equilibrium { segment, .. } => body.stems.get(*segment),
-        _ => None,
-    };
-    let span =
-        at.or(body.stems.first()).map_or(Span::default(), |stem| model.scenery.tissues[stem.tissue].span);
-    let module = at.map_or(String::new(), |stem| format!("{:x}", stem.key.module));
-    Error::Bending { error, module, span, time }
+    /// The error of a tick that begins at a time in s.
+    fn failure(&self, body: &Body, error: sway::Error, from: f64) -> Error {
+        let (at, seconds) = match error {
+            sway::Error::Step { segment, time, .. } => (Some(segment), time),
+            sway::Error::Value { segment, .. } | sway::Error::Equilibrium { segment, .. } => {
+                (Some(segment), from)
+            }
+            _ => (None, from),
+        };
+        let describe = |segment: usize| {
+            let (stem, part) = (body.stems.get(segment)?, body.skeleton.segments().get(segment)?);
+            let tissue = &self.model.scenery.tissues[stem.tissue];
+            let place = stem.start.coords * self.place.units.length;
+            Some(Box::new(FailedStem {
+                kind: self.model.kinds.get(stem.origin.kind).name.clone(),
+                lineage: stem.origin.lineage,
+                drawn: stem.origin.span(&self.model),
+                length: part.length,
+                width: part.diameter,
+                stiffness: tissue.stiffness,
+                tissue: tissue.span,
+                wind: self.wind.velocity(place, seconds).norm(),
+            }))
+        };
+        Error::Bending {
+            stem: at.and_then(describe),
+            time: self.place.time_at(seconds),
+            tolerance: self.tolerance,
+            error,
+        }
+    }
 }
 
 /// The strains of a string at a time within a tick, from the productions since then.

@@ -17,6 +17,8 @@ pub(crate) struct Body {
     pub(crate) stems: Vec<Stem>,
     /// Stems by their identity.
     pub(crate) numbers: HashMap<StemKey, usize>,
+    /// Whether the motion that growth prescribes is known, by stem. It is zero where it is not.
+    known: Vec<bool>,
 }
 
 impl Body {
@@ -51,7 +53,8 @@ impl Body {
             }
         }
         let numbers = stems.iter().enumerate().map(|(i, stem)| (stem.key, i)).collect();
-        Body { skeleton, stems, numbers }
+        let known = vec![false; stems.len()];
+        Body { skeleton, stems, numbers, known }
     }
 
     /// Sets the motion that growth prescribes, from the same stems a little earlier.
@@ -64,14 +67,16 @@ impl Body {
             segment.joint.velocity = (segment.joint.offset - before.joint.offset) / seconds;
             segment.length_rate = (segment.length - before.length) / seconds;
             segment.rest_rate = (segment.rest - before.rest) / seconds;
+            self.known[i] = true;
         }
     }
 
     /// Sets the motion that growth prescribes to that of the same stems at the tick before.
     pub(crate) fn move_as(&mut self, before: &Body) {
         for (i, segment) in self.skeleton.segments_mut().iter_mut().enumerate() {
-            let Some(&known) = before.numbers.get(&self.stems[i].key) else { continue };
-            let before = &before.skeleton.segments()[known];
+            let Some(&number) = before.numbers.get(&self.stems[i].key) else { continue };
+            self.known[i] = before.known[number];
+            let before = &before.skeleton.segments()[number];
             segment.joint.angular_velocity = before.joint.angular_velocity;
             segment.joint.velocity = before.joint.velocity;
             segment.length_rate = before.length_rate;
@@ -79,10 +84,14 @@ impl Body {
         }
     }
 
-    /// Sets the accelerations that growth prescribes, from the motion of the same stems an interval earlier. What was not there has none.
+    /// Sets the accelerations that growth prescribes, from the motion of the same stems an interval earlier. A stem has none whose
+    /// motion is not known at both instants: one that is born at a tick is already growing then, and is not pushed at the next.
     pub(crate) fn accelerate_from(&mut self, earlier: &Body, seconds: f64) {
         for (i, segment) in self.skeleton.segments_mut().iter_mut().enumerate() {
             let Some(&before) = earlier.numbers.get(&self.stems[i].key) else { continue };
+            if !self.known[i] || !earlier.known[before] {
+                continue;
+            }
             let before = &earlier.skeleton.segments()[before];
             let joint = &mut segment.joint;
             joint.angular_acceleration = (joint.angular_velocity - before.joint.angular_velocity) / seconds;
@@ -90,6 +99,37 @@ impl Body {
             segment.length_acceleration = (segment.length_rate - before.length_rate) / seconds;
             segment.rest_acceleration = (segment.rest_rate - before.rest_rate) / seconds;
         }
+    }
+
+    /// The same skeleton, of whose motion nothing is known.
+    pub(crate) fn unmoved(&self) -> Body {
+        let mut body = self.clone();
+        for segment in body.skeleton.segments_mut() {
+            segment.joint = Joint::fixed(segment.joint.rotation, segment.joint.offset);
+            (segment.length_rate, segment.length_acceleration) = (0.0, 0.0);
+            (segment.rest_rate, segment.rest_acceleration) = Default::default();
+        }
+        body.known.fill(false);
+        body
+    }
+
+    /// Notes that growth does not move it.
+    pub(crate) fn stand(&mut self) {
+        self.known.fill(true);
+    }
+
+    /// True if it is known that growth moves nothing, and begins to move nothing.
+    pub(crate) fn stands(&self) -> bool {
+        let zero = dlsys_sway::Vector::zeros();
+        self.known.iter().all(|known| *known)
+            && !self.moves()
+            && self.skeleton.segments().iter().all(|segment| {
+                let Joint { angular_acceleration, acceleration, .. } = segment.joint;
+                angular_acceleration == zero
+                    && acceleration == zero
+                    && segment.length_acceleration == 0.0
+                    && segment.rest_acceleration == zero
+            })
     }
 
     /// True if growth moves anything.
@@ -230,6 +270,7 @@ mod tests {
             let (start, end) = (Point::origin(), Point::new(0.0, 1.0, 0.0));
             Stem {
                 key,
+                origin: turtle::Origin::new(dlsys_model::KindId::OPEN, dlsys_tree::Lineage::of_axiom(0)),
                 parent: None,
                 depth: 0,
                 start,

@@ -104,7 +104,7 @@ impl Surroundings for Coupled {
     }
 
     fn tick(&mut self, string: &ModuleString, inputs: &mut Inputs) -> Result<(), Failure> {
-        let next = self.pass(string, inputs).map_err(|error| failure(&error))?;
+        let next = self.pass(string, inputs).map_err(|error| failure(&error, string))?;
         self.time = next;
         let Some(course) = &self.course else { return Ok(()) };
         let seconds = self.place.seconds(next);
@@ -140,10 +140,15 @@ impl Surroundings for Coupled {
     }
 }
 
-/// An error as the kernel reports it.
-fn failure(error: &Error) -> Failure {
+/// An error at a string as the kernel reports it.
+fn failure(error: &Error, string: &ModuleString) -> Failure {
     let diagnostic = error.diagnostic();
     let mut failure = Failure::new(diagnostic.message.clone());
+    if let Error::Bending { stem: Some(stem), .. } = error
+        && let Some(index) = string.iter().position(|module| module.lineage == stem.lineage)
+    {
+        failure = failure.of(index);
+    }
     if let Some((span, _)) = diagnostic.labels.first() {
         failure = failure.at(*span);
     }

@@ -4,7 +4,29 @@ use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_geometry::turtle;
 use dlsys_sim::{self as sim, brief};
 use dlsys_sway as sway;
+use dlsys_tree::Lineage;
 use dlsys_wind as wind;
+
+/// The stem with which the mechanics fail.
+#[derive(Clone, Debug)]
+pub struct FailedStem {
+    /// Name of the kind of the module that draws it.
+    pub kind: String,
+    /// The module itself.
+    pub lineage: Lineage,
+    /// The place in the text that says how it is drawn.
+    pub drawn: Option<Span>,
+    /// Its length in m.
+    pub length: f64,
+    /// Its diameter in m.
+    pub width: f64,
+    /// Young's modulus of its tissue in Pa.
+    pub stiffness: f64,
+    /// The declaration of its tissue.
+    pub tissue: Span,
+    /// The speed of the wind where it stands at rest, in m/s.
+    pub wind: f64,
+}
 
 /// Why the surroundings cannot be computed.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -25,16 +47,16 @@ pub enum Error {
         span: Span,
     },
     /// Stems cannot be advanced in time.
-    #[error("the stems of {module} cannot be followed at t = {time}: {error}")]
+    #[error("{}", bending(.error, .stem.as_deref(), *.time))]
     Bending {
         /// The reason.
         error: sway::Error,
-        /// The module that draws the stem in question.
-        module: String,
-        /// The declaration of its tissue.
-        span: Span,
+        /// The stem in question, if it is one.
+        stem: Option<Box<FailedStem>>,
         /// The time in units of the model.
         time: f64,
+        /// The tolerance of the steps.
+        tolerance: f64,
     },
     /// Too many steps up to the time that is asked for.
     #[error("the surroundings take more than {most:e} steps up to t = {time}")]
@@ -59,13 +81,22 @@ impl Error {
             Error::Wind { error, span } => Diagnostic::error(format!("this wind cannot blow: {error}"))
                 .at(*span, "declared here")
                 .help("look at the values of its expressions over time: they may read `t`"),
-            Error::Bending { error, module, span, time } => {
-                let when = brief(*time, 8);
-                let shown = format!("stems cannot be followed at t = {when}: {error}");
-                Diagnostic::error(shown)
-                    .at(*span, "made of this tissue")
-                    .note(format!("the stem is drawn for module {module}"))
-                    .help("look for a width or a length that is far too small or large for the `units`, or more damping")
+            Error::Bending { error, stem, tolerance, .. } => {
+                let mut diagnostic = Diagnostic::error(self.to_string());
+                if let Some(stem) = stem {
+                    diagnostic = stem.describe(diagnostic);
+                }
+                match error {
+                    sway::Error::Step { .. } => diagnostic
+                        .help("a stem is easier to follow if it is wider, if its tissue is stiffer or more damped, and in less wind")
+                        .help(format!(
+                            "`--bend-tolerance {}` allows larger errors than the present {}",
+                            brief((tolerance * 10.0).min(0.1), 3),
+                            brief(*tolerance, 3)
+                        )),
+                    _ => diagnostic
+                        .help("look for a width or a length that is far too small or large for the `units`"),
+                }
             }
             Error::TooLong { most, time, seconds, span } => Diagnostic::error(format!(
                 "the surroundings take more than {most:.0e} steps up to t = {}",
@@ -78,6 +109,42 @@ impl Error {
             .help("`units time S` is the pace of the film: seconds of motion in a unit of t, such as 1"),
         }
     }
+}
+
+impl FailedStem {
+    /// Adds the places in the text, and the measures.
+    fn describe(&self, diagnostic: Diagnostic) -> Diagnostic {
+        let drawn = match self.drawn {
+            Some(span) => diagnostic.at(span, "drawn by this"),
+            None => diagnostic,
+        };
+        let measure = |metres: f64| match metres {
+            0.01.. => format!("{} cm", brief(metres * 100.0, 3)),
+            _ => format!("{} mm", brief(metres * 1000.0, 3)),
+        };
+        let (length, width, wind) = (measure(self.length), measure(self.width), brief(self.wind, 3));
+        let is = format!("the stem is {length} long and {width} wide; the wind there blows at {wind} m/s");
+        drawn.at(self.tissue, format!("made of this tissue, of {:e} Pa", self.stiffness)).note(is)
+    }
+}
+
+/// The failure of the mechanics as a message.
+fn bending(error: &sway::Error, stem: Option<&FailedStem>, time: f64) -> String {
+    let why = match error {
+        sway::Error::Step { step, excess, .. } if excess.is_finite() => {
+            let (excess, step) = (brief(*excess, 2), brief(*step, 2));
+            format!("its error is {excess} times the tolerance even in steps of {step} s")
+        }
+        sway::Error::Step { step, .. } => {
+            format!("its motion is not finite even in steps of {} s", brief(*step, 2))
+        }
+        sway::Error::Value { what, .. } => (*what).to_owned(),
+        error => error.to_string(),
+    };
+    let stem = stem.map_or("stems".to_owned(), |FailedStem { kind, lineage, .. }| {
+        format!("the stem of `{kind}` (module {lineage})")
+    });
+    format!("{stem} cannot be followed at t = {}: {why}", brief(time, 8))
 }
 
 impl From<sim::Error> for Error {

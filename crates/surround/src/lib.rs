@@ -26,7 +26,7 @@ mod weather;
 
 pub use bending::{BentStems, Effort};
 pub use coupled::start;
-pub use error::Error;
+pub use error::{Error, FailedStem};
 pub use motion::{MOST_TICKS, Motion, Passive};
 pub use place::Place;
 pub use survey::{Axis, Survey, Vibration, moves};

@@ -146,6 +146,13 @@ struct Past {
     descent: Arc<Descent>,
 }
 
+impl Past {
+    /// Number of strains that it keeps, and one for itself.
+    fn size(&self) -> usize {
+        self.tick.size() + 1
+    }
+}
+
 /// The passive motion of a model: its stems in the wind.
 pub struct Motion<'m> {
     model: &'m Model,
@@ -156,6 +163,8 @@ struct Courses<'m> {
     present: Course<'m>,
     /// In the order of time, without gaps, up to the present tick.
     past: VecDeque<Past>,
+    /// The sum of the sizes of the past ticks.
+    kept: usize,
     marks: Vec<Course<'m>>,
     spacing: u64,
     passive: Passive,
@@ -177,6 +186,7 @@ impl<'m> Motion<'m> {
         if model.scenery.tissues.is_empty() {
             return Ok(None);
         }
+        check(model, &place, place.first_tick() as f64)?;
         let settings = Settings { log: true, transitions: false, ..settings };
         let growth = coupled::start(model, settings, place)?;
         let sampler = Arc::new(Sampler::new(weather, place));
@@ -187,6 +197,7 @@ impl<'m> Motion<'m> {
             passive,
             present,
             past: VecDeque::new(),
+            kept: 0,
             spacing: FIRST_SPACING,
             scene: turtle::blank(model),
         };
@@ -208,7 +219,8 @@ impl<'m> Motion<'m> {
     /// As of [`Motion::at`].
     pub fn advance(&self, seconds: f64) -> Result<(), Error> {
         let mut courses = self.courses.lock().unwrap_or_else(PoisonError::into_inner);
-        while courses.present.number as f64 + 1.0 <= Place::tick_at(seconds) {
+        let number = courses.number_of(self.model, seconds)?;
+        while (courses.present.number as f64) < number {
             courses.tick()?;
         }
         Ok(())
@@ -226,15 +238,20 @@ impl<'m> Motion<'m> {
     }
 }
 
+/// Fails if there are too many ticks up to one of this number.
+fn check(model: &Model, place: &Place, number: f64) -> Result<(), Error> {
+    if number <= MOST_TICKS {
+        return Ok(());
+    }
+    let (seconds, span) = (place.units.time, model.scenery.tissues[0].span);
+    let time = place.time_at(number * CLOCK);
+    Err(Error::TooLong { most: MOST_TICKS, time, seconds, span })
+}
+
 impl<'m> Courses<'m> {
     fn at(&mut self, model: &'m Model, string: &ModuleString) -> Result<BentStems, Error> {
         let place = *self.present.bending.place();
-        let seconds = place.seconds(string.time);
-        let number = Place::tick_at(seconds);
-        if number > MOST_TICKS {
-            let (span, seconds) = (model.scenery.tissues[0].span, place.units.time);
-            return Err(Error::TooLong { most: MOST_TICKS, time: string.time, seconds, span });
-        }
+        let number = self.number_of(model, place.seconds(string.time))?;
         // Before the first tick nothing has moved.
         if number < place.first_tick() as f64 {
             return Ok(BentStems::at_rest());
@@ -244,7 +261,7 @@ impl<'m> Courses<'m> {
             let mark = self.marks.iter().rev().find(|mark| mark.number <= number);
             let mark = mark.or(self.marks.first()).cloned();
             if let Some(mark) = mark {
-                (self.present, self.past) = (mark, VecDeque::new());
+                (self.present, self.past, self.kept) = (mark, VecDeque::new(), 0);
             }
         }
         if number >= self.present.number {
@@ -259,14 +276,20 @@ impl<'m> Courses<'m> {
         bent(tick, descent, &self.present.bending, string, &mut self.scene)
     }
 
+    /// The number of the tick at or before a time of the scene, in s, if so many are possible.
+    fn number_of(&self, model: &Model, seconds: f64) -> Result<f64, Error> {
+        let number = Place::tick_at(seconds);
+        check(model, self.present.bending.place(), number)?;
+        Ok(number)
+    }
+
     /// Goes on to the next tick.
     fn tick(&mut self) -> Result<(), Error> {
         let past = self.present.tick()?;
+        self.kept += past.size();
         self.past.push_back(past);
-        let size = |past: &Past| past.tick.size() + 1;
-        let mut kept: usize = self.past.iter().map(size).sum();
-        while kept > self.passive.kept && self.past.len() > 1 {
-            kept -= self.past.pop_front().map_or(0, |past| size(&past));
+        while self.kept > self.passive.kept && self.past.len() > 1 {
+            self.kept -= self.past.pop_front().map_or(0, |past| past.size());
         }
         self.mark();
         Ok(())

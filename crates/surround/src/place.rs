@@ -30,9 +30,14 @@ impl Place {
         self.birth + t * self.units.time
     }
 
+    /// The time of the model at a time of the scene, in s.
+    pub(crate) fn time_at(&self, seconds: f64) -> f64 {
+        (seconds - self.birth) / self.units.time
+    }
+
     /// The time of the model at a tick of the scene's clock.
     pub(crate) fn time_of(&self, tick: u64) -> f64 {
-        (tick as f64 * CLOCK - self.birth) / self.units.time
+        self.time_at(tick as f64 * CLOCK)
     }
 
     /// The first tick at which the model lives and the scene has begun.

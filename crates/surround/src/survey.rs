@@ -3,8 +3,6 @@
 //! An axis is a stem with its continuations outside brackets. It is judged with what it carries, which is rigid for this purpose, and clamped
 //! where it begins.
 
-use std::collections::HashMap;
-
 use dlsys_geometry::turtle;
 use dlsys_model::{KindId, Model};
 use dlsys_sway::{self as sway, Air, Joint, Segment, Solver, State, Still};
@@ -77,8 +75,6 @@ impl Survey {
     pub fn new(model: &Model, string: &ModuleString) -> Result<Survey, Error> {
         let body = body(model, string)?;
         let owners = owners(&body);
-        let kinds: HashMap<u64, KindId> =
-            string.iter().map(|module| (module.lineage.id, module.kind)).collect();
         let mut axes: Vec<Axis> = Vec::new();
         for (i, (stem, segment)) in body.stems.iter().zip(body.skeleton.segments()).enumerate() {
             if owners[i] == axes.len() {
@@ -100,10 +96,8 @@ impl Survey {
             axis.segments += 1;
             axis.length += segment.length;
             axis.mass += segment.mass * segment.length;
-            if let Some(kind) = kinds.get(&stem.key.module)
-                && !axis.kinds.contains(kind)
-            {
-                axis.kinds.push(*kind);
+            if !axis.kinds.contains(&stem.origin.kind) {
+                axis.kinds.push(stem.origin.kind);
             }
         }
         let mut survey = Survey { body, axes, owners };

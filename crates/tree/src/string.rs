@@ -121,6 +121,15 @@ impl ModuleString {
         self.version
     }
 
+    /// True if a simulation has written both strings, and they have the same modules with the same parameters, bit for bit. Times and ages may
+    /// differ.
+    pub fn has_same_modules(&self, other: &ModuleString) -> bool {
+        fn bits(string: &ModuleString) -> impl Iterator<Item = u64> {
+            string.parameters.iter().map(|value| value.to_bits())
+        }
+        self.version.is_some() && self.version == other.version && bits(self).eq(bits(other))
+    }
+
     /// Sets the version; changes of the string unset it.
     pub fn set_version(&mut self, version: Version) {
         self.version = Some(version);

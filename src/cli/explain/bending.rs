@@ -27,7 +27,10 @@ const BEFORE: f64 = 1.0 / 1024.0;
 /// Stems that bend, and the work that they make. Field names are those of the JSON.
 #[derive(Serialize)]
 pub struct BendingPlan {
-    /// The time of the axes: that of the last frame, or 0.
+    /// The plant of another model whose stems they are, such as `@Grass`, or `@Grass in @Meadow`; none for those of the model itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub plant: Option<String>,
+    /// The time of the axes: that of the last frame, or 0; the age of a plant of another model.
     pub t: f64,
     /// Number of ticks of the clock up to then.
     pub ticks: f64,
@@ -37,6 +40,8 @@ pub struct BendingPlan {
     /// Why there are no axes, if the model could not be run to that time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
+    /// Rules read `strain`, and the axes are those of a growth without strain.
+    pub unbent: bool,
     /// The row of the table of the scene.
     #[serde(skip)]
     pub part: ScenePart,
@@ -71,34 +76,61 @@ pub struct AxisPlan {
 impl BendingPlan {
     /// Of a model; `None` without tissues.
     pub fn new(model: &Model) -> Option<BendingPlan> {
+        BendingPlan::within(model, model, None)
+    }
+
+    /// Of the plants of other models that stand in a model, those in plants included.
+    pub fn of_plants(scene: &Model) -> Vec<BendingPlan> {
+        fn add(scene: &Model, outer: &Model, place: &str, plans: &mut Vec<BendingPlan>) {
+            for plant in &outer.scenery.plants {
+                let name = format!("{}{place}", plant.name);
+                plans.extend(BendingPlan::within(scene, &plant.model, Some(name.clone())));
+                add(scene, &plant.model, &format!(" in {name}"), plans);
+            }
+        }
+        let mut plans = Vec::new();
+        add(scene, scene, "", &mut plans);
+        plans
+    }
+
+    /// Of a model, or of a plant of this model in the wind of a scene.
+    fn within(scene: &Model, model: &Model, plant: Option<String>) -> Option<BendingPlan> {
         if model.scenery.tissues.is_empty() {
             return None;
         }
         let units = model.scenery.units;
         let t = model.frames.map_or(0.0, |frames| frames.to);
         let ticks = (t * units.time / CLOCK).ceil();
-        let wind = model.scenery.wind.as_ref().map(|wind| wind.speed.eval_one(&[t]));
-        let looked = look(model, t);
-        let (survey, moves, error) = match looked {
+        // A plant stands in the wind of the scene at a time that its age does not tell: the speed is that of the last frame.
+        let now = if plant.is_some() { scene.frames.map_or(0.0, |frames| frames.to) } else { t };
+        let wind = scene.scenery.wind.as_ref().map(|wind| wind.speed.eval_one(&[now]));
+        let (survey, moves, error) = match look(model, t) {
             Ok((survey, moves)) => (Some(survey), moves, None),
             Err(message) => (None, true, Some(message)),
         };
         let axes = survey.as_ref().map_or(Vec::new(), |survey| axes(model, survey, wind));
-        let part = part(model, (t, ticks), survey.as_ref(), moves);
-        Some(BendingPlan { t, ticks, wind, axes, error, part })
+        let part = part(scene, model, plant.as_deref(), (t, ticks), survey.as_ref(), moves);
+        Some(BendingPlan { plant, t, ticks, wind, axes, error, unbent: model.reads_strain(), part })
     }
 
     /// The section of the text.
     pub fn text(&self) -> String {
         let when = brief(self.t, 6);
+        let whose = match &self.plant {
+            Some(plant) => format!("Stems of {plant} at its age {when}"),
+            None => format!("Stems at t = {when}"),
+        };
         let mut out = match self.wind {
-            Some(speed) => format!("Stems at t = {when}, in a mean wind of {} m/s\n", brief(speed, 3)),
-            None => format!("Stems at t = {when}\n"),
+            Some(speed) => format!("{whose}, in a mean wind of {} m/s\n", brief(speed, 3)),
+            None => format!("{whose}\n"),
         };
         if let Some(error) = &self.error {
             let _ = writeln!(out, "  unknown, because the model cannot be run so far: {error}");
         } else if self.axes.is_empty() {
             let _ = writeln!(out, "  none that bends is drawn then");
+        }
+        if self.unbent {
+            let _ = writeln!(out, "  as they grow where nothing bends them");
         }
         for axis in self.axes.iter().take(MOST_SHOWN) {
             axis.text(&mut out);
@@ -276,14 +308,24 @@ fn range(values: impl Iterator<Item = f64>) -> Option<Range> {
     })
 }
 
-/// How the stems are followed, and why.
-fn part(model: &Model, (t, ticks): (f64, f64), survey: Option<&Survey>, moves: bool) -> ScenePart {
-    let scenery = &model.scenery;
+/// How the stems of a model are followed, in the wind of a scene, and why.
+fn part(
+    scene: &Model,
+    model: &Model,
+    plant: Option<&str>,
+    (t, ticks): (f64, f64),
+    survey: Option<&Survey>,
+    moves: bool,
+) -> ScenePart {
+    let name = plant.map_or("stems".to_owned(), |plant| format!("stems of {plant}"));
+    let tissues = &model.scenery.tissues;
     let is_used = |number: &usize| survey.is_none_or(|s| s.axes().iter().any(|axis| axis.tissue == *number));
-    let sagging = (0..scenery.tissues.len()).filter(|n| scenery.tissues[*n].sag && is_used(n));
-    let sagging: Vec<&str> = sagging.map(|n| &*scenery.tissues[n].name).collect();
+    let names = |is_meant: &dyn Fn(usize) -> bool| -> Vec<&str> {
+        (0..tissues.len()).filter(|n| is_used(n) && is_meant(*n)).map(|n| &*tissues[n].name).collect()
+    };
+    let sagging = names(&|number| tissues[number].sag);
     let mut reasons = Vec::new();
-    if scenery.wind.is_some() || !scenery.flows.is_empty() {
+    if scene.scenery.wind.is_some() || !scene.scenery.flows.is_empty() {
         reasons.push("the wind moves them".to_owned());
     }
     if !sagging.is_empty() {
@@ -295,19 +337,41 @@ fn part(model: &Model, (t, ticks): (f64, f64), survey: Option<&Survey>, moves: b
     let when = brief(t, 6);
     if reasons.is_empty() {
         let why = "there is no wind, no tissue with `sag`, and growth moves nothing: stems keep the shape that is drawn";
-        return ScenePart::new("stems", "nothing to do", why);
+        return ScenePart::new(name, "nothing to do", why);
     }
     if survey.is_some_and(|survey| survey.axes().is_empty()) && !moves {
-        let why = format!("none that bends is drawn at t = {when}");
-        return ScenePart::new("stems", "nothing to do", why);
+        let why =
+            format!("none that bends is drawn at {} = {when}", if plant.is_some() { "the age" } else { "t" });
+        return ScenePart::new(name, "nothing to do", why);
     }
-    let steps = if ticks > MOST_TICKS {
+    let reasons = reasons.join(", ");
+    let why = if plant.is_some() {
+        let made = names(&|_| true).join(", ");
         format!(
-            "{ticks:.1e} ticks of a clock of 1/30 s up to t = {when}, more than the {MOST_TICKS:.0e} that are possible"
+            "{reasons}; each plant sways at its own place, made of {made}, at every tick of a clock of 1/30 s"
         )
     } else {
-        format!("{ticks} ticks of a clock of 1/30 s up to t = {when}, of one step or more")
+        let steps = if ticks > MOST_TICKS {
+            format!(
+                "{ticks:.1e} ticks of a clock of 1/30 s up to t = {when}, more than the {MOST_TICKS:.0e} that are possible"
+            )
+        } else {
+            format!("{ticks} ticks of a clock of 1/30 s up to t = {when}, of one step or more")
+        };
+        format!("{reasons}; {steps}; {}", ways(model))
     };
-    let why = format!("{}; {steps}; one way: no equation reads them", reasons.join(", "));
-    ScenePart::new("stems", "in steps", why)
+    ScenePart::new(name, "in steps", why)
+}
+
+/// Whether the stems act on growth.
+fn ways(model: &Model) -> String {
+    let readers = (model.kinds.iter()).filter(|(_, kind)| kind.strain_parameter().is_some());
+    let readers: Vec<&str> = readers.map(|(_, kind)| &*kind.name).collect();
+    match model.reads_strain() {
+        true => format!(
+            "two ways: rules of {} read `strain`, and growth and stems go on in turn, tick by tick",
+            readers.join(", ")
+        ),
+        false => "one way: no rule reads `strain`".to_owned(),
+    }
 }

@@ -24,10 +24,12 @@
 //!   monotone;
 //! - `scene`, for what stands around a plant: a list of `{part, class, why}`; `class` is `constant`, `closed form`, `in steps`,
 //!   `nothing to do`, `evaluated at frames`, `one simulation` or `one simulation a seed`;
-//! - `bending`, for a model with tissues: `{t, ticks, wind, axes}`; `t` is the time at which axes are listed, `ticks` the number of steps of
+//! - `bending`, for a model with tissues: `{t, ticks, wind, axes, unbent}`; `t` is the time at which axes are listed, `ticks` the number of steps of
 //!   the clock up to it, `wind` the mean speed in m/s or null; an axis is `{kinds, tissue, depth, count, measured, segments, length, width, mass,
 //!   carried, frequency, damping, cauchy, greenhill}`: `count` axes of the same kinds, least and greatest values in SI, of `measured` of
-//!   them for the last four; null where there is none;
+//!   them for the last four; null where there is none; `unbent` is true if rules read `strain`: the axes are those of a growth without it;
+//! - `bending_of_plants`, for a model with plants of other models that have tissues: a list of such objects with `plant`, its name; `t` is its
+//!   age, `ticks` those of its age, `wind` that of the scene at the last frame;
 //! - `summary`: names of kinds by `work`, and `closed_form`: true if nothing is ever integrated numerically.
 
 mod bending;

@@ -26,6 +26,9 @@ pub struct Explanation {
     /// The stems that bend, if the model has tissues.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bending: Option<BendingPlan>,
+    /// Those of the plants of other models.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub bending_of_plants: Vec<BendingPlan>,
     pub summary: Summary,
 }
 
@@ -171,7 +174,8 @@ impl Explanation {
             });
         }
         let (mut scene, bending) = (scene::parts(model), BendingPlan::new(model));
-        scene.extend(bending.as_ref().map(|bending| bending.part.clone()));
+        let bending_of_plants = BendingPlan::of_plants(model);
+        scene.extend(bending.iter().chain(&bending_of_plants).map(|bending| bending.part.clone()));
         Explanation {
             model: session.source.name.clone(),
             title: model.title.clone(),
@@ -180,6 +184,7 @@ impl Explanation {
             curves: model.curves.iter().map(|curve| CurvePlan::new(curve)).collect(),
             scene,
             bending,
+            bending_of_plants,
             summary,
         }
     }

@@ -178,7 +178,7 @@ pub fn show(plan: &Explanation) -> String {
         Table(plan.scene.iter().map(ScenePart::row).collect()).show(2, &mut out);
         out.push('\n');
     }
-    if let Some(bending) = &plan.bending {
+    for bending in plan.bending.iter().chain(&plan.bending_of_plants) {
         out += &bending.text();
     }
     let _ = writeln!(out, "Summary");

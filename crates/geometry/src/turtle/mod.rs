@@ -74,7 +74,7 @@ pub use bent::{StemKey, Strains};
 use dlsys_model::Model;
 use dlsys_tree::ModuleString;
 pub use error::{Error, ErrorKind};
-pub use skeleton::{Form, Load, Skeleton, Stem};
+pub use skeleton::{Form, Load, Origin, Skeleton, Stem};
 
 /// Most modules that one frame may draw, those that interpretations make included.
 pub const MODULE_LIMIT: usize = 10_000_000;
@@ -136,6 +136,16 @@ pub fn draw_bent(
     scene: &mut Scene,
 ) -> Result<(), Error> {
     interpret::bent(model, string, strains, scene)
+}
+
+/// True if the string alone decides the drawing: no interpretation reads the time or the age of a module.
+pub fn is_timeless(model: &Model) -> bool {
+    model.kinds.iter().all(|(_, kind)| {
+        let drawing = kind.interpretation.map(|index| &model.interpretations[index].drawn);
+        // Behind the parameters are the time and the age.
+        let reads_time = |variable: &usize| [kind.arity, kind.arity + 1].contains(variable);
+        drawing.is_none_or(|drawn| !drawn.programs().flat_map(|program| program.reads()).any(reads_time))
+    })
 }
 
 /// The skeleton of a string: its stems that give way, and what they carry. `scene` is overwritten.

@@ -6,16 +6,45 @@ use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+use dlsys_diagnostic::Span;
+use dlsys_model::{KindId, Model};
+use dlsys_tree::Lineage;
 use nalgebra::Matrix3;
 
 use super::bent::StemKey;
+use super::error;
 use crate::scene::{Mesh, Patch, Placement, Point, Polygon, Scene, Segment, Surface, Vector};
+
+/// The module of the string that draws something.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Origin {
+    /// Its kind.
+    pub kind: KindId,
+    /// Its identity.
+    pub lineage: Lineage,
+    /// The interpretation that draws it, and the kind of the part of it.
+    pub(super) inside: Option<(usize, KindId)>,
+}
+
+impl Origin {
+    /// The module of a string, drawn without an interpretation.
+    pub fn new(kind: KindId, lineage: Lineage) -> Origin {
+        Origin { kind, lineage, inside: None }
+    }
+
+    /// The place in the text that says how it is drawn, as far as that is known.
+    pub fn span(&self, model: &Model) -> Option<Span> {
+        error::place(model, self.kind, self.lineage, self.inside)
+    }
+}
 
 /// A stem that gives way: a straight or, under a tropism, bent piece of one width, in its shape at rest.
 #[derive(Clone, Debug)]
 pub struct Stem {
     /// Its identity.
     pub key: StemKey,
+    /// The module that draws it.
+    pub origin: Origin,
     /// The stem from whose end it grows, rigid parts in between; `None` if it is clamped where the turtle stands.
     pub parent: Option<usize>,
     /// Number of brackets of the string around the module that draws it.

@@ -171,6 +171,57 @@ fn range(at: [i64; 3], end: usize) -> Option<[usize; 2]> {
     (low <= high).then_some([low as usize, high as usize])
 }
 
+/// Corners in the order that gives a positive area, and their depths. Places are in steps.
+struct Oriented {
+    at: [[i64; 2]; 3],
+    depths: [f64; 3],
+    /// Twice its area.
+    area: f64,
+}
+
+/// A side: `a x + b y` grows to the inside.
+#[derive(Clone, Copy)]
+struct Side {
+    a: i64,
+    b: i64,
+    /// A place on it.
+    through: [i64; 2],
+    /// -1 if places on it belong to the triangle on the other side, else 0.
+    bias: i64,
+}
+
+impl Oriented {
+    /// `None` if it has no area.
+    fn new(mut at: [[i64; 2]; 3], mut depths: [f64; 3]) -> Option<Oriented> {
+        let [[ax, ay], [bx, by], [cx, cy]] = at;
+        let area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax);
+        if area == 0 {
+            return None;
+        }
+        if area < 0 {
+            at.swap(1, 2);
+            depths.swap(1, 2);
+        }
+        Some(Oriented { at, depths, area: area.unsigned_abs() as f64 })
+    }
+
+    /// The side opposite of each corner.
+    fn sides(&self) -> [Side; 3] {
+        [0, 1, 2].map(|k| {
+            let ([px, py], [qx, qy]) = (self.at[(k + 1) % 3], self.at[(k + 2) % 3]);
+            let (a, b) = (py - qy, qx - px);
+            let bias = if a > 0 || (a == 0 && b > 0) { 0 } else { -1 };
+            Side { a, b, through: [px, py], bias }
+        })
+    }
+
+    /// The least and the greatest depth.
+    fn reach(&self) -> [f64; 2] {
+        let bounds = [f64::INFINITY, f64::NEG_INFINITY];
+        self.depths.iter().fold(bounds, |[low, high], &z| [low.min(z), high.max(z)])
+    }
+}
+
 /// A triangle, made ready.
 struct Triangle<const N: usize> {
     /// First and last column and row of pixels that it may touch.
@@ -190,40 +241,26 @@ struct Triangle<const N: usize> {
 impl<const N: usize> Triangle<N> {
     /// `None` if no sample can be in it.
     fn new(pattern: &Pattern<N>, corners: [Corner; 3], width: usize, height: usize) -> Option<Triangle<N>> {
-        let mut at = corners.map(|corner| [snap(corner.x), snap(corner.y)]);
-        let mut depths = corners.map(|corner| corner.depth);
-        let [[ax, ay], [bx, by], [cx, cy]] = at;
-        let area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax);
-        if area == 0 {
-            return None;
-        }
-        if area < 0 {
-            at.swap(1, 2);
-            depths.swap(1, 2);
-        }
+        let triangle = Oriented::new(
+            corners.map(|corner| [snap(corner.x), snap(corner.y)]),
+            corners.map(|corner| corner.depth),
+        )?;
+        let Oriented { at, depths, area } = triangle;
         let columns = range(at.map(|p| p[0]), width)?;
         let rows = range(at.map(|p| p[1]), height)?;
-        // The side opposite of each corner.
-        let sides = [0, 1, 2].map(|k| {
-            let ([px, py], [qx, qy]) = (at[(k + 1) % 3], at[(k + 2) % 3]);
-            let (a, b) = (py - qy, qx - px);
-            [a, b, -(a * px + b * py)]
-        });
-        let bias = sides.map(|[a, b, _]| if a > 0 || (a == 0 && b > 0) { 0 } else { -1 });
+        let lines = triangle.sides();
+        let sides = lines.map(|Side { a, b, through: [x, y], .. }| [a, b, -(a * x + b * y)]);
+        let bias = lines.map(|side| side.bias);
         let at_samples = sides.map(|[a, b, _]| {
             pattern.map(|(x, y)| {
                 let place = |k: i64| (k + 8) * (STEPS / 16) + STEPS / 32;
                 a * place(x) + b * place(y)
             })
         });
-        let area = area.unsigned_abs() as f64;
         let slope =
             |i: usize| (0..3).map(|k| sides[k][i] as f64 * depths[k]).sum::<f64>() / area * STEPS as f64;
         let (right, down) = (slope(0), slope(1));
         let [x, y] = at[0].map(|x| x as f64 / STEPS as f64);
-        let [least, greatest] = depths
-            .iter()
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &z| [low.min(z), high.max(z)]);
         Some(Triangle {
             columns,
             rows,
@@ -231,7 +268,7 @@ impl<const N: usize> Triangle<N> {
             bias,
             at_samples,
             depth: [depths[0] - right * x - down * y, right, down],
-            depths: [least, greatest],
+            depths: triangle.reach(),
         })
     }
 }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{Place, STEPS, range};
+use super::{Oriented, Place, STEPS, Side, range};
 
 /// The depth of a triangle at the upper left corners of pixels: at one place, its growth to the right and down, and its bounds.
 #[derive(Clone, Copy)]
@@ -57,17 +57,11 @@ pub(super) struct Ready {
 impl Ready {
     /// `None` if no sample of these rows can be in it.
     pub(super) fn new(corners: [Place; 3], width: usize, band: &Range<usize>) -> Option<Ready> {
-        let mut at = corners.map(|corner| [i64::from(corner.x), i64::from(corner.y)]);
-        let mut depths = corners.map(|corner| f64::from(corner.depth));
-        let [[ax, ay], [bx, by], [cx, cy]] = at;
-        let area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax);
-        if area == 0 {
-            return None;
-        }
-        if area < 0 {
-            at.swap(1, 2);
-            depths.swap(1, 2);
-        }
+        let triangle = Oriented::new(
+            corners.map(|corner| [i64::from(corner.x), i64::from(corner.y)]),
+            corners.map(|corner| f64::from(corner.depth)),
+        )?;
+        let Oriented { at, depths, area } = triangle;
         let columns = range(at.map(|p| p[0]), width)?;
         let [first, last] = range(at.map(|p| p[1]), band.end)?;
         let rows = [first.max(band.start), last];
@@ -75,22 +69,17 @@ impl Ready {
             return None;
         }
         let (x, y) = (columns[0] as i64 * STEPS, rows[0] as i64 * STEPS);
-        // The side opposite of each corner; places on a side belong to one of the two triangles that meet there.
-        let lines = [0, 1, 2].map(|k| {
-            let ([px, py], [qx, qy]) = (at[(k + 1) % 3], at[(k + 2) % 3]);
-            let (a, b) = (py - qy, qx - px);
-            let bias = if a > 0 || (a == 0 && b > 0) { 0 } else { -1 };
-            [a * (x - px) + b * (y - py) + bias, a, b]
-        });
-        let scale = STEPS as f64 / area.unsigned_abs() as f64;
+        // Places on a side belong to one of the two triangles that meet there.
+        let lines = triangle
+            .sides()
+            .map(|Side { a, b, through: [px, py], bias }| [a * (x - px) + b * (y - py) + bias, a, b]);
+        let scale = STEPS as f64 / area;
         let slope = |i: usize| (0..3).map(|k| lines[k][i] as f64 * depths[k]).sum::<f64>() * scale;
         let (right, down) = (slope(1), slope(2));
         let steps = STEPS as f64;
         let depth =
             depths[0] + right * ((x - at[0][0]) as f64 / steps) + down * ((y - at[0][1]) as f64 / steps);
-        let (least, greatest) = depths
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &z| (low.min(z), high.max(z)));
+        let [least, greatest] = triangle.reach();
         let plane = Plane {
             column: columns[0] as f32,
             row: rows[0] as f32,

@@ -2,7 +2,7 @@
 
 use super::{Row, rows, stem, vibration::BETA, weightless};
 use crate::{
-    Air, Error, Fixed, Joint, Load, Method, Pose, Segment, Settings, Skeleton, Solver, State, Still, Vector,
+    Error, Fixed, Joint, Load, Method, Pose, Segment, Settings, Skeleton, Solver, State, Still, Vector,
 };
 
 /// Settings of steps of one length.

@@ -3,9 +3,9 @@
 use super::super::bend::Bend;
 use super::super::bent::{self, Bent, StemKey};
 use super::super::error::ErrorKind;
-use super::super::skeleton::{Carrier, Stem};
+use super::super::skeleton::{Carrier, Origin, Stem};
 use super::super::{Error, SMALLEST_LENGTH};
-use super::Walk;
+use super::{DrawnModule, Walk};
 use crate::scene::{MaterialId, Point, Segment, Vector, Width};
 
 impl Walk<'_> {
@@ -82,7 +82,7 @@ impl Walk<'_> {
         let Width::Set(width) = self.state.width else {
             return Err(self.error(ErrorKind::NoWidth));
         };
-        let module = self.drawn.lineage;
+        let DrawnModule { kind, lineage } = self.drawn;
         let number = match self.state.joined {
             Some(number) => number,
             None => {
@@ -90,13 +90,14 @@ impl Walk<'_> {
                 self.stems_drawn - 1
             }
         };
-        let key = StemKey::of(module, number);
+        let key = StemKey::of(lineage, number);
         if let Some(recorder) = &mut self.recorder
             && self.state.joined.is_none()
         {
             let (start, axes) = (self.state.position, self.state.frame.vectors());
             recorder.stems.push(Stem {
                 key,
+                origin: Origin { kind, lineage, inside: self.inside },
                 parent: self.state.stem,
                 depth: self.depth,
                 start,
