@@ -293,3 +293,23 @@ fn a_stem_that_cannot_be_followed_is_named_with_its_place() {
     assert!(error.notes[0].contains("10 cm long and 5 mm wide"), "{:?}", error.notes);
     assert!(error.help.iter().any(|help| help.contains("`--bend-tolerance 0.01`")), "{:?}", error.help);
 }
+
+/// A rope in a storm takes thousands of steps a second: the limit of time holds for them, too.
+#[test]
+fn stems_stop_at_the_limit_of_time() {
+    let session =
+        read("rope.dls", &DIVIDING.replace("speed 4", "speed 40").replace("damping 0.05", "damping 0"));
+    let settings = Settings { max_seconds: 0.2, ..Settings::default() };
+    let nursery = Nursery::new(&session.model, settings);
+    let mut string = ModuleString::default();
+    let mut simulation = session.simulate(settings).expect("it starts");
+    simulation.at(6.0, &mut string).expect("it grows");
+    let begun = std::time::Instant::now();
+    let error = nursery.draw(&string, &mut nursery.blank()).expect_err("too slow").diagnostic();
+    assert!(
+        error.message.starts_with("after 0.2 s of computing, the stems are at t = "),
+        "{}",
+        error.message
+    );
+    assert!(begun.elapsed().as_secs() < 30, "{:?}", begun.elapsed());
+}

@@ -180,6 +180,11 @@ impl<M: Deref<Target = Model>> Bending<M> {
         &self.model
     }
 
+    /// Sets when the solver gives up.
+    pub(crate) fn give_up_at(&mut self, deadline: Option<std::time::Instant>) {
+        self.solver.deadline = deadline;
+    }
+
     pub(crate) fn place(&self) -> &Place {
         &self.place
     }
@@ -275,7 +280,9 @@ impl<M: Deref<Target = Model>> Bending<M> {
     /// The error of a tick that begins at a time in s.
     fn failure(&self, body: &Body, error: sway::Error, from: f64) -> Error {
         let (at, seconds) = match error {
-            sway::Error::Step { segment, time, .. } => (Some(segment), time),
+            sway::Error::Step { segment, time, .. } | sway::Error::Steps { segment, time, .. } => {
+                (Some(segment), time)
+            }
             sway::Error::Value { segment, .. } | sway::Error::Equilibrium { segment, .. } => {
                 (Some(segment), from)
             }

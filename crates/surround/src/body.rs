@@ -208,11 +208,17 @@ fn rotation_vector(rotation: &Matrix) -> Vector {
         rotation[(1, 0)] - rotation[(0, 1)],
     );
     let (sin, cos) = (odd.norm() / 2.0, (rotation.trace() - 1.0) / 2.0);
-    if sin < 1e-9 && cos > 0.0 {
+    if sin > 1e-6 {
+        // Without an arc cosine, which is not a number where rounding makes a cosine larger than 1.
+        return odd * (sin.atan2(cos) / (2.0 * sin));
+    }
+    if cos > 0.0 {
         // To second order the odd part is the vector.
         return odd / 2.0;
     }
-    nalgebra::Rotation3::from_matrix_unchecked(*rotation).scaled_axis()
+    // About half a turn, whose axis the odd part does not show.
+    let rotation = nalgebra::Rotation3::from_matrix_unchecked(*rotation);
+    nalgebra::UnitQuaternion::from_rotation_matrix(&rotation).scaled_axis()
 }
 
 /// Adds what a stem carries at its end.
@@ -286,5 +292,19 @@ mod tests {
         let strain = Vector::new(0.1, 0.2, -0.5);
         let after = rolled(strain, roll(&a, &b));
         assert!((frame(a.axes) * strain - frame(b.axes) * after).norm() < 1e-14);
+    }
+
+    /// Rotations of the size of those in a tick, of half a turn, and between.
+    #[test]
+    fn rotations_have_their_vectors() {
+        let axis = Vector::new(0.3, -0.5, 0.2).normalize();
+        for tenths in -170..=5_i32 {
+            let angle = (10_f64.powf(f64::from(tenths) / 10.0)).min(std::f64::consts::PI - 1e-12);
+            let rotation = nalgebra::Rotation3::new(axis * angle).into_inner();
+            // As a product of two frames, whose rounding makes the trace larger than 3 now and then.
+            let frame = nalgebra::Rotation3::new(Vector::new(0.7, f64::from(tenths), 1.1)).into_inner();
+            let vector = rotation_vector(&(rotation * frame * frame.transpose()));
+            assert!((vector - axis * angle).norm() < 1e-9, "{angle}: {vector}");
+        }
     }
 }

@@ -58,6 +58,16 @@ pub enum Error {
         /// The tolerance of the steps.
         tolerance: f64,
     },
+    /// More seconds than [`Settings::max_seconds`](sim::Settings::max_seconds).
+    #[error("the stems take more than {limit} s up to t = {time}")]
+    OutOfTime {
+        /// The limit in s.
+        limit: f64,
+        /// The time in units of the model.
+        time: f64,
+        /// The declaration of the first tissue.
+        span: Span,
+    },
     /// Too many steps up to the time that is asked for.
     #[error("the surroundings take more than {most:e} steps up to t = {time}")]
     TooLong {
@@ -87,7 +97,7 @@ impl Error {
                     diagnostic = stem.describe(diagnostic);
                 }
                 match error {
-                    sway::Error::Step { .. } => diagnostic
+                    sway::Error::Step { .. } | sway::Error::Steps { .. } => diagnostic
                         .help("a stem is easier to follow if it is wider, if its tissue is stiffer or more damped, and in less wind")
                         .help(format!(
                             "`--bend-tolerance {}` allows larger errors than the present {}",
@@ -98,6 +108,12 @@ impl Error {
                         .help("look for a width or a length that is far too small or large for the `units`"),
                 }
             }
+            Error::OutOfTime { limit, time, span } => Diagnostic::error(format!(
+                "after {limit} s of computing, the stems are at t = {} only",
+                brief(*time, 8)
+            ))
+            .at(*span, "they bend")
+            .help("`--max-seconds` is the limit; `--bend-tolerance 0.01` makes fewer steps"),
             Error::TooLong { most, time, seconds, span } => Diagnostic::error(format!(
                 "the surroundings take more than {most:.0e} steps up to t = {}",
                 brief(*time, 8)
@@ -137,6 +153,12 @@ fn bending(error: &sway::Error, stem: Option<&FailedStem>, time: f64) -> String 
         }
         sway::Error::Step { step, .. } => {
             format!("its motion is not finite even in steps of {} s", brief(*step, 2))
+        }
+        sway::Error::Steps { step, most, .. } => {
+            format!(
+                "it moves so fast that steps of {} s are needed, and more than {most} in a thirtieth of a second",
+                brief(*step, 2)
+            )
         }
         sway::Error::Value { what, .. } => (*what).to_owned(),
         error => error.to_string(),

@@ -10,6 +10,7 @@
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use dlsys_geometry::scene::Scene;
 use dlsys_geometry::turtle;
@@ -168,6 +169,9 @@ struct Courses<'m> {
     marks: Vec<Course<'m>>,
     spacing: u64,
     passive: Passive,
+    /// Seconds that the stems may take, and what they have taken.
+    limit: f64,
+    spent: Duration,
     scene: Scene,
 }
 
@@ -195,6 +199,8 @@ impl<'m> Motion<'m> {
             // Without marks the whole is begun anew where time goes back.
             marks: vec![present.clone()],
             passive,
+            limit: settings.max_seconds,
+            spent: Duration::ZERO,
             present,
             past: VecDeque::new(),
             kept: 0,
@@ -285,7 +291,20 @@ impl<'m> Courses<'m> {
 
     /// Goes on to the next tick.
     fn tick(&mut self) -> Result<(), Error> {
-        let past = self.present.tick()?;
+        // Without a limit the clock is not asked.
+        let begun = self.limit.is_finite().then(Instant::now);
+        let left =
+            Duration::try_from_secs_f64(self.limit).unwrap_or(Duration::MAX).saturating_sub(self.spent);
+        self.present.bending.give_up_at(begun.and_then(|begun| begun.checked_add(left)));
+        let past = self.present.tick();
+        self.spent += begun.map_or(Duration::ZERO, |begun| begun.elapsed());
+        if self.spent.as_secs_f64() > self.limit {
+            let bending = &self.present.bending;
+            let time = bending.place().time_of(self.present.number);
+            let span = bending.model().scenery.tissues[0].span;
+            return Err(Error::OutOfTime { limit: self.limit, time, span });
+        }
+        let past = past?;
         self.kept += past.size();
         self.past.push_back(past);
         while self.kept > self.passive.kept && self.past.len() > 1 {

@@ -34,6 +34,26 @@ pub enum Error {
         /// Its error, in units of the tolerance; not finite if its motion is not.
         excess: f64,
     },
+    /// The steps that the tolerance requires are too many.
+    #[error(
+        "at {time:.6} s, steps of {step:.1e} s for segment {segment} are more than {most:e} in a step of the clock"
+    )]
+    Steps {
+        /// Time that was reached, in s.
+        time: f64,
+        /// Length of the last step, in s.
+        step: f64,
+        /// The segment with the largest error in it.
+        segment: usize,
+        /// The largest number.
+        most: u64,
+    },
+    /// [`Solver::deadline`](crate::Solver::deadline) is over.
+    #[error("no time is left at {time:.6} s")]
+    OutOfTime {
+        /// Time that was reached, in s.
+        time: f64,
+    },
     /// An equilibrium has not been found within the number of iterations.
     #[error(
         "no equilibrium after {iterations} iterations; segment {segment} still moves by {moved} m in one"

@@ -39,6 +39,8 @@ pub struct Settings {
     pub longest: f64,
     /// Largest m.
     pub deepest: u32,
+    /// Largest number of steps tried in a time of H.
+    pub most: u64,
     /// δ: the moment of inertia of a stem about its own axis is at least about δ² of that across its root. It bounds the frequency of torsion;
     /// planar motion does not depend on it. 0 for the sections' own inertia alone.
     pub rotary: f64,
@@ -56,6 +58,7 @@ impl Default for Settings {
             tolerance: 1e-3,
             longest: 1.0 / 30.0,
             deepest: 40,
+            most: 50_000,
             rotary: 0.1,
             air: Air::default(),
             fixed: false,

@@ -11,12 +11,16 @@ use crate::{Error, Growth, Method, Settings, Skeleton, State, Step};
 pub struct Solver {
     /// How it works.
     pub settings: Settings,
+    /// When it stops with [`Error::OutOfTime`], if ever.
+    pub deadline: Option<std::time::Instant>,
     pub(crate) skeleton: Skeleton,
     pub(crate) work: Workspace,
     /// Second memory of the method with four stages.
     pub(crate) aside: Workspace,
     pub(crate) trial: State,
     extent: f64,
+    /// The segment with the largest error in the last step tried.
+    worst: usize,
     counts: Counts,
 }
 
@@ -48,7 +52,7 @@ impl Solver {
     /// # Errors
     ///
     /// [`Error::Length`] if the state does not fit the skeleton, [`Error::Value`] if a value is out of range, [`Error::Step`] if the
-    /// error is too large with the shortest step. The state is then that of the last accepted step.
+    /// error is too large with the shortest step, [`Error::Steps`] if there are too many, [`Error::OutOfTime`] after the deadline. The state is then that of the last accepted step.
     pub fn advance(
         &mut self,
         state: &mut State,
@@ -60,8 +64,18 @@ impl Solver {
     ) -> Result<(), Error> {
         self.skeleton.clear();
         let mut time = from;
+        let tried = |counts: Counts| counts.steps + counts.rejected;
+        let spans = ((to - from) / self.settings.longest).ceil().max(1.0);
+        let limit = tried(self.counts).saturating_add((self.settings.most as f64 * spans) as u64);
         while time < to {
             let end = self.step(state, time, to, growth, wind)?;
+            if tried(self.counts) > limit {
+                let (segment, most) = (self.worst, self.settings.most);
+                return Err(Error::Steps { time, step: end - time, segment, most });
+            }
+            if self.deadline.is_some_and(|deadline| std::time::Instant::now() > deadline) {
+                return Err(Error::OutOfTime { time });
+            }
             observe(&Step { from: time, to: end, before: state, after: &self.trial });
             std::mem::swap(state, &mut self.trial);
             time = end;
@@ -110,6 +124,7 @@ impl Solver {
             self.renew(state, time + 0.5 * (end - time), growth)?;
             let instant = Instant { wind, from: time, to: end };
             let found = self.attempt(state, instant);
+            self.worst = found.segment;
             let allowed = self.settings.tolerance * self.extent.max(f64::MIN_POSITIVE);
             let excess = found.displacement / allowed;
             if self.settings.fixed || excess <= 1.0 {
