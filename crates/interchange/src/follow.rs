@@ -1,6 +1,6 @@
 //! Follows a run through time: samples as close as the motion needs them, at events and wherever a straight way between two of them would be wrong.
 //!
-//! Frames are given. Between two of them a sample just before and one just after every event is taken, and one in the
+//! Frames are given. A sample is taken at every fourth of them, just before and just after every event, and in the
 //! middle of what is left, as a test. Where the test fails, or something appears that no event explains, the interval is halved. For that, the simulation
 //! is kept as it was before the frames at hand and run again. Simulations give the same bits again, so samples do not depend on the order in which they were taken.
 
@@ -19,8 +19,10 @@ use crate::{Error, Limits};
 
 /// Frames that are worked on together.
 const CHUNK: usize = 16;
+/// Frames from one sample to the next, where the motion does not need more.
+const STRIDE: usize = 4;
 /// Intervals of less than this part of the way from frame to frame are not tested.
-const TESTED: f64 = 0.25;
+const TESTED: f64 = 1.0;
 /// Strings that are drawn together, at most.
 const BATCH: usize = 64;
 /// Halvings of an interval, at most.
@@ -58,6 +60,8 @@ struct Knot {
     sample: Sample,
     depth: u32,
     done: bool,
+    /// The interval is tested however short it is: the one that it is a half of was not straight.
+    strict: bool,
 }
 
 impl Follower<'_, '_> {
@@ -95,9 +99,9 @@ impl Follower<'_, '_> {
     fn knots(&mut self, start: Sample, frames: &[f64]) -> Result<Vec<Sample>, Error> {
         let mut times = self.base(start.time, frames)?;
         let long = TESTED * (frames[frames.len() - 1] - start.time) / frames.len() as f64;
-        let mut knots = BTreeMap::from([(key(start.time), Knot { sample: start, depth: 0, done: true })]);
+        let mut knots =
+            BTreeMap::from([(key(start.time), Knot { sample: start, depth: 0, done: true, strict: false })]);
         let mut tests: Vec<f64> = Vec::new();
-        let mut depth = 0;
         loop {
             let mut all: Vec<f64> = times.iter().chain(&tests).copied().collect();
             all.sort_by(f64::total_cmp);
@@ -111,15 +115,14 @@ impl Follower<'_, '_> {
             }
             for time in times.drain(..) {
                 if let Some(sample) = taken.remove(&key(time)) {
-                    knots.insert(key(time), Knot { sample, depth, done: false });
+                    knots.insert(key(time), Knot { sample, depth: 0, done: false, strict: false });
                 }
             }
             self.judge(&mut knots, &mut taken);
-            tests = self.questions(&mut knots, if depth == 0 { long } else { 0.0 });
+            tests = self.questions(&mut knots, long);
             if tests.is_empty() {
                 break;
             }
-            depth += 1;
         }
         self.advance(frames[frames.len() - 1])?;
         Ok(knots.into_values().map(|knot| knot.sample).collect())
@@ -131,21 +134,25 @@ impl Follower<'_, '_> {
         let mut ahead = self.simulation.clone();
         ahead.take_events();
         let passed = ahead.pass(end);
-        let mut times: Vec<f64> = frames.to_vec();
+        let mut times: Vec<f64> =
+            frames.iter().copied().skip(STRIDE - 1).step_by(STRIDE).chain([end]).collect();
         for event in ahead.take_events() {
             self.tracks.endings.insert(event.lineage.id, Ending { time: event.time, rule: event.rule });
             let around = margin(event.time);
-            let just = [event.time - around, event.time + around];
+            // What grows from nothing is not seen at its birth, but soon after.
+            let just = [event.time - around, event.time + around, event.time + self.closeness.instant];
             times.extend(just.into_iter().filter(|t| *t > start && *t < end));
         }
-        // What is between two frames, in parts that are not too long.
+        passed?;
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        // What is between two of them, in parts that are not too long.
         let mut last = start;
-        for &frame in frames {
+        for frame in times.clone() {
             let parts = ((frame - last) / self.closeness.longest).ceil().clamp(1.0, 1e6) as usize;
             times.extend((1..parts).map(|i| last + (frame - last) * i as f64 / parts as f64));
             last = frame;
         }
-        passed?;
         times.sort_by(f64::total_cmp);
         times.dedup();
         Ok(times)
@@ -157,15 +164,16 @@ impl Follower<'_, '_> {
             let before = knots.range(..at).next_back().map(|(_, knot)| &knot.sample);
             let after = knots.range(at..).next().map(|(key, knot)| (*key, &knot.sample, knot.depth));
             let (Some(before), Some((after, end, depth))) = (before, after) else { continue };
-            if self.is_straight(before, &test, end) {
+            let explained = self.is_explained(before, &test) && self.is_explained(&test, end);
+            if explained && self.is_straight(before, &test, end) {
                 if let Some(knot) = knots.get_mut(&after) {
                     knot.done = true;
                 }
             } else {
                 if let Some(knot) = knots.get_mut(&after) {
-                    (knot.depth, knot.done) = (depth + 1, false);
+                    (knot.depth, knot.done, knot.strict) = (depth + 1, false, explained);
                 }
-                knots.insert(at, Knot { sample: test, depth: depth + 1, done: false });
+                knots.insert(at, Knot { sample: test, depth: depth + 1, done: false, strict: explained });
             }
         }
     }
@@ -185,7 +193,7 @@ impl Follower<'_, '_> {
             let middle = a + (b - a) / 2.0;
             let is_fine = b - a <= self.closeness.instant || middle <= a || middle >= b;
             let same = is_fine || self.is_explained(&from.sample, &to.sample);
-            if is_fine || to.depth >= DEEPEST || (same && b - a < long) {
+            if is_fine || to.depth >= DEEPEST || (same && !to.strict && b - a < long) {
                 done.push(pair[1]);
             } else if before != Some(middle) {
                 before = Some(middle);
@@ -214,11 +222,8 @@ impl Follower<'_, '_> {
         })
     }
 
-    /// True if the straight way from one sample to another passes the one between them, and nothing appears, changes or disappears unexplained.
+    /// True if the straight way from one sample to another passes the one between them.
     fn is_straight(&self, from: &Sample, test: &Sample, to: &Sample) -> bool {
-        if !self.is_explained(from, test) || !self.is_explained(test, to) {
-            return false;
-        }
         let w = weight(from.time, to.time, test.time);
         let mut ends: HashMap<u64, usize> = HashMap::new();
         if !same_modules(from, to) {

@@ -29,6 +29,7 @@
 
 #![warn(missing_docs)]
 
+mod blend;
 mod error;
 mod follow;
 mod glb;

@@ -5,6 +5,7 @@
 
 use std::collections::HashMap;
 
+use crate::blend::{Example, blend};
 use crate::part::{Form, Paint, Part, distance, triple};
 use crate::thin::{place, thin};
 use crate::track::Phase;
@@ -30,7 +31,8 @@ pub(crate) enum Shape {
     /// The same at all ages.
     Still(Vec<f32>),
     /// The first shape, and of each other one as much as its weight says, from 0 to 1, instead. Weights by age, one for each other shape.
-    Mixed { shapes: Vec<Vec<f32>>, weights: Vec<f32> },
+    /// `examples` are for the normals of corners, which are no sums; without them each shape has its own.
+    Mixed { shapes: Vec<Vec<f32>>, weights: Vec<f32>, examples: Vec<Example> },
     /// A straight stem of this contour: a unit stem of length, lower and upper radius 1, enlarged by `size`. Weights by age: how much shorter, thinner
     /// below and thinner above.
     Stem { contour: Option<u32>, size: f32, weights: Vec<f32> },
@@ -66,11 +68,27 @@ impl Phase {
         out.extend(a.iter().zip(b).map(|(a, b)| a + (b - a) * w as f32));
     }
 
+    /// Whether the other one has its colours at the same age, or at one that differs by little.
+    fn is_coloured_like(&self, other: &Phase, slack: f64) -> bool {
+        const NEAR: f64 = 0.03;
+        let [first, last] = [0, self.times.len() - 1].map(|i| self.age(i));
+        let near = slack + NEAR * (last - first);
+        [first, (first + last) / 2.0, last].into_iter().all(|age| {
+            let own = self.paint_at(self.birth + age);
+            let moments = [age - near, age, age + near].map(|age| other.birth + age);
+            let among = other.paints.iter().filter(|(from, _)| *from >= moments[0] && *from <= moments[2]);
+            moments.iter().map(|t| other.paint_at(*t)).chain(among.map(|(_, paint)| paint)).any(|p| p == own)
+        })
+    }
+
     /// Whether it goes through the same shapes as another one, which has been there at all its ages.
     fn is_like(&self, other: &Phase, ages: &[f64], slack: f64, tolerance: f64, room: &mut Vec<f32>) -> bool {
         let count = self.times.len();
         let (Some(first), Some(last)) = (ages.first(), ages.last()) else { return false };
         if self.age(0) < first - slack || self.age(count - 1) > last + slack {
+            return false;
+        }
+        if !self.is_coloured_like(other, slack) {
             return false;
         }
         // Differences are largest at the end, mostly.
@@ -91,12 +109,12 @@ pub(crate) fn lives(phases: &[Phase], tolerance: Tolerance, slack: f64) -> Lives
     let mut order: Vec<usize> = (0..phases.len()).collect();
     order.sort_by(|a, b| span(b).total_cmp(&span(a)).then(a.cmp(b)));
     let mut models: Vec<(usize, Vec<f64>)> = Vec::new();
-    let mut known: HashMap<(Form, Paint), Vec<usize>> = HashMap::new();
+    let mut known: HashMap<Form, Vec<usize>> = HashMap::new();
     let mut of_phase = vec![0; phases.len()];
     let mut room = Vec::new();
     for i in order {
         let phase = &phases[i];
-        let same = known.entry((phase.form.clone(), phase.paint().clone())).or_default();
+        let same = known.entry(phase.form.clone()).or_default();
         let found = same.iter().rev().take(TRIED).copied().find(|&life| {
             let (model, ages): &(usize, Vec<f64>) = &models[life];
             phase.is_like(&phases[*model], ages, slack, tolerance.likeness, &mut room)
@@ -116,7 +134,7 @@ fn life(phase: &Phase, ages: &[f64], tolerance: f64) -> Life {
         [Part::Stem(contour)] => stem(phase, ages, *contour, tolerance),
         _ => still(phase, ages, tolerance)
             .or_else(|| line(phase, ages, tolerance))
-            .unwrap_or_else(|| hats(phase, ages, tolerance)),
+            .unwrap_or_else(|| mixed(phase, ages, tolerance)),
     };
     let (form, paint, kind) = (phase.form.clone(), phase.paint().clone(), phase.kind.clone());
     Life { form, paint, kind, ages, shape }
@@ -164,8 +182,16 @@ fn line(phase: &Phase, ages: &[f64], tolerance: f64) -> Option<(Vec<f64>, Shape)
     let shape = Shape::Mixed {
         shapes: vec![a.to_vec(), b.to_vec()],
         weights: kept.iter().map(|&i| weights[i]).collect(),
+        examples: Vec::new(),
     };
     Some((kept.iter().map(|&i| ages[i]).collect(), shape))
+}
+
+/// Shapes at ages, or, if these are fewer, shapes of which those at all ages are sums.
+fn mixed(phase: &Phase, ages: &[f64], tolerance: f64) -> (Vec<f64>, Shape) {
+    let (keys, shape) = hats(phase, ages, tolerance);
+    let numbers: Vec<&[f32]> = (0..ages.len()).map(|i| phase.numbers(i)).collect();
+    blend(&phase.form, ages, &numbers, keys.len().saturating_sub(1), tolerance).unwrap_or((keys, shape))
 }
 
 /// Shapes at ages between which straight lines are near enough.
@@ -184,7 +210,7 @@ fn hats(phase: &Phase, ages: &[f64], tolerance: f64) -> (Vec<f64>, Shape) {
         // Shape 1 is the last but one.
         weights[key * (count - 1) + (count - 2 - key)] = 1.0;
     }
-    (kept.iter().map(|&i| ages[i]).collect(), Shape::Mixed { shapes, weights })
+    (kept.iter().map(|&i| ages[i]).collect(), Shape::Mixed { shapes, weights, examples: Vec::new() })
 }
 
 /// A straight stem: its length and its radii are enough.

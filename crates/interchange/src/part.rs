@@ -96,6 +96,17 @@ pub(crate) fn distance(form: &[Part], [a, b]: [&[f32]; 2], weight: f64, c: &[f32
     greatest
 }
 
+/// A bound of the distance between the corners of two drawings of this form whose numbers differ by these.
+pub(crate) fn length(form: &[Part], differences: &[f64]) -> f64 {
+    let mut first = 0;
+    let mut greatest = 0.0_f64;
+    for part in form {
+        greatest = greatest.max(part.distance(&differences[first..first + part.numbers()]));
+        first += part.numbers();
+    }
+    greatest
+}
+
 /// A bound of the distance of all corners from the origin of the frame.
 pub(crate) fn reach(form: &[Part], numbers: &[f32]) -> f64 {
     let mut first = 0;

@@ -93,8 +93,13 @@ impl Phase {
             (Some(first), Some(last)) => (first + last) / 2.0,
             _ => 0.0,
         };
-        let before = self.paints.iter().take_while(|(from, _)| *from <= middle).last();
-        &before.unwrap_or(&self.paints[0]).1
+        self.paint_at(middle)
+    }
+
+    /// The materials at a time.
+    pub(crate) fn paint_at(&self, time: f64) -> &Paint {
+        let after = self.paints.partition_point(|(from, _)| *from <= time);
+        &self.paints[after.saturating_sub(1)].1
     }
 }
 

@@ -61,8 +61,6 @@ pub(super) struct Node {
 pub(super) struct Mesh {
     pub(super) name: String,
     pub(super) primitives: Vec<Primitive>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) weights: Option<Vec<f32>>,
 }
 
 #[derive(Debug, Serialize)]

@@ -6,6 +6,7 @@
 mod buffer;
 mod document;
 mod motion;
+mod normals;
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -120,16 +121,16 @@ impl Writer<'_> {
     fn mesh(&mut self, life: &Life) -> usize {
         let number = self.document.meshes.len();
         let kind = plain_name(&life.kind);
-        let (shapes, targets) = match &life.shape {
+        let (shapes, examples) = match &life.shape {
             Shape::Stem { contour, size, weights } => return self.stem(life, *contour, *size, weights),
-            Shape::Still(shape) => (std::slice::from_ref(shape), 0),
-            Shape::Mixed { shapes, .. } => (&shapes[..], shapes.len() - 1),
+            Shape::Still(shape) => (std::slice::from_ref(shape), &[][..]),
+            Shape::Mixed { shapes, examples, .. } => (&shapes[..], &examples[..]),
         };
         let layout = self.cutter.layout(&life.form, &life.paint, shapes);
-        let all: Vec<Vec<Places>> = shapes.iter().map(|shape| layout.places(shape)).collect();
+        let mut all: Vec<Vec<Places>> = shapes.iter().map(|shape| layout.places(shape)).collect();
+        normals::fit(&layout, examples, &mut all);
         let primitives = self.primitives(&layout, &all);
-        let weights = (targets > 0).then(|| vec![0.0; targets]);
-        self.document.meshes.push(Mesh { name: format!("{kind}-{number}"), primitives, weights });
+        self.document.meshes.push(Mesh { name: format!("{kind}-{number}"), primitives });
         number
     }
 
@@ -204,7 +205,7 @@ impl Writer<'_> {
         let name = format!("stem-{number}");
         let material = self.material(Some(material));
         let primitives = vec![Primitive { attributes, indices, material, targets: targets.to_vec() }];
-        self.document.meshes.push(Mesh { name, primitives, weights: Some(vec![0.0; 3]) });
+        self.document.meshes.push(Mesh { name, primitives });
         self.stems.insert(key, number);
         number
     }
@@ -238,7 +239,7 @@ impl Writer<'_> {
         let material = self.material(None);
         let primitives = vec![Primitive { attributes, indices, material, targets: Vec::new() }];
         let mesh = Some(self.document.meshes.len());
-        self.document.meshes.push(Mesh { name: "ground".to_owned(), primitives, weights: None });
+        self.document.meshes.push(Mesh { name: "ground".to_owned(), primitives });
         let node = self.document.nodes.len();
         self.document.nodes[0].children.push(node);
         self.document.nodes.push(Node { name: "ground".to_owned(), mesh, ..Node::default() });

@@ -115,7 +115,7 @@ impl Moved<'_> {
         let Life { ages, shape, .. } = self.life;
         let (count, weights) = match shape {
             Shape::Still(_) => return,
-            Shape::Mixed { shapes, weights } => (shapes.len() - 1, weights),
+            Shape::Mixed { shapes, weights, .. } => (shapes.len() - 1, weights),
             Shape::Stem { weights, .. } => (3, weights),
         };
         let at = |age: f64| -> Vec<f32> {
