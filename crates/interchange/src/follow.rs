@@ -17,8 +17,10 @@ use crate::thin::weight;
 use crate::track::{Ending, Tracks};
 use crate::{Error, Limits};
 
-/// Frames that are worked on together.
-const CHUNK: usize = 16;
+/// Frames that are worked on together, at most.
+const CHUNK: usize = 64;
+/// Numbers of the samples that are worked on together, at most, as far as they can be foreseen.
+const AT_ONCE: usize = 20_000_000;
 /// Frames from one sample to the next, where the motion does not need more.
 const STRIDE: usize = 4;
 /// Intervals of less than this part of the way from frame to frame are not tested.
@@ -32,7 +34,9 @@ const DEEPEST: u32 = 14;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Closeness {
     /// Largest distance of a straight way between samples from the motion, in metres.
-    pub(crate) motion: f64,
+    pub(crate) straight: f64,
+    /// Largest distance of samples that are left out from the straight way between others, in metres.
+    pub(crate) thin: f64,
     /// How exactly the instant of an appearance without a production is found, in units of the model.
     pub(crate) instant: f64,
     /// Longest way between samples, in units of the model.
@@ -74,13 +78,22 @@ impl Follower<'_, '_> {
         let Some((&first, rest)) = frames.split_first() else { return Ok(()) };
         let mut start = self.take(vec![first])?.pop().unwrap_or_default();
         self.check(&start)?;
-        let tolerance = self.closeness.motion;
+        let tolerance = self.closeness.thin;
         self.tracks.add(&start, None, &self.births, tolerance);
-        for chunk in rest.chunks(CHUNK) {
+        let mut rest = rest;
+        while !rest.is_empty() {
             if !progress(start.time) {
                 return Err(Error::Stopped { time: start.time });
             }
-            let knots = self.knots(start, chunk)?;
+            let mut count = rest.len().min(CHUNK);
+            let mut times = self.base(start.time, &rest[..count])?;
+            while count > 1 && times.len() * (start.size() + 1) > AT_ONCE {
+                count = count.div_ceil(2);
+                times = self.base(start.time, &rest[..count])?;
+            }
+            let (chunk, others) = rest.split_at(count);
+            rest = others;
+            let knots = self.knots(start, chunk, times)?;
             for pair in knots.windows(2) {
                 self.tracks.add(&pair[1], Some(pair[0].time), &self.births, tolerance);
             }
@@ -96,8 +109,7 @@ impl Follower<'_, '_> {
     }
 
     /// The samples from the last one before some frames up to them.
-    fn knots(&mut self, start: Sample, frames: &[f64]) -> Result<Vec<Sample>, Error> {
-        let mut times = self.base(start.time, frames)?;
+    fn knots(&mut self, start: Sample, frames: &[f64], mut times: Vec<f64>) -> Result<Vec<Sample>, Error> {
         let long = TESTED * (frames[frames.len() - 1] - start.time) / frames.len() as f64;
         let mut knots =
             BTreeMap::from([(key(start.time), Knot { sample: start, depth: 0, done: true, strict: false })]);
@@ -169,6 +181,8 @@ impl Follower<'_, '_> {
                 if let Some(knot) = knots.get_mut(&after) {
                     knot.done = true;
                 }
+                // It is there, so what is left of the error is a quarter of it, where the motion is smooth.
+                knots.insert(at, Knot { sample: test, depth, done: true, strict: false });
             } else {
                 if let Some(knot) = knots.get_mut(&after) {
                     (knot.depth, knot.done, knot.strict) = (depth + 1, false, explained);
@@ -245,7 +259,7 @@ impl Follower<'_, '_> {
             let frame: Frame = from.modules[i].frame.between(&end.frame, w);
             let off = frame.distance(&test.modules[k].frame, reach(form, own))
                 + distance(form, [from.numbers(i), to.numbers(j)], w, own);
-            off <= self.closeness.motion
+            off <= self.closeness.straight
         })
     }
 

@@ -37,6 +37,11 @@ impl Sample {
         &self.parts[self.range(i, self.parts.len(), |m| m.part)]
     }
 
+    /// Roughly, how many numbers it holds.
+    pub(crate) fn size(&self) -> usize {
+        self.numbers.len() + 30 * self.modules.len()
+    }
+
     /// The materials of its parts.
     pub(crate) fn materials(&self, i: usize) -> &[Option<MaterialId>] {
         &self.materials[self.range(i, self.parts.len(), |m| m.part)]
