@@ -8,7 +8,7 @@ use super::album::Keeping;
 use super::args::{RenderArgs, RunArgs};
 use super::common::{Clock, Failure, ModelRun, count_of, out_error, size_of};
 use super::events::EventLog;
-use super::frame_source::{Frame, Pass, play};
+use super::frame_source::{Frame, Pass, play_at};
 use super::progress::Progress;
 use super::shared::SharedArgs;
 use crate::diagnostic::Diagnostic;
@@ -22,6 +22,8 @@ use crate::sim::Stats;
 const FLOOR: f64 = 5.0;
 /// The first bytes of a GLB file.
 const MARK: &[u8; 4] = b"glTF";
+/// Frames from one to the next that is measured.
+const SURVEYED: usize = 4;
 /// Bytes from which a file gets a hint about its size.
 const LARGE: usize = 50_000_000;
 
@@ -234,14 +236,17 @@ fn measure(order: &Order<'_>, run: &ModelRun, clock: &mut Clock) -> Result<(Surv
     let nothing = Survey::new(View::FRONT);
     let mut survey = nothing.clone();
     let mut events = EventLog::create(order.shared.events.as_deref(), run)?;
-    let mut progress = bar(order, "measuring", run.times.len());
+    // The extent changes little from frame to frame.
+    let count = run.times.len();
+    let times = (0..count).filter(|i| i % SURVEYED == 0 || i + 1 == count).map(|i| run.times[i]).collect();
+    let mut progress = bar(order, "measuring", count.div_ceil(SURVEYED));
     let pass = Pass { settings: run.settings, keeping: Keeping::Nothing, accuracy: 0.0 };
     let of_frame = |_: &Frame, scene: &Scene| {
         let mut survey = nothing.clone();
         survey.add(scene);
         survey
     };
-    let measured = play(run, pass, order.threads, clock, events.as_mut(), of_frame, |frame| {
+    let measured = play_at(run, times, pass, order.threads, (clock, events.as_mut()), of_frame, |frame| {
         survey.merge(&frame);
         progress.inc();
         Ok(())

@@ -1,7 +1,7 @@
 //! The file: meshes of lives, nodes of modules, one animation.
 //!
 //! Everything is linear interpolation, which every program knows. A node is hidden by a scale of 0: extensions for visibility are newer than most
-//! importers. Its scale changes between two neighbouring floats, at birth and at death, so these need not fall on frames.
+//! importers. Its scale changes within half a millisecond, just before birth and just after death, which need not fall on frames.
 
 mod buffer;
 mod document;

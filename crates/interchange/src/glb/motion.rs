@@ -8,6 +8,10 @@ use crate::track::Phase;
 use super::buffer::{Buffer, Kind};
 use super::document::{Animation, Node};
 
+/// Least time between two keys of a track, in seconds. Blender takes keys that are less than a hundredth of a frame apart for one, and a frame is a 24th of
+/// a second where it does not know better.
+const APART: f32 = 5e-4;
+
 /// Times of the model as seconds of the animation.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Clock {
@@ -58,7 +62,7 @@ impl Moved<'_> {
         let [birth, death] =
             [self.phase.from, self.phase.to].map(|time| time.map(|time| self.clock.at(time)));
         let birth = birth.filter(|birth| *birth > 0.0);
-        if death.is_some_and(|death| death <= birth.unwrap_or(0.0)) {
+        if death.is_some_and(|death| death <= birth.unwrap_or(0.0)) && !self.clock.is_still() {
             return false;
         }
         self.place(target, node, animation, buffer);
@@ -83,7 +87,7 @@ impl Moved<'_> {
                 })
             }),
         };
-        let keys = self.keys(kept.iter().map(|&i| times[i]));
+        let (keys, kept) = self.keys(kept.into_iter().map(|i| (times[i], i)));
         let places: Vec<[f32; 3]> =
             kept.iter().map(|&i| frames[i].origin.coords.map(|x| x as f32).into()).collect();
         let mut turns: Vec<[f32; 4]> = Vec::with_capacity(kept.len());
@@ -139,8 +143,11 @@ impl Moved<'_> {
         if kept.len() < 2 {
             return;
         }
+        let (keys, kept) = self.keys(kept.into_iter().map(|age| (age + birth, age)));
+        if keys.len() < 2 {
+            return;
+        }
         let values: Vec<f32> = kept.iter().flat_map(|age| at(*age)).collect();
-        let keys = self.keys(kept.iter().map(|age| age + birth));
         let (input, output) = (buffer.times(&keys), buffer.scalars(&values));
         animation.add(target, "weights", input, output);
     }
@@ -162,28 +169,51 @@ impl Moved<'_> {
             times.push(time);
             scales.push([scale; 3]);
         };
+        // It appears before its birth and vanishes after its death, so that there is no hole where it takes the place of another module.
+        let end = self.clock.end();
+        let mut from = 0.0;
         if let Some(birth) = birth {
-            key(birth.next_down(), 0.0);
-            key(birth, size);
+            from = birth.max(APART);
+            key(from - APART, 0.0);
+            key(from, size);
         }
         if let Some(death) = death {
-            // Where death is the next float after birth, that one key is both.
-            if death.next_down() > birth.unwrap_or(-1.0) {
-                key(death.next_down(), size);
+            let death = death.min(end - APART);
+            if death >= from + APART {
+                key(death, size);
             }
-            key(death, 0.0);
+            key(death.max(from) + APART, 0.0);
         }
         let (input, output) = (buffer.times(&times), buffer.vectors(&scales, Kind::Motion));
         animation.add(target, "scale", input, output);
     }
 
-    /// Times of keys in seconds, each later than the one before.
-    fn keys(&self, times: impl Iterator<Item = f64>) -> Vec<f32> {
-        let mut keys: Vec<f32> = Vec::new();
-        for time in times {
-            let key = self.clock.at(time);
-            keys.push(keys.last().map_or(key, |last| key.max(last.next_up())));
+    /// Keys of a track, as seconds and what they are made of. Keys in a row that are too near to one another are moved back; what would be before the
+    /// beginning is left out.
+    fn keys<K>(&self, wanted: impl Iterator<Item = (f64, K)>) -> (Vec<f32>, Vec<K>) {
+        let mut all: Vec<(f32, K)> = wanted.map(|(time, key)| (self.clock.at(time), key)).collect();
+        let mut limit = f32::INFINITY;
+        for (time, _) in all.iter_mut().rev() {
+            *time = time.min(limit);
+            limit = *time - APART;
         }
-        keys
+        let first = all.iter().position(|(time, _)| *time > -APART / 2.0).unwrap_or(0);
+        all.drain(..first);
+        if let Some((time, _)) = all.first_mut() {
+            *time = time.max(0.0);
+        }
+        all.into_iter().unzip()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_seconds_from_the_first_frame() {
+        let clock = Clock::new(2.0, 6.0, 0.5);
+        assert_eq!([1.0, 2.0, 3.0, 6.0, 7.0].map(|t| clock.at(t)), [0.0, 0.0, 0.5, 2.0, 2.0]);
+        assert!(!clock.is_still() && Clock::new(1.0, 1.0, 1.0).is_still());
     }
 }
