@@ -192,6 +192,9 @@ fn spare(order: &Order<'_>) -> Result<(), Failure> {
 /// Runs the model twice: to measure it, because all accuracy is relative to its extent, and to follow it.
 fn write(order: &Order<'_>, run: ModelRun, stale: &dyn Fn() -> bool) -> Result<(), Failure> {
     let begun = Instant::now();
+    if !run.session.model.scenery.plants.is_empty() {
+        return Err(failure(&run, &Error::Plants));
+    }
     let mut clock = run.clock;
     let (survey, stats) = measure(order, &run, &mut clock)?;
     if stale() {
@@ -313,6 +316,9 @@ fn failure(run: &ModelRun, error: &interchange::Error) -> Failure {
     let drawn = |diagnostic: Diagnostic| {
         Failure::Model(diagnostic.render(&run.session.source, super::common::coloured()))
     };
+    let span = run.times.last().unwrap_or(&0.0) - run.times.first().unwrap_or(&0.0);
+    let a_minute =
+        format!("let more of the model's time pass in a second: `--speed {:.0}`", (span / 60.0).ceil());
     let help: &[&str] = match error {
         Error::Run(error) => return run.fault(error),
         Error::Draw(error) => return drawn(error.diagnostic()),
@@ -327,7 +333,7 @@ fn failure(run: &ModelRun, error: &interchange::Error) -> Failure {
         Error::TooLarge { .. } => {
             &["a coarser --accuracy needs fewer numbers; so does a shorter time with `--from A --to B`"]
         }
-        Error::TooLong { .. } => &["let more of the model's time pass in a second: `--speed 3600`"],
+        Error::TooLong { .. } => &[&a_minute],
         _ => &[],
     };
     let help: String = help.iter().map(|line| format!("\n  = help: {line}")).collect();
