@@ -26,8 +26,8 @@ def compare(path):
         whole = int(frame)
         scene.frame_set(whole, subframe=frame - whole)
         graph = bpy.context.evaluated_depsgraph_get()
-        # Blender has the part of a frame in single precision.
-        shown = glb.shown(float((whole + np.float32(frame - whole)) / rate))
+        # Blender has frames in single precision.
+        shown = glb.shown(float(np.float32(whole) + np.float32(frame - whole)) / rate)
         for thing in (thing for thing in bpy.data.objects if thing.type == "MESH"):
             evaluated = thing.evaluated_get(graph)
             matrix = np.array(evaluated.matrix_world)

@@ -143,11 +143,11 @@ fn stems_that_sway_follow_the_wind() {
 
 #[test]
 fn modules_appear_and_vanish_within_a_millisecond() {
-    let text = "initial string: A(0)\nA(x):\n  if x < 1 solve dx/dt = 1\n  if x = 1 & t < 3 produce F(0.7) B(0) A(0)\n\
+    let text = "initial string: A(0, 3)\nA(x, n):\n  if x < 1 solve dx/dt = 1\n  if x = 1 & n > 0 produce F(0.7) B(0) A(0, n - 1)\n  if x = 1 & n = 0 produce F(0.1)\n\
                 B(y):\n  if y < 0.37 solve dy/dt = 1\n  if y = 0.37 produce F(0.3)\n\
-                interpret A(x): F(0.2 + x)\ninterpret B(y): [ +(60) @L(0.5 + y) ]";
+                interpret A(x, n): F(0.2 + x)\ninterpret B(y): [ +(60) @L(0.5 + y) ]";
     let session = Session::from_text("events.dls", text, &[]).expect("a model");
-    let growth = follow(session, [0.0, 4.0, 0.3], 1).growth;
+    let growth = follow(session, [0.0, 4.0, 0.25], 1).growth;
     let glb = Glb::read(&growth.glb().expect("a file"));
     let mut checked = 0;
     for (number, node) in glb.nodes().iter().enumerate().filter(|(_, node)| !node["mesh"].is_null()) {
@@ -168,14 +168,14 @@ fn modules_appear_and_vanish_within_a_millisecond() {
             None => assert!(glb.scale(number, 4.0) > 0.0),
         }
     }
-    assert_eq!((checked, glb.duration()), (20, 4.0_f32.into()));
+    assert!(checked > 12 && glb.duration() == 4.0, "{checked}");
 }
 
 #[test]
 fn lives_are_shared_and_the_file_depends_on_nothing_but_the_model() {
     let followed = follow(model("lychnis.dls"), [0.0, 6.0, 0.1], 1);
     let nodes = followed.growth.nodes();
-    assert!(nodes > 100 && followed.growth.lives() < 40, "{nodes} {}", followed.growth.lives());
+    assert!(nodes > 100 && 4 * followed.growth.lives() < nodes, "{nodes} {}", followed.growth.lives());
     let file = followed.growth.glb().expect("a file");
     assert!(file.len() < 1_500_000, "{}", file.len());
     let others = follow(model("lychnis.dls"), [0.0, 6.0, 0.1], 3).growth.glb().expect("a file");

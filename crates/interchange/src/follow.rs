@@ -25,6 +25,8 @@ const AT_ONCE: usize = 20_000_000;
 const STRIDE: usize = 4;
 /// Intervals of less than this part of the way from frame to frame are not tested.
 const TESTED: f64 = 1.0;
+/// Where an interval is tested, in parts of it.
+const ASIDE: f64 = 0.4;
 /// Strings that are drawn together, at most.
 const BATCH: usize = 64;
 /// Halvings of an interval, at most.
@@ -204,9 +206,11 @@ impl Follower<'_, '_> {
                 continue;
             }
             let (a, b) = (from.sample.time, to.sample.time);
-            let middle = a + (b - a) / 2.0;
+            let explained = self.is_explained(&from.sample, &to.sample);
+            // Not in the middle, where the error of a motion that turns round there is 0.
+            let middle = a + (b - a) * if explained { ASIDE } else { 0.5 };
             let is_fine = b - a <= self.closeness.instant || middle <= a || middle >= b;
-            let same = is_fine || self.is_explained(&from.sample, &to.sample);
+            let same = is_fine || explained;
             if is_fine || to.depth >= DEEPEST || (same && !to.strict && b - a < long) {
                 done.push(pair[1]);
             } else if before != Some(middle) {
