@@ -44,7 +44,7 @@ pub(crate) fn file(growth: &Growth) -> Result<Vec<u8>, Error> {
         catalogue: &growth.tracks.catalogue,
         palette: &growth.palette,
         contours: &growth.contours,
-        accuracy: 0.4 * growth.options.tolerance(),
+        accuracy: 0.36 * growth.options.tolerance(),
     };
     let clock = Clock::new(growth.first, growth.last, growth.options.seconds);
     let mut writer = Writer {
@@ -104,7 +104,7 @@ impl Writer<'_> {
                 extras["rule"] = growth.rules.get(ending.rule).cloned().into();
             }
             node.extras = Some(extras);
-            let tolerance = 0.15 * growth.options.tolerance();
+            let tolerance = 0.13 * growth.options.tolerance();
             let moved = motion::Moved { phase, life, clock: &self.clock, tolerance };
             if moved.write(target, &mut node, &mut animation, &mut self.buffer) {
                 self.document.nodes[0].children.push(target);
