@@ -44,6 +44,7 @@
 //! | [`turtle`] | from strings to geometry |
 //! | [`scene`] | geometry, independent of file formats |
 //! | [`render`] | SVG, PNG and OBJ files |
+//! | [`interchange`] | animated GLB files |
 //! | [`player`] | recordings, the page that plays them, and the window |
 //! | [`session`] | from a file to a simulation |
 //! | [`replay`] | random access to simulated time |
@@ -75,6 +76,7 @@ pub use dlsys_compile as compile;
 pub use dlsys_diagnostic as diagnostic;
 pub use dlsys_expr as expr;
 pub use dlsys_geometry::{scene, turtle};
+pub use dlsys_interchange as interchange;
 pub use dlsys_model as model;
 pub use dlsys_ode as ode;
 pub use dlsys_player as player;

@@ -6,12 +6,12 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::fmt::FmtArgs;
 use super::new::NewArgs;
-use super::shared::{BudgetArgs, SharedArgs, SolverArgs, TextFormat};
+use super::shared::{BudgetArgs, RunFormat, SharedArgs, SolverArgs, TextFormat};
 use super::shell::{self, CompletionsArgs, ManArgs};
 use super::values::{
-    Background, LineWidth, Seeds, Sky, background, bytes, camera, columns, direction, field_of_view, figure,
-    frame_format, layout, line_width, method, pixels, positive, runs, seeds, setting, size, sky, threads,
-    time, tolerance, zoom,
+    Background, LineWidth, RenderFormat, Seeds, Sky, background, bytes, camera, columns, direction,
+    field_of_view, figure, frame_format, layout, line_width, method, pixels, positive, render_format, runs,
+    seeds, setting, size, sky, threads, time, tolerance, zoom,
 };
 use super::verify::VerifyArgs;
 use crate::compile::Setting;
@@ -46,8 +46,9 @@ pub enum Action {
     /// Print how each equation and each condition of a model is solved (with the method `auto`), and why
     #[command(after_long_help = EXPLAIN_JSON)]
     Explain(ExplainArgs),
-    /// Run a model and print its strings of modules
-    Run(RunArgs),
+    /// Run a model and print its strings of modules, or write its growth as one animated file
+    #[command(after_long_help = RUN_EXAMPLES)]
+    Run(Box<RunArgs>),
     /// Run a model and draw it: a file for each frame, or all frames on one sheet
     #[command(after_long_help = RENDER_EXAMPLES)]
     Render(Box<RenderArgs>),
@@ -90,6 +91,16 @@ pub enum Action {
     /// one of them fails. The history is kept in $XDG_STATE_HOME/dlsys (or ~/.local/state/dlsys).
     Repl(ReplArgs),
 }
+
+/// A string, a distribution, a file that other programs play.
+const RUN_EXAMPLES: &str = "\
+Examples:
+  dlsys run models/anabaena.dls --at 1,2
+      the string of modules at two times
+  dlsys run models/birch.dls --seeds 1..100 --measure 'F(x): x' --at 14
+      the distribution of a length over a hundred specimens
+  dlsys run models/lychnis.dls --format glb -o lychnis.glb
+      the growing plant as one file for Blender, Godot, Unity, three.js";
 
 /// How the paper's figures are made.
 const RENDER_EXAMPLES: &str = "\
@@ -210,9 +221,11 @@ pub struct RunArgs {
     /// t,x,y,z,u,v,w; as JSON: a line for each sample with these fields. u, v and w are the velocity of the air along x, y and z in m/s.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["seeds", "events", "stats", "verify"])]
     pub field: Option<PathBuf>,
-    /// Output format of strings, measures or samples
-    #[arg(long, value_enum, default_value_t = TextFormat::Text)]
-    pub format: TextFormat,
+    /// Output format of strings, measures or samples; or `glb`: the growth as one animated file (with -o)
+    #[arg(long, value_enum, default_value_t = RunFormat::Text)]
+    pub format: RunFormat,
+    #[command(flatten)]
+    pub file: FileArgs,
     /// Run specimens with these seeds, both ends included, and print the distributions of their measures at each
     /// time
     ///
@@ -231,9 +244,27 @@ pub struct RunArgs {
     /// Draw the distributions of the measures over time as SVG: median, mean, bands of 50 and 90 per cent of specimens
     #[arg(long, value_name = "FILE", requires = "seeds")]
     pub plot: Option<PathBuf>,
-    /// Number of specimens run at once, with no effect on the results [default: one for each core]
-    #[arg(long, value_name = "N", value_parser = threads, requires = "seeds")]
+    /// Number of specimens run at once, or of threads that draw, with no effect on the results [default: one for each core]
+    #[arg(long, value_name = "N", value_parser = threads)]
     pub threads: Option<usize>,
+}
+
+/// Flags of `run` that are for files of whole animations.
+#[derive(Debug, Args)]
+pub struct FileArgs {
+    /// With --format glb: the file, such as plant.glb, or a folder for it
+    #[arg(short, long = "out", value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// With --format glb: largest distance of anything in the file from its place in the model, at any time, in scene units
+    /// [default: 1/2000 of the extent of the whole animation]
+    #[arg(long, value_name = "L", allow_negative_numbers = true, value_parser = positive)]
+    pub accuracy: Option<f64>,
+    /// With --format glb: units of the model's time in a second of the animation [default: 1, or, with `units … time S`, 1/S]
+    #[arg(long, value_name = "V", allow_negative_numbers = true, value_parser = positive)]
+    pub speed: Option<f64>,
+    /// With --format glb: write over a file that is not a GLB file
+    #[arg(long)]
+    pub force: bool,
 }
 
 #[derive(Debug, Args)]
@@ -244,12 +275,15 @@ pub struct RenderArgs {
     /// one scale
     #[arg(long, value_name = "A..B", value_parser = seeds, conflicts_with_all = ["seed", "events", "stats", "watch"])]
     pub seeds: Option<Seeds>,
-    /// Directory for the frames; made if it is not there
+    /// Directory for the frames; made if it is not there. With --format glb the file, or a folder for it
     #[arg(short, long = "out", value_name = "DIR")]
     pub out: PathBuf,
-    /// File format of the frames
-    #[arg(long, value_parser = frame_format(), default_value = Format::SVG.extension())]
-    pub format: Format,
+    /// File format of the frames, or of the whole animation
+    #[arg(long, value_parser = render_format(), default_value = Format::SVG.extension())]
+    pub format: RenderFormat,
+    /// With --format glb: units of the model's time in a second of the animation [default: 1, or, with `units … time S`, 1/S]
+    #[arg(long, value_name = "V", allow_negative_numbers = true, value_parser = positive)]
+    pub speed: Option<f64>,
     /// A file for each frame, or all frames on one sheet
     ///
     /// frames: a file for each frame. overlay: all in one place, the older the fainter. stack: each below the one before,

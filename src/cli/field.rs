@@ -23,7 +23,7 @@ const MOST_BYTES: u64 = 1 << 12;
 const KEPT: usize = 16;
 
 /// Prints the velocity of the wind at the places of the file.
-pub fn sample(args: &RunArgs, path: &Path) -> Result<(), Failure> {
+pub fn sample(args: &RunArgs, path: &Path, format: TextFormat) -> Result<(), Failure> {
     settings(&args.shared)?;
     let session = open(&args.shared.model, &args.shared.settings, &args.shared.include)?;
     let weather = Weather::of(&session.model.scenery)
@@ -41,7 +41,7 @@ pub fn sample(args: &RunArgs, path: &Path) -> Result<(), Failure> {
     };
     let out = BufWriter::with_capacity(1 << 16, std::io::stdout().lock());
     let units = session.model.scenery.units;
-    let mut sampler = Sampler { weather: &weather, units, format: args.format, recent: Vec::new(), out };
+    let mut sampler = Sampler { weather: &weather, units, format, recent: Vec::new(), out };
     sampler.head()?;
     let done = match places.has_times {
         true => sampler.sample_all(None, &mut places),

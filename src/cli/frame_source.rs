@@ -1,5 +1,6 @@
 //! The frames of a running simulation, drawn on other threads.
 
+use std::borrow::Cow;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -46,6 +47,7 @@ enum Origin<'r> {
 /// Frames at the times at which a model is observed.
 struct FrameSource<'r> {
     run: &'r ModelRun,
+    times: Cow<'r, [f64]>,
     origin: Origin<'r>,
     next: usize,
     failed: bool,
@@ -54,10 +56,11 @@ struct FrameSource<'r> {
 impl<'r> FrameSource<'r> {
     fn start(
         run: &'r ModelRun,
+        times: Cow<'r, [f64]>,
         settings: Settings,
         album: Option<&'r Album>,
     ) -> Result<FrameSource<'r>, Failure> {
-        let kept = album.and_then(|album| Some((album, album.stats_of_all(run.times.len())?)));
+        let kept = album.and_then(|album| Some((album, album.stats_of_all(times.len())?)));
         let origin = match kept {
             Some((album, stats)) => Origin::Album(album, stats),
             None => {
@@ -65,7 +68,7 @@ impl<'r> FrameSource<'r> {
                 Origin::Simulation(Box::new(simulation))
             }
         };
-        Ok(FrameSource { run, origin, next: 0, failed: false })
+        Ok(FrameSource { run, times, origin, next: 0, failed: false })
     }
 
     fn stats(&self) -> Stats {
@@ -78,7 +81,7 @@ impl<'r> FrameSource<'r> {
     /// The frame at the next time; `None` after the last, or after an error.
     fn next_frame(&mut self) -> Option<Frame> {
         let index = self.next;
-        let &time = self.run.times.get(index).filter(|_| !self.failed)?;
+        let &time = self.times.get(index).filter(|_| !self.failed)?;
         self.next += 1;
         if interrupt::asked() {
             self.failed = true;
@@ -120,11 +123,41 @@ pub fn play<Done: Send>(
     pass: Pass<'_>,
     threads: usize,
     clock: &mut Clock,
-    mut log: Option<&mut EventLog>,
+    log: Option<&mut EventLog>,
+    work: impl Fn(&Frame, &Scene) -> Done + Sync,
+    take: impl FnMut(Done) -> Result<(), Failure>,
+) -> Result<Stats, Failure> {
+    play_times(run, Cow::Borrowed(&run.times), pass, threads, (clock, log), work, take)
+}
+
+/// The same at other times than those of the run, without an album.
+///
+/// # Errors
+/// As of [`play`].
+pub fn play_at<Done: Send>(
+    run: &ModelRun,
+    times: Vec<f64>,
+    pass: Pass<'_>,
+    threads: usize,
+    (clock, log): (&mut Clock, Option<&mut EventLog>),
+    work: impl Fn(&Frame, &Scene) -> Done + Sync,
+    take: impl FnMut(Done) -> Result<(), Failure>,
+) -> Result<Stats, Failure> {
+    let pass = Pass { keeping: Keeping::Nothing, ..pass };
+    play_times(run, Cow::Owned(times), pass, threads, (clock, log), work, take)
+}
+
+fn play_times<Done: Send>(
+    run: &ModelRun,
+    times: Cow<'_, [f64]>,
+    pass: Pass<'_>,
+    threads: usize,
+    (clock, mut log): (&mut Clock, Option<&mut EventLog>),
     work: impl Fn(&Frame, &Scene) -> Done + Sync,
     mut take: impl FnMut(Done) -> Result<(), Failure>,
 ) -> Result<Stats, Failure> {
-    let mut source = FrameSource::start(run, pass.settings, pass.keeping.used())?;
+    let count = times.len();
+    let mut source = FrameSource::start(run, times, pass.settings, pass.keeping.used())?;
     let nursery = run.nursery();
     let mut blank = nursery.blank();
     blank.accuracy = pass.accuracy;
@@ -150,7 +183,7 @@ pub fn play<Done: Send>(
         let done = drawn.map(|()| work(&frame, &scene));
         let warnings = std::mem::take(&mut scene.warnings);
         let unkept = match pass.keeping.filled().filter(|_| is_whole) {
-            Some(album) => album.keep(frame.index, run.times.len(), Kept { scene, modules: frame.modules }),
+            Some(album) => album.keep(frame.index, count, Kept { scene, modules: frame.modules }),
             None => Some(scene).filter(|_| !is_kept),
         };
         pool().extend(unkept);

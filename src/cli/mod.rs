@@ -10,6 +10,7 @@ mod continuity;
 pub(crate) mod embedded;
 mod events;
 mod explain;
+mod export;
 mod field;
 mod fmt;
 mod frame_source;

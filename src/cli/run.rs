@@ -6,6 +6,7 @@ use std::time::Instant;
 use super::args::{CheckArgs, RunArgs};
 use super::common::{Failure, ModelRun, count_of, out_error};
 use super::events::EventLog;
+use super::export;
 use super::progress::Progress;
 use super::shared::TextFormat;
 use crate::model::Model;
@@ -37,12 +38,14 @@ const STRIDE: usize = 1000;
 
 /// Runs a model and prints its strings.
 pub fn run(args: &RunArgs) -> Result<(), Failure> {
+    let Some(format) = args.format.of_text() else { return export::run(args) };
+    export::refuse_flags(args)?;
     if let Some(path) = &args.field {
-        return super::field::sample(args, path);
+        return super::field::sample(args, path, format);
     }
     let run = ModelRun::start(&args.shared)?;
     if let Some(seeds) = args.seeds {
-        return super::specimens::summarise(args, &run, seeds);
+        return super::specimens::summarise(args, &run, seeds, format);
     }
     let mut clock = run.clock;
     let mut out = std::io::BufWriter::with_capacity(1 << 16, std::io::stdout().lock());
@@ -71,7 +74,7 @@ pub fn run(args: &RunArgs) -> Result<(), Failure> {
             done.map_err(|error| run.fault(&error))?;
             let before = Instant::now();
             text.clear();
-            match args.format {
+            match format {
                 TextFormat::Json => printer.json(&string, &mut text),
                 TextFormat::Text => printer.text(&string, &mut text),
             }

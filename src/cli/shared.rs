@@ -152,6 +152,27 @@ pub enum Scheduler {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum RunFormat {
+    /// Text for reading
+    Text,
+    /// One JSON object per time, each on a line
+    Json,
+    /// One animated file for other programs, glTF 2.0 binary: a node for each module that draws, with -o FILE
+    Glb,
+}
+
+impl RunFormat {
+    /// The format of text; `None` for files of geometry.
+    pub fn of_text(self) -> Option<TextFormat> {
+        match self {
+            RunFormat::Text => Some(TextFormat::Text),
+            RunFormat::Json => Some(TextFormat::Json),
+            RunFormat::Glb => None,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum TextFormat {
     /// Text for reading
     Text,

@@ -27,7 +27,7 @@ const MOST: usize = 100_000_000;
 const ALL: &str = "modules";
 
 /// Runs all specimens and prints the distributions of their measures.
-pub fn summarise(args: &RunArgs, run: &ModelRun, seeds: Seeds) -> Result<(), Failure> {
+pub fn summarise(args: &RunArgs, run: &ModelRun, seeds: Seeds, format: TextFormat) -> Result<(), Failure> {
     let measures: Vec<Measure> =
         args.measures.iter().map(|text| measure(run, text)).collect::<Result<_, _>>()?;
     spare(args)?;
@@ -58,7 +58,7 @@ pub fn summarise(args: &RunArgs, run: &ModelRun, seeds: Seeds) -> Result<(), Fai
                 all.push(*value);
             }
             progress.inc();
-            match args.format {
+            match format {
                 TextFormat::Json => {
                     let courses: serde_json::Map<String, serde_json::Value> = names
                         .iter()
@@ -82,7 +82,7 @@ pub fn summarise(args: &RunArgs, run: &ModelRun, seeds: Seeds) -> Result<(), Fai
             SpreadSeries { name: (*name).to_owned(), spreads: spreads.collect() }
         })
         .collect();
-    if args.format == TextFormat::Text {
+    if format == TextFormat::Text {
         out.write_all(spread_table(&courses).as_bytes()).and_then(|()| out.flush()).map_err(out_error)?;
     }
     let model = &run.session.model;

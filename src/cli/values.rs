@@ -13,6 +13,35 @@ pub(super) fn frame_format() -> impl TypedValueParser<Value = Format> {
     PossibleValuesParser::new(values).try_map(|name| name.parse::<Format>())
 }
 
+/// A format of `render`: of frames, or of the whole animation in one file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RenderFormat {
+    /// A file for each frame.
+    Frames(Format),
+    /// One animated file.
+    Glb,
+}
+
+impl RenderFormat {
+    /// The format of frames; `None` for one of whole animations.
+    pub fn of_frames(self) -> Option<Format> {
+        match self {
+            RenderFormat::Frames(format) => Some(format),
+            RenderFormat::Glb => None,
+        }
+    }
+}
+
+/// A format for frames or for a whole animation.
+pub(super) fn render_format() -> impl TypedValueParser<Value = RenderFormat> {
+    let frames = Format::all().map(|format| PossibleValue::new(format.extension()).help(format.about()));
+    let glb = PossibleValue::new("glb").help("One animated file, glTF 2.0: see --format glb of `dlsys run`");
+    PossibleValuesParser::new(frames.chain([glb])).try_map(|name| match &*name {
+        "glb" => Ok(RenderFormat::Glb),
+        name => name.parse::<Format>().map(RenderFormat::Frames),
+    })
+}
+
 pub(super) fn number(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
         Ok(x) if x.is_finite() => Ok(x),

@@ -18,6 +18,8 @@ mod evidence;
 mod export;
 mod files;
 mod gallery;
+mod glb;
+mod glb_reader;
 mod groups;
 mod inspect;
 mod language;

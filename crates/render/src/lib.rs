@@ -93,6 +93,7 @@ pub use layout::{Layout, Sheet, Spacing};
 pub use lengths::{CrossSection, Length, cross_section, lengths};
 pub use light::Light;
 pub use manifest::{FrameRecord, Manifest};
+pub use name::plain as plain_name;
 pub use page::{Page, Size};
 pub use sheet::{Assembly, Part, SheetWriter};
 pub use triangulate::{normal, triangulate};

@@ -69,7 +69,7 @@ impl<'s> Names<'s> {
 
 /// A name of a kind in ASCII letters, digits, `_` and `-`. The mark of a surface is dropped, `{` is
 /// `polygon`, other characters are written as `u` and their code.
-fn plain(name: &str) -> String {
+pub fn plain(name: &str) -> String {
     let name = name.strip_prefix('@').unwrap_or(name);
     let mut out = String::new();
     for c in name.chars() {

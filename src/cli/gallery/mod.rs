@@ -20,6 +20,7 @@ use super::common::{Failure, out_error};
 use super::output;
 use super::progress::Progress;
 use super::render::render;
+use super::values::RenderFormat;
 use crate::render::Content;
 use figures::{FIGURES, Picture, models};
 
@@ -97,7 +98,7 @@ fn typed(picture: &Picture, out: &Path, target: &Path, args: &GalleryArgs) -> Re
     };
     typed.shared.model = out.join(picture.model);
     typed.out = target.to_owned();
-    typed.format = args.format;
+    typed.format = RenderFormat::Frames(args.format);
     // The gallery prints its own summary.
     typed.quiet = true;
     Ok(*typed)

@@ -30,10 +30,13 @@ pub fn survey(args: &RenderArgs) -> Result<Survey, Failure> {
 }
 
 /// Refuses flags that have no meaning for the format or the layout.
-pub fn agree(args: &RenderArgs) -> Result<(), Failure> {
+pub fn agree(args: &RenderArgs, format: Format) -> Result<(), Failure> {
+    if args.speed.is_some() {
+        return Err(usage("--speed is for animated files; leave it out, or choose --format glb"));
+    }
     let extension = args.out.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let is_file = |name: &str| extension == name;
-    let known = Format::all().map(Format::extension).chain(["gif", "mp4", "webm"]);
+    let known = Format::all().map(Format::extension).chain(["gif", "mp4", "webm", "glb"]);
     if !args.out.is_dir() && known.into_iter().any(is_file) {
         let name = args.out.with_extension("");
         return Err(usage(format!(
@@ -42,7 +45,7 @@ pub fn agree(args: &RenderArgs) -> Result<(), Failure> {
             name.display()
         )));
     }
-    if args.format.content() == Content::Mesh {
+    if format.content() == Content::Mesh {
         if args.layout != Layout::Frames {
             return Err(usage(format!(
                 "an OBJ file is one mesh in space, so frames cannot be laid out on a sheet as --layout {} does; \

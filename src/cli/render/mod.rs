@@ -19,12 +19,13 @@ use super::album::{Album, Keeping};
 use super::args::RenderArgs;
 use super::common::{Clock, Failure, ModelRun, count_of, out_error, size_of};
 use super::events::EventLog;
+use super::export;
 use super::frame_source::{Frame, Pass, play};
 use super::progress::Progress;
 use super::values::Seeds;
 use crate::render::{
-    self, Content, Fit, FrameDirectory, FrameRecord, FrameWriter, Layout, Manifest, Page, Picture, Sheet,
-    SheetWriter, Survey,
+    self, Content, Fit, Format, FrameDirectory, FrameRecord, FrameWriter, Layout, Manifest, Page, Picture,
+    Sheet, SheetWriter, Survey,
 };
 use crate::scene::Scene;
 use crate::sim::{Method, Settings, Stats, brief};
@@ -36,17 +37,18 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
 
 /// Renders, unless `stale` becomes true before anything is written.
 fn once(args: &RenderArgs, stale: &(dyn Fn() -> bool + Sync)) -> Result<(), Failure> {
+    let Some(format) = args.format.of_frames() else { return export::render(args, stale) };
     flags::survey(args)?;
-    flags::agree(args)?;
+    flags::agree(args, format)?;
     let run = ModelRun::start(&args.shared)?;
     match args.seeds {
-        Some(seeds) => specimens(args, run, seeds),
+        Some(seeds) => specimens(args, format, run, seeds),
         None => render_run(args, run, stale),
     }
 }
 
 /// Renders specimens with several seeds, to one scale. All are measured before anything is written.
-fn specimens(args: &RenderArgs, mut run: ModelRun, seeds: Seeds) -> Result<(), Failure> {
+fn specimens(args: &RenderArgs, format: Format, mut run: ModelRun, seeds: Seeds) -> Result<(), Failure> {
     let begun = Instant::now();
     let never = || false;
     let threads = flags::threads(args);
@@ -56,6 +58,7 @@ fn specimens(args: &RenderArgs, mut run: ModelRun, seeds: Seeds) -> Result<(), F
         run.settings.seed = seed;
         let mut render = Render {
             args,
+            format,
             run: &run,
             out: &args.out,
             threads,
@@ -72,7 +75,8 @@ fn specimens(args: &RenderArgs, mut run: ModelRun, seeds: Seeds) -> Result<(), F
     for (seed, frames) in seeds.iter().zip(parts) {
         run.settings.seed = seed;
         let out = args.out.join(format!("seed-{seed:0width$}"));
-        let render = Render { args, run: &run, out: &out, threads, frames, album: None, stale: &never };
+        let render =
+            Render { args, format, run: &run, out: &out, threads, frames, album: None, stale: &never };
         bytes += render.write(fit.clone(), &mut Clock::default())?.1.bytes;
     }
     if args.quiet {
@@ -96,12 +100,14 @@ pub fn render_run(
     stale: &(dyn Fn() -> bool + Sync),
 ) -> Result<(), Failure> {
     let begun = Instant::now();
+    let Some(format) = args.format.of_frames() else { return export::render_run(args, run, stale) };
     let survey = flags::survey(args)?;
-    flags::agree(args)?;
+    flags::agree(args, format)?;
     let mut clock = run.clock;
     let threads = flags::threads(args);
     let album = Some(Album::default());
-    let mut render = Render { args, run: &run, out: &args.out, threads, frames: Vec::new(), album, stale };
+    let mut render =
+        Render { args, format, run: &run, out: &args.out, threads, frames: Vec::new(), album, stale };
     let survey = render.measure(survey, &mut clock)?;
     let fit = flags::fit(args, &survey, |fit| picture(args, &run, &render.frames, fit))?;
     let (stats, written) = render.write(fit, &mut clock)?;
@@ -116,7 +122,7 @@ pub fn render_run(
         begun.elapsed().as_secs_f64(),
         written.names
     );
-    if written.bytes > LARGE && args.accuracy.is_none() && args.format.content() != Content::Pixels {
+    if written.bytes > LARGE && args.accuracy.is_none() && format.content() != Content::Pixels {
         line +=
             "  large: --accuracy 0.02 makes surfaces of fewer pieces, --format png makes pictures of dots\n";
     }
@@ -155,6 +161,7 @@ struct Written {
 /// A render in progress.
 struct Render<'r> {
     args: &'r RenderArgs,
+    format: Format,
     run: &'r ModelRun,
     /// The output directory.
     out: &'r Path,
@@ -207,7 +214,7 @@ impl Render<'_> {
 
     /// The second pass, if each frame has a file of its own.
     fn frames(&self, fit: Fit, clock: &mut Clock) -> Result<(Stats, Written), Failure> {
-        let mut writer = FrameWriter::new(self.args.format, fit);
+        let mut writer = FrameWriter::new(self.format, fit);
         writer.page = flags::page(self.args, writer.page.picture)?;
         // The directory is created only after the first pass has succeeded.
         let mut directory = FrameDirectory::create(self.out, self.args.force)
@@ -263,7 +270,7 @@ impl Render<'_> {
         let sheet = sheet(self.args, self.run, &self.frames, &fit);
         let page = flags::page(self.args, sheet.picture)?;
         let refuse = |error: render::Error| Failure::Usage(format!("error: {error}\n"));
-        let writer = SheetWriter::new(self.args.format, fit.clone(), sheet, page).map_err(refuse)?;
+        let writer = SheetWriter::new(self.format, fit.clone(), sheet, page).map_err(refuse)?;
         let mut directory = FrameDirectory::create(self.out, self.args.force)
             .map_err(out_of_directory)?
             .limited(self.args.max_output);
@@ -307,11 +314,8 @@ impl Render<'_> {
     fn threads_for(&self, page: &Page) -> usize {
         const PIXELS_AT_ONCE: u64 = 100_000_000;
         let pixels = page.pixels.iter().map(|&side| u64::from(side)).product::<u64>();
-        let most = if self.args.format.content() == Content::Pixels {
-            PIXELS_AT_ONCE / pixels.max(1)
-        } else {
-            u64::MAX
-        };
+        let most =
+            if self.format.content() == Content::Pixels { PIXELS_AT_ONCE / pixels.max(1) } else { u64::MAX };
         self.threads.min(most.clamp(1, 256) as usize)
     }
 
@@ -332,7 +336,7 @@ impl Render<'_> {
             model.parameters.iter().map(|p| (p.name.clone(), p.value.into())).collect();
         let settings = &run.settings;
         let method = Method::NAMED.iter().rev().find(|(_, m)| *m == settings.method).map(|(name, _)| *name);
-        let format = args.format;
+        let format = self.format;
         let mut described = json!({
             "format": format.extension(),
             "layout": args.layout.name(),

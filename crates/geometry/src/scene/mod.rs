@@ -42,6 +42,8 @@ use dlsys_diagnostic::Diagnostic;
 use dlsys_model::Appearance;
 use dlsys_tree::Lineage;
 
+use crate::turtle::Pose;
+
 /// A point, in scene units.
 pub type Point = nalgebra::Point3<f64>;
 /// A direction or displacement, in scene units.
@@ -119,6 +121,10 @@ pub struct Scene {
     /// The turtle would have drawn something else, had it known an accuracy.
     pub lacked_accuracy: bool,
     owners: Vec<Owner>,
+    /// The turtle notes where it stands at the beginning of each module that draws.
+    pub notes_poses: bool,
+    /// With `notes_poses`, the pose of the turtle at the beginning of each of the [`owners`](Scene::owners).
+    pub poses: Vec<Pose>,
     /// Pieces of stems, in string order.
     pub segments: Vec<Segment>,
     /// Filled outlines, in the order in which they were closed.
@@ -161,6 +167,7 @@ impl Scene {
     /// Removes all elements and warnings; palette, shapes and memory stay.
     pub fn clear(&mut self) {
         self.owners.clear();
+        self.poses.clear();
         self.segments.clear();
         self.polygons.clear();
         self.surfaces.clear();

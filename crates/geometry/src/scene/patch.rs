@@ -58,6 +58,11 @@ impl Patch {
         edges(&self.net).iter().map(|e| (0..3).map(|i| (e[i + 1] - e[i]).norm()).sum::<f64>()).sum()
     }
 
+    /// Numbers of pieces from column to column and from row to row of a grid of triangles that is about as near to the patch as `accuracy`, in scene units.
+    pub fn pieces(&self, accuracy: f64) -> (usize, usize) {
+        Steps::Whole.of_grid(&self.net, accuracy.max(f64::MIN_POSITIVE))
+    }
+
     /// As a mesh in its place; `accuracy` is in scene units.
     pub fn surface(&self, accuracy: f64) -> Surface {
         self.placed(accuracy, Steps::Powers)

@@ -87,6 +87,8 @@ pub(super) struct Walk<'a> {
     drawn: DrawnModule,
     /// The same as an owner, once it has drawn something.
     owner: Option<OwnerId>,
+    /// The pose at the beginning of the module, if the scene notes it.
+    start: Option<Pose>,
     /// Names of the kinds that have drawn something, shared among their modules.
     names: Vec<Option<Arc<str>>>,
     /// The interpretation that is being drawn, and the kind of the part of it.
@@ -136,6 +138,7 @@ impl<'a> Walk<'a> {
             // Replaced before the first command.
             drawn: DrawnModule { kind: KindId::OPEN, lineage: Lineage::of_axiom(0) },
             owner: None,
+            start: None,
             names: vec![None; model.kinds.len()],
             inside: None,
             time,
@@ -171,6 +174,9 @@ impl<'a> Walk<'a> {
         self.drawn = module;
         self.owner = None;
         (self.depth, self.stems_drawn, self.state.joined) = (self.stack.len(), 0, None);
+        if self.scene.notes_poses {
+            self.start = Some(self.pose());
+        }
     }
 
     /// An error of the module that is being drawn.
@@ -352,6 +358,7 @@ impl<'a> Walk<'a> {
         let kinds = &self.model.kinds;
         let name =
             self.names[kind.index()].get_or_insert_with(|| kinds.get(kind).name.as_str().into()).clone();
+        self.scene.poses.extend(self.start);
         *self.owner.insert(self.scene.add_owner(Owner { name, lineage }))
     }
 }

@@ -1,0 +1,56 @@
+//! The error of this crate.
+
+use dlsys_session::DrawError;
+
+/// Why there is no file.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The run failed.
+    #[error(transparent)]
+    Run(#[from] dlsys_sim::Error),
+    /// A scene cannot be drawn.
+    #[error(transparent)]
+    Draw(#[from] DrawError),
+    /// Plants of other models are scenes of their own.
+    #[error("the scene is made of plants of other models, and a GLB file holds one model")]
+    Plants,
+    /// More modules draw than a file should have nodes.
+    #[error("more than {limit} modules draw something by t = {time}")]
+    TooMany {
+        /// The time at which they are too many, in units of the model.
+        time: f64,
+        /// The most that there may be.
+        limit: usize,
+    },
+    /// The motion needs more numbers than fit into memory.
+    #[error("by t = {time} there are more than {limit} numbers to keep")]
+    TooLarge {
+        /// The time at which they are too many, in units of the model.
+        time: f64,
+        /// The most that there may be.
+        limit: usize,
+    },
+    /// The file would be larger than a GLB file can be.
+    #[error("the file would have {bytes} bytes, and a GLB file has at most 4 GiB")]
+    File {
+        /// Its bytes.
+        bytes: u64,
+    },
+    /// Times of the file are 32 bit floats, which this long an animation has too few of.
+    #[error(
+        "the animation would last {seconds} s, and instants later than {limit} s are further apart than a millisecond in a GLB file"
+    )]
+    TooLong {
+        /// Its length in seconds.
+        seconds: f64,
+        /// The longest that it may be.
+        limit: f64,
+    },
+    /// The caller stopped the work.
+    #[error("stopped before t = {time}")]
+    Stopped {
+        /// The time reached, in units of the model.
+        time: f64,
+    },
+}

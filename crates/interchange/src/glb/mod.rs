@@ -1,0 +1,294 @@
+//! The file: meshes of lives, nodes of modules, one animation.
+//!
+//! Everything is linear interpolation, which every program knows. A node is hidden by a scale of 0: extensions for visibility are newer than most
+//! importers. Its scale changes within half a millisecond, just before birth and just after death, which need not fall on frames.
+
+mod buffer;
+mod document;
+mod motion;
+mod normals;
+
+use std::collections::{BTreeMap, HashMap};
+
+use dlsys_geometry::scene::{Color, MaterialId};
+use dlsys_render::{GENERATOR, plain_name};
+use serde_json::json;
+
+use crate::life::{Life, Shape};
+use crate::mesh::{Cutter, Layout, Places};
+use crate::stem::Corner;
+use crate::{Error, Growth};
+use buffer::{Buffer, Kind};
+use document::{Animation, Asset, Document, Material, Mesh, Node, Pbr, Primitive, Scene};
+use motion::Clock;
+
+/// Normals of shapes that differ by less than this are those of the mesh.
+const SAME_NORMAL: f32 = 0.01;
+
+/// A file that is being made.
+struct Writer<'a> {
+    growth: &'a Growth,
+    cutter: Cutter<'a>,
+    clock: Clock,
+    buffer: Buffer,
+    document: Document,
+    /// Numbers of materials; the floor has none in the palette.
+    materials: HashMap<Option<MaterialId>, usize>,
+    /// Numbers of the meshes of stems, by contour, sides and material.
+    stems: BTreeMap<(Option<u32>, usize, MaterialId), usize>,
+}
+
+/// The bytes of the file of a run.
+pub(crate) fn file(growth: &Growth) -> Result<Vec<u8>, Error> {
+    let cutter = Cutter {
+        catalogue: &growth.tracks.catalogue,
+        palette: &growth.palette,
+        contours: &growth.contours,
+        accuracy: 0.36 * growth.options.tolerance(),
+    };
+    let clock = Clock::new(growth.first, growth.last, growth.options.seconds);
+    let mut writer = Writer {
+        growth,
+        cutter,
+        clock,
+        buffer: Buffer::default(),
+        document: Document::default(),
+        materials: HashMap::new(),
+        stems: BTreeMap::new(),
+    };
+    writer.asset();
+    writer.nodes();
+    writer.finish()
+}
+
+impl Writer<'_> {
+    fn asset(&mut self) {
+        let growth = self.growth;
+        let extras = json!({
+            "title": growth.title,
+            "first_time": growth.first,
+            "last_time": growth.last,
+            "seconds_per_unit": growth.options.seconds,
+            "metres_per_unit": growth.options.metres,
+        });
+        self.document.asset = Asset { version: "2.0", generator: GENERATOR, extras };
+    }
+
+    /// The root, the nodes of all modules and their tracks, and the floor.
+    fn nodes(&mut self) {
+        let growth = self.growth;
+        self.document.nodes.push(Node { name: growth.title.clone(), ..Node::default() });
+        self.document.scenes.push(Scene { name: growth.title.clone(), nodes: vec![0] });
+        let meshes: Vec<usize> = growth.lives.lives.iter().map(|life| self.mesh(life)).collect();
+        let mut animation = Animation { name: "growth".to_owned(), ..Animation::default() };
+        if !self.clock.is_still() {
+            // So that the animation lasts as long as the run, whatever moves.
+            let input = self.buffer.times(&[0.0, self.clock.end()]);
+            let output = self.buffer.vectors(&[[0.0; 3]; 2], Kind::Motion);
+            animation.add(0, "translation", input, output);
+        }
+        for (i, &number) in growth.lives.of_phase.iter().enumerate() {
+            let phase = &growth.tracks.phases[i];
+            let life = &growth.lives.lives[number];
+            let target = self.document.nodes.len();
+            let mut node = Node {
+                name: name(&plain_name(&phase.kind), &phase.lineage.name(), phase.number),
+                mesh: Some(meshes[number]),
+                ..Node::default()
+            };
+            let mut extras = json!({
+                "kind": *phase.kind, "lineage": phase.lineage.to_string(), "birth": phase.birth,
+            });
+            if let Some(ending) = phase.ending {
+                extras["death"] = ending.time.into();
+                extras["rule"] = growth.rules.get(ending.rule).cloned().into();
+            }
+            node.extras = Some(extras);
+            let tolerance = 0.13 * growth.options.tolerance();
+            let moved = motion::Moved { phase, life, clock: &self.clock, tolerance };
+            if moved.write(target, &mut node, &mut animation, &mut self.buffer) {
+                self.document.nodes[0].children.push(target);
+                self.document.nodes.push(node);
+            }
+        }
+        if !animation.channels.is_empty() {
+            self.document.animations.push(animation);
+        }
+        self.floor();
+    }
+
+    /// The mesh of a life.
+    fn mesh(&mut self, life: &Life) -> usize {
+        let number = self.document.meshes.len();
+        let kind = plain_name(&life.kind);
+        let (shapes, examples) = match &life.shape {
+            Shape::Stem { contour, size, weights } => return self.stem(life, *contour, *size, weights),
+            Shape::Still(shape) => (std::slice::from_ref(shape), &[][..]),
+            Shape::Mixed { shapes, examples, .. } => (&shapes[..], &examples[..]),
+        };
+        let layout = self.cutter.layout(&life.form, &life.paint, shapes);
+        let mut all: Vec<Vec<Places>> = shapes.iter().map(|shape| layout.places(shape)).collect();
+        normals::fit(&layout, examples, &mut all);
+        let primitives = self.primitives(&layout, &all);
+        self.document.meshes.push(Mesh { name: format!("{kind}-{number}"), primitives });
+        number
+    }
+
+    fn primitives(&mut self, layout: &Layout, all: &[Vec<Places>]) -> Vec<Primitive> {
+        let mut primitives = Vec::new();
+        for (i, (material, triangles)) in layout.primitives.iter().enumerate() {
+            if triangles.is_empty() {
+                continue;
+            }
+            let mut base = all[0][i].clone();
+            for normal in base.normals.iter_mut().filter(|normal| **normal == [0.0; 3]) {
+                *normal = [0.0, 1.0, 0.0];
+            }
+            let shapes: Vec<Places> = all[1..].iter().map(|shape| difference(&shape[i], &base)).collect();
+            let turns = shapes.iter().flat_map(|s| &s.normals).flatten().any(|x| x.abs() > SAME_NORMAL);
+            let targets = shapes.iter().map(|shape| {
+                let mut target = BTreeMap::new();
+                target.insert("POSITION", self.buffer.vectors(&shape.positions, Kind::Place));
+                if turns {
+                    target.insert("NORMAL", self.buffer.vectors(&shape.normals, Kind::Normal));
+                }
+                target
+            });
+            let targets: Vec<_> = targets.collect();
+            let attributes = BTreeMap::from([
+                ("POSITION", self.buffer.vectors(&base.positions, Kind::Place)),
+                ("NORMAL", self.buffer.vectors(&base.normals, Kind::Normal)),
+            ]);
+            let indices = self.buffer.indices(triangles);
+            let material = self.material(Some(*material));
+            primitives.push(Primitive { attributes, indices, material, targets });
+        }
+        primitives
+    }
+
+    /// The mesh of straight stems: length and radii are 1; its targets make them 0.
+    fn stem(&mut self, life: &Life, contour: Option<u32>, size: f32, weights: &[f32]) -> usize {
+        let thickest = weights.chunks_exact(3).map(|w| 1.0 - w[1].min(w[2])).fold(0.0, f32::max);
+        let tube = self.cutter.tube(contour, f64::from(thickest * size));
+        let material = life.paint.first().copied().flatten().unwrap_or(MaterialId::STEM);
+        let key = (contour, tube.corners.len(), material);
+        if let Some(&known) = self.stems.get(&key) {
+            return known;
+        }
+        // The frame of a stem: its direction is +Y, across is -X.
+        let axes =
+            [[-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]].map(dlsys_geometry::scene::Vector::from);
+        let turned = |of: [f64; 3]| -> [f32; 3] { Corner::turned(of, axes).map(|x| x as f32).into() };
+        let side = |corner: &Corner| turned(corner.place);
+        let lift = |corner: &Corner| if corner.upper { 1.0_f32 } else { 0.0 };
+        let base = |corner: &Corner| {
+            let [x, y, z] = side(corner);
+            [x, y + lift(corner), z]
+        };
+        let without = |shown: bool, v: [f32; 3]| if shown { v.map(|x| 0.0 - x) } else { [0.0; 3] };
+        let corners = &tube.corners;
+        let places: Vec<[f32; 3]> = corners.iter().map(base).collect();
+        let normals: Vec<[f32; 3]> = corners.iter().map(|c| turned(c.normal)).collect();
+        let targets: [Vec<[f32; 3]>; 3] = [
+            corners.iter().map(|c| [0.0, 0.0 - lift(c), 0.0]).collect(),
+            corners.iter().map(|c| without(!c.upper, side(c))).collect(),
+            corners.iter().map(|c| without(c.upper, side(c))).collect(),
+        ];
+        let targets = targets.map(|t| BTreeMap::from([("POSITION", self.buffer.vectors(&t, Kind::Place))]));
+        let attributes = BTreeMap::from([
+            ("POSITION", self.buffer.vectors(&places, Kind::Place)),
+            ("NORMAL", self.buffer.vectors(&normals, Kind::Normal)),
+        ]);
+        let triangles: Vec<u32> = tube.triangles.iter().flatten().copied().collect();
+        let indices = self.buffer.indices(&triangles);
+        let number = self.document.meshes.len();
+        let name = format!("stem-{number}");
+        let material = self.material(Some(material));
+        let primitives = vec![Primitive { attributes, indices, material, targets: targets.to_vec() }];
+        self.document.meshes.push(Mesh { name, primitives });
+        self.stems.insert(key, number);
+        number
+    }
+
+    /// The number of a material; `None` is the floor.
+    fn material(&mut self, id: Option<MaterialId>) -> usize {
+        let (palette, floor) = (self.cutter.palette, self.growth.floor_color);
+        let materials = &mut self.document.materials;
+        *self.materials.entry(id).or_insert_with(|| {
+            let (name, color) = match id.and_then(|id| palette.materials().get(id.index())) {
+                Some(material) => (material.name.to_string(), material.color),
+                None => ("ground".to_owned(), floor),
+            };
+            materials.push(Material { name, pbr: Pbr::of(linear(color)), double_sided: true });
+            materials.len() - 1
+        })
+    }
+
+    /// The floor that the model declares, as a large square.
+    fn floor(&mut self) {
+        let metres = self.growth.options.metres;
+        let Some(floor) = self.growth.options.floor else { return };
+        let [height, x, z, half] = floor.map(|value| (value * metres) as f32);
+        let corners = [(-1.0, 1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)]
+            .map(|(a, b)| [x + a * half, height, z + b * half]);
+        let attributes = BTreeMap::from([
+            ("POSITION", self.buffer.vectors(&corners, Kind::Place)),
+            ("NORMAL", self.buffer.vectors(&[[0.0, 1.0, 0.0]; 4], Kind::Normal)),
+        ]);
+        let indices = self.buffer.indices(&[0, 1, 2, 0, 2, 3]);
+        let material = self.material(None);
+        let primitives = vec![Primitive { attributes, indices, material, targets: Vec::new() }];
+        let mesh = Some(self.document.meshes.len());
+        self.document.meshes.push(Mesh { name: "ground".to_owned(), primitives });
+        let node = self.document.nodes.len();
+        self.document.nodes[0].children.push(node);
+        self.document.nodes.push(Node { name: "ground".to_owned(), mesh, ..Node::default() });
+    }
+
+    fn finish(mut self) -> Result<Vec<u8>, Error> {
+        let bytes = self.buffer.finish(&mut self.document);
+        let mut text = serde_json::to_vec(&self.document).unwrap_or_default();
+        text.resize(text.len().next_multiple_of(4), b' ');
+        let has_bytes = !bytes.is_empty();
+        let total = 12 + 8 + text.len() + if has_bytes { 8 + bytes.len() } else { 0 };
+        let fits = |length: usize| u32::try_from(length).map_err(|_| Error::File { bytes: total as u64 });
+        let mut file = Vec::with_capacity(total);
+        file.extend(b"glTF");
+        file.extend(2_u32.to_le_bytes());
+        file.extend(fits(total)?.to_le_bytes());
+        file.extend(fits(text.len())?.to_le_bytes());
+        file.extend(b"JSON");
+        file.extend(text);
+        if has_bytes {
+            file.extend(fits(bytes.len())?.to_le_bytes());
+            file.extend(b"BIN\0");
+            file.extend(bytes);
+        }
+        Ok(file)
+    }
+}
+
+/// A shape as differences from the base; where it has no normal, it has that of the base.
+fn difference(shape: &Places, base: &Places) -> Places {
+    let minus = |a: &[f32; 3], b: &[f32; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+    let positions = shape.positions.iter().zip(&base.positions).map(|(a, b)| minus(a, b)).collect();
+    let turned = |(a, b): (&[f32; 3], &[f32; 3])| if *a == [0.0; 3] { [0.0; 3] } else { minus(a, b) };
+    Places { positions, normals: shape.normals.iter().zip(&base.normals).map(turned).collect() }
+}
+
+/// `KIND.LINEAGE`, as in OBJ files; with a number where a module goes on with other parts.
+fn name(kind: &str, lineage: &str, number: u32) -> String {
+    match number {
+        0 => format!("{kind}.{lineage}"),
+        _ => format!("{kind}.{lineage}.{}", number + 1),
+    }
+}
+
+/// Of an sRGB colour, the linear channels that glTF takes.
+fn linear(color: Color) -> [f32; 4] {
+    let [r, g, b] = color.channels().map(|c| {
+        let linear = if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) };
+        linear as f32
+    });
+    [r, g, b, 1.0]
+}

@@ -1,0 +1,220 @@
+//! Growing plants as files that other programs play: animated glTF 2.0 in one binary file (GLB).
+//!
+//! ```text
+//! Simulation ──Follower──▶ Sample ──▶ Tracks ──▶ Lives ──▶ glb
+//! ```
+//!
+//! - [`grow`] follows a run ([`Growth`]): each module that draws something has a frame, which moves, and a shape in that frame, which is mostly a
+//!   function of its age. Modules with the same shapes at the same ages share one life.
+//! - [`Growth::glb`] writes the file: a mesh for each life, with morph targets at ages chosen for the accuracy; a node for each module, with tracks
+//!   for translation and rotation, and for the scale, which is 0 before birth and after death.
+//!
+//! The accuracy bounds the distance of every point of the file from that of the model, at frames and between them. Its parts: triangles in place of curved
+//! surfaces 0.36 (an estimate); of frames, what happens between samples 0.18, tracks 0.13; of shapes, differences of modules that share a life, samples included, 0.25, what is between
+//! two ages 0.08.
+//! Stems end in half balls, also where they meet, in place of the joints of OBJ meshes.
+//!
+//! ```
+//! use dlsys_interchange::{Options, grow};
+//! use dlsys_session::Session;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let session = Session::from_text("stem.dls", "initial string: F(1)\nF(x): solve dx/dt = x", &[])?;
+//! let options = Options::new(&session.model, 0.05, 7.4);
+//! let growth = grow(&session, Default::default(), &[0.0, 1.0, 2.0], &options, &mut |_| true)?;
+//! let file = growth.glb()?;
+//! assert!(file.starts_with(b"glTF") && growth.nodes() == 1);
+//! # Ok(())
+//! # }
+//! ```
+
+#![warn(missing_docs)]
+
+mod blend;
+mod error;
+mod follow;
+mod glb;
+mod life;
+mod mesh;
+mod part;
+mod sample;
+mod stem;
+mod thin;
+mod track;
+
+use std::collections::HashMap;
+
+use dlsys_geometry::scene::{Color, Palette};
+use dlsys_model::Model;
+use dlsys_session::{Nursery, Session, sways};
+use dlsys_sim::Settings;
+pub use error::Error;
+use follow::{Closeness, Follower};
+use life::{Lives, Tolerance};
+use sample::Sampler;
+use track::Tracks;
+
+/// Bounds of the work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Most nodes, one for each module that draws something.
+    pub nodes: usize,
+    /// Most numbers that are kept, of four bytes each.
+    pub numbers: usize,
+}
+
+impl Default for Limits {
+    /// As many nodes as programs for scenes still open, and a gigabyte.
+    fn default() -> Limits {
+        Limits { nodes: 100_000, numbers: 250_000_000 }
+    }
+}
+
+/// How a run becomes a file.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Width of a line without a width of its own, in units of the model.
+    pub default_width: f64,
+    /// Largest extent of the whole animation, in units of the model.
+    pub extent: f64,
+    /// Largest distance of a point of the file from that of the model, in parts of the extent.
+    pub accuracy: f64,
+    /// Seconds of the animation in a unit of time of the model.
+    pub seconds: f64,
+    /// Metres in a unit of length of the model.
+    pub metres: f64,
+    /// Height of the floor, if there is one, its middle (x, z), and half of its side, in units of the model.
+    pub floor: Option<[f64; 4]>,
+    /// Number of threads; the file does not depend on it.
+    pub threads: usize,
+    /// Bounds of the work.
+    pub limits: Limits,
+}
+
+impl Options {
+    /// The default accuracy, in parts of the extent.
+    pub const ACCURACY: f64 = 5e-4;
+    /// The longest animation in seconds: up to there the instants that a file can name are half a millisecond apart at most.
+    pub const LONGEST: f64 = 8192.0;
+
+    /// Options with the units of a model, for an animation of this default width and this extent.
+    pub fn new(model: &Model, default_width: f64, extent: f64) -> Options {
+        let units = model.scenery.units;
+        Options {
+            default_width,
+            extent,
+            accuracy: Options::ACCURACY,
+            seconds: units.time,
+            metres: units.length,
+            floor: None,
+            threads: 1,
+            limits: Limits::default(),
+        }
+    }
+
+    /// The accuracy in metres.
+    fn tolerance(&self) -> f64 {
+        let extent = if self.extent > 0.0 { self.extent } else { 1.0 };
+        self.accuracy * extent * self.metres
+    }
+}
+
+/// A run that has been followed.
+#[derive(Debug)]
+pub struct Growth {
+    title: String,
+    first: f64,
+    last: f64,
+    options: Options,
+    palette: Palette,
+    floor_color: Color,
+    contours: Vec<Vec<[f64; 2]>>,
+    /// Heads of the rules.
+    rules: Vec<String>,
+    tracks: Tracks,
+    lives: Lives,
+}
+
+/// Seconds within which something that appears without a production may be early or late.
+const INSTANT: f64 = 2.5e-4;
+/// Parts of the whole time from one sample to the next, at least.
+const INTERVALS: f64 = 100.0;
+/// Longest time between samples where stems sway, in seconds of the physics.
+const SWAY: f64 = 0.04;
+
+/// Follows a run through the frames at these ascending times, of which there is at least one; one makes a file without an animation. `progress` is told the time reached
+/// and stops the work by being false.
+///
+/// # Errors
+/// See [`Error`].
+pub fn grow(
+    session: &Session,
+    settings: Settings,
+    times: &[f64],
+    options: &Options,
+    progress: &mut dyn FnMut(f64) -> bool,
+) -> Result<Growth, Error> {
+    let model = &session.model;
+    let (first, last) = (times.first().copied().unwrap_or(0.0), times.last().copied().unwrap_or(0.0));
+    let seconds = (last - first) * options.seconds;
+    if seconds > Options::LONGEST {
+        return Err(Error::TooLong { seconds, limit: Options::LONGEST });
+    }
+    let settings = Settings { log: true, ..settings };
+    let nursery = Nursery::new(model, settings);
+    let mut blank = nursery.blank();
+    blank.notes_poses = true;
+    let tolerance = options.tolerance();
+    blank.accuracy = 0.2 * tolerance / options.metres;
+    let (palette, contours) = (blank.palette.clone(), blank.contours.to_vec());
+    let longest = if sways(model) { SWAY / model.scenery.units.time } else { f64::INFINITY };
+    let longest = longest.min(((last - first) / INTERVALS).max(f64::MIN_POSITIVE));
+    let instant = INSTANT / options.seconds;
+    let mut follower = Follower {
+        nursery: &nursery,
+        sampler: Sampler { default_width: options.default_width, metres: options.metres },
+        closeness: Closeness { straight: 0.15 * tolerance, thin: 0.03 * tolerance, instant, longest },
+        limits: options.limits,
+        threads: options.threads,
+        blank,
+        simulation: session.simulate(settings)?,
+        tracks: Tracks::default(),
+        births: HashMap::new(),
+    };
+    follower.follow(times, progress)?;
+    let tracks = follower.tracks;
+    let allowed = Tolerance { likeness: 0.25 * tolerance, mix: 0.08 * tolerance };
+    let lives = life::lives(&tracks.phases, allowed, 2.0 * instant);
+    Ok(Growth {
+        title: model.title.clone().unwrap_or_else(|| session.source.name.clone()),
+        first,
+        last,
+        options: options.clone(),
+        palette,
+        floor_color: dlsys_render::Page::BACKGROUND,
+        contours,
+        rules: model.rules.iter().map(|rule| rule.label.clone()).collect(),
+        tracks,
+        lives,
+    })
+}
+
+impl Growth {
+    /// Number of nodes of modules.
+    pub fn nodes(&self) -> usize {
+        self.tracks.phases.len()
+    }
+
+    /// Number of different lives.
+    pub fn lives(&self) -> usize {
+        self.lives.lives.len()
+    }
+
+    /// The file.
+    ///
+    /// # Errors
+    /// If it is larger than a GLB file can be.
+    pub fn glb(&self) -> Result<Vec<u8>, Error> {
+        glb::file(self)
+    }
+}

@@ -1,0 +1,174 @@
+//! A scene as modules, each with its frame and with its parts in numbers.
+
+use std::sync::Arc;
+
+use dlsys_geometry::scene::{MaterialId, Owner, OwnerId, Point, Scene, Segment, Vector};
+use dlsys_tree::Lineage;
+
+use crate::part::{Frame, Part, Source};
+
+/// Everything that is drawn at one instant.
+#[derive(Debug, Default)]
+pub(crate) struct Sample {
+    pub(crate) time: f64,
+    /// In string order.
+    pub(crate) modules: Vec<Module>,
+    parts: Vec<Part>,
+    materials: Vec<Option<MaterialId>>,
+    numbers: Vec<f32>,
+    /// Surfaces that the parts name.
+    pub(crate) sources: Vec<(usize, Source)>,
+}
+
+/// A module that draws something.
+#[derive(Clone, Debug)]
+pub(crate) struct Module {
+    pub(crate) lineage: Lineage,
+    pub(crate) kind: Arc<str>,
+    pub(crate) frame: Frame,
+    /// Where its parts and its numbers begin.
+    part: u32,
+    number: u32,
+}
+
+impl Sample {
+    /// The parts of a module, by its number.
+    pub(crate) fn parts(&self, i: usize) -> &[Part] {
+        &self.parts[self.range(i, self.parts.len(), |m| m.part)]
+    }
+
+    /// Roughly, how many numbers it holds.
+    pub(crate) fn size(&self) -> usize {
+        self.numbers.len() + 30 * self.modules.len()
+    }
+
+    /// The materials of its parts.
+    pub(crate) fn materials(&self, i: usize) -> &[Option<MaterialId>] {
+        &self.materials[self.range(i, self.parts.len(), |m| m.part)]
+    }
+
+    /// The numbers of its parts, in its frame.
+    pub(crate) fn numbers(&self, i: usize) -> &[f32] {
+        &self.numbers[self.range(i, self.numbers.len(), |m| m.number)]
+    }
+
+    fn range(&self, i: usize, end: usize, of: impl Fn(&Module) -> u32) -> std::ops::Range<usize> {
+        let next = self.modules.get(i + 1).map_or(end, |next| of(next) as usize);
+        of(&self.modules[i]) as usize..next
+    }
+}
+
+/// An element of a scene, by kind and number.
+#[derive(Clone, Copy)]
+enum Element {
+    Segment(usize),
+    Polygon(usize),
+    Surface(usize),
+    Patch(usize),
+}
+
+/// Makes samples of scenes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sampler {
+    /// Width of a line of default width, in units of the model.
+    pub(crate) default_width: f64,
+    /// Metres in a unit of the model.
+    pub(crate) metres: f64,
+}
+
+impl Sampler {
+    /// The modules of a scene, in the order of its owners.
+    pub(crate) fn sample(&self, time: f64, scene: &Scene) -> Sample {
+        let mut elements: Vec<(OwnerId, Element)> = Vec::new();
+        let visible = |segment: &Segment| segment.widths.iter().any(|w| w.resolve(self.default_width) > 0.0);
+        let segments = scene.segments.iter().enumerate().filter(|(_, segment)| visible(segment));
+        elements.extend(segments.map(|(i, e)| (e.owner, Element::Segment(i))));
+        elements.extend(scene.polygons.iter().enumerate().map(|(i, e)| (e.owner, Element::Polygon(i))));
+        elements.extend(scene.surfaces.iter().enumerate().map(|(i, e)| (e.owner, Element::Surface(i))));
+        elements.extend(scene.patches.iter().enumerate().map(|(i, e)| (e.owner, Element::Patch(i))));
+        // Stable: elements of a module stay in order.
+        elements.sort_by_key(|(owner, _)| *owner);
+        let mut sample = Sample { time, ..Sample::default() };
+        for group in elements.chunk_by(|a, b| a.0 == b.0) {
+            let frame = self.frame(scene, group);
+            let Owner { name, lineage } = scene.owner(group[0].0);
+            let (part, number) = (sample.parts.len() as u32, sample.numbers.len() as u32);
+            sample.modules.push(Module { lineage: *lineage, kind: name.clone(), frame, part, number });
+            for (_, element) in group {
+                self.add(scene, *element, &frame, &mut sample);
+            }
+        }
+        sample
+    }
+
+    /// The frame of a module: that of a single stem or surface, so that its shape is a matter of sizes only; else that of the turtle at the beginning of the
+    /// module.
+    fn frame(&self, scene: &Scene, group: &[(OwnerId, Element)]) -> Frame {
+        let at = |p: Point| p * self.metres;
+        match group {
+            [(_, Element::Segment(i))] => {
+                let segment = &scene.segments[*i];
+                Frame::new(at(segment.start), segment.direction, segment.across)
+            }
+            [(_, Element::Surface(i))] => {
+                let place = &scene.surfaces[*i].placement;
+                Frame::new(at(place.origin), place.axes[0], place.axes[1])
+            }
+            _ => {
+                let pose = group.first().and_then(|(owner, _)| scene.poses.get(owner.index()));
+                let place = |pose: &dlsys_geometry::turtle::Pose| {
+                    Frame::new(at(pose.position), pose.axes[0], pose.axes[1])
+                };
+                let origin = || Frame::new(Point::origin(), Vector::y(), -Vector::x());
+                pose.map_or_else(origin, place)
+            }
+        }
+    }
+
+    fn add(&self, scene: &Scene, element: Element, frame: &Frame, sample: &mut Sample) {
+        let metres = self.metres;
+        let numbers = &mut sample.numbers;
+        let mut put = |v: Vector| numbers.extend(v.iter().map(|x| *x as f32));
+        let point = |p: Point| frame.local(p * metres - frame.origin);
+        let (part, material) = match element {
+            Element::Segment(i) => {
+                let segment = &scene.segments[i];
+                let radii = segment.widths.map(|w| w.resolve(self.default_width) / 2.0 * metres);
+                let radius = radii[0].max(radii[1]);
+                put(point(segment.start));
+                put(point(segment.end));
+                put(frame.local(segment.direction) * radius);
+                put(frame.local(segment.across) * radius);
+                put(Vector::new(radii[0], radii[1], 0.0));
+                (Part::Stem(segment.contour), Some(segment.material))
+            }
+            Element::Polygon(i) => {
+                let polygon = &scene.polygons[i];
+                polygon.vertices.iter().for_each(|p| put(point(*p)));
+                (Part::Polygon(polygon.vertices.len() as u32), Some(polygon.material))
+            }
+            Element::Surface(i) => {
+                let surface = &scene.surfaces[i];
+                let source = Source::of(surface);
+                let place = source.place();
+                put(point(surface.placement.origin));
+                for ((axis, scale), limit) in
+                    surface.placement.axes.iter().zip(surface.placement.scales).zip(source.limits())
+                {
+                    put(frame.local(*axis) * (scale * limit * metres));
+                }
+                if sample.sources.iter().all(|known| known.0 != place) {
+                    sample.sources.push((place, source));
+                }
+                (Part::Surface(place), surface.tint)
+            }
+            Element::Patch(i) => {
+                let patch = &scene.patches[i];
+                patch.net.iter().flatten().for_each(|p| put(point(*p)));
+                (Part::Patch, Some(patch.material))
+            }
+        };
+        sample.parts.push(part);
+        sample.materials.push(material);
+    }
+}

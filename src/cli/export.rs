@@ -1,0 +1,342 @@
+//! `--format glb` of `dlsys run` and of `dlsys render`: a growing plant as one file that other programs play.
+
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use super::album::Keeping;
+use super::args::{RenderArgs, RunArgs};
+use super::common::{Clock, Failure, ModelRun, count_of, out_error, size_of};
+use super::events::EventLog;
+use super::frame_source::{Frame, Pass, play_at};
+use super::progress::Progress;
+use super::shared::SharedArgs;
+use crate::diagnostic::Diagnostic;
+use crate::interchange::{self, Error, Growth, Options, grow};
+use crate::interrupt;
+use crate::render::{self, Fit, Format, FrameWriter, Layout, Survey, View};
+use crate::scene::Scene;
+use crate::sim::Stats;
+
+/// Half of the side of the floor, in parts of the extent: as in OBJ files.
+const FLOOR: f64 = 5.0;
+/// The first bytes of a GLB file.
+const MARK: &[u8; 4] = b"glTF";
+/// Frames from one to the next that is measured.
+const SURVEYED: usize = 4;
+/// Bytes from which a file gets a hint about its size.
+const LARGE: usize = 50_000_000;
+
+/// How the file is written, from the flags of either command.
+struct Order<'a> {
+    shared: &'a SharedArgs,
+    out: PathBuf,
+    /// In units of the model.
+    accuracy: Option<f64>,
+    /// Units of the model's time in a second.
+    speed: Option<f64>,
+    threads: usize,
+    limit: u64,
+    force: bool,
+    quiet: bool,
+}
+
+fn usage(message: impl std::fmt::Display) -> Failure {
+    Failure::Usage(format!("error: {message}\n"))
+}
+
+/// Refuses flags of `run` that are for files, where it prints text.
+pub fn refuse_flags(args: &RunArgs) -> Result<(), Failure> {
+    let file = &args.file;
+    let given = [
+        ("--out", file.out.is_some()),
+        ("--accuracy", file.accuracy.is_some()),
+        ("--speed", file.speed.is_some()),
+        ("--force", file.force),
+    ];
+    if let Some((flag, _)) = given.iter().find(|(_, given)| *given) {
+        return Err(usage(format!(
+            "{flag} is for animated files; add --format glb, or leave it out and take what is printed: `dlsys run … > strings.txt`"
+        )));
+    }
+    if args.threads.is_some() && args.seeds.is_none() {
+        return Err(usage("--threads is for --seeds and for --format glb; a single run has one thread"));
+    }
+    Ok(())
+}
+
+/// `dlsys run MODEL --format glb -o FILE`.
+pub fn run(args: &RunArgs) -> Result<(), Failure> {
+    let given = [
+        ("--field", args.field.is_some()),
+        ("--seeds", args.seeds.is_some()),
+        ("--verify", args.verify.verify),
+    ];
+    refuse(&given, "a file holds one growing plant")?;
+    let model = &args.shared.model;
+    let Some(out) = &args.file.out else {
+        let name = model.file_stem().map_or("plant".into(), |stem| stem.to_string_lossy());
+        return Err(usage(format!("`--format glb` writes a file: name it, such as `-o {name}.glb`")));
+    };
+    let order = Order {
+        shared: &args.shared,
+        out: file_of(out, model)?,
+        accuracy: args.file.accuracy,
+        speed: args.file.speed,
+        threads: args.threads.unwrap_or_else(cores),
+        limit: u64::MAX,
+        force: args.file.force,
+        quiet: false,
+    };
+    spare(&order)?;
+    write(&order, ModelRun::start(&args.shared)?, &|| false)
+}
+
+/// `dlsys render MODEL --format glb -o FILE`.
+pub fn render(args: &RenderArgs, stale: &(dyn Fn() -> bool + Sync)) -> Result<(), Failure> {
+    spare(&order_of(args)?)?;
+    render_run(args, ModelRun::start(&args.shared)?, stale)
+}
+
+/// The same for a model that has been read.
+pub fn render_run(
+    args: &RenderArgs,
+    run: ModelRun,
+    stale: &(dyn Fn() -> bool + Sync),
+) -> Result<(), Failure> {
+    let order = order_of(args)?;
+    spare(&order)?;
+    write(&order, run, stale)
+}
+
+/// The flags of `render`; those for pictures are refused.
+fn order_of(args: &RenderArgs) -> Result<Order<'_>, Failure> {
+    let pictures = [
+        ("--view", args.view.is_some()),
+        ("--perspective", args.perspective.is_some()),
+        ("--camera", args.camera.is_some()),
+        ("--zoom", args.zoom.is_some()),
+        ("--light", args.light.is_some()),
+        ("--sky", args.sky.is_some()),
+        ("--width", args.width.is_some()),
+        ("--size", args.size.is_some()),
+        ("--background", args.background.is_some()),
+        ("--line-width", args.line_width.is_some()),
+        ("--layout", args.layout != Layout::Frames),
+    ];
+    refuse(&pictures, "a GLB file is a plant in space, and the program that shows it has a camera")?;
+    refuse(&[("--seeds", args.seeds.is_some())], "a file holds one growing plant")?;
+    Ok(Order {
+        shared: &args.shared,
+        out: file_of(&args.out, &args.shared.model)?,
+        accuracy: args.accuracy,
+        speed: args.speed,
+        threads: args.threads.unwrap_or_else(cores),
+        limit: args.max_output,
+        force: args.force,
+        quiet: args.quiet,
+    })
+}
+
+fn refuse(given: &[(&str, bool)], why: &str) -> Result<(), Failure> {
+    match given.iter().find(|(_, given)| *given) {
+        Some((flag, _)) => Err(usage(format!("{flag} does not go with --format glb: {why}; leave it out"))),
+        None => Ok(()),
+    }
+}
+
+fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
+/// The path of the file: as given, or in a folder under the name of the model.
+fn file_of(out: &Path, model: &Path) -> Result<PathBuf, Failure> {
+    let text = out.to_string_lossy();
+    match out.extension().map(|extension| extension.to_string_lossy().to_lowercase()) {
+        Some(extension) if extension == "glb" && !out.is_dir() => Ok(out.to_owned()),
+        Some(extension) if !out.is_dir() && !text.ends_with('/') => Err(usage(format!(
+            "`-o {}` is a .{extension} file, and --format glb writes .glb: `-o {}`",
+            out.display(),
+            out.with_extension("glb").display()
+        ))),
+        _ => {
+            let stem = model.file_stem().map_or("plant".into(), |stem| stem.to_string_lossy());
+            Ok(out.join(format!("{stem}.glb")))
+        }
+    }
+}
+
+/// Refuses to write over a file of another kind.
+fn spare(order: &Order<'_>) -> Result<(), Failure> {
+    let out = &order.out;
+    if out.is_dir() {
+        return Err(usage(format!("{} is a directory: name another file", out.display())));
+    }
+    let Ok(mut file) = std::fs::File::open(out) else { return Ok(()) };
+    let mut start = [0; 4];
+    // An empty file is nobody's work.
+    let is_ours = match file.read(&mut start) {
+        Ok(0) => true,
+        Ok(4) => start == *MARK,
+        _ => false,
+    };
+    if order.force || is_ours || !out.is_file() {
+        return Ok(());
+    }
+    Err(usage(format!(
+        "{} is there and is not a GLB file: choose another name, or add --force",
+        out.display()
+    )))
+}
+
+/// Runs the model twice: to measure it, because all accuracy is relative to its extent, and to follow it.
+fn write(order: &Order<'_>, run: ModelRun, stale: &dyn Fn() -> bool) -> Result<(), Failure> {
+    let begun = Instant::now();
+    if !run.session.model.scenery.plants.is_empty() {
+        return Err(failure(&run, &Error::Plants));
+    }
+    let mut clock = run.clock;
+    let (survey, stats) = measure(order, &run, &mut clock)?;
+    if stale() {
+        return Err(Failure::Stale);
+    }
+    let fit = FrameWriter::new(Format::OBJ, survey.fit()).fit;
+    let growth = follow(order, &run, &survey, fit, &mut clock)?;
+    let before = Instant::now();
+    let bytes = growth.glb().map_err(|error| failure(&run, &error))?;
+    if bytes.len() as u64 > order.limit {
+        return Err(Failure::Model(format!(
+            "error: the file is {}, and --max-output allows {}\n\n  = help: a coarser --accuracy makes it smaller\n",
+            size_of(bytes.len() as u64),
+            size_of(order.limit)
+        )));
+    }
+    save(&order.out, &bytes)?;
+    clock.output += before.elapsed();
+    run.write_stats(order.shared, clock, stats)?;
+    if order.quiet {
+        return Ok(());
+    }
+    let seconds = begun.elapsed().as_secs_f64();
+    let mut line = format!(
+        "{}: {}, {}, {}, in {seconds:.2} s\n",
+        order.out.display(),
+        count_of(growth.nodes(), "node"),
+        match growth.lives() {
+            1 => "1 different life".to_owned(),
+            lives => format!("{lives} different lives"),
+        },
+        size_of(bytes.len() as u64),
+    );
+    if bytes.len() > LARGE && order.accuracy.is_none() {
+        line += "  large: a coarser --accuracy, or a shorter time, makes a smaller file\n";
+    }
+    std::io::stdout().write_all(line.as_bytes()).map_err(out_error)
+}
+
+/// The first pass.
+fn measure(order: &Order<'_>, run: &ModelRun, clock: &mut Clock) -> Result<(Survey, Stats), Failure> {
+    let nothing = Survey::new(View::FRONT);
+    let mut survey = nothing.clone();
+    let mut events = EventLog::create(order.shared.events.as_deref(), run)?;
+    // The extent changes little from frame to frame.
+    let count = run.times.len();
+    let times = (0..count).filter(|i| i % SURVEYED == 0 || i + 1 == count).map(|i| run.times[i]).collect();
+    let mut progress = bar(order, "measuring", count.div_ceil(SURVEYED));
+    let pass = Pass { settings: run.settings, keeping: Keeping::Nothing, accuracy: 0.0 };
+    let of_frame = |_: &Frame, scene: &Scene| {
+        let mut survey = nothing.clone();
+        survey.add(scene);
+        survey
+    };
+    let measured = play_at(run, times, pass, order.threads, (clock, events.as_mut()), of_frame, |frame| {
+        survey.merge(&frame);
+        progress.inc();
+        Ok(())
+    });
+    drop(progress);
+    if measured.is_ok() {
+        run.note_what_is_seen(survey.fit().bounds.is_some());
+    }
+    run.warn();
+    events.map_or(Ok(()), EventLog::finish)?;
+    measured.map(|stats| (survey, stats))
+}
+
+/// The second pass.
+fn follow(
+    order: &Order<'_>,
+    run: &ModelRun,
+    survey: &Survey,
+    fit: Fit,
+    clock: &mut Clock,
+) -> Result<Growth, Failure> {
+    let before = Instant::now();
+    let extent = fit.accuracy / Fit::ACCURACY;
+    let mut options = Options::new(&run.session.model, fit.default_width, extent);
+    options.threads = order.threads;
+    if let Some(accuracy) = order.accuracy {
+        options.accuracy = fit.clone().with_accuracy(accuracy).accuracy / extent;
+    }
+    if let Some(speed) = order.speed {
+        options.seconds = 1.0 / speed;
+    }
+    if let Some(height) = survey.first_surroundings().floor {
+        let [low, high] = fit.bounds.unwrap_or_default();
+        let middle = crate::scene::Point::from((low.coords + high.coords) / 2.0);
+        options.floor = Some([height, middle.x, middle.z, FLOOR * extent]);
+    }
+    let (first, last) = (run.times.first().copied().unwrap_or(0.0), run.times.last().copied().unwrap_or(0.0));
+    let mut progress = bar(order, "following", 1000);
+    let mut reached = |time: f64| {
+        progress.reach((time - first) / (last - first).max(f64::MIN_POSITIVE));
+        !interrupt::asked()
+    };
+    let growth = grow(&run.session, run.settings, &run.times, &options, &mut reached);
+    drop(progress);
+    clock.simulate += before.elapsed();
+    growth.map_err(|error| failure(run, &error))
+}
+
+fn bar(order: &Order<'_>, what: &str, count: usize) -> Progress {
+    if order.quiet { Progress::quiet() } else { Progress::new(what, count) }
+}
+
+/// Writes the file, whole or not at all.
+fn save(out: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    std::fs::create_dir_all(folder)
+        .map_err(|error| usage(format!("cannot make the directory {}: {error}", folder.display())))?;
+    let name = out.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
+    render::replace(folder, &name, bytes).map_err(|error| Failure::Model(format!("error: {error}\n")))
+}
+
+/// An error as a message, with advice where there is some.
+fn failure(run: &ModelRun, error: &interchange::Error) -> Failure {
+    let drawn = |diagnostic: Diagnostic| {
+        Failure::Model(diagnostic.render(&run.session.source, super::common::coloured()))
+    };
+    let span = run.times.last().unwrap_or(&0.0) - run.times.first().unwrap_or(&0.0);
+    let a_minute =
+        format!("let more of the model's time pass in a second: `--speed {:.0}`", (span / 60.0).ceil());
+    let help: &[&str] = match error {
+        Error::Run(error) => return run.fault(error),
+        Error::Draw(error) => return drawn(error.diagnostic()),
+        Error::Plants => &[
+            "write the other model by itself, and place copies of it in the program that takes the file",
+            "a single time of the whole scene: `dlsys render MODEL --at T --format obj`",
+        ],
+        Error::TooMany { .. } => &[
+            "each is a node of its own, and programs for scenes hardly open more; end earlier with `--to T`",
+            "a single time of any size: `dlsys render MODEL --at T --format obj`",
+        ],
+        Error::TooLarge { .. } => {
+            &["a coarser --accuracy needs fewer numbers; so does a shorter time with `--from A --to B`"]
+        }
+        Error::TooLong { .. } => &[&a_minute],
+        _ => &[],
+    };
+    let help: String = help.iter().map(|line| format!("\n  = help: {line}")).collect();
+    let gap = if help.is_empty() { "" } else { "\n" };
+    Failure::Model(format!("error: {error}\n{gap}{}{gap}", help.trim_start_matches('\n')))
+}

@@ -1,0 +1,269 @@
+//! Animated GLB files, read by a reader of our own, against the model drawn again at random times, frames or not.
+
+use std::collections::HashMap;
+use std::fs;
+
+use dlsys::interchange::{Error, Growth, Limits, Options, grow};
+use dlsys::render::{Fit, Format, FrameWriter, Survey, View};
+use dlsys::scene::{Point, Scene, Segment, Vector};
+use dlsys::session::{Nursery, Session};
+use dlsys::sim::{Settings, Simulation};
+use dlsys::tree::ModuleString;
+
+use crate::cli::{bad, good};
+use crate::common::repository;
+use crate::glb_reader::Glb;
+
+/// A model with its run followed up to a time.
+struct Followed {
+    session: Session,
+    growth: Growth,
+    options: Options,
+}
+
+fn scene_at(simulation: &mut Simulation<'_>, nursery: &Nursery<'_>, time: f64) -> Scene {
+    let mut string = ModuleString::default();
+    simulation.at(time, &mut string).expect("a run");
+    let mut scene = nursery.blank();
+    nursery.draw(&string, &mut scene).expect("drawn");
+    scene
+}
+
+fn follow(session: Session, [from, to, step]: [f64; 3], threads: usize) -> Followed {
+    let settings = Settings::default();
+    let count = ((to - from) / step).round() as usize;
+    let times: Vec<f64> = (0..=count).map(|i| from + step * i as f64).collect();
+    let mut survey = Survey::new(View::FRONT);
+    {
+        let nursery = Nursery::new(&session.model, settings);
+        let mut simulation = session.simulate(settings).expect("a start");
+        times.iter().for_each(|t| survey.add(&scene_at(&mut simulation, &nursery, *t)));
+    }
+    let fit = FrameWriter::new(Format::OBJ, survey.fit()).fit;
+    let mut options = Options::new(&session.model, fit.default_width, fit.accuracy / Fit::ACCURACY);
+    options.threads = threads;
+    let growth = grow(&session, settings, &times, &options, &mut |_| true).expect("a growth");
+    Followed { session, growth, options }
+}
+
+fn model(name: &str) -> Session {
+    Session::open(&repository(&format!("models/{name}")), &[]).expect("a model")
+}
+
+/// Points on the side of a stem.
+fn side(segment: &Segment, default_width: f64) -> Vec<Point> {
+    let radii = segment.widths.map(|w| w.resolve(default_width) / 2.0);
+    let u = segment.across;
+    let v = segment.direction.cross(&u);
+    let at = |(part, angle): (f64, f64)| {
+        let out: Vector = u * angle.cos() + v * angle.sin();
+        segment.start + (segment.end - segment.start) * part + out * (radii[0] + (radii[1] - radii[0]) * part)
+    };
+    let angles = (0..6).map(|k| f64::from(k) * 1.1);
+    angles.flat_map(|angle| [0.0, 0.3, 0.7, 1.0].map(|part| (part, angle))).map(at).collect()
+}
+
+/// The largest distance of drawn points from what the file shows for their module, in metres.
+fn worst(followed: &Followed, times: &[f64], first: f64) -> f64 {
+    let Followed { session, growth, options } = followed;
+    let glb = Glb::read(&growth.glb().expect("a file"));
+    let nursery = Nursery::new(&session.model, Settings::default());
+    let mut simulation = session.simulate(Settings::default()).expect("a start");
+    let mut worst = 0.0_f64;
+    let mut compared = 0;
+    for &time in times {
+        let scene = scene_at(&mut simulation, &nursery, time);
+        let shown = glb.shown((time - first) * options.seconds);
+        let mut points: HashMap<String, Vec<Point>> = HashMap::new();
+        let mut add = |owner, some: Vec<Point>| {
+            let owner = scene.owner(owner);
+            let kind = dlsys::render::plain_name(&owner.name);
+            points.entry(format!("{kind}.{}", owner.lineage.name())).or_default().extend(some);
+        };
+        for segment in &scene.segments {
+            add(segment.owner, side(segment, options.default_width));
+        }
+        for polygon in &scene.polygons {
+            add(polygon.owner, polygon.vertices.clone());
+        }
+        for surface in &scene.tessellated(options.accuracy * options.extent).surfaces {
+            let all = surface.mesh.vertices.iter().map(|p| surface.placement.point(*p));
+            add(surface.owner, all.collect());
+        }
+        for (name, points) in points {
+            let Some(shown) = shown.get(&name) else { panic!("{name} is not shown at {time}") };
+            let some = points.len().div_ceil(60);
+            for point in points.iter().step_by(some) {
+                worst = worst.max(shown.distance(*point * options.metres));
+                compared += 1;
+            }
+        }
+    }
+    assert!(compared > 1000, "{compared} points");
+    worst
+}
+
+/// Times that are no frames.
+fn random_times(from: f64, to: f64, count: usize) -> Vec<f64> {
+    let mut times: Vec<f64> =
+        (1..=count).map(|i| from + (to - from) * (i as f64 * 0.618_033_988_749_894_9).fract()).collect();
+    times.sort_by(f64::total_cmp);
+    times
+}
+
+#[test]
+fn positions_are_within_the_accuracy_between_frames_too() {
+    let cases = [
+        ("leaf.dls", [0.0, 9.0, 0.1]),
+        ("dragon.dls", [0.0, 6.0, 0.125]),
+        ("campanula.dls", [6.0, 20.0, 0.2]),
+        ("lychnis.dls", [0.0, 5.0, 0.1]),
+        ("birch.dls", [4.0, 9.0, 0.2]),
+    ];
+    for (name, [from, to, step]) in cases {
+        let followed = follow(model(name), [from, to, step], 2);
+        let worst = worst(&followed, &random_times(from, to, 12), from);
+        let allowed = followed.options.accuracy * followed.options.extent;
+        assert!(worst <= allowed, "{name}: {worst} of {allowed}");
+    }
+}
+
+#[test]
+fn stems_that_sway_follow_the_wind() {
+    let text = "units length 0.1, time 1\nwind 1, 0, 0 speed 3 turbulence 0.3 scale 4\n\
+                tissue stalk = stiffness 2e8, density 900, damping 0.1\n\
+                initial string: @E(stalk) S(1) S(1) [ +(40) @L(0.5) ] S(1)\nS(x): solve dx/dt = 0.2\ninterpret S(x): !(0.1) F(x)";
+    let session = Session::from_text("reed.dls", text, &[]).expect("a model");
+    let followed = follow(session, [0.0, 2.0, 0.1], 2);
+    // Segments of the model are pieces of arcs, of another number than in the file: compared are their ends, by the distance of their sides.
+    let worst = worst(&followed, &random_times(0.0, 2.0, 12), 0.0);
+    let allowed = followed.options.accuracy * followed.options.extent * followed.options.metres;
+    assert!(worst <= 2.0 * allowed, "{worst} of {allowed}");
+}
+
+#[test]
+fn modules_appear_and_vanish_within_a_millisecond() {
+    let text = "initial string: A(0, 3)\nA(x, n):\n  if x < 1 solve dx/dt = 1\n  if x = 1 & n > 0 produce F(0.7) B(0) A(0, n - 1)\n  if x = 1 & n = 0 produce F(0.1)\n\
+                B(y):\n  if y < 0.37 solve dy/dt = 1\n  if y = 0.37 produce F(0.3)\n\
+                interpret A(x, n): F(0.2 + x)\ninterpret B(y): [ +(60) @L(0.5 + y) ]";
+    let session = Session::from_text("events.dls", text, &[]).expect("a model");
+    let growth = follow(session, [0.0, 4.0, 0.25], 1).growth;
+    let glb = Glb::read(&growth.glb().expect("a file"));
+    let mut checked = 0;
+    for (number, node) in glb.nodes().iter().enumerate().filter(|(_, node)| !node["mesh"].is_null()) {
+        let birth = node["extras"]["birth"].as_f64().expect("a birth");
+        let death = node["extras"]["death"].as_f64();
+        assert_eq!(death.is_some(), node["extras"]["rule"].is_string());
+        assert!(glb.scale(number, birth + 1e-6) > 0.0, "{node}");
+        if birth > 0.0 {
+            assert_eq!(glb.scale(number, birth - 1e-3), 0.0, "{node}");
+            checked += 1;
+        }
+        match death {
+            Some(death) => {
+                assert_eq!(glb.scale(number, death + 1e-3), 0.0, "{node}");
+                assert!(glb.scale(number, death - 1e-6) > 0.0, "{node}");
+                checked += 1;
+            }
+            None => assert!(glb.scale(number, 4.0) > 0.0),
+        }
+    }
+    assert!(checked > 12 && glb.duration() == 4.0, "{checked}");
+}
+
+#[test]
+fn lives_are_shared_and_the_file_depends_on_nothing_but_the_model() {
+    let followed = follow(model("lychnis.dls"), [0.0, 8.0, 0.04], 1);
+    let nodes = followed.growth.nodes();
+    assert!(nodes > 100 && 4 * followed.growth.lives() < nodes, "{nodes} {}", followed.growth.lives());
+    let file = followed.growth.glb().expect("a file");
+    assert!(file.len() < 2_500_000, "{}", file.len());
+    let others = follow(model("lychnis.dls"), [0.0, 8.0, 0.04], 3).growth.glb().expect("a file");
+    assert!(file == others, "threads do not matter");
+    let glb = Glb::read(&file);
+    let mut names: Vec<&str> = glb.nodes().iter().filter_map(|node| node["name"].as_str()).collect();
+    let count = names.len();
+    names.sort_unstable();
+    names.dedup();
+    assert_eq!(names.len(), count, "names are unique");
+}
+
+#[test]
+fn units_are_metres_and_seconds_and_titles_are_escaped() {
+    let text = "title \"a \\\"reed\\\" \u{1f33e} </script>\"\nunits length 0.5, time 4\ninitial string: F(2) +(90) F(x0)\nparam x0 = 1\n";
+    let text = text.replace("\\\"", "'");
+    let session = Session::from_text("units.dls", &text, &[]).expect("a model");
+    let growth = follow(session, [0.0, 3.0, 1.0], 1).growth;
+    let glb = Glb::read(&growth.glb().expect("a file"));
+    assert_eq!(glb.duration(), 12.0);
+    let extras = &glb.json["asset"]["extras"];
+    assert_eq!(
+        (extras["seconds_per_unit"].as_f64(), extras["metres_per_unit"].as_f64()),
+        (Some(4.0), Some(0.5))
+    );
+    assert_eq!(glb.json["scenes"][0]["name"], "a 'reed' \u{1f33e} </script>");
+    let all: Vec<Point> = glb.shown(6.0).into_values().flat_map(|shown| shown.vertices).collect();
+    let top = all.iter().map(|p| p.y).fold(f64::MIN, f64::max);
+    let left = all.iter().map(|p| p.x).fold(f64::MAX, f64::min);
+    // Two units high and one to the left, and the half ball of a line of 0.8 % of two units.
+    assert!((top - 1.004).abs() < 1e-3 && (left + 0.504).abs() < 1e-3, "{top} {left}");
+}
+
+#[test]
+fn too_much_is_refused_before_it_fills_the_memory() {
+    let session = model("dragon.dls");
+    let mut options = Options::new(&session.model, 0.01, 1.0);
+    options.limits = Limits { nodes: 100, ..Limits::default() };
+    let refused = grow(&session, Settings::default(), &[0.0, 4.0, 8.0], &options, &mut |_| true);
+    assert!(matches!(refused, Err(Error::TooMany { limit: 100, .. })), "{refused:?}");
+    options.limits = Limits { numbers: 1000, ..Limits::default() };
+    let refused = grow(&session, Settings::default(), &[0.0, 4.0, 8.0], &options, &mut |_| true);
+    assert!(matches!(refused, Err(Error::TooLarge { limit: 1000, .. })), "{refused:?}");
+    options.seconds = 1e4;
+    let refused = grow(&session, Settings::default(), &[0.0, 8.0], &options, &mut |_| true);
+    assert!(matches!(refused, Err(Error::TooLong { .. })), "{refused:?}");
+    options = Options::new(&session.model, 0.01, 1.0);
+    let stopped = grow(&session, Settings::default(), &[0.0, 8.0], &options, &mut |_| false);
+    assert!(matches!(stopped, Err(Error::Stopped { .. })), "{stopped:?}");
+}
+
+#[test]
+fn the_program_writes_files_whole_or_not_at_all() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
+    let said = good(&["run", "models/leaf.dls", "--format", "glb", "-o", &at("leaf.glb")]);
+    assert!(said.contains("leaf.glb: 19 nodes, 4 different lives"), "{said}");
+    let whole = fs::read(at("leaf.glb")).expect("a file");
+    good(&["render", "models/leaf.dls", "--format", "glb", "-o", &at("there")]);
+    assert!(fs::read(at("there/leaf.glb")).expect("a file") == whole, "both commands write the same");
+    let still = Glb::read(&{
+        good(&["render", "models/leaf.dls", "--at", "4", "--format", "glb", "-o", &at("still.glb")]);
+        fs::read(at("still.glb")).expect("a file")
+    });
+    assert!(still.json["animations"].is_null() && still.shown(0.0).len() > 3);
+    fs::write(at("thesis.glb"), "years of work").expect("written");
+    let cases: [(&[&str], &str); 8] = [
+        (&["run", "models/leaf.dls", "--format", "glb"], "name it, such as `-o leaf.glb`"),
+        (&["run", "models/leaf.dls", "--format", "glb", "-o", "a.gltf"], "`-o a.glb`"),
+        (&["run", "models/leaf.dls", "-o", "a.glb"], "add --format glb"),
+        (
+            &["run", "models/leaf.dls", "--format", "glb", "-o", "a.glb", "--seeds", "1..2"],
+            "--seeds does not go",
+        ),
+        (&["run", "models/leaf.dls", "--format", "glb", "-o", "a.glb", "--speed", "1e-6"], "`--speed 1`"),
+        (&["run", "models/meadow.dls", "--format", "glb", "-o", "a.glb"], "plants of other models"),
+        (
+            &["render", "models/leaf.dls", "--format", "glb", "-o", "a.glb", "--view", "top"],
+            "--view does not go",
+        ),
+        (&["render", "models/leaf.dls", "--speed", "2", "-o", "a"], "--speed is for animated files"),
+    ];
+    for (arguments, expected) in cases {
+        let (_, message) = bad(arguments);
+        assert!(message.contains(expected), "{arguments:?}: {message}");
+    }
+    let (_, message) = bad(&["run", "models/leaf.dls", "--format", "glb", "-o", &at("thesis.glb")]);
+    assert!(message.contains("is not a GLB file"), "{message}");
+    assert_eq!(fs::read_to_string(at("thesis.glb")).expect("there"), "years of work");
+    assert!(!repository("a.glb").exists());
+}
