@@ -126,11 +126,13 @@ fn stems(args: &ReportArgs, session: &Session, name: &str, plan: &Plan) -> Resul
 const SEEDS: u64 = 32;
 /// Segments of the longest chain among the hard cases.
 const CHAIN: usize = 10_000;
+/// Seeds of the random trees.
+const TREES: std::ops::Range<u64> = 48..128;
 
 /// Exact cases, hard cases and speed of wind and stems. Each table is printed when it is complete.
 fn surroundings(args: &ReportArgs) -> Result<(), Failure> {
     let defect = |error: String| Failure::Model(format!("error: {error}\n"));
-    let mut progress = Progress::of_printed("surroundings", 5);
+    let mut progress = Progress::of_printed("surroundings", 6);
     let mut show = |table: String| {
         progress.inc();
         progress.suspend(|| print(&format!("{table}\n")))
@@ -142,6 +144,9 @@ fn surroundings(args: &ReportArgs) -> Result<(), Failure> {
     show(study::exact_stem_table(&stems))?;
     let hard = crate::sway::study::hard_cases(CHAIN);
     show(study::hard_stem_table(&hard))?;
+    let (method, tolerance) = (crate::sway::Method::default(), crate::sway::Settings::default().tolerance);
+    let random: Vec<_> = TREES.map(|seed| crate::sway::study::random_case(seed, method, tolerance)).collect();
+    show(study::random_stem_table(&random))?;
     let methods = crate::sway::study::methods().map_err(|error| defect(error.to_string()))?;
     show(study::method_table(&methods))?;
     let wind = crate::wind::study::statistics(SEEDS).map_err(|error| defect(error.to_string()))?;
@@ -152,13 +157,14 @@ fn surroundings(args: &ReportArgs) -> Result<(), Failure> {
         write(out, "surroundings.csv", &study::surroundings_csv(&wind, &stems))?;
     }
     let bad = wind.iter().filter(|row| !row.holds()).count();
-    let failed = hard.iter().filter(|case| case.failure.is_some()).count();
+    let failed = hard.iter().filter(|case| case.failure.is_some()).count()
+        + random.iter().filter(|case| case.failure.is_some()).count();
     match bad + failed {
         0 => Ok(()),
         _ => Err(Failure::Model(format!(
             "error: {} out of bounds, {} failed\n",
             count_of(bad, "statistic"),
-            count_of(failed, "hard case")
+            count_of(failed, "case of stems")
         ))),
     }
 }

@@ -56,7 +56,8 @@ pub use spread::{QUANTILES, Spread, SpreadSeries, spread_csv, spread_table};
 pub use stems::{StemOutcome, StemPoint, StemStudy, stem_csv, stem_study, stem_table};
 pub use study::{Outcome, Plan, Point, Series, Study, Wall, default_times, study};
 pub use surroundings::{
-    exact_stem_table, hard_stem_table, method_table, speed_table, surroundings_csv, wind_table,
+    exact_stem_table, hard_stem_table, method_table, random_stem_table, speed_table, surroundings_csv,
+    wind_table,
 };
 pub use table::{hard_table, mismatches, series_table, study_head, study_table};
 pub use verify::{

@@ -80,6 +80,23 @@ pub fn hard_stem_table(cases: &[sway::study::HardCase]) -> String {
     out
 }
 
+/// Random trees in random winds, in sum.
+pub fn random_stem_table(cases: &[sway::study::RandomCase]) -> String {
+    let failed: Vec<_> = cases.iter().filter_map(|case| Some((case.seed, case.failure.as_ref()?))).collect();
+    let steps: u64 = cases.iter().map(|case| case.steps + case.rejected).sum();
+    let most = cases.iter().map(|case| case.steps + case.rejected).max().unwrap_or(0);
+    let shortest = cases.iter().map(|case| case.shortest).fold(f64::INFINITY, f64::min);
+    let mut out = format!(
+        "stems: {} random trees in random winds for 0.5 s\n  {} failed, {steps} steps, {most} of them in one case, the shortest of {shortest:.1e} s\n",
+        cases.len(),
+        failed.len()
+    );
+    for (seed, error) in failed {
+        out += &format!("  {seed}: {error}\n");
+    }
+    out
+}
+
 /// The implicit methods on a stem in gusts as a table.
 pub fn method_table(rows: &[sway::study::WorkRow]) -> String {
     let mut out = "stems: a stalk in gusts for 2 s, error of its tip against work\n".to_owned();
