@@ -50,6 +50,7 @@
 //! | [`repl`] | the interactive session |
 //! | [`surround`] | wind and stems that bend, around a growing plant |
 //! | [`sway`] | mechanics of stems that bend |
+//! | [`fall`](crate::fall) | flight and landing of plates and small bodies |
 //! | [`wind`] | the velocity of the air, as a function of place and time |
 //! | [`study`] | accuracy and cost of methods; verification |
 //! | [`cli`] | the command line |
@@ -74,6 +75,7 @@ pub use front::{Error, Model, Module, Plant, Run};
 pub use dlsys_compile as compile;
 pub use dlsys_diagnostic as diagnostic;
 pub use dlsys_expr as expr;
+pub use dlsys_fall as fall;
 pub use dlsys_geometry::{scene, turtle};
 pub use dlsys_model as model;
 pub use dlsys_ode as ode;
