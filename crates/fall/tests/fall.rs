@@ -130,3 +130,50 @@ fn a_body_in_the_ground_does_not_jump() -> Result<(), Error> {
     assert!(fall.rest().is_some() && (end.position.y + 0.05).abs() < 1e-6, "{end:?}");
     Ok(())
 }
+
+/// Plates of 0.1 mm to 3 m, as light as tissue paper or as heavy as steel, in storms: the fall is followed, or an error says that its steps are
+/// too many.
+#[test]
+fn extreme_bodies_end() -> Result<(), Error> {
+    let mut followed = 0;
+    for k in 0..60 {
+        let x = f64::from(k);
+        let half = 1e-4 * 10_f64.powf(4.5 * (x * 0.618).fract());
+        let heavy = 0.01 * 10_f64.powf(4.0 * (x * 0.4142).fract());
+        let body = Body::plate(heavy * half * half * 2.0, [half, half * (0.2 + (x * 0.732).fract())])?;
+        let mut release = Motion::at(Vector::new(0.0, 2.0 + 2.0 * half, 0.0));
+        release.spin = Vector::new(x.sin(), 3.0 * x.cos(), 1.0);
+        let storm = 40.0 * (x * 0.236).fract();
+        let wind = move |p: Vector, t: f64| Vector::new(storm * (t + p.x).sin(), 0.1 * storm * t.cos(), 0.0);
+        let settings = Settings { steps: 200_000, ..Settings::default() };
+        let mut fall = Fall::new(body, release, 0.0, Some(Ground::at(0.0)), settings)?;
+        match fall.at(10.0, &wind) {
+            Ok(motion) => {
+                followed += 1;
+                assert!(motion.position.iter().chain(motion.spin.iter()).all(|value| value.is_finite()));
+                assert!(motion.position.y > -1e-5 * half, "{k}: {motion:?}");
+            }
+            Err(Error::Steps { .. }) => {}
+            Err(error) => return Err(error),
+        }
+    }
+    assert!(followed >= 50, "{followed}");
+    Ok(())
+}
+
+#[test]
+fn threads_give_the_same_bits() -> Result<(), Error> {
+    let mut alone = petal()?;
+    let expected = alone.at(1.5, &wind)?;
+    let results = std::thread::scope(|scope| {
+        let ask = |first: f64| {
+            move || petal().and_then(|mut fall| fall.at(first, &wind).and_then(|_| fall.at(1.5, &wind)))
+        };
+        let threads = [0.3, 4.0].map(|first| scope.spawn(ask(first)));
+        threads.map(|thread| thread.join().ok())
+    });
+    for result in results {
+        assert_eq!(result, Some(Ok(expected)));
+    }
+    Ok(())
+}
