@@ -51,6 +51,7 @@
 //! | [`repl`] | the interactive session |
 //! | [`surround`] | wind and stems that bend, around a growing plant |
 //! | [`sway`] | mechanics of stems that bend |
+//! | [`fall`](crate::fall) | flight and landing of plates and small bodies |
 //! | [`wind`] | the velocity of the air, as a function of place and time |
 //! | [`study`] | accuracy and cost of methods; verification |
 //! | [`cli`] | the command line |
@@ -75,6 +76,7 @@ pub use front::{Error, Model, Module, Plant, Run};
 pub use dlsys_compile as compile;
 pub use dlsys_diagnostic as diagnostic;
 pub use dlsys_expr as expr;
+pub use dlsys_fall as fall;
 pub use dlsys_geometry::{scene, turtle};
 pub use dlsys_interchange as interchange;
 pub use dlsys_model as model;

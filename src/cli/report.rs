@@ -128,11 +128,13 @@ const SEEDS: u64 = 32;
 const CHAIN: usize = 10_000;
 /// Seeds of the random trees.
 const TREES: std::ops::Range<u64> = 48..128;
+/// Bodies that are thrown at the ground.
+const THROWS: u64 = 400;
 
-/// Exact cases, hard cases and speed of wind and stems. Each table is printed when it is complete.
+/// Exact cases, hard cases and speed of wind, stems and bodies that fall. Each table is printed when it is complete.
 fn surroundings(args: &ReportArgs) -> Result<(), Failure> {
     let defect = |error: String| Failure::Model(format!("error: {error}\n"));
-    let mut progress = Progress::of_printed("surroundings", 6);
+    let mut progress = Progress::of_printed("surroundings", 8);
     let mut show = |table: String| {
         progress.inc();
         progress.suspend(|| print(&format!("{table}\n")))
@@ -149,22 +151,30 @@ fn surroundings(args: &ReportArgs) -> Result<(), Failure> {
     show(study::random_stem_table(&random))?;
     let methods = crate::sway::study::methods().map_err(|error| defect(error.to_string()))?;
     show(study::method_table(&methods))?;
+    let mut falls = Vec::new();
+    for case in crate::fall::study::EXACT_CASES {
+        falls.extend(case().map_err(|error| defect(error.to_string()))?);
+    }
+    show(study::exact_fall_table(&falls))?;
+    let landings = study::Landings::new(THROWS).map_err(|error| defect(error.to_string()))?;
+    show(landings.table())?;
     let wind = crate::wind::study::statistics(SEEDS).map_err(|error| defect(error.to_string()))?;
     show(study::wind_table(&wind))?;
     show(study::speed_table().map_err(defect)?)?;
     drop(progress);
     if let Some(out) = &args.out {
-        write(out, "surroundings.csv", &study::surroundings_csv(&wind, &stems))?;
+        write(out, "surroundings.csv", &study::surroundings_csv(&wind, &stems, &falls))?;
     }
     let bad = wind.iter().filter(|row| !row.holds()).count();
     let failed = hard.iter().filter(|case| case.failure.is_some()).count()
-        + random.iter().filter(|case| case.failure.is_some()).count();
+        + random.iter().filter(|case| case.failure.is_some()).count()
+        + landings.failed();
     match bad + failed {
         0 => Ok(()),
         _ => Err(Failure::Model(format!(
             "error: {} out of bounds, {} failed\n",
             count_of(bad, "statistic"),
-            count_of(failed, "case of stems")
+            count_of(failed, "case of stems and falls")
         ))),
     }
 }

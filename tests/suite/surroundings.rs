@@ -291,11 +291,18 @@ fn the_report_of_the_surroundings_has_all_its_tables() {
     let folder = folder(&[]);
     let output = dlsys(&folder, "report --surroundings -o out", "");
     let table = String::from_utf8_lossy(&output.stdout);
-    for part in
-        ["exact cases", "hard cases", "a stalk in gusts", "statistics of the turbulence", "speed on one core"]
-    {
+    for part in [
+        "exact cases",
+        "hard cases",
+        "a stalk in gusts",
+        "falling: exact cases",
+        "400 of 400",
+        "statistics of the turbulence",
+        "speed on one core",
+    ] {
         assert!(table.contains(part), "{part}: {table}");
     }
     let csv = std::fs::read_to_string(folder.path().join("out/surroundings.csv")).expect("written");
     assert!(csv.lines().count() > 80 && csv.contains("stems,\"end load"), "{csv}");
+    assert!(csv.contains("falling,\"flutter"), "{csv}");
 }

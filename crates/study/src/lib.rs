@@ -13,7 +13,8 @@
 //! - `table`, `files`, `plot`: a study as text, as CSV and JSON, and as a picture; `axis`, `diagram`: parts that plots share.
 //! - `spread`, `band`: the distribution of measures over many specimens, as tables and as a plot.
 //! - `verify`: a run computed again in an independent way.
-//! - `stems`: error of drawn positions against work for stems that bend; `surroundings`: exact cases and speed of wind and stems.
+//! - `stems`: error of drawn positions against work for stems that bend; `surroundings`, `falls`: exact cases and speed of wind, stems and
+//!   bodies that fall.
 //! - `case`, `hard`, `cases`: models with exact answers in their first lines.
 //!
 //! Runs are made one after another, never in parallel, because they are timed.
@@ -27,6 +28,7 @@ mod cases;
 mod compare;
 mod diagram;
 mod error;
+mod falls;
 mod files;
 mod hard;
 mod order;
@@ -46,6 +48,7 @@ pub use case::{Case, Expectation, PlainModule, Within};
 pub use cases::CASES;
 pub use compare::{Agreement, Comparison, Difference, compare};
 pub use error::Error;
+pub use falls::{Landings, exact_fall_table};
 pub use files::{csv, hard_csv, hard_json, json};
 pub use hard::{CaseResult, HardPlan, Mismatch, run_case};
 pub use order::{nominal_order, observed_order};

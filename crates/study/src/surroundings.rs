@@ -3,6 +3,7 @@
 use std::hint::black_box;
 use std::time::Instant;
 
+use dlsys_fall as fall;
 use dlsys_sim::brief;
 use dlsys_sway::{self as sway, Fixed, Method, Segment, Skeleton, Solver, State, upright};
 use dlsys_wind::{self as wind, Description, Field};
@@ -229,8 +230,12 @@ fn wind_time() -> Result<(f64, [f64; 2]), wind::Error> {
     Ok((instant, samples))
 }
 
-/// Exact cases of wind and stems as CSV.
-pub fn surroundings_csv(wind: &[wind::study::Row], stems: &[sway::study::Row]) -> String {
+/// Exact cases of wind, stems and falling as CSV.
+pub fn surroundings_csv(
+    wind: &[wind::study::Row],
+    stems: &[sway::study::Row],
+    falls: &[fall::study::Row],
+) -> String {
     let quoted = |name: &str| format!("\"{}\"", name.replace('"', "\"\""));
     let mut out = "part,case,resolution,value,expected,error,bound,order\n".to_owned();
     for row in wind {
@@ -241,6 +246,12 @@ pub fn surroundings_csv(wind: &[wind::study::Row], stems: &[sway::study::Row]) -
         let sway::study::Row { case, resolution, value, expected, error, order } = row;
         let order = order.map_or(String::new(), |order| order.to_string());
         out += &format!("stems,{},{resolution:e},{value:e},{expected:e},{error:e},,{order}\n", quoted(case));
+    }
+    for row in falls {
+        let fall::study::Row { case, resolution, value, expected, error, order } = row;
+        let order = order.map_or(String::new(), |order| order.to_string());
+        out +=
+            &format!("falling,{},{resolution:e},{value:e},{expected:e},{error:e},,{order}\n", quoted(case));
     }
     out
 }

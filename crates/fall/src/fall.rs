@@ -1,0 +1,296 @@
+//! The fall of one body: a pure function of its release, evaluated at any time in any order.
+
+use crate::error::check;
+use crate::forces::Dynamics;
+use crate::motion::Packed;
+use crate::step::{Step, bogacki_shampine};
+use crate::{Body, Error, Ground, Motion, Settings, Wind};
+
+/// What a body is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Phase {
+    Flight,
+    Contact,
+    Rest,
+}
+
+/// All that the next step depends on, beside the rules and the wind.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct State {
+    pub(crate) time: f64,
+    pub(crate) motion: Motion,
+    /// Level m of the last step, which had the length H/2^m.
+    pub(crate) level: u32,
+    pub(crate) phase: Phase,
+    /// Number of impacts so far.
+    pub(crate) impacts: u32,
+    /// For how long the body has hardly moved, in s.
+    pub(crate) calm: f64,
+    pub(crate) steps: u64,
+    /// Derivative in flight, if the step before has computed it.
+    pub(crate) rate: Option<Packed>,
+}
+
+/// What does not change during a fall.
+#[derive(Clone, Debug)]
+pub(crate) struct Rules {
+    pub(crate) body: Body,
+    pub(crate) dynamics: Dynamics,
+    pub(crate) ground: Option<Ground>,
+    pub(crate) settings: Settings,
+    /// Largest half-extent in m.
+    pub(crate) size: f64,
+    /// Time scale in s, see [`Dynamics::moment`].
+    moment: f64,
+}
+
+/// Motions around a step.
+pub(crate) struct Part {
+    pub(crate) before: Motion,
+    /// At its end, before an impact.
+    pub(crate) within: Motion,
+    /// At its end, after an impact.
+    pub(crate) after: Motion,
+    /// Whether it is a step in flight.
+    pub(crate) flight: bool,
+}
+
+/// Number of states that are kept for going back.
+const KEPT: usize = 64;
+
+/// The motion of a body after its release.
+///
+/// The result of [`at`](Fall::at) depends on what was given to [`new`](Fall::new) and on the wind only, not on the times asked for
+/// before: steps are those of the error. Going on costs the steps in between; going back costs some of them again, from the nearest of at most
+/// 64 states that are kept.
+#[derive(Clone, Debug)]
+pub struct Fall {
+    rules: Rules,
+    release: State,
+    /// The last step, and the state after it.
+    step: Option<Step>,
+    state: State,
+    /// States in the order of time: every `stride` steps.
+    kept: Vec<State>,
+    stride: u64,
+    /// The state at rest.
+    rest: Option<State>,
+}
+
+impl Fall {
+    /// A body that is let go at a time in s. One that is below the ground then, in part or as a whole, lands on the level of its lowest contact.
+    ///
+    /// # Errors
+    ///
+    /// A value out of range.
+    pub fn new(
+        body: Body,
+        motion: Motion,
+        time: f64,
+        ground: Option<Ground>,
+        settings: Settings,
+    ) -> Result<Fall, Error> {
+        body.check()?;
+        motion.check()?;
+        check("a time of release (s)", time, time.abs() <= 1e9, "-1e9 to 1e9")?;
+        let settings = settings.checked()?;
+        let mut ground = ground;
+        if let Some(ground) = &mut ground {
+            ground.check()?;
+            ground.height += ground.lowest(&motion, &body).min(0.0);
+        }
+        let dynamics = Dynamics::new(&body, settings.air, ground);
+        let rules = Rules { size: body.size(), moment: dynamics.moment(), body, dynamics, ground, settings };
+        let state = State {
+            time,
+            motion,
+            level: 0,
+            phase: Phase::Flight,
+            impacts: 0,
+            calm: 0.0,
+            steps: 0,
+            rate: None,
+        };
+        Ok(Fall { rules, release: state, step: None, state, kept: Vec::new(), stride: 8, rest: None })
+    }
+
+    /// The body.
+    pub fn body(&self) -> &Body {
+        &self.rules.body
+    }
+
+    /// Time of the release, in s.
+    pub fn begin(&self) -> f64 {
+        self.release.time
+    }
+
+    /// The time from which on the body rests, in s; `None` if that is later than all times asked for.
+    pub fn rest(&self) -> Option<f64> {
+        self.rest.map(|state| state.time)
+    }
+
+    /// Number of steps up to the latest time asked for.
+    pub fn steps(&self) -> u64 {
+        self.state.steps.max(self.kept.last().map_or(0, |state| state.steps))
+    }
+
+    /// Number of impacts before the last time asked for.
+    pub fn impacts(&self) -> u32 {
+        self.state.impacts
+    }
+
+    /// Kinetic and potential energy of a motion in J, with the kinetic energy of the air that moves with the body in still air.
+    pub fn energy(&self, motion: &Motion) -> [f64; 2] {
+        let dynamics = &self.rules.dynamics;
+        [dynamics.kinetic_energy(motion), dynamics.potential_energy(motion)]
+    }
+
+    /// The motion at a time in s. Before the release it is that at the release.
+    ///
+    /// # Errors
+    ///
+    /// A time or a wind that is not finite, an error that no step makes small enough, too many steps.
+    pub fn at(&mut self, time: f64, wind: &impl Wind) -> Result<Motion, Error> {
+        check("a time (s)", time, true, "a finite number")?;
+        if time <= self.release.time {
+            return Ok(self.release.motion);
+        }
+        if let Some(rest) = self.rest.filter(|rest| rest.time <= time) {
+            return Ok(rest.motion);
+        }
+        if self.step.is_some_and(|step| time < step.start) {
+            let after = self.kept.partition_point(|state| state.time <= time);
+            self.state = after.checked_sub(1).map_or(self.release, |index| self.kept[index]);
+            self.step = None;
+        }
+        loop {
+            if let Some(step) = &self.step
+                && time < step.end
+            {
+                return Ok(step.at(time));
+            }
+            if self.state.phase == Phase::Rest {
+                self.rest = Some(self.state);
+                return Ok(self.state.motion);
+            }
+            let (step, next) = self.rules.advance(&self.state, wind)?;
+            (self.step, self.state) = (Some(step), next);
+            self.keep();
+            if next.steps > self.rules.settings.steps {
+                let from = self.release.time;
+                return Err(Error::Steps { from, steps: next.steps, time: next.time });
+            }
+        }
+    }
+
+    /// Makes the next step, up to a time in s; for studies. `None` at rest and after that time.
+    pub(crate) fn part(&mut self, until: f64, wind: &impl Wind) -> Result<Option<Part>, Error> {
+        let before = self.state;
+        if before.phase == Phase::Rest || before.time >= until {
+            return Ok(None);
+        }
+        let (step, next) = self.rules.advance(&before, wind)?;
+        (self.step, self.state) = (Some(step), next);
+        let flight = before.phase == Phase::Flight;
+        Ok(Some(Part { before: before.motion, within: step.last, after: next.motion, flight }))
+    }
+
+    /// Keeps the state for going back, if it is new and its turn has come. Twice as many steps lie between those kept when there are too
+    /// many.
+    fn keep(&mut self) {
+        let due = self.state.steps.is_multiple_of(self.stride);
+        if !due || self.kept.last().is_some_and(|last| last.steps >= self.state.steps) {
+            return;
+        }
+        self.kept.push(self.state);
+        if self.kept.len() >= KEPT {
+            self.stride *= 2;
+            let stride = self.stride;
+            self.kept.retain(|state| state.steps.is_multiple_of(stride));
+        }
+    }
+}
+
+impl Rules {
+    /// The error of a position that is allowed, in m.
+    pub(crate) fn resolution(&self) -> f64 {
+        self.settings.tolerance * self.size
+    }
+
+    /// How far a contact may sink into the ground before the impact is located, in m.
+    pub(crate) fn depth(&self) -> f64 {
+        0.01 * self.resolution()
+    }
+
+    /// The end of a step of a level that begins at a time: the next point of the grid of this level.
+    pub(crate) fn grid(&self, time: f64, level: u32) -> f64 {
+        let h = self.settings.longest / libm::exp2(f64::from(level));
+        let mut end = (libm::floor(time / h) + 1.0) * h;
+        if end - time < 1e-9 * h {
+            end += h;
+        }
+        // At large times, the grid may be finer than the resolution of numbers.
+        if end > time { end } else { time.next_up() }
+    }
+
+    /// The next step, and the state after it.
+    fn advance(&self, state: &State, wind: &impl Wind) -> Result<(Step, State), Error> {
+        let (step, mut next) = match (state.phase, &self.ground) {
+            (Phase::Contact, Some(ground)) => self.slide(ground, state, wind)?,
+            _ => self.fly(state, wind)?,
+        };
+        next.steps = state.steps + 1;
+        Ok((step, next))
+    }
+
+    /// A step in flight, up to the next impact at most.
+    fn fly(&self, state: &State, wind: &impl Wind) -> Result<(Step, State), Error> {
+        let mut level = state.level;
+        loop {
+            let end = self.grid(state.time, level);
+            let h = end - state.time;
+            let (last, rate, error) =
+                bogacki_shampine(&self.dynamics, (&state.motion, state.rate), (state.time, end), wind)?;
+            let excess = self.excess(&error, state.motion.spin.norm().max(last.spin.norm()) * h);
+            if !self.settings.fixed && excess > 1.0 {
+                if level >= self.settings.deepest {
+                    return Err(Error::Step { time: state.time, step: h, excess });
+                }
+                level += 1;
+                continue;
+            }
+            // A step of twice the length has eight times the error. It must begin on its own grid.
+            if !self.settings.fixed && excess < 1.0 / 16.0 && level > 0 {
+                level -= 1;
+            }
+            let step = Step::new(state.time, state.motion, end, last);
+            let contact = self
+                .ground
+                .and_then(|ground| Some((ground, ground.first_contact(&step, &self.body, self.depth())?)));
+            let Some((ground, time)) = contact else {
+                return Ok((
+                    step,
+                    State { time: end, motion: last, level, calm: 0.0, rate: Some(rate), ..*state },
+                ));
+            };
+            let step = step.until(time);
+            let struck = State { time, motion: step.last, level, ..*state };
+            return Ok((step, self.strike(&ground, &struck)));
+        }
+    }
+
+    /// The error of a step in units of the tolerance.
+    fn excess(&self, error: &Packed, turned: f64) -> f64 {
+        // A step never turns the body by more than a radian: dense output and the bounds of contacts count on it.
+        if turned > 1.0 {
+            return f64::INFINITY;
+        }
+        let part = |at: usize| error.fixed_rows::<3>(at).norm();
+        let attitude = 2.0 * error.fixed_rows::<4>(6).norm();
+        let moved = part(0).max(part(3) * self.moment) / self.size;
+        let rotated = attitude.max(part(10) * self.moment);
+        // A maximum would pass over what is no number.
+        let sum = moved + rotated;
+        if sum.is_finite() { moved.max(rotated) / self.settings.tolerance } else { f64::INFINITY }
+    }
+}

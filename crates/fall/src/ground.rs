@@ -1,0 +1,96 @@
+//! The ground, and the search for the instant at which a body touches it.
+
+use crate::error::check;
+use crate::step::Step;
+use crate::{Body, Contact, Error, Motion};
+
+/// A level rigid floor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ground {
+    /// Height in m.
+    pub height: f64,
+    /// Coulomb's coefficient of friction.
+    pub friction: f64,
+    /// Coefficient of restitution, 0 to 1: speed of a rebound relative to that of the impact.
+    pub restitution: f64,
+    /// Resistance of round contacts to rolling, in parts of their radius.
+    pub rolling: f64,
+}
+
+impl Ground {
+    /// A floor at a height in m, with a friction of 0.5, a restitution of 0.2 and a resistance to rolling of 0.02.
+    pub fn at(height: f64) -> Ground {
+        Ground { height, friction: 0.5, restitution: 0.2, rolling: 0.02 }
+    }
+
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        let Ground { height, friction, restitution, rolling } = *self;
+        check("a height of the ground (m)", height, true, "a finite number")?;
+        check("a friction", friction, friction >= 0.0, "0 or more")?;
+        check("a restitution", restitution, (0.0..=1.0).contains(&restitution), "0 to 1")?;
+        check("a resistance to rolling", rolling, rolling >= 0.0, "0 or more")
+    }
+
+    /// Height of a contact above the ground, in m.
+    pub(crate) fn gap(&self, motion: &Motion, contact: &Contact) -> f64 {
+        motion.point(contact.point).y - contact.radius - self.height
+    }
+
+    /// Height of the lowest contact above the ground, in m; infinite without contacts.
+    pub(crate) fn lowest(&self, motion: &Motion, body: &Body) -> f64 {
+        body.contacts.iter().map(|contact| self.gap(motion, contact)).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The first time in a step at which a contact is lower than `-depth`, to within the time in which it sinks half of that; `None` if there
+    /// is none.
+    ///
+    /// Between two samples, a height lies above their chord less an eighth of its largest second derivative times the square of the time between
+    /// them. Intervals where that is not enough are halved, so no point dips into the ground and comes out between two samples.
+    pub(crate) fn first_contact(&self, step: &Step, body: &Body, depth: f64) -> Option<f64> {
+        let curvature = step.bound(body.reach());
+        let height = |time: f64| self.lowest(&step.at(time), body);
+        let ends = [(step.start, height(step.start)), (step.end, height(step.end))];
+        let crossed = self.search(&height, curvature, depth, ends, HALVINGS)?;
+        let (mut above, mut below) = crossed;
+        for _ in 0..60 {
+            let middle = (above + below) / 2.0;
+            let value = height(middle);
+            if value < -depth {
+                below = middle;
+            } else {
+                above = middle;
+                if value < -0.5 * depth {
+                    break;
+                }
+            }
+        }
+        Some(above)
+    }
+
+    /// Two times around the first crossing of `-depth` downward.
+    fn search(
+        &self,
+        height: &impl Fn(f64) -> f64,
+        curvature: f64,
+        depth: f64,
+        [from, to]: [(f64, f64); 2],
+        halvings: u32,
+    ) -> Option<(f64, f64)> {
+        let span = to.0 - from.0;
+        let sag = curvature * span * span / 8.0;
+        if from.1.min(to.1) - sag > -depth {
+            return None;
+        }
+        // A sag of a part of the depth cannot matter.
+        if halvings == 0 || sag < 0.1 * depth {
+            return (to.1 < -depth).then_some((from.0, to.0));
+        }
+        let middle = (from.0 + to.0) / 2.0;
+        let middle = (middle, height(middle));
+        self.search(height, curvature, depth, [from, middle], halvings - 1)
+            .or_else(|| self.search(height, curvature, depth, [middle, to], halvings - 1))
+    }
+}
+
+/// Largest depth of the search; its steps are shorter than the resolution of time then.
+const HALVINGS: u32 = 48;
