@@ -168,6 +168,7 @@ pub fn play<Done: Send>(
             Ok(())
         });
     (clock.simulate, clock.output) = (simulate, output);
+    run.note_sway(nursery.sway_report());
     if let Origin::Simulation(simulation) = &source.origin {
         run.note(simulation.remarks());
     }

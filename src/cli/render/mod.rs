@@ -27,6 +27,7 @@ use crate::render::{
     SheetWriter, Survey,
 };
 use crate::scene::Scene;
+use crate::session::SwayReport;
 use crate::sim::{Method, Settings, Stats, brief};
 
 /// Runs a model and writes its frames; with `--watch`, again and again.
@@ -38,7 +39,8 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
 fn once(args: &RenderArgs, stale: &(dyn Fn() -> bool + Sync)) -> Result<(), Failure> {
     flags::survey(args)?;
     flags::agree(args)?;
-    let run = ModelRun::start(&args.shared)?;
+    let mut run = ModelRun::start(&args.shared)?;
+    run.detail = flags::detail(args);
     match args.seeds {
         Some(seeds) => specimens(args, run, seeds),
         None => render_run(args, run, stale),
@@ -116,11 +118,23 @@ pub fn render_run(
         begun.elapsed().as_secs_f64(),
         written.names
     );
+    if let Some(sway) = run.sway().filter(|sway| sway.by_modes > 0) {
+        line += &sway_line(&sway);
+    }
     if written.bytes > LARGE && args.accuracy.is_none() && args.format.content() != Content::Pixels {
         line +=
             "  large: --accuracy 0.02 makes surfaces of fewer pieces, --format png makes pictures of dots\n";
     }
     std::io::stdout().write_all(line.as_bytes()).map_err(out_error)
+}
+
+/// How the plants in the wind were followed.
+fn sway_line(sway: &SwayReport) -> String {
+    let [least, most] = sway.modes;
+    let modes = if least == most { most.to_string() } else { format!("{least} to {most}") };
+    let (solved, error) = (sway.solved, brief(sway.error_pixels, 2));
+    let modal = format!("{} by {modes} modes a root, measured error {error} pixels", sway.by_modes);
+    format!("  {} in the wind: {solved} solved, {modal}\n", count_of(sway.plants, "plant"))
 }
 
 /// The area of the page: that of a frame, or of a sheet of frames.
