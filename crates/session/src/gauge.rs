@@ -192,10 +192,14 @@ fn kind(
             let points = solved.points();
             reach = points.iter().map(|point| point.norm()).fold(reach, f64::max);
             for (motion, error) in motions.iter().zip(&mut errors) {
-                motion.advance(now).ok()?;
+                if motion.advance(now).is_err() {
+                    *error = f64::INFINITY;
+                    continue;
+                }
                 let apart = motion.points().into_iter().zip(&points).map(|(a, b)| (a - b).norm());
                 // What is no number is no motion.
-                *error = apart.fold(*error, |most, one| if one <= most { most } else { one });
+                let number = |one: f64| if one.is_nan() { f64::INFINITY } else { one };
+                *error = apart.map(number).fold(*error, f64::max);
             }
         }
     }

@@ -7,22 +7,20 @@
 //! a'' = Φᵀ (Q(u, u', t) - M(u) u'')  with  u'' = Φ a''
 //! ```
 //!
-//! is advanced by the method of `ros2.rs` with the matrix `1 + γhD + γ²h²Λ`, of the size of the number of modes. Its damping is estimated
-//! once from the modes; the method has order 2 with any matrix. What stiff modes would do is left out, so steps may be as long as a tick.
+//! is advanced by the method of `ros2.rs` with the matrix `Φᵀ(M + γhD)Φ + γ²h²Λ`, of the size of the number of modes, in the pose at the start of
+//! the step: a mode that bends a stem to the side has another mass where the stem is bent. What stiff modes would do is left out, so steps may be
+//! as long as a tick.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::air::Wind;
 use crate::forces::{Part, Stretch};
-use crate::form::Wrench;
-use crate::link::{Link, pair};
+use crate::form::{Form, Twist, Wrench};
+use crate::link::{Link, pair, transport};
 use crate::place::{Local, Place, Strain};
 use crate::ros2::GAMMA;
 use crate::sweep::part;
 use crate::{Air, Error, Fixed, Mode, Skeleton, Solver, State, Vector};
-
-/// Drag grows with the square of the speed, so its derivative along the flow is twice that across it: the mean of both.
-const SLOPE: f64 = 1.5;
 
 /// The modes of a skeleton that does not change, and of what moves by them.
 #[derive(Clone, Debug)]
@@ -45,9 +43,8 @@ struct Root {
     shapes: Vec<Vec<Vector>>,
     duals: Vec<Vec<Vector>>,
     squared: Vec<f64>,
-    /// Damping by the tissue, and by the air for each m/s of flow.
+    /// Damping by the tissue.
     tissue: DMatrix<f64>,
-    drag: DMatrix<f64>,
 }
 
 /// Amplitudes of modes and their rates.
@@ -62,6 +59,10 @@ struct Amplitudes {
 struct Pass {
     places: Vec<Place>,
     wrenches: Vec<(Wrench, Vector)>,
+    /// Of mass and drag, for each segment alone.
+    forms: Vec<Form>,
+    /// Velocities of the bases in each mode: those of one segment are neighbours.
+    twists: Vec<Twist>,
     /// Middle of each segment and its velocity, in the world.
     middles: Vec<(Vector, Vector)>,
 }
@@ -121,7 +122,6 @@ impl Solver {
         let duals = shapes.iter().map(dual).collect();
         let (rest_moments, rotary) = (self.work.rest_moments.clone(), self.work.rotary.clone());
         let squared = modes.iter().map(|mode| mode.squared).collect();
-        let none = DMatrix::zeros(0, 0);
         let mut root = Root {
             skeleton,
             members,
@@ -131,11 +131,9 @@ impl Solver {
             shapes,
             duals,
             squared,
-            tissue: none.clone(),
-            drag: none,
+            tissue: DMatrix::zeros(0, 0),
         };
         root.tissue = root.heat();
-        root.drag = root.drag(&air);
         Ok(root)
     }
 }
@@ -216,47 +214,6 @@ impl Root {
         })
     }
 
-    /// Damping by a flow of 1 m/s, about: the derivative of the drag.
-    fn drag(&self, air: &Air) -> DMatrix<f64> {
-        let m = self.shapes.len();
-        let mut drag = DMatrix::zeros(m, m);
-        // Velocities of all points by each mode, weighted by the square root of the coefficients.
-        let mut columns: Vec<Vec<f64>> = Vec::new();
-        let mut places: Vec<Place> = Vec::new();
-        for shape in &self.shapes {
-            let mut column = Vec::new();
-            places.clear();
-            for (index, segment) in self.skeleton.segments().iter().enumerate() {
-                let parent = segment.parent.map(|parent| &places[parent]);
-                let strain =
-                    Strain { value: self.base[index], rate: shape[index], acceleration: Vector::zeros() };
-                let (local, place) = Local::new(segment, parent, &Vector::zeros(), &strain);
-                let along = 0.25 * air.density * air.cylinder * segment.drag_diameter * segment.length;
-                for point in &Stretch::new(&local).points {
-                    column.extend((point.velocity * along.sqrt()).iter());
-                }
-                for plate in self.skeleton.plates(index) {
-                    let motion = local.motion(plate.at);
-                    let axes = motion.section.rotation();
-                    let velocity = motion.velocity_at(&(axes * plate.centre));
-                    let across = velocity.dot(&(axes * plate.normal));
-                    let half = 0.5 * air.density * plate.area;
-                    column.push(across * (half * air.normal).sqrt());
-                    column.extend((velocity * (half * air.tangential).sqrt()).iter());
-                }
-                places.push(place);
-            }
-            columns.push(column);
-        }
-        for j in 0..m {
-            for k in 0..m {
-                let sum: f64 = columns[j].iter().zip(&columns[k]).map(|(x, y)| x * y).sum();
-                drag[(j, k)] = SLOPE * sum;
-            }
-        }
-        drag
-    }
-
     /// The amplitudes that a state has.
     fn project(&self, state: &State) -> Amplitudes {
         let of = |value: &dyn Fn(usize) -> Vector| {
@@ -326,18 +283,20 @@ impl Root {
         }
     }
 
-    /// Forces on the modes at a state with accelerations, inertia included.
+    /// Forces on the modes at a state with accelerations, inertia included; and, if `forms` is given, the forms of mass and of drag times it.
     fn forces(
         &self,
         now: &Amplitudes,
         acceleration: &DVector<f64>,
         air: &Air,
         wind: impl Fn(usize) -> Vector,
+        forms: Option<f64>,
         pass: &mut Pass,
     ) -> DVector<f64> {
         let upwards = -air.gravity;
         pass.places.clear();
         pass.wrenches.clear();
+        pass.forms.clear();
         for (index, segment) in self.skeleton.segments().iter().enumerate() {
             let strain = Strain {
                 value: self.base[index] + self.field(&now.value, index),
@@ -352,6 +311,9 @@ impl Root {
             let forces = whole.forces(&local, &place, &stretch, &wind);
             let elastic = segment.rigidity().component_mul(&(strain.value + strain.rate * segment.damping));
             pass.wrenches.push((forces.wrench, forces.pull - elastic - self.rest_moments[index]));
+            if let Some(damping) = forms {
+                pass.forms.push(whole.form(&local, &stretch, &wind, damping));
+            }
             pass.places.push(place);
         }
         for (index, segment) in self.skeleton.segments().iter().enumerate().rev() {
@@ -382,36 +344,57 @@ impl Root {
         if m == 0 {
             return;
         }
-        let Some(matrix) = self.matrix(h, &wind) else {
-            now.value.fill(f64::NAN);
-            return;
-        };
         let squared = DVector::from_column_slice(&self.squared);
         let stiff = |x: &DVector<f64>| squared.component_mul(x);
         let still = DVector::zeros(m);
         // The derivative by time is that of the wind: its value at γh.
-        let force = self.forces(now, &still, air, |i| wind(i, GAMMA), pass);
+        let force = self.forces(now, &still, air, |i| wind(i, GAMMA), Some(GAMMA * h), pass);
+        let Some(matrix) = self.matrix(h, pass) else {
+            now.value.fill(f64::NAN);
+            return;
+        };
         let k = matrix.solve(&(force * h - stiff(&now.rate) * (GAMMA * h * h)));
         let middle = Amplitudes {
             value: &now.value + (&now.rate + &k * GAMMA) * (0.5 * h),
             rate: &now.rate + &k * 0.5,
         };
-        let left = self.forces(&middle, &(&k / h), air, |i| wind(i, 0.5), pass);
+        let left = self.forces(&middle, &(&k / h), air, |i| wind(i, 0.5), None, pass);
         let z = matrix.solve(&(left * h - stiff(&k) * (GAMMA * (0.5 - GAMMA) * h * h)));
         let second = &k + z;
         now.value += (&now.rate + &k * (0.5 - GAMMA)) * h + &second * (GAMMA * h);
         now.rate += second;
     }
 
-    /// 1 + γhD + γ²h²Λ, factorised.
-    fn matrix(&self, h: f64, wind: &impl Fn(usize, f64) -> Vector) -> Option<Cholesky<f64, Dyn>> {
-        let speeds = self.members.iter().map(|&i| wind(i, 0.5).norm());
-        let speed = speeds.sum::<f64>() / self.members.len() as f64;
+    /// M + γhD + γ²h²Λ on the modes, factorised: mass and drag in the present pose, from the forms of the last pass.
+    fn matrix(&self, h: f64, pass: &mut Pass) -> Option<Cholesky<f64, Dyn>> {
+        let m = self.shapes.len();
+        let segments = self.skeleton.segments();
         let step = GAMMA * h;
-        let mut matrix = (&self.tissue + &self.drag * speed) * step;
-        for (k, squared) in self.squared.iter().enumerate() {
-            matrix[(k, k)] += 1.0 + step * step * squared;
+        let mut matrix = &self.tissue * step;
+        pass.twists.clear();
+        for (index, segment) in segments.iter().enumerate() {
+            let form = &pass.forms[index];
+            for (k, shape) in self.shapes.iter().enumerate() {
+                let twist = segment.parent.map_or(Twist::ZERO, |parent| {
+                    let (behind, own) = (&pass.places[parent], &pass.places[index]);
+                    let before = &pass.twists[parent * m + k];
+                    transport(before, &shape[parent], segments[parent].length, behind, own)
+                });
+                pass.twists.push(twist);
+                let long = shape[index] * segment.length;
+                let (moment, force, pull) = form.times(&twist, &long);
+                for (l, other) in self.shapes.iter().enumerate().take(k + 1) {
+                    let against = &pass.twists[index * m + l];
+                    matrix[(k, l)] += moment.dot(&against.angular)
+                        + force.dot(&against.linear)
+                        + pull.dot(&other[index]) * segment.length;
+                }
+            }
         }
+        for (k, squared) in self.squared.iter().enumerate() {
+            matrix[(k, k)] += step * step * squared;
+        }
+        // Cholesky's decomposition takes what is below the diagonal.
         Cholesky::new(matrix)
     }
 }
