@@ -9,7 +9,7 @@ use dlsys::tree::ModuleString;
 /// A tuft without chance, whose ears hang at bent necks.
 const TUFT: &str = "units length 0.1, time 1\ntissue straw = stiffness 3e9, density 350, damping 0.12\n\
     initial string: for i in 1 .. 3: ( [ /(120*i) &(6) Culm ] )\n\
-    interpret Culm: @E(straw) !(0.032) F(2.2) !(0.030) F(2.0) !(0.027) F(1.9) !(0.024) F(1.3) &(10) !(0.02) F(0.6) @E(0) [ @M(0.6, 1.2, 0.5) ]\n";
+    interpret Culm: @E(straw) !(0.032) F(2.2) !(0.030) F(2.0) !(0.027) F(1.9) !(0.024) F(1.3) &(10) !(0.02) F(0.6) @E(0) [ @M(0.6, 1.2, 0.5) @L(0.05) ]\n";
 /// A field of it, over which a gust runs.
 const FIELD: &str = "units length 0.1, time 1\nplant @Tuft from \"tuft.dls\"\n\
     wind 1, 0, 0 speed 1.5 turbulence 0.35 scale 1.2\n\
@@ -67,7 +67,7 @@ fn seen(p: Point, pixels: f64) -> [f64; 2] {
 /// Largest distance between two pictures of the same things, in pixels.
 fn apart(a: &Scene, b: &Scene, pixels: f64) -> f64 {
     let (a, b) = (places(a), places(b));
-    assert!(a.len() == 144 && a.len() == b.len());
+    assert!(a.len() >= 48 && a.len() == b.len(), "{} and {} ears", a.len(), b.len());
     let distance = |(a, b): (&Point, &Point)| {
         let ([ax, ay], [bx, by]) = (seen(*a, pixels), seen(*b, pixels));
         (ax - bx).hypot(ay - by)
