@@ -9,9 +9,9 @@ use super::new::NewArgs;
 use super::shared::{BudgetArgs, RunFormat, SharedArgs, SolverArgs, TextFormat};
 use super::shell::{self, CompletionsArgs, ManArgs};
 use super::values::{
-    Background, LineWidth, RenderFormat, Seeds, Sky, background, bytes, camera, columns, direction,
-    field_of_view, figure, frame_format, layout, line_width, method, pixels, positive, render_format, runs,
-    seeds, setting, size, sky, threads, time, tolerance, zoom,
+    Background, LineWidth, RenderFormat, Seeds, Sky, background, bend_pixels, bytes, camera, columns,
+    direction, field_of_view, figure, frame_format, layout, line_width, method, pixels, positive,
+    render_format, runs, seeds, setting, size, sky, threads, time, tolerance, zoom,
 };
 use super::verify::VerifyArgs;
 use crate::compile::Setting;
@@ -325,6 +325,11 @@ pub struct RenderArgs {
     /// @L, the flower @K and meshes from files are not subdivided.
     #[arg(long, value_name = "L", value_parser = positive)]
     pub accuracy: Option<f64>,
+    /// Largest error, in pixels, of plants of other models that move in the wind by the modes of their class (0 to 100; 0: all are solved)
+    ///
+    /// For --format png, in scenes with a camera. The error is measured on a sample; without a camera, all plants are solved.
+    #[arg(long, value_name = "PIXELS", allow_negative_numbers = true, default_value = "0.5", value_parser = bend_pixels)]
+    pub bend_pixels: f64,
     /// Draw in perspective with this field of view (1 to 120 degrees), filled by the drawings of all times [default:
     /// orthographic]
     #[arg(long, value_name = "DEGREES", value_parser = field_of_view)]

@@ -15,7 +15,7 @@ use crate::compile::Setting;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::model::Frames;
 use crate::scene::Scene;
-use crate::session::{Nursery, Session};
+use crate::session::{Detail, Nursery, Session, SwayReport};
 use crate::sim::{self, Settings, Simulation, Stats};
 use crate::tree::ModuleString;
 
@@ -125,6 +125,10 @@ pub struct ModelRun {
     remarks: Mutex<Remarks>,
     pub times: Vec<f64>,
     pub settings: Settings,
+    /// The size of the pictures, if they have one: see [`Nursery::for_picture`].
+    pub detail: Option<Detail>,
+    /// How plants were followed in the wind.
+    sway: Mutex<Option<SwayReport>>,
     /// Time spent; at first that of reading the model.
     pub clock: Clock,
 }
@@ -147,6 +151,29 @@ struct StatsFile {
     seed: u64,
     #[serde(flatten)]
     counts: Stats,
+    /// How plants of other models were followed in the wind.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sway: Option<SwayStats>,
+}
+
+/// A [`SwayReport`] in the file.
+#[derive(Serialize)]
+struct SwayStats {
+    plants: usize,
+    solved: usize,
+    by_modes: usize,
+    /// Least and greatest number of modes of a root.
+    modes: [usize; 2],
+    classes: usize,
+    /// Measured on a sample.
+    error_pixels: f64,
+}
+
+impl SwayStats {
+    fn of(report: SwayReport) -> SwayStats {
+        let SwayReport { plants, solved, by_modes, modes, classes, error_pixels } = report;
+        SwayStats { plants, solved, by_modes, modes, classes, error_pixels }
+    }
 }
 
 /// Largest number of slices of the scheduler `local`, the same as that of frames.
@@ -255,7 +282,8 @@ impl ModelRun {
                 )));
             }
         }
-        Ok(ModelRun { session, remarks: Mutex::default(), times, settings, clock: Clock::default() })
+        let (remarks, sway) = Default::default();
+        Ok(ModelRun { session, remarks, times, settings, detail: None, sway, clock: Clock::default() })
     }
 
     /// Starts a simulation.
@@ -270,7 +298,19 @@ impl ModelRun {
 
     /// Draws the strings of a run, with plants of other models.
     pub fn nursery(&self) -> Nursery<'_> {
-        Nursery::new(&self.session.model, self.settings)
+        Nursery::new(&self.session.model, self.settings).for_picture(self.detail)
+    }
+
+    /// Notes how the plants of a pass were followed in the wind. A pass of scenes that are kept follows none.
+    pub fn note_sway(&self, report: Option<SwayReport>) {
+        if report.is_some() {
+            *self.sway.lock().unwrap_or_else(PoisonError::into_inner) = report;
+        }
+    }
+
+    /// How plants of other models were followed in the wind; `None` if none sways.
+    pub fn sway(&self) -> Option<SwayReport> {
+        *self.sway.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Draws a frame.
@@ -325,6 +365,7 @@ impl ModelRun {
             frames: self.times.len(),
             seed: self.settings.seed,
             counts,
+            sway: self.sway().map(SwayStats::of),
         };
         let text = serde_json::to_string_pretty(&file)
             .map_err(|error| Failure::Model(format!("error: cannot write {}: {error}\n", path.display())))?

@@ -201,6 +201,7 @@ fn play_times<Done: Send>(
             Ok(())
         });
     (clock.simulate, clock.output) = (simulate, output);
+    run.note_sway(nursery.sway_report());
     if let Origin::Simulation(simulation) = &source.origin {
         run.note(simulation.remarks());
     }

@@ -296,6 +296,14 @@ pub(super) fn bend_method(text: &str) -> Result<BendMethod, String> {
 /// Smallest tolerance of bending: below it, rounding is what remains of the error of a step.
 const FINEST_BEND: f64 = 1e-9;
 
+/// Largest error in pixels of plants that move by modes.
+pub(super) fn bend_pixels(text: &str) -> Result<f64, String> {
+    match number(text)? {
+        x if (0.0..=100.0).contains(&x) => Ok(x),
+        _ => Err("must be between 0 and 100".to_owned()),
+    }
+}
+
 pub(super) fn bend_tolerance(text: &str) -> Result<f64, String> {
     match number(text)? {
         x if (FINEST_BEND..=0.1).contains(&x) => Ok(x),

@@ -43,6 +43,7 @@ mod schedulers;
 mod semantics;
 mod shadows;
 mod signals;
+mod small_plants;
 mod strain;
 mod strain_runs;
 mod surroundings;

@@ -174,7 +174,7 @@ pub struct Fit {
 }
 
 /// The shape of pictures of declared cameras: width by height.
-const CAMERA_SHAPE: f64 = 1.5;
+pub const CAMERA_SHAPE: f64 = 1.5;
 
 /// Surroundings of flags, and those of a scene where there are none.
 fn joined(flags: &Surroundings, scene: &Surroundings) -> Surroundings {

@@ -86,7 +86,7 @@ mod view;
 
 pub use camera::Camera;
 pub use error::Error;
-pub use fit::{Fit, Picture, Survey};
+pub use fit::{CAMERA_SHAPE, Fit, Picture, Survey};
 pub use formats::{Content, Description, Drawing, Exporter, Format};
 pub use frames::{FrameDirectory, MANIFEST, Staged, Staging, replace};
 pub use layout::{Layout, Sheet, Spacing};

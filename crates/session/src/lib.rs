@@ -20,12 +20,14 @@
 
 #![warn(missing_docs)]
 
+mod gauge;
 mod nursery;
 pub mod replay;
 mod swaying;
 
+pub use gauge::Detail;
 pub use nursery::{DrawError, Nursery};
-pub use swaying::sways;
+pub use swaying::{SwayReport, sways};
 
 use std::cell::RefCell;
 use std::io::Read;

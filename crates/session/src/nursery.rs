@@ -10,13 +10,14 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use crate::swaying::{Around, Swaying, sways};
+use crate::gauge::{Detail, Gauge};
+use crate::swaying::{Around, SwayReport, Swaying, sways};
 use dlsys_diagnostic::Diagnostic;
 use dlsys_geometry::scene::{Bounds, Plant, Scene, Seedling, Width};
 use dlsys_geometry::turtle::{self, Strains};
 use dlsys_model::{self as model, Model};
 use dlsys_sim::{self as sim, Settings, Simulation, brief};
-use dlsys_surround::{self as surround, Motion, Passive as Following, Place, Weather};
+use dlsys_surround::{self as surround, Classes, Motion, Passive as Following, Place, Weather};
 use dlsys_tree::ModuleString;
 
 /// Most simulations that are kept from one scene to the next.
@@ -86,6 +87,9 @@ pub struct Nursery<'m> {
     passive: OnceLock<Result<Passive<'m>, surround::Error>>,
     /// The plants in the wind.
     swaying: Swaying<'m>,
+    /// The size of the picture, if there is one, and what it means for the plants in the wind.
+    detail: Option<Detail>,
+    gauge: OnceLock<Option<Gauge>>,
 }
 
 /// What is passive in a scene.
@@ -118,7 +122,20 @@ impl<'m> Nursery<'m> {
             pool: Mutex::default(),
             passive: OnceLock::new(),
             swaying: Swaying::default(),
+            detail: None,
+            gauge: OnceLock::new(),
         }
+    }
+
+    /// For pictures of this size, in which plants that are small move by the modes of their class, with an error below its bound.
+    /// Without a size, all plants are solved; so are those in plants.
+    pub fn for_picture(self, detail: Option<Detail>) -> Nursery<'m> {
+        Nursery { detail, gauge: OnceLock::new(), ..self }
+    }
+
+    /// How the plants that have been drawn so far were followed in the wind; `None` if none of them sways.
+    pub fn sway_report(&self) -> Option<SwayReport> {
+        self.swaying.report()
     }
 
     /// An empty scene with the materials of the model and of its plants, to be drawn into.
@@ -282,7 +299,12 @@ impl<'m> Nursery<'m> {
         };
         let all: Vec<(&Seedling, &'m Model, u64)> = seedlings.iter().map(of).collect();
         let now = around.place.birth + time * around.place.units.time;
-        let motions = self.swaying.of(around, &all, self.settings, now);
+        let gauge = || {
+            let (model, classes) = ((self.model, self.settings), Arc::new(Classes::default()));
+            Gauge::new(model, &self.blank, around, self.detail?, &classes)
+        };
+        let gauge = self.detail.and_then(|_| self.gauge.get_or_init(gauge).as_ref());
+        let motions = self.swaying.of(around, &all, (self.settings, gauge), now);
         motions.map(Some).map_err(|(i, error)| {
             let plant = &plants[seedlings[i].plant];
             let message = format!("the plant `{}` cannot move in the wind", plant.name);
@@ -349,7 +371,7 @@ fn count(scene: &Scene) -> usize {
 }
 
 /// A seed as it is given in a string: whole numbers as `--seed` takes them; others by their digits.
-fn number_of(seed: f64) -> u64 {
+pub(crate) fn number_of(seed: f64) -> u64 {
     match (0.0..9e15).contains(&seed) && seed.fract() == 0.0 {
         true => seed as u64,
         false => seed.to_bits(),

@@ -6,8 +6,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 use dlsys_geometry::scene::Seedling;
 use dlsys_model::{Model, Units};
 use dlsys_sim::Settings;
-use dlsys_surround::{CLOCK, Error, Motion, Passive, Place, Weather};
+use dlsys_surround::{ByModes, CLOCK, Classes, Error, Motion, Passive, Place, Weather};
 use nalgebra::Matrix3;
+
+use crate::gauge::{Choice, Gauge};
 
 /// Most motions that are kept from one scene to the next.
 const MOST_KEPT: usize = 100_000;
@@ -53,13 +55,53 @@ pub fn sways(model: &Model) -> bool {
 /// A plant at its place: its number, its seed, its birth and its placement.
 type Key = (usize, u64, [u64; 13]);
 
+/// How the plants of a scene that sway were followed.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SwayReport {
+    /// Plants that sway.
+    pub plants: usize,
+    /// Those that were solved.
+    pub solved: usize,
+    /// Those that moved by modes where they did not grow.
+    pub by_modes: usize,
+    /// Least and greatest number of modes of a root among them.
+    pub modes: [usize; 2],
+    /// Different bodies that they had.
+    pub classes: usize,
+    /// Largest error of these plants, in pixels: the one that a sample of their declaration has, at their places.
+    pub error_pixels: f64,
+}
+
 /// The motions of the plants of a model.
 #[derive(Default)]
 pub struct Swaying<'m> {
-    kept: Mutex<HashMap<Key, Arc<Motion<'m>>>>,
+    kept: Mutex<HashMap<Key, Kept<'m>>>,
+    classes: Arc<Classes>,
 }
 
+/// A motion, and how it is followed: `None` if it is solved.
+type Kept<'m> = (Arc<Motion<'m>>, Option<Choice>);
+
 impl<'m> Swaying<'m> {
+    /// How the plants that have been drawn were followed; `None` if none sways.
+    pub fn report(&self) -> Option<SwayReport> {
+        let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut report = SwayReport { plants: kept.len(), ..SwayReport::default() };
+        for (_, choice) in kept.values() {
+            let Some(choice) = choice else {
+                report.solved += 1;
+                continue;
+            };
+            let [least, most] = report.modes;
+            let least = if report.by_modes == 0 { choice.count } else { least.min(choice.count) };
+            report.modes = [least, most.max(choice.count)];
+            report.by_modes += 1;
+            report.error_pixels = report.error_pixels.max(choice.pixels);
+        }
+        report.classes = if report.by_modes > 0 { self.classes.count() } else { 0 };
+        (report.plants > 0).then_some(report)
+    }
+
     /// The motions of these plants, all advanced to the present of the scene, in s. Each comes with its model and its seed;
     /// `None` for a plant without stems that give way.
     ///
@@ -69,20 +111,23 @@ impl<'m> Swaying<'m> {
         &self,
         around: &Around,
         plants: &[(&Seedling, &'m Model, u64)],
-        settings: Settings,
+        (settings, gauge): (Settings, Option<&Gauge>),
         now: f64,
     ) -> Result<Vec<Option<Arc<Motion<'m>>>>, (usize, Error)> {
-        let passive = Passive { kept: KEPT, marks: false, ..Passive::of(settings.bending) };
         let mut motions = Vec::with_capacity(plants.len());
         for (i, &(seedling, model, seed)) in plants.iter().enumerate() {
             let place = around.of(seedling, model);
             let key = (seedling.plant, seed, bits(&place));
             let kept = || self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-            if let Some(known) = kept().get(&key) {
+            if let Some((known, _)) = kept().get(&key) {
                 motions.push(Some(known.clone()));
                 continue;
             }
             let settings = Settings { seed, ..settings };
+            let choice = gauge.and_then(|gauge| gauge.choose(seedling.plant, seedling.placement.origin));
+            let by = |choice: Choice| ByModes { count: choice.count, classes: Arc::clone(&self.classes) };
+            let default = Passive::of(settings.bending);
+            let passive = Passive { kept: KEPT, marks: false, modes: choice.map(by), ..default };
             let new = Motion::new(model, settings, around.weather.clone(), place, passive);
             let new = new.map_err(|error| (i, error))?.map(Arc::new);
             if let Some(new) = &new {
@@ -90,7 +135,7 @@ impl<'m> Swaying<'m> {
                 if kept.len() >= MOST_KEPT {
                     kept.clear();
                 }
-                kept.insert(key, new.clone());
+                kept.insert(key, (new.clone(), choice));
             }
             motions.push(new);
         }

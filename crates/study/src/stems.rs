@@ -219,7 +219,7 @@ pub fn stem_csv(study: &StemStudy) -> String {
     for StemPoint { bending, result } in &study.points {
         out += &format!("{},{:e}", bending.method.name(), bending.tolerance);
         out += &match result {
-            Ok(StemOutcome { error, seconds, effort: Effort { ticks, steps, stem_steps } }) => {
+            Ok(StemOutcome { error, seconds, effort: Effort { ticks, steps, stem_steps, .. } }) => {
                 format!(",{error:e},{seconds},{ticks},{steps},{stem_steps}\n")
             }
             Err(_) => ",,,,,\n".to_owned(),

@@ -15,6 +15,7 @@ use dlsys_sway::{self as sway, Solver, State, Vector, Wind, hermite};
 use dlsys_tree::ModuleString;
 
 use crate::body::{Body, roll, rolled};
+use crate::classes::{ByModes, Modal};
 use crate::descent::Descent;
 use crate::place::Place;
 use crate::weather::Sampler;
@@ -27,6 +28,12 @@ struct Knot {
     time: f64,
     strain: Vec<Vector>,
     rate: Vec<Vector>,
+}
+
+impl Knot {
+    fn new(time: f64, state: &State) -> Knot {
+        Knot { time, strain: state.strain.clone(), rate: state.rate.clone() }
+    }
 }
 
 /// The motion of the stems from one tick to the next. Times are in s.
@@ -47,6 +54,22 @@ impl Tick {
             (Some(knot), None) | (None, Some(knot)) => (knot.strain[stem], knot.rate[stem]),
             (None, None) => (Vector::zeros(), Vector::zeros()),
         }
+    }
+
+    /// The ends of all stems at the tick, and points beyond the centres of what they carry, in m.
+    pub(crate) fn points(&self) -> Vec<Vector> {
+        let skeleton = &self.body.skeleton;
+        let strain: &[Vector] = self.knots.first().map_or(&[], |knot| &knot.strain);
+        let pose = sway::Pose::new(skeleton, strain);
+        let mut points = Vec::new();
+        for stem in 0..skeleton.len() {
+            points.push(pose.point(stem, 1.0));
+            points.extend(skeleton.loads(stem).iter().map(|load| {
+                let section = pose.at(stem, load.at);
+                section.origin + section.axes * load.centre * 2.0
+            }));
+        }
+        points
     }
 
     /// Number of strains that are kept.
@@ -138,6 +161,8 @@ pub struct Effort {
     pub steps: u64,
     /// Sum of the number of stems over these steps.
     pub stem_steps: u64,
+    /// Ticks in which the stems moved by modes, which are no steps of the solver.
+    pub by_modes: u64,
 }
 
 /// The stems of a model in motion.
@@ -149,6 +174,7 @@ pub(crate) struct Bending<M> {
     solver: Solver,
     tolerance: f64,
     state: State,
+    modal: Option<Modal>,
     /// The body at the last tick.
     body: Arc<Body>,
     /// The string at the last tick.
@@ -167,6 +193,7 @@ impl<M: Deref<Target = Model>> Bending<M> {
             solver: Solver::new(place.settings(settings)),
             tolerance: settings.tolerance,
             state: State::default(),
+            modal: None,
             body: Arc::default(),
             string: ModuleString::default(),
             timeless: turtle::is_timeless(&model),
@@ -174,6 +201,11 @@ impl<M: Deref<Target = Model>> Bending<M> {
             effort: Effort::default(),
             model,
         }
+    }
+
+    /// Moves by modes where it does not grow.
+    pub(crate) fn by_modes(self, modes: Option<ByModes>) -> Bending<M> {
+        Bending { modal: modes.map(Modal::new), ..self }
     }
 
     pub(crate) fn model(&self) -> &Model {
@@ -221,28 +253,46 @@ impl<M: Deref<Target = Model>> Bending<M> {
         self.effort.ticks += 1;
         let mut knots = Vec::new();
         if self.is_due(&body, &state) {
-            let knot =
-                |time, state: &State| Knot { time, strain: state.strain.clone(), rate: state.rate.clone() };
-            knots.push(knot(from, &state));
-            let mut given = f64::NAN;
-            let moves = body.moves();
-            let mut growth = |time: f64, out: &mut sway::Skeleton| {
-                if !out.is_empty() && (!moves || time == given) {
-                    return false;
-                }
-                given = time;
-                body.later(time - from, out);
-                true
-            };
-            let mut note = |step: &sway::Step<'_>| knots.push(knot(step.to, step.after));
-            let done = self.solver.advance(&mut state, from, to, &mut growth, &*self.wind, &mut note);
-            done.map_err(|error| self.wind.failure().unwrap_or_else(|| self.failure(&body, error, from)))?;
-            let steps = knots.len() as u64 - 1;
-            (self.effort.steps, self.effort.stem_steps) =
-                (self.effort.steps + steps, self.effort.stem_steps + steps * body.stems.len() as u64);
+            knots.push(Knot::new(from, &state));
+            let modal = self.modal.as_mut();
+            if modal.is_some_and(|modal| {
+                modal.advance(&body, &mut state, (from, to), &*self.wind, &mut self.solver)
+            }) {
+                knots.push(Knot::new(to, &state));
+                self.effort.by_modes += 1;
+            } else {
+                self.solve(&body, &mut state, (from, to), &mut knots)?;
+            }
         }
         (self.body, self.state) = (Arc::clone(&body), state);
         Ok(Tick { body, knots })
+    }
+
+    /// Advances a state by a tick, with controlled error.
+    fn solve(
+        &mut self,
+        body: &Body,
+        state: &mut State,
+        (from, to): (f64, f64),
+        knots: &mut Vec<Knot>,
+    ) -> Result<(), Error> {
+        let mut given = f64::NAN;
+        let moves = body.moves();
+        let mut growth = |time: f64, out: &mut sway::Skeleton| {
+            if !out.is_empty() && (!moves || time == given) {
+                return false;
+            }
+            given = time;
+            body.later(time - from, out);
+            true
+        };
+        let mut note = |step: &sway::Step<'_>| knots.push(Knot::new(step.to, step.after));
+        let done = self.solver.advance(state, from, to, &mut growth, &*self.wind, &mut note);
+        done.map_err(|error| self.wind.failure().unwrap_or_else(|| self.failure(body, error, from)))?;
+        let steps = knots.len() as u64 - 1;
+        (self.effort.steps, self.effort.stem_steps) =
+            (self.effort.steps + steps, self.effort.stem_steps + steps * body.stems.len() as u64);
+        Ok(())
     }
 
     /// The body of a string with the motion that growth prescribes, from the string a little earlier, unless there was a production in between.

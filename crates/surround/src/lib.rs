@@ -10,12 +10,14 @@
 //!
 //! - [`Weather`]: the wind that a model declares.
 //! - [`Survey`]: axes of a string with their natural frequencies, before anything is simulated.
+//! - [`Classes`]: modes by which plants move that are small in the picture.
 //! - [`Motion`]: the stems of a model at any time, as [`BentStems`] for [`draw_bent`](dlsys_geometry::turtle::draw_bent).
 
 #![warn(missing_docs)]
 
 mod bending;
 mod body;
+mod classes;
 mod coupled;
 mod descent;
 mod error;
@@ -25,6 +27,7 @@ mod survey;
 mod weather;
 
 pub use bending::{BentStems, Effort};
+pub use classes::{ByModes, Classes};
 pub use coupled::start;
 pub use error::{Error, FailedStem};
 pub use motion::{MOST_TICKS, Motion, Passive};

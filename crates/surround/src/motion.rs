@@ -20,6 +20,7 @@ use dlsys_sway as sway;
 use dlsys_tree::ModuleString;
 
 use crate::bending::{Bending, BentStems, Effort, Tick, bent};
+use crate::classes::ByModes;
 use crate::coupled;
 use crate::descent::Descent;
 use crate::place::Place;
@@ -38,7 +39,7 @@ const FIRST_SPACING: u64 = 64;
 pub(crate) const LOOK_BACK: f64 = 1.0 / 1024.0;
 
 /// How passive motion is computed and kept.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Passive {
     /// The solver of stems: method, tolerance, air.
     pub solver: sway::Settings,
@@ -46,6 +47,8 @@ pub struct Passive {
     pub kept: usize,
     /// Copies are kept, so that a time far back does not mean to begin anew.
     pub marks: bool,
+    /// Moves by modes where it does not grow; otherwise it is solved.
+    pub modes: Option<ByModes>,
 }
 
 impl Passive {
@@ -70,6 +73,7 @@ impl Default for Passive {
             solver: sway::Settings { longest: CLOCK, ..Default::default() },
             kept: MOST_KEPT,
             marks: true,
+            modes: None,
         }
     }
 }
@@ -194,7 +198,8 @@ impl<'m> Motion<'m> {
         let settings = Settings { log: true, transitions: false, ..settings };
         let growth = coupled::start(model, settings, place)?;
         let sampler = Arc::new(Sampler::new(weather, place));
-        let present = Course::new(growth, Bending::new(model, sampler, place, passive.solver))?;
+        let bending = Bending::new(model, sampler, place, passive.solver).by_modes(passive.modes.clone());
+        let present = Course::new(growth, bending)?;
         let courses = Courses {
             // Without marks the whole is begun anew where time goes back.
             marks: vec![present.clone()],
@@ -236,6 +241,12 @@ impl<'m> Motion<'m> {
     pub fn reached(&self) -> f64 {
         let courses = self.courses.lock().unwrap_or_else(PoisonError::into_inner);
         courses.present.number as f64 * CLOCK
+    }
+
+    /// Points of the plant at the present tick, in m: the ends of all stems, and of what they carry about as far beyond its centre as that is
+    /// from the stem.
+    pub fn points(&self) -> Vec<sway::Vector> {
+        self.courses.lock().unwrap_or_else(PoisonError::into_inner).present.tick.points()
     }
 
     /// Work of the present course from t = 0.

@@ -211,6 +211,20 @@ impl Part<'_> {
         form
     }
 
+    /// The form of mass, and of drag in a wind (base frame) times `damping`.
+    pub(crate) fn form(&self, local: &Local, stretch: &Stretch, wind: &Vector, damping: f64) -> Form {
+        let mut form = self.mass_form(local, stretch);
+        if self.feels_air() {
+            let damper = self.damper(local, stretch, wind);
+            form.damper(&(damper.damping * damping), &damper.place, &damper.shift);
+            for plate in self.plates {
+                let damper = self.plate_damper(local, plate, wind);
+                form.damper(&(damper.damping * damping), &damper.place, &damper.shift);
+            }
+        }
+        form
+    }
+
     /// Adds the inertia of levers that change by the square root of `square` (m²) during the step.
     ///
     /// The inertia of a straight stem against twist is next to nothing, and grows with the square of its bend: within a step by orders of

@@ -161,6 +161,16 @@ impl Form {
 }
 
 impl Form {
+    /// The product with a twist of the base and a rate of strain times the length: moment, force, and pull on the strain.
+    #[inline(always)]
+    pub(crate) fn times(&self, twist: &Twist, long: &Vector) -> (Vector, Vector, Vector) {
+        let Twist { angular, linear } = twist;
+        let moment = self.inertia.aa * angular + self.inertia.al * linear + self.moment * long;
+        let force = self.inertia.al.tr_mul(angular) + self.inertia.ll * linear + self.force * long;
+        let pull = self.moment.tr_mul(angular) + self.force.tr_mul(linear) + self.own * long;
+        (moment, force, pull)
+    }
+
     /// Multiplies the form by a number.
     pub(crate) fn scale(&mut self, factor: f64) {
         for matrix in [&mut self.inertia.aa, &mut self.inertia.al, &mut self.inertia.ll] {

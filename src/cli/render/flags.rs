@@ -3,8 +3,9 @@
 use crate::cli::args::RenderArgs;
 use crate::cli::common::Failure;
 use crate::cli::values::{Background, LineWidth, Sky};
-use crate::render::{Content, Fit, Format, Layout, Page, Picture, Size, Spacing, Survey, View};
+use crate::render::{CAMERA_SHAPE, Content, Fit, Format, Layout, Page, Picture, Size, Spacing, Survey, View};
 use crate::scene::Surroundings;
+use crate::session::Detail;
 
 fn usage(message: impl std::fmt::Display) -> Failure {
     Failure::Usage(format!("error: {message}\n"))
@@ -112,6 +113,25 @@ pub fn fit(args: &RenderArgs, survey: &Survey, picture: impl Fn(&Fit) -> Picture
         fit = fit.with_accuracy(accuracy);
     }
     Ok(fit)
+}
+
+/// The size in which the plants of a scene are seen, if pictures of dots are taken by its camera.
+pub fn detail(args: &RenderArgs, format: Format) -> Option<Detail> {
+    let has_view = args.view.is_some() || args.perspective.is_some();
+    if format.content() != Content::Pixels || has_view || args.bend_pixels == 0.0 {
+        return None;
+    }
+    let size = match (args.size, args.width) {
+        (Some((width, height)), _) => Size::Exact(width, height),
+        (None, Some(width)) => Size::Width(width),
+        (None, None) => Size::default(),
+    };
+    let smaller = match size {
+        Size::Exact(width, height) => f64::from(width.min(height)),
+        Size::Larger(pixels) | Size::Width(pixels) => f64::from(pixels) / CAMERA_SHAPE,
+    };
+    let pixels = smaller * args.zoom.unwrap_or(1.0);
+    Some(Detail { pixels, viewpoint: args.camera, bound: args.bend_pixels })
 }
 
 /// The page for a picture.

@@ -28,6 +28,7 @@ use crate::render::{
     Sheet, SheetWriter, Survey,
 };
 use crate::scene::Scene;
+use crate::session::SwayReport;
 use crate::sim::{Method, Settings, Stats, brief};
 
 /// Runs a model and writes its frames; with `--watch`, again and again.
@@ -40,7 +41,8 @@ fn once(args: &RenderArgs, stale: &(dyn Fn() -> bool + Sync)) -> Result<(), Fail
     let Some(format) = args.format.of_frames() else { return export::render(args, stale) };
     flags::survey(args)?;
     flags::agree(args, format)?;
-    let run = ModelRun::start(&args.shared)?;
+    let mut run = ModelRun::start(&args.shared)?;
+    run.detail = flags::detail(args, format);
     match args.seeds {
         Some(seeds) => specimens(args, format, run, seeds),
         None => render_run(args, run, stale),
@@ -122,11 +124,23 @@ pub fn render_run(
         begun.elapsed().as_secs_f64(),
         written.names
     );
+    if let Some(sway) = run.sway().filter(|sway| sway.by_modes > 0) {
+        line += &sway_line(&sway);
+    }
     if written.bytes > LARGE && args.accuracy.is_none() && format.content() != Content::Pixels {
         line +=
             "  large: --accuracy 0.02 makes surfaces of fewer pieces, --format png makes pictures of dots\n";
     }
     std::io::stdout().write_all(line.as_bytes()).map_err(out_error)
+}
+
+/// How the plants in the wind were followed.
+fn sway_line(sway: &SwayReport) -> String {
+    let [least, most] = sway.modes;
+    let modes = if least == most { most.to_string() } else { format!("{least} to {most}") };
+    let (solved, error) = (sway.solved, brief(sway.error_pixels, 2));
+    let modal = format!("{} by {modes} modes a root, measured error {error} pixels", sway.by_modes);
+    format!("  {} in the wind: {solved} solved, {modal}\n", count_of(sway.plants, "plant"))
 }
 
 /// The area of the page: that of a frame, or of a sheet of frames.

@@ -75,6 +75,7 @@ use dlsys_model::Model;
 use dlsys_tree::ModuleString;
 pub use error::{Error, ErrorKind};
 pub use skeleton::{Form, Load, Origin, Skeleton, Stem};
+pub use surroundings::surroundings;
 
 /// Most modules that one frame may draw, those that interpretations make included.
 pub const MODULE_LIMIT: usize = 10_000_000;

@@ -11,7 +11,7 @@ use dlsys_tree::Lineage;
 ///
 /// # Errors
 /// A direction without a length, a camera that stands where it looks, an angle that is none, or a number that is none.
-pub(super) fn surroundings(model: &Model, time: f64) -> Result<Surroundings, Error> {
+pub fn surroundings(model: &Model, time: f64) -> Result<Surroundings, Error> {
     let scenery = &model.scenery;
     let mut found = Surroundings {
         sky: scenery.sky.map(|colors| colors.map(Color::hex)),
