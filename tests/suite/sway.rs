@@ -179,11 +179,22 @@ fn a_plant_sways_as_its_model_does_alone() {
     }
 }
 
+/// The number of segments drawn at a time, unless the model or its stems fail before, or the string is long.
+fn drawn(session: &Session, time: f64) -> Option<usize> {
+    let nursery = Nursery::new(&session.model, Settings::default());
+    let mut string = ModuleString::default();
+    let mut scene = nursery.blank();
+    let settings = Settings { max_modules: 20_000, ..Settings::default() };
+    session.simulate(settings).ok()?.at(time, &mut string).ok()?;
+    nursery.draw(&string, &mut scene).ok()?;
+    Some(scene.segments.len())
+}
+
 /// The models of the repository with everything that they draw made of a soft tissue, in a wind.
 #[test]
 #[ignore = "takes minutes"]
 fn nothing_pops_in_any_model() {
-    let (mut seen, mut refused) = (0, Vec::new());
+    let (mut seen, mut large, mut refused) = (0, 0, Vec::new());
     for path in common::models().into_iter().filter(|path| path.to_string_lossy().contains("/models/")) {
         let text = std::fs::read_to_string(&path).expect("readable");
         let (head, tail) = text.split_once("initial string:").unwrap_or(("", ""));
@@ -204,12 +215,14 @@ fn nothing_pops_in_any_model() {
         let times = instants(&rigid, end);
         let some: Vec<f64> =
             times.iter().copied().step_by(times.len() / 4 + 1).filter(|t| *t > 0.1).collect();
-        // The solver says so where it cannot follow: soft stems of these models, which were not made for wind.
-        let nursery = Nursery::new(&bent.model, Settings::default());
-        let mut string = ModuleString::default();
-        let Ok(mut simulation) = bent.simulate(Settings::default()) else { continue };
         let last = some.last().copied().unwrap_or(0.0) + 0.1;
-        if simulation.at(last, &mut string).is_err() || nursery.draw(&string, &mut nursery.blank()).is_err() {
+        // Curves of thousands of segments are no stems, and take minutes.
+        let Some(stems) = drawn(&rigid, last) else { continue };
+        if stems > 600 {
+            large += 1;
+            continue;
+        }
+        if drawn(&bent, last).is_none() {
             refused.push(path.display().to_string());
             continue;
         }
@@ -223,7 +236,8 @@ fn nothing_pops_in_any_model() {
             seen += 1;
         }
     }
-    assert!(seen > 30 && refused.len() < 8, "{seen}, {refused:?}");
+    assert!(refused.is_empty(), "{refused:?}");
+    assert!(seen > 30 && large < 20, "{seen}, {large}");
 }
 
 /// Days instead of seconds: the wind of so long a film would take more than ten million ticks, for a plant from the first tick on, and
