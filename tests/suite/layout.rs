@@ -75,6 +75,17 @@ fn laid_out(path: &std::path::Path, text: &str) -> Result<Option<String>, String
     Ok(Some(once))
 }
 
+/// Every kind of space of the grammar stands for every other, also where the layout looks ahead.
+#[test]
+fn all_kinds_of_space_are_alike() {
+    let text = "initial string: for i in 1 .. 3: ( F(i) ) if 1 < 2: ( A )\n";
+    let plain = format(&Source::new("t", text)).expect("good");
+    for space in ["\t", "\r ", "\u{A0}", "  "] {
+        let other = format(&Source::new("t", &text.replace(' ', space))).expect("good");
+        assert_eq!(other, plain, "{space:?}");
+    }
+}
+
 #[test]
 fn changed_texts_keep_their_characters_and_their_meaning() {
     keep_characters_and_meaning(12);

@@ -56,10 +56,10 @@ impl Scanner<'_> {
 
     /// True if `NAME in` stands behind a `for` that ends at this byte.
     pub(super) fn is_repetition(&self, end: usize) -> bool {
-        let rest = self.text[end..].trim_start_matches([' ', '\t', '\r']);
+        let rest = self.text[end..].trim_start_matches(is_space);
         let after = rest.trim_start_matches(in_name);
         let name = &rest[..rest.len() - after.len()];
-        let next = after.trim_start_matches([' ', '\t', '\r']);
+        let next = after.trim_start_matches(is_space);
         name.starts_with(char::is_alphabetic)
             && next.len() < after.len()
             && next.strip_prefix("in").is_some_and(|rest| !rest.starts_with(in_name))
@@ -165,7 +165,7 @@ impl Scanner<'_> {
 
     /// True if the word at these bytes begins `at rate`.
     pub(super) fn is_at_rate(&self, start: usize, end: usize) -> bool {
-        let next = self.text[end..].trim_start_matches([' ', '\t', '\r']);
+        let next = self.text[end..].trim_start_matches(is_space);
         let in_rule = self.items.last().is_some_and(|i| i.kind == ItemKind::Rule && i.after_colon.is_some());
         in_rule
             && &self.text[start..end] == "at"
@@ -173,7 +173,12 @@ impl Scanner<'_> {
     }
 
     pub(super) fn follows_at(&self, start: usize) -> bool {
-        let before = self.text[..start].trim_end_matches([' ', '\t']).strip_suffix("at");
+        let before = self.text[..start].trim_end_matches(is_space).strip_suffix("at");
         before.is_some_and(|rest| !rest.ends_with(in_name))
     }
+}
+
+/// Space between the words of a line, as in the grammar: `WHITESPACE` in `grammars/dlsys.pest`.
+fn is_space(c: char) -> bool {
+    matches!(c, ' ' | '\t' | '\r' | '\u{A0}')
 }
