@@ -81,7 +81,7 @@ fn all_kinds_of_space_are_alike() {
     let text = "initial string: for i in 1 .. 3: ( F(i) ) if 1 < 2: ( A )\n";
     let plain = format(&Source::new("t", text)).expect("good");
     for space in ["\t", "\r ", "\u{A0}", "  "] {
-        let other = format(&Source::new("t", &text.replace(' ', space))).expect("good");
+        let other = format(&Source::new("t", text.replace(' ', space))).expect("good");
         assert_eq!(other, plain, "{space:?}");
     }
 }
