@@ -136,7 +136,7 @@ impl Field {
         Ok((within, Instant { share, drift: drift - share * lap.drift, swept: swept - share * lap.swept }))
     }
 
-    /// The wind at a time in seconds, to be evaluated at any number of places. It takes 0.6 ms and 1.5 MB with
+    /// The wind at a time in seconds, to be evaluated at any number of places. It takes 1.5 ms and 3 MB with
     /// turbulence, and nothing without; it holds all that it needs and can be sent to other threads.
     ///
     /// # Errors

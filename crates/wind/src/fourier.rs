@@ -6,8 +6,6 @@
 //! ```text
 //! modes (a, b, c) ──along a──▶ 32 planes of modes (b, c) ──along b──▶ modes c of each line ──along c──▶ values at points
 //! ```
-//!
-//! Single precision is enough, because the values are coefficients that are kept in it.
 
 use crate::lanes::{Complex, Lanes};
 use crate::turns::cos_sin;
@@ -55,7 +53,7 @@ impl Transform {
         let zero = Complex::default();
         let roots = std::array::from_fn(|j| {
             let (c, s) = cos_sin(j as f64 / N as f64);
-            Complex { re: Lanes::all(c as f32), im: Lanes::all(s as f32) }
+            Complex { re: Lanes::all(c), im: Lanes::all(s) }
         });
         Transform {
             modes: vec![zero; HALF * USED * USED],
@@ -183,7 +181,7 @@ mod tests {
     use super::*;
 
     /// Modes in all parts of the spectrum, with pairs of conjugates where the last component is 0.
-    const GIVEN: [([i32; 3], [f32; 2]); 10] = [
+    const GIVEN: [([i32; 3], [f64; 2]); 10] = [
         ([0, 1, 3], [0.5, -1.0]),
         ([0, 0, 0], [0.75, 0.0]),
         ([6, -6, 6], [2.0, 0.25]),
@@ -204,11 +202,11 @@ mod tests {
         transform.values();
         transform.clear();
         for (m, [re, im]) in GIVEN {
-            let lanes = |x: f32| Lanes([x, 2.0 * x, -x, 0.0]);
+            let lanes = |x: f64| Lanes([x, 2.0 * x, -x, 0.0]);
             transform.modes[index(m)] = Complex { re: lanes(re), im: lanes(im) };
         }
         let values = transform.values();
-        let size: f64 = GIVEN.iter().map(|(_, [re, im])| 2.0 * f64::from(re.hypot(*im))).sum();
+        let size: f64 = GIVEN.iter().map(|(_, [re, im])| 2.0 * re.hypot(*im)).sum();
         assert_eq!(values.len(), N * N * N);
         for (at, value) in values.iter().enumerate() {
             let n = [at / (N * N), at / N % N, at % N];
@@ -217,11 +215,11 @@ mod tests {
                 let phase: i32 = m.iter().zip(n).map(|(m, n)| m * n as i32).sum();
                 let (c, s) = cos_sin(f64::from(phase) / N as f64);
                 let pair = if m[2] == 0 { 1.0 } else { 2.0 };
-                sum += pair * (f64::from(re) * c - f64::from(im) * s);
+                sum += pair * (re * c - im * s);
             }
             for (lane, factor) in [1.0, 2.0, -1.0, 0.0].into_iter().enumerate() {
-                let error = f64::from(value.0[lane]) - factor * sum;
-                assert!(error.abs() <= 3e-7 * factor.abs() * size, "{n:?}, lane {lane}: {error:e}");
+                let error = value.0[lane] - factor * sum;
+                assert!(error.abs() <= 1e-15 * factor.abs() * size, "{n:?}, lane {lane}: {error:e}");
             }
         }
     }

@@ -1,14 +1,14 @@
 //! The sum over the frequencies of modes at an instant, for eight modes at once.
 //!
-//! The numbers of eight modes stand next to each other, so that compilers compute with several at once. Phases are reduced to a turn in
-//! double precision, however far the wind has come; the rest is in single precision, as the coefficients of a lattice are.
+//! The numbers of eight modes stand next to each other, so that compilers compute with several at once. Phases are reduced to a
+//! turn before anything is made of them, however far the wind has come.
 
 use nalgebra::Vector3;
 
 use crate::fourier::Transform;
 use crate::lanes::{Complex, Lanes};
 use crate::modes::{FREQUENCIES, Instant, Lap};
-use crate::turns::{cos_sin, cos_sin_single, nearest};
+use crate::turns::{cos_sin, cos_sin_each, nearest};
 
 /// Modes in a group.
 pub(crate) const GROUP: usize = 8;
@@ -23,7 +23,7 @@ pub(crate) struct Group {
     drift: Each<f64>,
     lines: [Line; FREQUENCIES],
     /// The factors of the two polarisations in the potential, by axes of the lattice; see [`Mode::potential`].
-    potential: [[Each<f32>; 3]; 2],
+    potential: [[Each<f64>; 3]; 2],
     /// Where the amplitudes of a mode belong in the transform, and where those of its conjugate, if they do.
     indices: Each<[u32; 2]>,
     /// The number of modes.
@@ -36,14 +36,14 @@ struct Line {
     /// Turns of phase per metre of decorrelation.
     turns: Each<f64>,
     /// The complex amplitudes of both polarisations.
-    amplitude: [Each<f32>; 4],
+    amplitude: [Each<f64>; 4],
 }
 
 /// The numbers of one mode.
 pub(crate) struct Member {
     pub(crate) drift: f64,
     pub(crate) turns: [f64; FREQUENCIES],
-    pub(crate) amplitude: [[f32; 4]; FREQUENCIES],
+    pub(crate) amplitude: [[f64; 4]; FREQUENCIES],
     /// The potential of each polarisation for an amplitude of 1, in the axes of the lattice.
     pub(crate) potential: [Vector3<f64>; 2],
     pub(crate) indices: [u32; 2],
@@ -95,7 +95,7 @@ impl Group {
             }
             for (axes, vector) in group.potential.iter_mut().zip(member.potential) {
                 for (each, value) in axes.iter_mut().zip(vector.iter()) {
-                    each[l] = *value as f32;
+                    each[l] = *value;
                 }
             }
         }
@@ -104,15 +104,15 @@ impl Group {
 
     /// The sums over frequencies: complex amplitudes of both polarisations.
     #[inline]
-    fn sums(&self, [drift, swept]: [Path; 2], periodic: bool) -> [Each<f32>; 4] {
-        let mut sums = [[0.0f32; GROUP]; 4];
+    fn sums(&self, [drift, swept]: [Path; 2], periodic: bool) -> [Each<f64>; 4] {
+        let mut sums = [[0.0; GROUP]; 4];
         for Line { turns, amplitude: [a, b, d, e] } in &self.lines {
-            let mut phases = [0.0f32; GROUP];
+            let mut phases = [0.0; GROUP];
             for (reduced, turns) in phases.iter_mut().zip(turns) {
                 let phase = if periodic { swept.phase(*turns) } else { turns * swept.metres };
-                *reduced = (phase - nearest(phase)) as f32;
+                *reduced = phase - nearest(phase);
             }
-            let (c, s) = cos_sin_single(phases);
+            let (c, s) = cos_sin_each(phases);
             for l in 0..GROUP {
                 sums[0][l] += a[l] * c[l] - b[l] * s[l];
                 sums[1][l] += a[l] * s[l] + b[l] * c[l];
@@ -120,12 +120,12 @@ impl Group {
                 sums[3][l] += d[l] * s[l] + e[l] * c[l];
             }
         }
-        let mut phases = [0.0f32; GROUP];
+        let mut phases = [0.0; GROUP];
         for (reduced, turns) in phases.iter_mut().zip(self.drift) {
             let phase = drift.phase(turns);
-            *reduced = (phase - nearest(phase)) as f32;
+            *reduced = phase - nearest(phase);
         }
-        let (c, s) = cos_sin_single(phases);
+        let (c, s) = cos_sin_each(phases);
         let [mut a, mut b, mut d, mut e] = sums;
         for l in 0..GROUP {
             (a[l], b[l]) = (a[l] * c[l] - b[l] * s[l], a[l] * s[l] + b[l] * c[l]);
@@ -135,14 +135,14 @@ impl Group {
     }
 
     /// Writes the amplitudes of the potential at an instant into a transform, times a factor.
-    pub(crate) fn write(&self, at: Instant, lap: Option<Lap>, factor: f32, transform: &mut Transform) {
+    pub(crate) fn write(&self, at: Instant, lap: Option<Lap>, factor: f64, transform: &mut Transform) {
         let [a, b, d, e] = self.sums(Path::both(at, lap), lap.is_some());
         let [p, q] = &self.potential;
         for l in 0..self.count {
-            let vector = |each: &[Each<f32>; 3]| Lanes([each[0][l], each[1][l], each[2][l], 0.0]);
+            let vector = |each: &[Each<f64>; 3]| Lanes([each[0][l], each[1][l], each[2][l], 0.0]);
             let (p, q) = (vector(p), vector(q));
             let part =
-                |first: f32, second: f32| p * Lanes::all(first * factor) + q * Lanes::all(second * factor);
+                |first: f64, second: f64| p * Lanes::all(first * factor) + q * Lanes::all(second * factor);
             let (re, im) = (part(a[l], d[l]), part(b[l], e[l]));
             let [here, conjugate] = self.indices[l].map(|index| index as usize);
             // Both indices are the same where there is no conjugate.
@@ -158,7 +158,7 @@ impl Group {
         let mut sum = [0.0f64; 4];
         for line in &self.lines {
             let (c, s) = cos_sin(drift + swept.phase(line.turns[l]));
-            let [a, b, d, e] = line.amplitude.map(|each| f64::from(each[l]));
+            let [a, b, d, e] = line.amplitude.map(|each| each[l]);
             sum[0] += a * c - b * s;
             sum[1] += a * s + b * c;
             sum[2] += d * c - e * s;

@@ -1,4 +1,4 @@
-//! Four numbers of single precision that are computed with at once, and complex numbers made of them.
+//! Four numbers that are computed with at once, and complex numbers made of them.
 //!
 //! Compilers turn each operation into one instruction; all of them are exactly rounded, so results have the same bits on all machines.
 
@@ -6,17 +6,17 @@ use std::ops::{Add, Mul, Sub};
 
 /// Four numbers: three components of a vector, and one that is not used.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[repr(align(16))]
-pub(crate) struct Lanes(pub(crate) [f32; 4]);
+#[repr(align(32))]
+pub(crate) struct Lanes(pub(crate) [f64; 4]);
 
 impl Lanes {
     /// The same number four times.
-    pub(crate) const fn all(value: f32) -> Lanes {
+    pub(crate) const fn all(value: f64) -> Lanes {
         Lanes([value; 4])
     }
 
     #[inline(always)]
-    fn zip(self, other: Lanes, f: impl Fn(f32, f32) -> f32) -> Lanes {
+    fn zip(self, other: Lanes, f: impl Fn(f64, f64) -> f64) -> Lanes {
         let ([a, b, c, d], [e, g, h, i]) = (self.0, other.0);
         Lanes([f(a, e), f(b, g), f(c, h), f(d, i)])
     }

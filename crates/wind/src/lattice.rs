@@ -84,7 +84,7 @@ impl Lattice {
         let spacing = band.period / N as f64;
         transform.clear();
         for group in &band.groups {
-            group.write(at, lap, amplitude as f32, transform);
+            group.write(at, lap, amplitude, transform);
         }
         let coefficients = transform.values();
         let rotation = band.rotation.into_inner();
@@ -113,7 +113,7 @@ impl Lattice {
     fn row(&self, a: usize, b: usize, c: &[usize; 4]) -> [[f64; 4]; 4] {
         let at = (a * N + b) * N;
         let plane = &self.coefficients[at..at + N];
-        c.map(|c| plane[c % N].0.map(f64::from))
+        c.map(|c| plane[c % N].0)
     }
 
     /// Indices of the four nearest points along an axis.
@@ -241,7 +241,7 @@ mod tests {
         (band, lattice, at)
     }
 
-    /// Phases, amplitudes and transform in single precision (2.4e-7 of the root mean square at most here), against the sum of the modes in double precision.
+    /// The transform against the sum of the modes. After 4,000 km, the phases of the shortest modes have lost seven digits.
     #[test]
     fn potentials_at_points_of_the_lattice_are_sums_of_modes() {
         let energy = Energy::new(Spectrum::VonKarman, 3.0);
@@ -249,7 +249,7 @@ mod tests {
         let late = Instant { share: 0.0, drift: 4e6, swept: 1.3e6 };
         let within = Instant { share: 0.37, drift: 0.25, swept: -0.5 };
         for (i, band) in bands(energy, Vector3::x(), 1).iter().enumerate() {
-            for (at, lap) in [(late, None), (within, lap), (within, None)] {
+            for (at, lap, tolerance) in [(late, None, 3e-9), (within, lap, 3e-14), (within, None, 3e-14)] {
                 let lattice = Lattice::new(band, at, lap, 1.0, &mut Transform::new());
                 let (mut error, mut square) = (0.0, 0.0);
                 for n in 0..40 {
@@ -267,14 +267,14 @@ mod tests {
                     square += exact.norm_squared();
                 }
                 let relative = (error / square).sqrt();
-                assert!(relative < 3e-7, "band {i}: {relative:e}");
+                assert!(relative < tolerance, "band {i}: {relative:e}");
             }
         }
     }
 
-    /// The same for velocities, which are differences of coefficients, at any place: against a lattice of exact coefficients.
+    /// The same for velocities, at any place: against the spline through the sum of the modes.
     #[test]
-    fn velocities_have_the_precision_of_their_coefficients() {
+    fn velocities_are_curls_of_the_spline_through_the_modes() {
         let energy = Energy::new(Spectrum::VonKarman, 3.0);
         let at = Instant { share: 0.0, drift: 130.0, swept: 40.0 };
         for (i, band) in bands(energy, Vector3::x(), 1).iter().enumerate() {
@@ -289,11 +289,11 @@ mod tests {
                 square += exact.norm_squared();
             }
             let relative = (error / square).sqrt();
-            assert!(relative < 3e-7, "band {i}: {relative:e}");
+            assert!(relative < 3e-13, "band {i}: {relative:e}");
         }
     }
 
-    /// The velocity of the spline through the sum of the modes, in double precision: along each axis, the spline of a wave takes the
+    /// The velocity of the spline through the sum of the modes: along each axis, the spline of a wave takes the
     /// factor Σ w_k e^(2πi m k/32) / ((2 + cos 2πm/32)/3).
     fn interpolated(band: &Band, at: Instant, point: Vector3<f64>) -> Vector3<f64> {
         let spacing = band.period / N as f64;

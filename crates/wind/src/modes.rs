@@ -170,7 +170,7 @@ impl Mode {
             let ([a, b], [c, d]) = (draw.of(1).normal_pair(), draw.of(2).normal_pair());
             let sign = f64::from(sign);
             turns[j] = sign * quantiles.draw(j, draw.of(3).unit()) * self.k / TAU;
-            amplitude[j] = [a, sign * b, c, sign * d].map(|x| (x * size) as f32);
+            amplitude[j] = [a, sign * b, c, sign * d].map(|x| x * size);
         }
         // The transform of the coefficients of the spline is that of the values divided by (2 + cos 2πm/32)/3 for each axis.
         let filter = |size: f64, m: &i32| size * 3.0 / (2.0 + cos_sin(f64::from(*m) / N as f64).0);
