@@ -14,5 +14,6 @@ pub mod plants;
 pub mod restart;
 pub mod scale;
 pub mod solver;
+pub mod stems;
 pub mod transport;
 pub mod tune;

@@ -99,8 +99,7 @@ impl Solver {
             self.equilibrium(&skeleton, &mut state, &crate::Still, 0.0)?;
         }
         let base = state.strain.clone();
-        // Some of them are twist.
-        let modes = match self.modes(&skeleton, &base, 2 * count) {
+        let modes = match self.modes(&skeleton, &base, count) {
             // Nothing of this root bends, or has a mass.
             Err(Error::Vibration(_)) => Vec::new(),
             modes => modes?,
@@ -108,8 +107,7 @@ impl Solver {
         if modes.iter().any(|mode| mode.squared <= 0.0) {
             return Err(Error::Vibration("the pose at rest is not stable"));
         }
-        let bends = |mode: &Mode| mode.squared.is_finite() && twist(&skeleton, &mode.shape) < 0.5;
-        let modes: Vec<Mode> = modes.into_iter().filter(bends).take(count).collect();
+        let modes: Vec<Mode> = modes.into_iter().filter(|mode| mode.squared.is_finite()).collect();
         self.skeleton.clear();
         self.renew(&state, 0.0, &mut Fixed(&skeleton))?;
         let air = self.settings.air;
@@ -136,16 +134,6 @@ impl Solver {
         root.tissue = root.heat();
         Ok(root)
     }
-}
-
-/// The part of twist in the elastic energy of a mode. The inertia of a straight stem against twist is next to nothing, and grows by orders
-/// of magnitude as it bends, so such a mode is none any more in a stem that moves.
-fn twist(skeleton: &Skeleton, shape: &[Vector]) -> f64 {
-    let mut energy = Vector::zeros();
-    for (segment, x) in skeleton.segments().iter().zip(shape) {
-        energy += segment.rigidity().component_mul(x).component_mul(x) * segment.length;
-    }
-    energy.x / energy.sum().max(f64::MIN_POSITIVE)
 }
 
 impl Reduced {
