@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use dlsys_diagnostic::{Diagnostic, Severity, Span};
 use dlsys_model::{DETACH, ELASTIC, GROUND, Kind, KindId, Model};
+use dlsys_syntax::foreign_syntax;
 
 /// The argument of a module that names a tissue, if it is a constant.
 pub struct TissueNumber {
@@ -49,7 +50,11 @@ pub fn detach(model: &Model, places: &HashMap<KindId, Span>, diagnostics: &mut V
                 Diagnostic::error("`@D` has no parameters")
                     .at(*span, format!("{} here", crate::scope::plural(kind.arity, "parameter")))
                     .help("write `@D` alone, in front of what is let go: `produce @D Loose(k)`")
-                    .help("it is let go when its module is born; a condition or a rate of the production that makes it says when"),
+                    .help("it is let go when its module is born: the production that makes it says when")
+                    .help_opt(
+                        foreign_syntax::module(DETACH)
+                            .map(|there| format!("in cpfg it is another command; here {there}")),
+                    ),
             );
         }
     }

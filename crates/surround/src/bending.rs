@@ -133,7 +133,7 @@ pub struct BentStems {
     time: f64,
     /// Metres in a unit of length.
     metre: f64,
-    /// Stems that the tick does not know, with their strains per metre; `None` if there are none.
+    /// The stems of the string with their strains per metre, if there are some that the tick does not know.
     new: Option<std::collections::HashMap<StemKey, Vector>>,
     /// Where the parts are that have been let go.
     pub(crate) flown: Flown,
@@ -145,6 +145,18 @@ impl BentStems {
         let tick = Arc::new(Tick::still());
         BentStems { tick, time: 0.0, metre: 1.0, new: None, flown: Flown::default() }
     }
+
+    /// Adds the strains of stems that are not in the skeleton, by descent. True if there are any.
+    pub(crate) fn take_over<'a>(&mut self, stems: impl Iterator<Item = &'a Stem>, descent: &Descent) -> bool {
+        let mut any = false;
+        for stem in stems.filter(|stem| !self.tick.body.numbers.contains_key(&stem.key)) {
+            if let Some((strain, _)) = self.tick.inherited(stem, descent, self.time) {
+                self.new.get_or_insert_default().insert(stem.key, strain);
+                any = true;
+            }
+        }
+        any
+    }
 }
 
 impl Strains for BentStems {
@@ -153,14 +165,10 @@ impl Strains for BentStems {
         if let Some((_, strain)) = frozen {
             return *strain;
         }
-        let strain = match &self.new {
-            Some(new) => new.get(&stem).copied().unwrap_or_else(Vector::zeros),
-            None => match self.tick.body.numbers.get(&stem) {
-                Some(&known) => self.tick.strain(known, self.time).0,
-                None => Vector::zeros(),
-            },
-        };
-        strain * self.metre
+        let new = self.new.as_ref().and_then(|new| new.get(&stem).copied());
+        // One that has just been let go is none of the stems of its string.
+        let known = || Some(self.tick.strain(*self.tick.body.numbers.get(&stem)?, self.time).0);
+        new.or_else(known).unwrap_or_else(Vector::zeros) * self.metre
     }
 
     fn flight(&self, part: PartKey) -> Option<Pose> {

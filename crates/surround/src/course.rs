@@ -6,12 +6,12 @@
 use std::sync::Arc;
 
 use dlsys_geometry::scene::Scene;
-use dlsys_geometry::turtle;
+use dlsys_geometry::turtle::{self, FreePart};
 use dlsys_model::Model;
 use dlsys_sim::{Passed, Simulation};
 use dlsys_tree::ModuleString;
 
-use crate::bending::{Bending, Tick, bent};
+use crate::bending::{Bending, BentStems, Tick, bent};
 use crate::descent::Descent;
 use crate::flights::Flights;
 use crate::{CLOCK, Error};
@@ -157,9 +157,7 @@ impl<'m> Course<'m> {
         let Some(flights) = flights else { return Ok(()) };
         let mut string = string.clone();
         while flights.has_news(model, &string, descent) {
-            let mut strains = bent(&self.tick, descent, &self.bending, &string, &mut self.scene)?;
-            strains.flown = flights.poses(model, &string)?;
-            let news = flights.news(model, &string, &strains)?;
+            let (strains, news) = self.held_back(&string, descent, flights)?;
             if news.is_empty() {
                 break;
             }
@@ -173,9 +171,7 @@ impl<'m> Course<'m> {
             let events = growth.take_events();
             let mut after = descent.clone();
             after.add(model, &events);
-            let mut moved = bent(&self.tick, &after, &self.bending, &later, &mut self.scene)?;
-            moved.flown = flights.poses(model, &later)?;
-            let there = flights.news(model, &later, &moved)?;
+            let (_, there) = self.held_back(&later, &after, flights)?;
             let times = [string.time, later.time].map(|time| place.seconds(time));
             flights.let_go(model, (news, &strains), &there, times)?;
             if !goes_on {
@@ -186,6 +182,26 @@ impl<'m> Course<'m> {
             string = later;
         }
         Ok(())
+    }
+
+    /// What a string is about to let go, as if the branch still held it, and the strains with which it is drawn.
+    fn held_back(
+        &mut self,
+        string: &ModuleString,
+        descent: &Descent,
+        flights: &mut Flights,
+    ) -> Result<(BentStems, Vec<FreePart>), Error> {
+        let model = self.model;
+        let mut strains = bent(&self.tick, descent, &self.bending, string, &mut self.scene)?;
+        strains.flown = flights.poses(model, string)?;
+        let news = flights.news(model, string, &strains)?;
+        let stems = news.iter().flat_map(|part| &part.stems);
+        // Stems that have taken the place of others have their strain, which a string that no longer carries them does not tell.
+        if !strains.take_over(stems, descent) {
+            return Ok((strains, news));
+        }
+        let news = flights.news(model, string, &strains)?;
+        Ok((strains, news))
     }
 
     /// Goes on to the next tick; returns the one that is past.

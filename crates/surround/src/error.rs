@@ -3,6 +3,7 @@
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_fall as fall;
 use dlsys_geometry::turtle;
+use dlsys_model::Model;
 use dlsys_sim::{self as sim, brief};
 use dlsys_sway as sway;
 use dlsys_tree::Lineage;
@@ -119,6 +120,23 @@ pub enum Error {
 }
 
 impl Error {
+    /// A flight that fails, at a time in units of the model.
+    pub(crate) fn falling(
+        model: &Model,
+        origin: &turtle::Origin,
+        body: Option<&fall::Body>,
+        (error, time): (fall::Error, f64),
+    ) -> Error {
+        let part = Box::new(FallingPart {
+            kind: model.kinds.get(origin.kind).name.clone(),
+            lineage: origin.lineage,
+            drawn: origin.span(model),
+            mass: body.map(|body| body.mass),
+            size: body.map(|body| 2.0 * body.size()),
+        });
+        Error::Falling { error, part, time }
+    }
+
     /// The error as a message that quotes the model, with advice.
     pub fn diagnostic(&self) -> Diagnostic {
         match self {

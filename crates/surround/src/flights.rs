@@ -15,13 +15,13 @@ use dlsys_sim::Event;
 use dlsys_sway::{Matrix, Vector};
 use dlsys_tree::ModuleString;
 
+use crate::Error;
 use crate::bending::BentStems;
 use crate::body::rotation_vector;
 use crate::descent::Descent;
 use crate::loose::{Loose, stand};
 use crate::place::Place;
 use crate::weather::{Gusts, Sampler};
-use crate::{Error, FallingPart};
 
 /// Most parts that one model may let go.
 const MOST_PARTS: usize = 100_000;
@@ -144,7 +144,7 @@ impl Flights {
         for part in news {
             let place = self.place;
             let failed =
-                |error: fall::Error| failure(model, &part.origin, None, (error, place.time_at(time)));
+                |error: fall::Error| Error::falling(model, &part.origin, None, (error, place.time_at(time)));
             let here = stand(&part, &place);
             let there = later.get(&part.key).map_or(here, |part| stand(part, &place));
             let loose = Loose::of(&part, model, &place).map_err(failed)?;
@@ -168,9 +168,9 @@ impl Flights {
                 return Err(Error::TooManyParts { most: MOST_PARTS, time: place.time_at(time), span });
             }
             for stem in &part.stems {
-                let strain = turtle::Strains::strain(strains, *stem);
+                let strain = turtle::Strains::strain(strains, stem.key);
                 if strain != Vector::zeros() {
-                    Arc::make_mut(&mut self.frozen).insert(*stem, (time, strain));
+                    Arc::make_mut(&mut self.frozen).insert(stem.key, (time, strain));
                 }
             }
             self.parts.insert(part.key, self.releases.len());
@@ -229,7 +229,8 @@ impl Flights {
             Some(fall) => {
                 let gusts = Gusts(&self.wind);
                 let moved = fall.at(time, &gusts).map_err(|error| {
-                    let failed = failure(model, origin, Some(fall.body()), (error, place.time_at(time)));
+                    let failed =
+                        Error::falling(model, origin, Some(fall.body()), (error, place.time_at(time)));
                     self.wind.failure().unwrap_or(failed)
                 })?;
                 (moved.point(*offset), moved.attitude.to_rotation_matrix().into_inner() * *axes)
@@ -253,20 +254,4 @@ fn motion(loose: &Loose, here: (Vector, Matrix), there: (Vector, Matrix), second
         attitude,
         spin: attitude.inverse_transform_vector(&(rotation_vector(&turn) / seconds)),
     }
-}
-
-fn failure(
-    model: &Model,
-    origin: &Origin,
-    body: Option<&fall::Body>,
-    (error, time): (fall::Error, f64),
-) -> Error {
-    let part = Box::new(FallingPart {
-        kind: model.kinds.get(origin.kind).name.clone(),
-        lineage: origin.lineage,
-        drawn: origin.span(model),
-        mass: body.map(|body| body.mass),
-        size: body.map(|body| 2.0 * body.size()),
-    });
-    Error::Falling { error, part, time }
 }

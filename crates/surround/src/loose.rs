@@ -1,12 +1,14 @@
 //! What is let go as a body in SI: mass, size, attitude and contacts, from what the turtle notes.
 
 use dlsys_fall::{self as fall, Attitude, Body, Contact, Shape};
-use dlsys_geometry::turtle::{Form, FreePart, Origin, Piece};
+use dlsys_geometry::turtle::{self, Form, FreePart, Origin, Piece};
 use dlsys_model::{Model, Tissue};
 use dlsys_sway::{Matrix, Vector};
+use dlsys_tree::ModuleString;
 
-use crate::Place;
+use crate::bending::BentStems;
 use crate::body::{density, frame, thickness};
+use crate::{Error, Place};
 
 /// A part that is let go, where it is at an instant.
 #[derive(Clone, Debug)]
@@ -27,6 +29,11 @@ const FLAT: f64 = 0.25;
 const THINNEST: f64 = 1e-3;
 /// A surface whose normals cancel to less than this part of its area is closed, or folded: it shows a quarter of its area from anywhere (Cauchy).
 const CLOSED: f64 = 0.3;
+
+/// Number of directions in which the outermost point of a part is a contact: the most that a body may have.
+const DIRECTIONS: usize = 64;
+/// In radians.
+const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
 
 impl Loose {
     /// The body of a part; `None` if it has no mass.
@@ -73,6 +80,24 @@ impl Loose {
         Ok(Some(Loose { origin: part.origin, body, centre: place.point(centre), attitude }))
     }
 
+    /// The bodies that a string has let go, in its shape at rest.
+    ///
+    /// # Errors
+    /// A module that cannot be drawn, or a value that no body can have.
+    pub fn all(model: &Model, string: &ModuleString) -> Result<Vec<Loose>, Error> {
+        let strains = BentStems::at_rest();
+        let parts = turtle::free_parts(model, string, &strains, &mut turtle::blank(model))?;
+        let place = Place::of_scene(&model.scenery);
+        let mut all = Vec::with_capacity(parts.len());
+        for part in &parts {
+            let loose = Loose::of(part, model, &place);
+            all.extend(
+                loose.map_err(|error| Error::falling(model, &part.origin, None, (error, string.time)))?,
+            );
+        }
+        Ok(all)
+    }
+
     /// True for a plate, which flutters or tumbles; false for a compact body.
     pub fn is_plate(&self) -> bool {
         self.body.shape == Shape::Plate
@@ -114,7 +139,7 @@ fn volume(piece: &Piece, tissues: &[Tissue], metre: f64) -> f64 {
     }
 }
 
-/// The outermost points of a part in 26 directions, in the axes of its body.
+/// The outermost points of a part in directions all around, in the axes of its body.
 fn contacts(part: &FreePart, (centre, axes): (Vector, &Matrix), half: [f64; 3], metre: f64) -> Vec<Contact> {
     let inverse = axes.transpose();
     let place = |(point, radius): &(dlsys_geometry::scene::Point, f64)| Contact {
@@ -123,10 +148,12 @@ fn contacts(part: &FreePart, (centre, axes): (Vector, &Matrix), half: [f64; 3], 
     };
     let points: Vec<Contact> = part.points.iter().map(place).collect();
     let mut found: Vec<Contact> = Vec::new();
-    let signs = || [-1.0, 0.0, 1.0].into_iter();
-    for (x, y, z) in signs().flat_map(|x| signs().flat_map(move |y| signs().map(move |z| (x, y, z)))) {
-        // In proportion to the extents: the corners of a long leaf, not its ends only.
-        let direction = Vector::new(x / half[0], y / half[1], z / half[2]);
+    for k in 0..DIRECTIONS {
+        // Evenly over a sphere along a spiral of the golden angle, in proportion to the extents: all around a long leaf, not its ends only.
+        let height = 1.0 - (2 * k + 1) as f64 / DIRECTIONS as f64;
+        let (sin, cos) = (GOLDEN_ANGLE * k as f64).sin_cos();
+        let across = (1.0 - height * height).sqrt();
+        let direction = Vector::new(across * cos / half[0], across * sin / half[1], height / half[2]);
         let Some(direction) = direction.try_normalize(0.0) else { continue };
         let reach = |contact: &Contact| direction.dot(&contact.point) + contact.radius;
         let farthest = points.iter().max_by(|a, b| reach(a).total_cmp(&reach(b)));

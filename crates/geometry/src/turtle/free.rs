@@ -1,8 +1,8 @@
 //! Parts of a string that are let go (`@D`): what they are made of, as they are seen, and where they can touch the ground.
 
 use super::Pose;
-use super::bent::{PartKey, StemKey};
-use super::skeleton::{Origin, Piece, Recorder};
+use super::bent::PartKey;
+use super::skeleton::{Origin, Piece, Recorder, Stem};
 use crate::scene::{Placement, Point, Scene, Surface};
 
 /// What follows an `@D`, to the end of the branch, as it is seen. What is let go within it is a part of its own.
@@ -16,8 +16,8 @@ pub struct FreePart {
     pub pose: Pose,
     /// Its elements that have a mass.
     pub pieces: Vec<Piece>,
-    /// Its stems that give way as long as a branch holds them.
-    pub stems: Vec<StemKey>,
+    /// Its stems that give way as long as a branch holds them, where they begin in their shape at rest.
+    pub stems: Vec<Stem>,
     /// Small balls that its surface lies between: their centres and radii, in scene units.
     pub points: Vec<(Point, f64)>,
 }

@@ -95,13 +95,11 @@ impl Walk<'_> {
             }
         };
         let key = StemKey::of(lineage, number);
-        if let (Some(recorder), Some(part)) = (&mut self.recorder, self.state.part) {
-            recorder.parts[part].stems.push(key);
-        } else if let Some(recorder) = &mut self.recorder
+        if let Some(recorder) = &mut self.recorder
             && self.state.joined.is_none()
         {
             let (start, axes) = (self.state.position, self.state.frame.vectors());
-            recorder.stems.push(Stem {
+            let stem = Stem {
                 key,
                 origin: Origin { kind, lineage, inside: self.inside },
                 parent: self.state.stem,
@@ -113,8 +111,14 @@ impl Walk<'_> {
                 length: 0.0,
                 width,
                 tissue,
-            });
-            self.state.stem = Some(recorder.stems.len() - 1);
+            };
+            match self.state.part {
+                Some(part) => recorder.parts[part].stems.push(stem),
+                None => {
+                    recorder.stems.push(stem);
+                    self.state.stem = Some(recorder.stems.len() - 1);
+                }
+            }
         }
         self.state.joined = Some(number);
         Ok(Some(self.strains.map_or_else(Vector::zeros, |strains| strains.strain(key))))
