@@ -146,11 +146,11 @@ impl Flights {
             let failed =
                 |error: fall::Error| Error::falling(model, &part.origin, None, (error, place.time_at(time)));
             let here = stand(&part, &place);
-            let there = later.get(&part.key).map_or(here, |part| stand(part, &place));
+            let there = later.get(&part.key).copied();
             let loose = Loose::of(&part, model, &place).map_err(failed)?;
             let release = match loose {
                 Some(loose) => {
-                    let motion = motion(&loose, here, there, after - time);
+                    let motion = motion(&loose, &part, there, &place, after - time);
                     let (offset, axes) = (
                         loose.attitude.inverse_transform_vector(&(here.0 - loose.centre)),
                         loose.attitude.inverse().to_rotation_matrix().into_inner() * here.1,
@@ -243,15 +243,59 @@ impl Flights {
     }
 }
 
-/// The motion of a body at its release, from the turtle's frame there and a little later.
-fn motion(loose: &Loose, here: (Vector, Matrix), there: (Vector, Matrix), seconds: f64) -> fall::Motion {
-    let turn = there.1 * here.1.transpose();
-    let centre = there.0 + turn * (loose.centre - here.0);
+/// The motion of a body at its release, from where the part is then and a little later.
+fn motion(
+    loose: &Loose,
+    here: &FreePart,
+    there: Option<&FreePart>,
+    place: &Place,
+    seconds: f64,
+) -> fall::Motion {
     let attitude: Attitude = loose.attitude;
-    fall::Motion {
+    let moves = |(velocity, spin): (Vector, Vector)| fall::Motion {
         position: loose.centre,
-        velocity: (centre - loose.centre) / seconds,
+        velocity,
         attitude,
-        spin: attitude.inverse_transform_vector(&(rotation_vector(&turn) / seconds)),
+        spin: attitude.inverse_transform_vector(&spin),
+    };
+    let Some(there) = there else { return moves((Vector::zeros(), Vector::zeros())) };
+    let [before, after] = [here, there].map(|part| stand(part, place));
+    let turn = after.1 * before.1.transpose();
+    let centre = after.0 + turn * (loose.centre - before.0);
+    let rigid = ((centre - loose.centre) / seconds, rotation_vector(&turn) / seconds);
+    let bends = !here.stems.is_empty() && here.points.len() == there.points.len();
+    let followed = || mean_motion(loose, here, there, place, seconds);
+    moves(if bends { followed().unwrap_or(rigid) } else { rigid })
+}
+
+/// The velocity and the spin of the rigid motion that is nearest to that of the points of a part whose stems bend (least squares). `None`
+/// if the points are in one line.
+fn mean_motion(
+    loose: &Loose,
+    here: &FreePart,
+    there: &FreePart,
+    place: &Place,
+    seconds: f64,
+) -> Option<(Vector, Vector)> {
+    let at = |point: &Point| place.point(point.coords * place.units.length);
+    let pairs = here
+        .points
+        .iter()
+        .zip(&there.points)
+        .map(|((from, _), (to, _))| (at(from), (at(to) - at(from)) / seconds));
+    let pairs: Vec<(Vector, Vector)> = pairs.collect();
+    let count = pairs.len() as f64;
+    let middle = pairs.iter().map(|(point, _)| *point).sum::<Vector>() / count;
+    let mean = pairs.iter().map(|(_, velocity)| *velocity).sum::<Vector>() / count;
+    let (mut spread, mut moment) = (Matrix::zeros(), Vector::zeros());
+    for (point, velocity) in &pairs {
+        let arm = point - middle;
+        spread += Matrix::identity() * arm.norm_squared() - arm * arm.transpose();
+        moment += arm.cross(&(velocity - mean));
     }
+    // Points in one line do not tell the rotation about it.
+    let scale = spread.trace();
+    let inverse = (spread / scale).try_inverse().filter(|inverse| inverse.norm() < 1e9)?;
+    let spin = inverse * moment / scale;
+    Some((mean + spin.cross(&(loose.centre - middle)), spin))
 }
