@@ -115,7 +115,7 @@ impl PartPlan {
             format!(", mass ratio I* {}: {way}", values(ratio, 1.0))
         });
         format!(
-            "{}: {} {}{plural}, {}{each}, {} across, falls at {} m/s{ratio}",
+            "{}: {} {}{plural}, {}{each}, {} long, falls at {} m/s{ratio}",
             self.kind,
             self.count,
             self.shape,
