@@ -141,6 +141,9 @@ JSON fields:
     axes        a list of kinds, tissue, depth (brackets), count, measured; as least and greatest
                 values in SI: segments, length, width, mass, carried,
                 frequency, damping, cauchy, greenhill
+  falling     with `@D`: a list of plant, t, and
+    parts       a list of kind, shape (plate | lump), count; as least and greatest values
+                in SI: mass, size, speed (of falling), ratio (I* of plates)
   summary     kinds by work; closed_form: nothing is ever integrated";
 
 #[derive(Debug, Args)]

@@ -142,6 +142,21 @@ fn stems_that_sway_follow_the_wind() {
 }
 
 #[test]
+fn what_is_let_go_flies_as_its_drawing_does() {
+    // The `@D` as a module of its own, and in a drawing.
+    let text = "ground 0\nwind 1, 0, 0 speed 2 turbulence 0.4 scale 1\n\
+                initial string: for k in 0 .. 1: ( [ f(0.6 + k/4) P(k) ] ) [ f(0.5) R ]\nP(k): if age = 0.3 + k/10 produce @D Q(k)\n\
+                R: if age = 0.2 produce S\ninterpret P(k): @P(0.1)\ninterpret Q(k): @P(0.1)\n\
+                interpret R: +(40) !(0.01) F(0.1) @L(0.1)\ninterpret S: +(40) @D !(0.01) F(0.1) @L(0.1)";
+    let session = Session::from_text("petals.dls", text, &[]).expect("a model");
+    // Before the first impact: samples may miss what happens between two of them there.
+    let followed = follow(session, [0.0, 0.6, 0.05], 2);
+    let worst = worst(&followed, &random_times(0.0, 0.6, 40), 0.0);
+    let allowed = followed.options.accuracy * followed.options.extent;
+    assert!(worst <= allowed, "{worst} of {allowed}");
+}
+
+#[test]
 fn modules_appear_and_vanish_within_a_millisecond() {
     let text = "initial string: A(0, 3)\nA(x, n):\n  if x < 1 solve dx/dt = 1\n  if x = 1 & n > 0 produce F(0.7) B(0) A(0, n - 1)\n  if x = 1 & n = 0 produce F(0.1)\n\
                 B(y):\n  if y < 0.37 solve dy/dt = 1\n  if y = 0.37 produce F(0.3)\n\

@@ -16,6 +16,7 @@ mod discrete;
 mod editing;
 mod evidence;
 mod export;
+mod falling;
 mod files;
 mod gallery;
 mod glb;

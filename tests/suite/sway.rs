@@ -321,7 +321,7 @@ fn stems_stop_at_the_limit_of_time() {
     let begun = std::time::Instant::now();
     let error = nursery.draw(&string, &mut nursery.blank()).expect_err("too slow").diagnostic();
     assert!(
-        error.message.starts_with("after 0.2 s of computing, the stems are at t = "),
+        error.message.starts_with("after 0.2 s of computing, the surroundings are at t = "),
         "{}",
         error.message
     );

@@ -243,6 +243,7 @@ impl<'d> Parts<'d> {
         porting::drawn_words(&model, drawn, diagnostics);
         let all = drawn.iter().chain(occurs).map(|(k, s)| (*k, *s)).collect();
         scene_checks::ground(&model, &all, diagnostics);
+        scene_checks::detach(&model, &all, diagnostics);
         scene_checks::tissues(&model, &all, &places.tissues, diagnostics);
         check::commands(&model, diagnostics, &all);
         check::surface_sizes(&model, diagnostics, &all);

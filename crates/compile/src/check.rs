@@ -8,8 +8,8 @@ use crate::clauses::names_of;
 use crate::scene_checks::is_hidden;
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{
-    BUILT_IN_SURFACES, COMMAND_SURFACES, Class, Condition, ConditionStep, ContextPart, DRAWN_WORDS, ELASTIC,
-    GROUND, KindId, Model, Pattern, Remedy, Rule, SURFACE_SIZES, Sign, base_of, class_of,
+    BUILT_IN_SURFACES, COMMAND_SURFACES, Class, Condition, ConditionStep, ContextPart, DETACH, DRAWN_WORDS,
+    ELASTIC, GROUND, KindId, Model, Pattern, Remedy, Rule, SURFACE_SIZES, Sign, base_of, class_of,
 };
 use dlsys_syntax::ast;
 use dlsys_syntax::foreign_syntax;
@@ -294,6 +294,7 @@ pub fn inert_modules(model: &Model, occurs: &HashMap<KindId, Span>, diagnostics:
                 if BUILT_IN_SURFACES.contains(&kind.base())
                     || COMMAND_SURFACES.iter().any(|(command, _)| *command == name)
                     || name == GROUND
+                    || kind.base() == DETACH
                     || kind.base() == ELASTIC
                     || model.scenery.plants.iter().any(|plant| plant.name == name)
                     || model.appearance.surfaces.iter().any(|shape| shape.name == name) => {}

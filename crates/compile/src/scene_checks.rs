@@ -1,9 +1,10 @@
-//! Checks of the modules that need a declaration of the scene: `@G` a ground, `@E(NAME)` a tissue.
+//! Checks of the modules of a scene: `@G` needs a ground, `@E(NAME)` a tissue, and `@D` has no parameters.
 
 use std::collections::HashMap;
 
 use dlsys_diagnostic::{Diagnostic, Severity, Span};
-use dlsys_model::{ELASTIC, GROUND, Kind, KindId, Model};
+use dlsys_model::{DETACH, ELASTIC, GROUND, Kind, KindId, Model};
+use dlsys_syntax::foreign_syntax;
 
 /// The argument of a module that names a tissue, if it is a constant.
 pub struct TissueNumber {
@@ -35,6 +36,25 @@ pub fn ground(model: &Model, places: &HashMap<KindId, Span>, diagnostics: &mut V
                 Diagnostic::error("`@G` sets the turtle on the ground, and there is none")
                     .at(*span, "the model declares no ground")
                     .help("declare one: `ground 0`"),
+            );
+        }
+    }
+}
+
+/// Reports `@D` with parameters.
+pub fn detach(model: &Model, places: &HashMap<KindId, Span>, diagnostics: &mut Vec<Diagnostic>) {
+    let is_wrong = |kind: &Kind| kind.base() == DETACH && kind.arity > 0 && !is_hidden(model, kind);
+    for (id, kind) in model.kinds.iter().filter(|(_, kind)| is_wrong(kind)) {
+        if let Some(span) = places.get(&id) {
+            diagnostics.push(
+                Diagnostic::error("`@D` has no parameters")
+                    .at(*span, format!("{} here", crate::scope::plural(kind.arity, "parameter")))
+                    .help("write `@D` alone, in front of what is let go: `produce @D Loose(k)`")
+                    .help("it is let go when its module is born: the production that makes it says when")
+                    .help_opt(
+                        foreign_syntax::module(DETACH)
+                            .map(|there| format!("in cpfg it is another command; here {there}")),
+                    ),
             );
         }
     }

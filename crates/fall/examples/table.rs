@@ -4,6 +4,7 @@
 use std::time::Instant;
 
 use dlsys_fall::{Body, Error, Fall, Ground, Motion, Settings, Still, Vector, Wind, study};
+use dlsys_wind::study::Convergence;
 
 /// Time of the fall of many petals in µs for each body and second, and steps a second.
 fn cost(tolerance: f64, wind: &impl Wind) -> Result<(f64, f64), Error> {
@@ -37,7 +38,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for case in study::EXACT_CASES {
         for row in case()? {
             let order = row.order.map_or(String::new(), |order| format!("{order:.2}"));
-            let study::Row { case, resolution, value, expected, error, .. } = row;
+            let Convergence { case, resolution, value, expected, error, .. } = row;
             println!(
                 "{case:<46} {resolution:>9.2e} {value:>16.9e} {expected:>16.9e} {error:>9.1e} {order:>6}"
             );

@@ -1,31 +1,5 @@
 //! Air and gravity: what acts on bodies from outside.
 
-use crate::Vector;
-
-/// Velocity of the air.
-///
-/// Every closure `Fn(Vector, f64) -> Vector` is a wind. It must be a pure function, or falls are none.
-pub trait Wind {
-    /// Velocity in m/s at a point (world coordinates, m) and a time (s).
-    fn velocity(&self, point: Vector, time: f64) -> Vector;
-}
-
-impl<F: Fn(Vector, f64) -> Vector> Wind for F {
-    fn velocity(&self, point: Vector, time: f64) -> Vector {
-        self(point, time)
-    }
-}
-
-/// Air that does not move.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Still;
-
-impl Wind for Still {
-    fn velocity(&self, _: Vector, _: f64) -> Vector {
-        Vector::zeros()
-    }
-}
-
 /// Constants of the surroundings, and coefficients of the forces of the air. Those of plates are measured and computed by Andersen, Pesavento
 /// and Wang (2005) at Reynolds numbers of some 10³.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -33,6 +33,8 @@ pub struct Body {
     pub half: [f64; 3],
     /// Area of a plate, or the area that a lump shows on average, in m².
     pub area: f64,
+    /// Volume of air that it displaces, in m³; that of a plate is taken as 0.
+    pub volume: f64,
     /// The points by which it touches the ground; at most 64.
     pub contacts: Vec<Contact>,
 }
@@ -57,6 +59,7 @@ impl Body {
             mass,
             half: [half[0], half[1], 0.0],
             area: std::f64::consts::PI * half[0] * half[1],
+            volume: 0.0,
             contacts: (0..8).map(rim).collect(),
         };
         body.check().map(|()| body)
@@ -93,7 +96,8 @@ impl Body {
         }
         // The mean of the three views along the axes.
         let area = std::f64::consts::PI * (half[0] * half[1] + half[1] * half[2] + half[2] * half[0]) / 3.0;
-        let body = Body { shape: Shape::Lump, mass, half, area, contacts };
+        let volume = 4.0 / 3.0 * std::f64::consts::PI * half.into_iter().product::<f64>();
+        let body = Body { shape: Shape::Lump, mass, half, area, volume, contacts };
         body.check().map(|()| body)
     }
 
@@ -110,6 +114,7 @@ impl Body {
     pub(crate) fn check(&self) -> Result<(), Error> {
         check("a mass (kg)", self.mass, self.mass > 0.0, "more than 0")?;
         check("an area (m²)", self.area, self.area > 0.0, "more than 0")?;
+        check("a volume (m³)", self.volume, self.volume >= 0.0, "0 or more")?;
         for (axis, half) in self.half.into_iter().enumerate() {
             let thin = self.shape == Shape::Plate && axis == 2;
             let expected = if thin { "0 or more" } else { "more than 0" };
@@ -141,17 +146,9 @@ impl Body {
         self.half[0].min(self.half[1])
     }
 
-    /// Volume of a lump in m³; that of a plate is taken as 0.
-    pub fn volume(&self) -> f64 {
-        match self.shape {
-            Shape::Plate => 0.0,
-            Shape::Lump => 4.0 / 3.0 * std::f64::consts::PI * self.half.into_iter().product::<f64>(),
-        }
-    }
-
     /// Mass less that of the air in its place, in kg.
     pub fn heaviness(&self, air: &Air) -> f64 {
-        self.mass - air.density * self.volume()
+        self.mass - air.density * self.volume
     }
 
     /// Speed in m/s at which weight and drag are equal: of a plate broadside on.

@@ -55,14 +55,14 @@ pub(crate) struct Part {
     pub(crate) flight: bool,
 }
 
-/// Number of states that are kept for going back.
-const KEPT: usize = 64;
+/// Number of states that are kept for going back: some kilobytes a body, of which a scene may have many.
+const KEPT: usize = 16;
 
 /// The motion of a body after its release.
 ///
 /// The result of [`at`](Fall::at) depends on what was given to [`new`](Fall::new) and on the wind only, not on the times asked for
 /// before: steps are those of the error. Going on costs the steps in between; going back costs some of them again, from the nearest of at most
-/// 64 states that are kept.
+/// 16 states that are kept.
 #[derive(Clone, Debug)]
 pub struct Fall {
     rules: Rules,

@@ -41,7 +41,7 @@ impl Dynamics {
                 inertia += Vector::new(b * b, a * a, 0.0) * (added / 8.0);
                 (added, Vector::new(b, a, half_chord))
             }
-            Shape::Lump => (air.density * body.volume() / 2.0, Vector::new(b.max(c), a.max(c), a.max(b))),
+            Shape::Lump => (air.density * body.volume / 2.0, Vector::new(b.max(c), a.max(c), a.max(b))),
         };
         let speed = if air.density > 0.0 {
             libm::sqrt(2.0 * weight.abs() / (PI * air.density * body.area))

@@ -59,8 +59,9 @@ mod settings;
 mod step;
 pub mod study;
 
-pub use air::{Air, Still, Wind};
+pub use air::Air;
 pub use body::{Body, Contact, Shape};
+pub use dlsys_wind::{Still, Wind};
 pub use error::Error;
 pub use fall::Fall;
 pub use ground::Ground;

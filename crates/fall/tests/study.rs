@@ -1,9 +1,10 @@
 //! The exact cases: errors and orders of the study, and the values of the design.
 
-use dlsys_fall::study::{self, Row};
+use dlsys_fall::study;
+use dlsys_wind::study::Convergence;
 
 /// Errors fall from row to row, and the last one of a case is below `most`.
-fn check(rows: &[Row], most: f64) {
+fn check(rows: &[Convergence], most: f64) {
     for (index, row) in rows.iter().enumerate() {
         match rows.get(index + 1).filter(|next| next.case == row.case) {
             Some(next) => assert!(next.error <= row.error.max(1e-12), "{next:?}"),

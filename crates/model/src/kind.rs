@@ -138,6 +138,10 @@ pub const GROUND: &str = "@G";
 /// name instead.
 pub const ELASTIC: &str = "@E";
 
+/// The command that lets go what follows, to the end of the branch. A model may declare a surface or a drawing of this name
+/// instead.
+pub const DETACH: &str = "@D";
+
 /// The cut symbol: removes itself and the rest of its branch.
 pub const CUT: &str = "%";
 

@@ -53,8 +53,8 @@ pub use chance::{Clock, Distribution, Draw, NewClock, choose};
 pub use condition::{Condition, ConditionStep};
 pub use dlsys_expr::{Comparison, Fold, Sign, Truth};
 pub use kind::{
-    BUILT_IN_SURFACES, COMMAND_SURFACES, CUT, Class, DRAWN_WORDS, ELASTIC, GROUND, Kind, KindId, Kinds,
-    SURFACE_SIZES, Strain, base_of, class_of,
+    BUILT_IN_SURFACES, COMMAND_SURFACES, CUT, Class, DETACH, DRAWN_WORDS, ELASTIC, GROUND, Kind, KindId,
+    Kinds, SURFACE_SIZES, Strain, base_of, class_of,
 };
 pub use measure::Measure;
 pub use physics::{FieldCache, Flow, Primitive, Spectrum, Tissue, Units, Wind};

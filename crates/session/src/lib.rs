@@ -230,7 +230,7 @@ impl Session {
     /// # Errors
     /// A module of the initial string is outside its domain, or an equation has no finite value there.
     pub fn simulate(&self, settings: sim::Settings) -> Result<Simulation<'_>, sim::Error> {
-        dlsys_surround::start(&self.model, settings, Place::of_scene(self.model.scenery.units))
+        dlsys_surround::start(&self.model, settings, Place::of_scene(&self.model.scenery))
     }
 }
 

@@ -163,7 +163,7 @@ impl<'m> Nursery<'m> {
             let model = self.model;
             let sways = sways(model);
             let weather = if sways { Weather::of(&model.scenery)? } else { None };
-            let around = Around { place: Place::of_scene(model.scenery.units), weather: weather.clone() };
+            let around = Around { place: Place::of_scene(&model.scenery), weather: weather.clone() };
             let following = Following::of(self.settings.bending);
             let motion = Motion::new(model, self.settings, weather, around.place, following)?;
             Ok(Passive { around, motion })

@@ -119,7 +119,7 @@ impl<'m> Replay<'m> {
     /// # Errors
     /// Those of [`Simulation::new`].
     pub fn new(model: &'m Model, settings: Settings) -> Result<Replay<'m>, Error> {
-        let place = Place::of_scene(model.scenery.units);
+        let place = Place::of_scene(&model.scenery);
         Replay::begin(dlsys_surround::start(model, Settings { log: true, ..settings }, place)?)
     }
 

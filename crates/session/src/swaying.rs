@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use dlsys_geometry::scene::Seedling;
+use dlsys_geometry::turtle::lets_go;
 use dlsys_model::{Model, Units};
 use dlsys_sim::Settings;
 use dlsys_surround::{ByModes, CLOCK, Classes, Error, Motion, Passive, Place, Weather};
@@ -38,6 +39,7 @@ impl Around {
             birth: outer.birth + seedling.birth * outer.units.time,
             origin: outer.origin + at,
             turn,
+            ground: outer.ground,
         }
     }
 
@@ -47,9 +49,11 @@ impl Around {
     }
 }
 
-/// True if something in a model, or in the plants in it, is passive.
+/// True if something in a model, or in the plants in it, is passive: stems that give way, or what is let go.
 pub fn sways(model: &Model) -> bool {
-    !model.scenery.tissues.is_empty() || model.scenery.plants.iter().any(|plant| sways(&plant.model))
+    !model.scenery.tissues.is_empty()
+        || lets_go(model)
+        || model.scenery.plants.iter().any(|plant| sways(&plant.model))
 }
 
 /// A plant at its place: its number, its seed, its birth and its placement.

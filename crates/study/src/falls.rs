@@ -2,32 +2,17 @@
 
 use std::time::Instant;
 
-use dlsys_fall::study::{RandomLanding, Row, random_landing};
+use dlsys_fall::study::{RandomLanding, random_landing};
 use dlsys_fall::{self as fall, Body, Fall, Ground, Motion, Settings, Vector};
 use dlsys_sim::brief;
+use dlsys_wind::study::Convergence;
 
-use super::table::Table;
+use super::table::{Table, exact_table};
 
 /// Exact cases of falling as a table. The order is that from the line above.
-pub fn exact_fall_table(rows: &[Row]) -> String {
-    let mut out = "falling: exact cases, by tolerance or length of a step\n".to_owned();
-    let mut table = Table::default();
-    table.push(["", "", "value", "exact", "error", "order"].map(str::to_owned));
-    let mut before = "";
-    for row in rows {
-        let name = if row.case == before { "" } else { row.case };
-        before = row.case;
-        table.push([
-            name.to_owned(),
-            format!("{:.1e}", row.resolution),
-            brief(row.value, 8),
-            brief(row.expected, 8),
-            format!("{:.1e}", row.error),
-            row.order.map_or(String::new(), |order| format!("{order:.2}")),
-        ]);
-    }
-    table.write("  ", &mut out);
-    out
+pub fn exact_fall_table(rows: &[Convergence]) -> String {
+    let title = "falling: exact cases, by tolerance or length of a step";
+    exact_table(title, rows, |resolution| format!("{resolution:.1e}"))
 }
 
 /// Bodies that are thrown at the ground at random.

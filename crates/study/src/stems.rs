@@ -131,7 +131,7 @@ fn track(session: &Session, times: &[f64], settings: Settings, limit: f64) -> Re
     let model = &session.model;
     let fault = |error: dlsys_surround::Error| error.diagnostic().message;
     let weather = Weather::of(&model.scenery).map_err(fault)?;
-    let place = Place::of_scene(model.scenery.units);
+    let place = Place::of_scene(&model.scenery);
     let begun = Instant::now();
     let motion =
         Motion::new(model, settings, weather, place, Passive::of(settings.bending)).map_err(fault)?;

@@ -3,12 +3,12 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use dlsys_fall as fall;
 use dlsys_sim::brief;
 use dlsys_sway::{self as sway, Fixed, Method, Segment, Skeleton, Solver, State, upright};
+use dlsys_wind::study::Convergence;
 use dlsys_wind::{self as wind, Description, Field};
 
-use super::table::Table;
+use super::table::{Table, exact_table};
 
 /// Seconds for a measurement of speed.
 const MEASURED: f64 = 0.3;
@@ -34,25 +34,9 @@ pub fn wind_table(rows: &[wind::study::Row]) -> String {
 }
 
 /// Exact cases of stems as a table. The order is that from the line above.
-pub fn exact_stem_table(rows: &[sway::study::Row]) -> String {
-    let mut out = "stems: exact cases, by the number of segments, or what is refined\n".to_owned();
-    let mut table = Table::default();
-    table.push(["", "", "value", "exact", "error", "order"].map(str::to_owned));
-    let mut before = "";
-    for row in rows {
-        let name = if row.case == before { "" } else { row.case };
-        before = row.case;
-        table.push([
-            name.to_owned(),
-            brief(row.resolution, 4),
-            brief(row.value, 8),
-            brief(row.expected, 8),
-            format!("{:.1e}", row.error),
-            row.order.map_or(String::new(), |order| format!("{order:.2}")),
-        ]);
-    }
-    table.write("  ", &mut out);
-    out
+pub fn exact_stem_table(rows: &[Convergence]) -> String {
+    let title = "stems: exact cases, by the number of segments, or what is refined";
+    exact_table(title, rows, |resolution| brief(resolution, 4))
 }
 
 /// Hard cases of stems as a table.
@@ -231,11 +215,7 @@ fn wind_time() -> Result<(f64, [f64; 2]), wind::Error> {
 }
 
 /// Exact cases of wind, stems and falling as CSV.
-pub fn surroundings_csv(
-    wind: &[wind::study::Row],
-    stems: &[sway::study::Row],
-    falls: &[fall::study::Row],
-) -> String {
+pub fn surroundings_csv(wind: &[wind::study::Row], stems: &[Convergence], falls: &[Convergence]) -> String {
     let quoted = |name: &str| format!("\"{}\"", name.replace('"', "\"\""));
     let mut out = "part,case,resolution,value,expected,error,bound,order\n".to_owned();
     for row in wind {
@@ -243,12 +223,12 @@ pub fn surroundings_csv(
         out += &format!("wind,{},,{value:e},{expected:e},{error:e},{bound:e},\n", quoted(name));
     }
     for row in stems {
-        let sway::study::Row { case, resolution, value, expected, error, order } = row;
+        let Convergence { case, resolution, value, expected, error, order } = row;
         let order = order.map_or(String::new(), |order| order.to_string());
         out += &format!("stems,{},{resolution:e},{value:e},{expected:e},{error:e},,{order}\n", quoted(case));
     }
     for row in falls {
-        let fall::study::Row { case, resolution, value, expected, error, order } = row;
+        let Convergence { case, resolution, value, expected, error, order } = row;
         let order = order.map_or(String::new(), |order| order.to_string());
         out +=
             &format!("falling,{},{resolution:e},{value:e},{expected:e},{error:e},,{order}\n", quoted(case));

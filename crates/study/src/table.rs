@@ -6,6 +6,7 @@ use super::hard::CaseResult;
 use super::record::Accuracy;
 use super::study::{Outcome, Series, Study};
 use dlsys_sim::brief;
+use dlsys_wind::study::Convergence;
 
 /// A table whose columns are as wide as what stands in them. All but the first and last are set to the right.
 #[derive(Default)]
@@ -37,6 +38,28 @@ impl Table {
             out.push('\n');
         }
     }
+}
+
+/// Exact cases as a table, with a title of its own. The order is that from the line above.
+pub(super) fn exact_table(title: &str, rows: &[Convergence], resolution: fn(f64) -> String) -> String {
+    let mut table = Table::default();
+    table.push(["", "", "value", "exact", "error", "order"].map(str::to_owned));
+    let mut before = "";
+    for row in rows {
+        let name = if row.case == before { "" } else { row.case };
+        before = row.case;
+        table.push([
+            name.to_owned(),
+            resolution(row.resolution),
+            brief(row.value, 8),
+            brief(row.expected, 8),
+            format!("{:.1e}", row.error),
+            row.order.map_or(String::new(), |order| format!("{order:.2}")),
+        ]);
+    }
+    let mut out = format!("{title}\n");
+    table.write("  ", &mut out);
+    out
 }
 
 /// A whole study.

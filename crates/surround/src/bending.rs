@@ -9,7 +9,7 @@ use std::ops::Deref;
 use std::sync::Arc;
 
 use dlsys_geometry::scene::Scene;
-use dlsys_geometry::turtle::{self, Stem, StemKey, Strains};
+use dlsys_geometry::turtle::{self, PartKey, Pose, Stem, StemKey, Strains};
 use dlsys_model::Model;
 use dlsys_sway::{self as sway, Solver, State, Vector, Wind, hermite};
 use dlsys_tree::ModuleString;
@@ -17,6 +17,7 @@ use dlsys_tree::ModuleString;
 use crate::body::{Body, roll, rolled};
 use crate::classes::{ByModes, Modal};
 use crate::descent::Descent;
+use crate::flights::Flown;
 use crate::place::Place;
 use crate::weather::Sampler;
 use crate::{CLOCK, Error, FailedStem};
@@ -45,6 +46,11 @@ pub(crate) struct Tick {
 }
 
 impl Tick {
+    /// Of nothing that gives way.
+    pub(crate) fn still() -> Tick {
+        Tick { body: Arc::default(), knots: Vec::new() }
+    }
+
     /// The strain of a stem and its rate at a time within the tick, per metre.
     fn strain(&self, stem: usize, time: f64) -> (Vector, Vector) {
         let after = self.knots.partition_point(|knot| knot.time <= time);
@@ -119,7 +125,7 @@ impl Tick {
     }
 }
 
-/// The strains of a string, for the turtle.
+/// The strains of a string, and where the parts are that it has let go, for the turtle.
 #[derive(Clone, Debug)]
 pub struct BentStems {
     tick: Arc<Tick>,
@@ -127,28 +133,46 @@ pub struct BentStems {
     time: f64,
     /// Metres in a unit of length.
     metre: f64,
-    /// Stems that the tick does not know, with their strains per metre; `None` if there are none.
+    /// The stems of the string with their strains per metre, if there are some that the tick does not know.
     new: Option<std::collections::HashMap<StemKey, Vector>>,
+    /// Where the parts are that have been let go.
+    pub(crate) flown: Flown,
 }
 
 impl BentStems {
     /// No strain anywhere.
     pub(crate) fn at_rest() -> BentStems {
-        let tick = Arc::new(Tick { body: Arc::default(), knots: Vec::new() });
-        BentStems { tick, time: 0.0, metre: 1.0, new: None }
+        let tick = Arc::new(Tick::still());
+        BentStems { tick, time: 0.0, metre: 1.0, new: None, flown: Flown::default() }
+    }
+
+    /// Adds the strains of stems that are not in the skeleton, by descent. True if there are any.
+    pub(crate) fn take_over<'a>(&mut self, stems: impl Iterator<Item = &'a Stem>, descent: &Descent) -> bool {
+        let mut any = false;
+        for stem in stems.filter(|stem| !self.tick.body.numbers.contains_key(&stem.key)) {
+            if let Some((strain, _)) = self.tick.inherited(stem, descent, self.time) {
+                self.new.get_or_insert_default().insert(stem.key, strain);
+                any = true;
+            }
+        }
+        any
     }
 }
 
 impl Strains for BentStems {
     fn strain(&self, stem: StemKey) -> Vector {
-        let strain = match &self.new {
-            Some(new) => new.get(&stem).copied().unwrap_or_else(Vector::zeros),
-            None => match self.tick.body.numbers.get(&stem) {
-                Some(&known) => self.tick.strain(known, self.time).0,
-                None => Vector::zeros(),
-            },
-        };
-        strain * self.metre
+        let frozen = self.flown.frozen.get(&stem).filter(|(since, _)| *since <= self.time);
+        if let Some((_, strain)) = frozen {
+            return *strain;
+        }
+        let new = self.new.as_ref().and_then(|new| new.get(&stem).copied());
+        // One that has just been let go is none of the stems of its string.
+        let known = || Some(self.tick.strain(*self.tick.body.numbers.get(&stem)?, self.time).0);
+        new.or_else(known).unwrap_or_else(Vector::zeros) * self.metre
+    }
+
+    fn flight(&self, part: PartKey) -> Option<Pose> {
+        self.flown.poses.get(&part).copied()
     }
 }
 
@@ -222,6 +246,9 @@ impl<M: Deref<Target = Model>> Bending<M> {
     }
 
     fn body(&mut self, string: &ModuleString) -> Result<Body, Error> {
+        if self.model.scenery.tissues.is_empty() {
+            return Ok(Body::default());
+        }
         let noted = turtle::skeleton(&self.model, string, &mut self.scene)?;
         Ok(Body::new(noted, &self.model, self.place.units.length))
     }
@@ -371,8 +398,9 @@ pub(crate) fn bent(
     scene: &mut Scene,
 ) -> Result<BentStems, Error> {
     let time = bending.place().seconds(string.time);
-    let mut stems = BentStems { tick: tick.clone(), time, metre: bending.place().units.length, new: None };
-    if !descent.is_empty() {
+    let metre = bending.place().units.length;
+    let mut stems = BentStems { tick: tick.clone(), time, metre, new: None, flown: Flown::default() };
+    if !descent.is_empty() && !bending.model().scenery.tissues.is_empty() {
         let noted = turtle::skeleton(bending.model(), string, scene)?;
         let strain = |stem: &Stem| tick.inherited(stem, descent, time).map(|(strain, _)| (stem.key, strain));
         stems.new = Some(noted.stems.iter().filter_map(strain).collect());

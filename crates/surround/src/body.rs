@@ -1,7 +1,7 @@
 //! From the skeleton that the turtle notes to the mechanics: masses and stiffnesses in SI, and the motion of growth.
 
 use dlsys_geometry::scene::{Point, Vector};
-use dlsys_geometry::turtle::{self, Form, Stem, StemKey};
+use dlsys_geometry::turtle::{self, Form, Piece, Stem, StemKey};
 use dlsys_model::{Model, Tissue};
 use dlsys_sway::{Joint, Load, Matrix, Plate, Segment, Skeleton};
 use std::collections::HashMap;
@@ -49,7 +49,7 @@ impl Body {
                 )
             });
             for load in carried {
-                carry(&mut skeleton, stem, load, load.tissue.map(|tissue| &tissues[tissue]), metre);
+                carry(&mut skeleton, stem, &load.piece, tissues, metre);
             }
         }
         let numbers = stems.iter().enumerate().map(|(i, stem)| (stem.key, i)).collect();
@@ -201,7 +201,7 @@ fn rest(stem: &Stem) -> Vector {
 }
 
 /// The vector of a rotation: its axis times its angle.
-fn rotation_vector(rotation: &Matrix) -> Vector {
+pub(crate) fn rotation_vector(rotation: &Matrix) -> Vector {
     let odd = Vector::new(
         rotation[(2, 1)] - rotation[(1, 2)],
         rotation[(0, 2)] - rotation[(2, 0)],
@@ -221,15 +221,28 @@ fn rotation_vector(rotation: &Matrix) -> Vector {
     nalgebra::UnitQuaternion::from_rotation_matrix(&rotation).scaled_axis()
 }
 
-/// Adds what a stem carries at its end.
-fn carry(skeleton: &mut Skeleton, stem: &Stem, load: &turtle::Load, tissue: Option<&Tissue>, metre: f64) {
+/// Mass in kg of a unit of the measure of a piece, where a unit of length is `metre` metres.
+pub(crate) fn density(piece: &Piece, tissues: &[Tissue], metre: f64) -> f64 {
+    let tissue = piece.tissue.map(|tissue| &tissues[tissue]);
     let density = tissue.map_or(Tissue::SURFACE_DENSITY, |tissue| tissue.density);
-    let thickness = tissue.map_or(Tissue::THICKNESS, |tissue| tissue.thickness);
-    // Mass of a unit of the measure in the scene.
-    let (dense, drag) = match load.form {
-        Form::Surface(_) => (density * thickness * metre * metre, 1.0),
-        Form::Ball(_) => (density * metre.powi(3), DRAG[0]),
-        Form::Rod(_) => (density * metre.powi(3), DRAG[1]),
+    match piece.form {
+        Form::Surface(_) => density * thickness(piece, tissues) * metre * metre,
+        Form::Ball(_) | Form::Rod(_) => density * metre.powi(3),
+    }
+}
+
+/// Thickness of a surface in m.
+pub(crate) fn thickness(piece: &Piece, tissues: &[Tissue]) -> f64 {
+    piece.tissue.map_or(Tissue::THICKNESS, |tissue| tissues[tissue].thickness)
+}
+
+/// Adds what a stem carries at its end.
+fn carry(skeleton: &mut Skeleton, stem: &Stem, load: &Piece, tissues: &[Tissue], metre: f64) {
+    let dense = density(load, tissues, metre);
+    let drag = match load.form {
+        Form::Surface(_) => 1.0,
+        Form::Ball(_) => DRAG[0],
+        Form::Rod(_) => DRAG[1],
     };
     let axes = frame(stem.end_axes).transpose();
     let centre = axes * (load.centre - stem.end) * metre;

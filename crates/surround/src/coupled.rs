@@ -12,8 +12,9 @@ use dlsys_sway::{self as sway, Vector};
 use dlsys_tree::ModuleString;
 
 use crate::bending::{Bending, Tick};
+use crate::course::LOOK_BACK;
 use crate::descent::Descent;
-use crate::motion::{LOOK_BACK, Passive};
+use crate::motion::Passive;
 use crate::place::Place;
 use crate::weather::{Sampler, Weather};
 use crate::{CLOCK, Error};

@@ -1,7 +1,9 @@
 //! Errors of the surroundings, with their place in the model.
 
 use dlsys_diagnostic::{Diagnostic, Span};
+use dlsys_fall as fall;
 use dlsys_geometry::turtle;
+use dlsys_model::Model;
 use dlsys_sim::{self as sim, brief};
 use dlsys_sway as sway;
 use dlsys_tree::Lineage;
@@ -26,6 +28,21 @@ pub struct FailedStem {
     pub tissue: Span,
     /// The speed of the wind where it stands at rest, in m/s.
     pub wind: f64,
+}
+
+/// The part that is let go whose flight fails.
+#[derive(Clone, Debug)]
+pub struct FallingPart {
+    /// Name of the kind of the module that holds its `@D`.
+    pub kind: String,
+    /// The module itself.
+    pub lineage: Lineage,
+    /// The place in the text that says how it is drawn.
+    pub drawn: Option<Span>,
+    /// Its mass in kg, if it is known.
+    pub mass: Option<f64>,
+    /// Its largest extent in m, if it is known.
+    pub size: Option<f64>,
 }
 
 /// Why the surroundings cannot be computed.
@@ -58,14 +75,34 @@ pub enum Error {
         /// The tolerance of the steps.
         tolerance: f64,
     },
+    /// A part that is let go cannot be followed.
+    #[error("{}", falling(.error, .part, *.time))]
+    Falling {
+        /// The reason.
+        error: fall::Error,
+        /// The part.
+        part: Box<FallingPart>,
+        /// The time in units of the model.
+        time: f64,
+    },
+    /// Too many parts are let go.
+    #[error("more than {most} parts are let go up to t = {time}")]
+    TooManyParts {
+        /// The largest number.
+        most: usize,
+        /// The time in units of the model.
+        time: f64,
+        /// The place in the text that draws the last one.
+        span: Option<Span>,
+    },
     /// More seconds than [`Settings::max_seconds`](sim::Settings::max_seconds).
-    #[error("the stems take more than {limit} s up to t = {time}")]
+    #[error("the surroundings take more than {limit} s up to t = {time}")]
     OutOfTime {
         /// The limit in s.
         limit: f64,
         /// The time in units of the model.
         time: f64,
-        /// The declaration of the first tissue.
+        /// The declaration of the first tissue, or the first `@D`.
         span: Span,
     },
     /// Too many steps up to the time that is asked for.
@@ -77,12 +114,29 @@ pub enum Error {
         time: f64,
         /// Seconds in a unit of time.
         seconds: f64,
-        /// The declaration of the first tissue.
+        /// The declaration of the first tissue, or the first `@D`.
         span: Span,
     },
 }
 
 impl Error {
+    /// A flight that fails, at a time in units of the model.
+    pub(crate) fn falling(
+        model: &Model,
+        origin: &turtle::Origin,
+        body: Option<&fall::Body>,
+        (error, time): (fall::Error, f64),
+    ) -> Error {
+        let part = Box::new(FallingPart {
+            kind: model.kinds.get(origin.kind).name.clone(),
+            lineage: origin.lineage,
+            drawn: origin.span(model),
+            mass: body.map(|body| body.mass),
+            size: body.map(|body| 2.0 * body.size()),
+        });
+        Error::Falling { error, part, time }
+    }
+
     /// The error as a message that quotes the model, with advice.
     pub fn diagnostic(&self) -> Diagnostic {
         match self {
@@ -108,11 +162,36 @@ impl Error {
                         .help("look for a width or a length that is far too small or large for the `units`"),
                 }
             }
+            Error::Falling { error, part, .. } => {
+                let mut diagnostic = Diagnostic::error(self.to_string());
+                if let Some(span) = part.drawn {
+                    diagnostic = diagnostic.at(span, "let go here");
+                }
+                if let (Some(mass), Some(size)) = (part.mass, part.size) {
+                    let (mass, size) = (brief(mass * 1e3, 3), brief(size * 1e3, 3));
+                    diagnostic = diagnostic.note(format!("it has {mass} g and is {size} mm large"));
+                }
+                match error {
+                    fall::Error::Value { .. } => diagnostic
+                        .help("look for a size, a width or a density that is far too small or large for the `units`"),
+                    _ => diagnostic
+                        .help("look at its size and mass in `units`, and at the speed of the wind")
+                        .help("`--bend-tolerance 0.01` allows larger errors than the default 0.001"),
+                }
+            }
+            Error::TooManyParts { most, span, .. } => {
+                let diagnostic = Diagnostic::error(self.to_string());
+                let diagnostic = match span {
+                    Some(span) => diagnostic.at(*span, "the last one"),
+                    None => diagnostic,
+                };
+                diagnostic.help(format!("let go of fewer than {most}: larger parts, or of some only"))
+            }
             Error::OutOfTime { limit, time, span } => Diagnostic::error(format!(
-                "after {limit} s of computing, the stems are at t = {} only",
+                "after {limit} s of computing, the surroundings are at t = {} only",
                 brief(*time, 8)
             ))
-            .at(*span, "they bend")
+            .at(*span, "this moves")
             .help("`--max-seconds` is the limit; `--bend-tolerance 0.01` makes fewer steps"),
             Error::TooLong { most, time, seconds, span } => Diagnostic::error(format!(
                 "the surroundings take more than {most:.0e} steps up to t = {}",
@@ -120,7 +199,7 @@ impl Error {
             ))
             .at(
                 *span,
-                format!("stems move in steps of a thirtieth of a second, and a unit of t is {seconds} s"),
+                format!("what is passive moves in steps of a thirtieth of a second, and a unit of t is {seconds} s"),
             )
             .help("`units time S` is the pace of the film: seconds of motion in a unit of t, such as 1"),
         }
@@ -167,6 +246,12 @@ fn bending(error: &sway::Error, stem: Option<&FailedStem>, time: f64) -> String 
         format!("the stem of `{kind}` (module {lineage})")
     });
     format!("{stem} cannot be followed at t = {}: {why}", brief(time, 8))
+}
+
+/// The failure of a flight as a message.
+fn falling(error: &fall::Error, part: &FallingPart, time: f64) -> String {
+    let FallingPart { kind, lineage, .. } = part;
+    format!("what `{kind}` (module {lineage}) lets go cannot be followed at t = {}: {error}", brief(time, 8))
 }
 
 impl From<sim::Error> for Error {

@@ -1,7 +1,8 @@
-//! The surroundings of a growing plant: wind, and the stems that bend in it.
+//! The surroundings of a growing plant: wind, the stems that bend in it, and what is let go and falls.
 //!
 //! ```text
 //! growth (sim) ──string──▶ turtle ──skeleton──▶ body ──▶ stems in the wind (sway, wind) ──strains──▶ turtle ──▶ scene
+//!                                ──free parts──▶ loose ──▶ flights (fall, wind) ──poses──▶
 //! ```
 //!
 //! Growth is active and the surroundings are passive (O'Brien, Zordan and Hodgins): they change what is seen. They advance on a clock of
@@ -11,7 +12,8 @@
 //! - [`Weather`]: the wind that a model declares.
 //! - [`Survey`]: axes of a string with their natural frequencies, before anything is simulated.
 //! - [`Classes`]: modes by which plants move that are small in the picture.
-//! - [`Motion`]: the stems of a model at any time, as [`BentStems`] for [`draw_bent`](dlsys_geometry::turtle::draw_bent).
+//! - [`Loose`]: what is let go, as a body.
+//! - [`Motion`]: the stems and the flights of a model at any time, as [`BentStems`] for [`draw_bent`](dlsys_geometry::turtle::draw_bent).
 
 #![warn(missing_docs)]
 
@@ -19,8 +21,11 @@ mod bending;
 mod body;
 mod classes;
 mod coupled;
+mod course;
 mod descent;
 mod error;
+mod flights;
+mod loose;
 mod motion;
 mod place;
 mod survey;
@@ -29,7 +34,8 @@ mod weather;
 pub use bending::{BentStems, Effort};
 pub use classes::{ByModes, Classes};
 pub use coupled::start;
-pub use error::{Error, FailedStem};
+pub use error::{Error, FailedStem, FallingPart};
+pub use loose::Loose;
 pub use motion::{MOST_TICKS, Motion, Passive};
 pub use place::Place;
 pub use survey::{Axis, Survey, Vibration, moves};

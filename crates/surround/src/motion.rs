@@ -12,17 +12,19 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use dlsys_diagnostic::Span;
 use dlsys_geometry::scene::Scene;
 use dlsys_geometry::turtle;
 use dlsys_model::Model;
-use dlsys_sim::{self as sim, Settings, Simulation};
+use dlsys_sim::{self as sim, Settings};
 use dlsys_sway as sway;
 use dlsys_tree::ModuleString;
 
-use crate::bending::{Bending, BentStems, Effort, Tick, bent};
+use crate::bending::{Bending, BentStems, Effort, bent};
 use crate::classes::ByModes;
 use crate::coupled;
-use crate::descent::Descent;
+use crate::course::{Course, Past};
+use crate::flights::Flights;
 use crate::place::Place;
 use crate::weather::{Sampler, Weather};
 use crate::{CLOCK, Error};
@@ -35,8 +37,6 @@ const MOST_KEPT: usize = 1_000_000;
 const MOST_MARKS: usize = 24;
 /// The first distance between marks, in ticks.
 const FIRST_SPACING: u64 = 64;
-/// Part of a tick over which the rates of growth are taken.
-pub(crate) const LOOK_BACK: f64 = 1.0 / 1024.0;
 
 /// How passive motion is computed and kept.
 #[derive(Clone, Debug)]
@@ -78,87 +78,7 @@ impl Default for Passive {
     }
 }
 
-/// A run of growth with the motion of its stems, at a tick and up to the next.
-#[derive(Clone)]
-struct Course<'m> {
-    growth: Simulation<'m>,
-    bending: Bending<&'m Model>,
-    /// The number of the present tick.
-    number: u64,
-    tick: Arc<Tick>,
-    /// Productions from the present tick to the next.
-    descent: Arc<Descent>,
-    /// The strings a little before the next tick, and at the next tick, if growth gets there.
-    ahead: Result<Arc<[ModuleString; 2]>, Error>,
-    /// There was a production between these two strings.
-    jumps: bool,
-}
-
-impl<'m> Course<'m> {
-    /// From the first tick.
-    fn new(mut growth: Simulation<'m>, mut bending: Bending<&'m Model>) -> Result<Course<'m>, Error> {
-        let mut string = ModuleString::default();
-        let number = bending.place().first_tick();
-        growth.at(bending.place().time_of(number).max(0.0), &mut string)?;
-        growth.take_events();
-        let tick = Arc::new(bending.advance(number, &string, None)?);
-        let descent = Arc::default();
-        let mut course =
-            Course { growth, bending, number, tick, descent, ahead: Ok(Arc::default()), jumps: false };
-        course.look_ahead();
-        Ok(course)
-    }
-
-    /// Lets growth go on to the next tick. It may fail there, after a time that is asked for.
-    fn look_ahead(&mut self) {
-        let place = *self.bending.place();
-        let next = place.time_of(self.number + 1);
-        let before = next - LOOK_BACK * CLOCK / place.units.time;
-        let mut strings = <[ModuleString; 2]>::default();
-        let [earlier, now] = &mut strings;
-        let mut gone = self.growth.at(before, earlier);
-        let mut descent = Descent::default();
-        descent.add(self.bending.model(), &self.growth.take_events());
-        if gone.is_ok() {
-            gone = self.growth.at(next, now);
-        }
-        let last = self.growth.take_events();
-        self.jumps = !last.is_empty();
-        descent.add(self.bending.model(), &last);
-        self.descent = Arc::new(descent);
-        self.ahead = gone.map(|()| Arc::new(strings)).map_err(Error::from);
-    }
-
-    /// Goes on to the next tick; returns the one that is past.
-    fn tick(&mut self) -> Result<Past, Error> {
-        let ahead = self.ahead.clone()?;
-        let [before, now] = &*ahead;
-        let before = (!self.jumps).then_some(before);
-        let tick = self.bending.advance(self.number + 1, now, Some((&self.tick, &self.descent, before)))?;
-        let tick = std::mem::replace(&mut self.tick, Arc::new(tick));
-        let past = Past { number: self.number, tick, descent: self.descent.clone() };
-        self.number += 1;
-        self.look_ahead();
-        Ok(past)
-    }
-}
-
-/// A tick of the past.
-#[derive(Clone)]
-struct Past {
-    number: u64,
-    tick: Arc<Tick>,
-    descent: Arc<Descent>,
-}
-
-impl Past {
-    /// Number of strains that it keeps, and one for itself.
-    fn size(&self) -> usize {
-        self.tick.size() + 1
-    }
-}
-
-/// The passive motion of a model: its stems in the wind.
+/// The passive motion of a model: its stems in the wind, and what it lets go.
 pub struct Motion<'m> {
     model: &'m Model,
     courses: Mutex<Courses<'m>>,
@@ -166,6 +86,8 @@ pub struct Motion<'m> {
 
 struct Courses<'m> {
     present: Course<'m>,
+    /// What has been let go up to the latest tick, if anything may be. A release is the same whichever course comes by.
+    flights: Option<Flights>,
     /// In the order of time, without gaps, up to the present tick.
     past: VecDeque<Past>,
     /// The sum of the sizes of the past ticks.
@@ -191,15 +113,17 @@ impl<'m> Motion<'m> {
         place: Place,
         passive: Passive,
     ) -> Result<Option<Motion<'m>>, Error> {
-        if model.scenery.tissues.is_empty() {
+        if model.scenery.tissues.is_empty() && !turtle::lets_go(model) {
             return Ok(None);
         }
         check(model, &place, place.first_tick() as f64)?;
         let settings = Settings { log: true, transitions: false, ..settings };
         let growth = coupled::start(model, settings, place)?;
         let sampler = Arc::new(Sampler::new(weather, place));
-        let bending = Bending::new(model, sampler, place, passive.solver).by_modes(passive.modes.clone());
-        let present = Course::new(growth, bending)?;
+        let bending =
+            Bending::new(model, sampler.clone(), place, passive.solver).by_modes(passive.modes.clone());
+        let mut flights = Flights::new(model, sampler, place, passive.solver.tolerance);
+        let present = Course::new(model, (growth, bending), &mut flights)?;
         let courses = Courses {
             // Without marks the whole is begun anew where time goes back.
             marks: vec![present.clone()],
@@ -207,6 +131,7 @@ impl<'m> Motion<'m> {
             limit: settings.max_seconds,
             spent: Duration::ZERO,
             present,
+            flights,
             past: VecDeque::new(),
             kept: 0,
             spacing: FIRST_SPACING,
@@ -215,10 +140,10 @@ impl<'m> Motion<'m> {
         Ok(Some(Motion { model, courses: Mutex::new(courses) }))
     }
 
-    /// The strains of a string of the model, at the string's time.
+    /// The strains of a string of the model, and where what it has let go is, at the string's time.
     ///
     /// # Errors
-    /// The growth up to that time fails, or the motion of the stems does.
+    /// The growth up to that time fails, or the motion of the stems or of what falls does.
     pub fn at(&self, string: &ModuleString) -> Result<BentStems, Error> {
         let mut courses = self.courses.lock().unwrap_or_else(PoisonError::into_inner);
         courses.at(self.model, string)
@@ -260,13 +185,30 @@ fn check(model: &Model, place: &Place, number: f64) -> Result<(), Error> {
     if number <= MOST_TICKS {
         return Ok(());
     }
-    let (seconds, span) = (place.units.time, model.scenery.tissues[0].span);
+    let (seconds, span) = (place.units.time, span(model));
     let time = place.time_at(number * CLOCK);
     Err(Error::TooLong { most: MOST_TICKS, time, seconds, span })
 }
 
+/// The place in the text of the first declaration, or module, that makes a model passive.
+fn span(model: &Model) -> Span {
+    let tissue = model.scenery.tissues.first().map(|tissue| tissue.span);
+    tissue.or_else(|| turtle::place_of_detach(model)).unwrap_or_default()
+}
+
 impl<'m> Courses<'m> {
     fn at(&mut self, model: &'m Model, string: &ModuleString) -> Result<BentStems, Error> {
+        let mut stems = self.bent(model, string)?;
+        if let Some(flights) = &mut self.flights {
+            let begun = self.limit.is_finite().then(Instant::now);
+            stems.flown = flights.poses(model, string)?;
+            self.spent += begun.map_or(Duration::ZERO, |begun| begun.elapsed());
+            self.check_time()?;
+        }
+        Ok(stems)
+    }
+
+    fn bent(&mut self, model: &'m Model, string: &ModuleString) -> Result<BentStems, Error> {
         let place = *self.present.bending.place();
         let number = self.number_of(model, place.seconds(string.time))?;
         // Before the first tick nothing has moved.
@@ -285,7 +227,10 @@ impl<'m> Courses<'m> {
             while self.present.number < number {
                 self.tick()?;
             }
-            let Course { tick, descent, .. } = &self.present;
+            let Course { tick, descent, held, .. } = &self.present;
+            if let Some((_, error)) = held.as_ref().filter(|(since, _)| *since <= string.time) {
+                return Err(error.clone());
+            }
             return bent(tick, descent, &self.present.bending, string, &mut self.scene);
         }
         let first = self.past.front().map_or(0, |past| past.number);
@@ -307,14 +252,9 @@ impl<'m> Courses<'m> {
         let left =
             Duration::try_from_secs_f64(self.limit).unwrap_or(Duration::MAX).saturating_sub(self.spent);
         self.present.bending.give_up_at(begun.and_then(|begun| begun.checked_add(left)));
-        let past = self.present.tick();
+        let past = self.present.tick(&mut self.flights);
         self.spent += begun.map_or(Duration::ZERO, |begun| begun.elapsed());
-        if self.spent.as_secs_f64() > self.limit {
-            let bending = &self.present.bending;
-            let time = bending.place().time_of(self.present.number);
-            let span = bending.model().scenery.tissues[0].span;
-            return Err(Error::OutOfTime { limit: self.limit, time, span });
-        }
+        self.check_time()?;
         let past = past?;
         self.kept += past.size();
         self.past.push_back(past);
@@ -323,6 +263,16 @@ impl<'m> Courses<'m> {
         }
         self.mark();
         Ok(())
+    }
+
+    /// Fails if the surroundings have taken more time than they may.
+    fn check_time(&self) -> Result<(), Error> {
+        if self.spent.as_secs_f64() <= self.limit {
+            return Ok(());
+        }
+        let bending = &self.present.bending;
+        let (time, span) = (bending.place().time_of(self.present.number), span(bending.model()));
+        Err(Error::OutOfTime { limit: self.limit, time, span })
     }
 
     /// Sets a mark where one is due.

@@ -1,6 +1,6 @@
 //! Where and when a model lives in a scene: its units, its birth, and its turtle's axes in the world.
 
-use dlsys_model::Units;
+use dlsys_model::{Scenery, Units};
 use dlsys_sway as sway;
 use nalgebra::{Matrix3, Point3, Vector3};
 
@@ -17,12 +17,16 @@ pub struct Place {
     pub origin: Point3<f64>,
     /// From the model's axes to those of the scene: a rotation.
     pub turn: Matrix3<f64>,
+    /// The height of the ground of the scene, in m, if there is one.
+    pub ground: Option<f64>,
 }
 
 impl Place {
     /// The place of the model of the scene itself.
-    pub fn of_scene(units: Units) -> Place {
-        Place { units, birth: 0.0, origin: Point3::origin(), turn: Matrix3::identity() }
+    pub fn of_scene(scenery: &Scenery) -> Place {
+        let units = scenery.units;
+        let ground = scenery.ground.map(|height| height * units.length);
+        Place { units, birth: 0.0, origin: Point3::origin(), turn: Matrix3::identity(), ground }
     }
 
     /// The time of the scene, in s, at a time of the model.

@@ -183,6 +183,30 @@ impl Sampler {
     }
 }
 
+/// The wind in the axes of the scene at instants of a grid, and between them by straight lines: for bodies that fall, each in steps of its own.
+/// Turbulence changes little from one instant to the next, and many bodies read the same ones.
+pub(crate) struct Gusts<'a>(pub(crate) &'a Sampler);
+
+/// Instants in a second. Steps of a flight end at parts of a second that are powers of 2, and the longest ones read the wind at these.
+const INSTANTS: f64 = 128.0;
+
+impl sway::Wind for Gusts<'_> {
+    fn velocity(&self, point: sway::Vector, time: f64) -> sway::Vector {
+        let Gusts(sampler) = self;
+        if !sampler.blows() {
+            return sway::Vector::zeros();
+        }
+        let at = |instant: f64| match sampler.at(instant / INSTANTS) {
+            Some(snapshot) => snapshot.velocity(point),
+            None => sway::Vector::repeat(f64::NAN),
+        };
+        let instant = (time * INSTANTS).floor();
+        let part = time * INSTANTS - instant;
+        let before = at(instant);
+        if part == 0.0 { before } else { before.lerp(&at(instant + 1.0), part) }
+    }
+}
+
 impl sway::Wind for Sampler {
     fn velocity(&self, point: sway::Vector, time: f64) -> sway::Vector {
         match self.at(time) {

@@ -2,6 +2,7 @@
 //! `cargo run --release -p dlsys-sway --example table`. An argument is the number of segments of the longest chain (10000).
 
 use dlsys_sway::study;
+use dlsys_wind::study::Convergence;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let chain = std::env::args().nth(1).map_or(Ok(10_000), |text| text.parse())?;
@@ -14,7 +15,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
     }) {
         let order = row.order.map_or(String::new(), |order| format!("{order:.2}"));
-        let study::Row { case, resolution, value, expected, error, .. } = row;
+        let Convergence { case, resolution, value, expected, error, .. } = row;
         println!("{case:<50} {resolution:>8} {value:>16.9e} {expected:>16.9e} {error:>9.1e} {order:>6}");
     }
     println!(

@@ -2,30 +2,6 @@
 
 use crate::{Matrix, Vector};
 
-/// Velocity of the air.
-///
-/// Every closure `Fn(Vector, f64) -> Vector` is a wind.
-pub trait Wind {
-    /// Velocity in m/s at a point (world coordinates, m) and a time (s).
-    fn velocity(&self, point: Vector, time: f64) -> Vector;
-}
-
-impl<F: Fn(Vector, f64) -> Vector> Wind for F {
-    fn velocity(&self, point: Vector, time: f64) -> Vector {
-        self(point, time)
-    }
-}
-
-/// Air that does not move.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Still;
-
-impl Wind for Still {
-    fn velocity(&self, _: Vector, _: f64) -> Vector {
-        Vector::zeros()
-    }
-}
-
 /// Constants of the surroundings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Air {

@@ -1,6 +1,6 @@
 //! Natural frequencies, Greenhill's ratio, Cauchy's number: what is known of a plant before it is simulated.
 
-use crate::air::Still;
+use crate::Still;
 use crate::form::{Twist, Wrench};
 use crate::krylov::largest;
 use crate::link::{Link, Weights, pair, transport};

@@ -1,6 +1,6 @@
 //! Static solution: the strain under which all forces are in balance, by Newton's method with the same elimination.
 
-use crate::air::Wind;
+use crate::Wind;
 use crate::form::Twist;
 use crate::link::Weights;
 use crate::ros2::StepError;

@@ -79,8 +79,9 @@ mod state;
 pub mod study;
 mod sweep;
 
-pub use air::{Air, Still, Wind};
+pub use air::Air;
 pub use analysis::{Mode, cauchy_number};
+pub use dlsys_wind::{Still, Wind};
 pub use energy::Energy;
 pub use error::Error;
 pub use pose::{Frame, Pose};

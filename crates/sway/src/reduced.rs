@@ -13,7 +13,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use crate::air::Wind;
+use crate::Wind;
 use crate::forces::{Part, Stretch};
 use crate::form::{Form, Twist, Wrench};
 use crate::link::{Link, pair, transport};

@@ -15,7 +15,7 @@
 //! with the residual `r = Q₁ - M₁ k/h` (inverse dynamics, in linear time), `M₀ a₁ = M₀ k/h + r` up to `(M₁ - M₀)(a₁ - k/h)`, of second order
 //! in h, so the step stays of order 2. All products with D cancel: `(M + γhD + γ²h²K) z = h r - γ(½ - γ) h² K k`.
 
-use crate::air::Wind;
+use crate::Wind;
 use crate::forces::Stretch;
 use crate::form::{Twist, Wrench};
 use crate::link::{Link, Weights, pair, transport};

@@ -3,7 +3,7 @@
 //! Stages `k_i = h f(y + Σ α_ij k_j) + h W Σ γ_ij k_j`. The accelerations f come from the mass matrix at each stage, factorised there; so a step takes
 //! five eliminations instead of one.
 
-use crate::air::Wind;
+use crate::Wind;
 use crate::link::{Weights, transport};
 use crate::ros2::StepError;
 use crate::sweep::{Bend, Instant, Workspace};

@@ -1,6 +1,6 @@
 //! The solver: steps on a global grid, of controlled error.
 
-use crate::air::Wind;
+use crate::Wind;
 use crate::link::Weights;
 use crate::ros2::StepError;
 use crate::sweep::{Bend, Instant, Workspace};

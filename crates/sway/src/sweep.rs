@@ -1,6 +1,6 @@
 //! Passes over the tree: places and forces from the roots to the tips, elimination back.
 
-use crate::air::Wind;
+use crate::Wind;
 use crate::forces::{Damper, Forces, Part, Stretch};
 use crate::form::{Twist, Wrench};
 use crate::link::{Link, Weights, pair, transport};

@@ -1,10 +1,11 @@
 //! The exact cases: errors and orders of the study.
 
 use dlsys_sway::Method;
-use dlsys_sway::study::{self, Row};
+use dlsys_sway::study;
+use dlsys_wind::study::Convergence;
 
 /// The last row of each case has an error below `most`; its order, where errors are not rounding, is 2.
-fn check(rows: &[Row], most: f64) {
+fn check(rows: &[Convergence], most: f64) {
     for pair in rows.windows(2).filter(|pair| pair[0].case == pair[1].case) {
         assert!(pair[1].error <= pair[0].error.max(1e-12), "{pair:?}");
     }

@@ -47,6 +47,7 @@
 
 #![warn(missing_docs)]
 
+mod air;
 mod bodies;
 mod description;
 mod error;
@@ -65,6 +66,7 @@ mod spectrum;
 pub mod study;
 mod turns;
 
+pub use air::{Still, Wind};
 pub use description::{Description, Signal};
 pub use error::Error;
 pub use field::Field;

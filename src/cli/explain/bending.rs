@@ -20,7 +20,7 @@ const MOST_MEASURED: usize = 24;
 /// Number of times at which motion of growth is looked for.
 const LOOKS: u32 = 16;
 /// Seconds that the run to the last frame may take.
-const PATIENCE: f64 = 20.0;
+pub(super) const PATIENCE: f64 = 20.0;
 /// Part of a tick over which motion of growth is looked for.
 const BEFORE: f64 = 1.0 / 1024.0;
 
@@ -48,7 +48,7 @@ pub struct BendingPlan {
 }
 
 /// Least and greatest value.
-type Range = [f64; 2];
+pub(super) type Range = [f64; 2];
 
 /// Axes that modules of the same kinds draw.
 #[derive(Serialize)]
@@ -196,7 +196,7 @@ impl AxisPlan {
 }
 
 /// Least and greatest value in a unit.
-fn values([least, greatest]: Range, unit: f64) -> String {
+pub(super) fn values([least, greatest]: Range, unit: f64) -> String {
     let [least, greatest] = [least, greatest].map(|value| brief(value / unit, 3));
     if least == greatest { least } else { format!("{least} to {greatest}") }
 }
@@ -216,12 +216,12 @@ fn with_unit(range: Range, units: &[(f64, &str)]) -> String {
 }
 
 /// A length from m, as people read it.
-fn length(range: Range) -> String {
+pub(super) fn length(range: Range) -> String {
     with_unit(range, &[(1.0, "m"), (0.01, "cm"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm")])
 }
 
 /// A mass from kg.
-fn mass(range: Range) -> String {
+pub(super) fn mass(range: Range) -> String {
     with_unit(range, &[(1.0, "kg"), (1e-3, "g"), (1e-6, "mg"), (1e-9, "µg")])
 }
 
@@ -301,7 +301,7 @@ fn plan(model: &Model, survey: &Survey, group: &[usize], wind: Option<f64>) -> A
     }
 }
 
-fn range(values: impl Iterator<Item = f64>) -> Option<Range> {
+pub(super) fn range(values: impl Iterator<Item = f64>) -> Option<Range> {
     values.fold(None, |range, x| match range {
         None => Some([x, x]),
         Some([least, greatest]) => Some([x.min(least), x.max(greatest)]),

@@ -30,10 +30,13 @@
 //!   them for the last four; null where there is none; `unbent` is true if rules read `strain`: the axes are those of a growth without it;
 //! - `bending_of_plants`, for a model with plants of other models that have tissues: a list of such objects with `plant`, its name; `t` is its
 //!   age, `ticks` those of its age, `wind` that of the scene at the last frame;
+//! - `falling`, for models that let go (`@D`), plants included: a list of `{plant, t, parts}`; a part is `{kind, shape, count, mass, size, speed, ratio}`: `count`
+//!   parts that modules of this kind let go, `plate` or `lump`, least and greatest values in SI; `ratio` is I* of plates;
 //! - `summary`: names of kinds by `work`, and `closed_form`: true if nothing is ever integrated numerically.
 
 mod bending;
 mod curves;
+mod falling;
 mod given;
 mod plan;
 mod scene;

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::bending::BendingPlan;
 use super::curves::CurvePlan;
+use super::falling::FallingPlan;
 use super::scene::{self, ScenePart};
 use super::{given, words};
 use crate::diagnostic::Source;
@@ -29,6 +30,9 @@ pub struct Explanation {
     /// Those of the plants of other models.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub bending_of_plants: Vec<BendingPlan>,
+    /// What is let go.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub falling: Vec<FallingPlan>,
     pub summary: Summary,
 }
 
@@ -176,6 +180,8 @@ impl Explanation {
         let (mut scene, bending) = (scene::parts(model), BendingPlan::new(model));
         let bending_of_plants = BendingPlan::of_plants(model);
         scene.extend(bending.iter().chain(&bending_of_plants).map(|bending| bending.part.clone()));
+        let falling = FallingPlan::all(model);
+        scene.extend(falling.iter().map(|falling| falling.row.clone()));
         Explanation {
             model: session.source.name.clone(),
             title: model.title.clone(),
@@ -185,6 +191,7 @@ impl Explanation {
             scene,
             bending,
             bending_of_plants,
+            falling,
             summary,
         }
     }

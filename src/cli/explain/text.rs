@@ -181,6 +181,9 @@ pub fn show(plan: &Explanation) -> String {
     for bending in plan.bending.iter().chain(&plan.bending_of_plants) {
         out += &bending.text();
     }
+    for falling in &plan.falling {
+        out += &falling.text();
+    }
     let _ = writeln!(out, "Summary");
     let summary = &plan.summary;
     let row = |label: &str, says: &str, list: &[String]| [label.to_owned(), says.to_owned(), list.join(" ")];

@@ -2,8 +2,10 @@
 
 use std::f64::consts::{PI, TAU};
 
+use dlsys_wind::study::Convergence;
+
+use super::TOLERANCES;
 use super::planar::{Planar, planar_flutter, planar_tumble};
-use super::{Row, TOLERANCES, rows};
 use crate::motion::turn;
 use crate::{Air, Body, Error, Fall, Motion, Settings, Still, Vector};
 
@@ -21,7 +23,7 @@ fn petal() -> Result<Body, Error> {
 /// # Errors
 ///
 /// An error of the fall, which is a defect.
-pub fn terminal_speed() -> Result<Vec<Row>, Error> {
+pub fn terminal_speed() -> Result<Vec<Convergence>, Error> {
     let air = Air::default();
     let (petal, seed) = (petal()?, Body::ball(2e-5, 2e-3)?);
     let exact = (2.0 * petal.mass * 9.81 / (2.4 * 1.2 * petal.area)).sqrt();
@@ -43,7 +45,7 @@ pub fn terminal_speed() -> Result<Vec<Row>, Error> {
             )?;
             found.push((tolerance, -fall.at(time, &Still)?.velocity.y));
         }
-        all.extend(rows(case, exact, &found));
+        all.extend(Convergence::rows(case, exact, &found));
     }
     Ok(all)
 }
@@ -67,7 +69,7 @@ impl Broadside {
         Ok(Broadside { body, time, speed: terminal * 1_f64.tanh(), way })
     }
 
-    fn rows(&self, names: [&'static str; 2], list: &[(f64, Settings)]) -> Result<Vec<Row>, Error> {
+    fn rows(&self, names: [&'static str; 2], list: &[(f64, Settings)]) -> Result<Vec<Convergence>, Error> {
         let (mut speeds, mut ways) = (Vec::new(), Vec::new());
         for (resolution, settings) in list {
             let mut fall = Fall::new(self.body.clone(), Motion::at(Vector::zeros()), 0.0, None, *settings)?;
@@ -75,8 +77,8 @@ impl Broadside {
             speeds.push((*resolution, -motion.velocity.y));
             ways.push((*resolution, -motion.position.y));
         }
-        let mut all = rows(names[0], self.speed, &speeds);
-        all.extend(rows(names[1], self.way, &ways));
+        let mut all = Convergence::rows(names[0], self.speed, &speeds);
+        all.extend(Convergence::rows(names[1], self.way, &ways));
         Ok(all)
     }
 }
@@ -86,7 +88,7 @@ impl Broadside {
 /// # Errors
 ///
 /// An error of the fall, which is a defect.
-pub fn broadside() -> Result<Vec<Row>, Error> {
+pub fn broadside() -> Result<Vec<Convergence>, Error> {
     let list = TOLERANCES.map(|tolerance| (tolerance, settings(tolerance)));
     Broadside::new()?.rows(["broadside fall: speed (m/s)", "broadside fall: way (m)"], &list)
 }
@@ -96,7 +98,7 @@ pub fn broadside() -> Result<Vec<Row>, Error> {
 /// # Errors
 ///
 /// An error of the fall, which is a defect.
-pub fn broadside_steps() -> Result<Vec<Row>, Error> {
+pub fn broadside_steps() -> Result<Vec<Convergence>, Error> {
     let case = Broadside::new()?;
     let list = [8.0, 16.0, 32.0].map(|count| {
         let longest = case.time / count;
@@ -165,7 +167,7 @@ fn measure(
 /// # Errors
 ///
 /// An error of the fall, which is a defect.
-pub fn flutter() -> Result<Vec<Row>, Error> {
+pub fn flutter() -> Result<Vec<Convergence>, Error> {
     let exact = planar_flutter(0.5, 5, 15);
     let (mut periods, mut falls) = (Vec::new(), Vec::new());
     for tolerance in TOLERANCES {
@@ -173,8 +175,8 @@ pub fn flutter() -> Result<Vec<Row>, Error> {
         periods.push((tolerance, found.period));
         falls.push((tolerance, found.fall));
     }
-    let mut all = rows("flutter at I* = 0.5: period (a/U)", exact.period, &periods);
-    all.extend(rows("flutter at I* = 0.5: mean fall (U)", exact.fall, &falls));
+    let mut all = Convergence::rows("flutter at I* = 0.5: period (a/U)", exact.period, &periods);
+    all.extend(Convergence::rows("flutter at I* = 0.5: mean fall (U)", exact.fall, &falls));
     Ok(all)
 }
 
@@ -184,7 +186,7 @@ pub fn flutter() -> Result<Vec<Row>, Error> {
 /// # Errors
 ///
 /// An error of the fall, which is a defect.
-pub fn tumble() -> Result<Vec<Row>, Error> {
+pub fn tumble() -> Result<Vec<Convergence>, Error> {
     let level = |n: usize| n as f64 * TAU;
     let exact = planar_tumble(1.4, 2, 6);
     let (mut periods, mut falls) = (Vec::new(), Vec::new());
@@ -193,7 +195,7 @@ pub fn tumble() -> Result<Vec<Row>, Error> {
         periods.push((tolerance, found.period));
         falls.push((tolerance, found.fall));
     }
-    let mut all = rows("tumbling at I* = 1.4: time of a turn (a/U)", exact.period, &periods);
-    all.extend(rows("tumbling at I* = 1.4: mean fall (U)", exact.fall, &falls));
+    let mut all = Convergence::rows("tumbling at I* = 1.4: time of a turn (a/U)", exact.period, &periods);
+    all.extend(Convergence::rows("tumbling at I* = 1.4: mean fall (U)", exact.fall, &falls));
     Ok(all)
 }

@@ -1,6 +1,8 @@
 //! Landing: rebounds, friction, rolling, energy, random throws.
 
-use super::{Row, TOLERANCES, rows};
+use dlsys_wind::study::Convergence;
+
+use super::TOLERANCES;
 use crate::motion::turn;
 use crate::{Air, Body, Error, Fall, Ground, Motion, Settings, Still, Vector};
 
@@ -15,7 +17,7 @@ fn vacuum(tolerance: f64) -> Settings {
 /// # Errors
 ///
 /// An error of the fall, which is a defect.
-pub fn bounce() -> Result<Vec<Row>, Error> {
+pub fn bounce() -> Result<Vec<Convergence>, Error> {
     let (e, radius) = (0.8_f64, 0.02);
     let first = (2.0 / 9.81_f64).sqrt();
     let time = first * (1.0 + 2.0 * e + 2.0 * e * e + e * e * e);
@@ -26,7 +28,7 @@ pub fn bounce() -> Result<Vec<Row>, Error> {
         let mut fall = Fall::new(Body::ball(0.01, radius)?, release, 0.0, Some(ground), vacuum(tolerance))?;
         found.push((tolerance, fall.at(time, &Still)?.position.y - radius));
     }
-    Ok(rows("third rebound of a ball: height (m)", e.powi(6), &found))
+    Ok(Convergence::rows("third rebound of a ball: height (m)", e.powi(6), &found))
 }
 
 /// Way of a plate that lies on the ground and starts with a velocity of 1 m/s, until it rests.
@@ -43,12 +45,12 @@ fn sliding(settings: Settings, friction: f64) -> Result<f64, Error> {
 /// # Errors
 ///
 /// An error of the fall, which is a defect.
-pub fn slide() -> Result<Vec<Row>, Error> {
+pub fn slide() -> Result<Vec<Convergence>, Error> {
     let mut found = Vec::new();
     for tolerance in TOLERANCES {
         found.push((tolerance, sliding(vacuum(tolerance), 0.4)?));
     }
-    Ok(rows("sliding to rest: way (m)", 1.0 / (2.0 * 0.4 * 9.81), &found))
+    Ok(Convergence::rows("sliding to rest: way (m)", 1.0 / (2.0 * 0.4 * 9.81), &found))
 }
 
 /// The same with the drag of a plate edge-on: m/(2 k) ln(1 + k v²/(μ m g)), k = ½ · 0.4 ρ A.
@@ -56,7 +58,7 @@ pub fn slide() -> Result<Vec<Row>, Error> {
 /// # Errors
 ///
 /// An error of the fall, which is a defect.
-pub fn slide_in_air() -> Result<Vec<Row>, Error> {
+pub fn slide_in_air() -> Result<Vec<Convergence>, Error> {
     let mass = 1e-3;
     let k = 0.2 * 1.2 * std::f64::consts::PI * 0.02 * 0.03;
     let exact = mass / (2.0 * k) * (k / (0.4 * mass * 9.81)).ln_1p();
@@ -64,7 +66,7 @@ pub fn slide_in_air() -> Result<Vec<Row>, Error> {
     for tolerance in TOLERANCES {
         found.push((tolerance, sliding(Settings { tolerance, ..Settings::default() }, 0.4)?));
     }
-    Ok(rows("sliding to rest in air: way (m)", exact, &found))
+    Ok(Convergence::rows("sliding to rest in air: way (m)", exact, &found))
 }
 
 /// A ball that slides at first without spin, without air and without resistance to rolling: it rolls at 5/7 of its speed in the end.
@@ -72,7 +74,7 @@ pub fn slide_in_air() -> Result<Vec<Row>, Error> {
 /// # Errors
 ///
 /// An error of the fall, which is a defect.
-pub fn roll() -> Result<Vec<Row>, Error> {
+pub fn roll() -> Result<Vec<Convergence>, Error> {
     let radius = 0.02;
     let ground = Ground { rolling: 0.0, ..Ground::at(0.0) };
     let mut found = Vec::new();
@@ -82,7 +84,7 @@ pub fn roll() -> Result<Vec<Row>, Error> {
         let mut fall = Fall::new(Body::ball(0.01, radius)?, release, 0.0, Some(ground), vacuum(tolerance))?;
         found.push((tolerance, fall.at(0.5, &Still)?.velocity.norm()));
     }
-    Ok(rows("ball from sliding to rolling: speed (m/s)", 1.0, &found))
+    Ok(Convergence::rows("ball from sliding to rolling: speed (m/s)", 1.0, &found))
 }
 
 /// Plates and lumps that are thrown at the ground without air: the largest gain of energy in an impact or in a step in contact, and in a
@@ -91,7 +93,7 @@ pub fn roll() -> Result<Vec<Row>, Error> {
 /// # Errors
 ///
 /// An error of the fall, which is a defect.
-pub fn contact_energy() -> Result<Vec<Row>, Error> {
+pub fn contact_energy() -> Result<Vec<Convergence>, Error> {
     let (mut in_contact, mut in_flight) = (Vec::new(), Vec::new());
     for tolerance in TOLERANCES {
         let (mut contact, mut flight) = (0.0_f64, 0.0_f64);
@@ -113,8 +115,8 @@ pub fn contact_energy() -> Result<Vec<Row>, Error> {
         in_contact.push((tolerance, contact));
         in_flight.push((tolerance, flight));
     }
-    let mut all = rows("thrown bodies: gain of energy by contact", 0.0, &in_contact);
-    all.extend(rows("thrown bodies: gain of energy in flight", 0.0, &in_flight));
+    let mut all = Convergence::rows("thrown bodies: gain of energy by contact", 0.0, &in_contact);
+    all.extend(Convergence::rows("thrown bodies: gain of energy in flight", 0.0, &in_flight));
     Ok(all)
 }
 

@@ -14,6 +14,7 @@
 use dlsys_tree::Lineage;
 use nalgebra::Matrix3;
 
+use super::Pose;
 use crate::scene::{Point, Vector};
 
 /// A stem of a string: the module that draws it, and its number among the stems of that module. Straight steps of one width that
@@ -33,11 +34,26 @@ impl StemKey {
     }
 }
 
-/// How far the stems of a string are from their shapes at rest.
+/// A part of a string that is let go: the module that holds its `@D`, and its number among those of that module.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct PartKey {
+    /// [`Lineage::id`] of the module.
+    pub module: u64,
+    /// From 0, in the order of drawing.
+    pub number: u32,
+}
+
+/// How far the stems of a string are from their shapes at rest, and where the parts are that it has let go.
 pub trait Strains {
     /// The strain of a stem beyond that of its shape at rest: rotation about its heading, left and up, in radians per scene unit.
     /// Zero for a stem that is not known.
     fn strain(&self, stem: StemKey) -> Vector;
+
+    /// Where the turtle stands at the `@D` of a part that has been let go; `None` for one that is not known, which stays where the branch
+    /// holds it.
+    fn flight(&self, _: PartKey) -> Option<Pose> {
+        None
+    }
 }
 
 /// The rigid motion from the shape at rest to what is seen.
@@ -53,6 +69,12 @@ impl Bent {
     /// No motion, about a point.
     pub(super) fn at(point: Point) -> Bent {
         Bent { rotation: Matrix3::identity(), rest: point, seen: point }
+    }
+
+    /// The motion that leads from one pose to another.
+    pub(super) fn between(rest: &Pose, seen: &Pose) -> Bent {
+        let [from, to] = [rest.axes, seen.axes].map(|axes| Matrix3::from_columns(&axes));
+        Bent { rotation: to * from.transpose(), rest: rest.position, seen: seen.position }
     }
 
     /// Where a point of the shape at rest is seen.

@@ -1,7 +1,7 @@
 //! Which module is which command.
 
 use super::frame::Axis;
-use dlsys_model::{Kind, Model};
+use dlsys_model::{DETACH, Kind, KindId, Model};
 
 /// What a module tells the turtle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,6 +56,8 @@ pub(super) enum Command {
     Surface(usize),
     /// A plant of another model, by its index among those that the model declares.
     Plant(usize),
+    /// `@D`: what follows is free.
+    Detach,
     /// `@G`: the turtle is set on the ground.
     Ground,
     /// `@PS(n)`
@@ -113,6 +115,7 @@ impl Command {
             "@T" => Command::Bend,
             "@C" => Command::Contour,
             "@E" => Command::Elastic,
+            DETACH => Command::Detach,
             "@G" => Command::Ground,
             "@PS" => Command::BeginPatch,
             "@PC" => Command::ControlPoint,
@@ -124,6 +127,28 @@ impl Command {
     /// The commands of all kinds of a model, by the kinds' index.
     pub(super) fn table(model: &Model) -> Vec<Command> {
         model.kinds.iter().map(|(_, kind)| Command::of(kind, model)).collect()
+    }
+
+    /// The kinds of a model that hold an `@D`, themselves or in what they are drawn as, by the kinds' index.
+    pub(super) fn that_let_go(model: &Model) -> Vec<bool> {
+        let table = Command::table(model);
+        let mut lets_go: Vec<bool> = table.iter().map(|command| *command == Command::Detach).collect();
+        let holds = |lets_go: &[bool], drawn: KindId| {
+            // Inside its own drawing a module is what its name says.
+            lets_go[drawn.index()] || Command::plain(model.kinds.get(drawn), model) == Command::Detach
+        };
+        loop {
+            let before = lets_go.clone();
+            for (id, command) in table.iter().enumerate() {
+                if let Command::Interpret(index) = command {
+                    lets_go[id] |=
+                        model.interpretations[*index].drawn.kinds().any(|kind| holds(&before, kind));
+                }
+            }
+            if lets_go == before {
+                return lets_go;
+            }
+        }
     }
 
     /// True for a step that may continue the stem before it.

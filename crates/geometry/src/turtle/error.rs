@@ -67,6 +67,12 @@ pub enum ErrorKind {
     /// A stem under `@E` without a width of its own.
     #[error("it draws a stem that gives way, and its width is not set")]
     NoWidth,
+    /// A stem behind `@D` without a width of its own.
+    #[error("it draws a stem that is let go, and its width is not set")]
+    NoWidthFree,
+    /// A plant of another model behind `@D`.
+    #[error("it lets go of a plant of another model")]
+    FreePlant,
     /// More patches have been begun than a frame may have.
     #[error("it begins more patches than a frame may have")]
     TooManyPatches,
@@ -98,6 +104,12 @@ impl ErrorKind {
             }
             ErrorKind::NoWidth => {
                 "stiffness and mass follow from the width: write `!(w)` before it, or `@E(0)` for a rigid stem".to_owned()
+            }
+            ErrorKind::NoWidthFree => {
+                "the mass of what falls follows from the width: write `!(w)` before it, as in `@D !(0.01) F(0.2)`".to_owned()
+            }
+            ErrorKind::FreePlant => {
+                "a plant of another model stands where it is: draw what falls with modules of this model".to_owned()
             }
             ErrorKind::TooManyPatches => {
                 "use the number of a patch again when it is drawn: `@PS(1)` forgets the patch 1 that was there".to_owned()
@@ -150,6 +162,8 @@ pub(super) enum Remark {
     GradientWithoutPlace(usize),
     NoContour(f64, usize),
     NoTissue(f64, usize),
+    /// An `@D` of a part that was not there when its module was born.
+    HeldBack,
     /// A polygon with so many vertices.
     FewVertices(usize),
     PolygonNotOpen,
@@ -236,6 +250,12 @@ fn warning(remark: Remark, model: &Model, span: Option<Span>, time: f64) -> Diag
                 [] => "declare one and write its name: `tissue stalk = stiffness 2e8, density 900, damping 0.05`, `@E(stalk)`".to_owned(),
                 [first, ..] => format!("write the name of a tissue, such as `@E({})`; the model has {count}, and 0 is rigid", first.name),
             },
+        ),
+        Remark::HeldBack => (
+            "this `@D` lets nothing go".to_owned(),
+            format!("first drawn at t = {time}, after the birth of its module"),
+            "what it holds is free since the birth of the module: let a production make a module that is drawn with `@D` from its birth on"
+                .to_owned(),
         ),
         Remark::FewVertices(count) => (
             "a polygon has fewer than three vertices, and is not drawn".to_owned(),

@@ -4,6 +4,7 @@
 //! depth costs memory by the level and nothing by the module.
 
 use super::command::Command;
+use super::free::FreePart;
 use super::prepare::prepare;
 use super::skeleton::Skeleton;
 use super::surroundings::surroundings;
@@ -66,6 +67,20 @@ pub(super) fn skeleton(model: &Model, string: &ModuleString, scene: &mut Scene) 
     let mut walk = Walk::new(model, scene, string.time).recording();
     run(model, string, &mut walk)?;
     Ok(walk.skeleton())
+}
+
+/// See [`super::free_parts`].
+pub(super) fn free_parts(
+    model: &Model,
+    string: &ModuleString,
+    strains: &dyn Strains,
+    scene: &mut Scene,
+) -> Result<Vec<FreePart>, Error> {
+    scene.clear();
+    prepare(model, scene);
+    let mut walk = Walk::new(model, scene, string.time).bending(strains).recording();
+    run(model, string, &mut walk)?;
+    Ok(walk.free_parts())
 }
 
 fn begin(model: &Model, string: &ModuleString, scene: &mut Scene) -> Result<(), Error> {

@@ -26,6 +26,7 @@
 //! | `@O(d)` | a ball of diameter `d` (1) around the turtle |
 //! | `@L(w, l, h)` | the same for each surface: its width (to the left), length (along the heading) and height (up) in parts of its own; `@L(w, l)` is `@L(w, l, l)` |
 //! | `@NAME(b, s)` | a plant of another model, declared by `plant @NAME from …`, as it is at its time t - b; `s` is its seed |
+//! | `@D` | what follows, to the end of the branch, is free since the birth of the module that holds it: it falls, flutters, lands |
 //! | `@G` | the turtle is set down on the ground; `x`, `z` and its directions stay |
 //! | `@PS(n)` `@PC(n, r, c)` `@PD(n)` | begin Bézier patch `n`; make the position its control point in row `r` and column `c` (0 to 3); draw it, when all 16 are there. Brackets do not matter to them |
 //!
@@ -55,6 +56,7 @@ mod bent;
 mod command;
 mod error;
 mod frame;
+mod free;
 mod interpret;
 mod patch;
 mod prepare;
@@ -70,11 +72,14 @@ mod organ_tests;
 mod tests;
 
 use crate::scene::{Point, Scene, Vector};
-pub use bent::{StemKey, Strains};
-use dlsys_model::Model;
+pub use bent::{PartKey, StemKey, Strains};
+use command::Command;
+use dlsys_diagnostic::Span;
+use dlsys_model::{DETACH, KindId, Model};
 use dlsys_tree::ModuleString;
 pub use error::{Error, ErrorKind};
-pub use skeleton::{Form, Load, Origin, Skeleton, Stem};
+pub use free::FreePart;
+pub use skeleton::{Form, Load, Origin, Piece, Skeleton, Stem};
 pub use surroundings::surroundings;
 
 /// Most modules that one frame may draw, those that interpretations make included.
@@ -155,4 +160,38 @@ pub fn is_timeless(model: &Model) -> bool {
 /// As of [`draw`].
 pub fn skeleton(model: &Model, string: &ModuleString, scene: &mut Scene) -> Result<Skeleton, Error> {
     interpret::skeleton(model, string, scene)
+}
+
+/// The parts of a string that are let go, with stems bent by these strains, and with parts that are known where they are. `scene` is
+/// overwritten.
+///
+/// # Errors
+/// As of [`draw`].
+pub fn free_parts(
+    model: &Model,
+    string: &ModuleString,
+    strains: &dyn Strains,
+    scene: &mut Scene,
+) -> Result<Vec<FreePart>, Error> {
+    interpret::free_parts(model, string, strains, scene)
+}
+
+/// The kinds of a model that hold an `@D`, themselves or in what they are drawn as, by [`KindId::index`].
+pub fn kinds_that_let_go(model: &Model) -> Vec<bool> {
+    Command::that_let_go(model)
+}
+
+/// True if a model may let go of something (`@D`).
+pub fn lets_go(model: &Model) -> bool {
+    kinds_that_let_go(model).contains(&true)
+}
+
+/// The first place in the text of a model that writes an `@D`.
+pub fn place_of_detach(model: &Model) -> Option<Span> {
+    let of_rules = model.rules.iter().flat_map(|rule| &rule.produces).flat_map(|p| &p.outcome.successors);
+    let drawings = model.interpretations.iter().map(|interpretation| &interpretation.drawn);
+    let strings = std::iter::once(&model.axiom).chain(of_rules).chain(drawings);
+    let places = strings.flat_map(|string| string.stretches()).flat_map(|stretch| &stretch.places);
+    let is_one = |kind: KindId| model.kinds.get(kind).base() == DETACH;
+    places.filter(|(kind, _)| is_one(*kind)).map(|(_, span)| *span).min_by_key(|span| span.start)
 }

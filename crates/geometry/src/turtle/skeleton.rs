@@ -13,6 +13,7 @@ use nalgebra::Matrix3;
 
 use super::bent::StemKey;
 use super::error;
+use super::free::FreePart;
 use crate::scene::{Mesh, Patch, Placement, Point, Polygon, Scene, Segment, Surface, Vector};
 
 /// The module of the string that draws something.
@@ -70,6 +71,13 @@ pub struct Stem {
 pub struct Load {
     /// The stem at whose end it is.
     pub stem: usize,
+    /// The thing itself.
+    pub piece: Piece,
+}
+
+/// An element of the scene as a body.
+#[derive(Clone, Debug)]
+pub struct Piece {
     /// Number of its tissue among those of the model, from 0; `None` if there is no tissue.
     pub tissue: Option<usize>,
     /// Its measure.
@@ -83,7 +91,7 @@ pub struct Load {
     pub faces: [Vector; 3],
 }
 
-/// The kind of the measure of a [`Load`].
+/// The kind of the measure of a [`Piece`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Form {
     /// A surface of this area.
@@ -112,10 +120,11 @@ pub struct Skeleton {
     pub loads: Vec<Load>,
 }
 
-/// The stem that carries an element, if one does, and the number of its tissue.
+/// The stem that carries an element, or the free part that it belongs to, if there is one, and the number of its tissue.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Carrier {
     pub(super) stem: Option<usize>,
+    pub(super) part: Option<usize>,
     pub(super) tissue: Option<usize>,
 }
 
@@ -123,6 +132,7 @@ pub(super) struct Carrier {
 #[derive(Debug, Default)]
 pub(super) struct Recorder {
     pub(super) stems: Vec<Stem>,
+    pub(super) parts: Vec<FreePart>,
     pub(super) segments: Vec<Carrier>,
     pub(super) surfaces: Vec<Carrier>,
     pub(super) polygons: Vec<Carrier>,
@@ -133,18 +143,38 @@ impl Recorder {
     /// The skeleton, with the masses of what has been drawn into the scene.
     pub(super) fn finish(self, scene: &Scene) -> Skeleton {
         let mut loads = Vec::new();
+        self.pieces(scene, |carrier| carrier.stem, |stem, piece| loads.push(Load { stem, piece }));
+        Skeleton { stems: self.stems, loads }
+    }
+
+    /// The free parts, with what they are made of.
+    pub(super) fn finish_parts(mut self, scene: &Scene) -> Vec<FreePart> {
+        let mut parts = std::mem::take(&mut self.parts);
+        self.pieces(scene, |carrier| carrier.part, |part, piece| parts[part].pieces.push(piece));
+        self.points(scene, &mut parts);
+        parts
+    }
+
+    /// Hands over what has a mass and an owner of one sort, with the owner's number.
+    fn pieces(
+        &self,
+        scene: &Scene,
+        owner: fn(&Carrier) -> Option<usize>,
+        mut take: impl FnMut(usize, Piece),
+    ) {
         let mut add = |carrier: &Carrier, moments: Moments, form: fn(f64) -> Form| {
-            if let Some(stem) = carrier.stem
+            if let Some(owner) = owner(carrier)
                 && moments.measure > 0.0
             {
-                loads.push(moments.load(stem, carrier.tissue, form));
+                take(owner, moments.piece(carrier.tissue, form));
             }
         };
         for (carrier, segment) in self.segments.iter().zip(&scene.segments) {
             add(carrier, Moments::of_segment(segment), Form::Rod);
         }
         let mut known: HashMap<*const Mesh, Moments> = HashMap::new();
-        for (carrier, surface) in self.surfaces.iter().zip(&scene.surfaces).filter(|(c, _)| c.stem.is_some())
+        for (carrier, surface) in
+            self.surfaces.iter().zip(&scene.surfaces).filter(|(c, _)| owner(c).is_some())
         {
             let (moments, form) = Moments::of_surface(surface, &mut known);
             add(carrier, moments, form);
@@ -155,7 +185,6 @@ impl Recorder {
         for (carrier, patch) in self.patches.iter().zip(&scene.patches) {
             add(carrier, Moments::of_patch(patch), Form::Surface);
         }
-        Skeleton { stems: self.stems, loads }
     }
 }
 
@@ -275,10 +304,9 @@ impl Moments {
         }
     }
 
-    fn load(&self, stem: usize, tissue: Option<usize>, form: fn(f64) -> Form) -> Load {
+    fn piece(&self, tissue: Option<usize>, form: fn(f64) -> Form) -> Piece {
         let mean = self.first / self.measure;
-        Load {
-            stem,
+        Piece {
             tissue,
             form: form(self.measure),
             centre: Point::from(self.origin + mean),
@@ -298,7 +326,7 @@ mod tests {
         let mut moments = Moments::about(corner(0.0, 0.0));
         moments.add([corner(0.0, 0.0), corner(2.0, 0.0), corner(2.0, 2.0)]);
         moments.add([corner(0.0, 0.0), corner(2.0, 2.0), corner(0.0, 2.0)]);
-        let load = moments.load(0, None, Form::Surface);
+        let load = moments.piece(None, Form::Surface);
         assert_eq!(load.form, Form::Surface(4.0));
         assert!((load.centre - corner(1.0, 1.0)).norm() < 1e-14);
         // ∫ x² over a square of the side 2 about its middle is a⁴/12.

@@ -10,6 +10,7 @@ use super::bent::{Bent, Strains};
 use super::command::Command;
 use super::error::{self, Error, ErrorKind, Remark, Remarks};
 use super::frame::{Axis, Frame};
+use super::free::FreePart;
 use super::patch::OpenPatches;
 use super::skeleton::{Recorder, Skeleton};
 use super::{COORDINATE_LIMIT, Pose, SMALLEST_LENGTH, shapes};
@@ -60,6 +61,8 @@ struct State {
     bent: Option<Bent>,
     /// The stem of the skeleton at whose end the turtle is, rigid parts in between.
     stem: Option<usize>,
+    /// What is drawn here is let go: the number of its part, from 0 in the order of drawing.
+    part: Option<usize>,
     /// The number of the stem that a step here continues.
     joined: Option<u32>,
 }
@@ -103,6 +106,8 @@ pub(super) struct Walk<'a> {
     depth: usize,
     /// Number of stems that this module has drawn.
     stems_drawn: u32,
+    /// Number of parts that this module has let go, and that the string has.
+    parts_drawn: (u32, usize),
 }
 
 impl<'a> Walk<'a> {
@@ -128,6 +133,7 @@ impl<'a> Walk<'a> {
                 rigid: None,
                 bent: None,
                 stem: None,
+                part: None,
                 joined: None,
             },
             stack: Vec::new(),
@@ -147,6 +153,7 @@ impl<'a> Walk<'a> {
             recorder: None,
             depth: 0,
             stems_drawn: 0,
+            parts_drawn: (0, 0),
         }
     }
 
@@ -165,6 +172,11 @@ impl<'a> Walk<'a> {
         self.recorder.map_or_else(Skeleton::default, |recorder| recorder.finish(self.scene))
     }
 
+    /// The free parts, if they were noted.
+    pub(super) fn free_parts(self) -> Vec<FreePart> {
+        self.recorder.map_or_else(Vec::new, |recorder| recorder.finish_parts(self.scene))
+    }
+
     pub(super) fn pose(&self) -> Pose {
         Pose { position: self.seen(self.state.position), axes: self.seen_axes() }
     }
@@ -174,6 +186,7 @@ impl<'a> Walk<'a> {
         self.drawn = module;
         self.owner = None;
         (self.depth, self.stems_drawn, self.state.joined) = (self.stack.len(), 0, None);
+        self.parts_drawn.0 = 0;
         if self.scene.notes_poses {
             self.start = Some(self.pose());
         }
@@ -273,7 +286,8 @@ impl<'a> Walk<'a> {
                     self.place(&shape, read)?;
                 }
             }
-            Command::Plant(plant) => self.plant(plant, read),
+            Command::Plant(plant) => self.plant(plant, read)?,
+            Command::Detach => self.let_go(),
             Command::Ground => self.set_down(),
             Command::BeginPatch | Command::ControlPoint | Command::DrawPatch => self.patch(command, read)?,
         }

@@ -2,6 +2,8 @@
 //!
 //! Each case is computed at three resolutions or tolerances; the order is that of the error from one row to the next.
 
+use dlsys_wind::study::Convergence;
+
 use crate::{Air, Error, Load, Segment, Settings, Skeleton, Vector, upright};
 
 mod hard;
@@ -19,40 +21,8 @@ pub use random::{RandomCase, random_case};
 pub use statics::{elastica, end_load, greenhill, greenhill_settles, uniform_load};
 pub use vibration::{cantilever_modes, cone_modes, hanging_chain};
 
-/// One line of a study.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Row {
-    /// The case and its quantity, with its unit.
-    pub case: &'static str,
-    /// Number of segments, steps, or tolerance: what is refined.
-    pub resolution: f64,
-    /// Computed value.
-    pub value: f64,
-    /// Exact value.
-    pub expected: f64,
-    /// Error relative to the exact value; absolute where that is 0.
-    pub error: f64,
-    /// Order of convergence from the row before to this one; none in the first row of a case, or where errors are rounding.
-    pub order: Option<f64>,
-}
-
-/// Rows of one case from (resolution, value) pairs. Resolutions above 1 are counts; below 1 tolerances or steps.
-pub(crate) fn rows(case: &'static str, expected: f64, found: &[(f64, f64)]) -> Vec<Row> {
-    let mut rows: Vec<Row> = Vec::new();
-    for &(resolution, value) in found {
-        let scale = if expected == 0.0 { 1.0 } else { expected.abs() };
-        let error = (value - expected).abs() / scale;
-        let order = rows.last().and_then(|before| {
-            let finer = (resolution / before.resolution).ln().abs();
-            (error > 1e-12 && before.error > 1e-12).then(|| (before.error / error).ln() / finer)
-        });
-        rows.push(Row { case, resolution, value, expected, error, order });
-    }
-    rows
-}
-
 /// A case: computes its rows.
-pub type Case = fn() -> Result<Vec<Row>, Error>;
+pub type Case = fn() -> Result<Vec<Convergence>, Error>;
 
 /// The exact cases.
 pub const EXACT_CASES: [Case; 15] = [

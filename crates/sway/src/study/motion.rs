@@ -1,6 +1,8 @@
 //! Motion: decrement, energy, prescribed motion of the base, momentum, cutting.
 
-use super::{Row, rows, stem, vibration::BETA, weightless};
+use dlsys_wind::study::Convergence;
+
+use super::{stem, vibration::BETA, weightless};
 use crate::{
     Error, Fixed, Joint, Load, Method, Pose, Segment, Settings, Skeleton, Solver, State, Still, Vector,
 };
@@ -15,7 +17,7 @@ fn steps(settings: Settings, length: f64) -> Settings {
 /// # Errors
 ///
 /// An error of the solver, which is a defect.
-pub fn decrement() -> Result<Vec<Row>, Error> {
+pub fn decrement() -> Result<Vec<Convergence>, Error> {
     let mut skeleton = stem(10, 1.0, 0.01, 1e9, 900.0, false);
     let rest = vec![Vector::zeros(); skeleton.len()];
     let shape = |skeleton: &Skeleton| Solver::new(weightless()).modes(skeleton, &rest, 1);
@@ -43,7 +45,7 @@ pub fn decrement() -> Result<Vec<Row>, Error> {
         found.push((count, (before / amplitude(&state)).ln() / 5.0));
     }
     let exact = std::f64::consts::TAU * zeta / (1.0 - zeta * zeta).sqrt();
-    Ok(rows("logarithmic decrement (steps a period)", exact, &found))
+    Ok(Convergence::rows("logarithmic decrement (steps a period)", exact, &found))
 }
 
 /// A stem that bends much in a gust: gain of energy less work of the wind plus heat, relative to the work, by the number of steps a second.
@@ -51,7 +53,7 @@ pub fn decrement() -> Result<Vec<Row>, Error> {
 /// # Errors
 ///
 /// An error of the solver, which is a defect.
-pub fn energy_balance() -> Result<Vec<Row>, Error> {
+pub fn energy_balance() -> Result<Vec<Convergence>, Error> {
     let mut skeleton = stem(10, 1.0, 0.01, 3e8, 900.0, true);
     for segment in skeleton.segments_mut() {
         segment.damping = 0.02;
@@ -67,7 +69,7 @@ pub fn energy_balance() -> Result<Vec<Row>, Error> {
         let gain = solver.energy(&skeleton, &state)?.total() - before;
         found.push((count, (gain - state.work.wind + state.work.dissipated) / state.work.wind));
     }
-    Ok(rows("energy balance: defect/work (steps a second)", 0.0, &found))
+    Ok(Convergence::rows("energy balance: defect/work (steps a second)", 0.0, &found))
 }
 
 /// `F(x) → F(k x) F((1 - k) x)` with copied strain and rate, in a bent and moving stem: largest change of position (m) and velocity (m/s)
@@ -76,7 +78,7 @@ pub fn energy_balance() -> Result<Vec<Row>, Error> {
 /// # Errors
 ///
 /// An error of the solver, which is a defect.
-pub fn splitting() -> Result<Vec<Row>, Error> {
+pub fn splitting() -> Result<Vec<Convergence>, Error> {
     let whole = stem(6, 1.0, 0.01, 1e8, 900.0, true);
     let mut state = State::at_rest(&whole);
     for index in 0..whole.len() {
@@ -105,8 +107,8 @@ pub fn splitting() -> Result<Vec<Row>, Error> {
         places.push((k, (after.0.point(6, 1.0) - before.0.point(5, 1.0)).norm()));
         speeds.push((k, speed.norm()));
     }
-    let mut all = rows("cut at k: shift of the tip (m)", 0.0, &places);
-    all.extend(rows("cut at k: change of its velocity (m/s)", 0.0, &speeds));
+    let mut all = Convergence::rows("cut at k: shift of the tip (m)", 0.0, &places);
+    all.extend(Convergence::rows("cut at k: change of its velocity (m/s)", 0.0, &speeds));
     Ok(all)
 }
 
@@ -116,7 +118,7 @@ pub fn splitting() -> Result<Vec<Row>, Error> {
 /// # Errors
 ///
 /// An error of the solver, which is a defect.
-pub fn shaken_cantilever() -> Result<Vec<Row>, Error> {
+pub fn shaken_cantilever() -> Result<Vec<Convergence>, Error> {
     let (length, diameter, stiffness, density) = (1.0_f64, 1e-3_f64, 1e10, 900.0);
     let unit = (stiffness * diameter * diameter / (16.0 * density) / length.powi(4)).sqrt();
     let (size, shake, end) = (1e-5, 2.0 * unit, 4.0 / unit);
@@ -148,7 +150,7 @@ pub fn shaken_cantilever() -> Result<Vec<Row>, Error> {
         Solver::new(settings).advance(&mut state, 0.0, end, &mut growth, &Still, |_| ())?;
         found.push((n as f64, Pose::new(&rest, &state.strain).point(n - 1, 1.0).y));
     }
-    Ok(rows("shaken cantilever: tip (m)", exact, &found))
+    Ok(Convergence::rows("shaken cantilever: tip (m)", exact, &found))
 }
 
 /// A pendulum whose pivot accelerates steadily by a from rest: half a period of the pendulum in the gravity √(g² + a²) later it stands at
@@ -157,7 +159,7 @@ pub fn shaken_cantilever() -> Result<Vec<Row>, Error> {
 /// # Errors
 ///
 /// An error of the solver, which is a defect.
-pub fn pendulum_on_a_cart() -> Result<Vec<Row>, Error> {
+pub fn pendulum_on_a_cart() -> Result<Vec<Convergence>, Error> {
     let (length, pull, hinge) = (0.8_f64, 6.0_f64, 1e-6);
     let amplitude = (pull / 9.81_f64).atan();
     let half = 0.5 * pendulum_period(length, 9.81_f64.hypot(pull), amplitude);
@@ -185,7 +187,7 @@ pub fn pendulum_on_a_cart() -> Result<Vec<Row>, Error> {
         Solver::new(settings).advance(&mut state, 0.0, half, &mut growth, &Still, |_| ())?;
         found.push((count, state.strain[0].norm() * hinge));
     }
-    Ok(rows("pendulum on a cart: angle (steps)", 2.0 * amplitude, &found))
+    Ok(Convergence::rows("pendulum on a cart: angle (steps)", 2.0 * amplitude, &found))
 }
 
 /// Period of a pendulum of any amplitude, by the arithmetic-geometric mean.
@@ -203,7 +205,7 @@ fn pendulum_period(length: f64, gravity: f64, amplitude: f64) -> f64 {
 /// # Errors
 ///
 /// An error of the solver, which is a defect.
-pub fn angular_momentum() -> Result<Vec<Row>, Error> {
+pub fn angular_momentum() -> Result<Vec<Convergence>, Error> {
     let mut skeleton = Skeleton::new();
     for index in 0..4_usize {
         let mut segment = Segment::solid(index.checked_sub(1), 0.2, 4e-3, 1e8, 0.0);
@@ -244,7 +246,7 @@ pub fn angular_momentum() -> Result<Vec<Row>, Error> {
         Solver::new(settings).advance(&mut state, 0.0, 2.0, &mut Fixed(&skeleton), &Still, |_| ())?;
         found.push((tolerance, momentum(&state) / before - 1.0));
     }
-    Ok(rows("angular momentum: relative change (tolerance)", 0.0, &found))
+    Ok(Convergence::rows("angular momentum: relative change (tolerance)", 0.0, &found))
 }
 
 /// What the flywheels about the tangents change: largest distance of the tip of a stalk that hangs over, in gusts from its side, from that with
@@ -253,7 +255,7 @@ pub fn angular_momentum() -> Result<Vec<Row>, Error> {
 /// # Errors
 ///
 /// An error of the solver, which is a defect.
-pub fn flywheels() -> Result<Vec<Row>, Error> {
+pub fn flywheels() -> Result<Vec<Convergence>, Error> {
     let (mut skeleton, wind) = stalk_in_gusts();
     for segment in skeleton.segments_mut() {
         segment.rest.y = 1.0;
@@ -269,7 +271,7 @@ pub fn flywheels() -> Result<Vec<Row>, Error> {
         let most = tips.iter().zip(&reference).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
         found.push((delta, most));
     }
-    Ok(rows("flywheels of δ: tip of a stalk in gusts/L", 0.0, &found))
+    Ok(Convergence::rows("flywheels of δ: tip of a stalk in gusts/L", 0.0, &found))
 }
 
 /// A stalk of 1 m, bent to and fro and sideways by gusts.

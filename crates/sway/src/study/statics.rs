@@ -1,6 +1,8 @@
 //! Static cases: beams, the elastica, Greenhill's length.
 
-use super::{Row, loaded_stem, rigidity, rows, stem};
+use dlsys_wind::study::Convergence;
+
+use super::{loaded_stem, rigidity, stem};
 use crate::{Error, Fixed, Pose, Settings, Skeleton, Solver, State, Still, Vector};
 
 const GRAVITY: f64 = 9.81;
@@ -17,7 +19,7 @@ fn settled(skeleton: &Skeleton) -> Result<Pose, Error> {
 /// # Errors
 ///
 /// An error of the solver, which is a defect.
-pub fn end_load() -> Result<Vec<Row>, Error> {
+pub fn end_load() -> Result<Vec<Convergence>, Error> {
     let (length, diameter, stiffness) = (2.0_f64, 0.01_f64, 1e9);
     let ei = rigidity(diameter, stiffness);
     let force = 1e-4 * ei / (length * length);
@@ -26,7 +28,7 @@ pub fn end_load() -> Result<Vec<Row>, Error> {
         let pose = settled(&loaded_stem(n, length, diameter, stiffness, force / GRAVITY))?;
         found.push((n as f64, -pose.point(n - 1, 1.0).y));
     }
-    Ok(rows("end load: drop PL³/3EI (m)", force * length.powi(3) / (3.0 * ei), &found))
+    Ok(Convergence::rows("end load: drop PL³/3EI (m)", force * length.powi(3) / (3.0 * ei), &found))
 }
 
 /// Drop of the tip of a cantilever under its own weight, q L⁴/8EI, at qL³/EI = 1e-4.
@@ -34,7 +36,7 @@ pub fn end_load() -> Result<Vec<Row>, Error> {
 /// # Errors
 ///
 /// An error of the solver, which is a defect.
-pub fn uniform_load() -> Result<Vec<Row>, Error> {
+pub fn uniform_load() -> Result<Vec<Convergence>, Error> {
     let (length, diameter, stiffness) = (2.0_f64, 0.01_f64, 1e9);
     let ei = rigidity(diameter, stiffness);
     let q = 1e-4 * ei / length.powi(3);
@@ -44,7 +46,7 @@ pub fn uniform_load() -> Result<Vec<Row>, Error> {
         let pose = settled(&stem(n, length, diameter, stiffness, density, false))?;
         found.push((n as f64, -pose.point(n - 1, 1.0).y));
     }
-    Ok(rows("own weight: drop qL⁴/8EI (m)", q * length.powi(4) / (8.0 * ei), &found))
+    Ok(Convergence::rows("own weight: drop qL⁴/8EI (m)", q * length.powi(4) / (8.0 * ei), &found))
 }
 
 /// The elastica under an end load: drop and shortening relative to the length at PL²/EI = 1 and 10. The exact values solve
@@ -53,7 +55,7 @@ pub fn uniform_load() -> Result<Vec<Row>, Error> {
 /// # Errors
 ///
 /// An error of the solver, which is a defect.
-pub fn elastica() -> Result<Vec<Row>, Error> {
+pub fn elastica() -> Result<Vec<Convergence>, Error> {
     let cases = [
         (1.0, "elastica PL²/EI = 1: drop/L", "elastica PL²/EI = 1: shortening/L", ELASTICA[0]),
         (10.0, "elastica PL²/EI = 10: drop/L", "elastica PL²/EI = 10: shortening/L", ELASTICA[1]),
@@ -69,8 +71,8 @@ pub fn elastica() -> Result<Vec<Row>, Error> {
             drops.push((n as f64, -tip.y / length));
             shorts.push((n as f64, 1.0 - tip.x / length));
         }
-        all.extend(rows(drop_name, drop, &drops));
-        all.extend(rows(short_name, shortening, &shorts));
+        all.extend(Convergence::rows(drop_name, drop, &drops));
+        all.extend(Convergence::rows(short_name, shortening, &shorts));
     }
     Ok(all)
 }
@@ -98,12 +100,12 @@ const GREENHILL: f64 = 7.837_347_438_943_481;
 /// # Errors
 ///
 /// An error of the solver, which is a defect.
-pub fn greenhill() -> Result<Vec<Row>, Error> {
+pub fn greenhill() -> Result<Vec<Convergence>, Error> {
     let mut found = Vec::new();
     for n in [10, 20, 40] {
         found.push((n as f64, Solver::new(Settings::default()).buckling(&greenhill_stem(n, 1.0))?));
     }
-    Ok(rows("Greenhill: load factor qL³/7.8373EI", 1.0, &found))
+    Ok(Convergence::rows("Greenhill: load factor qL³/7.8373EI", 1.0, &found))
 }
 
 /// A stem 1 % below Greenhill's length stands: its tip goes back to the vertical. One 1 % above settles aside and below, from motion with
@@ -112,7 +114,7 @@ pub fn greenhill() -> Result<Vec<Row>, Error> {
 /// # Errors
 ///
 /// An error of the solver, which is a defect.
-pub fn greenhill_settles() -> Result<Vec<Row>, Error> {
+pub fn greenhill_settles() -> Result<Vec<Convergence>, Error> {
     let mut all = Vec::new();
     let (mut stands, mut aside, mut lower) = (Vec::new(), Vec::new(), Vec::new());
     for n in [20, 40, 80] {
@@ -134,8 +136,8 @@ pub fn greenhill_settles() -> Result<Vec<Row>, Error> {
             }
         }
     }
-    all.extend(rows("Greenhill - 1 %: tip aside/L", 0.0, &stands));
-    all.extend(rows("Greenhill + 1 %: tip aside/L", BUCKLED.0, &aside));
-    all.extend(rows("Greenhill + 1 %: tip lower/L", BUCKLED.1, &lower));
+    all.extend(Convergence::rows("Greenhill - 1 %: tip aside/L", 0.0, &stands));
+    all.extend(Convergence::rows("Greenhill + 1 %: tip aside/L", BUCKLED.0, &aside));
+    all.extend(Convergence::rows("Greenhill + 1 %: tip lower/L", BUCKLED.1, &lower));
     Ok(all)
 }

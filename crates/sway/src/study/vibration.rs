@@ -1,6 +1,8 @@
 //! Natural frequencies: cantilever, cone, hanging chain.
 
-use super::{Row, rigidity, rows, stem, weightless};
+use dlsys_wind::study::Convergence;
+
+use super::{rigidity, stem, weightless};
 use crate::{Error, Segment, Settings, Skeleton, Solver};
 
 /// Roots β of cos β cosh β = -1.
@@ -36,7 +38,7 @@ fn frequencies(
 /// # Errors
 ///
 /// An error of the solver, which is a defect.
-pub fn cantilever_modes() -> Result<Vec<Row>, Error> {
+pub fn cantilever_modes() -> Result<Vec<Convergence>, Error> {
     let (length, diameter, stiffness, density) = (2.0_f64, 1e-4_f64, 1e10, 900.0);
     let mass = density * std::f64::consts::PI * diameter * diameter / 4.0;
     let unit = (rigidity(diameter, stiffness) / (mass * length.powi(4))).sqrt();
@@ -44,7 +46,7 @@ pub fn cantilever_modes() -> Result<Vec<Row>, Error> {
     let found =
         frequencies(weightless(), [8, 16, 32], 3, |n| stem(n, length, diameter, stiffness, density, false))?;
     let cases = names.iter().zip(BETA).zip(&found);
-    Ok(cases.flat_map(|((name, beta), found)| rows(name, beta * beta * unit, found)).collect())
+    Ok(cases.flat_map(|((name, beta), found)| Convergence::rows(name, beta * beta * unit, found)).collect())
 }
 
 /// The first two frequencies of a cone, ω = 8.7193 and 21.1457 √(EI₀/μ₀L⁴), from the roots of J₂ I₂' = I₂ J₂' at 2 √ω (Kirchhoff).
@@ -52,7 +54,7 @@ pub fn cantilever_modes() -> Result<Vec<Row>, Error> {
 /// # Errors
 ///
 /// An error of the solver, which is a defect.
-pub fn cone_modes() -> Result<Vec<Row>, Error> {
+pub fn cone_modes() -> Result<Vec<Convergence>, Error> {
     let (length, diameter, stiffness, density) = (1.5_f64, 1e-4_f64, 1e10, 900.0);
     let mass = density * std::f64::consts::PI * diameter * diameter / 4.0;
     let unit = (rigidity(diameter, stiffness) / (mass * length.powi(4))).sqrt();
@@ -66,8 +68,8 @@ pub fn cone_modes() -> Result<Vec<Row>, Error> {
         }
         cone
     })?;
-    let mut all = rows("cone: ω₁ (1/s)", CONE[0] * unit, &found[0]);
-    all.extend(rows("cone: ω₂ (1/s)", CONE[1] * unit, &found[1]));
+    let mut all = Convergence::rows("cone: ω₁ (1/s)", CONE[0] * unit, &found[0]);
+    all.extend(Convergence::rows("cone: ω₂ (1/s)", CONE[1] * unit, &found[1]));
     Ok(all)
 }
 
@@ -79,7 +81,7 @@ const CONE: [f64; 2] = [8.719_264_2, 21.145_662_4];
 /// # Errors
 ///
 /// An error of the solver, which is a defect.
-pub fn hanging_chain() -> Result<Vec<Row>, Error> {
+pub fn hanging_chain() -> Result<Vec<Convergence>, Error> {
     let length = 1.0_f64;
     let found = frequencies(Settings::default(), [50, 100, 200], 1, |n| {
         let mut chain = stem(n, length, 0.004, 1.0, 900.0, true);
@@ -89,5 +91,9 @@ pub fn hanging_chain() -> Result<Vec<Row>, Error> {
         }
         chain
     })?;
-    Ok(rows("hanging chain: ω₁ (1/s)", 1.202_412_778_847_886 * (9.81_f64 / length).sqrt(), &found[0]))
+    Ok(Convergence::rows(
+        "hanging chain: ω₁ (1/s)",
+        1.202_412_778_847_886 * (9.81_f64 / length).sqrt(),
+        &found[0],
+    ))
 }

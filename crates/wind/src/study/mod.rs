@@ -2,9 +2,11 @@
 //!
 //! Values come from the fields as they are: from sampled velocities and from the amplitudes of modes, averaged over seeds.
 
+mod convergence;
 mod lines;
 mod shells;
 
+pub use convergence::Convergence;
 use lines::Lines;
 use nalgebra::Vector3;
 use shells::Shells;

@@ -1,9 +1,12 @@
 //! Elements that stand where the turtle is: surfaces, plants, polygons, patches.
 
-use super::super::Error;
+use super::super::bent::{Bent, PartKey};
 use super::super::command::Command;
-use super::super::error::Remark;
-use super::{Outline, Walk};
+use super::super::error::{ErrorKind, Remark};
+use super::super::free::FreePart;
+use super::super::skeleton::Origin;
+use super::super::{Error, Pose};
+use super::{DrawnModule, Outline, Walk};
 use crate::scene::{MaterialId, Patch, Placement, Point, Polygon, Seedling, Shape, Surface, Vector};
 
 impl Walk<'_> {
@@ -97,16 +100,48 @@ impl Walk<'_> {
     }
 
     /// Puts a plant of another model, born at the time given first, at the turtle's position. Its axes follow the turtle's.
-    pub(super) fn plant(&mut self, plant: usize, parameters: &[f64]) {
+    pub(super) fn plant(&mut self, plant: usize, parameters: &[f64]) -> Result<(), Error> {
         let birth = parameters.first().copied().unwrap_or(0.0);
         let age = self.time - birth;
+        if self.state.part.is_some() {
+            return Err(self.error(ErrorKind::FreePlant));
+        }
         if age < 0.0 {
-            return;
+            return Ok(());
         }
         let [heading, left, up] = self.seen_axes();
         let placement = Placement::uniform(self.seen(self.state.position), [-left, heading, up], 1.0);
         let (seed, owner) = (parameters.get(1).copied(), self.owner());
         self.scene.seedlings.push(Seedling { plant, birth, age, seed, placement, owner });
+        Ok(())
+    }
+
+    /// Lets go what follows, to the end of the branch: it is seen where its flight has led it.
+    pub(super) fn let_go(&mut self) {
+        let DrawnModule { kind, lineage } = self.drawn;
+        let key = PartKey { module: lineage.id, number: self.parts_drawn.0 };
+        let rest = Pose { position: self.state.position, axes: self.state.frame.vectors() };
+        if let Some(strains) = self.strains {
+            match strains.flight(key) {
+                Some(seen) => self.state.bent = Some(Bent::between(&rest, &seen)),
+                None if self.recorder.is_none() => self.remark(Remark::HeldBack),
+                None => {}
+            }
+        }
+        let pose = self.pose();
+        // The frame of a module that draws nothing before it is that of the part.
+        if self.scene.notes_poses && self.owner.is_none() {
+            self.start = Some(pose);
+        }
+        if let Some(recorder) = &mut self.recorder {
+            let origin = Origin { kind, lineage, inside: self.inside };
+            let (pieces, stems, points) = Default::default();
+            recorder.parts.push(FreePart { key, origin, pose, pieces, stems, points });
+        }
+        let state = &mut self.state;
+        state.part = Some(self.parts_drawn.1);
+        (state.stem, state.joined, state.last, state.parent) = (None, None, None, None);
+        self.parts_drawn = (self.parts_drawn.0 + 1, self.parts_drawn.1 + 1);
     }
 
     /// Moves to the ground below or above, without a vertex of a polygon.

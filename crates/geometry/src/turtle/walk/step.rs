@@ -5,7 +5,7 @@ use super::super::bent::{self, Bent, StemKey};
 use super::super::error::ErrorKind;
 use super::super::skeleton::{Carrier, Origin, Stem};
 use super::super::{Error, SMALLEST_LENGTH};
-use super::{DrawnModule, Walk};
+use super::{DrawnModule, State, Walk};
 use crate::scene::{MaterialId, Point, Segment, Vector, Width};
 
 impl Walk<'_> {
@@ -22,6 +22,10 @@ impl Walk<'_> {
     pub(super) fn step(&mut self, length: f64, draw: bool) -> Result<(), Error> {
         let [heading, left, _] = self.state.frame.vectors();
         let length = self.in_range(length)?;
+        let has_mass = draw && self.polygons.is_empty() && length != 0.0;
+        if self.state.part.is_some() && has_mass && matches!(self.state.width, Width::Default(_)) {
+            return Err(self.error(ErrorKind::NoWidthFree));
+        }
         let strain = match self.state.tissue {
             Some(_) if draw && self.polygons.is_empty() && length >= 0.0 => self.giving()?,
             _ => {
@@ -95,7 +99,7 @@ impl Walk<'_> {
             && self.state.joined.is_none()
         {
             let (start, axes) = (self.state.position, self.state.frame.vectors());
-            recorder.stems.push(Stem {
+            let stem = Stem {
                 key,
                 origin: Origin { kind, lineage, inside: self.inside },
                 parent: self.state.stem,
@@ -107,8 +111,14 @@ impl Walk<'_> {
                 length: 0.0,
                 width,
                 tissue,
-            });
-            self.state.stem = Some(recorder.stems.len() - 1);
+            };
+            match self.state.part {
+                Some(part) => recorder.parts[part].stems.push(stem),
+                None => {
+                    recorder.stems.push(stem);
+                    self.state.stem = Some(recorder.stems.len() - 1);
+                }
+            }
         }
         self.state.joined = Some(number);
         Ok(Some(self.strains.map_or_else(Vector::zeros, |strains| strains.strain(key))))
@@ -175,7 +185,8 @@ impl Walk<'_> {
             self.state.run = if follows.is_some() { self.state.run + 1 } else { 1 };
             self.state.last = Some(self.scene.segments.len());
             self.scene.segments.push(segment);
-            let carrier = if self.state.tissue.is_none() { self.carrier() } else { Carrier::default() };
+            let is_load = self.state.tissue.is_none() || self.state.part.is_some();
+            let carrier = if is_load { self.carrier() } else { Carrier::default() };
             if let Some(recorder) = &mut self.recorder {
                 recorder.segments.push(carrier);
             }
@@ -194,9 +205,10 @@ impl Walk<'_> {
         self.state.bent.map_or(axes, |bent| axes.map(|axis| bent.vector(axis)))
     }
 
-    /// The stem that carries what is drawn here.
+    /// What carries that which is drawn here.
     pub(super) fn carrier(&self) -> Carrier {
-        Carrier { stem: self.state.stem, tissue: self.state.tissue.or(self.state.rigid) }
+        let State { stem, part, tissue, rigid, .. } = self.state;
+        Carrier { stem: stem.filter(|_| part.is_none()), part, tissue: tissue.or(rigid) }
     }
 
     /// Moves, with compensated summation (Neumaier 1974).
