@@ -330,7 +330,8 @@ pub struct RenderArgs {
     pub accuracy: Option<f64>,
     /// Largest error, in pixels, of plants of other models that move in the wind by the modes of their class (0 to 100; 0: all are solved)
     ///
-    /// For --format png, in scenes with a camera. The error is measured on a sample; without a camera, all plants are solved.
+    /// For --format png, in scenes with a camera. The error is measured on a sample; without a camera, all plants are solved. Plants of nearly the same age share a drawing where
+    /// that moves no point by more than this.
     #[arg(long, value_name = "PIXELS", allow_negative_numbers = true, default_value = "0.5", value_parser = bend_pixels)]
     pub bend_pixels: f64,
     /// Draw in perspective with this field of view (1 to 120 degrees), filled by the drawings of all times [default:

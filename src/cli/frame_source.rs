@@ -158,7 +158,8 @@ fn play_times<Done: Send>(
 ) -> Result<Stats, Failure> {
     let count = times.len();
     let mut source = FrameSource::start(run, times, pass.settings, pass.keeping.used())?;
-    let nursery = run.nursery();
+    // With fewer frames than threads, several threads share a frame.
+    let nursery = run.nursery().with_threads((threads / count.max(1)).max(1));
     let mut blank = nursery.blank();
     blank.accuracy = pass.accuracy;
     // Scenes are reused, because they keep their memory; there is at most one for each thread.

@@ -29,6 +29,7 @@ mod light;
 mod limits;
 mod linear;
 mod listings;
+mod meadow;
 mod organs;
 mod pages;
 mod pictures;

@@ -26,7 +26,7 @@ fn field() -> Session {
     Session::open(&folder.path().join("field.dls"), &[]).unwrap_or_else(|refused| panic!("{refused}"))
 }
 
-const DETAIL: Detail = Detail { pixels: 240.0, viewpoint: None, bound: 0.5 };
+const DETAIL: Detail = Detail { pixels: 240.0, shape: 1.0, viewpoint: None, bound: 0.5 };
 
 fn draw(session: &Session, nursery: &Nursery<'_>, t: f64) -> Scene {
     let mut string = ModuleString::default();

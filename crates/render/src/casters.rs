@@ -19,9 +19,20 @@ const KEPT: usize = 2_000_000;
 /// Triangles and thin stems, relative to the middle of the box around everything.
 #[derive(Default)]
 pub(super) struct Batch {
-    pub(super) triangles: Vec<[[f32; 3]; 3]>,
+    pub(super) vertices: Vec<[f32; 3]>,
+    /// Corners by number of a vertex.
+    pub(super) triangles: Vec<[u32; 3]>,
     /// Ends and radii.
     pub(super) lines: Vec<([[f32; 3]; 2], [f32; 2])>,
+}
+
+impl Batch {
+    /// Begins the next one with the vertices from this one on.
+    fn begin(&mut self, first: usize) {
+        self.vertices.drain(..first);
+        self.triangles.clear();
+        self.lines.clear();
+    }
 }
 
 /// Plants that look the same, or the scene itself.
@@ -51,13 +62,14 @@ pub(super) struct Casters<'s> {
 
 impl<'s> Casters<'s> {
     /// All that a scene has, but for what is of a material of its own, at so many pixels for a scene unit; plants as coarse as they are seen
-    /// with `scale_at` pixels.
+    /// with `scale_at` pixels. Of the plants, those count whose ball (middle and radius) does.
     pub(super) fn new(
         scene: &'s Scene,
         fit: &'s Fit,
         scale: f64,
         scale_at: impl Fn(Point) -> f64,
         without: Option<MaterialId>,
+        counts: impl Fn(Point, f64) -> bool,
     ) -> Casters<'s> {
         let own = Group { scene, default_width: fit.default_width, scale, places: vec![None] };
         let mut casters = Casters {
@@ -71,22 +83,31 @@ impl<'s> Casters<'s> {
             half: Vector::zeros(),
             count: 0,
         };
-        casters.gather(scene, None, &scale_at);
+        casters.gather(scene, None, &scale_at, &counts);
         casters.measure();
         casters
     }
 
     /// Sorts the plants of a scene in its place into groups. Recursion is bounded by the depth of plants in plants.
-    fn gather(&mut self, scene: &'s Scene, place: Option<&Placement>, scale_at: &dyn Fn(Point) -> f64) {
+    fn gather(
+        &mut self,
+        scene: &'s Scene,
+        place: Option<&Placement>,
+        scale_at: &dyn Fn(Point) -> f64,
+        counts: &dyn Fn(Point, f64) -> bool,
+    ) {
         for plant in &scene.plants {
             let Some([low, high]) = plant.bounds() else { continue };
             let placement = match place {
                 None => plant.placement,
                 Some(outer) => plant.placement.within(outer),
             };
+            let middle = placement.point(nalgebra::center(&low, &high));
+            if !counts(middle, (high - low).norm() / 2.0 * placement.largest()) {
+                continue;
+            }
             // A plant behind the viewer is seen by its shadow only.
-            let seen =
-                Some(scale_at(placement.point(nalgebra::center(&low, &high)))).filter(|seen| *seen > 0.0);
+            let seen = Some(scale_at(middle)).filter(|seen| *seen > 0.0);
             let scale = seen.map_or(self.scale, |seen| seen.min(self.scale)) * placement.largest();
             let exponent = scale.log2().ceil().clamp(-60.0, 60.0) as i32;
             let number = *self.numbers.entry((&raw const *plant.scene, exponent)).or_insert_with(|| {
@@ -96,13 +117,14 @@ impl<'s> Casters<'s> {
                 self.groups.len() - 1
             });
             self.groups[number].places.push(Some(placement));
-            self.gather(&plant.scene, Some(&placement), scale_at);
+            self.gather(&plant.scene, Some(&placement), scale_at, counts);
         }
     }
 
     fn draft(&self, group: &Group<'s>) -> Draft<'s> {
         let detail = Detail {
             scale_at: |_| group.scale,
+            scale_of: None,
             accuracy: self.fit.accuracy,
             scale: self.scale,
             is_flat: false,
@@ -156,30 +178,31 @@ impl<'s> Casters<'s> {
             let p = p.coords - self.middle;
             [p.x as f32, p.y as f32, p.z as f32]
         };
-        let mut placed: Vec<[f32; 3]> = Vec::new();
+        let full = |batch: &Batch| batch.triangles.len() + batch.lines.len() >= BATCH;
         for (group, kept) in self.groups.iter().zip(&self.drafts) {
             let made = kept.is_none().then(|| self.draft(group));
             let Some(draft) = kept.as_ref().or(made.as_ref()) else { continue };
             for place in &group.places {
                 let place = place.as_ref();
-                let full = |batch: &Batch| batch.triangles.len() + batch.lines.len() >= BATCH;
-                placed.clear();
+                let mut first = batch.vertices.len() as u32;
                 let vertices = draft.mesh.vertices.iter();
-                placed.extend(vertices.map(|&p| relative(place.map_or(p, |place| place.point(p)))));
+                let placed = vertices.map(|&p| relative(place.map_or(p, |place| place.point(p))));
+                batch.vertices.extend(placed);
                 for face in self.faces(draft, place) {
-                    batch.triangles.push(face.corners.map(|(v, _)| placed[v as usize]));
+                    batch.triangles.push(face.corners.map(|(v, _)| first + v));
                     if full(&batch) {
                         visit(&batch);
-                        batch.triangles.clear();
-                        batch.lines.clear();
+                        // The other triangles have the same vertices.
+                        batch.begin(first as usize);
+                        first = 0;
                     }
                 }
                 for (ends, radii) in draft.lines(place) {
                     batch.lines.push((ends.map(relative), radii.map(|r| r as f32)));
                     if full(&batch) {
                         visit(&batch);
-                        batch.triangles.clear();
-                        batch.lines.clear();
+                        batch.begin(first as usize);
+                        first = 0;
                     }
                 }
             }
@@ -222,11 +245,12 @@ mod tests {
         let mut survey = Survey::new(View::FRONT);
         survey.add(&scene);
         let fit = survey.fit();
-        let mut casters = Casters::new(&scene, &fit, 40.0, |_| 40.0, None);
+        let mut casters = Casters::new(&scene, &fit, 40.0, |_| 40.0, None, |_, _| true);
         let collect = |casters: &Casters| {
             let (mut all, mut most) = (Vec::new(), 0);
             casters.each_batch(|batch| {
-                all.extend_from_slice(&batch.triangles);
+                let corners = |t: &[u32; 3]| t.map(|v| batch.vertices[v as usize]);
+                all.extend(batch.triangles.iter().map(corners));
                 most = most.max(batch.triangles.len());
             });
             (all, most)
@@ -238,7 +262,7 @@ mod tests {
         casters.drafts.iter_mut().for_each(|draft| *draft = None);
         assert_eq!(collect(&casters).0, kept);
         // Far away, a plant is two triangles.
-        let far = Casters::new(&scene, &fit, 40.0, |_| 1e-3, None);
+        let far = Casters::new(&scene, &fit, 40.0, |_| 1e-3, None, |_, _| true);
         assert_eq!(far.count(), 6000);
     }
 }

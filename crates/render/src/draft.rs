@@ -28,9 +28,12 @@ const LONGEST: f64 = 1.5;
 const MOST_FLAT: usize = 100_000;
 
 /// The accuracy of a picture, in scene units.
-pub(super) struct Detail<S> {
+pub(super) struct Detail<'d, S> {
     /// Pixels in a scene unit at a place.
     pub(super) scale_at: S,
+    /// The same for a surface within the ball with this middle and radius: its largest, or 0 if it is not seen. `None`: that at its
+    /// place.
+    pub(super) scale_of: Option<&'d dyn Fn(Point, f64) -> f64>,
     /// Triangles are no nearer to curved surfaces than this, in the plane of focus where a scene unit has `scale` pixels.
     pub(super) accuracy: f64,
     pub(super) scale: f64,
@@ -63,10 +66,11 @@ impl<'s> Draft<'s> {
     pub(super) fn new<S: Fn(Point) -> f64>(
         scene: &'s Scene,
         default_width: f64,
-        detail: &Detail<S>,
+        detail: &Detail<'_, S>,
     ) -> Draft<'s> {
-        let wanted = |at: Point| {
-            let scale = (detail.scale_at)(at).max(f64::MIN_POSITIVE);
+        let wanted = |at: Point, (middle, radius): (Point, f64)| {
+            let scale = detail.scale_of.map_or_else(|| (detail.scale_at)(at), |of| of(middle, radius));
+            let scale = scale.max(f64::MIN_POSITIVE);
             accuracy(scale, detail.accuracy * detail.scale)
         };
         let is_few = detail.is_flat && scene.segments.len() <= MOST_FLAT;

@@ -1,5 +1,7 @@
 //! A camera with the pixels of its picture: where points come to lie, how large things are there, and what is outside.
 
+use std::ops::Range;
+
 use super::{Camera, Fit};
 use crate::raster::{Corner, Place};
 use dlsys_geometry::scene::{Point, Vector};
@@ -53,16 +55,58 @@ impl Lens {
         Point::new((column as f64 + 0.5 - b) / a, (c - row as f64 - 0.5) / a, depth / self.depth)
     }
 
-    /// True if a ball is outside of the picture.
-    pub(super) fn misses(&self, centre: Point, radius: f64) -> bool {
-        let Some(nearest) = self.camera.ahead(centre + self.camera.towards(centre) * radius) else {
-            // The viewer is in it, or it is behind.
-            return self.camera.ahead(centre - self.camera.view().towards() * radius).is_none();
-        };
+    /// The most pixels in a scene unit within a ball; `None` if it is outside of the picture.
+    pub(super) fn scale_of(&self, centre: Point, radius: f64) -> Option<f64> {
+        let towards = self.camera.towards(centre) * radius;
+        let nearest = self.scale_at(centre + towards).max(self.scale_at(centre));
+        // Within the ball, the viewer sees it at any size.
+        let scale = if nearest > 0.0 { nearest } else { self.scale_at(centre - towards) };
+        (!self.misses(centre, radius)).then_some(scale)
+    }
+
+    /// Pixels in a scene unit for a surface in a ball; 0 if it is outside of the picture. One that comes very near to the viewer is as large as a
+    /// quarter of the distance of its middle makes it: what is nearer is few of its points, and larger than the picture.
+    pub(super) fn scale_within(&self, centre: Point, radius: f64) -> f64 {
+        const NEAREST: f64 = 4.0;
+        if self.misses(centre, radius) {
+            return 0.0;
+        }
+        let towards = self.camera.towards(centre) * radius;
+        let (middle, nearest) = (self.scale_at(centre), self.scale_at(centre + towards));
+        match middle > 0.0 {
+            true if nearest > 0.0 => nearest.clamp(middle, NEAREST * middle),
+            true => NEAREST * middle,
+            false => NEAREST * self.scale_at(centre - towards),
+        }
+    }
+
+    /// The rows of the picture that a ball may touch.
+    pub(super) fn rows(&self, centre: Point, radius: f64) -> Range<usize> {
+        let height = self.size[1];
+        match self.reach(centre, radius) {
+            None => 0..height,
+            Some(([_, y], reach)) => {
+                let row = |y: f64| y.clamp(0.0, height as f64) as usize;
+                row(y - reach)..(row(y + reach) + 1).min(height)
+            }
+        }
+    }
+
+    /// The place of the middle of a ball in the picture, and a distance beyond which nothing of it is seen, in pixels; `None` if the viewer is in it, or
+    /// it is behind.
+    fn reach(&self, centre: Point, radius: f64) -> Option<([f64; 2], f64)> {
+        let nearest = self.camera.ahead(centre + self.camera.towards(centre) * radius)?;
         let [a, b, c] = self.placement;
         let seen = self.camera.project(centre);
-        let (x, y) = (a * seen.x + b, c - a * seen.y);
         let reach = 1.5 * radius * a * self.camera.magnification(nearest.z);
+        Some(([a * seen.x + b, c - a * seen.y], reach))
+    }
+
+    /// True if a ball is outside of the picture.
+    pub(super) fn misses(&self, centre: Point, radius: f64) -> bool {
+        let Some(([x, y], reach)) = self.reach(centre, radius) else {
+            return self.camera.ahead(centre - self.camera.view().towards() * radius).is_none();
+        };
         let [width, height] = self.size.map(|side| side as f64);
         x + reach < 0.0 || y + reach < 0.0 || x - reach > width || y - reach > height
     }

@@ -122,7 +122,7 @@ pub struct FrameWriter {
     pub page: Page,
     /// Sides of the tubes that stems are made of (OBJ only); 0 for as many as the accuracy takes, and 8 at least.
     pub sides: usize,
-    /// Threads that make the file of one frame (OBJ only), at least 1. The bytes do not depend on it.
+    /// Threads that make the file of one frame (OBJ and PNG), at least 1. The bytes do not depend on it.
     pub threads: usize,
 }
 

@@ -29,6 +29,22 @@ const EARTHY: f64 = 0.6;
 const COOL: f64 = 0.35;
 const WARM: f64 = 0.85;
 
+/// Plants out of the picture darken the sky for what is nearer than so many of their radii.
+const NEIGHBOURHOOD: f64 = 3.0;
+
+/// Whether the shadow of a ball in the sun, down to the floor, may be seen; without a floor it has no end.
+fn is_shadow_seen(
+    lens: &Lens,
+    (middle, radius): (Point, f64),
+    sun: Option<Vector>,
+    floor: Option<f64>,
+) -> bool {
+    let Some(sun) = sun else { return false };
+    let Some(floor) = floor.filter(|_| sun.y > 0.0) else { return true };
+    let length = ((middle.y + radius - floor) / sun.y).max(0.0);
+    !lens.misses(middle - sun * (length / 2.0), radius + length / 2.0)
+}
+
 /// A declared light.
 struct Declared {
     /// Unit vector towards the sun.
@@ -51,13 +67,14 @@ pub(super) struct Lighting<'a> {
 
 impl<'a> Lighting<'a> {
     /// The light on a scene. Shadows are as fine as a picture with so many pixels for a scene unit shows.
-    /// A floor among the polygons has the material `ground`.
+    /// A floor among the polygons has the material `ground`. Through a lens, plants count if they or their shadows are seen, or are near to what is.
     pub(super) fn new(
         scene: &Scene,
         fit: &'a Fit,
         scale: f64,
         threads: usize,
         ground: Option<MaterialId>,
+        lens: Option<&Lens>,
     ) -> Lighting<'a> {
         let around = fit.surroundings(scene);
         let is_declared = (around.sun.is_some() || around.sky.is_some()) && !fit.light.is_flat();
@@ -75,7 +92,11 @@ impl<'a> Lighting<'a> {
             let extent = if fit.extent > 0.0 { fit.extent } else { 1.0 };
             // Details beyond the maps' cells cast no shadows of their own.
             let seen = |p| fit.camera.ahead(p).map_or(0.0, |p| scale * fit.camera.magnification(p.z));
-            let casters = Casters::new(scene, fit, scale.min(1500.0 / extent), seen, ground);
+            let counts = |middle: Point, radius: f64| {
+                lens.is_none_or(|lens| !lens.misses(middle, NEIGHBOURHOOD * radius))
+                    || lens.is_none_or(|lens| is_shadow_seen(lens, (middle, radius), sun, floor))
+            };
+            let casters = Casters::new(scene, fit, scale.min(1500.0 / extent), seen, ground, counts);
             let maps = (casters.count() > 0).then(|| Maps::new(&casters, sun, scale, threads))?;
             open_sky = floor.map(|height| OpenSky::new(&maps, casters.around(), height));
             Some(maps)

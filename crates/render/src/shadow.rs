@@ -62,8 +62,9 @@ impl Map {
         let place = |p: &[f32; 3]| {
             [0, 1, 2].map(|k| scaled[k][0] * p[0] + scaled[k][1] * p[1] + scaled[k][2] * p[2] - from[k])
         };
-        for [p, q, r] in &batch.triangles {
-            self.fill([place(p), place(q), place(r)]);
+        let placed: Vec<[f32; 3]> = batch.vertices.iter().map(place).collect();
+        for corners in &batch.triangles {
+            self.fill(corners.map(|v| placed[v as usize]));
         }
         for ([a, b], radii) in &batch.lines {
             let [a, b] = [place(a), place(b)];

@@ -1,6 +1,8 @@
 //! A picture in the making: the triangles of a [`Stage`] in pixels, and their colours in the light.
 
 use std::ops::Range;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::draft::Draft;
 use super::lens::Lens;
@@ -10,8 +12,10 @@ use super::raster::{self, Image, Pattern, Place};
 use super::stage::{Part, Stage};
 use dlsys_geometry::scene::{Color, Vector};
 
-/// Most triangles that are in memory at a time: a picture with more is drawn in strips.
-const MOST: usize = 4_000_000;
+/// Most triangles that are in memory at a time: a picture with more is drawn in strips, if these have fewer.
+const MOST: usize = 6_000_000;
+/// Parts that are made side by side.
+const BLOCK: usize = 64;
 /// How far the edges of a ribbon are turned away, as those of a stem: sine and cosine.
 const TURNED: (f32, f32) = (0.866, 0.5);
 /// The same of a hair, a ribbon of less than two pixels: the middle of a pixel is often beside it, and the light is then that on an edge.
@@ -51,8 +55,6 @@ pub(super) fn draw<const N: usize>(
 ) -> Image {
     let [width, height] = lens.size;
     let mut pixels = vec![[0; 4]; width * height];
-    let strips = stage.len().div_ceil(MOST).max(1);
-    let rows = height.div_ceil(strips).next_multiple_of(16).max(16);
     let mut shot = Shot {
         lens,
         lighting,
@@ -63,21 +65,93 @@ pub(super) fn draw<const N: usize>(
         faces: Vec::new(),
         surface: 0,
     };
-    for (strip, pixels) in pixels.chunks_mut((rows * width).max(1)).enumerate() {
-        shot.rows = strip * rows..((strip + 1) * rows).min(height);
-        shot.places.clear();
-        shot.normals.clear();
-        shot.faces.clear();
-        shot.add_floor();
-        for part in &stage.parts {
-            shot.add(&stage.drafts[part.draft], part);
+    // Rows that are yet to be drawn, the next ones last.
+    let mut left: Vec<Range<usize>> = Vec::new();
+    left.push(0..height);
+    while let Some(rows) = left.pop() {
+        if !shot.fill(rows.clone(), stage, threads) {
+            let half = (rows.len() / 2).next_multiple_of(raster::BAND);
+            left.extend([rows.start + half..rows.end, rows.start..rows.start + half]);
+            continue;
         }
-        raster::draw(pattern, threads, lens.size, shot.rows.clone(), &shot, pixels);
+        let pixels = &mut pixels[rows.start * width..rows.end * width];
+        raster::draw(pattern, threads, lens.size, rows, &shot, pixels);
     }
     Image { width, height, pixels }
 }
 
 impl Shot<'_> {
+    /// All that is seen in some rows; false if that is too much, and there may be less in fewer rows.
+    fn fill(&mut self, rows: Range<usize>, stage: &Stage, threads: usize) -> bool {
+        let may_split = rows.len() > raster::BAND;
+        self.clear();
+        self.rows = rows;
+        self.add_floor();
+        let parts: Vec<&Part> = stage.parts.iter().filter(|part| part.touches(&self.rows)).collect();
+        for block in parts.chunks(BLOCK) {
+            if threads <= 1 || block.len() == 1 {
+                block.iter().for_each(|part| stage.with_draft(part, |draft| self.add(draft, part)));
+            } else {
+                self.add_block(block, stage, threads);
+            }
+            if may_split && self.faces.len() > MOST {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// Adds parts that several threads make, in their order.
+    fn add_block(&mut self, block: &[&Part], stage: &Stage, threads: usize) {
+        let made: Vec<OnceLock<Shot>> = block.iter().map(|_| OnceLock::new()).collect();
+        let next = AtomicUsize::new(0);
+        let Shot { lens, lighting, colors, ref rows, .. } = *self;
+        let make = || {
+            loop {
+                let number = next.fetch_add(1, Ordering::Relaxed);
+                let Some((part, place)) = block.get(number).zip(made.get(number)) else { return };
+                place.get_or_init(|| {
+                    let mut shot = Shot {
+                        lens,
+                        lighting,
+                        colors,
+                        rows: rows.clone(),
+                        places: Vec::new(),
+                        normals: Vec::new(),
+                        faces: Vec::new(),
+                        surface: 0,
+                    };
+                    stage.with_draft(part, |draft| shot.add(draft, part));
+                    shot
+                });
+            }
+        };
+        std::thread::scope(|scope| {
+            (1..threads.min(block.len())).for_each(|_| drop(scope.spawn(make)));
+            make();
+        });
+        for shot in made.into_iter().filter_map(OnceLock::into_inner) {
+            let (vertex, normal, surface) =
+                (self.places.len() as u32, self.normals.len() as u32, self.surface);
+            self.places.extend_from_slice(&shot.places);
+            self.normals.extend_from_slice(&shot.normals);
+            self.faces.extend(shot.faces.iter().map(|face| Face {
+                corners: face.corners.map(|v| vertex + v),
+                normals: face.normals.map(|n| normal + n),
+                surface: surface + face.surface,
+                look: face.look,
+            }));
+            self.surface += shot.surface;
+        }
+    }
+
+    fn clear(&mut self) {
+        self.places.clear();
+        self.normals.clear();
+        self.faces.clear();
+        self.surface = 0;
+    }
+
     /// Adds a draft in its place.
     fn add(&mut self, draft: &Draft, part: &Part) {
         let place = part.place.as_ref();

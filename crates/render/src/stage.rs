@@ -1,35 +1,80 @@
 //! All that a picture shows: the drafts of a scene and of the plants of other models in it, and where each stands.
 //!
-//! Plants outside of the picture are left out. The others share drafts by their look and by their size in the picture, to a power of
-//! two; they are never one mesh.
+//! Plants outside of the picture are left out. The others share drafts by their look and by their size in the picture, to half a
+//! power of two; they are never one mesh. A plant so near to the viewer that its parts have different sizes in the picture has a draft of its own, as detailed
+//! at each place as it is seen there.
 
 use std::collections::HashMap;
+use std::ops::Range;
+use std::sync::OnceLock;
 
 use super::Fit;
 use super::draft::{Detail, Draft};
 use super::lens::Lens;
 use dlsys_geometry::scene::{Color, Placement, Plant, Point, Scene};
 
+/// A plant is near if its nearest point is so many times as large in the picture as its middle.
+const NEAR: f64 = 1.5;
+
 /// A draft in its place.
 pub(super) struct Part {
-    /// Its number.
-    pub(super) draft: usize,
+    /// 0 for the scene itself.
+    draft: usize,
     /// `None`: the scene's own coordinates.
     pub(super) place: Option<Placement>,
     /// The number of the first colour of its palette.
     pub(super) colors: u32,
+    /// Rows of the picture below and above which nothing of it is seen.
+    rows: Range<usize>,
+}
+
+impl Part {
+    /// Whether some of it may be seen in these rows.
+    pub(super) fn touches(&self, rows: &Range<usize>) -> bool {
+        self.rows.start < rows.end && self.rows.end > rows.start
+    }
 }
 
 /// What a picture shows.
 pub(super) struct Stage<'s> {
-    pub(super) drafts: Vec<Draft<'s>>,
+    /// The scene without its plants.
+    scene: Draft<'s>,
+    wanted: Vec<Wanted<'s>>,
+    /// Those that several plants share, once they are made.
+    shared: Vec<OnceLock<Draft<'s>>>,
     /// In string order: what is later is in front of what is at the same depth.
     pub(super) parts: Vec<Part>,
     /// All palettes, one after the other.
     pub(super) colors: Vec<Color>,
-    /// The looks of plants so far, and their drafts by the power of two of their size; plants in plants share them.
-    looks: HashMap<*const Scene, Option<Look>>,
-    drafted: HashMap<(*const Scene, i32), usize>,
+    fit: &'s Fit,
+    lens: &'s Lens,
+}
+
+/// A stage whose drafts are yet to be made.
+struct Plan<'s> {
+    wanted: Vec<Wanted<'s>>,
+    parts: Vec<Part>,
+    colors: Vec<Color>,
+    /// The looks of plants so far by the address of their scene, and their drafts by their size, in half powers of two; plants in plants share them.
+    looks: HashMap<usize, Option<Look>>,
+    drafted: HashMap<(usize, i32), usize>,
+}
+
+/// A draft that is yet to be made.
+struct Wanted<'s> {
+    scene: &'s Scene,
+    default_width: f64,
+    size: Size,
+    /// Number of parts.
+    uses: usize,
+}
+
+/// How large a plant is in the picture.
+enum Size {
+    /// Everywhere so many pixels for a unit.
+    Even(f64),
+    /// As it is seen in this place.
+    Near(Placement),
 }
 
 /// A ball around all that one look has.
@@ -43,52 +88,64 @@ struct Look {
 
 impl<'s> Stage<'s> {
     /// For a picture.
-    pub(super) fn new(scene: &'s Scene, fit: &Fit, lens: &Lens) -> Stage<'s> {
-        let scale_at = |p: Point| lens.scale_at(p);
-        let mut stage = Stage::of(scene, fit, fit.light.is_flat(), lens.scale(), scale_at);
-        stage.add_plants(scene, None, fit, lens.scale(), &|centre, radius| {
-            let towards = lens.camera.towards(centre) * radius;
-            let nearest = lens.scale_at(centre + towards).max(lens.scale_at(centre));
-            // Within the ball around it, the viewer sees it at any size.
-            let scale = if nearest > 0.0 { nearest } else { lens.scale_at(centre - towards) };
-            (!lens.misses(centre, radius)).then_some(scale)
-        });
-        stage
-    }
-
-    /// Number of triangles.
-    pub(super) fn len(&self) -> usize {
-        self.parts.iter().map(|part| self.drafts[part.draft].len()).sum()
-    }
-
-    fn of(
-        scene: &'s Scene,
-        fit: &Fit,
-        is_flat: bool,
-        scale: f64,
-        scale_at: impl Fn(Point) -> f64,
-    ) -> Stage<'s> {
-        let detail = Detail { scale_at, accuracy: fit.accuracy, scale, is_flat };
-        Stage {
-            drafts: vec![Draft::new(scene, fit.default_width, &detail)],
-            parts: vec![Part { draft: 0, place: None, colors: 0 }],
+    pub(super) fn new(scene: &'s Scene, fit: &'s Fit, lens: &'s Lens) -> Stage<'s> {
+        let mut plan = Plan {
+            wanted: Vec::new(),
+            parts: vec![Part { draft: 0, place: None, colors: 0, rows: 0..lens.size[1] }],
             colors: scene.palette.materials().iter().map(|material| material.color).collect(),
             looks: HashMap::new(),
             drafted: HashMap::new(),
-        }
+        };
+        plan.add_plants(scene, None, lens);
+        let detail = Detail {
+            scale_at: |p: Point| lens.scale_at(p),
+            scale_of: None,
+            accuracy: fit.accuracy,
+            scale: lens.scale(),
+            is_flat: fit.light.is_flat(),
+        };
+        let shared = plan.wanted.iter().map(|_| OnceLock::new()).collect();
+        let scene = Draft::new(scene, fit.default_width, &detail);
+        Stage { scene, wanted: plan.wanted, shared, parts: plan.parts, colors: plan.colors, fit, lens }
     }
 
-    /// Adds the plants of a scene in its place. `scale_of` tells the pixels of a scene unit at a ball; `None`: it is not seen.
-    fn add_plants(
-        &mut self,
-        scene: &'s Scene,
-        place: Option<&Placement>,
-        fit: &Fit,
-        scale: f64,
-        scale_of: &dyn Fn(Point, f64) -> Option<f64>,
-    ) {
+    /// Passes on the draft of a part. One that no other part shares is made for that, and dropped.
+    pub(super) fn with_draft<Done>(&self, part: &Part, work: impl FnOnce(&Draft) -> Done) -> Done {
+        let number = part.draft.checked_sub(1);
+        let Some((wanted, place)) = number.and_then(|i| self.wanted.get(i).zip(self.shared.get(i))) else {
+            return work(&self.scene);
+        };
+        let make = || wanted.draft(self.fit, self.lens);
+        if wanted.uses > 1 { work(place.get_or_init(make)) } else { work(&make()) }
+    }
+}
+
+impl<'s> Wanted<'s> {
+    fn draft(&self, fit: &Fit, lens: &Lens) -> Draft<'s> {
+        let (accuracy, scale, is_flat) = (fit.accuracy, lens.scale(), false);
+        match self.size {
+            Size::Even(seen) => {
+                let scale_at = |_| seen;
+                let detail = Detail { scale_at, scale_of: None, accuracy, scale, is_flat };
+                Draft::new(self.scene, self.default_width, &detail)
+            }
+            Size::Near(placement) => {
+                let larger = placement.largest();
+                let scale_at = |p| lens.scale_at(placement.point(p)) * larger;
+                let scale_of =
+                    |p, radius: f64| lens.scale_within(placement.point(p), radius * larger) * larger;
+                let detail = Detail { scale_at, scale_of: Some(&scale_of), accuracy, scale, is_flat };
+                Draft::new(self.scene, self.default_width, &detail)
+            }
+        }
+    }
+}
+
+impl<'s> Plan<'s> {
+    /// Adds the plants of a scene in its place.
+    fn add_plants(&mut self, scene: &'s Scene, place: Option<&Placement>, lens: &Lens) {
         for plant in &scene.plants {
-            let key = &raw const *plant.scene;
+            let key = (&raw const *plant.scene).addr();
             let known = self.looks.get(&key).copied();
             let look = known.unwrap_or_else(|| self.look(plant));
             self.looks.insert(key, look);
@@ -97,19 +154,27 @@ impl<'s> Stage<'s> {
                 None => plant.placement,
                 Some(outer) => plant.placement.within(outer),
             };
-            let Some(seen) = scale_of(placement.point(look.centre), look.radius * placement.largest()) else {
-                continue;
+            let (centre, radius) = (placement.point(look.centre), look.radius * placement.largest());
+            let Some(seen) = lens.scale_of(centre, radius) else { continue };
+            let scene = &plant.scene;
+            let wanted = &mut self.wanted;
+            // The scene itself is the first draft.
+            let mut add = |size| {
+                wanted.push(Wanted { scene, default_width: look.default_width, size, uses: 0 });
+                wanted.len()
             };
-            let exponent = (seen * placement.largest()).log2().ceil().clamp(-60.0, 60.0) as i32;
-            let draft = *self.drafted.entry((key, exponent)).or_insert_with(|| {
-                let scale_there = 2_f64.powi(exponent);
-                let detail =
-                    Detail { scale_at: |_| scale_there, accuracy: fit.accuracy, scale, is_flat: false };
-                self.drafts.push(Draft::new(&plant.scene, look.default_width, &detail));
-                self.drafts.len() - 1
-            });
-            self.parts.push(Part { draft, place: Some(placement), colors: look.colors });
-            self.add_plants(&plant.scene, Some(&placement), fit, scale, scale_of);
+            let draft = if seen <= NEAR * lens.scale_at(centre) {
+                let exponent = (2.0 * (seen * placement.largest()).log2()).ceil().clamp(-120.0, 120.0);
+                let size = Size::Even((exponent / 2.0).exp2());
+                let exponent = exponent as i32;
+                *self.drafted.entry((key, exponent)).or_insert_with(|| add(size))
+            } else {
+                add(Size::Near(placement))
+            };
+            wanted[draft - 1].uses += 1;
+            let rows = lens.rows(centre, radius);
+            self.parts.push(Part { draft, place: Some(placement), colors: look.colors, rows });
+            self.add_plants(scene, Some(&placement), lens);
         }
     }
 

@@ -40,6 +40,8 @@ const LOOKS: u32 = 64;
 pub struct Detail {
     /// Pixels across the smaller side, times the zoom.
     pub pixels: f64,
+    /// The larger side in smaller ones.
+    pub shape: f64,
     /// A camera that stands above the one that the model declares.
     pub viewpoint: Option<Viewpoint>,
     /// Largest error of a plant that moves by modes, in pixels.

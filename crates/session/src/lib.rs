@@ -20,10 +20,13 @@
 
 #![warn(missing_docs)]
 
+mod bed;
 mod gauge;
+mod looks;
 mod nursery;
 pub mod replay;
 mod swaying;
+mod threads;
 
 pub use gauge::Detail;
 pub use nursery::{DrawError, Nursery};

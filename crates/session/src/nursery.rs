@@ -8,10 +8,14 @@
 //! begins anew.
 
 use std::collections::HashMap;
+use std::sync::atomic::AtomicUsize;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
+use crate::bed::{Bed, Grown};
 use crate::gauge::{Detail, Gauge};
+use crate::looks::Sight;
 use crate::swaying::{Around, SwayReport, Swaying, sways};
+use crate::threads;
 use dlsys_diagnostic::Diagnostic;
 use dlsys_geometry::scene::{Bounds, Plant, Scene, Seedling, Width};
 use dlsys_geometry::turtle::{self, Strains};
@@ -23,7 +27,7 @@ use dlsys_tree::ModuleString;
 /// Most simulations that are kept from one scene to the next.
 const MOST_KEPT: usize = 256;
 /// Most elements (segments, polygons, surfaces, patches) that the plants of one scene hold, those that look the same counted once.
-const MOST_ELEMENTS: usize = 50_000_000;
+pub(crate) const MOST_ELEMENTS: usize = 50_000_000;
 /// Most plants in one scene, plants in plants included.
 const MOST_PLANTS: usize = 10_000_000;
 
@@ -54,16 +58,17 @@ impl DrawError {
 }
 
 /// A simulation that is kept, and the time that it has reached.
-struct Kept<'m> {
-    simulation: Simulation<'m>,
-    time: f64,
+#[derive(Clone)]
+pub(crate) struct Kept<'m> {
+    pub(crate) simulation: Simulation<'m>,
+    pub(crate) time: f64,
     /// The string at that time.
-    string: ModuleString,
+    pub(crate) string: ModuleString,
 }
 
 impl Kept<'_> {
     /// Goes on to an age.
-    fn reach(&mut self, plant: &model::Plant, age: f64) -> Result<(), DrawError> {
+    pub(crate) fn reach(&mut self, plant: &model::Plant, age: f64) -> Result<(), DrawError> {
         self.simulation.at(age, &mut self.string).map_err(|error| fault(plant, age, &error))?;
         self.time = age;
         Ok(())
@@ -71,16 +76,16 @@ impl Kept<'_> {
 }
 
 /// Simulations by plant and seed.
-type Growing<'m> = HashMap<(usize, u64), Kept<'m>>;
+pub(crate) type Growing<'m> = HashMap<(usize, u64), Kept<'m>>;
 
 /// Draws strings of a model with the plants of other models that they contain.
 pub struct Nursery<'m> {
-    model: &'m Model,
+    pub(crate) model: &'m Model,
     settings: Settings,
     /// An empty scene of the model, with materials that suit the scene that it stands in.
     blank: Scene,
     /// The nurseries of the plants' models, for plants in plants.
-    below: Vec<Nursery<'m>>,
+    pub(crate) below: Vec<Nursery<'m>>,
     /// One set of simulations for each thread that draws.
     pool: Mutex<Vec<Growing<'m>>>,
     /// The wind, and the stems of the model in it, once a string has been drawn.
@@ -90,6 +95,8 @@ pub struct Nursery<'m> {
     /// The size of the picture, if there is one, and what it means for the plants in the wind.
     detail: Option<Detail>,
     gauge: OnceLock<Option<Gauge>>,
+    /// Threads for the plants of one scene.
+    threads: usize,
 }
 
 /// What is passive in a scene.
@@ -124,10 +131,17 @@ impl<'m> Nursery<'m> {
             swaying: Swaying::default(),
             detail: None,
             gauge: OnceLock::new(),
+            threads: 1,
         }
     }
 
-    /// For pictures of this size, in which plants that are small move by the modes of their class, with an error below its bound.
+    /// With so many threads for the plants of one scene, at least 1. Results do not depend on it.
+    pub fn with_threads(self, threads: usize) -> Nursery<'m> {
+        Nursery { threads: threads.max(1), ..self }
+    }
+
+    /// For pictures of this size, in which plants that are small move by the modes of their class, with an error below its bound, and plants that
+    /// differ by less than that share a drawing.
     /// Without a size, all plants are solved; so are those in plants.
     pub fn for_picture(self, detail: Option<Detail>) -> Nursery<'m> {
         Nursery { detail, gauge: OnceLock::new(), ..self }
@@ -171,7 +185,7 @@ impl<'m> Nursery<'m> {
         self.passive.get_or_init(start).as_ref().map_err(Clone::clone)
     }
 
-    fn draw_with(
+    pub(crate) fn draw_with(
         &self,
         (seed, around): (u64, &Around),
         string: &ModuleString,
@@ -226,43 +240,39 @@ impl<'m> Nursery<'m> {
             let (a, b) = (&seedlings[*a], &seedlings[*b]);
             key(a).cmp(&key(b)).then(a.age.total_cmp(&b.age))
         });
-        let mut drawn: Vec<Option<Plant>> = vec![None; seedlings.len()];
         let motions = self.motions((seed, around, time), &seedlings)?;
-        let mut elements = 0;
+        // A first pass knows no accuracy.
+        let is_survey = scene.accuracy == 0.0;
+        let declared = scene.surroundings.camera;
+        let sight = self.detail.and_then(|detail| Sight::new(detail, declared, is_survey));
+        scene.lacked_accuracy |= is_survey && sight.is_some();
+        let elements = AtomicUsize::new(0);
+        let bed = Bed {
+            nursery: self,
+            around,
+            seedlings: &seedlings,
+            motions: motions.as_deref(),
+            sight,
+            accuracy: scene.accuracy,
+            elements: &elements,
+        };
+        let mut jobs = Vec::new();
         for group in order.chunk_by(|a, b| key(&seedlings[*a]) == key(&seedlings[*b])) {
-            let first = &seedlings[group[0]];
-            let (key, plant) = (key(first), &plants[first.plant]);
-            let mut kept = match growing.remove(&key).filter(|kept| kept.time <= first.age) {
-                Some(kept) => kept,
-                None => {
-                    Kept { simulation: self.start(plant, key.1)?, time: 0.0, string: ModuleString::default() }
-                }
-            };
-            for twins in group.chunk_by(|a, b| seedlings[*a].age == seedlings[*b].age) {
-                let age = seedlings[twins[0]].age;
-                kept.reach(plant, age)?;
-                // Plants that sway have shapes of their own.
-                let alike = if motions.is_some() && sways(&plant.model) { 1 } else { twins.len() };
-                for twins in twins.chunks(alike) {
-                    let seedling = &seedlings[twins[0]];
-                    let around = around.within(seedling, &plant.model);
-                    let motion = motions.as_ref().and_then(|motions| motions[twins[0]].as_deref());
-                    let grown = self.look(seedling, (key.1, &around), (&kept, motion), scene)?;
-                    elements += count(&grown);
-                    if elements > MOST_ELEMENTS {
-                        let what = format!("the plants of this scene have more than {MOST_ELEMENTS} pieces");
-                        return Err(too_many(plant, what));
-                    }
-                    if grown.is_empty() {
-                        continue;
-                    }
-                    let grown = Plant::new(Arc::new(grown), seedling.placement, seedling.owner);
-                    for &i in twins {
-                        drawn[i] = Some(grown.twin(seedlings[i].placement, seedlings[i].owner));
-                    }
+            bed.divide(key(&seedlings[group[0]]), group, growing, &mut jobs)?;
+        }
+        let mut drawn: Vec<Option<Plant>> = vec![None; seedlings.len()];
+        for done in threads::in_order(self.threads, jobs, |job| bed.grow(job)) {
+            let Grown { plants, kept, warnings, lacked_accuracy } = done?;
+            for (i, plant) in plants {
+                drawn[i] = Some(plant);
+            }
+            for (span, warning) in warnings {
+                if !scene.warnings.iter().any(|known| known.labels.first().is_some_and(|l| l.0 == span)) {
+                    scene.warnings.push(warning);
                 }
             }
-            if growing.len() < MOST_KEPT {
+            scene.lacked_accuracy |= lacked_accuracy;
+            if let Some((key, kept)) = kept.filter(|_| growing.len() < MOST_KEPT) {
                 growing.insert(key, kept);
             }
         }
@@ -270,7 +280,7 @@ impl<'m> Nursery<'m> {
         Ok(())
     }
 
-    fn start(&self, plant: &'m model::Plant, seed: u64) -> Result<Simulation<'m>, DrawError> {
+    pub(crate) fn start(&self, plant: &'m model::Plant, seed: u64) -> Result<Simulation<'m>, DrawError> {
         let settings = Settings { seed, ..self.settings };
         if plant.model.reads_strain() {
             // Each would grow in another way, at its own place.
@@ -311,46 +321,10 @@ impl<'m> Nursery<'m> {
             DrawError::Plant(Box::new(within(plant, message, &error.diagnostic())))
         })
     }
-
-    /// What a plant draws at its age.
-    fn look(
-        &self,
-        &Seedling { plant: number, age, .. }: &Seedling,
-        (seed, around): (u64, &Around),
-        (kept, motion): (&Kept<'m>, Option<&Motion<'m>>),
-        outer: &mut Scene,
-    ) -> Result<Scene, DrawError> {
-        let plant = &self.model.scenery.plants[number];
-        let mut scene = self.below[number].blank();
-        scene.accuracy = outer.accuracy;
-        let bent = match motion {
-            Some(motion) => Some(motion.at(&kept.string)?),
-            None => None,
-        };
-        let strains = bent.as_ref().map(|bent| bent as &dyn Strains);
-        if let Err(error) = self.below[number].draw_with((seed, around), &kept.string, strains, &mut scene) {
-            let inner = error.diagnostic();
-            let message = format!("the plant `{}` cannot be drawn at its age {}", plant.name, brief(age, 6));
-            let error = Diagnostic::error(message).at(plant.span, "this plant").note(inner.message);
-            return Err(DrawError::Plant(Box::new(error)));
-        }
-        if let Some(warning) = scene.warnings.first()
-            && !outer.warnings.iter().any(|known| known.labels.first().is_some_and(|l| l.0 == plant.span))
-        {
-            let message = format!("in the plant `{}`: {}", plant.name, warning.message);
-            outer.warnings.push(Diagnostic::warning(message).at(plant.span, "this plant"));
-        }
-        scene.warnings.clear();
-        outer.lacked_accuracy |= scene.lacked_accuracy;
-        // The surroundings are those of the outermost scene.
-        scene.surroundings = Default::default();
-        set_widths(&mut scene);
-        Ok(scene)
-    }
 }
 
 /// Gives lines of default width the width that suits the plant at its age, so that it does not depend on the scene around it.
-fn set_widths(scene: &mut Scene) {
+pub(crate) fn set_widths(scene: &mut Scene) {
     let is_default = |width: &Width| matches!(width, Width::Default(_));
     if !scene.segments.iter().flat_map(|segment| &segment.widths).any(is_default) {
         return;
@@ -361,7 +335,7 @@ fn set_widths(scene: &mut Scene) {
     }
 }
 
-fn count(scene: &Scene) -> usize {
+pub(crate) fn count(scene: &Scene) -> usize {
     scene.segments.len()
         + scene.polygons.len()
         + scene.surfaces.len()
@@ -400,7 +374,7 @@ fn within(plant: &model::Plant, message: String, inner: &Diagnostic) -> Diagnost
     Diagnostic::error(message).at(plant.span, "this plant").note(format!("{place}{}", inner.message))
 }
 
-fn too_many(plant: &model::Plant, what: String) -> DrawError {
+pub(crate) fn too_many(plant: &model::Plant, what: String) -> DrawError {
     let error = Diagnostic::error("too much is drawn in one scene").at(plant.span, what);
     DrawError::Plant(Box::new(error.help("draw fewer plants, or plants of fewer modules")))
 }

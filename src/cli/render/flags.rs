@@ -126,12 +126,15 @@ pub fn detail(args: &RenderArgs, format: Format) -> Option<Detail> {
         (None, Some(width)) => Size::Width(width),
         (None, None) => Size::default(),
     };
-    let smaller = match size {
-        Size::Exact(width, height) => f64::from(width.min(height)),
-        Size::Larger(pixels) | Size::Width(pixels) => f64::from(pixels) / CAMERA_SHAPE,
+    let (smaller, shape) = match size {
+        Size::Exact(width, height) => {
+            let [smaller, larger] = [width.min(height), width.max(height)].map(f64::from);
+            (smaller, larger / smaller.max(1.0))
+        }
+        Size::Larger(pixels) | Size::Width(pixels) => (f64::from(pixels) / CAMERA_SHAPE, CAMERA_SHAPE),
     };
     let pixels = smaller * args.zoom.unwrap_or(1.0);
-    Some(Detail { pixels, viewpoint: args.camera, bound: args.bend_pixels })
+    Some(Detail { pixels, shape, viewpoint: args.camera, bound: args.bend_pixels })
 }
 
 /// The page for a picture.

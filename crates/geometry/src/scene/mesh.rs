@@ -66,6 +66,12 @@ impl Mesh {
         })
     }
 
+    /// Middle and radius of a ball around all vertices.
+    pub fn ball(&self) -> (Point, f64) {
+        let around = |[low, high]: [Point; 2]| (nalgebra::center(&low, &high), (high - low).norm() / 2.0);
+        self.bounds().map_or((Point::origin(), 0.0), around)
+    }
+
     /// The mesh for a picture in which it may be small: of vertices nearer to one another than `accuracy`, in its own units, one is left, and triangles
     /// with two corners in one are gone. `None` if that would be hardly fewer triangles. Meshes are kept: accuracies within a factor of two share one.
     pub fn draft(&self, accuracy: f64) -> Option<Arc<Mesh>> {

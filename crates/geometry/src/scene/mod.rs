@@ -179,6 +179,15 @@ impl Scene {
         self.lacked_accuracy = false;
     }
 
+    /// Gives back memory that elements do not take.
+    pub fn shrink_to_fit(&mut self) {
+        self.owners.shrink_to_fit();
+        self.segments.shrink_to_fit();
+        self.polygons.shrink_to_fit();
+        self.surfaces.shrink_to_fit();
+        self.patches.shrink_to_fit();
+    }
+
     /// Roughly the memory of all elements, in bytes; plants that share a scene count it once.
     pub fn footprint(&self) -> usize {
         let mut known = HashSet::new();
@@ -229,28 +238,37 @@ impl Scene {
     }
 
     /// The surfaces and patches as meshes for a picture, in the order of [`tessellated`](Scene::tessellated): each within
-    /// `accuracy` (scene units) of its shape, which may depend on its place.
-    pub fn drafted(&self, accuracy: impl Fn(Point) -> f64) -> Cow<'_, [Surface]> {
+    /// `accuracy` (scene units) of its shape, which may depend on its place, and on a ball
+    /// around it: middle and radius.
+    pub fn drafted(&self, accuracy: impl Fn(Point, (Point, f64)) -> f64) -> Cow<'_, [Surface]> {
         if self.patches.is_empty() && self.surfaces.is_empty() {
             return Cow::Borrowed(&self.surfaces);
         }
         let placed = self.surfaces.iter().map(|surface| {
             let mut surface = surface.clone();
             let place = surface.placement;
-            let accuracy = accuracy(place.origin) / place.largest();
+            let (middle, radius) = surface.mesh.ball();
+            let ball = (place.point(middle), radius * place.largest());
+            let accuracy = accuracy(place.origin, ball) / place.largest();
             match surface.patches.take() {
                 Some(patches) => surface.mesh = patches.draft(accuracy),
                 None => surface.mesh = surface.mesh.draft(accuracy).unwrap_or(surface.mesh),
             }
             surface
         });
-        let patches = self.patches.iter().map(|patch| patch.draft(accuracy(patch.net[0][0])));
+        let patches = self.patches.iter().map(|patch| {
+            let from = patch.net[0][0];
+            let points = || patch.net.iter().flatten();
+            let (low, high) = points().fold((from, from), |(low, high), p| (low.inf(p), high.sup(p)));
+            let ball = (nalgebra::center(&low, &high), (high - low).norm() / 2.0);
+            patch.draft(accuracy(from, ball))
+        });
         Cow::Owned(placed.chain(patches).collect())
     }
 
     /// The scene with meshes in place of everything curved, as detailed as a picture needs: see [`drafted`](Scene::drafted).
     pub fn drafted_scene(&self, accuracy: impl Fn(Point) -> f64) -> Cow<'_, Scene> {
-        match self.drafted(accuracy) {
+        match self.drafted(|at, _| accuracy(at)) {
             Cow::Borrowed(_) => Cow::Borrowed(self),
             Cow::Owned(surfaces) => Cow::Owned(Scene { surfaces, patches: Vec::new(), ..self.clone() }),
         }

@@ -95,6 +95,9 @@ fn strict_derivatives(net: &Net) -> [f64; 3] {
 
 /// The fewest pieces of any number.
 fn fewest([uu, uv, vv]: [f64; 3], accuracy: f64) -> (usize, usize) {
+    /// Far from overflow: what is not seen may be as inaccurate as it likes.
+    const COARSEST: f64 = 1e100;
+    let accuracy = accuracy.min(COARSEST);
     // For each number of rows the least number of columns: where a quadratic in one over it is zero.
     let columns = |rows: usize| {
         let v = rows as f64;

@@ -38,7 +38,7 @@ impl Exporter for Png {
         out: &mut (dyn Write + Send),
     ) -> io::Result<()> {
         let (fit, page) = writer.fit.for_frame(scene, &writer.page);
-        let image = picture(scene, &fit, page.pixels, page.placement(), Smoothness::Fine, 1);
+        let image = picture(scene, &fit, page.pixels, page.placement(), Smoothness::Fine, writer.threads);
         out.write_all(&encode(&page, title, Sky::of(scene, &fit, &page).as_ref(), &image))
     }
 }
@@ -56,7 +56,7 @@ pub(crate) fn picture(
 ) -> Image {
     let lens = Lens::new(fit, size, placement);
     let stage = Stage::new(scene, fit, &lens);
-    let lighting = Lighting::new(scene, fit, lens.scale(), threads, None);
+    let lighting = Lighting::new(scene, fit, lens.scale(), threads, None, Some(&lens));
     match smoothness {
         Smoothness::Fine => shot::draw(&raster::SIXTEEN, threads, &stage, &lens, &lighting),
         Smoothness::Quick => shot::draw(&raster::FOUR, threads, &stage, &lens, &lighting),
@@ -91,7 +91,15 @@ impl<'m> Lit<'m> {
         let seen: Vec<Point> = mesh.vertices.iter().map(|p| fit.camera.project(*p)).collect();
         let places = seen.iter().map(|p| [a * p.x + b, c - a * p.y, p.z]).collect();
         let normals = mesh.normals.iter().map(|&n| fit.camera.direction(n)).collect();
-        Lit { mesh, lighting: Lighting::new(scene, fit, a, 1, floor), floor, places, seen, normals, scale }
+        Lit {
+            mesh,
+            lighting: Lighting::new(scene, fit, a, 1, floor, None),
+            floor,
+            places,
+            seen,
+            normals,
+            scale,
+        }
     }
 
     /// Moves the origin of pixels to another one.

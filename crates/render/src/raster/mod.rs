@@ -20,7 +20,7 @@ use std::sync::{Mutex, PoisonError};
 use band::Band;
 
 /// Rows in a band.
-const BAND: usize = 16;
+pub(super) const BAND: usize = 16;
 /// Places of the samples in a pixel, in sixteenths of it from its middle.
 pub(super) type Pattern<const N: usize> = [(i64, i64); N];
 pub(super) const SIXTEEN: Pattern<16> = [
