@@ -10,6 +10,7 @@ use super::common::{Clock, Failure, ModelRun, count_of, out_error, size_of};
 use super::events::EventLog;
 use super::frame_source::{Frame, Pass, play_at};
 use super::progress::Progress;
+use super::render::flags::of_pictures;
 use super::shared::SharedArgs;
 use crate::diagnostic::Diagnostic;
 use crate::interchange::{self, Error, Growth, Options, grow};
@@ -111,19 +112,8 @@ pub fn render_run(
 
 /// The flags of `render`; those for pictures are refused.
 fn order_of(args: &RenderArgs) -> Result<Order<'_>, Failure> {
-    let pictures = [
-        ("--view", args.view.is_some()),
-        ("--perspective", args.perspective.is_some()),
-        ("--camera", args.camera.is_some()),
-        ("--zoom", args.zoom.is_some()),
-        ("--light", args.light.is_some()),
-        ("--sky", args.sky.is_some()),
-        ("--width", args.width.is_some()),
-        ("--size", args.size.is_some()),
-        ("--background", args.background.is_some()),
-        ("--line-width", args.line_width.is_some()),
-        ("--layout", args.layout != Layout::Frames),
-    ];
+    let in_a_plane = [("--view", args.view.is_some()), ("--layout", args.layout != Layout::Frames)];
+    let pictures: Vec<_> = in_a_plane.into_iter().chain(of_pictures(args)).collect();
     refuse(&pictures, "a GLB file is a plant in space, and the program that shows it has a camera")?;
     refuse(&[("--seeds", args.seeds.is_some())], "a file holds one growing plant")?;
     Ok(Order {

@@ -30,6 +30,21 @@ pub fn survey(args: &RenderArgs) -> Result<Survey, Failure> {
     Ok(if has_view { survey.without_cameras() } else { survey })
 }
 
+/// Flags that are for pictures, and whether they are given.
+pub fn of_pictures(args: &RenderArgs) -> [(&'static str, bool); 9] {
+    [
+        ("--perspective", args.perspective.is_some()),
+        ("--camera", args.camera.is_some()),
+        ("--zoom", args.zoom.is_some()),
+        ("--light", args.light.is_some()),
+        ("--sky", args.sky.is_some()),
+        ("--width", args.width.is_some()),
+        ("--size", args.size.is_some()),
+        ("--background", args.background.is_some()),
+        ("--line-width", args.line_width.is_some()),
+    ]
+}
+
 /// Refuses flags that have no meaning for the format or the layout.
 pub fn agree(args: &RenderArgs, format: Format) -> Result<(), Failure> {
     if args.speed.is_some() {
@@ -54,17 +69,7 @@ pub fn agree(args: &RenderArgs, format: Format) -> Result<(), Failure> {
                 args.layout.name()
             )));
         }
-        let given = [
-            ("--perspective", args.perspective.is_some()),
-            ("--camera", args.camera.is_some()),
-            ("--zoom", args.zoom.is_some()),
-            ("--light", args.light.is_some()),
-            ("--sky", args.sky.is_some()),
-            ("--width", args.width.is_some()),
-            ("--size", args.size.is_some()),
-            ("--background", args.background.is_some()),
-            ("--line-width", args.line_width.is_some()),
-        ];
+        let given = of_pictures(args);
         if let Some((flag, _)) = given.iter().find(|(_, given)| *given) {
             return Err(usage(format!(
                 "{flag} is for pictures, and an OBJ file is a mesh in space; leave it out, or choose --format svg or png"

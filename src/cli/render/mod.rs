@@ -5,7 +5,7 @@
 //! cheaper than keeping every frame in memory. Frames are drawn and written on other threads while the simulation
 //! continues; files do not depend on the number of threads.
 
-mod flags;
+pub(super) mod flags;
 mod watch;
 
 use std::collections::HashMap;
