@@ -66,7 +66,7 @@ fn side(segment: &Segment, default_width: f64) -> Vec<Point> {
 /// The largest distance of drawn points from what the file shows for their module, in metres.
 fn worst(followed: &Followed, times: &[f64], first: f64) -> f64 {
     let Followed { session, growth, options } = followed;
-    let glb = Glb::read(&growth.glb().expect("a file"));
+    let glb = Glb::read(&growth.file(dlsys::interchange::Format::Glb).expect("a file"));
     let nursery = Nursery::new(&session.model, Settings::default());
     let mut simulation = session.simulate(Settings::default()).expect("a start");
     let mut worst = 0.0_f64;
@@ -148,7 +148,7 @@ fn modules_appear_and_vanish_within_a_millisecond() {
                 interpret A(x, n): F(0.2 + x)\ninterpret B(y): [ +(60) @L(0.5 + y) ]";
     let session = Session::from_text("events.dls", text, &[]).expect("a model");
     let growth = follow(session, [0.0, 4.0, 0.25], 1).growth;
-    let glb = Glb::read(&growth.glb().expect("a file"));
+    let glb = Glb::read(&growth.file(dlsys::interchange::Format::Glb).expect("a file"));
     let mut checked = 0;
     for (number, node) in glb.nodes().iter().enumerate().filter(|(_, node)| !node["mesh"].is_null()) {
         let birth = node["extras"]["birth"].as_f64().expect("a birth");
@@ -176,9 +176,12 @@ fn lives_are_shared_and_the_file_depends_on_nothing_but_the_model() {
     let followed = follow(model("lychnis.dls"), [0.0, 8.0, 0.04], 1);
     let nodes = followed.growth.nodes();
     assert!(nodes > 100 && 4 * followed.growth.lives() < nodes, "{nodes} {}", followed.growth.lives());
-    let file = followed.growth.glb().expect("a file");
+    let file = followed.growth.file(dlsys::interchange::Format::Glb).expect("a file");
     assert!(file.len() < 2_500_000, "{}", file.len());
-    let others = follow(model("lychnis.dls"), [0.0, 8.0, 0.04], 3).growth.glb().expect("a file");
+    let others = follow(model("lychnis.dls"), [0.0, 8.0, 0.04], 3)
+        .growth
+        .file(dlsys::interchange::Format::Glb)
+        .expect("a file");
     assert!(file == others, "threads do not matter");
     let glb = Glb::read(&file);
     let mut names: Vec<&str> = glb.nodes().iter().filter_map(|node| node["name"].as_str()).collect();
@@ -194,7 +197,7 @@ fn units_are_metres_and_seconds_and_titles_are_escaped() {
     let text = text.replace("\\\"", "'");
     let session = Session::from_text("units.dls", &text, &[]).expect("a model");
     let growth = follow(session, [0.0, 3.0, 1.0], 1).growth;
-    let glb = Glb::read(&growth.glb().expect("a file"));
+    let glb = Glb::read(&growth.file(dlsys::interchange::Format::Glb).expect("a file"));
     assert_eq!(glb.duration(), 12.0);
     let extras = &glb.json["asset"]["extras"];
     assert_eq!(

@@ -94,6 +94,7 @@ pub use lengths::{CrossSection, Length, cross_section, lengths};
 pub use light::Light;
 pub use manifest::{FrameRecord, Manifest};
 pub use name::plain as plain_name;
+pub use number::push as push_number;
 pub use page::{Page, Size};
 pub use sheet::{Assembly, Part, SheetWriter};
 pub use triangulate::{normal, triangulate};

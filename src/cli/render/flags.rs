@@ -48,11 +48,11 @@ pub fn of_pictures(args: &RenderArgs) -> [(&'static str, bool); 9] {
 /// Refuses flags that have no meaning for the format or the layout.
 pub fn agree(args: &RenderArgs, format: Format) -> Result<(), Failure> {
     if args.speed.is_some() {
-        return Err(usage("--speed is for animated files; leave it out, or choose --format glb"));
+        return Err(usage("--speed is for animated files; leave it out, or choose --format glb or usda"));
     }
     let extension = args.out.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let is_file = |name: &str| extension == name;
-    let known = Format::all().map(Format::extension).chain(["gif", "mp4", "webm", "glb"]);
+    let known = Format::all().map(Format::extension).chain(["gif", "mp4", "webm", "glb", "usda"]);
     if !args.out.is_dir() && known.into_iter().any(is_file) {
         let name = args.out.with_extension("");
         return Err(usage(format!(
