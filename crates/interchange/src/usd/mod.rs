@@ -12,21 +12,28 @@ use std::collections::HashMap;
 use dlsys_geometry::scene::{Color, MaterialId};
 use dlsys_render::{GENERATOR, plain_name, push_number};
 
+use crate::life::Life;
 use crate::mesh::Cutter;
 use crate::motion::{Clock, Moved};
 use crate::track::Phase;
 use crate::{Growth, linear};
-use shape::Primitive;
+use shape::{Form, Primitive, Samples, Tolerance};
 use text::{BRACES, Identifiers, PARENTHESES, Text, entry, list, quoted, tuple, tuples};
 
 /// Time codes in a second: frames of film, and of Blender unless it is told otherwise.
 const RATE: f64 = 24.0;
 /// Decimals of normals, and of turns and colours.
-const OF_NORMALS: usize = 3;
+const OF_NORMALS: usize = 2;
 const OF_TURNS: usize = 7;
 const OF_COLORS: usize = 4;
 /// The last decimal of points, in parts of the accuracy.
 const LAST_DECIMAL: f64 = 0.05;
+
+/// Parts of the accuracy. With those of samples (0.18) and of modules that share a life (0.25) they are less than 1 by what rounding needs.
+const OF_TRIANGLES: f64 = 0.3;
+const OF_TRACKS: f64 = 0.06;
+const OF_SIZE: f64 = 0.04;
+const OF_SHAPE: f64 = 0.15;
 
 /// A layer that is being written.
 struct Writer<'a> {
@@ -47,7 +54,7 @@ pub(crate) fn file(growth: &Growth) -> Vec<u8> {
         catalogue: &growth.tracks.catalogue,
         palette: &growth.palette,
         contours: &growth.contours,
-        accuracy: 0.34 * tolerance,
+        accuracy: OF_TRIANGLES * tolerance,
     };
     let decimals = (-(LAST_DECIMAL * tolerance).log10()).ceil().clamp(0.0, 300.0) as usize;
     let mut writer = Writer {
@@ -70,8 +77,11 @@ impl Writer<'_> {
 
     fn layer(&mut self) {
         let growth = self.growth;
-        let lives: Vec<Vec<Primitive>> =
-            growth.lives.lives.iter().map(|life| shape::primitives(life, &self.cutter)).collect();
+        let of_shape = growth.options.tolerance();
+        let tolerance = Tolerance { size: OF_SIZE * of_shape, shape: OF_SHAPE * of_shape };
+        let form =
+            |life: &Life| shape::form(life, &growth.tracks.phases[life.model], &self.cutter, tolerance);
+        let lives: Vec<Form> = growth.lives.lives.iter().map(form).collect();
         self.text.line("#usda 1.0");
         let end = Writer::code(self.clock.end());
         self.text.block("", PARENTHESES, |text| {
@@ -104,8 +114,8 @@ impl Writer<'_> {
             |text| {
                 self.palette(text, &lives);
                 text.block("class \"Lives\" ", BRACES, |text| {
-                    for (i, primitives) in lives.iter().enumerate() {
-                        self.life(text, i, primitives);
+                    for (i, form) in lives.iter().enumerate() {
+                        self.life(text, i, form);
                     }
                 });
                 self.modules(text);
@@ -116,8 +126,9 @@ impl Writer<'_> {
     }
 
     /// The materials that are used, in the order of the palette.
-    fn palette(&mut self, text: &mut Text, lives: &[Vec<Primitive>]) {
-        let mut used: Vec<MaterialId> = lives.iter().flatten().map(|p| p.material).collect();
+    fn palette(&mut self, text: &mut Text, lives: &[Form]) {
+        let primitives = lives.iter().flat_map(|form| &form.primitives);
+        let mut used: Vec<MaterialId> = primitives.map(|primitive| primitive.material).collect();
         used.sort_by_key(|id| id.index());
         used.dedup();
         let mut all: Vec<(Option<MaterialId>, &str, Color)> = Vec::new();
@@ -152,15 +163,13 @@ impl Writer<'_> {
     }
 
     /// A life: its samples are at ages, in time codes.
-    fn life(&self, text: &mut Text, number: usize, primitives: &[Primitive]) {
-        let codes = self.growth.options.seconds * RATE;
-        let ages: Vec<f64> = self.growth.lives.lives[number].ages.iter().map(|age| age * codes).collect();
+    fn life(&self, text: &mut Text, number: usize, form: &Form) {
         text.block(&format!("def Xform \"Life_{number}\" "), BRACES, |text| {
             let mut names = Identifiers::default();
-            for primitive in primitives {
+            for primitive in &form.primitives {
                 let material = self.materials.get(&Some(primitive.material));
                 let name = names.choose(material.map_or("Mesh", String::as_str));
-                self.mesh(text, &name, Some(primitive.material), (&ages, primitive));
+                self.mesh(text, &name, Some(primitive.material), (primitive, form.size.as_ref()));
             }
         });
     }
@@ -170,63 +179,68 @@ impl Writer<'_> {
         text: &mut Text,
         name: &str,
         id: Option<MaterialId>,
-        (ages, primitive): (&[f64], &Primitive),
+        (primitive, size): (&Primitive, Option<&Samples<f64>>),
     ) {
-        let material = self.materials.get(&id);
         let color = match id {
             Some(id) => self.growth.palette.materials().get(id.index()).map(|material| material.color),
             None => Some(self.growth.floor_color),
         };
-        let (shapes, triangles) = (&primitive.shapes, &primitive.triangles);
-        let is_moving = shapes.len() > 1 && ages.len() == shapes.len();
-        let at = |i: usize| ages.get(i).copied().unwrap_or(0.0);
+        let Primitive { triangles, points, normals, .. } = primitive;
         text.prim(
             &format!("def Mesh \"{name}\""),
             |text| text.line("prepend apiSchemas = [\"MaterialBindingAPI\"]"),
             |text| {
                 text.line("uniform bool doubleSided = 1");
-                let bounds: Vec<[[f32; 3]; 2]> = shapes.iter().map(|s| bounds(&s.positions)).collect();
-                let extent = |out: &mut String, [low, high]: [[f32; 3]; 2]| {
-                    tuples(out, &[low, high], self.decimals);
-                };
-                if is_moving {
-                    let all = bounds.iter().enumerate().map(|(i, own)| (at(i), *own));
-                    text.samples("float3[] extent", all, extent);
-                } else if let Some(own) = bounds.last() {
-                    text.long("float3[] extent = ", |out| extent(out, *own));
-                }
+                let bounds = points.values.iter().map(|points| bounds(points)).collect();
+                let extent = Samples { ages: points.ages.clone(), values: bounds };
+                self.attribute(text, "float3[] extent", &extent, |out, corners| {
+                    tuples(out, corners, self.decimals);
+                });
                 text.long("int[] faceVertexCounts = ", |out| {
                     list(out, &vec![3_u32; triangles.len() / 3], |out, n| push_number(out, n.into(), 0));
                 });
                 text.long("int[] faceVertexIndices = ", |out| {
                     list(out, triangles, |out, n| push_number(out, n.into(), 0));
                 });
-                if let Some(material) = material {
+                if let Some(material) = self.materials.get(&id) {
                     text.line(&format!("rel material:binding = </Plant/Materials/{material}>"));
-                }
-                if let (false, Some(mature)) = (is_moving && !primitive.has_one_normal(), shapes.last()) {
-                    text.long("normal3f[] normals = ", |out| tuples(out, &mature.normals, OF_NORMALS));
-                } else {
-                    let all = shapes.iter().enumerate().map(|(i, own)| (at(i), &own.normals));
-                    text.samples("normal3f[] normals", all, |out, own| tuples(out, own, OF_NORMALS));
                 }
                 text.block("normal3f[] normals ", PARENTHESES, |text| {
                     text.line("interpolation = \"vertex\"")
                 });
-                if is_moving {
-                    let all = shapes.iter().enumerate().map(|(i, own)| (at(i), &own.positions));
-                    text.samples("point3f[] points", all, |out, own| tuples(out, own, self.decimals));
-                } else if let Some(mature) = shapes.last() {
-                    text.long("point3f[] points = ", |out| tuples(out, &mature.positions, self.decimals));
-                }
+                self.attribute(text, "normal3f[] normals", normals, |out, all| tuples(out, all, OF_NORMALS));
+                self.attribute(text, "point3f[] points", points, |out, all| tuples(out, all, self.decimals));
                 if let Some(color) = color {
                     text.long("color3f[] primvars:displayColor = ", |out| {
                         list(out, &[rgb(color)], |out, rgb| tuple(out, rgb, OF_COLORS));
                     });
                 }
                 text.line("uniform token subdivisionScheme = \"none\"");
+                if let Some(size) = size {
+                    let decimals = self.decimals + 1;
+                    self.attribute(text, "float3 xformOp:scale", size, |out, size| {
+                        tuple(out, [*size; 3], decimals);
+                    });
+                    text.line("uniform token[] xformOpOrder = [\"xformOp:scale\"]");
+                }
             },
         );
+    }
+
+    /// An attribute with samples at ages, or with one value.
+    fn attribute<T>(
+        &self,
+        text: &mut Text,
+        name: &str,
+        samples: &Samples<T>,
+        write: impl Fn(&mut String, &T),
+    ) {
+        let codes = self.growth.options.seconds * RATE;
+        match (&samples.values[..], samples.ages.is_empty()) {
+            ([], _) => {}
+            ([.., last], true) => text.long(&format!("{name} = "), |out| write(out, last)),
+            (all, false) => text.samples(name, samples.ages.iter().map(|age| age * codes).zip(all), write),
+        }
     }
 
     /// A prim for each module.
@@ -240,7 +254,7 @@ impl Writer<'_> {
             let phase = &growth.tracks.phases[i];
             let life = &growth.lives.lives[number];
             let moved =
-                Moved { phase, life, clock: &self.clock, tolerance: 0.13 * growth.options.tolerance() };
+                Moved { phase, life, clock: &self.clock, tolerance: OF_TRACKS * growth.options.tolerance() };
             let Some(lifetime) = moved.lifetime() else { continue };
             let usual = format!("{}_{}", plain_name(&phase.kind), phase.lineage.name());
             let name = names.choose(&match phase.number {
@@ -253,7 +267,7 @@ impl Writer<'_> {
                     self.custom_data(text, phase);
                     let offset = (phase.birth - self.clock.first) * growth.options.seconds * RATE;
                     text.long(&format!("prepend references = </Plant/Lives/Life_{number}>"), |out| {
-                        if offset != 0.0 && !life.ages.is_empty() {
+                        if offset != 0.0 {
                             out.push_str(" (offset = ");
                             push_number(out, offset, 6);
                             out.push(')');
@@ -325,10 +339,10 @@ impl Writer<'_> {
     /// The floor that the model declares, as a large square.
     fn floor(&self, text: &mut Text) {
         let Some((positions, triangles)) = self.growth.floor() else { return };
-        let shapes = vec![crate::mesh::Places { normals: vec![[0.0, 1.0, 0.0]; 4], positions }];
-        let material = MaterialId::LEAF;
-        let primitive = Primitive { material, triangles, shapes };
-        self.mesh(text, "ground", None, (&[], &primitive));
+        let normals = Samples::still(vec![[0.0, 1.0, 0.0]; positions.len()]);
+        let (material, points) = (MaterialId::LEAF, Samples::still(positions));
+        let primitive = Primitive { material, triangles, points, normals };
+        self.mesh(text, "ground", None, (&primitive, None));
     }
 }
 
