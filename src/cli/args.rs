@@ -275,13 +275,14 @@ pub struct RenderArgs {
     /// one scale
     #[arg(long, value_name = "A..B", value_parser = seeds, conflicts_with_all = ["seed", "events", "stats", "watch"])]
     pub seeds: Option<Seeds>,
-    /// Directory for the frames; made if it is not there. With --format glb or usda the file, or a folder for it
+    /// Directory for the frames; made if it is not there. With a format of whole animations (glb, usda, webp, apng, gif, y4m) the file, or a folder for it; - is
+    /// standard output, for y4m
     #[arg(short, long = "out", value_name = "DIR")]
     pub out: PathBuf,
     /// File format of the frames, or of the whole animation
     #[arg(long, value_parser = render_format(), default_value = Format::SVG.extension())]
     pub format: RenderFormat,
-    /// With --format glb or usda: units of the model's time in a second of the animation [default: 1, or, with `units … time S`, 1/S]
+    /// With a format of whole animations: units of the model's time in a second of the animation [default: 1, or, with `units … time S`, 1/S]
     #[arg(long, value_name = "V", allow_negative_numbers = true, value_parser = positive)]
     pub speed: Option<f64>,
     /// A file for each frame, or all frames on one sheet

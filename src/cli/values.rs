@@ -3,6 +3,7 @@
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use crate::compile::Setting;
+use crate::film;
 use crate::interchange;
 use crate::render::{Camera, Format, Layout, Page};
 use crate::scene::{Color, Point, Vector, Viewpoint};
@@ -21,6 +22,8 @@ pub enum RenderFormat {
     Frames(Format),
     /// One file of a plant that grows in space.
     Growth(interchange::Format),
+    /// One file of pictures.
+    Film(film::Format),
 }
 
 /// A format for frames or for a whole animation.
@@ -29,10 +32,14 @@ pub(super) fn render_format() -> impl TypedValueParser<Value = RenderFormat> {
     let glb = PossibleValue::new("glb").help("One animated file, glTF 2.0: see --format glb of `dlsys run`");
     let usda =
         PossibleValue::new("usda").help("One animated file, USD in text: see --format usda of `dlsys run`");
-    PossibleValuesParser::new(frames.chain([glb, usda])).try_map(|name| match &*name {
+    let films = film::Format::ALL.map(|film| PossibleValue::new(film.extension()).help(film.about()));
+    PossibleValuesParser::new(frames.chain([glb, usda]).chain(films)).try_map(|name| match &*name {
         "glb" => Ok(RenderFormat::Growth(interchange::Format::Glb)),
         "usda" => Ok(RenderFormat::Growth(interchange::Format::Usda)),
-        name => name.parse::<Format>().map(RenderFormat::Frames),
+        name => match film::Format::ALL.into_iter().find(|film| film.extension() == name) {
+            Some(film) => Ok(RenderFormat::Film(film)),
+            None => name.parse::<Format>().map(RenderFormat::Frames),
+        },
     })
 }
 

@@ -48,15 +48,19 @@ pub fn of_pictures(args: &RenderArgs) -> [(&'static str, bool); 9] {
 /// Refuses flags that have no meaning for the format or the layout.
 pub fn agree(args: &RenderArgs, format: Format) -> Result<(), Failure> {
     if args.speed.is_some() {
-        return Err(usage("--speed is for animated files; leave it out, or choose --format glb or usda"));
+        return Err(usage(
+            "--speed is for animated files; leave it out, or choose --format glb, usda, webp, apng, gif or y4m",
+        ));
     }
     let extension = args.out.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let is_file = |name: &str| extension == name;
-    let known = Format::all().map(Format::extension).chain(["gif", "mp4", "webm", "glb", "usda"]);
+    let known = Format::all()
+        .map(Format::extension)
+        .chain(["gif", "webp", "apng", "y4m", "mp4", "webm", "glb", "usda"]);
     if !args.out.is_dir() && known.into_iter().any(is_file) {
         let name = args.out.with_extension("");
         return Err(usage(format!(
-            "-o names a folder, and {} looks like a file: every frame is a file in it; `-o {}` and --format svg, png or obj, or `--at T` for one frame",
+            "-o names a folder, and {} looks like a file: every frame is a file in it; `-o {}` and --format svg, png or obj, or `--at T` for one frame; a whole film in one file is --format webp, apng, gif or y4m",
             args.out.display(),
             name.display()
         )));
@@ -76,6 +80,11 @@ pub fn agree(args: &RenderArgs, format: Format) -> Result<(), Failure> {
             )));
         }
     }
+    of_layouts(args)
+}
+
+/// Refuses flags of another layout.
+pub fn of_layouts(args: &RenderArgs) -> Result<(), Failure> {
     let of_layout = [
         ("--columns", args.columns.is_some(), Layout::Grid),
         ("--no-captions", args.no_captions, Layout::Grid),

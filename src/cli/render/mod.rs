@@ -5,6 +5,7 @@
 //! cheaper than keeping every frame in memory. Frames are drawn and written on other threads while the simulation
 //! continues; files do not depend on the number of threads.
 
+mod film;
 pub(super) mod flags;
 mod watch;
 
@@ -41,6 +42,7 @@ fn once(args: &RenderArgs, stale: &(dyn Fn() -> bool + Sync)) -> Result<(), Fail
     let format = match args.format {
         RenderFormat::Frames(format) => format,
         RenderFormat::Growth(format) => return export::render(args, format, stale),
+        RenderFormat::Film(format) => return film::render(args, format, stale),
     };
     flags::survey(args)?;
     flags::agree(args, format)?;
@@ -108,6 +110,7 @@ pub fn render_run(
     let format = match args.format {
         RenderFormat::Frames(format) => format,
         RenderFormat::Growth(format) => return export::render_run(args, format, run, stale),
+        RenderFormat::Film(format) => return film::render_run(args, format, run, stale),
     };
     let survey = flags::survey(args)?;
     flags::agree(args, format)?;
