@@ -24,15 +24,15 @@ use text::{BRACES, Identifiers, PARENTHESES, Text, entry, list, quoted, tuple, t
 const RATE: f64 = 24.0;
 /// Decimals of normals, and of turns and colours.
 const OF_NORMALS: usize = 2;
-const OF_TURNS: usize = 7;
+const OF_TURNS: usize = 6;
 const OF_COLORS: usize = 4;
 /// The last decimal of points, in parts of the accuracy.
 const LAST_DECIMAL: f64 = 0.05;
 
 /// Parts of the accuracy. With those of samples (0.18) and of modules that share a life (0.25) they are less than 1 by what rounding needs.
-const OF_TRIANGLES: f64 = 0.3;
-const OF_TRACKS: f64 = 0.06;
-const OF_SIZE: f64 = 0.04;
+const OF_TRIANGLES: f64 = 0.33;
+const OF_TRACKS: f64 = 0.04;
+const OF_SIZE: f64 = 0.02;
 const OF_SHAPE: f64 = 0.15;
 
 /// A layer that is being written.

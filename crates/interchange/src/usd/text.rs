@@ -59,7 +59,8 @@ impl Text {
         self.block("", BRACES, properties);
     }
 
-    /// Samples of an attribute at times: `beginning.timeSamples = { … }`.
+    /// Samples of an attribute at ascending times: `beginning.timeSamples = { … }`. Those just before and just after an event, whose times are
+    /// less than [`APART`] from one another, are set that far apart, because no time may stand there twice.
     pub(super) fn samples<T>(
         &mut self,
         beginning: &str,
@@ -68,7 +69,10 @@ impl Text {
     ) {
         self.long(beginning, |out| {
             out.push_str(".timeSamples = {");
+            let mut before = f64::NEG_INFINITY;
             for (i, (time, value)) in samples.into_iter().enumerate() {
+                let time = time.max(before + APART);
+                before = time;
                 out.push_str(if i == 0 { "" } else { "," });
                 push_number(out, time, TIME);
                 out.push(':');
@@ -85,6 +89,8 @@ impl Text {
 
 /// Decimals of times, in time codes.
 const TIME: usize = 5;
+/// Least time between two samples, in time codes: four microseconds.
+const APART: f64 = 1e-4;
 
 pub(super) const PARENTHESES: [&str; 2] = ["(", ")"];
 pub(super) const BRACES: [&str; 2] = ["{", "}"];
@@ -178,12 +184,15 @@ mod tests {
     fn samples_are_one_line() {
         let mut text = Text::default();
         text.block("def Xform \"a\" ", BRACES, |text| {
-            text.samples("double3 xformOp:translate", [(0.0, 1.0), (1.25, -0.00001)], |out, x| {
-                tuple(out, [x, 0.0, 2.0], 4);
-            });
+            text.samples(
+                "double3 xformOp:translate",
+                [(0.0, 1.0), (1.25, -0.00001), (1.25, 3.0)],
+                |out, x| {
+                    tuple(out, [x, 0.0, 2.0], 4);
+                },
+            );
         });
-        let expected =
-            "def Xform \"a\" {\n    double3 xformOp:translate.timeSamples = {0:(1,0,2),1.25:(0,0,2)}\n}\n";
+        let expected = "def Xform \"a\" {\n    double3 xformOp:translate.timeSamples = {0:(1,0,2),1.25:(0,0,2),1.2501:(3,0,2)}\n}\n";
         assert_eq!(String::from_utf8(text.finish()).expect("text"), expected);
     }
 }
