@@ -44,7 +44,8 @@
 //! | [`turtle`] | from strings to geometry |
 //! | [`scene`] | geometry, independent of file formats |
 //! | [`render`] | SVG, PNG and OBJ files |
-//! | [`interchange`] | animated GLB files |
+//! | [`interchange`] | animated GLB and USD files |
+//! | [`film`] | films: animated WebP, PNG, GIF, raw video |
 //! | [`player`] | recordings, the page that plays them, and the window |
 //! | [`session`] | from a file to a simulation |
 //! | [`replay`] | random access to simulated time |
@@ -77,6 +78,7 @@ pub use dlsys_compile as compile;
 pub use dlsys_diagnostic as diagnostic;
 pub use dlsys_expr as expr;
 pub use dlsys_fall as fall;
+pub use dlsys_film as film;
 pub use dlsys_geometry::{scene, turtle};
 pub use dlsys_interchange as interchange;
 pub use dlsys_model as model;

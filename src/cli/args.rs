@@ -224,7 +224,7 @@ pub struct RunArgs {
     /// t,x,y,z,u,v,w; as JSON: a line for each sample with these fields. u, v and w are the velocity of the air along x, y and z in m/s.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["seeds", "events", "stats", "verify"])]
     pub field: Option<PathBuf>,
-    /// Output format of strings, measures or samples; or `glb`: the growth as one animated file (with -o)
+    /// Output format of strings, measures or samples; or `glb`, `usda`: the growth as one animated file (with -o)
     #[arg(long, value_enum, default_value_t = RunFormat::Text)]
     pub format: RunFormat,
     #[command(flatten)]
@@ -255,17 +255,17 @@ pub struct RunArgs {
 /// Flags of `run` that are for files of whole animations.
 #[derive(Debug, Args)]
 pub struct FileArgs {
-    /// With --format glb: the file, such as plant.glb, or a folder for it
+    /// With --format glb or usda: the file, such as plant.glb, or a folder for it
     #[arg(short, long = "out", value_name = "FILE")]
     pub out: Option<PathBuf>,
-    /// With --format glb: largest distance of anything in the file from its place in the model, at any time, in scene units
+    /// With --format glb or usda: largest distance of anything in the file from its place in the model, at any time, in scene units
     /// [default: 1/2000 of the extent of the whole animation]
     #[arg(long, value_name = "L", allow_negative_numbers = true, value_parser = positive)]
     pub accuracy: Option<f64>,
-    /// With --format glb: units of the model's time in a second of the animation [default: 1, or, with `units … time S`, 1/S]
+    /// With --format glb or usda: units of the model's time in a second of the animation [default: 1, or, with `units … time S`, 1/S]
     #[arg(long, value_name = "V", allow_negative_numbers = true, value_parser = positive)]
     pub speed: Option<f64>,
-    /// With --format glb: write over a file that is not a GLB file
+    /// With --format glb or usda: write over a file of another kind
     #[arg(long)]
     pub force: bool,
 }
@@ -278,13 +278,14 @@ pub struct RenderArgs {
     /// one scale
     #[arg(long, value_name = "A..B", value_parser = seeds, conflicts_with_all = ["seed", "events", "stats", "watch"])]
     pub seeds: Option<Seeds>,
-    /// Directory for the frames; made if it is not there. With --format glb the file, or a folder for it
+    /// Directory for the frames; made if it is not there. With a format of whole animations (glb, usda, webp, apng, gif, y4m) the file, or a folder for it; - is
+    /// standard output, for y4m
     #[arg(short, long = "out", value_name = "DIR")]
     pub out: PathBuf,
     /// File format of the frames, or of the whole animation
     #[arg(long, value_parser = render_format(), default_value = Format::SVG.extension())]
     pub format: RenderFormat,
-    /// With --format glb: units of the model's time in a second of the animation [default: 1, or, with `units … time S`, 1/S]
+    /// With a format of whole animations: units of the model's time in a second of the animation [default: 1, or, with `units … time S`, 1/S]
     #[arg(long, value_name = "V", allow_negative_numbers = true, value_parser = positive)]
     pub speed: Option<f64>,
     /// A file for each frame, or all frames on one sheet

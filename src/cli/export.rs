@@ -1,7 +1,7 @@
-//! `--format glb` of `dlsys run` and of `dlsys render`: a growing plant as one file that other programs play.
+//! `--format glb` and `--format usda` of `dlsys run` and of `dlsys render`: a growing plant as one file that other programs play.
 
-use std::io::{Read, Write};
-use std::path::{Path, PathBuf};
+use std::io::Write;
+use std::path::PathBuf;
 use std::time::Instant;
 
 use super::album::Keeping;
@@ -9,19 +9,19 @@ use super::args::{RenderArgs, RunArgs};
 use super::common::{Clock, Failure, ModelRun, count_of, out_error, size_of};
 use super::events::EventLog;
 use super::frame_source::{Frame, Pass, play_at};
+use super::one_file::{file_of, save, spare};
 use super::progress::Progress;
+use super::render::flags::of_pictures;
 use super::shared::SharedArgs;
 use crate::diagnostic::Diagnostic;
 use crate::interchange::{self, Error, Growth, Options, grow};
 use crate::interrupt;
-use crate::render::{self, Fit, Format, FrameWriter, Layout, Survey, View};
+use crate::render::{Fit, Format, FrameWriter, Layout, Survey, View};
 use crate::scene::Scene;
 use crate::sim::Stats;
 
 /// Half of the side of the floor, in parts of the extent: as in OBJ files.
 const FLOOR: f64 = 5.0;
-/// The first bytes of a GLB file.
-const MARK: &[u8; 4] = b"glTF";
 /// Frames from one to the next that is measured.
 const SURVEYED: usize = 4;
 /// Bytes from which a file gets a hint about its size.
@@ -29,6 +29,7 @@ const LARGE: usize = 50_000_000;
 
 /// How the file is written, from the flags of either command.
 struct Order<'a> {
+    format: interchange::Format,
     shared: &'a SharedArgs,
     out: PathBuf,
     /// In units of the model.
@@ -39,6 +40,13 @@ struct Order<'a> {
     limit: u64,
     force: bool,
     quiet: bool,
+}
+
+impl Order<'_> {
+    fn spare(&self) -> Result<(), Failure> {
+        let mark = self.format.mark();
+        spare(&self.out, self.force, self.format.extension(), |start| start.starts_with(mark))
+    }
 }
 
 fn usage(message: impl std::fmt::Display) -> Failure {
@@ -56,31 +64,37 @@ pub fn refuse_flags(args: &RunArgs) -> Result<(), Failure> {
     ];
     if let Some((flag, _)) = given.iter().find(|(_, given)| *given) {
         return Err(usage(format!(
-            "{flag} is for animated files; add --format glb, or leave it out and take what is printed: `dlsys run … > strings.txt`"
+            "{flag} is for animated files; add --format glb or usda, or leave it out and take what is printed: `dlsys run … > strings.txt`"
         )));
     }
     if args.threads.is_some() && args.seeds.is_none() {
-        return Err(usage("--threads is for --seeds and for --format glb; a single run has one thread"));
+        return Err(usage(
+            "--threads is for --seeds and for animated files (--format glb or usda); a single run has one thread",
+        ));
     }
     Ok(())
 }
 
 /// `dlsys run MODEL --format glb -o FILE`.
-pub fn run(args: &RunArgs) -> Result<(), Failure> {
+pub fn run(args: &RunArgs, format: interchange::Format) -> Result<(), Failure> {
     let given = [
         ("--field", args.field.is_some()),
         ("--seeds", args.seeds.is_some()),
         ("--verify", args.verify.verify),
     ];
-    refuse(&given, "a file holds one growing plant")?;
+    refuse(format, &given, "a file holds one growing plant")?;
     let model = &args.shared.model;
     let Some(out) = &args.file.out else {
         let name = model.file_stem().map_or("plant".into(), |stem| stem.to_string_lossy());
-        return Err(usage(format!("`--format glb` writes a file: name it, such as `-o {name}.glb`")));
+        let extension = format.extension();
+        return Err(usage(format!(
+            "`--format {extension}` writes a file: name it, such as `-o {name}.{extension}`"
+        )));
     };
     let order = Order {
+        format,
         shared: &args.shared,
-        out: file_of(out, model)?,
+        out: file_of(out, model, format.extension())?,
         accuracy: args.file.accuracy,
         speed: args.file.speed,
         threads: args.threads.unwrap_or_else(cores),
@@ -88,47 +102,42 @@ pub fn run(args: &RunArgs) -> Result<(), Failure> {
         force: args.file.force,
         quiet: false,
     };
-    spare(&order)?;
+    order.spare()?;
     write(&order, ModelRun::start(&args.shared)?, &|| false)
 }
 
 /// `dlsys render MODEL --format glb -o FILE`.
-pub fn render(args: &RenderArgs, stale: &(dyn Fn() -> bool + Sync)) -> Result<(), Failure> {
-    spare(&order_of(args)?)?;
-    render_run(args, ModelRun::start(&args.shared)?, stale)
+pub fn render(
+    args: &RenderArgs,
+    format: interchange::Format,
+    stale: &(dyn Fn() -> bool + Sync),
+) -> Result<(), Failure> {
+    order_of(args, format)?.spare()?;
+    render_run(args, format, ModelRun::start(&args.shared)?, stale)
 }
 
 /// The same for a model that has been read.
 pub fn render_run(
     args: &RenderArgs,
+    format: interchange::Format,
     run: ModelRun,
     stale: &(dyn Fn() -> bool + Sync),
 ) -> Result<(), Failure> {
-    let order = order_of(args)?;
-    spare(&order)?;
+    let order = order_of(args, format)?;
+    order.spare()?;
     write(&order, run, stale)
 }
 
 /// The flags of `render`; those for pictures are refused.
-fn order_of(args: &RenderArgs) -> Result<Order<'_>, Failure> {
-    let pictures = [
-        ("--view", args.view.is_some()),
-        ("--perspective", args.perspective.is_some()),
-        ("--camera", args.camera.is_some()),
-        ("--zoom", args.zoom.is_some()),
-        ("--light", args.light.is_some()),
-        ("--sky", args.sky.is_some()),
-        ("--width", args.width.is_some()),
-        ("--size", args.size.is_some()),
-        ("--background", args.background.is_some()),
-        ("--line-width", args.line_width.is_some()),
-        ("--layout", args.layout != Layout::Frames),
-    ];
-    refuse(&pictures, "a GLB file is a plant in space, and the program that shows it has a camera")?;
-    refuse(&[("--seeds", args.seeds.is_some())], "a file holds one growing plant")?;
+fn order_of(args: &RenderArgs, format: interchange::Format) -> Result<Order<'_>, Failure> {
+    let in_a_plane = [("--view", args.view.is_some()), ("--layout", args.layout != Layout::Frames)];
+    let pictures: Vec<_> = in_a_plane.into_iter().chain(of_pictures(args)).collect();
+    refuse(format, &pictures, "the file is a plant in space, and the program that shows it has a camera")?;
+    refuse(format, &[("--seeds", args.seeds.is_some())], "a file holds one growing plant")?;
     Ok(Order {
+        format,
         shared: &args.shared,
-        out: file_of(&args.out, &args.shared.model)?,
+        out: file_of(&args.out, &args.shared.model, format.extension())?,
         accuracy: args.accuracy,
         speed: args.speed,
         threads: args.threads.unwrap_or_else(cores),
@@ -138,55 +147,18 @@ fn order_of(args: &RenderArgs) -> Result<Order<'_>, Failure> {
     })
 }
 
-fn refuse(given: &[(&str, bool)], why: &str) -> Result<(), Failure> {
+fn refuse(format: interchange::Format, given: &[(&str, bool)], why: &str) -> Result<(), Failure> {
     match given.iter().find(|(_, given)| *given) {
-        Some((flag, _)) => Err(usage(format!("{flag} does not go with --format glb: {why}; leave it out"))),
+        Some((flag, _)) => Err(usage(format!(
+            "{flag} does not go with --format {}: {why}; leave it out",
+            format.extension()
+        ))),
         None => Ok(()),
     }
 }
 
 fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
-}
-
-/// The path of the file: as given, or in a folder under the name of the model.
-fn file_of(out: &Path, model: &Path) -> Result<PathBuf, Failure> {
-    let text = out.to_string_lossy();
-    match out.extension().map(|extension| extension.to_string_lossy().to_lowercase()) {
-        Some(extension) if extension == "glb" && !out.is_dir() => Ok(out.to_owned()),
-        Some(extension) if !out.is_dir() && !text.ends_with('/') => Err(usage(format!(
-            "`-o {}` is a .{extension} file, and --format glb writes .glb: `-o {}`",
-            out.display(),
-            out.with_extension("glb").display()
-        ))),
-        _ => {
-            let stem = model.file_stem().map_or("plant".into(), |stem| stem.to_string_lossy());
-            Ok(out.join(format!("{stem}.glb")))
-        }
-    }
-}
-
-/// Refuses to write over a file of another kind.
-fn spare(order: &Order<'_>) -> Result<(), Failure> {
-    let out = &order.out;
-    if out.is_dir() {
-        return Err(usage(format!("{} is a directory: name another file", out.display())));
-    }
-    let Ok(mut file) = std::fs::File::open(out) else { return Ok(()) };
-    let mut start = [0; 4];
-    // An empty file is nobody's work.
-    let is_ours = match file.read(&mut start) {
-        Ok(0) => true,
-        Ok(4) => start == *MARK,
-        _ => false,
-    };
-    if order.force || is_ours || !out.is_file() {
-        return Ok(());
-    }
-    Err(usage(format!(
-        "{} is there and is not a GLB file: choose another name, or add --force",
-        out.display()
-    )))
 }
 
 /// Runs the model twice: to measure it, because all accuracy is relative to its extent, and to follow it.
@@ -203,7 +175,7 @@ fn write(order: &Order<'_>, run: ModelRun, stale: &dyn Fn() -> bool) -> Result<(
     let fit = FrameWriter::new(Format::OBJ, survey.fit()).fit;
     let growth = follow(order, &run, &survey, fit, &mut clock)?;
     let before = Instant::now();
-    let bytes = growth.glb().map_err(|error| failure(&run, &error))?;
+    let bytes = growth.file(order.format).map_err(|error| failure(&run, &error))?;
     if bytes.len() as u64 > order.limit {
         return Err(Failure::Model(format!(
             "error: the file is {}, and --max-output allows {}\n\n  = help: a coarser --accuracy makes it smaller\n",
@@ -300,15 +272,6 @@ fn follow(
 
 fn bar(order: &Order<'_>, what: &str, count: usize) -> Progress {
     if order.quiet { Progress::quiet() } else { Progress::new(what, count) }
-}
-
-/// Writes the file, whole or not at all.
-fn save(out: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    std::fs::create_dir_all(folder)
-        .map_err(|error| usage(format!("cannot make the directory {}: {error}", folder.display())))?;
-    let name = out.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
-    render::replace(folder, &name, bytes).map_err(|error| Failure::Model(format!("error: {error}\n")))
 }
 
 /// An error as a message, with advice where there is some.

@@ -16,6 +16,7 @@ mod fmt;
 mod frame_source;
 mod gallery;
 mod new;
+mod one_file;
 mod output;
 mod parallel;
 mod progress;

@@ -38,7 +38,10 @@ const STRIDE: usize = 1000;
 
 /// Runs a model and prints its strings.
 pub fn run(args: &RunArgs) -> Result<(), Failure> {
-    let Some(format) = args.format.of_text() else { return export::run(args) };
+    let format = match args.format.of_text() {
+        Ok(format) => format,
+        Err(format) => return export::run(args, format),
+    };
     export::refuse_flags(args)?;
     if let Some(path) = &args.field {
         return super::field::sample(args, path, format);

@@ -8,6 +8,7 @@ use super::args::IncludeArgs;
 use super::common::Failure;
 use super::values::{bend_method, bend_tolerance, bytes, events, method, positive, setting, time, tolerance};
 use crate::compile::Setting;
+use crate::interchange::Format;
 use crate::sim::{BendMethod, BendSettings, Method, Settings};
 use crate::study::method_name;
 
@@ -159,15 +160,18 @@ pub enum RunFormat {
     Json,
     /// One animated file for other programs, glTF 2.0 binary: a node for each module that draws, with -o FILE
     Glb,
+    /// The same for programs that take USD (Blender, Houdini), in text
+    Usda,
 }
 
 impl RunFormat {
-    /// The format of text; `None` for files of geometry.
-    pub fn of_text(self) -> Option<TextFormat> {
+    /// The format of text, or of a file of geometry.
+    pub fn of_text(self) -> Result<TextFormat, Format> {
         match self {
-            RunFormat::Text => Some(TextFormat::Text),
-            RunFormat::Json => Some(TextFormat::Json),
-            RunFormat::Glb => None,
+            RunFormat::Text => Ok(TextFormat::Text),
+            RunFormat::Json => Ok(TextFormat::Json),
+            RunFormat::Glb => Err(Format::Glb),
+            RunFormat::Usda => Err(Format::Usda),
         }
     }
 }

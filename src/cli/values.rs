@@ -3,6 +3,8 @@
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use crate::compile::Setting;
+use crate::film;
+use crate::interchange;
 use crate::render::{Camera, Format, Layout, Page};
 use crate::scene::{Color, Point, Vector, Viewpoint};
 use crate::sim::{BendMethod, Method};
@@ -18,27 +20,26 @@ pub(super) fn frame_format() -> impl TypedValueParser<Value = Format> {
 pub enum RenderFormat {
     /// A file for each frame.
     Frames(Format),
-    /// One animated file.
-    Glb,
-}
-
-impl RenderFormat {
-    /// The format of frames; `None` for one of whole animations.
-    pub fn of_frames(self) -> Option<Format> {
-        match self {
-            RenderFormat::Frames(format) => Some(format),
-            RenderFormat::Glb => None,
-        }
-    }
+    /// One file of a plant that grows in space.
+    Growth(interchange::Format),
+    /// One file of pictures.
+    Film(film::Format),
 }
 
 /// A format for frames or for a whole animation.
 pub(super) fn render_format() -> impl TypedValueParser<Value = RenderFormat> {
     let frames = Format::all().map(|format| PossibleValue::new(format.extension()).help(format.about()));
     let glb = PossibleValue::new("glb").help("One animated file, glTF 2.0: see --format glb of `dlsys run`");
-    PossibleValuesParser::new(frames.chain([glb])).try_map(|name| match &*name {
-        "glb" => Ok(RenderFormat::Glb),
-        name => name.parse::<Format>().map(RenderFormat::Frames),
+    let usda =
+        PossibleValue::new("usda").help("One animated file, USD in text: see --format usda of `dlsys run`");
+    let films = film::Format::ALL.map(|film| PossibleValue::new(film.extension()).help(film.about()));
+    PossibleValuesParser::new(frames.chain([glb, usda]).chain(films)).try_map(|name| match &*name {
+        "glb" => Ok(RenderFormat::Growth(interchange::Format::Glb)),
+        "usda" => Ok(RenderFormat::Growth(interchange::Format::Usda)),
+        name => match film::Format::ALL.into_iter().find(|film| film.extension() == name) {
+            Some(film) => Ok(RenderFormat::Film(film)),
+            None => name.parse::<Format>().map(RenderFormat::Frames),
+        },
     })
 }
 

@@ -1,4 +1,4 @@
-"""compare.py DLSYS MODEL FILE.glb [TIMES]: distances of vertices of OBJ files of random times from the triangles of the same module in the GLB file.
+"""compare.py DLSYS MODEL FILE [TIMES]: distances of vertices of OBJ files of random times from the triangles of the same module in a GLB or USD file.
 
 Stems are listed apart: OBJ files have mitres and collars where stems meet, and GLB files half balls. Exit status 1 if a module is missing.
 """
@@ -8,8 +8,6 @@ import sys
 import tempfile
 
 import numpy as np
-
-from glb import Glb
 
 
 def groups(path):
@@ -45,15 +43,19 @@ def distance(point, a, b, c):
 
 
 def main(program, model, path, count=6):
-    glb, chance = Glb(path), random.Random(1)
-    times = sorted(round(chance.uniform(glb.first, glb.last), 6) for _ in range(int(count)))
-    extent, found, missing = glb.extent(), {"stems": [], "organs": []}, 0
+    if path.endswith(".glb"):
+        from glb import Glb as File
+    else:
+        from usd import UsdFile as File
+    file, chance = File(path), random.Random(1)
+    times = sorted(round(chance.uniform(file.first, file.last), 6) for _ in range(int(count)))
+    extent, found, missing = file.extent(), {"stems": [], "organs": []}, 0
     with tempfile.TemporaryDirectory() as folder:
         at = ",".join(map(str, times))
         subprocess.run([program, "render", model, "--at", at, "--format", "obj", "-o", folder, "-q"], check=True)
         for i, time in enumerate(times):
             shown = {}
-            for name, thing in glb.shown((time - glb.first) * glb.seconds).items():
+            for name, thing in file.shown((time - file.first) * file.seconds).items():
                 shown[".".join(name.split(".")[:2])] = thing
             for name, vertices in groups(f"{folder}/frame-{i:04d}.obj").items():
                 if name not in shown:
@@ -61,8 +63,8 @@ def main(program, model, path, count=6):
                     print(f"{name} is missing at t = {time}")
                     continue
                 places, triangles, node = shown[name]
-                kind = "stems" if glb.json["meshes"][node["mesh"]]["name"].startswith("stem-") else "organs"
-                some = vertices[np.linspace(0, len(vertices) - 1, min(len(vertices), 40)).astype(int)] * glb.metres
+                kind = "stems" if node["stem"] else "organs"
+                some = vertices[np.linspace(0, len(vertices) - 1, min(len(vertices), 40)).astype(int)] * file.metres
                 corners = [places[triangles[:, k]] for k in range(3)]
                 found[kind].append((max(distance(point, *corners) for point in some) / extent, name, time))
     for kind, all_of in found.items():

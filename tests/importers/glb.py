@@ -50,7 +50,7 @@ class Glb:
         return mixed / np.linalg.norm(mixed)
 
     def shown(self, time):
-        """Vertices, triangles and the node of everything that has a size, by name."""
+        """Vertices, triangles and a description of everything that has a size, by name."""
         shown = {}
         for number, node in enumerate(self.json["nodes"]):
             scale = self.value(number, "scale", time, [1, 1, 1])
@@ -71,7 +71,8 @@ class Glb:
                 triangles.append(self.accessor(primitive["indices"]).astype(int).reshape(-1, 3) + count)
                 count += len(places)
             at = self.value(number, "translation", time, [0, 0, 0])
-            shown[node["name"]] = (np.vstack(vertices) * scale) @ turn.T + at, np.vstack(triangles), node
+            stem = self.json["meshes"][node["mesh"]]["name"].startswith("stem-")
+            shown[node["name"]] = (np.vstack(vertices) * scale) @ turn.T + at, np.vstack(triangles), {"name": node["name"], "stem": stem}
         return shown
 
     def end(self):

@@ -1,10 +1,10 @@
 //! Animated GLB files, read by a reader of our own, against the model drawn again at random times, frames or not.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fs;
 
-use dlsys::interchange::{Error, Growth, Limits, Options, grow};
-use dlsys::render::{Fit, Format, FrameWriter, Survey, View};
+use dlsys::interchange::{Error, Format, Growth, Limits, Options, grow};
+use dlsys::render::{self, Fit, FrameWriter, Survey, View};
 use dlsys::scene::{Point, Scene, Segment, Vector};
 use dlsys::session::{Nursery, Session};
 use dlsys::sim::{Settings, Simulation};
@@ -12,13 +12,13 @@ use dlsys::tree::ModuleString;
 
 use crate::cli::{bad, good};
 use crate::common::repository;
-use crate::glb_reader::Glb;
+use crate::glb_reader::{Glb, Shown};
 
 /// A model with its run followed up to a time.
-struct Followed {
-    session: Session,
-    growth: Growth,
-    options: Options,
+pub struct Followed {
+    pub session: Session,
+    pub growth: Growth,
+    pub options: Options,
 }
 
 fn scene_at(simulation: &mut Simulation<'_>, nursery: &Nursery<'_>, time: f64) -> Scene {
@@ -29,7 +29,7 @@ fn scene_at(simulation: &mut Simulation<'_>, nursery: &Nursery<'_>, time: f64) -
     scene
 }
 
-fn follow(session: Session, [from, to, step]: [f64; 3], threads: usize) -> Followed {
+pub fn follow(session: Session, [from, to, step]: [f64; 3], threads: usize) -> Followed {
     let settings = Settings::default();
     let count = ((to - from) / step).round() as usize;
     let times: Vec<f64> = (0..=count).map(|i| from + step * i as f64).collect();
@@ -39,14 +39,14 @@ fn follow(session: Session, [from, to, step]: [f64; 3], threads: usize) -> Follo
         let mut simulation = session.simulate(settings).expect("a start");
         times.iter().for_each(|t| survey.add(&scene_at(&mut simulation, &nursery, *t)));
     }
-    let fit = FrameWriter::new(Format::OBJ, survey.fit()).fit;
+    let fit = FrameWriter::new(render::Format::OBJ, survey.fit()).fit;
     let mut options = Options::new(&session.model, fit.default_width, fit.accuracy / Fit::ACCURACY);
     options.threads = threads;
     let growth = grow(&session, settings, &times, &options, &mut |_| true).expect("a growth");
     Followed { session, growth, options }
 }
 
-fn model(name: &str) -> Session {
+pub fn model(name: &str) -> Session {
     Session::open(&repository(&format!("models/{name}")), &[]).expect("a model")
 }
 
@@ -65,15 +65,25 @@ fn side(segment: &Segment, default_width: f64) -> Vec<Point> {
 
 /// The largest distance of drawn points from what the file shows for their module, in metres.
 fn worst(followed: &Followed, times: &[f64], first: f64) -> f64 {
-    let Followed { session, growth, options } = followed;
-    let glb = Glb::read(&growth.glb().expect("a file"));
+    let glb = Glb::read(&followed.growth.file(Format::Glb).expect("a file"));
+    worst_of(followed, |seconds| glb.shown(seconds), times, first)
+}
+
+/// The same of any file, by what it shows.
+pub fn worst_of(
+    followed: &Followed,
+    shown: impl Fn(f64) -> BTreeMap<String, Shown>,
+    times: &[f64],
+    first: f64,
+) -> f64 {
+    let Followed { session, options, .. } = followed;
     let nursery = Nursery::new(&session.model, Settings::default());
     let mut simulation = session.simulate(Settings::default()).expect("a start");
     let mut worst = 0.0_f64;
     let mut compared = 0;
     for &time in times {
         let scene = scene_at(&mut simulation, &nursery, time);
-        let shown = glb.shown((time - first) * options.seconds);
+        let shown = shown((time - first) * options.seconds);
         let mut points: HashMap<String, Vec<Point>> = HashMap::new();
         let mut add = |owner, some: Vec<Point>| {
             let owner = scene.owner(owner);
@@ -104,7 +114,7 @@ fn worst(followed: &Followed, times: &[f64], first: f64) -> f64 {
 }
 
 /// Times that are no frames.
-fn random_times(from: f64, to: f64, count: usize) -> Vec<f64> {
+pub fn random_times(from: f64, to: f64, count: usize) -> Vec<f64> {
     let mut times: Vec<f64> =
         (1..=count).map(|i| from + (to - from) * (i as f64 * 0.618_033_988_749_894_9).fract()).collect();
     times.sort_by(f64::total_cmp);
@@ -163,7 +173,7 @@ fn modules_appear_and_vanish_within_a_millisecond() {
                 interpret A(x, n): F(0.2 + x)\ninterpret B(y): [ +(60) @L(0.5 + y) ]";
     let session = Session::from_text("events.dls", text, &[]).expect("a model");
     let growth = follow(session, [0.0, 4.0, 0.25], 1).growth;
-    let glb = Glb::read(&growth.glb().expect("a file"));
+    let glb = Glb::read(&growth.file(Format::Glb).expect("a file"));
     let mut checked = 0;
     for (number, node) in glb.nodes().iter().enumerate().filter(|(_, node)| !node["mesh"].is_null()) {
         let birth = node["extras"]["birth"].as_f64().expect("a birth");
@@ -191,9 +201,9 @@ fn lives_are_shared_and_the_file_depends_on_nothing_but_the_model() {
     let followed = follow(model("lychnis.dls"), [0.0, 8.0, 0.04], 1);
     let nodes = followed.growth.nodes();
     assert!(nodes > 100 && 4 * followed.growth.lives() < nodes, "{nodes} {}", followed.growth.lives());
-    let file = followed.growth.glb().expect("a file");
+    let file = followed.growth.file(Format::Glb).expect("a file");
     assert!(file.len() < 2_500_000, "{}", file.len());
-    let others = follow(model("lychnis.dls"), [0.0, 8.0, 0.04], 3).growth.glb().expect("a file");
+    let others = follow(model("lychnis.dls"), [0.0, 8.0, 0.04], 3).growth.file(Format::Glb).expect("a file");
     assert!(file == others, "threads do not matter");
     let glb = Glb::read(&file);
     let mut names: Vec<&str> = glb.nodes().iter().filter_map(|node| node["name"].as_str()).collect();
@@ -209,7 +219,7 @@ fn units_are_metres_and_seconds_and_titles_are_escaped() {
     let text = text.replace("\\\"", "'");
     let session = Session::from_text("units.dls", &text, &[]).expect("a model");
     let growth = follow(session, [0.0, 3.0, 1.0], 1).growth;
-    let glb = Glb::read(&growth.glb().expect("a file"));
+    let glb = Glb::read(&growth.file(Format::Glb).expect("a file"));
     assert_eq!(glb.duration(), 12.0);
     let extras = &glb.json["asset"]["extras"];
     assert_eq!(

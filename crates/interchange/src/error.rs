@@ -13,7 +13,7 @@ pub enum Error {
     #[error(transparent)]
     Draw(#[from] DrawError),
     /// Plants of other models are scenes of their own.
-    #[error("the scene is made of plants of other models, and a GLB file holds one model")]
+    #[error("the scene is made of plants of other models, and one file holds one model")]
     Plants,
     /// More modules draw than a file should have nodes.
     #[error("more than {limit} modules draw something by t = {time}")]
@@ -39,7 +39,7 @@ pub enum Error {
     },
     /// Times of the file are 32 bit floats, which this long an animation has too few of.
     #[error(
-        "the animation would last {seconds} s, and instants later than {limit} s are further apart than a millisecond in a GLB file"
+        "the animation would last {seconds} s, and instants later than {limit} s are further apart than a millisecond in the file"
     )]
     TooLong {
         /// Its length in seconds.

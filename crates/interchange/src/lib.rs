@@ -1,13 +1,13 @@
-//! Growing plants as files that other programs play: animated glTF 2.0 in one binary file (GLB).
+//! Growing plants as files that other programs play: animated glTF 2.0 in one binary file (GLB), and USD in text (USDA).
 //!
 //! ```text
-//! Simulation ──Follower──▶ Sample ──▶ Tracks ──▶ Lives ──▶ glb
+//! Simulation ──Follower──▶ Sample ──▶ Tracks ──▶ Lives ──▶ glb, usd
 //! ```
 //!
 //! - [`grow`] follows a run ([`Growth`]): each module that draws something has a frame, which moves, and a shape in that frame, which is mostly a
 //!   function of its age. Modules with the same shapes at the same ages share one life.
-//! - [`Growth::glb`] writes the file: a mesh for each life, with morph targets at ages chosen for the accuracy; a node for each module, with tracks
-//!   for translation and rotation, and for the scale, which is 0 before birth and after death.
+//! - [`Growth::file`] writes the file: a mesh for each life, with morph targets, or samples of its points, at ages chosen for the accuracy; a node for each
+//!   module, with tracks for translation and rotation, and for the scale, which is 0 before birth and after death.
 //!
 //! The accuracy bounds the distance of every point of the file from that of the model, at frames and between them. Its parts: triangles in place of curved
 //! surfaces 0.36 (an estimate); of frames, what happens between samples 0.18, tracks 0.13; of shapes, differences of modules that share a life, samples included, 0.25, what is between
@@ -15,14 +15,14 @@
 //! Stems end in half balls, also where they meet, in place of the joints of OBJ meshes.
 //!
 //! ```
-//! use dlsys_interchange::{Options, grow};
+//! use dlsys_interchange::{Format, Options, grow};
 //! use dlsys_session::Session;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let session = Session::from_text("stem.dls", "initial string: F(1)\nF(x): solve dx/dt = x", &[])?;
 //! let options = Options::new(&session.model, 0.05, 7.4);
 //! let growth = grow(&session, Default::default(), &[0.0, 1.0, 2.0], &options, &mut |_| true)?;
-//! let file = growth.glb()?;
+//! let file = growth.file(Format::Glb)?;
 //! assert!(file.starts_with(b"glTF") && growth.nodes() == 1);
 //! # Ok(())
 //! # }
@@ -36,11 +36,13 @@ mod follow;
 mod glb;
 mod life;
 mod mesh;
+mod motion;
 mod part;
 mod sample;
 mod stem;
 mod thin;
 mod track;
+mod usd;
 
 use std::collections::HashMap;
 
@@ -53,6 +55,33 @@ use follow::{Closeness, Follower};
 use life::{Lives, Tolerance};
 use sample::Sampler;
 use track::Tracks;
+
+/// Formats of files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// glTF 2.0 in one binary file.
+    Glb,
+    /// USD in text.
+    Usda,
+}
+
+impl Format {
+    /// The extension of its files, which is also its name.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Format::Glb => "glb",
+            Format::Usda => "usda",
+        }
+    }
+
+    /// The first bytes of its files.
+    pub fn mark(self) -> &'static [u8] {
+        match self {
+            Format::Glb => b"glTF",
+            Format::Usda => b"#usda",
+        }
+    }
+}
 
 /// Bounds of the work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -210,11 +239,31 @@ impl Growth {
         self.lives.lives.len()
     }
 
-    /// The file.
+    /// The file in a format.
     ///
     /// # Errors
     /// If it is larger than a GLB file can be.
-    pub fn glb(&self) -> Result<Vec<u8>, Error> {
-        glb::file(self)
+    pub fn file(&self, format: Format) -> Result<Vec<u8>, Error> {
+        match format {
+            Format::Glb => glb::file(self),
+            Format::Usda => Ok(usd::file(self)),
+        }
     }
+
+    /// The floor that the model declares: the corners of a large square, in metres, and its triangles.
+    pub(crate) fn floor(&self) -> Option<(Vec<[f32; 3]>, Vec<u32>)> {
+        let [height, x, z, half] = self.options.floor?.map(|value| (value * self.options.metres) as f32);
+        let corners = [(-1.0, 1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
+        let corners = corners.map(|(a, b)| [x + a * half, height, z + b * half]);
+        Some((corners.to_vec(), vec![0, 1, 2, 0, 2, 3]))
+    }
+}
+
+/// Of an sRGB colour, the linear channels that files take.
+pub(crate) fn linear(color: Color) -> [f32; 4] {
+    let [r, g, b] = color.channels().map(|c| {
+        let linear = if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) };
+        linear as f32
+    });
+    [r, g, b, 1.0]
 }

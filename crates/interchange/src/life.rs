@@ -23,6 +23,8 @@ pub(crate) struct Life {
     /// Ages at which the weights are given, ascending.
     pub(crate) ages: Vec<f64>,
     pub(crate) shape: Shape,
+    /// The phase that it was made of.
+    pub(crate) model: usize,
 }
 
 /// How a shape is made of others.
@@ -56,7 +58,7 @@ pub(crate) struct Tolerance {
 
 impl Phase {
     /// The age of the module at a sample.
-    fn age(&self, i: usize) -> f64 {
+    pub(crate) fn age(&self, i: usize) -> f64 {
         self.times[i] - self.birth
     }
 
@@ -125,11 +127,11 @@ pub(crate) fn lives(phases: &[Phase], tolerance: Tolerance, slack: f64) -> Lives
             models.len() - 1
         });
     }
-    let lives = models.into_iter().map(|(i, ages)| life(&phases[i], &ages, tolerance.mix)).collect();
+    let lives = models.into_iter().map(|(i, ages)| life(i, &phases[i], &ages, tolerance.mix)).collect();
     Lives { lives, of_phase }
 }
 
-fn life(phase: &Phase, ages: &[f64], tolerance: f64) -> Life {
+fn life(model: usize, phase: &Phase, ages: &[f64], tolerance: f64) -> Life {
     let (ages, shape) = match &phase.form[..] {
         [Part::Stem(contour)] => stem(phase, ages, *contour, tolerance),
         _ => still(phase, ages, tolerance)
@@ -137,7 +139,7 @@ fn life(phase: &Phase, ages: &[f64], tolerance: f64) -> Life {
             .unwrap_or_else(|| mixed(phase, ages, tolerance)),
     };
     let (form, paint, kind) = (phase.form.clone(), phase.paint().clone(), phase.kind.clone());
-    Life { form, paint, kind, ages, shape }
+    Life { form, paint, kind, ages, shape, model }
 }
 
 /// One shape, if all are near to one.

@@ -264,8 +264,11 @@ pub fn replace(directory: &Path, name: &str, bytes: &[u8]) -> Result<(), Error> 
     Staged(file).persist(&target)
 }
 
-/// A new file with a temporary name.
-fn aside(directory: &Path) -> Result<tempfile::NamedTempFile, Error> {
+/// A new file with a temporary name, to be given its own when it is whole.
+///
+/// # Errors
+/// If it cannot be made.
+pub fn aside(directory: &Path) -> Result<tempfile::NamedTempFile, Error> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(TEMPORARY);
     // As any other file: what the user's mask leaves of this.

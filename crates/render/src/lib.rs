@@ -88,12 +88,13 @@ pub use camera::Camera;
 pub use error::Error;
 pub use fit::{CAMERA_SHAPE, Fit, Picture, Survey};
 pub use formats::{Content, Description, Drawing, Exporter, Format};
-pub use frames::{FrameDirectory, MANIFEST, Staged, Staging, replace};
+pub use frames::{FrameDirectory, MANIFEST, Staged, Staging, aside, replace};
 pub use layout::{Layout, Sheet, Spacing};
 pub use lengths::{CrossSection, Length, cross_section, lengths};
 pub use light::Light;
 pub use manifest::{FrameRecord, Manifest};
 pub use name::plain as plain_name;
+pub use number::push as push_number;
 pub use page::{Page, Size};
 pub use sheet::{Assembly, Part, SheetWriter};
 pub use triangulate::{normal, triangulate};
@@ -169,6 +170,13 @@ impl FrameWriter {
             Content::Vectors | Content::Mesh => self.fit.drawn(flattened.tessellated(self.fit.accuracy)),
         };
         self.format.exporter().write(Drawing { scene: &scene, writer: self, title }, out)
+    }
+
+    /// The pixels of the PNG file of a frame, row by row from the top: red, green and blue, and the opacity if the page has no background.
+    pub fn pixels(&self, scene: &Scene) -> Vec<u8> {
+        let scene = &*self.fit.drawn(Cow::Borrowed(scene));
+        let (fit, page) = self.fit.for_frame(scene, &self.page);
+        formats::png::drawn(scene, &fit, &page, self.threads)
     }
 
     /// The file that all frames refer to, if there is one: its name and its bytes.

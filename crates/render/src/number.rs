@@ -12,7 +12,7 @@ pub(super) fn rounded(x: f64, decimals: usize) -> f64 {
 }
 
 /// Appends a number, rounded to so many decimals, without trailing zeros and without a negative zero.
-pub(super) fn push(out: &mut String, x: f64, decimals: usize) {
+pub fn push(out: &mut String, x: f64, decimals: usize) {
     if let Some(quick) = text::quick(x, decimals) {
         out.push_str(quick.as_str());
         return;

@@ -30,18 +30,37 @@ pub fn survey(args: &RenderArgs) -> Result<Survey, Failure> {
     Ok(if has_view { survey.without_cameras() } else { survey })
 }
 
+/// Flags that are for pictures, and whether they are given.
+pub fn of_pictures(args: &RenderArgs) -> [(&'static str, bool); 9] {
+    [
+        ("--perspective", args.perspective.is_some()),
+        ("--camera", args.camera.is_some()),
+        ("--zoom", args.zoom.is_some()),
+        ("--light", args.light.is_some()),
+        ("--sky", args.sky.is_some()),
+        ("--width", args.width.is_some()),
+        ("--size", args.size.is_some()),
+        ("--background", args.background.is_some()),
+        ("--line-width", args.line_width.is_some()),
+    ]
+}
+
 /// Refuses flags that have no meaning for the format or the layout.
 pub fn agree(args: &RenderArgs, format: Format) -> Result<(), Failure> {
     if args.speed.is_some() {
-        return Err(usage("--speed is for animated files; leave it out, or choose --format glb"));
+        return Err(usage(
+            "--speed is for animated files; leave it out, or choose --format glb, usda, webp, apng, gif or y4m",
+        ));
     }
     let extension = args.out.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let is_file = |name: &str| extension == name;
-    let known = Format::all().map(Format::extension).chain(["gif", "mp4", "webm", "glb"]);
+    let known = Format::all()
+        .map(Format::extension)
+        .chain(["gif", "webp", "apng", "y4m", "mp4", "webm", "glb", "usda"]);
     if !args.out.is_dir() && known.into_iter().any(is_file) {
         let name = args.out.with_extension("");
         return Err(usage(format!(
-            "-o names a folder, and {} looks like a file: every frame is a file in it; `-o {}` and --format svg, png or obj, or `--at T` for one frame",
+            "-o names a folder, and {} looks like a file: every frame is a file in it; `-o {}` and --format svg, png or obj, or `--at T` for one frame; a whole film in one file is --format webp, apng, gif or y4m",
             args.out.display(),
             name.display()
         )));
@@ -54,23 +73,18 @@ pub fn agree(args: &RenderArgs, format: Format) -> Result<(), Failure> {
                 args.layout.name()
             )));
         }
-        let given = [
-            ("--perspective", args.perspective.is_some()),
-            ("--camera", args.camera.is_some()),
-            ("--zoom", args.zoom.is_some()),
-            ("--light", args.light.is_some()),
-            ("--sky", args.sky.is_some()),
-            ("--width", args.width.is_some()),
-            ("--size", args.size.is_some()),
-            ("--background", args.background.is_some()),
-            ("--line-width", args.line_width.is_some()),
-        ];
+        let given = of_pictures(args);
         if let Some((flag, _)) = given.iter().find(|(_, given)| *given) {
             return Err(usage(format!(
                 "{flag} is for pictures, and an OBJ file is a mesh in space; leave it out, or choose --format svg or png"
             )));
         }
     }
+    of_layouts(args)
+}
+
+/// Refuses flags of another layout.
+pub fn of_layouts(args: &RenderArgs) -> Result<(), Failure> {
     let of_layout = [
         ("--columns", args.columns.is_some(), Layout::Grid),
         ("--no-captions", args.no_captions, Layout::Grid),

@@ -5,7 +5,8 @@
 //! cheaper than keeping every frame in memory. Frames are drawn and written on other threads while the simulation
 //! continues; files do not depend on the number of threads.
 
-mod flags;
+mod film;
+pub(super) mod flags;
 mod watch;
 
 use std::collections::HashMap;
@@ -22,7 +23,7 @@ use super::events::EventLog;
 use super::export;
 use super::frame_source::{Frame, Pass, play};
 use super::progress::Progress;
-use super::values::Seeds;
+use super::values::{RenderFormat, Seeds};
 use crate::render::{
     self, Content, Fit, Format, FrameDirectory, FrameRecord, FrameWriter, Layout, Manifest, Page, Picture,
     Sheet, SheetWriter, Survey,
@@ -38,7 +39,11 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
 
 /// Renders, unless `stale` becomes true before anything is written.
 fn once(args: &RenderArgs, stale: &(dyn Fn() -> bool + Sync)) -> Result<(), Failure> {
-    let Some(format) = args.format.of_frames() else { return export::render(args, stale) };
+    let format = match args.format {
+        RenderFormat::Frames(format) => format,
+        RenderFormat::Growth(format) => return export::render(args, format, stale),
+        RenderFormat::Film(format) => return film::render(args, format, stale),
+    };
     flags::survey(args)?;
     flags::agree(args, format)?;
     let mut run = ModelRun::start(&args.shared)?;
@@ -102,7 +107,11 @@ pub fn render_run(
     stale: &(dyn Fn() -> bool + Sync),
 ) -> Result<(), Failure> {
     let begun = Instant::now();
-    let Some(format) = args.format.of_frames() else { return export::render_run(args, run, stale) };
+    let format = match args.format {
+        RenderFormat::Frames(format) => format,
+        RenderFormat::Growth(format) => return export::render_run(args, format, run, stale),
+        RenderFormat::Film(format) => return film::render_run(args, format, run, stale),
+    };
     let survey = flags::survey(args)?;
     flags::agree(args, format)?;
     let mut clock = run.clock;

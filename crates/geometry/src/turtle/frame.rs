@@ -27,6 +27,9 @@ pub(super) struct Frame {
     axis: Axis,
     /// Degrees about `axis`, in (-360, 360).
     pending: f64,
+    /// The two vectors that the pending turn moves, once they have been computed: branches often begin with
+    /// the same turn, and a turn is by far the most expensive part of a step.
+    turned: Option<[Twofold; 2]>,
 }
 
 impl Frame {
@@ -37,7 +40,7 @@ impl Frame {
 
     fn looking(heading: Vector, left: Vector, up: Vector) -> Frame {
         let [heading, left, up] = [heading, left, up].map(Twofold::new);
-        Frame { heading, left, up, axis: Axis::Up, pending: 0.0 }
+        Frame { heading, left, up, axis: Axis::Up, pending: 0.0, turned: None }
     }
 
     /// Turns about an axis: left about up, down about left, to the left about heading (the left side goes
@@ -52,13 +55,28 @@ impl Frame {
             self.axis = axis;
         }
         self.pending = (self.pending + degrees) % 360.0;
+        self.turned = None;
     }
 
     /// Heading, left and up as they are now.
-    pub(super) fn vectors(&self) -> [Vector; 3] {
-        let mut now = *self;
-        now.apply();
-        [now.heading, now.left, now.up].map(|v| v.value())
+    pub(super) fn vectors(&mut self) -> [Vector; 3] {
+        let Frame { heading, left, up, .. } = *self;
+        let now = match (self.pending == 0.0, self.axis) {
+            (true, _) => [heading, left, up],
+            (false, Axis::Up) => {
+                let [heading, left] = self.turned();
+                [heading, left, up]
+            }
+            (false, Axis::Left) => {
+                let [up, heading] = self.turned();
+                [heading, left, up]
+            }
+            (false, Axis::Heading) => {
+                let [left, up] = self.turned();
+                [heading, left, up]
+            }
+        };
+        now.map(|v| v.value())
     }
 
     /// Rolls until left is horizontal and up is as far up as it can be (`$`; Prusinkiewicz and Lindenmayer
@@ -82,18 +100,33 @@ impl Frame {
         *self = Frame::looking(turned, left, turned.cross(&left));
     }
 
+    /// The vectors that the pending turn moves, after it: the first towards the second.
+    fn turned(&mut self) -> [Twofold; 2] {
+        let (pending, axis) = (self.pending, self.axis);
+        let Frame { heading, left, up, .. } = *self;
+        *self.turned.get_or_insert_with(|| {
+            let (sin, cos) = sin_cos_degrees(pending);
+            match axis {
+                Axis::Up => Twofold::turned(&heading, &left, (sin, cos)),
+                Axis::Left => Twofold::turned(&up, &heading, (sin, cos)),
+                Axis::Heading => Twofold::turned(&left, &up, (-sin, cos)),
+            }
+        })
+    }
+
     /// Applies the pending turn.
     fn apply(&mut self) {
         if self.pending == 0.0 {
             return;
         }
-        let angle = sin_cos_degrees(self.pending);
+        let turned = self.turned();
         match self.axis {
-            Axis::Up => Twofold::turn(&mut self.heading, &mut self.left, angle),
-            Axis::Left => Twofold::turn(&mut self.up, &mut self.heading, angle),
-            Axis::Heading => Twofold::turn(&mut self.left, &mut self.up, (-angle.0, angle.1)),
+            Axis::Up => [self.heading, self.left] = turned,
+            Axis::Left => [self.up, self.heading] = turned,
+            Axis::Heading => [self.left, self.up] = turned,
         }
         self.pending = 0.0;
+        self.turned = None;
     }
 }
 
@@ -101,7 +134,7 @@ impl Frame {
 mod tests {
     use super::*;
 
-    fn assert_orthonormal(frame: &Frame) {
+    fn assert_orthonormal(frame: &mut Frame) {
         let [h, l, u] = frame.vectors();
         for (a, b, expected) in [(h, h, 1.0), (l, l, 1.0), (u, u, 1.0), (h, l, 0.0), (l, u, 0.0), (u, h, 0.0)]
         {
@@ -141,10 +174,10 @@ mod tests {
             for i in 0..1_000_000 {
                 frame.turn(axes[i % 3], angle);
                 if i % 1000 == 0 {
-                    assert_orthonormal(&frame);
+                    assert_orthonormal(&mut frame);
                 }
             }
-            assert_orthonormal(&frame);
+            assert_orthonormal(&mut frame);
         }
     }
 
@@ -192,6 +225,6 @@ mod tests {
         frame.level();
         let [_, left, up] = frame.vectors();
         assert!(left.y.abs() < 1e-15 && up.y > 0.0);
-        assert_orthonormal(&frame);
+        assert_orthonormal(&mut frame);
     }
 }

@@ -66,12 +66,10 @@ impl Twofold {
         self.combined(1.0, self, -0.5 * self.excess())
     }
 
-    /// Turns two vectors in their plane, the first towards the second.
-    pub(super) fn turn(a: &mut Twofold, b: &mut Twofold, (sin, cos): (f64, f64)) {
+    /// Two vectors turned in their plane, the first towards the second.
+    pub(super) fn turned(a: &Twofold, b: &Twofold, (sin, cos): (f64, f64)) -> [Twofold; 2] {
         // Sine and cosine are rounded, so the pair is stretched a little, both by the same factor; angles
         // stay right.
-        let turned = a.combined(cos, b, sin).unit();
-        *b = b.combined(cos, a, -sin).unit();
-        *a = turned;
+        [a.combined(cos, b, sin).unit(), b.combined(cos, a, -sin).unit()]
     }
 }

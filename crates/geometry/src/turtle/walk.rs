@@ -177,7 +177,7 @@ impl<'a> Walk<'a> {
         self.recorder.map_or_else(Vec::new, |recorder| recorder.finish_parts(self.scene))
     }
 
-    pub(super) fn pose(&self) -> Pose {
+    pub(super) fn pose(&mut self) -> Pose {
         Pose { position: self.seen(self.state.position), axes: self.seen_axes() }
     }
 

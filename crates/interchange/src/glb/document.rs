@@ -134,7 +134,6 @@ pub(super) struct Interpolation {
 #[serde(rename_all = "camelCase")]
 pub(super) struct Accessor {
     pub(super) buffer_view: usize,
-    #[serde(skip_serializing_if = "is_zero")]
     pub(super) byte_offset: usize,
     pub(super) component_type: u32,
     pub(super) count: usize,
@@ -150,7 +149,6 @@ pub(super) struct Accessor {
 #[serde(rename_all = "camelCase")]
 pub(super) struct View {
     pub(super) buffer: usize,
-    #[serde(skip_serializing_if = "is_zero")]
     pub(super) byte_offset: usize,
     pub(super) byte_length: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -163,8 +161,4 @@ pub(super) struct View {
 #[serde(rename_all = "camelCase")]
 pub(super) struct Bytes {
     pub(super) byte_length: usize,
-}
-
-fn is_zero(offset: &usize) -> bool {
-    *offset == 0
 }

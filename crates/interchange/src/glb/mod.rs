@@ -10,17 +10,17 @@ mod normals;
 
 use std::collections::{BTreeMap, HashMap};
 
-use dlsys_geometry::scene::{Color, MaterialId};
+use dlsys_geometry::scene::MaterialId;
 use dlsys_render::{GENERATOR, plain_name};
 use serde_json::json;
 
 use crate::life::{Life, Shape};
 use crate::mesh::{Cutter, Layout, Places};
+use crate::motion::{Clock, Moved};
 use crate::stem::Corner;
-use crate::{Error, Growth};
+use crate::{Error, Growth, linear};
 use buffer::{Buffer, Kind};
 use document::{Animation, Asset, Document, Material, Mesh, Node, Pbr, Primitive, Scene};
-use motion::Clock;
 
 /// Normals of shapes that differ by less than this are those of the mesh.
 const SAME_NORMAL: f32 = 0.01;
@@ -105,8 +105,10 @@ impl Writer<'_> {
             }
             node.extras = Some(extras);
             let tolerance = 0.13 * growth.options.tolerance();
-            let moved = motion::Moved { phase, life, clock: &self.clock, tolerance };
-            if moved.write(target, &mut node, &mut animation, &mut self.buffer) {
+            let moved = Moved { phase, life, clock: &self.clock, tolerance };
+            let buffer = &mut self.buffer;
+            let tracks = motion::Tracks { target, node: &mut node, animation: &mut animation, buffer };
+            if tracks.write(&moved) {
                 self.document.nodes[0].children.push(target);
                 self.document.nodes.push(node);
             }
@@ -226,16 +228,12 @@ impl Writer<'_> {
 
     /// The floor that the model declares, as a large square.
     fn floor(&mut self) {
-        let metres = self.growth.options.metres;
-        let Some(floor) = self.growth.options.floor else { return };
-        let [height, x, z, half] = floor.map(|value| (value * metres) as f32);
-        let corners = [(-1.0, 1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)]
-            .map(|(a, b)| [x + a * half, height, z + b * half]);
+        let Some((corners, triangles)) = self.growth.floor() else { return };
         let attributes = BTreeMap::from([
             ("POSITION", self.buffer.vectors(&corners, Kind::Place)),
             ("NORMAL", self.buffer.vectors(&[[0.0, 1.0, 0.0]; 4], Kind::Normal)),
         ]);
-        let indices = self.buffer.indices(&[0, 1, 2, 0, 2, 3]);
+        let indices = self.buffer.indices(&triangles);
         let material = self.material(None);
         let primitives = vec![Primitive { attributes, indices, material, targets: Vec::new() }];
         let mesh = Some(self.document.meshes.len());
@@ -282,13 +280,4 @@ fn name(kind: &str, lineage: &str, number: u32) -> String {
         0 => format!("{kind}.{lineage}"),
         _ => format!("{kind}.{lineage}.{}", number + 1),
     }
-}
-
-/// Of an sRGB colour, the linear channels that glTF takes.
-fn linear(color: Color) -> [f32; 4] {
-    let [r, g, b] = color.channels().map(|c| {
-        let linear = if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) };
-        linear as f32
-    });
-    [r, g, b, 1.0]
 }

@@ -38,9 +38,14 @@ impl Exporter for Png {
         out: &mut (dyn Write + Send),
     ) -> io::Result<()> {
         let (fit, page) = writer.fit.for_frame(scene, &writer.page);
-        let image = picture(scene, &fit, page.pixels, page.placement(), Smoothness::Fine, writer.threads);
-        out.write_all(&encode(&page, title, Sky::of(scene, &fit, &page).as_ref(), &image))
+        out.write_all(&file(&page, title, &drawn(scene, &fit, &page, writer.threads)))
     }
+}
+
+/// The bytes of a frame: three for each pixel, or four if there is no background.
+pub(crate) fn drawn(scene: &Scene, fit: &Fit, page: &Page, threads: usize) -> Vec<u8> {
+    let image = picture(scene, fit, page.pixels, page.placement(), Smoothness::Fine, threads);
+    composed(page, Sky::of(scene, fit, page).as_ref(), &image)
 }
 
 /// Pixels of a scene, transparent where nothing is. A point that the camera sees at x, y is at `a x + b` and `c - a y`
@@ -238,8 +243,8 @@ impl Canvas<'_> {
     }
 }
 
-/// The file of one image that fills a page; a sky stands behind it where there is a background.
-fn encode(page: &Page, title: &str, sky: Option<&Sky>, image: &Image) -> Vec<u8> {
+/// The bytes of one image that fills a page; a sky stands behind it where there is a background.
+fn composed(page: &Page, sky: Option<&Sky>, image: &Image) -> Vec<u8> {
     let mut data = Vec::with_capacity(image.pixels.len() * if page.background.is_some() { 3 } else { 4 });
     for (line, row) in image.pixels.chunks_exact(image.width.max(1)).enumerate() {
         let part = (line as f64 + 0.5) / image.height.max(1) as f64;
@@ -263,7 +268,7 @@ fn encode(page: &Page, title: &str, sky: Option<&Sky>, image: &Image) -> Vec<u8>
             }
         }
     }
-    file(page, title, &data)
+    data
 }
 
 /// The file of a page with this data, of three bytes a pixel, or four if there is no background.

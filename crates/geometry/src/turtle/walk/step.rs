@@ -200,7 +200,7 @@ impl Walk<'_> {
     }
 
     /// Directions of the shape at rest as they are seen.
-    pub(super) fn seen_axes(&self) -> [Vector; 3] {
+    pub(super) fn seen_axes(&mut self) -> [Vector; 3] {
         let axes = self.state.frame.vectors();
         self.state.bent.map_or(axes, |bent| axes.map(|axis| bent.vector(axis)))
     }

@@ -1,0 +1,391 @@
+//! Animated USD in text (`.usda`): lives once, as abstract prims with samples of their points by age; a prim for each module, which references its life with
+//! the module's birth as the offset of time.
+//!
+//! Points between samples are interpolated linearly and turns spherically, as USD says. A prim that is not seen is invisible, and its scale is 0, too, because
+//! some importers take no visibility that changes. References are not instanceable: Blender 5.0 draws wrong shapes for instances with offsets.
+
+mod shape;
+mod text;
+
+use std::collections::HashMap;
+
+use dlsys_geometry::scene::{Color, MaterialId};
+use dlsys_render::{GENERATOR, plain_name, push_number};
+
+use crate::life::Life;
+use crate::mesh::Cutter;
+use crate::motion::{Clock, Moved};
+use crate::track::Phase;
+use crate::{Growth, linear};
+use shape::{Form, Primitive, Samples, Tolerance};
+use text::{BRACES, Identifiers, PARENTHESES, Text, entry, list, quoted, tuple, tuples};
+
+/// Time codes in a second: frames of film, and of Blender unless it is told otherwise.
+const RATE: f64 = 24.0;
+/// Decimals of normals, and of turns and colours.
+const OF_NORMALS: usize = 2;
+const OF_TURNS: usize = 6;
+const OF_COLORS: usize = 4;
+/// The last decimal of points, in parts of the accuracy.
+const LAST_DECIMAL: f64 = 0.05;
+
+/// Parts of the accuracy. With those of samples (0.18) and of modules that share a life (0.25) they are less than 1 by what rounding needs.
+const OF_TRIANGLES: f64 = 0.33;
+const OF_TRACKS: f64 = 0.04;
+const OF_SIZE: f64 = 0.02;
+const OF_SHAPE: f64 = 0.15;
+
+/// A layer that is being written.
+struct Writer<'a> {
+    growth: &'a Growth,
+    cutter: Cutter<'a>,
+    clock: Clock,
+    /// Decimals of points.
+    decimals: usize,
+    text: Text,
+    /// Names of materials; the floor has none in the palette.
+    materials: HashMap<Option<MaterialId>, String>,
+}
+
+/// The text of a run.
+pub(crate) fn file(growth: &Growth) -> Vec<u8> {
+    let tolerance = growth.options.tolerance();
+    let cutter = Cutter {
+        catalogue: &growth.tracks.catalogue,
+        palette: &growth.palette,
+        contours: &growth.contours,
+        accuracy: OF_TRIANGLES * tolerance,
+    };
+    let decimals = (-(LAST_DECIMAL * tolerance).log10()).ceil().clamp(0.0, 300.0) as usize;
+    let mut writer = Writer {
+        growth,
+        cutter,
+        clock: Clock::new(growth.first, growth.last, growth.options.seconds),
+        decimals,
+        text: Text::default(),
+        materials: HashMap::new(),
+    };
+    writer.layer();
+    writer.text.finish()
+}
+
+impl Writer<'_> {
+    /// The time code of an instant of the animation in seconds.
+    fn code(seconds: f32) -> f64 {
+        f64::from(seconds) * RATE
+    }
+
+    fn layer(&mut self) {
+        let growth = self.growth;
+        let of_shape = growth.options.tolerance();
+        let tolerance = Tolerance { size: OF_SIZE * of_shape, shape: OF_SHAPE * of_shape };
+        let form =
+            |life: &Life| shape::form(life, &growth.tracks.phases[life.model], &self.cutter, tolerance);
+        let lives: Vec<Form> = growth.lives.lives.iter().map(form).collect();
+        self.text.line("#usda 1.0");
+        let end = Writer::code(self.clock.end());
+        self.text.block("", PARENTHESES, |text| {
+            text.line("defaultPrim = \"Plant\"");
+            text.line(&format!("doc = {}", quoted(&format!("{}, by {GENERATOR}", growth.title))));
+            text.block("customLayerData = ", BRACES, |text| {
+                text.line(&entry("double", "first_time", growth.first));
+                text.line(&entry("double", "last_time", growth.last));
+                text.line(&entry("double", "metres_per_unit", growth.options.metres));
+                text.line(&entry("double", "seconds_per_unit", growth.options.seconds));
+                text.line(&entry("string", "title", quoted(&growth.title)));
+            });
+            text.line("metersPerUnit = 1");
+            text.line("upAxis = \"Y\"");
+            text.line(&format!("timeCodesPerSecond = {RATE}"));
+            text.line(&format!("framesPerSecond = {RATE}"));
+            if end > 0.0 {
+                text.line("startTimeCode = 0");
+                text.long("endTimeCode = ", |out| push_number(out, end, 5));
+            }
+        });
+        self.text.line("");
+        let mut text = std::mem::take(&mut self.text);
+        text.prim(
+            "def Xform \"Plant\"",
+            |text| {
+                text.line(&format!("displayName = {}", quoted(&growth.title)));
+                text.line("kind = \"component\"");
+            },
+            |text| {
+                self.palette(text, &lives);
+                text.block("class \"Lives\" ", BRACES, |text| {
+                    for (i, form) in lives.iter().enumerate() {
+                        self.life(text, i, form);
+                    }
+                });
+                self.modules(text);
+                self.floor(text);
+            },
+        );
+        self.text = text;
+    }
+
+    /// The materials that are used, in the order of the palette.
+    fn palette(&mut self, text: &mut Text, lives: &[Form]) {
+        let primitives = lives.iter().flat_map(|form| &form.primitives);
+        let mut used: Vec<MaterialId> = primitives.map(|primitive| primitive.material).collect();
+        used.sort_by_key(|id| id.index());
+        used.dedup();
+        let mut all: Vec<(Option<MaterialId>, &str, Color)> = Vec::new();
+        for id in used {
+            if let Some(material) = self.growth.palette.materials().get(id.index()) {
+                all.push((Some(id), &material.name, material.color));
+            }
+        }
+        if self.growth.options.floor.is_some() {
+            all.push((None, "ground", self.growth.floor_color));
+        }
+        let mut names = Identifiers::default();
+        text.block("def Scope \"Materials\" ", BRACES, |text| {
+            for (id, name, color) in all {
+                let name = names.choose(name);
+                let path = format!("/Plant/Materials/{name}");
+                text.block(&format!("def Material \"{name}\" "), BRACES, |text| {
+                    text.line(&format!("token outputs:surface.connect = <{path}/Shader.outputs:surface>"));
+                    text.block("def Shader \"Shader\" ", BRACES, |text| {
+                        text.line("uniform token info:id = \"UsdPreviewSurface\"");
+                        text.long("color3f inputs:diffuseColor = ", |out| {
+                            tuple(out, rgb(color), OF_COLORS);
+                        });
+                        text.line("float inputs:metallic = 0");
+                        text.line("float inputs:roughness = 0.8");
+                        text.line("token outputs:surface");
+                    });
+                });
+                self.materials.insert(id, name);
+            }
+        });
+    }
+
+    /// A life: its samples are at ages, in time codes.
+    fn life(&self, text: &mut Text, number: usize, form: &Form) {
+        text.block(&format!("def Xform \"Life_{number}\" "), BRACES, |text| {
+            let mut names = Identifiers::default();
+            for primitive in &form.primitives {
+                let material = self.materials.get(&Some(primitive.material));
+                let name = names.choose(material.map_or("Mesh", String::as_str));
+                self.mesh(text, &name, Some(primitive.material), (primitive, form.size.as_ref()));
+            }
+        });
+    }
+
+    fn mesh(
+        &self,
+        text: &mut Text,
+        name: &str,
+        id: Option<MaterialId>,
+        (primitive, size): (&Primitive, Option<&Samples<f64>>),
+    ) {
+        let color = match id {
+            Some(id) => self.growth.palette.materials().get(id.index()).map(|material| material.color),
+            None => Some(self.growth.floor_color),
+        };
+        let Primitive { triangles, points, normals, .. } = primitive;
+        text.prim(
+            &format!("def Mesh \"{name}\""),
+            |text| text.line("prepend apiSchemas = [\"MaterialBindingAPI\"]"),
+            |text| {
+                text.line("uniform bool doubleSided = 1");
+                let bounds = points.values.iter().map(|points| bounds(points)).collect();
+                let extent = Samples { ages: points.ages.clone(), values: bounds };
+                self.attribute(text, "float3[] extent", &extent, |out, corners| {
+                    tuples(out, corners, self.decimals);
+                });
+                text.long("int[] faceVertexCounts = ", |out| {
+                    list(out, &vec![3_u32; triangles.len() / 3], |out, n| push_number(out, n.into(), 0));
+                });
+                text.long("int[] faceVertexIndices = ", |out| {
+                    list(out, triangles, |out, n| push_number(out, n.into(), 0));
+                });
+                if let Some(material) = self.materials.get(&id) {
+                    text.line(&format!("rel material:binding = </Plant/Materials/{material}>"));
+                }
+                text.block("normal3f[] normals ", PARENTHESES, |text| {
+                    text.line("interpolation = \"vertex\"")
+                });
+                self.attribute(text, "normal3f[] normals", normals, |out, all| tuples(out, all, OF_NORMALS));
+                self.attribute(text, "point3f[] points", points, |out, all| tuples(out, all, self.decimals));
+                if let Some(color) = color {
+                    text.long("color3f[] primvars:displayColor = ", |out| {
+                        list(out, &[rgb(color)], |out, rgb| tuple(out, rgb, OF_COLORS));
+                    });
+                }
+                text.line("uniform token subdivisionScheme = \"none\"");
+                if let Some(size) = size {
+                    let decimals = self.decimals + 1;
+                    self.attribute(text, "float3 xformOp:scale", size, |out, size| {
+                        tuple(out, [*size; 3], decimals);
+                    });
+                    text.line("uniform token[] xformOpOrder = [\"xformOp:scale\"]");
+                }
+            },
+        );
+    }
+
+    /// An attribute with samples at ages, or with one value.
+    fn attribute<T>(
+        &self,
+        text: &mut Text,
+        name: &str,
+        samples: &Samples<T>,
+        write: impl Fn(&mut String, &T),
+    ) {
+        let codes = self.growth.options.seconds * RATE;
+        match (&samples.values[..], samples.ages.is_empty()) {
+            ([], _) => {}
+            ([.., last], true) => text.long(&format!("{name} = "), |out| write(out, last)),
+            (all, false) => text.samples(name, samples.ages.iter().map(|age| age * codes).zip(all), write),
+        }
+    }
+
+    /// A prim for each module.
+    fn modules(&self, text: &mut Text) {
+        let growth = self.growth;
+        let mut names = Identifiers::default();
+        for taken in ["Materials", "Lives", "ground"] {
+            names.choose(taken);
+        }
+        for (i, &number) in growth.lives.of_phase.iter().enumerate() {
+            let phase = &growth.tracks.phases[i];
+            let life = &growth.lives.lives[number];
+            let moved =
+                Moved { phase, life, clock: &self.clock, tolerance: OF_TRACKS * growth.options.tolerance() };
+            let Some(lifetime) = moved.lifetime() else { continue };
+            let usual = format!("{}_{}", plain_name(&phase.kind), phase.lineage.name());
+            let name = names.choose(&match phase.number {
+                0 => usual,
+                again => format!("{usual}_{}", again + 1),
+            });
+            text.prim(
+                &format!("def Xform \"{name}\""),
+                |text| {
+                    self.custom_data(text, phase);
+                    let offset = (phase.birth - self.clock.first) * growth.options.seconds * RATE;
+                    text.long(&format!("prepend references = </Plant/Lives/Life_{number}>"), |out| {
+                        if offset != 0.0 {
+                            out.push_str(" (offset = ");
+                            push_number(out, offset, 6);
+                            out.push(')');
+                        }
+                    });
+                },
+                |text| {
+                    self.motion(text, &moved);
+                    let sight = moved.sight(lifetime).into_iter();
+                    let sight: Vec<(f64, bool)> =
+                        sight.map(|(time, seen)| (Writer::code(time), seen)).collect();
+                    let has_scale = !sight.is_empty();
+                    if has_scale {
+                        let visible = visibility(&sight, lifetime[0].is_some());
+                        text.samples("token visibility", visible, |out, seen| {
+                            out.push_str(if seen { "\"inherited\"" } else { "\"invisible\"" });
+                        });
+                        text.samples("float3 xformOp:scale", sight, |out, seen| {
+                            out.push_str(if seen { "(1,1,1)" } else { "(0,0,0)" });
+                        });
+                    }
+                    text.line(&format!(
+                        "uniform token[] xformOpOrder = [\"xformOp:translate\", \"xformOp:orient\"{}]",
+                        if has_scale { ", \"xformOp:scale\"" } else { "" }
+                    ));
+                },
+            );
+        }
+    }
+
+    fn custom_data(&self, text: &mut Text, phase: &Phase) {
+        text.block("customData = ", BRACES, |text| {
+            text.line(&entry("double", "birth", phase.birth));
+            if let Some(ending) = phase.ending {
+                text.line(&entry("double", "death", ending.time));
+            }
+            text.line(&entry("string", "kind", quoted(&phase.kind)));
+            text.line(&entry("string", "lineage", quoted(&phase.lineage.to_string())));
+            if let Some(rule) = phase.ending.and_then(|ending| self.growth.rules.get(ending.rule)) {
+                text.line(&entry("string", "rule", quoted(rule)));
+            }
+        });
+    }
+
+    fn motion(&self, text: &mut Text, moved: &Moved<'_>) {
+        let path = moved.path();
+        let place =
+            |out: &mut String, i: usize| tuple(out, path.frames[i].origin.coords.into(), self.decimals);
+        // Of the two signs of a turn any: USD interpolates the shorter way.
+        let turn = |out: &mut String, i: usize| {
+            let turn = &path.frames[i].turn;
+            tuple(out, [turn.w, turn.i, turn.j, turn.k], OF_TURNS);
+        };
+        let last = path.frames.len() - 1;
+        let is_still = path.is_still() || self.clock.is_still();
+        let moves = !is_still && path.frames.iter().any(|frame| frame.origin != path.frames[0].origin);
+        let turns = !is_still && path.frames.iter().any(|frame| frame.turn != path.frames[0].turn);
+        let keys = || path.keys.iter().enumerate().map(|(i, key)| (Writer::code(*key), i));
+        match turns {
+            true => text.samples("quatf xformOp:orient", keys(), turn),
+            false => text.long("quatf xformOp:orient = ", |out| turn(out, last)),
+        }
+        match moves {
+            true => text.samples("double3 xformOp:translate", keys(), place),
+            false => text.long("double3 xformOp:translate = ", |out| place(out, last)),
+        }
+    }
+
+    /// The floor that the model declares, as a large square.
+    fn floor(&self, text: &mut Text) {
+        let Some((positions, triangles)) = self.growth.floor() else { return };
+        let normals = Samples::still(vec![[0.0, 1.0, 0.0]; positions.len()]);
+        let (material, points) = (MaterialId::LEAF, Samples::still(positions));
+        let primitive = Primitive { material, triangles, points, normals };
+        self.mesh(text, "ground", None, (&primitive, None));
+    }
+}
+
+/// When it is visible; each value holds from its time on. The scale begins to be more than 0, or has become 0, at these times.
+fn visibility(sight: &[(f64, bool)], is_born: bool) -> Vec<(f64, bool)> {
+    let (Some((first, _)), Some((last, seen))) = (sight.first(), sight.last()) else { return Vec::new() };
+    let mut all = Vec::new();
+    if *first > 0.0 {
+        all.push((0.0, !is_born));
+    }
+    if is_born {
+        all.push((*first, true));
+    }
+    if !seen {
+        all.push((*last, false));
+    }
+    all
+}
+
+/// The channels of a colour as USD takes them.
+fn rgb(color: Color) -> [f64; 3] {
+    let [r, g, b, _] = linear(color).map(f64::from);
+    [r, g, b]
+}
+
+fn bounds(points: &[[f32; 3]]) -> [[f32; 3]; 2] {
+    let extreme = |pick: fn(f32, f32) -> f32| {
+        [0, 1, 2].map(|k| points.iter().map(|p| p[k]).reduce(pick).unwrap_or(0.0))
+    };
+    [extreme(f32::min), extreme(f32::max)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_visible_has_a_size() {
+        assert_eq!(visibility(&[(1.0, false), (2.0, true)], true), [(0.0, false), (1.0, true)]);
+        assert_eq!(visibility(&[(3.0, true), (4.0, false)], false), [(0.0, true), (4.0, false)]);
+        assert_eq!(visibility(&[(4.0, false)], false), [(0.0, true), (4.0, false)]);
+        let both = [(0.0, false), (1.0, true), (2.0, true), (3.0, false)];
+        assert_eq!(visibility(&both, true), [(0.0, true), (3.0, false)]);
+        assert_eq!(visibility(&[], false), []);
+    }
+}

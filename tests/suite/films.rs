@@ -1,0 +1,91 @@
+//! Films in one file, decoded again, against the PNG frames of the same render.
+
+use std::fs;
+use std::io::Cursor;
+
+use crate::cli::{bad, good};
+
+const RENDER: [&str; 7] =
+    ["render", "models/leaf.dls", "--at", "0.5,1.2,1.2000001,3,6", "--size", "90x70", "--format"];
+
+fn png(path: &std::path::Path) -> Vec<u8> {
+    let file = fs::read(path).expect("a file");
+    let mut reader = png::Decoder::new(Cursor::new(file)).read_info().expect("PNG");
+    let mut data = vec![0; reader.output_buffer_size().expect("small")];
+    reader.next_frame(&mut data).expect("a picture");
+    data
+}
+
+#[test]
+fn films_show_the_frames_bit_for_bit() {
+    for background in ["#fbfaf5", "none"] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let at = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
+        let render = |format: &str, out: &str| {
+            good(&[&RENDER[..], &[format, "-o", out, "--background", background]].concat())
+        };
+        render("png", &at("frames"));
+        let frames: Vec<Vec<u8>> =
+            (0..5).map(|i| png(&folder.path().join(format!("frames/frame-{i:04}.png")))).collect();
+        let said = render("webp", &at("a.webp"));
+        assert!(said.contains("5 frames of 90x70 pixels"), "{said}");
+        let file = fs::read(at("a.webp")).expect("a file");
+        let mut decoder = image_webp::WebPDecoder::new(Cursor::new(&file[..])).expect("WebP");
+        assert_eq!(decoder.num_frames(), 5);
+        let mut milliseconds = Vec::new();
+        for frame in &frames {
+            let mut decoded = vec![0; frame.len()];
+            milliseconds.push(decoder.read_frame(&mut decoded).expect("a frame"));
+            assert!(decoded == *frame);
+        }
+        assert_eq!(milliseconds, [700, 1, 1799, 3000, 3000]);
+        good(
+            &[&RENDER[..], &["webp", "-o", &at("b.webp"), "--threads", "1", "--background", background]]
+                .concat(),
+        );
+        assert!(fs::read(at("b.webp")).expect("a file") == file, "threads do not matter");
+        render("apng", &at("a.apng"));
+        assert!(png(&folder.path().join("a.apng")) == frames[0]);
+    }
+}
+
+#[test]
+fn raw_video_goes_to_a_pipe() {
+    let video = std::process::Command::new(env!("CARGO_BIN_EXE_dlsys"))
+        .args(RENDER)
+        .args(["y4m", "-o", "-"])
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .output()
+        .expect("the program");
+    assert!(video.status.success() && video.stdout.starts_with(b"YUV4MPEG2 W90 H70 F"));
+    let head = video.stdout.iter().position(|byte| *byte == b'\n').expect("a line") + 1;
+    assert_eq!(video.stdout.len() - head, 5 * (6 + 3 * 90 * 70));
+}
+
+#[test]
+fn flags_that_make_no_film_are_refused_and_files_of_others_stay() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let thesis = folder.path().join("thesis.gif");
+    fs::write(&thesis, "years of work").expect("written");
+    let thesis = thesis.to_str().expect("UTF-8");
+    let cases: [(&[&str], &str); 6] = [
+        (&["gif", "-o", thesis], "is not a GIF file"),
+        (&["gif", "-o", "a.gif", "--background", "none"], "no transparency"),
+        (&["webp", "-o", "a.gif"], "`-o a.webp`"),
+        (&["webp", "-o", "-"], "`-o -` is for --format y4m"),
+        (&["webp", "-o", "a.webp", "--layout", "grid"], "on one sheet"),
+        (&["png", "-o", "a.gif"], "--format webp"),
+    ];
+    for (arguments, expected) in cases {
+        let (_, message) = bad(&[&RENDER[..], arguments].concat());
+        assert!(message.contains(expected), "{arguments:?}: {message}");
+    }
+    let limited = folder.path().join("b.webp");
+    let (_, message) = bad(&[
+        &RENDER[..],
+        &["webp", "-o", limited.to_str().expect("UTF-8"), "--max-output", "1kB"],
+    ]
+    .concat());
+    assert!(message.contains("larger than"), "{message}");
+    assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 1, "nothing is left over");
+}
