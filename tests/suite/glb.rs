@@ -159,9 +159,9 @@ fn what_is_let_go_flies_as_its_drawing_does() {
                 R: if age = 0.2 produce S\ninterpret P(k): @P(0.1)\ninterpret Q(k): @P(0.1)\n\
                 interpret R: +(40) !(0.01) F(0.1) @L(0.1)\ninterpret S: +(40) @D !(0.01) F(0.1) @L(0.1)";
     let session = Session::from_text("petals.dls", text, &[]).expect("a model");
-    // Before the first impact, at 0.52 s: samples may miss what happens between two of them there.
-    let followed = follow(session, [0.0, 0.5, 0.05], 2);
-    let worst = worst(&followed, &random_times(0.0, 0.5, 40), 0.0);
+    // Flight, impacts from 0.52 s on, and rest.
+    let followed = follow(session, [0.0, 1.5, 0.05], 2);
+    let worst = worst(&followed, &random_times(0.0, 1.5, 100), 0.0);
     let allowed = followed.options.accuracy * followed.options.extent;
     assert!(worst <= allowed, "{worst} of {allowed}");
 }

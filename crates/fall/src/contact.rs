@@ -10,7 +10,7 @@ const REBOUNDS: u32 = 64;
 
 impl Rules {
     /// Impact speed below which a body does not rebound, in m/s: the rebound would not rise above the tolerance.
-    fn slow(&self) -> f64 {
+    pub(crate) fn slow(&self) -> f64 {
         libm::sqrt(2.0 * self.settings.air.gravity * self.resolution())
     }
 

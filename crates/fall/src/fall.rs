@@ -57,6 +57,8 @@ pub(crate) struct Part {
 
 /// Number of states that are kept for going back: some kilobytes a body, of which a scene may have many.
 const KEPT: usize = 16;
+/// Most jolts that are noted of a fall.
+const MOST_JOLTS: usize = 1024;
 
 /// The motion of a body after its release.
 ///
@@ -75,6 +77,8 @@ pub struct Fall {
     stride: u64,
     /// The state at rest.
     rest: Option<State>,
+    /// Times at which the velocity jumped.
+    jolts: Vec<f64>,
 }
 
 impl Fall {
@@ -111,7 +115,16 @@ impl Fall {
             steps: 0,
             rate: None,
         };
-        Ok(Fall { rules, release: state, step: None, state, kept: Vec::new(), stride: 8, rest: None })
+        Ok(Fall {
+            rules,
+            release: state,
+            step: None,
+            state,
+            kept: Vec::new(),
+            stride: 8,
+            rest: None,
+            jolts: Vec::new(),
+        })
     }
 
     /// The body.
@@ -127,6 +140,12 @@ impl Fall {
     /// The time from which on the body rests, in s; `None` if that is later than all times asked for.
     pub fn rest(&self) -> Option<f64> {
         self.rest.map(|state| state.time)
+    }
+
+    /// The times in s, up to the latest one asked for, at which the velocity jumped by more than the speed below which a body does not
+    /// rebound: impacts, and corners that come to the ground while others touch it. At most 1,024.
+    pub fn jolts(&self) -> &[f64] {
+        &self.jolts
     }
 
     /// Number of steps up to the latest time asked for.
@@ -174,6 +193,9 @@ impl Fall {
                 return Ok(self.state.motion);
             }
             let (step, next) = self.rules.advance(&self.state, wind)?;
+            let before = self.state.motion;
+            self.note(step.start, &before, &step.first);
+            self.note(step.end, &step.last, &next.motion);
             (self.step, self.state) = (Some(step), next);
             self.keep();
             if next.steps > self.rules.settings.steps {
@@ -193,6 +215,19 @@ impl Fall {
         (self.step, self.state) = (Some(step), next);
         let flight = before.phase == Phase::Flight;
         Ok(Some(Part { before: before.motion, within: step.last, after: next.motion, flight }))
+    }
+
+    /// Notes a jolt, if the velocity before and after a time differs by one.
+    fn note(&mut self, time: f64, before: &Motion, after: &Motion) {
+        let known = self.jolts.last().is_some_and(|last| *last >= time);
+        if known || self.jolts.len() >= MOST_JOLTS {
+            return;
+        }
+        let jump =
+            (after.velocity - before.velocity).norm() + (after.spin - before.spin).norm() * self.rules.size;
+        if jump > self.rules.slow() {
+            self.jolts.push(time);
+        }
     }
 
     /// Keeps the state for going back, if it is new and its turn has come. Twice as many steps lie between those kept when there are too

@@ -59,6 +59,8 @@ pub(crate) struct Follower<'m, 'a> {
     pub(crate) tracks: Tracks,
     /// Births of the modules of the last samples.
     pub(crate) births: HashMap<u64, f64>,
+    /// The model lets something go.
+    pub(crate) falls: bool,
 }
 
 /// A drawn sample, and whether the interval up to it is known to be straight enough.
@@ -68,6 +70,8 @@ struct Knot {
     done: bool,
     /// The interval is tested however short it is: the one that it is a half of was not straight.
     strict: bool,
+    /// Tests that the interval, and those that it is a part of, have passed since the last that failed.
+    passed: u32,
 }
 
 impl Follower<'_, '_> {
@@ -113,8 +117,10 @@ impl Follower<'_, '_> {
     /// The samples from the last one before some frames up to them.
     fn knots(&mut self, start: Sample, frames: &[f64], mut times: Vec<f64>) -> Result<Vec<Sample>, Error> {
         let long = TESTED * (frames[frames.len() - 1] - start.time) / frames.len() as f64;
-        let mut knots =
-            BTreeMap::from([(key(start.time), Knot { sample: start, depth: 0, done: true, strict: false })]);
+        let mut knots = BTreeMap::from([(
+            key(start.time),
+            Knot { sample: start, depth: 0, done: true, strict: false, passed: 0 },
+        )]);
         let mut tests: Vec<f64> = Vec::new();
         loop {
             let mut all: Vec<f64> = times.iter().chain(&tests).copied().collect();
@@ -129,7 +135,10 @@ impl Follower<'_, '_> {
             }
             for time in times.drain(..) {
                 if let Some(sample) = taken.remove(&key(time)) {
-                    knots.insert(key(time), Knot { sample, depth: 0, done: false, strict: false });
+                    knots.insert(
+                        key(time),
+                        Knot { sample, depth: 0, done: false, strict: self.falls, passed: 0 },
+                    );
                 }
             }
             self.judge(&mut knots, &mut taken);
@@ -142,7 +151,7 @@ impl Follower<'_, '_> {
         Ok(knots.into_values().map(|knot| knot.sample).collect())
     }
 
-    /// Frames, and the instants just before and just after every event.
+    /// Frames, and the instants just before and just after every event; and those at which something that falls is jolted.
     fn base(&mut self, start: f64, frames: &[f64]) -> Result<Vec<f64>, Error> {
         let end = frames[frames.len() - 1];
         let mut ahead = self.simulation.clone();
@@ -158,6 +167,11 @@ impl Follower<'_, '_> {
             times.extend(just.into_iter().filter(|t| *t > start && *t < end));
         }
         passed?;
+        if self.falls {
+            // Drawn up to the end, so that it has fallen.
+            self.take(vec![end])?;
+            times.extend(self.nursery.jolts().into_iter().filter(|t| *t > start && *t < end));
+        }
         times.sort_by(f64::total_cmp);
         times.dedup();
         // What is between two of them, in parts that are not too long.
@@ -176,20 +190,24 @@ impl Follower<'_, '_> {
     fn judge(&self, knots: &mut BTreeMap<u64, Knot>, tests: &mut BTreeMap<u64, Sample>) {
         for (at, test) in std::mem::take(tests) {
             let before = knots.range(..at).next_back().map(|(_, knot)| &knot.sample);
-            let after = knots.range(at..).next().map(|(key, knot)| (*key, &knot.sample, knot.depth));
-            let (Some(before), Some((after, end, depth))) = (before, after) else { continue };
+            let (Some(before), Some((&after, knot))) = (before, knots.range(at..).next()) else { continue };
+            let Knot { sample: end, depth, passed, .. } = knot;
+            let (depth, passed) = (*depth, *passed + 1);
             let explained = self.is_explained(before, &test) && self.is_explained(&test, end);
             if explained && self.is_straight(before, &test, end) {
+                // What turns to and fro may come by one place of the test at any time: both parts are tested, too.
+                let done = !self.falls || passed > 1;
                 if let Some(knot) = knots.get_mut(&after) {
-                    knot.done = true;
+                    (knot.done, knot.passed) = (done, passed);
                 }
                 // It is there, so what is left of the error is a quarter of it, where the motion is smooth.
-                knots.insert(at, Knot { sample: test, depth, done: true, strict: false });
+                knots.insert(at, Knot { sample: test, depth, done, strict: self.falls, passed });
             } else {
                 if let Some(knot) = knots.get_mut(&after) {
-                    (knot.depth, knot.done, knot.strict) = (depth + 1, false, explained);
+                    (knot.depth, knot.done, knot.strict, knot.passed) = (depth + 1, false, explained, 0);
                 }
-                knots.insert(at, Knot { sample: test, depth: depth + 1, done: false, strict: explained });
+                let depth = depth + 1;
+                knots.insert(at, Knot { sample: test, depth, done: false, strict: explained, passed: 0 });
             }
         }
     }

@@ -209,6 +209,7 @@ pub fn grow(
         simulation: session.simulate(settings)?,
         tracks: Tracks::default(),
         births: HashMap::new(),
+        falls: dlsys_geometry::turtle::lets_go(model),
     };
     follower.follow(times, progress)?;
     let tracks = follower.tracks;

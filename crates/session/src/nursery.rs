@@ -152,6 +152,11 @@ impl<'m> Nursery<'m> {
         self.swaying.report()
     }
 
+    /// The times at which what the model has let go was jolted by the ground, up to the latest one drawn. Between them, motion is smooth.
+    pub fn jolts(&self) -> Vec<f64> {
+        self.passive().ok().and_then(|passive| passive.motion.as_ref()).map_or_else(Vec::new, Motion::jolts)
+    }
+
     /// An empty scene with the materials of the model and of its plants, to be drawn into.
     pub fn blank(&self) -> Scene {
         self.blank.clone()

@@ -199,6 +199,12 @@ impl Flights {
         Ok(Flown { poses, frozen: Arc::clone(&self.frozen) })
     }
 
+    /// The times at which what flies was jolted, so far, in units of the model.
+    pub(crate) fn jolts(&self) -> impl Iterator<Item = f64> {
+        let falls = self.releases.iter().filter_map(|release| release.fall.as_ref());
+        falls.flat_map(|fall| fall.jolts()).map(|seconds| self.place.time_at(*seconds))
+    }
+
     /// Lets flights go on in turn.
     fn advance(&mut self, model: &Model, keys: &[(PartKey, usize)], time: f64) -> Result<(), Error> {
         let flies = |release: &Release| release.fall.as_ref().is_some_and(|fall| fall.rest().is_none());

@@ -174,6 +174,12 @@ impl<'m> Motion<'m> {
         self.courses.lock().unwrap_or_else(PoisonError::into_inner).present.tick.points()
     }
 
+    /// The times, in units of the model, at which what it has let go was jolted by the ground, as far as it has been followed.
+    pub fn jolts(&self) -> Vec<f64> {
+        let courses = self.courses.lock().unwrap_or_else(PoisonError::into_inner);
+        courses.flights.iter().flat_map(Flights::jolts).collect()
+    }
+
     /// Work of the present course from t = 0.
     pub fn effort(&self) -> Effort {
         self.courses.lock().unwrap_or_else(PoisonError::into_inner).present.bending.effort
