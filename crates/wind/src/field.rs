@@ -36,7 +36,7 @@ pub struct Field {
 #[derive(Debug)]
 pub(crate) struct Setting {
     pub(crate) ground: Option<Ground>,
-    pub(crate) obstacles: Vec<Box<dyn Obstacle>>,
+    pub(crate) obstacles: Vec<Arc<dyn Obstacle>>,
     /// The thickness in metres of the layer over the ground in which a band of turbulence turns aside.
     pub(crate) layers: [f64; BANDS],
     /// The same for flows that come from above.
@@ -89,7 +89,8 @@ impl Field {
         for (layer, band) in layers.iter_mut().zip(&bands) {
             *layer = LAYER * band.eddy_size();
         }
-        let setting = Setting { ground: d.ground, obstacles: d.obstacles, layers, layer: d.scale };
+        let obstacles = d.obstacles.into_iter().map(Arc::from).collect();
+        let setting = Setting { ground: d.ground, obstacles, layers, layer: d.scale };
         let mut field = Field {
             direction,
             speed: d.speed,
@@ -157,17 +158,10 @@ impl Field {
                     .map(|band| Lattice::new(band, instant, self.lap, amplitude, &mut work)),
             );
         }
-        for (i, obstacle) in self.setting.obstacles.iter().enumerate() {
-            let (centre, velocity) = (obstacle.centre(time), obstacle.velocity(time));
-            if let Some(value) = centre.iter().chain(velocity.iter()).copied().find(|v| !v.is_finite()) {
-                let name = format!("the centre or the velocity of obstacle {}", i + 1);
-                return Err(Error::NotFinite { name, time, value });
-            }
-        }
         let flows = self.flows.iter().enumerate().map(|(i, flow)| flow.at(time, i));
         let flows = flows.collect::<Result<Vec<_>, _>>()?;
         let mean = Mean::new(self.direction * speed, self.roughness);
-        Ok(Snapshot::new(time, lattices, mean, flows, Arc::clone(&self.setting)))
+        Snapshot::new(time, lattices, mean, flows, Arc::clone(&self.setting))
     }
 
     /// The factor of the velocities of the bands at a mean speed.

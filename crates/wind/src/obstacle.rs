@@ -22,7 +22,7 @@ pub(crate) fn ramp(r: f64) -> [f64; 3] {
 /// A body in the wind. All of its functions must be pure: equal arguments give equal values. Lengths are in metres, times in seconds.
 ///
 /// Layers of two bodies, or of a body and the ground, may overlap, but air leaks through a surface that lies in the layer of another
-/// body.
+/// body. A surface that moves otherwise than as a rigid body, such as one that grows, pushes the wind as the rigid body does.
 pub trait Obstacle: fmt::Debug + Send + Sync {
     /// The distance of a point from the surface, negative inside.
     fn distance(&self, point: Vector3<f64>, time: f64) -> f64;
@@ -30,8 +30,13 @@ pub trait Obstacle: fmt::Debug + Send + Sync {
     /// The direction away from the surface at a point outside: the gradient of the distance, of length 1.
     fn normal(&self, point: Vector3<f64>, time: f64) -> Vector3<f64>;
 
-    /// The velocity of the body in m/s.
+    /// The velocity of the centre in m/s.
     fn velocity(&self, time: f64) -> Vector3<f64>;
+
+    /// The velocity of the rotation about the centre in 1/s: its direction is that of the axis. By default, there is none.
+    fn spin(&self, _time: f64) -> Vector3<f64> {
+        Vector3::zeros()
+    }
 
     /// A point in the middle of the body.
     fn centre(&self, time: f64) -> Vector3<f64>;

@@ -9,9 +9,11 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::bodies::Body;
+use crate::description::positive;
+use crate::error::Error;
 use crate::field::Setting;
 use crate::lattice::{Jet, Lattice, curl, curl_gradient};
-use crate::obstacle::{Level, ramp};
+use crate::obstacle::{Level, Obstacle, ramp};
 use crate::primitives::Primitive;
 
 /// The wind at an instant. It is a value of its own: it can be kept, cloned and shared between threads.
@@ -85,13 +87,32 @@ impl Snapshot {
         mean: Mean,
         flows: Vec<Primitive>,
         setting: Arc<Setting>,
-    ) -> Snapshot {
-        let mut snapshot =
-            Snapshot { time, lattices: lattices.into(), mean, flows, bodies: Vec::new(), setting };
+    ) -> Result<Snapshot, Error> {
+        let snapshot = Snapshot { time, lattices: lattices.into(), mean, flows, bodies: Vec::new(), setting };
         let setting = Arc::clone(&snapshot.setting);
-        snapshot.bodies =
-            setting.obstacles.iter().map(|body| Body::new(body.as_ref(), time, &snapshot)).collect();
-        snapshot
+        snapshot.among(&setting.obstacles)
+    }
+
+    /// The same wind with further bodies in it, as they are at this instant. The wind at the centre of each is that without any body.
+    ///
+    /// # Errors
+    ///
+    /// A centre, a velocity or a rotation that is not finite, or a layer without a thickness.
+    pub fn among(&self, obstacles: &[Arc<dyn Obstacle>]) -> Result<Snapshot, Error> {
+        let mut snapshot = self.clone();
+        for (i, obstacle) in obstacles.iter().enumerate() {
+            let time = self.time;
+            positive("the thickness of the layer around an obstacle", obstacle.layer())?;
+            let [centre, velocity, spin] =
+                [obstacle.centre(time), obstacle.velocity(time), obstacle.spin(time)];
+            let values = centre.iter().chain(&velocity).chain(&spin);
+            if let Some(value) = values.copied().find(|value| !value.is_finite()) {
+                let name = format!("the centre or the velocity of obstacle {}", i + 1);
+                return Err(Error::NotFinite { name, time, value });
+            }
+            snapshot.bodies.push(Body::new(obstacle, time, self));
+        }
+        Ok(snapshot)
     }
 
     /// The time in seconds, within the period of a wind that has one.
@@ -123,19 +144,19 @@ impl Snapshot {
 
     /// The velocity of the air.
     pub fn velocity(&self, x: Vector3<f64>) -> Vector3<f64> {
-        let mut near = self.setting.obstacles.iter().zip(&self.bodies).filter_map(|(obstacle, body)| {
-            let distance = obstacle.distance(x, self.time);
-            (distance < body.layer).then_some((obstacle, body, distance))
+        let mut near = self.bodies.iter().filter_map(|body| {
+            let distance = body.obstacle.distance(x, self.time);
+            (distance < body.layer).then_some((body, distance))
         });
         let Some(first) = near.next() else { return self.stream(x).velocity };
         let stream = self.stream(x);
         let potential = self.potential(x);
         let mut velocity = stream.velocity;
-        for (obstacle, body, distance) in std::iter::once(first).chain(near) {
+        for (body, distance) in std::iter::once(first).chain(near) {
             if distance < 0.0 {
-                return body.velocity;
+                return body.velocity_at(x);
             }
-            velocity -= body.turn_aside(obstacle.as_ref(), self.time, x, distance, potential, stream.rest);
+            velocity -= body.turn_aside(self.time, x, distance, potential, stream.rest);
         }
         velocity
     }
@@ -211,10 +232,8 @@ impl Snapshot {
         let velocity = self.velocity(x);
         let flat = self.setting.ground.as_ref().is_none_or(|ground| ground.is_flat());
         let step = self.step();
-        let near =
-            |body: &Body, obstacle: &dyn crate::Obstacle| obstacle.distance(x, self.time) < body.layer + step;
-        let mut bodies = self.bodies.iter().zip(&self.setting.obstacles);
-        if flat && !bodies.any(|(body, obstacle)| near(body, obstacle.as_ref())) {
+        let near = |body: &Body| body.obstacle.distance(x, self.time) < body.layer + step;
+        if flat && !self.bodies.iter().any(near) {
             return (velocity, self.free_gradient(x));
         }
         let columns: [Vector3<f64>; 3] = std::array::from_fn(|j| {

@@ -1,6 +1,8 @@
 //! Ground and bodies: no air passes them, and the flow around them has no divergence.
 
-use dlsys_wind::{Description, Field, Flow, Ground, Obstacle, Signal, Snapshot, Sphere, grid};
+use std::sync::Arc;
+
+use dlsys_wind::{Description, Field, Flow, Ground, Hull, Obstacle, Signal, Snapshot, Sphere, grid};
 use nalgebra::Vector3;
 
 fn gusty() -> Description {
@@ -216,4 +218,45 @@ fn a_body_of_any_shape_pushes_the_wind_aside() {
     assert!(changed > 1.0, "{changed}");
     let far = Vector3::new(0.0, 0.41, 0.3);
     assert_eq!(wind.velocity(far), free.velocity(far));
+}
+
+/// A rounded box that flies and turns: relative to its surface, no air passes, and the flow has no divergence.
+#[test]
+fn no_air_passes_a_hull_that_flies_and_turns() {
+    let half = Vector3::new(0.5, 0.3, 0.2);
+    let corner = |k: i32| {
+        let sign = |bit: i32| if k >> bit & 1 == 1 { 1.0 } else { -1.0 };
+        half.component_mul(&Vector3::new(sign(0), sign(1), sign(2)))
+    };
+    let (velocity, spin) = (Vector3::new(2.0, 0.5, -1.0), Vector3::new(3.0, -1.0, 4.0));
+    let body = Hull::new((0..8).map(corner).collect(), 0.1).unwrap().moving(velocity, spin);
+    let free = at(0.25, gusty());
+    let wind = free.among(&[Arc::new(body.clone())]).unwrap();
+    let (mut largest, mut tried) = (0.0f64, [0; 3]);
+    for (i, direction) in directions(600).enumerate() {
+        // The point of the box that is nearest to a place around it, and the surface above: over faces, edges and corners.
+        let place = direction * 0.8;
+        let nearest = place.zip_map(&half, |x, limit| x.clamp(-limit, limit));
+        let normal = (place - nearest).normalize();
+        let surface = nearest + normal * (0.1 * (1.0 + 1e-9));
+        let moved = velocity + spin.cross(&surface);
+        let relative = wind.velocity(surface) - moved;
+        assert!(relative.dot(&normal).abs() < 1e-6, "{relative} at {surface}");
+        largest = largest.max(relative.norm());
+        let place = nearest + normal * (0.11 + 0.0002 * i as f64);
+        // Away from the borders between parts, where derivatives of the normal jump.
+        if place.iter().zip(&half).all(|(x, limit)| (limit - x.abs()).abs() > 1e-3) {
+            let divergence = divergence(&wind, place, 1e-5);
+            assert!(divergence < 1e-6, "{divergence} at {place}");
+            let at_limits = nearest.iter().zip(&half).filter(|(x, limit)| x.abs() == **limit);
+            tried[at_limits.count() - 1] += 1;
+        }
+    }
+    assert!(largest > 1.0, "air moves along the surface");
+    assert!(tried.iter().all(|count| *count > 20), "faces, edges and corners: {tried:?}");
+    // Inside, the body's own velocity; far away, the wind.
+    assert_eq!(wind.velocity(half * 0.5), velocity + spin.cross(&(half * 0.5)));
+    assert_eq!(wind.velocity(Vector3::repeat(2.0)), free.velocity(Vector3::repeat(2.0)));
+    let broken = Hull::new(vec![Vector3::zeros()], 1.0).unwrap().moving(Vector3::repeat(f64::NAN), spin);
+    assert!(free.among(&[Arc::new(broken)]).is_err());
 }

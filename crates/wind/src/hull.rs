@@ -1,0 +1,273 @@
+//! A rounded convex body as an obstacle: all points within a radius of the convex hull of some points.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::obstacle::Obstacle;
+
+/// Most steps towards the nearest point; a few are enough, unless rounding stops the progress.
+const STEPS: usize = 100;
+/// The layer around a body in parts of the middle one of its half-extents, as around a [`Sphere`](crate::Sphere).
+const LAYER: f64 = 0.625;
+
+/// A body at an instant: the convex hull of points, rounded by a radius. One point is a ball, two are a capsule.
+///
+/// It does not depend on the time that it is asked for: a wind in which bodies move takes new ones for each instant
+/// ([`Snapshot::among`](crate::Snapshot::among)). Lengths are in metres.
+#[derive(Clone, Debug)]
+pub struct Hull {
+    points: Vec<Vector3<f64>>,
+    radius: f64,
+    centre: Vector3<f64>,
+    /// The distance from the centre to the farthest point.
+    reach: f64,
+    layer: f64,
+    velocity: Vector3<f64>,
+    spin: Vector3<f64>,
+}
+
+impl Hull {
+    /// The hull of these points, rounded by a radius; `None` unless there is a point, all coordinates are finite, and the radius is finite
+    /// and greater than 0.
+    pub fn new(points: Vec<Vector3<f64>>, radius: f64) -> Option<Hull> {
+        let is_finite = points.iter().all(|point| point.iter().all(|x| x.is_finite()));
+        if points.is_empty() || !is_finite || !(radius > 0.0 && radius.is_finite()) {
+            return None;
+        }
+        let count = points.len() as f64;
+        let centre = points.iter().sum::<Vector3<f64>>() / count;
+        let reach = points.iter().map(|point| (point - centre).norm()).fold(0.0, f64::max);
+        let layer = LAYER * (middle_extent(&points, centre) + radius);
+        let (velocity, spin) = (Vector3::zeros(), Vector3::zeros());
+        Some(Hull { points, radius, centre, reach, layer, velocity, spin })
+    }
+
+    /// The same body with the velocity of its centre in m/s and the velocity of its rotation in 1/s.
+    pub fn moving(self, velocity: Vector3<f64>, spin: Vector3<f64>) -> Hull {
+        Hull { velocity, spin, ..self }
+    }
+}
+
+impl Obstacle for Hull {
+    fn distance(&self, point: Vector3<f64>, _: f64) -> f64 {
+        // Far away, the ball around the body is enough.
+        let outside = (point - self.centre).norm() - self.reach - self.radius;
+        if outside > 2.0 * self.layer {
+            return outside;
+        }
+        Nearest::of(&self.points, point).way.norm() - self.radius
+    }
+
+    fn normal(&self, point: Vector3<f64>, _: f64) -> Vector3<f64> {
+        let way = Nearest::of(&self.points, point).way;
+        way.try_normalize(0.0).unwrap_or_else(Vector3::y)
+    }
+
+    fn velocity(&self, _: f64) -> Vector3<f64> {
+        self.velocity
+    }
+
+    fn spin(&self, _: f64) -> Vector3<f64> {
+        self.spin
+    }
+
+    fn centre(&self, _: f64) -> Vector3<f64> {
+        self.centre
+    }
+
+    /// 5/8 of the middle one of the three half-extents.
+    fn layer(&self) -> f64 {
+        self.layer
+    }
+
+    /// Zero over a face; around an edge, the normal turns in one direction; around a corner, in two.
+    fn normal_gradient(&self, point: Vector3<f64>, _: f64) -> Matrix3<f64> {
+        let Nearest { way, corners } = Nearest::of(&self.points, point);
+        let distance = way.norm();
+        if distance == 0.0 {
+            return Matrix3::zeros();
+        }
+        let normal = way / distance;
+        let across = Matrix3::identity() - normal * normal.transpose();
+        match corners[..] {
+            [_] => across / distance,
+            [a, b] => {
+                let edge = (b - a).normalize();
+                (across - edge * edge.transpose()) / distance
+            }
+            _ => Matrix3::zeros(),
+        }
+    }
+}
+
+/// The middle one of half the extents of points along their principal axes.
+fn middle_extent(points: &[Vector3<f64>], centre: Vector3<f64>) -> f64 {
+    let mut spread = Matrix3::zeros();
+    for point in points {
+        spread += (point - centre) * (point - centre).transpose();
+    }
+    let axes = nalgebra::SymmetricEigen::new(spread).eigenvectors;
+    let extent = |axis: Vector3<f64>| {
+        let along = points.iter().map(|point| axis.dot(point));
+        let (least, greatest) =
+            along.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+        (greatest - least) / 2.0
+    };
+    let mut extents = [0, 1, 2].map(|k| extent(axes.column(k).into_owned()));
+    extents.sort_by(f64::total_cmp);
+    extents[1]
+}
+
+/// The point of a convex hull that is nearest to a place.
+struct Nearest {
+    /// From that point to the place; 0 within the hull.
+    way: Vector3<f64>,
+    /// The corners of the smallest part of the surface that the point lies in: a corner, an edge or a triangle.
+    corners: Vec<Vector3<f64>>,
+}
+
+impl Nearest {
+    /// By the method of Gilbert, Johnson and Keerthi (1988): the nearest point of a simplex of corners, which takes in a corner that is
+    /// nearer as long as there is one.
+    fn of(points: &[Vector3<f64>], place: Vector3<f64>) -> Nearest {
+        let seen = |corner: &Vector3<f64>| corner - place;
+        let mut simplex: Vec<Vector3<f64>> = points.first().map(seen).into_iter().collect();
+        let mut nearest = simplex.first().copied().unwrap_or_default();
+        for _ in 0..STEPS {
+            let along = |corner: &Vector3<f64>| (corner - place).dot(&nearest);
+            let Some(next) = points.iter().min_by(|a, b| along(a).total_cmp(&along(b))) else { break };
+            let next = seen(next);
+            let gain = nearest.norm_squared() - next.dot(&nearest);
+            if gain <= 1e-14 * nearest.norm_squared() || simplex.contains(&next) {
+                break;
+            }
+            simplex.push(next);
+            let (found, part) = of_simplex(&simplex);
+            // Rounding: there is no progress any more.
+            if found.norm_squared() >= nearest.norm_squared() {
+                simplex.pop();
+                break;
+            }
+            (nearest, simplex) = (found, part);
+            if simplex.len() == 4 {
+                break;
+            }
+        }
+        Nearest { way: -nearest, corners: simplex.iter().map(|corner| corner + place).collect() }
+    }
+}
+
+/// The point of a simplex that is nearest to the origin, and the corners of the part that it lies in.
+fn of_simplex(corners: &[Vector3<f64>]) -> (Vector3<f64>, Vec<Vector3<f64>>) {
+    let mut best = (Vector3::repeat(f64::INFINITY), Vec::new());
+    for chosen in 1_u8..1 << corners.len() {
+        let part: Vec<Vector3<f64>> =
+            (0..corners.len()).filter(|i| chosen >> i & 1 == 1).map(|i| corners[i]).collect();
+        let found = match part[..] {
+            [a] => Some(a),
+            [a, b] => on_edge(a, b),
+            [a, b, c] => on_triangle(a, b, c),
+            [a, b, c, d] => is_within([a, b, c, d]).then(Vector3::zeros),
+            _ => None,
+        };
+        if let Some(found) = found.filter(|found| found.norm_squared() < best.0.norm_squared()) {
+            best = (found, part);
+        }
+    }
+    best
+}
+
+/// The foot of the perpendicular from the origin, if it lies between the ends.
+fn on_edge(a: Vector3<f64>, b: Vector3<f64>) -> Option<Vector3<f64>> {
+    let way = b - a;
+    let part = -a.dot(&way) / way.norm_squared();
+    (part > 0.0 && part < 1.0).then(|| a + way * part)
+}
+
+/// The same in a triangle.
+fn on_triangle(a: Vector3<f64>, b: Vector3<f64>, c: Vector3<f64>) -> Option<Vector3<f64>> {
+    let normal = (b - a).cross(&(c - a));
+    let square = normal.norm_squared();
+    let foot = normal * (a.dot(&normal) / square);
+    let is_left = |p: Vector3<f64>, q: Vector3<f64>| (q - p).cross(&(foot - p)).dot(&normal) > 0.0;
+    (square > 0.0 && is_left(a, b) && is_left(b, c) && is_left(c, a)).then_some(foot)
+}
+
+/// True if the origin lies within a tetrahedron.
+fn is_within(corners: [Vector3<f64>; 4]) -> bool {
+    let volume = |[a, b, c, d]: [Vector3<f64>; 4]| (b - a).cross(&(c - a)).dot(&(d - a));
+    let whole = volume(corners);
+    let is_inside = |k: usize| {
+        let mut part = corners;
+        part[k] = Vector3::zeros();
+        volume(part) * whole > 0.0
+    };
+    whole != 0.0 && (0..4).all(is_inside)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cube() -> Vec<Vector3<f64>> {
+        let corner = |k: i32| Vector3::new((k & 1) as f64, (k >> 1 & 1) as f64, (k >> 2) as f64);
+        (0..8).map(corner).collect()
+    }
+
+    /// Places in a box around the unit cube.
+    fn places() -> impl Iterator<Item = Vector3<f64>> {
+        let part = |k: usize, ratio: f64| (k as f64 * ratio).fract() * 4.0 - 1.5;
+        (1..2000)
+            .map(move |k| Vector3::new(part(k, 0.754_877_67), part(k, 0.569_840_29), part(k, 0.430_159_71)))
+    }
+
+    #[test]
+    fn distances_from_a_cube_are_those_of_its_formula() {
+        let body = Hull::new(cube(), 0.1).unwrap();
+        for place in places() {
+            let outside = place.map(|x| x - x.clamp(0.0, 1.0));
+            let found = body.distance(place, 0.0);
+            if outside.norm() == 0.0 {
+                assert!((found + 0.1).abs() < 1e-12, "{place} {found}");
+            } else if found < body.layer() {
+                assert!((found - (outside.norm() - 0.1)).abs() < 1e-12, "{place} {found}");
+                assert!((body.normal(place, 0.0) - outside.normalize()).norm() < 1e-10, "{place}");
+            } else {
+                assert!(outside.norm() - 0.1 > body.layer() - 1e-12, "{place} {found}");
+            }
+        }
+    }
+
+    #[test]
+    fn normals_bend_as_differences_say() {
+        let body = Hull::new(cube(), 0.1).unwrap();
+        let mut compared = 0;
+        for place in places() {
+            let (distance, step) = (body.distance(place, 0.0), 1e-6);
+            // On the border of two parts, the derivatives jump.
+            let is_inner = |x: f64| x.abs() > 1e-5 && (x - 1.0).abs() > 1e-5;
+            if !(0.0..body.layer()).contains(&distance) || !place.iter().all(|x| is_inner(*x)) {
+                continue;
+            }
+            let columns: [Vector3<f64>; 3] = std::array::from_fn(|j| {
+                let offset = Vector3::ith(j, step);
+                (body.normal(place + offset, 0.0) - body.normal(place - offset, 0.0)) / (2.0 * step)
+            });
+            let error = (body.normal_gradient(place, 0.0) - Matrix3::from_columns(&columns)).norm();
+            assert!(error < 1e-7, "{place} {error}");
+            compared += 1;
+        }
+        assert!(compared > 200, "{compared}");
+    }
+
+    #[test]
+    fn one_point_is_a_ball_and_flat_ones_are_a_plate() {
+        let ball = Hull::new(vec![Vector3::x()], 0.5).unwrap();
+        assert_eq!(ball.layer(), 0.3125);
+        assert!((ball.distance(Vector3::new(1.0, 0.6, 0.0), 0.0) - 0.1).abs() < 1e-15);
+        let square = cube().into_iter().filter(|corner| corner.y == 0.0).collect();
+        let plate = Hull::new(square, 0.02).unwrap();
+        assert!((plate.layer() - 0.625 * 0.52).abs() < 1e-12);
+        assert!((plate.distance(Vector3::new(0.5, 0.3, 0.4), 0.0) - 0.28).abs() < 1e-12);
+        assert!(Hull::new(vec![], 1.0).is_none() && Hull::new(cube(), 0.0).is_none());
+    }
+}
