@@ -6,6 +6,7 @@
 use std::fs::File;
 use std::io::{BufRead, BufReader, BufWriter, Read, Seek, Write};
 use std::path::Path;
+use std::sync::Arc;
 
 use super::args::RunArgs;
 use super::common::{Failure, coloured, open, out_error, settings, times};
@@ -14,7 +15,7 @@ use super::run::number;
 use super::shared::TextFormat;
 use crate::model::Units;
 use crate::scene::Vector;
-use crate::surround::Weather;
+use crate::surround::{Error, Weather};
 use crate::wind::Snapshot;
 
 /// Most bytes of a line.
@@ -24,10 +25,10 @@ const KEPT: usize = 16;
 
 /// Prints the velocity of the wind at the places of the file.
 pub fn sample(args: &RunArgs, path: &Path, format: TextFormat) -> Result<(), Failure> {
-    settings(&args.shared)?;
+    let settings = settings(&args.shared)?;
     let session = open(&args.shared.model, &args.shared.settings, &args.shared.include)?;
-    let weather = Weather::of(&session.model.scenery)
-        .map_err(|error| Failure::Model(error.diagnostic().render(&session.source, coloured())))?;
+    let fault = |error: Error| Failure::Model(error.diagnostic().render(&session.source, coloured()));
+    let weather = Weather::of(&session.model, settings).map_err(fault)?;
     let Some(weather) = weather else {
         return Err(Failure::Usage(format!(
             "error: {} has no wind to sample\n\n  = help: declare one, such as `wind 1, 0, 0 speed 5`, or a `flow`\n",
@@ -41,7 +42,7 @@ pub fn sample(args: &RunArgs, path: &Path, format: TextFormat) -> Result<(), Fai
     };
     let out = BufWriter::with_capacity(1 << 16, std::io::stdout().lock());
     let units = session.model.scenery.units;
-    let mut sampler = Sampler { weather: &weather, units, format, recent: Vec::new(), out };
+    let mut sampler = Sampler { weather: &weather, fault: &fault, units, format, recent: Vec::new(), out };
     sampler.head()?;
     let done = match places.has_times {
         true => sampler.sample_all(None, &mut places),
@@ -78,11 +79,13 @@ fn at_times(times: &[f64], places: &mut Places, sampler: &mut Sampler) -> Result
 
 /// Evaluates and prints.
 struct Sampler<'a> {
-    weather: &'a Weather,
+    weather: &'a Weather<'a>,
+    /// The message of an error of the model.
+    fault: &'a dyn Fn(Error) -> Failure,
     units: Units,
     format: TextFormat,
     /// The last instants, with their times in units of the model.
-    recent: Vec<(f64, Snapshot)>,
+    recent: Vec<(f64, Arc<Snapshot>)>,
     out: BufWriter<std::io::StdoutLock<'static>>,
 }
 
@@ -105,8 +108,10 @@ impl Sampler<'_> {
     /// Prints the wind at the place of the present line.
     fn sample(&mut self, t: f64, place: [f64; 3], places: &Places) -> Result<(), Failure> {
         if !self.recent.iter().any(|(time, _)| *time == t) {
-            let new = self.weather.field().at(t * self.units.time);
-            let new = new.map_err(|error| places.fault(1, &error.to_string(), ""))?;
+            let new = self.weather.at(t * self.units.time).map_err(|error| match error {
+                Error::Wind { error, .. } => places.fault(1, &error.to_string(), ""),
+                error => (self.fault)(error),
+            })?;
             if self.recent.len() == KEPT {
                 self.recent.remove(0);
             }

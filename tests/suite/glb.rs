@@ -121,21 +121,28 @@ pub fn random_times(from: f64, to: f64, count: usize) -> Vec<f64> {
     times
 }
 
-#[test]
-fn positions_are_within_the_accuracy_between_frames_too() {
-    let cases = [
-        ("leaf.dls", [0.0, 9.0, 0.1]),
-        ("dragon.dls", [0.0, 6.0, 0.125]),
-        ("campanula.dls", [6.0, 20.0, 0.2]),
-        ("lychnis.dls", [0.0, 5.0, 0.1]),
-        ("birch.dls", [4.0, 9.0, 0.2]),
-    ];
-    for (name, [from, to, step]) in cases {
+/// Runs of models whose positions are compared, with their frames.
+pub const RUNS: [(&str, [f64; 3]); 5] = [
+    ("leaf.dls", [0.0, 9.0, 0.1]),
+    ("dragon.dls", [0.0, 6.0, 0.125]),
+    ("campanula.dls", [6.0, 20.0, 0.2]),
+    ("lychnis.dls", [0.0, 5.0, 0.1]),
+    ("birch.dls", [4.0, 9.0, 0.2]),
+];
+
+/// Checks the errors of the positions in the files of some runs at times that are no frames. `worst` is the largest one at these times.
+pub fn check_positions(runs: &[(&str, [f64; 3])], worst: impl Fn(&Followed, &[f64], f64) -> f64) {
+    for &(name, [from, to, step]) in runs {
         let followed = follow(model(name), [from, to, step], 2);
         let worst = worst(&followed, &random_times(from, to, 12), from);
         let allowed = followed.options.accuracy * followed.options.extent;
         assert!(worst <= allowed, "{name}: {worst} of {allowed}");
     }
+}
+
+#[test]
+fn positions_are_within_the_accuracy_between_frames_too() {
+    check_positions(&RUNS, worst);
 }
 
 #[test]

@@ -47,6 +47,7 @@ mod semantics;
 mod shadows;
 mod signals;
 mod small_plants;
+mod solids;
 mod strain;
 mod strain_runs;
 mod surroundings;

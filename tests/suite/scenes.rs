@@ -234,9 +234,12 @@ fn wind_and_tissues_have_the_values_that_are_written() {
     assert_eq!(values[1], (Primitive::Vortex, vec![10.0, 1.0, 2.0, -3.0, 0.0, 1.0, 0.0], Some(3.0)));
     assert_eq!(values[2], (Primitive::Sink, vec![4.0, 0.0, 1.0, 0.0], None));
     let [stalk, leaf] = &scenery.tissues[..] else { panic!("two tissues") };
-    assert_eq!((stalk.stiffness, stalk.density, stalk.damping), (2e8, 900.0, 0.05));
+    assert_eq!((stalk.stiffness_at(0.0), stalk.density, stalk.damping), (Some(2e8), 900.0, 0.05));
     assert_eq!((stalk.thickness, stalk.sag), (Tissue::THICKNESS, false));
-    assert_eq!((leaf.stiffness, leaf.damping, leaf.thickness, leaf.sag), (3e7, 0.0, 1e-4, true));
+    assert_eq!(
+        (leaf.stiffness_at(0.0), leaf.damping, leaf.thickness, leaf.sag),
+        (Some(3e7), 0.0, 1e-4, true)
+    );
     let mut string = ModuleString::default();
     session.simulate(Settings::default()).and_then(|mut run| run.at(0.0, &mut string)).expect("it grows");
     let parameters: Vec<f64> = string.iter().map(|module| module.parameters[0]).collect();

@@ -53,7 +53,7 @@ fn the_field_is_the_wind_of_the_library() {
     let csv = good(&folder, "run gusts.dls --field places.csv --at 0.5,2");
     assert!(csv.starts_with("t,x,y,z,u,v,w\n0.5,0,10,0,"), "{csv}");
     let session = Session::open(&folder.path().join("gusts.dls"), &[]).expect("a good model");
-    let weather = Weather::of(&session.model.scenery).expect("a wind").expect("there is one");
+    let weather = Weather::of(&session.model, Default::default()).expect("a wind").expect("there is one");
     let rows = numbers(&csv);
     assert_eq!(rows.len(), 4);
     for row in rows {

@@ -6,7 +6,7 @@ use dlsys::interchange::Format;
 use dlsys::session::Session;
 
 use crate::cli::{bad, good};
-use crate::glb::{Followed, follow, model, random_times, worst_of};
+use crate::glb::{Followed, RUNS, check_positions, follow, worst_of};
 use crate::usd_reader::Usd;
 
 fn text(followed: &Followed) -> String {
@@ -15,19 +15,10 @@ fn text(followed: &Followed) -> String {
 
 #[test]
 fn positions_are_within_the_accuracy_between_frames_too() {
-    let cases = [
-        ("leaf.dls", [0.0, 9.0, 0.1]),
-        ("dragon.dls", [0.0, 6.0, 0.125]),
-        ("campanula.dls", [6.0, 20.0, 0.2]),
-        ("lychnis.dls", [0.0, 5.0, 0.1]),
-    ];
-    for (name, [from, to, step]) in cases {
-        let followed = follow(model(name), [from, to, step], 2);
-        let usd = Usd::read(&text(&followed));
-        let worst = worst_of(&followed, |seconds| usd.shown(seconds), &random_times(from, to, 12), from);
-        let allowed = followed.options.accuracy * followed.options.extent;
-        assert!(worst <= allowed, "{name}: {worst} of {allowed}");
-    }
+    check_positions(&RUNS[..4], |followed, times, from| {
+        let usd = Usd::read(&text(followed));
+        worst_of(followed, |seconds| usd.shown(seconds), times, from)
+    });
 }
 
 #[test]

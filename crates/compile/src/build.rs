@@ -93,6 +93,7 @@ struct Parts<'d> {
     period: Option<(f64, Span)>,
     ignored: Vec<&'d ast::Name>,
     considered: Vec<&'d ast::Name>,
+    solid: Vec<&'d ast::Name>,
     axiom: Successor,
     axiom_span: Span,
     rules: Vec<DeclaredRule>,
@@ -127,6 +128,7 @@ impl<'d> Parts<'d> {
             Item::Frames { from, to, step } => self.frames([*from, *to, *step], span, builder),
             Item::Ignore(names) => self.ignored.extend(names),
             Item::Consider(names) => self.considered.extend(names),
+            Item::Solid(names) => self.solid.extend(names),
             Item::Axiom(modules) => self.axiom(modules, span, builder),
             Item::Interpret { head, drawn } => {
                 self.heads.push(head);
@@ -212,6 +214,7 @@ impl<'d> Parts<'d> {
         let diagnostics = &mut scope.diagnostics;
         let interpretations = assign_interpretations(self.interpretations, &mut kinds, diagnostics);
         contexts::filter(&mut kinds, &self.ignored, &self.considered, diagnostics);
+        let solids = contexts::solids(&kinds, &self.solid, diagnostics);
         let rules = contexts::resolve_all(&kinds, self.rules, diagnostics);
         let Analysed { rules, drawn_only } = analyse(&mut scope.graph, &kinds, rules);
         let model = Model {
@@ -226,7 +229,7 @@ impl<'d> Parts<'d> {
             rules,
             interpretations,
             appearance: Arc::new(looks.appearance),
-            scenery: looks.scenery,
+            scenery: Scenery { solids, ..looks.scenery },
             drawn_only,
             curves: scope.graph.curves().to_vec(),
         };
@@ -245,6 +248,7 @@ impl<'d> Parts<'d> {
         scene_checks::ground(&model, &all, diagnostics);
         scene_checks::detach(&model, &all, diagnostics);
         scene_checks::tissues(&model, &all, &places.tissues, diagnostics);
+        scene_checks::solids(&model, occurs, drawn, diagnostics);
         check::commands(&model, diagnostics, &all);
         check::surface_sizes(&model, diagnostics, &all);
         model

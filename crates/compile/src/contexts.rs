@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 use crate::advice;
 use crate::declared::{DeclaredPattern, DeclaredRule, ResolvedRule};
 use crate::scope::plural;
-use dlsys_diagnostic::Diagnostic;
+use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{Class, KindId, Kinds, Pattern, class_of};
 use dlsys_syntax::ast;
 
@@ -93,6 +93,28 @@ fn resolve(
         );
     }
     pattern
+}
+
+/// The kinds that `solid` names.
+pub fn solids(kinds: &Kinds, names: &[&ast::Name], diagnostics: &mut Vec<Diagnostic>) -> Vec<(KindId, Span)> {
+    let index = ByName::new(kinds);
+    let mut solids: Vec<(KindId, Span)> = Vec::new();
+    for name in names {
+        let found = index.matching(&name.text);
+        if found.is_empty() {
+            diagnostics.push(
+                Diagnostic::error(format!("there is no module `{}`", name.text))
+                    .at(name.span, "no body of this name")
+                    .help(advice::no_such_module(kinds, &name.text)),
+            );
+        }
+        for &kind in found {
+            if !solids.iter().any(|(known, _)| *known == kind) {
+                solids.push((kind, name.span));
+            }
+        }
+    }
+    solids
 }
 
 /// Applies `ignore` and `consider` to the kinds.

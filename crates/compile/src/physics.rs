@@ -50,7 +50,7 @@ const TIME: Quantity = positive(
     "write the duration of one unit of t in seconds, which is greater than 0: `units time 86400` for days",
 );
 const STIFFNESS: Quantity = Quantity {
-    most: 1e15,
+    most: Tissue::STIFFEST,
     ..positive(
         "stiffness",
         " Pa",
@@ -254,9 +254,14 @@ impl Builder<'_> {
             );
             return None;
         };
-        let program = self.of_time(&speed.values)?;
-        if let (Some(&[value]), Some(&written)) = (program.constants(), speed.values.first()) {
-            return self.is_within(value, written, &SPEED).then_some(program);
+        self.varying(speed, &SPEED)
+    }
+
+    /// The value of an attribute that may depend on `t`, within the bounds of a quantity if it is a constant.
+    fn varying(&mut self, attribute: &Attribute, quantity: &Quantity) -> Option<Program> {
+        let program = self.of_time(&attribute.values)?;
+        if let (Some(&[value]), Some(&written)) = (program.constants(), attribute.values.first()) {
+            return self.is_within(value, written, quantity).then_some(program);
         }
         Some(program)
     }
@@ -426,9 +431,13 @@ impl Builder<'_> {
             );
         }
         // A tissue with an error takes its number all the same; the model is refused then.
+        let modulus = stiffness.and_then(|stiffness| self.varying(stiffness, &STIFFNESS));
         let tissue = Tissue {
             name: name.text.clone(),
-            stiffness: self.attribute(stiffness, &STIFFNESS).unwrap_or(1.0),
+            stiffness: modulus.unwrap_or_else(|| {
+                let one = self.scope.graph.constant(1.0);
+                Program::compile(&self.scope.graph, &[one], 1)
+            }),
             density: self.attribute(density, &DENSITY).unwrap_or(1.0),
             damping: self.attribute(damping, &DAMPING).unwrap_or(0.0),
             thickness: self.attribute(thickness, &THICKNESS).unwrap_or(Tissue::THICKNESS),

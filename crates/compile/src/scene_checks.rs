@@ -1,4 +1,4 @@
-//! Checks of the modules of a scene: `@G` needs a ground, `@E(NAME)` a tissue, and `@D` has no parameters.
+//! Checks of the modules of a scene: `@G` needs a ground, `@E(NAME)` a tissue, `@D` has no parameters, and what is solid is drawn.
 
 use std::collections::HashMap;
 
@@ -57,6 +57,27 @@ pub fn detach(model: &Model, places: &HashMap<KindId, Span>, diagnostics: &mut V
                     ),
             );
         }
+    }
+}
+
+/// Reports names behind `solid` that are no modules of a string: a body is all that a module of the string draws.
+pub fn solids(
+    model: &Model,
+    occurs: &HashMap<KindId, Span>,
+    drawn: &HashMap<KindId, Span>,
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    for (kind, span) in &model.scenery.solids {
+        if occurs.contains_key(kind) {
+            continue;
+        }
+        let name = &model.kinds.get(*kind).name;
+        let mut error = Diagnostic::error(format!("`{name}` never stands in a string"))
+            .at(*span, "a body is all that a module of the string draws");
+        if let Some(place) = drawn.get(kind) {
+            error = error.at(*place, "here it is a part of a drawing");
+        }
+        diagnostics.push(error.help("name the module that is drawn this way, or put this one in a string"));
     }
 }
 

@@ -22,12 +22,12 @@ impl Default for Units {
 }
 
 /// `tissue NAME = stiffness E, density D, damping Z`: a material of stems and surfaces.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Tissue {
     /// The name, which stands for its number (from 1) in expressions.
     pub name: Arc<str>,
-    /// Young's modulus in Pa.
-    pub stiffness: f64,
+    /// Young's modulus in Pa; it reads `t`.
+    pub stiffness: Program,
     /// Density in kg/m³.
     pub density: f64,
     /// Damping ratio at 1 Hz.
@@ -43,8 +43,21 @@ pub struct Tissue {
 impl Tissue {
     /// The thickness of surfaces if the text gives none, in m.
     pub const THICKNESS: f64 = 2e-4;
+    /// The largest Young's modulus in Pa.
+    pub const STIFFEST: f64 = 1e15;
     /// The density of surfaces without a tissue, in kg/m³.
     pub const SURFACE_DENSITY: f64 = 1000.0;
+
+    /// Young's modulus in Pa at a time of the model; `None` if it is out of range: greater than 0 and at most [`Tissue::STIFFEST`].
+    pub fn stiffness_at(&self, time: f64) -> Option<f64> {
+        let value = self.stiffness.eval_one(&[time]);
+        (value > 0.0 && value <= Tissue::STIFFEST).then_some(value)
+    }
+
+    /// True if its stiffness does not follow the time.
+    pub fn is_constant(&self) -> bool {
+        self.stiffness.constants().is_some()
+    }
 }
 
 /// `wind X, Y, Z speed U turbulence I scale L …`

@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
-use crate::{FieldCache, Flow, Model, Rgb, Tissue, Units, Wind};
+use crate::{FieldCache, Flow, KindId, Model, Rgb, Tissue, Units, Wind};
 use dlsys_diagnostic::{Source, Span};
 use dlsys_expr::Program;
 
-/// The declarations of a model that concern its surroundings: `plant`, `light`, `sky`, `camera`, `ground`, `units`, `wind`, `flow`, `tissue`.
+/// The declarations of a model that concern its surroundings: `plant`, `light`, `sky`, `camera`, `ground`, `units`, `wind`, `flow`,
+/// `tissue`, `solid`.
 #[derive(Clone, Debug, Default)]
 pub struct Scenery {
     /// In the order written.
@@ -27,6 +28,8 @@ pub struct Scenery {
     pub flows: Vec<Flow>,
     /// In the order written; their names stand for their numbers, from 1.
     pub tissues: Vec<Tissue>,
+    /// The kinds of modules whose drawings are solid bodies, in the order written, with the places of their names.
+    pub solids: Vec<(KindId, Span)>,
     /// The field of the wind.
     pub field: FieldCache,
 }

@@ -28,7 +28,7 @@ const MOST_IN_JOB: usize = 192;
 /// What the plants of a scene have in common.
 pub(crate) struct Bed<'a, 'm> {
     pub(crate) nursery: &'a Nursery<'m>,
-    pub(crate) around: &'a Around,
+    pub(crate) around: &'a Around<'m>,
     pub(crate) seedlings: &'a [Seedling],
     pub(crate) motions: Option<&'a [Option<Arc<Motion<'m>>>]>,
     /// `None`: every age has a drawing of its own.

@@ -77,10 +77,10 @@ struct Kind {
 
 impl Gauge {
     /// Measures the plants of a scene; `None` if it has no camera, or no plants that are worth it.
-    pub(crate) fn new(
-        (model, settings): (&Model, Settings),
+    pub(crate) fn new<'m>(
+        (model, settings): (&'m Model, Settings),
         blank: &Scene,
-        around: &Around,
+        around: &Around<'m>,
         detail: Detail,
         classes: &Arc<Classes>,
     ) -> Option<Gauge> {
@@ -155,10 +155,10 @@ fn chosen(mut all: Vec<&Seedling>) -> Vec<&Seedling> {
 }
 
 /// Measures a sample of one declaration from t = 0 to the end; `None` if no plant of it ever stands, or one fails.
-fn kind(
-    model: &Model,
+fn kind<'m>(
+    model: &'m Model,
     settings: Settings,
-    around: &Around,
+    around: &Around<'m>,
     (sample, end): (&[&Seedling], f64),
     classes: &Arc<Classes>,
 ) -> Option<Kind> {

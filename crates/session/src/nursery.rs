@@ -101,7 +101,7 @@ pub struct Nursery<'m> {
 
 /// What is passive in a scene.
 struct Passive<'m> {
-    around: Around,
+    around: Around<'m>,
     motion: Option<Motion<'m>>,
 }
 
@@ -181,7 +181,7 @@ impl<'m> Nursery<'m> {
         let start = || {
             let model = self.model;
             let sways = sways(model);
-            let weather = if sways { Weather::of(&model.scenery)? } else { None };
+            let weather = if sways { Weather::of(model, self.settings)? } else { None };
             let around = Around { place: Place::of_scene(&model.scenery), weather: weather.clone() };
             let following = Following::of(self.settings.bending);
             let motion = Motion::new(model, self.settings, weather, around.place, following)?;
@@ -192,7 +192,7 @@ impl<'m> Nursery<'m> {
 
     pub(crate) fn draw_with(
         &self,
-        (seed, around): (u64, &Around),
+        (seed, around): (u64, &Around<'m>),
         string: &ModuleString,
         strains: Option<&dyn Strains>,
         scene: &mut Scene,
@@ -227,7 +227,7 @@ impl<'m> Nursery<'m> {
     /// Puts plants in the place of seedlings.
     fn grow(
         &self,
-        (seed, around, time): (u64, &Around, f64),
+        (seed, around, time): (u64, &Around<'m>, f64),
         scene: &mut Scene,
         growing: &mut Growing<'m>,
     ) -> Result<(), DrawError> {
@@ -301,7 +301,7 @@ impl<'m> Nursery<'m> {
     #[allow(clippy::type_complexity)]
     fn motions<'s>(
         &self,
-        (seed, around, time): (u64, &Around, f64),
+        (seed, around, time): (u64, &Around<'m>, f64),
         seedlings: &'s [Seedling],
     ) -> Result<Option<Vec<Option<Arc<Motion<'m>>>>>, DrawError> {
         let plants = &self.model.scenery.plants;

@@ -22,12 +22,12 @@ const TURN: f64 = CLOCK;
 
 /// A model in the scene: where it stands, and in which wind.
 #[derive(Clone)]
-pub struct Around {
+pub struct Around<'m> {
     pub place: Place,
-    pub weather: Option<Arc<Weather>>,
+    pub weather: Option<Arc<Weather<'m>>>,
 }
 
-impl Around {
+impl<'m> Around<'m> {
     /// The place of a plant that stands in this model.
     fn of(&self, seedling: &Seedling, inner: &Model) -> Place {
         let outer = &self.place;
@@ -44,7 +44,7 @@ impl Around {
     }
 
     /// A plant as the model around the plants in it.
-    pub fn within(&self, seedling: &Seedling, inner: &Model) -> Around {
+    pub fn within(&self, seedling: &Seedling, inner: &Model) -> Around<'m> {
         Around { place: self.of(seedling, inner), weather: self.weather.clone() }
     }
 }
@@ -113,7 +113,7 @@ impl<'m> Swaying<'m> {
     /// The first failure in the order of the plants, with its index.
     pub fn of(
         &self,
-        around: &Around,
+        around: &Around<'m>,
         plants: &[(&Seedling, &'m Model, u64)],
         (settings, gauge): (Settings, Option<&Gauge>),
         now: f64,

@@ -130,7 +130,7 @@ pub fn stem_study(
 fn track(session: &Session, times: &[f64], settings: Settings, limit: f64) -> Result<Track, String> {
     let model = &session.model;
     let fault = |error: dlsys_surround::Error| error.diagnostic().message;
-    let weather = Weather::of(&model.scenery).map_err(fault)?;
+    let weather = Weather::of(model, settings).map_err(fault)?;
     let place = Place::of_scene(&model.scenery);
     let begun = Instant::now();
     let motion =

@@ -191,10 +191,10 @@ pub struct Effort {
 
 /// The stems of a model in motion.
 #[derive(Clone)]
-pub(crate) struct Bending<M> {
+pub(crate) struct Bending<'w, M> {
     model: M,
     place: Place,
-    wind: Arc<Sampler>,
+    wind: Arc<Sampler<'w>>,
     solver: Solver,
     tolerance: f64,
     state: State,
@@ -209,8 +209,13 @@ pub(crate) struct Bending<M> {
     pub(crate) effort: Effort,
 }
 
-impl<M: Deref<Target = Model>> Bending<M> {
-    pub(crate) fn new(model: M, wind: Arc<Sampler>, place: Place, settings: sway::Settings) -> Bending<M> {
+impl<'w, M: Deref<Target = Model>> Bending<'w, M> {
+    pub(crate) fn new(
+        model: M,
+        wind: Arc<Sampler<'w>>,
+        place: Place,
+        settings: sway::Settings,
+    ) -> Bending<'w, M> {
         Bending {
             place,
             wind,
@@ -220,15 +225,16 @@ impl<M: Deref<Target = Model>> Bending<M> {
             modal: None,
             body: Arc::default(),
             string: ModuleString::default(),
-            timeless: turtle::is_timeless(&model),
+            timeless: turtle::is_timeless(&model) && is_constant(&model),
             scene: turtle::blank(&model),
             effort: Effort::default(),
             model,
         }
     }
 
-    /// Moves by modes where it does not grow.
-    pub(crate) fn by_modes(self, modes: Option<ByModes>) -> Bending<M> {
+    /// Moves by modes where it does not grow, if its tissues keep their stiffness.
+    pub(crate) fn by_modes(self, modes: Option<ByModes>) -> Bending<'w, M> {
+        let modes = modes.filter(|_| is_constant(&self.model));
         Bending { modal: modes.map(Modal::new), ..self }
     }
 
@@ -250,7 +256,7 @@ impl<M: Deref<Target = Model>> Bending<M> {
             return Ok(Body::default());
         }
         let noted = turtle::skeleton(&self.model, string, &mut self.scene)?;
-        Ok(Body::new(noted, &self.model, self.place.units.length))
+        Body::new(noted, &self.model, (self.place.units.length, string.time))
     }
 
     /// The motion from the tick of this number, with the string at that time, to the next. `before` is the tick before, with the
@@ -375,7 +381,7 @@ impl<M: Deref<Target = Model>> Bending<M> {
                 drawn: stem.origin.span(&self.model),
                 length: part.length,
                 width: part.diameter,
-                stiffness: tissue.stiffness,
+                stiffness: tissue.stiffness.eval_one(&[self.place.time_at(seconds)]),
                 tissue: tissue.span,
                 wind: self.wind.velocity(place, seconds).norm(),
             }))
@@ -389,11 +395,16 @@ impl<M: Deref<Target = Model>> Bending<M> {
     }
 }
 
+/// True if no tissue of a model becomes softer or stiffer in time.
+fn is_constant(model: &Model) -> bool {
+    model.scenery.tissues.iter().all(|tissue| tissue.is_constant())
+}
+
 /// The strains of a string at a time within a tick, from the productions since then.
 pub(crate) fn bent(
     tick: &Arc<Tick>,
     descent: &Descent,
-    bending: &Bending<impl Deref<Target = Model>>,
+    bending: &Bending<'_, impl Deref<Target = Model>>,
     string: &ModuleString,
     scene: &mut Scene,
 ) -> Result<BentStems, Error> {

@@ -7,6 +7,8 @@ use dlsys_sway::{Joint, Load, Matrix, Plate, Segment, Skeleton};
 use std::collections::HashMap;
 use std::f64::consts::PI;
 
+use crate::Error;
+
 /// Drag of a ball and of a rod in parts of that of plates that show the same area (1.2): coefficients 0.47 and 1.1.
 const DRAG: [f64; 2] = [0.47 / 1.2, 1.1 / 1.2];
 
@@ -22,9 +24,26 @@ pub(crate) struct Body {
 }
 
 impl Body {
-    /// Of what the turtle noted: a unit of length is `metre` metres.
-    pub(crate) fn new(noted: turtle::Skeleton, model: &Model, metre: f64) -> Body {
+    /// Of what the turtle noted at a time of the model: a unit of length is `metre` metres.
+    ///
+    /// # Errors
+    /// A tissue whose stiffness is out of range at that time.
+    pub(crate) fn new(
+        noted: turtle::Skeleton,
+        model: &Model,
+        (metre, time): (f64, f64),
+    ) -> Result<Body, Error> {
         let tissues = &model.scenery.tissues;
+        let stiffnesses = tissues.iter().map(|tissue| {
+            let failed = || Error::Stiffness {
+                tissue: tissue.name.to_string(),
+                value: tissue.stiffness.eval_one(&[time]),
+                time,
+                span: tissue.span,
+            };
+            tissue.stiffness_at(time).ok_or_else(failed)
+        });
+        let stiffnesses = stiffnesses.collect::<Result<Vec<f64>, Error>>()?;
         let turtle::Skeleton { stems, loads } = noted;
         let mut carried: Vec<Vec<&turtle::Load>> = vec![Vec::new(); stems.len()];
         for load in &loads {
@@ -44,7 +63,7 @@ impl Body {
                     stem.parent,
                     stem.length * metre,
                     stem.width * metre,
-                    tissue.stiffness,
+                    stiffnesses[stem.tissue],
                     tissue.density,
                 )
             });
@@ -54,7 +73,7 @@ impl Body {
         }
         let numbers = stems.iter().enumerate().map(|(i, stem)| (stem.key, i)).collect();
         let known = vec![false; stems.len()];
-        Body { skeleton, stems, numbers, known }
+        Ok(Body { skeleton, stems, numbers, known })
     }
 
     /// Sets the motion that growth prescribes, from the same stems a little earlier.

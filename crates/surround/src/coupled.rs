@@ -48,7 +48,7 @@ struct Coupled {
 
 #[derive(Clone)]
 struct Course {
-    bending: Bending<Arc<Model>>,
+    bending: Bending<'static, Arc<Model>>,
     number: u64,
     tick: Arc<Tick>,
     /// Productions since the present tick.
@@ -64,7 +64,7 @@ impl Coupled {
     }
 
     fn begin(&self, string: &ModuleString) -> Result<Course, Error> {
-        let sampler = Arc::new(Sampler::new(Weather::of(&self.model.scenery)?, self.place));
+        let sampler = Arc::new(Sampler::new(Weather::without_solids(&self.model.scenery)?, self.place));
         let mut bending = Bending::new(self.model.clone(), sampler, self.place, self.solver);
         let number = self.place.first_tick();
         let tick = Arc::new(bending.advance(number, string, None)?);

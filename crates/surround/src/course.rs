@@ -24,7 +24,7 @@ pub(crate) const LOOK_BACK: f64 = 1.0 / 1024.0;
 pub(crate) struct Course<'m> {
     model: &'m Model,
     growth: Simulation<'m>,
-    pub(crate) bending: Bending<&'m Model>,
+    pub(crate) bending: Bending<'m, &'m Model>,
     /// The number of the present tick.
     pub(crate) number: u64,
     pub(crate) tick: Arc<Tick>,
@@ -44,8 +44,8 @@ impl<'m> Course<'m> {
     /// From the first tick.
     pub(crate) fn new(
         model: &'m Model,
-        (growth, bending): (Simulation<'m>, Bending<&'m Model>),
-        flights: &mut Option<Flights>,
+        (growth, bending): (Simulation<'m>, Bending<'m, &'m Model>),
+        flights: &mut Option<Flights<'m>>,
     ) -> Result<Course<'m>, Error> {
         let number = bending.place().first_tick();
         let mut course = Course {
@@ -77,7 +77,7 @@ impl<'m> Course<'m> {
     }
 
     /// Lets growth go on to the next tick. It may fail there, after a time that is asked for.
-    fn look_ahead(&mut self, flights: &mut Option<Flights>) {
+    fn look_ahead(&mut self, flights: &mut Option<Flights<'m>>) {
         let place = *self.bending.place();
         let next = place.time_of(self.number + 1);
         let before = next - LOOK_BACK * CLOCK / place.units.time;
@@ -100,7 +100,7 @@ impl<'m> Course<'m> {
         time: f64,
         string: &mut ModuleString,
         descent: &mut Descent,
-        flights: &mut Option<Flights>,
+        flights: &mut Option<Flights<'m>>,
     ) -> Result<bool, Error> {
         let released = self.pass(time, descent, flights)?;
         if self.model.scenery.tissues.is_empty() {
@@ -119,7 +119,7 @@ impl<'m> Course<'m> {
         &mut self,
         until: f64,
         descent: &mut Descent,
-        flights: &mut Option<Flights>,
+        flights: &mut Option<Flights<'m>>,
     ) -> Result<bool, Error> {
         let model = self.model;
         let mut string = ModuleString::default();
@@ -150,7 +150,7 @@ impl<'m> Course<'m> {
         &mut self,
         (string, until): (&ModuleString, f64),
         descent: &mut Descent,
-        flights: &mut Option<Flights>,
+        flights: &mut Option<Flights<'m>>,
     ) -> Result<(), Error> {
         let model = self.model;
         let place = *self.bending.place();
@@ -189,7 +189,7 @@ impl<'m> Course<'m> {
         &mut self,
         string: &ModuleString,
         descent: &Descent,
-        flights: &mut Flights,
+        flights: &mut Flights<'m>,
     ) -> Result<(BentStems, Vec<FreePart>), Error> {
         let model = self.model;
         let mut strains = bent(&self.tick, descent, &self.bending, string, &mut self.scene)?;
@@ -205,7 +205,7 @@ impl<'m> Course<'m> {
     }
 
     /// Goes on to the next tick; returns the one that is past.
-    pub(crate) fn tick(&mut self, flights: &mut Option<Flights>) -> Result<Past, Error> {
+    pub(crate) fn tick(&mut self, flights: &mut Option<Flights<'m>>) -> Result<Past, Error> {
         let ahead = self.ahead.clone()?;
         let [before, now] = &*ahead;
         let before = (!self.jumps).then_some(before);

@@ -85,6 +85,48 @@ pub enum Error {
         /// The time in units of the model.
         time: f64,
     },
+    /// A tissue whose stiffness is out of range.
+    #[error("the stiffness of the tissue `{tissue}` is {value} Pa at t = {time}")]
+    Stiffness {
+        /// Its name.
+        tissue: String,
+        /// The value in Pa.
+        value: f64,
+        /// The time in units of the model.
+        time: f64,
+        /// The declaration.
+        span: Span,
+    },
+    /// A body that bends or falls, so that its place depends on the wind that it would push.
+    #[error("the body of `{kind}` (module {lineage}) cannot push the wind: it {}", if *.falls { "falls" } else { "bends in it" })]
+    PassiveSolid {
+        /// Name of the kind of the module.
+        kind: String,
+        /// The module itself.
+        lineage: Lineage,
+        /// It is let go; otherwise it stands on stems that give way, or holds one.
+        falls: bool,
+        /// The time in units of the model.
+        time: f64,
+        /// Its name in the declaration.
+        span: Span,
+    },
+    /// Bodies whose growth depends on the wind that they would push.
+    #[error("bodies cannot push the wind of a model whose rules read `strain`")]
+    SolidInLoop {
+        /// The name of the first body in its declaration.
+        span: Span,
+    },
+    /// Too many bodies.
+    #[error("more than {most} bodies push the wind at t = {time}")]
+    TooManySolids {
+        /// The largest number.
+        most: usize,
+        /// The time in units of the model.
+        time: f64,
+        /// The name in the declaration of the first one beyond.
+        span: Span,
+    },
     /// Too many parts are let go.
     #[error("more than {most} parts are let go up to t = {time}")]
     TooManyParts {
@@ -179,6 +221,30 @@ impl Error {
                         .help("`--bend-tolerance 0.01` allows larger errors than the default 0.001"),
                 }
             }
+            Error::Stiffness { tissue, value, time, span } => Diagnostic::error(format!(
+                "the stiffness of the tissue `{tissue}` is {} Pa at t = {}",
+                brief(*value, 6),
+                brief(*time, 8)
+            ))
+            .at(*span, "it follows t")
+            .help("Young's modulus is greater than 0 and at most 1e15 Pa at all times that are computed"),
+            Error::PassiveSolid { falls, time, span, .. } => Diagnostic::error(self.to_string())
+                .at(*span, format!("declared here, and drawn at t = {}", brief(*time, 8)))
+                .note("the wind is pushed by bodies that the equations of the model move")
+                .help(match falls {
+                    true => "give what is let go a module of its own that is not `solid`",
+                    false => "draw the body outside the branch of `@E`, or take its name out of `solid`",
+                }),
+            Error::SolidInLoop { span } => Diagnostic::error(self.to_string())
+                .at(*span, "declared here")
+                .note("its growth would follow the wind, and the wind its bodies, at one and the same time")
+                .help("leave out `solid`, or let the rules do without `strain`"),
+            Error::TooManySolids { most, time, span } => Diagnostic::error(format!(
+                "more than {most} bodies push the wind at t = {}",
+                brief(*time, 8)
+            ))
+            .at(*span, "of this name is the first one beyond")
+            .help("draw several bodies in one module, or name fewer modules"),
             Error::TooManyParts { most, span, .. } => {
                 let diagnostic = Diagnostic::error(self.to_string());
                 let diagnostic = match span {

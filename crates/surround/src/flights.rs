@@ -44,7 +44,7 @@ struct Release {
 }
 
 /// All parts that a model has let go.
-pub(crate) struct Flights {
+pub(crate) struct Flights<'m> {
     /// The kinds that hold an `@D`.
     lets_go: Vec<bool>,
     /// Where the drawing of a module is an interpretation, a part of it goes on in that which takes its place.
@@ -52,7 +52,7 @@ pub(crate) struct Flights {
     releases: Vec<Release>,
     /// The strains with which stems were let go, per unit of length, and when.
     frozen: Arc<Frozen>,
-    wind: Arc<Sampler>,
+    wind: Arc<Sampler<'m>>,
     place: Place,
     settings: fall::Settings,
     scene: Scene,
@@ -70,9 +70,14 @@ pub(crate) struct Flown {
     pub(crate) frozen: Arc<Frozen>,
 }
 
-impl Flights {
+impl<'m> Flights<'m> {
     /// `None` for a model that lets go of nothing.
-    pub(crate) fn new(model: &Model, wind: Arc<Sampler>, place: Place, tolerance: f64) -> Option<Flights> {
+    pub(crate) fn new(
+        model: &Model,
+        wind: Arc<Sampler<'m>>,
+        place: Place,
+        tolerance: f64,
+    ) -> Option<Flights<'m>> {
         let lets_go = turtle::kinds_that_let_go(model);
         let settings = fall::Settings { tolerance: tolerance.clamp(1e-12, 0.1), ..Default::default() };
         lets_go.contains(&true).then(|| Flights {

@@ -28,6 +28,8 @@ mod flights;
 mod loose;
 mod motion;
 mod place;
+mod rigid;
+mod solids;
 mod survey;
 mod weather;
 

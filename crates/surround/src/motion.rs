@@ -87,7 +87,7 @@ pub struct Motion<'m> {
 struct Courses<'m> {
     present: Course<'m>,
     /// What has been let go up to the latest tick, if anything may be. A release is the same whichever course comes by.
-    flights: Option<Flights>,
+    flights: Option<Flights<'m>>,
     /// In the order of time, without gaps, up to the present tick.
     past: VecDeque<Past>,
     /// The sum of the sizes of the past ticks.
@@ -109,7 +109,7 @@ impl<'m> Motion<'m> {
     pub fn new(
         model: &'m Model,
         settings: Settings,
-        weather: Option<Arc<Weather>>,
+        weather: Option<Arc<Weather<'m>>>,
         place: Place,
         passive: Passive,
     ) -> Result<Option<Motion<'m>>, Error> {

@@ -185,7 +185,7 @@ fn owners(body: &Body) -> Vec<usize> {
 
 fn body(model: &Model, string: &ModuleString) -> Result<Body, Error> {
     let noted = turtle::skeleton(model, string, &mut turtle::blank(model))?;
-    Ok(Body::new(noted, model, model.scenery.units.length))
+    Body::new(noted, model, (model.scenery.units.length, string.time))
 }
 
 /// Whether growth moves any stem, or what it carries, between two strings of a model, the second a little later than the first.

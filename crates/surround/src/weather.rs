@@ -1,23 +1,61 @@
 //! The wind that a model declares, as a field in SI.
 
+use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use dlsys_diagnostic::Span;
 use dlsys_expr::Program;
-use dlsys_model::{self as model, Primitive, Scenery, Units};
+use dlsys_model::{self as model, Model, Primitive, Scenery, Units};
+use dlsys_sim::Settings;
 use dlsys_sway as sway;
 use dlsys_wind::{self as wind, Description, Field, Flow, Ground, Signal, Snapshot, Spectrum};
 use nalgebra::Vector3;
 
+use crate::solids::Solids;
 use crate::{Error, Place};
 
-/// The wind of a scene: a pure function of place and time.
+/// The wind of a scene, with its bodies: a pure function of place and time.
+pub struct Weather<'m> {
+    declared: Arc<Declared>,
+    solids: Option<Solids<'m>>,
+    /// The last instants with bodies.
+    recent: Recent,
+}
+
+/// The wind that a model declares, without bodies. Runs of one model share it.
 #[derive(Debug)]
-pub struct Weather {
+struct Declared {
     field: Field,
-    /// The last instants that were asked for; many plants stand in one wind.
-    recent: Mutex<Vec<(f64, Arc<Snapshot>)>>,
+    recent: Recent,
     spans: Spans,
+}
+
+/// The last instants that were asked for; many plants stand in one wind.
+#[derive(Debug, Default)]
+struct Recent(Mutex<VecDeque<(f64, Arc<Snapshot>)>>);
+
+/// Number of instants that are kept: the stages of some ticks, as plants that are drawn one after another read them.
+const KEPT: usize = 48;
+
+impl Recent {
+    /// An instant that is kept, or a new one.
+    fn get_or_make<E>(
+        &self,
+        time: f64,
+        make: impl FnOnce() -> Result<Arc<Snapshot>, E>,
+    ) -> Result<Arc<Snapshot>, E> {
+        let recent = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, known)) = recent().iter().find(|(at, _)| *at == time) {
+            return Ok(known.clone());
+        }
+        let new = make()?;
+        let mut recent = recent();
+        if recent.len() >= KEPT {
+            recent.pop_front();
+        }
+        recent.push_back((time, new.clone()));
+        Ok(new)
+    }
 }
 
 /// The declarations of the wind and of the flows.
@@ -35,18 +73,12 @@ impl Spans {
     }
 }
 
-/// Number of instants that are kept: the stages of some ticks, as plants that are drawn one after another read them.
-const KEPT: usize = 48;
-
-impl Weather {
-    /// The wind and the flows that a model declares; `None` if it declares neither.
-    ///
-    /// # Errors
-    /// A value that is out of range, with the place of its declaration.
-    pub fn of(scenery: &Scenery) -> Result<Option<Arc<Weather>>, Error> {
-        let Scenery { units, wind, flows, ground, .. } = scenery;
+impl Declared {
+    /// The wind and the flows that a model declares; `None` if it declares neither, and no bodies that may move the air.
+    fn of(scenery: &Scenery) -> Result<Option<Arc<Declared>>, Error> {
+        let Scenery { units, wind, flows, ground, solids, .. } = scenery;
         let span = wind.as_ref().map(|wind| wind.span).or(flows.first().map(|flow| flow.span));
-        let Some(span) = span else { return Ok(None) };
+        let Some(span) = span.or(solids.first().map(|(_, span)| *span)) else { return Ok(None) };
         let make = || {
             let mut description = match wind {
                 Some(wind) => of_wind(wind, *units),
@@ -56,31 +88,62 @@ impl Weather {
             description.ground = ground.map(|height| Ground::Flat(height * units.length));
             let spans = Spans { wind: span, flows: flows.iter().map(|flow| flow.span).collect() };
             match Field::new(description) {
-                Ok(field) => Ok(Arc::new(Weather { field, recent: Mutex::default(), spans })),
+                Ok(field) => Ok(Arc::new(Declared { field, recent: Recent::default(), spans })),
                 Err(error) => Err(spans.locate(error)),
             }
         };
         scenery.field.get_or_make(make)
     }
 
-    /// The field.
+    fn at(&self, time: f64) -> Result<Arc<Snapshot>, Error> {
+        let make = || self.field.at(time).map(Arc::new);
+        self.recent.get_or_make(time, make).map_err(|error| self.spans.locate(error))
+    }
+}
+
+impl<'m> Weather<'m> {
+    /// The wind and the flows that a model declares, pushed aside by its bodies as they move in a run with these settings; `None` if it
+    /// declares none of them.
+    ///
+    /// # Errors
+    /// A value that is out of range, with the place of its declaration; bodies of a model whose rules read `strain`.
+    pub fn of(model: &'m Model, settings: Settings) -> Result<Option<Arc<Weather<'m>>>, Error> {
+        let Some(declared) = Declared::of(&model.scenery)? else { return Ok(None) };
+        let solids = Solids::new(model, settings)?;
+        Ok(Some(Arc::new(Weather { declared, solids, recent: Recent::default() })))
+    }
+
+    /// The wind of a model whose rules read `strain`, which has no bodies.
+    pub(crate) fn without_solids(scenery: &Scenery) -> Result<Option<Arc<Weather<'static>>>, Error> {
+        if let Some((_, span)) = scenery.solids.first() {
+            return Err(Error::SolidInLoop { span: *span });
+        }
+        let declared = Declared::of(scenery)?;
+        let weather = |declared| Arc::new(Weather { declared, solids: None, recent: Recent::default() });
+        Ok(declared.map(weather))
+    }
+
+    /// The field without bodies.
     pub fn field(&self) -> &Field {
-        &self.field
+        &self.declared.field
     }
 
     /// The wind at an instant, in s.
-    fn at(&self, time: f64) -> Result<Arc<Snapshot>, wind::Error> {
-        let recent = || self.recent.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, known)) = recent().iter().find(|(at, _)| *at == time) {
-            return Ok(known.clone());
-        }
-        let new = Arc::new(self.field.at(time)?);
-        let mut recent = recent();
-        if recent.len() >= KEPT {
-            recent.remove(0);
-        }
-        recent.push((time, new.clone()));
-        Ok(new)
+    ///
+    /// # Errors
+    /// A value of the wind that is not finite at that time; the growth of the bodies up to that time fails, or one of them cannot push
+    /// the wind.
+    pub fn at(&self, time: f64) -> Result<Arc<Snapshot>, Error> {
+        let free = self.declared.at(time)?;
+        let Some(solids) = &self.solids else { return Ok(free) };
+        let make = || {
+            let bodies = solids.at(time)?;
+            if bodies.is_empty() {
+                return Ok(free);
+            }
+            free.among(&bodies).map(Arc::new).map_err(|error| self.declared.spans.locate(error))
+        };
+        self.recent.get_or_make(time, make)
     }
 }
 
@@ -135,18 +198,18 @@ fn of_flow(flow: &model::Flow, units: Units) -> Flow {
 const CORE: f64 = 0.1;
 
 /// The wind at a place, for a solver that asks for a few instants many times.
-pub struct Sampler {
-    weather: Option<Arc<Weather>>,
+pub struct Sampler<'m> {
+    weather: Option<Arc<Weather<'m>>>,
     /// The last instant.
     last: Mutex<Option<(f64, Arc<Snapshot>)>>,
     /// The reason why the wind had no value at an instant.
-    failure: Mutex<Option<wind::Error>>,
+    failure: Mutex<Option<Error>>,
     place: Place,
 }
 
-impl Sampler {
+impl<'m> Sampler<'m> {
     /// The wind for a model at a place; without weather the air is still.
-    pub fn new(weather: Option<Arc<Weather>>, place: Place) -> Sampler {
+    pub fn new(weather: Option<Arc<Weather<'m>>>, place: Place) -> Sampler<'m> {
         Sampler { weather, last: Mutex::default(), failure: Mutex::default(), place }
     }
 
@@ -158,8 +221,7 @@ impl Sampler {
     /// The reason why the wind had no value, if there was an instant without one: its velocities are not numbers then, and a solver
     /// that depends on them fails.
     pub(crate) fn failure(&self) -> Option<Error> {
-        let error = self.failure.lock().unwrap_or_else(PoisonError::into_inner).clone()?;
-        Some(self.weather.as_ref()?.spans.locate(error))
+        self.failure.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// The wind at an instant, in s; `None` without weather, or if it has no value.
@@ -185,12 +247,12 @@ impl Sampler {
 
 /// The wind in the axes of the scene at instants of a grid, and between them by straight lines: for bodies that fall, each in steps of its own.
 /// Turbulence changes little from one instant to the next, and many bodies read the same ones.
-pub(crate) struct Gusts<'a>(pub(crate) &'a Sampler);
+pub(crate) struct Gusts<'a, 'm>(pub(crate) &'a Sampler<'m>);
 
 /// Instants in a second. Steps of a flight end at parts of a second that are powers of 2, and the longest ones read the wind at these.
 const INSTANTS: f64 = 128.0;
 
-impl sway::Wind for Gusts<'_> {
+impl sway::Wind for Gusts<'_, '_> {
     fn velocity(&self, point: sway::Vector, time: f64) -> sway::Vector {
         let Gusts(sampler) = self;
         if !sampler.blows() {
@@ -207,7 +269,7 @@ impl sway::Wind for Gusts<'_> {
     }
 }
 
-impl sway::Wind for Sampler {
+impl sway::Wind for Sampler<'_> {
     fn velocity(&self, point: sway::Vector, time: f64) -> sway::Vector {
         match self.at(time) {
             Some(snapshot) => self.place.turn.transpose() * snapshot.velocity(self.place.point(point)),

@@ -327,6 +327,8 @@ pub enum Item {
         /// Its values, in the order written.
         attributes: Vec<Attribute>,
     },
+    /// `solid names`: the modules whose drawings are solid bodies.
+    Solid(Vec<Name>),
     /// `ignore names`: the modules that context matching passes over.
     Ignore(Vec<Name>),
     /// `consider names`: the only modules that context matching does not pass over.
@@ -372,6 +374,7 @@ impl Item {
             Item::Wind { .. } => "wind",
             Item::Flow { .. } => "flow",
             Item::Tissue { .. } => "tissue",
+            Item::Solid(_) => "solid",
             Item::Ignore(_) => "ignore",
             Item::Consider(_) => "consider",
             Item::Axiom(_) => "initial",

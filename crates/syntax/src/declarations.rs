@@ -73,7 +73,7 @@ const fn row(word: &'static str, rule: Rule) -> Declaration {
 }
 
 /// All declarations, in the order in which messages list them.
-pub static DECLARATIONS: [Declaration; 29] = [
+pub static DECLARATIONS: [Declaration; 30] = [
     Declaration {
         usage: "\"…\"",
         summary: "the title of the model, shown above its pictures",
@@ -321,6 +321,16 @@ pub static DECLARATIONS: [Declaration; 29] = [
         begins: Begins::BeforeValue,
         written: "a tissue is written `tissue stalk = stiffness 2e8, density 900, damping 0.05`",
         ..row("tissue", Rule::tissue_item)
+    },
+    Declaration {
+        usage: "NAME …",
+        summary: "modules whose drawings are solid bodies: they push the wind aside",
+        category: Category::Scene,
+        repeats: Repeats::Freely,
+        body: Body::Names,
+        begins: Begins::BeforeValue,
+        written: "modules that are solid are written `solid Ball Post`",
+        ..row("solid", Rule::solid_item)
     },
     Declaration {
         usage: "NAME …",

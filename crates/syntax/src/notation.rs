@@ -74,6 +74,7 @@ pub(crate) fn read(builder: &mut Builder, pair: Pair) -> Built<Item> {
         Rule::wind_item => Item::Wind { direction: parts.triple()?, attributes: parts.attributes()? },
         Rule::flow_item => Item::Flow { kind: parts.attribute()?, attributes: parts.attributes()? },
         Rule::tissue_item => Item::Tissue { name: parts.name(), attributes: parts.attributes()? },
+        Rule::solid_item => Item::Solid(parts.names()),
         Rule::ignore_item => Item::Ignore(parts.names()),
         Rule::consider_item => Item::Consider(parts.names()),
         Rule::interpret_item => {
@@ -160,6 +161,7 @@ pub(crate) fn write(expressions: &Expressions, item: &Item) -> String {
         Item::Tissue { name, attributes } => {
             format!("tissue {} = {}", name.text, written(expressions, attributes, ", "))
         }
+        Item::Solid(list) => format!("solid {}", print::names(list, " ")),
         Item::Ignore(list) => format!("ignore {}", print::names(list, " ")),
         Item::Consider(list) => format!("consider {}", print::names(list, " ")),
         Item::Axiom(string) => format!("initial string: {}", print::modules(expressions, string)),

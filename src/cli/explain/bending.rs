@@ -328,6 +328,9 @@ fn part(
     if scene.scenery.wind.is_some() || !scene.scenery.flows.is_empty() {
         reasons.push("the wind moves them".to_owned());
     }
+    if !scene.scenery.solids.is_empty() {
+        reasons.push("so does the air that bodies push aside (`solid`)".to_owned());
+    }
     if !sagging.is_empty() {
         reasons.push(format!("their weight does (`sag`: {})", sagging.join(", ")));
     }
@@ -336,7 +339,7 @@ fn part(
     }
     let when = brief(t, 6);
     if reasons.is_empty() {
-        let why = "there is no wind, no tissue with `sag`, and growth moves nothing: stems keep the shape that is drawn";
+        let why = "there is no wind, no body that is `solid`, no tissue with `sag`, and growth moves nothing: stems keep the shape that is drawn";
         return ScenePart::new(name, "nothing to do", why);
     }
     if survey.is_some_and(|survey| survey.axes().is_empty()) && !moves {

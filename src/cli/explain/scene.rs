@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use crate::model::{Flow, Model, Primitive, Scenery, Spectrum, Tissue, Units, Wind};
+use crate::session::sways;
 use crate::sim::brief;
 
 /// A part of a scene that is declared.
@@ -64,7 +65,28 @@ pub fn parts(model: &Model) -> Vec<ScenePart> {
         add("camera", class, why);
     }
     physics(scenery, &mut parts);
+    parts.extend(solid(model));
     parts
+}
+
+/// The bodies that push the wind aside.
+fn solid(model: &Model) -> Option<ScenePart> {
+    let mut names: Vec<&str> =
+        model.scenery.solids.iter().map(|(kind, _)| &*model.kinds.get(*kind).name).collect();
+    names.dedup();
+    let part = format!("solid {}", names.join(" "));
+    match (names.is_empty(), sways(model)) {
+        (true, _) => None,
+        (_, false) => {
+            let why = "nothing in the scene feels the wind: no stem gives way, and nothing is let go";
+            Some(ScenePart::new(part, "nothing to do", why))
+        }
+        (_, true) => {
+            let why = "the wind flows around the convex hull of each body; their places are those of growth at 120 instants a second, \
+                with straight lines in between";
+            Some(ScenePart::new(part, "in steps", why))
+        }
+    }
 }
 
 /// Units, wind, flows and tissues.
@@ -170,13 +192,18 @@ fn tissue(tissue: &Tissue, number: usize) -> ScenePart {
     /// Diameter in m of the stem whose bending stiffness is shown.
     const STEM: f64 = 1e-3;
     let Tissue { name, stiffness, density, damping, thickness, sag, .. } = tissue;
-    let bending = stiffness * std::f64::consts::PI * STEM.powi(4) / 64.0;
+    let now = stiffness.eval_one(&[0.0]);
+    let bending = now * std::f64::consts::PI * STEM.powi(4) / 64.0;
+    let (class, follows) = match tissue.is_constant() {
+        true => (CONSTANT, ""),
+        false => (FORMULA, " at t = 0, and follows t"),
+    };
     let shape = if *sag { "without weight, which bends it" } else { "at rest under its weight" };
     ScenePart::new(
         format!("tissue {name} ({number})"),
-        CONSTANT,
+        class,
         format!(
-            "{stiffness:e} Pa, {} kg/m³, damping ratio {} at 1 Hz; surfaces are {} mm thick; the drawing is the shape {shape}; \
+            "{now:e} Pa{follows}, {} kg/m³, damping ratio {} at 1 Hz; surfaces are {} mm thick; the drawing is the shape {shape}; \
             a stem of 1 mm has the bending stiffness {} N·m²",
             digits(*density),
             digits(*damping),

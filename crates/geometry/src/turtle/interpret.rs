@@ -4,7 +4,7 @@
 //! depth costs memory by the level and nothing by the module.
 
 use super::command::Command;
-use super::free::FreePart;
+use super::free::{FreePart, SolidBody};
 use super::prepare::prepare;
 use super::skeleton::Skeleton;
 use super::surroundings::surroundings;
@@ -81,6 +81,19 @@ pub(super) fn free_parts(
     let mut walk = Walk::new(model, scene, string.time).bending(strains).recording();
     run(model, string, &mut walk)?;
     Ok(walk.free_parts())
+}
+
+/// See [`super::solids`].
+pub(super) fn solids(
+    model: &Model,
+    string: &ModuleString,
+    scene: &mut Scene,
+) -> Result<Vec<SolidBody>, Error> {
+    scene.clear();
+    prepare(model, scene);
+    let mut walk = Walk::new(model, scene, string.time).recording_solids();
+    run(model, string, &mut walk)?;
+    Ok(walk.solids())
 }
 
 fn begin(model: &Model, string: &ModuleString, scene: &mut Scene) -> Result<(), Error> {

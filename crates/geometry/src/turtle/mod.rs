@@ -78,7 +78,7 @@ use dlsys_diagnostic::Span;
 use dlsys_model::{DETACH, KindId, Model};
 use dlsys_tree::ModuleString;
 pub use error::{Error, ErrorKind};
-pub use free::FreePart;
+pub use free::{FreePart, Passive, SolidBody};
 pub use skeleton::{Form, Load, Origin, Piece, Skeleton, Stem};
 pub use surroundings::surroundings;
 
@@ -174,6 +174,14 @@ pub fn free_parts(
     scene: &mut Scene,
 ) -> Result<Vec<FreePart>, Error> {
     interpret::free_parts(model, string, strains, scene)
+}
+
+/// The bodies of a string: what each of its modules that are `solid` draws, in the shape at rest of stems. `scene` is overwritten.
+///
+/// # Errors
+/// As of [`draw`].
+pub fn solids(model: &Model, string: &ModuleString, scene: &mut Scene) -> Result<Vec<SolidBody>, Error> {
+    interpret::solids(model, string, scene)
 }
 
 /// The kinds of a model that hold an `@D`, themselves or in what they are drawn as, by [`KindId::index`].

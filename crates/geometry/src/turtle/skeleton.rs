@@ -13,7 +13,7 @@ use nalgebra::Matrix3;
 
 use super::bent::StemKey;
 use super::error;
-use super::free::FreePart;
+use super::free::{FreePart, SolidBody};
 use crate::scene::{Mesh, Patch, Placement, Point, Polygon, Scene, Segment, Surface, Vector};
 
 /// The module of the string that draws something.
@@ -120,11 +120,13 @@ pub struct Skeleton {
     pub loads: Vec<Load>,
 }
 
-/// The stem that carries an element, or the free part that it belongs to, if there is one, and the number of its tissue.
+/// The stem that carries an element, or the free part that it belongs to, if there is one, the body that it is a part of, and the number of its
+/// tissue.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Carrier {
     pub(super) stem: Option<usize>,
     pub(super) part: Option<usize>,
+    pub(super) solid: Option<usize>,
     pub(super) tissue: Option<usize>,
 }
 
@@ -133,6 +135,9 @@ pub(super) struct Carrier {
 pub(super) struct Recorder {
     pub(super) stems: Vec<Stem>,
     pub(super) parts: Vec<FreePart>,
+    /// The bodies, if they are noted, and which kinds are solid.
+    pub(super) solids: Vec<SolidBody>,
+    pub(super) solid_kinds: Vec<bool>,
     pub(super) segments: Vec<Carrier>,
     pub(super) surfaces: Vec<Carrier>,
     pub(super) polygons: Vec<Carrier>,

@@ -10,9 +10,9 @@ use super::bent::{Bent, Strains};
 use super::command::Command;
 use super::error::{self, Error, ErrorKind, Remark, Remarks};
 use super::frame::{Axis, Frame};
-use super::free::FreePart;
+use super::free::{FreePart, Passive, SolidBody};
 use super::patch::OpenPatches;
-use super::skeleton::{Recorder, Skeleton};
+use super::skeleton::{Origin, Recorder, Skeleton};
 use super::{COORDINATE_LIMIT, Pose, SMALLEST_LENGTH, shapes};
 use crate::scene::{MaterialId, Owner, OwnerId, Point, Scene, Vector, Width};
 use dlsys_diagnostic::Span;
@@ -108,6 +108,8 @@ pub(super) struct Walk<'a> {
     stems_drawn: u32,
     /// Number of parts that this module has let go, and that the string has.
     parts_drawn: (u32, usize),
+    /// The body that this module draws, by its number in the recorder.
+    solid: Option<usize>,
 }
 
 impl<'a> Walk<'a> {
@@ -154,6 +156,7 @@ impl<'a> Walk<'a> {
             depth: 0,
             stems_drawn: 0,
             parts_drawn: (0, 0),
+            solid: None,
         }
     }
 
@@ -165,6 +168,20 @@ impl<'a> Walk<'a> {
     /// Notes the skeleton of what is drawn; the scene must be empty.
     pub(super) fn recording(self) -> Walk<'a> {
         Walk { recorder: Some(Recorder::default()), ..self }
+    }
+
+    /// Notes the bodies among what is drawn; the scene must be empty.
+    pub(super) fn recording_solids(self) -> Walk<'a> {
+        let mut solid_kinds = vec![false; self.model.kinds.len()];
+        for (kind, _) in &self.model.scenery.solids {
+            solid_kinds[kind.index()] = true;
+        }
+        Walk { recorder: Some(Recorder { solid_kinds, ..Recorder::default() }), ..self }
+    }
+
+    /// The bodies, if they were noted.
+    pub(super) fn solids(self) -> Vec<SolidBody> {
+        self.recorder.map_or_else(Vec::new, |recorder| recorder.finish_solids(self.scene))
     }
 
     /// The skeleton, if it was noted.
@@ -187,6 +204,14 @@ impl<'a> Walk<'a> {
         self.owner = None;
         (self.depth, self.stems_drawn, self.state.joined) = (self.stack.len(), 0, None);
         self.parts_drawn.0 = 0;
+        self.solid = None;
+        if let Some(recorder) = &mut self.recorder
+            && recorder.solid_kinds.get(module.kind.index()) == Some(&true)
+        {
+            let origin = Origin::new(module.kind, module.lineage);
+            recorder.solids.push(SolidBody { origin, points: Vec::new(), passive: None });
+            self.solid = Some(recorder.solids.len() - 1);
+        }
         if self.scene.notes_poses {
             self.start = Some(self.pose());
         }
@@ -207,6 +232,13 @@ impl<'a> Walk<'a> {
     /// The place in the text that says how the present module is drawn.
     fn written(&self) -> Option<Span> {
         error::place(self.model, self.drawn.kind, self.drawn.lineage, self.inside)
+    }
+
+    /// Notes that the body that is being drawn, if there is one, is passive.
+    fn note_passive(&mut self, passive: Passive) {
+        if let (Some(recorder), Some(solid)) = (&mut self.recorder, self.solid) {
+            recorder.solids[solid].passive.get_or_insert(passive);
+        }
     }
 
     /// Ends the string: reports polygons that are still open.

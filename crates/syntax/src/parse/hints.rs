@@ -169,6 +169,9 @@ fn hint_by_symbol(item: Rule, text: &str, at: usize, found: &str) -> Option<Stri
         (_, ":") if matches!(item, Rule::ignore_item | Rule::consider_item) => {
             "write the names after it: `ignore F_x @L`"
         }
+        (_, ",") if matches!(item, Rule::ignore_item | Rule::consider_item | Rule::solid_item) => {
+            "there are spaces between names: `Ball Post`"
+        }
         (_, "<" | ">") if item == Rule::interpret_item => {
             "a drawing does not depend on the context of a module"
         }
@@ -272,7 +275,7 @@ fn hint_by_word(item: Rule, text: &str, at: usize, found: &str) -> Option<String
     let line = before.rsplit('\n').next().unwrap_or(before).trim();
     let last_word = line.rsplit(|c: char| !(c.is_alphanumeric() || c == '_')).next().unwrap_or_default();
     let advice = match found {
-        "ignore" | "consider" => "brackets cannot be chosen: they are no modules",
+        "ignore" | "consider" | "solid" => "brackets cannot be chosen: they are no modules",
         _ if last_word == "not" => "“not” is written `!`",
         "if" | "then" | "else" | "solve" | "produce" if is_item_with_name(item) && !before.contains('=') => {
             "this word is reserved: choose another name"

@@ -3,6 +3,7 @@
 use super::super::bend::Bend;
 use super::super::bent::{self, Bent, StemKey};
 use super::super::error::ErrorKind;
+use super::super::free::Passive;
 use super::super::skeleton::{Carrier, Origin, Stem};
 use super::super::{Error, SMALLEST_LENGTH};
 use super::{DrawnModule, State, Walk};
@@ -186,7 +187,13 @@ impl Walk<'_> {
             self.state.last = Some(self.scene.segments.len());
             self.scene.segments.push(segment);
             let is_load = self.state.tissue.is_none() || self.state.part.is_some();
-            let carrier = if is_load { self.carrier() } else { Carrier::default() };
+            let carrier = match is_load {
+                true => self.carrier(),
+                false => {
+                    self.note_passive(Passive::Bends);
+                    Carrier::default()
+                }
+            };
             if let Some(recorder) = &mut self.recorder {
                 recorder.segments.push(carrier);
             }
@@ -206,9 +213,14 @@ impl Walk<'_> {
     }
 
     /// What carries that which is drawn here.
-    pub(super) fn carrier(&self) -> Carrier {
+    pub(super) fn carrier(&mut self) -> Carrier {
         let State { stem, part, tissue, rigid, .. } = self.state;
-        Carrier { stem: stem.filter(|_| part.is_none()), part, tissue: tissue.or(rigid) }
+        if part.is_some() {
+            self.note_passive(Passive::Falls);
+        } else if stem.is_some() {
+            self.note_passive(Passive::Bends);
+        }
+        Carrier { stem: stem.filter(|_| part.is_none()), part, solid: self.solid, tissue: tissue.or(rigid) }
     }
 
     /// Moves, with compensated summation (Neumaier 1974).
