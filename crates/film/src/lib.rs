@@ -6,6 +6,7 @@
 //! | animated PNG | all | yes |
 //! | animated GIF | 255 in the changes of each frame | no |
 //! | YUV4MPEG2, raw, for encoders of video | all but for the rounding of BT.601 | no |
+//! | AV1 in MP4, behind the feature `video` | lossy | no |
 //!
 //! Frames come one after another, and only the one before is kept, and those that are being encoded. Of a frame only the pixels that have changed are written, except in raw video: the others are
 //! transparent in the rectangle around them.
@@ -29,6 +30,8 @@
 
 mod apng;
 mod gif;
+#[cfg(feature = "video")]
+mod mp4;
 mod palette;
 mod pipeline;
 mod rectangle;
@@ -51,11 +54,18 @@ pub enum Format {
     Gif,
     /// YUV4MPEG2: raw video.
     Y4m,
+    /// AV1 in MP4.
+    #[cfg(feature = "video")]
+    Mp4,
 }
 
 impl Format {
     /// All formats.
+    #[cfg(not(feature = "video"))]
     pub const ALL: [Format; 4] = [Format::Webp, Format::Apng, Format::Gif, Format::Y4m];
+    /// All formats.
+    #[cfg(feature = "video")]
+    pub const ALL: [Format; 5] = [Format::Webp, Format::Apng, Format::Gif, Format::Y4m, Format::Mp4];
 
     /// The extension of files, which is also the name of the format.
     pub fn extension(self) -> &'static str {
@@ -64,6 +74,8 @@ impl Format {
             Format::Apng => "apng",
             Format::Gif => "gif",
             Format::Y4m => "y4m",
+            #[cfg(feature = "video")]
+            Format::Mp4 => "mp4",
         }
     }
 
@@ -77,6 +89,10 @@ impl Format {
             Format::Gif => "A film in one file: animated GIF, at most 255 colours in the changes of a frame",
             Format::Y4m => {
                 "A film in one file: raw video; with -o - for a pipe into ffmpeg and other encoders"
+            }
+            #[cfg(feature = "video")]
+            Format::Mp4 => {
+                "A film in one file: video, AV1 in MP4, lossy and smallest; web pages, players and slides play it"
             }
         }
     }
@@ -93,6 +109,8 @@ impl Format {
             Format::Apng => start.starts_with(b"\x89PNG") && start.get(37..41) == Some(b"acTL"),
             Format::Gif => start.starts_with(b"GIF8"),
             Format::Y4m => start.starts_with(b"YUV4MPEG2"),
+            #[cfg(feature = "video")]
+            Format::Mp4 => start.get(4..8) == Some(b"ftyp"),
         }
     }
 }
@@ -212,6 +230,12 @@ impl<'w> Film<'w> {
             Format::Apng => Box::new(apng::Apng::new(out, shape, ends.len())?),
             Format::Gif => Box::new(gif::Gif::new(out, shape)?),
             Format::Y4m => Box::new(y4m::Y4m::new(out, shape, &ends)?),
+            #[cfg(feature = "video")]
+            Format::Mp4 if shape.width.min(shape.height) < mp4::LEAST => {
+                return Err(invalid(format!("mp4 films have at least {} pixels on a side", mp4::LEAST)));
+            }
+            #[cfg(feature = "video")]
+            Format::Mp4 => Box::new(mp4::Mp4::new(out, shape, &ends, threads)?),
         };
         Ok(Film { encoder, shape, ends, next: 0, before: Vec::new() })
     }
