@@ -1,5 +1,8 @@
 //! Films in one file, decoded again, against the PNG frames of the same render.
 
+#[path = "../../crates/film/src/tests/reader.rs"]
+mod reader;
+
 use std::fs;
 use std::io::Cursor;
 
@@ -8,12 +11,16 @@ use crate::cli::{bad, good};
 const RENDER: [&str; 7] =
     ["render", "models/leaf.dls", "--at", "0.5,1.2,1.2000001,3,6", "--size", "90x70", "--format"];
 
+/// The first picture of a file, with the opacity of each pixel.
 fn png(path: &std::path::Path) -> Vec<u8> {
     let file = fs::read(path).expect("a file");
     let mut reader = png::Decoder::new(Cursor::new(file)).read_info().expect("PNG");
     let mut data = vec![0; reader.output_buffer_size().expect("small")];
     reader.next_frame(&mut data).expect("a picture");
-    data
+    match reader.info().color_type {
+        png::ColorType::Rgb => data.chunks_exact(3).flat_map(|rgb| [rgb[0], rgb[1], rgb[2], 255]).collect(),
+        _ => data,
+    }
 }
 
 #[test]
@@ -30,14 +37,8 @@ fn films_show_the_frames_bit_for_bit() {
         let said = render("webp", &at("a.webp"));
         assert!(said.contains("5 frames of 90x70 pixels"), "{said}");
         let file = fs::read(at("a.webp")).expect("a file");
-        let mut decoder = image_webp::WebPDecoder::new(Cursor::new(&file[..])).expect("WebP");
-        assert_eq!(decoder.num_frames(), 5);
-        let mut milliseconds = Vec::new();
-        for frame in &frames {
-            let mut decoded = vec![0; frame.len()];
-            milliseconds.push(decoder.read_frame(&mut decoded).expect("a frame"));
-            assert!(decoded == *frame);
-        }
+        let (pictures, milliseconds) = reader::read(&file);
+        assert!(pictures == frames);
         assert_eq!(milliseconds, [700, 1, 1799, 3000, 3000]);
         good(
             &[&RENDER[..], &["webp", "-o", &at("b.webp"), "--threads", "1", "--background", background]]

@@ -4,10 +4,12 @@
 //! |---|---|---|
 //! | animated WebP, lossless | all | yes |
 //! | animated PNG | all | yes |
-//! | animated GIF | 256 in each frame | no |
+//! | animated GIF | 255 in the changes of each frame | no |
 //! | YUV4MPEG2, raw, for encoders of video | all but for the rounding of BT.601 | no |
+//! | AV1 in MP4, behind the feature `video` | lossy | no |
 //!
-//! Frames come one after another, and only the one before is kept. Of a frame only the rectangle that has changed is written, except in raw video.
+//! Frames come one after another, and only the one before is kept, and those that are being encoded. Of a frame only the pixels that have changed are written, except in raw video: the others are
+//! transparent in the rectangle around them.
 //!
 //! ```
 //! use dlsys_film::{Film, Format, Shape};
@@ -15,7 +17,7 @@
 //! # fn main() -> std::io::Result<()> {
 //! let mut file = std::io::Cursor::new(Vec::new());
 //! let shape = Shape { width: 2, height: 1, has_alpha: false };
-//! let mut film = Film::begin(Format::Webp, &mut file, shape, vec![0.5, 1.0])?;
+//! let mut film = Film::begin(Format::Webp, &mut file, shape, vec![0.5, 1.0], 2)?;
 //! film.add(&[255, 0, 0, 255, 0, 0])?;
 //! film.add(&[255, 0, 0, 0, 0, 255])?;
 //! film.finish()?;
@@ -28,7 +30,12 @@
 
 mod apng;
 mod gif;
+#[cfg(feature = "video")]
+mod mp4;
+mod palette;
+mod pipeline;
 mod rectangle;
+mod vp8l;
 mod webp;
 mod y4m;
 
@@ -47,11 +54,18 @@ pub enum Format {
     Gif,
     /// YUV4MPEG2: raw video.
     Y4m,
+    /// AV1 in MP4.
+    #[cfg(feature = "video")]
+    Mp4,
 }
 
 impl Format {
     /// All formats.
+    #[cfg(not(feature = "video"))]
     pub const ALL: [Format; 4] = [Format::Webp, Format::Apng, Format::Gif, Format::Y4m];
+    /// All formats.
+    #[cfg(feature = "video")]
+    pub const ALL: [Format; 5] = [Format::Webp, Format::Apng, Format::Gif, Format::Y4m, Format::Mp4];
 
     /// The extension of files, which is also the name of the format.
     pub fn extension(self) -> &'static str {
@@ -60,6 +74,8 @@ impl Format {
             Format::Apng => "apng",
             Format::Gif => "gif",
             Format::Y4m => "y4m",
+            #[cfg(feature = "video")]
+            Format::Mp4 => "mp4",
         }
     }
 
@@ -70,9 +86,13 @@ impl Format {
                 "A film in one file: animated WebP, lossless and small; browsers play it in <img>"
             }
             Format::Apng => "A film in one file: animated PNG, lossless",
-            Format::Gif => "A film in one file: animated GIF, at most 256 colours in a frame",
+            Format::Gif => "A film in one file: animated GIF, at most 255 colours in the changes of a frame",
             Format::Y4m => {
                 "A film in one file: raw video; with -o - for a pipe into ffmpeg and other encoders"
+            }
+            #[cfg(feature = "video")]
+            Format::Mp4 => {
+                "A film in one file: video, AV1 in MP4, lossy and smallest; web pages, players and slides play it"
             }
         }
     }
@@ -89,6 +109,8 @@ impl Format {
             Format::Apng => start.starts_with(b"\x89PNG") && start.get(37..41) == Some(b"acTL"),
             Format::Gif => start.starts_with(b"GIF8"),
             Format::Y4m => start.starts_with(b"YUV4MPEG2"),
+            #[cfg(feature = "video")]
+            Format::Mp4 => start.get(4..8) == Some(b"ftyp"),
         }
     }
 }
@@ -127,6 +149,37 @@ struct Frame<'a> {
     end: f64,
 }
 
+/// Opacity, red, green and blue, from the highest byte to the lowest.
+fn colour(pixel: &[u8]) -> u32 {
+    let opacity = pixel.get(3).copied().unwrap_or(u8::MAX);
+    u32::from_be_bytes([opacity, pixel[0], pixel[1], pixel[2]])
+}
+
+impl Frame<'_> {
+    fn colours<'p>(&self, part: Rectangle, pixels: &'p [u8]) -> impl Iterator<Item = u32> + use<'p> {
+        let channels = self.shape.channels();
+        part.rows(pixels, self.shape).flat_map(move |row| row.chunks_exact(channels)).map(colour)
+    }
+
+    /// The pixels of a rectangle.
+    fn cut(&self, part: Rectangle) -> Vec<u32> {
+        self.colours(part, self.pixels).collect()
+    }
+
+    /// The pixels of a rectangle, those that have not changed with opacity 0. None in the first frame, and where a change makes a pixel transparent: laid over the
+    /// pixel below, it would not replace it.
+    fn over(&self, part: Rectangle) -> Option<Vec<u32>> {
+        let pairs = self.colours(part, self.before?).zip(self.colours(part, self.pixels));
+        pairs
+            .map(|(old, new)| match new >> 24 {
+                _ if old == new => Some(0),
+                255 => Some(new),
+                _ => None,
+            })
+            .collect()
+    }
+}
+
 /// One format.
 trait Encoder {
     fn add(&mut self, frame: &Frame<'_>) -> io::Result<()>;
@@ -147,7 +200,8 @@ fn invalid(message: String) -> io::Error {
 }
 
 impl<'w> Film<'w> {
-    /// Begins a film whose frames end at these ascending times, in seconds.
+    /// Begins a film whose frames end at these ascending times, in seconds. They are encoded on this many threads where the format takes most of the time (WebP); the
+    /// file does not depend on it.
     ///
     /// # Errors
     /// If there are no frames, if the shape is impossible in the format, or those of `out`. Formats other than WebP never seek.
@@ -156,6 +210,7 @@ impl<'w> Film<'w> {
         out: &'w mut W,
         shape: Shape,
         ends: Vec<f64>,
+        threads: usize,
     ) -> io::Result<Film<'w>> {
         if ends.is_empty() || shape.width == 0 || shape.height == 0 {
             return Err(invalid("a film without frames, or without pixels".to_owned()));
@@ -171,10 +226,16 @@ impl<'w> Film<'w> {
             )));
         }
         let encoder: Box<dyn Encoder + 'w> = match format {
-            Format::Webp => Box::new(webp::Webp::new(out, shape)?),
+            Format::Webp => Box::new(webp::Webp::new(out, shape, threads)?),
             Format::Apng => Box::new(apng::Apng::new(out, shape, ends.len())?),
             Format::Gif => Box::new(gif::Gif::new(out, shape)?),
             Format::Y4m => Box::new(y4m::Y4m::new(out, shape, &ends)?),
+            #[cfg(feature = "video")]
+            Format::Mp4 if shape.width.min(shape.height) < mp4::LEAST => {
+                return Err(invalid(format!("mp4 films have at least {} pixels on a side", mp4::LEAST)));
+            }
+            #[cfg(feature = "video")]
+            Format::Mp4 => Box::new(mp4::Mp4::new(out, shape, &ends, threads)?),
         };
         Ok(Film { encoder, shape, ends, next: 0, before: Vec::new() })
     }

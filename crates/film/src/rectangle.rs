@@ -25,13 +25,6 @@ impl Rectangle {
         let rows = pixels.chunks_exact(shape.width as usize * channels);
         rows.skip(self.top as usize).take(self.height as usize).map(move |row| &row[left..left + width])
     }
-
-    /// Its pixels, row by row.
-    pub(crate) fn cut(self, pixels: &[u8], shape: Shape) -> Vec<u8> {
-        let mut cut = Vec::with_capacity(self.width as usize * self.height as usize * shape.channels());
-        self.rows(pixels, shape).for_each(|row| cut.extend_from_slice(row));
-        cut
-    }
 }
 
 /// The smallest rectangle around all pixels that differ; the first pixel where none do.

@@ -1,22 +1,26 @@
-//! Animated WebP: lossless frames (VP8L) of `image-webp` in a container of our own (Google, *WebP Container Specification*, 2024).
+//! Animated WebP: lossless frames ([`vp8l`]) in its container (RFC 9649, section 2).
 
 use std::io::{self, Seek, SeekFrom, Write};
 
-use image_webp::{ColorType, WebPEncoder};
-
-use crate::{Encoder, Frame, Shape, Ticks};
+use crate::pipeline::Pipeline;
+use crate::{Encoder, Frame, Shape, Ticks, vp8l};
 
 const HAS_ANIMATION: u8 = 0x02;
 const HAS_ALPHA: u8 = 0x10;
-/// A frame replaces the pixels below it.
+/// A frame replaces the pixels below it; else opaque ones do, and those of opacity 0 leave them.
 const REPLACES: u8 = 0x02;
+/// Place of the first byte of flags.
+const FLAGS: u64 = 20;
 
 pub(crate) struct Webp<'w, W> {
     out: &'w mut W,
     /// Bytes behind the first eight.
     bytes: u64,
     begun: u64,
+    flags: u8,
     ticks: Ticks,
+    /// Frames with the head of each.
+    frames: Pipeline<Vec<u8>>,
 }
 
 /// The lower 24 bits.
@@ -26,12 +30,14 @@ fn three(x: u32) -> [u8; 3] {
 }
 
 impl<'w, W: Write + Seek> Webp<'w, W> {
-    pub(crate) fn new(out: &'w mut W, shape: Shape) -> io::Result<Webp<'w, W>> {
+    pub(crate) fn new(out: &'w mut W, shape: Shape, threads: usize) -> io::Result<Webp<'w, W>> {
         let begun = out.stream_position()?;
         // The size is not known yet.
         out.write_all(b"RIFF\0\0\0\0WEBP")?;
-        let mut webp = Webp { out, bytes: 4, begun, ticks: Ticks::new(1000.0, [1, 0xff_ffff]) };
-        let mut head = vec![HAS_ANIMATION | if shape.has_alpha { HAS_ALPHA } else { 0 }, 0, 0, 0];
+        let flags = HAS_ANIMATION | if shape.has_alpha { HAS_ALPHA } else { 0 };
+        let (ticks, frames) = (Ticks::new(1000.0, [1, 0xff_ffff]), Pipeline::new(threads));
+        let mut webp = Webp { out, bytes: 4, begun, flags, ticks, frames };
+        let mut head = vec![flags, 0, 0, 0];
         head.extend(three(shape.width - 1));
         head.extend(three(shape.height - 1));
         webp.chunk(b"VP8X", &head)?;
@@ -56,27 +62,43 @@ impl<'w, W: Write + Seek> Webp<'w, W> {
 impl<W: Write + Seek> Encoder for Webp<'_, W> {
     fn add(&mut self, frame: &Frame<'_>) -> io::Result<()> {
         let part = frame.changed.even();
-        let mut still = Vec::new();
-        let color = if frame.shape.has_alpha { ColorType::Rgba8 } else { ColorType::Rgb8 };
-        WebPEncoder::new(&mut still)
-            .encode(&part.cut(frame.pixels, frame.shape), part.width, part.height, color)
-            .map_err(io::Error::other)?;
-        let mut data = Vec::with_capacity(16 + still.len());
+        let over = frame.over(part);
+        let is_over = over.is_some();
+        if is_over {
+            // Pixels that leave those below count as transparent, even if nothing in the film is.
+            self.flags |= HAS_ALPHA;
+        }
+        let pixels = over.unwrap_or_else(|| frame.cut(part));
+        let mut data = Vec::new();
         for number in [part.left / 2, part.top / 2, part.width - 1, part.height - 1] {
             data.extend(three(number));
         }
         data.extend(three(self.ticks.up_to(frame.end)));
-        data.push(REPLACES);
-        // Behind the head of the still file there is one chunk, which is also the frame of an animation.
-        data.extend(still.get(12..).unwrap_or_default());
-        self.chunk(b"ANMF", &data)
+        data.push(if is_over { 0 } else { REPLACES });
+        let encode = move || {
+            let picture = vp8l::encode(&pixels, part.width as usize, is_over);
+            data.extend(b"VP8L");
+            data.extend((picture.len() as u32).to_le_bytes());
+            data.extend(&picture);
+            data.extend((picture.len() % 2 == 1).then_some(0));
+            data
+        };
+        match self.frames.push(encode) {
+            Some(data) => self.chunk(b"ANMF", &data),
+            None => Ok(()),
+        }
     }
 
-    fn finish(self: Box<Self>) -> io::Result<()> {
+    fn finish(mut self: Box<Self>) -> io::Result<()> {
+        while let Some(data) = self.frames.pop() {
+            self.chunk(b"ANMF", &data)?;
+        }
         let bytes = u32::try_from(self.bytes)
             .map_err(|_| io::Error::other("a WebP file has at most 4 GiB: fewer or smaller frames"))?;
         self.out.seek(SeekFrom::Start(self.begun + 4))?;
         self.out.write_all(&bytes.to_le_bytes())?;
+        self.out.seek(SeekFrom::Start(self.begun + FLAGS))?;
+        self.out.write_all(&[self.flags])?;
         self.out.seek(SeekFrom::End(0))?;
         self.out.flush()
     }

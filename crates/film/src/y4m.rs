@@ -31,7 +31,7 @@ fn ratio(rate: f64) -> (u64, u64) {
 }
 
 /// Brightness and the two differences of colour.
-fn yuv(rgb: &[u8]) -> [u8; 3] {
+pub(crate) fn yuv(rgb: &[u8]) -> [u8; 3] {
     let [r, g, b] = [rgb[0], rgb[1], rgb[2]].map(f64::from);
     let y = 0.299 * r + 0.587 * g + 0.114 * b;
     let blue = (b - y) / (2.0 * (1.0 - 0.114));

@@ -137,7 +137,8 @@ fn film(
         io::ErrorKind::InvalidInput => usage(error),
         _ => Failure::Model(format!("error: cannot write the film: {error}\n")),
     };
-    let mut film = Film::begin(format, target, shape, ends(render.args, render.run)).map_err(failed)?;
+    let ends = ends(render.args, render.run);
+    let mut film = Film::begin(format, target, shape, ends, render.threads).map_err(failed)?;
     let mut progress = render.bar("writing", render.run.times.len());
     let stats = play(
         render.run,

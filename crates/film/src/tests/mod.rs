@@ -1,5 +1,7 @@
 //! Films, decoded again by the readers of the crates that wrote their frames.
 
+mod reader;
+
 use std::io::Cursor;
 
 use super::*;
@@ -25,7 +27,7 @@ fn frames(shape: Shape) -> Vec<Vec<u8>> {
 fn film(format: Format, shape: Shape, frames: &[Vec<u8>]) -> Vec<u8> {
     let mut out = Cursor::new(Vec::new());
     let ends = (1..=frames.len()).map(|i| i as f64 / 30.0).collect();
-    let mut film = Film::begin(format, &mut out, shape, ends).expect("a film");
+    let mut film = Film::begin(format, &mut out, shape, ends, 2).expect("a film");
     frames.iter().for_each(|frame| film.add(frame).expect("a frame"));
     film.finish().expect("an end");
     let bytes = out.into_inner();
@@ -36,23 +38,24 @@ fn film(format: Format, shape: Shape, frames: &[Vec<u8>]) -> Vec<u8> {
 const SHAPES: [Shape; 2] =
     [Shape { width: 33, height: 21, has_alpha: false }, Shape { width: 32, height: 27, has_alpha: true }];
 
+/// A frame as it is decoded: with the opacity of each pixel.
+fn with_opacity(frame: &[u8], shape: Shape) -> Vec<u8> {
+    let pixels = frame.chunks_exact(shape.channels());
+    pixels.flat_map(|pixel| colour(pixel).rotate_left(8).to_be_bytes()).collect()
+}
+
 #[test]
 fn webp_films_are_lossless() {
     for shape in SHAPES {
         let frames = frames(shape);
         let file = film(Format::Webp, shape, &frames);
-        let length = u32::from_le_bytes([file[4], file[5], file[6], file[7]]);
-        assert_eq!(length as usize + 8, file.len());
-        let mut decoder = image_webp::WebPDecoder::new(Cursor::new(file)).expect("WebP");
+        let decoder = image_webp::WebPDecoder::new(Cursor::new(&file[..])).expect("WebP");
         assert_eq!(decoder.dimensions(), (shape.width, shape.height));
-        assert_eq!((decoder.num_frames() as usize, decoder.has_alpha()), (frames.len(), shape.has_alpha));
-        let mut sum = 0;
-        for frame in &frames {
-            let mut decoded = vec![0; shape.bytes()];
-            sum += decoder.read_frame(&mut decoded).expect("a frame");
-            assert!(decoded == *frame);
-        }
-        assert_eq!(sum, 167, "five thirtieths of a second, without drift");
+        assert_eq!((decoder.num_frames() as usize, decoder.has_alpha()), (frames.len(), true));
+        let (pictures, milliseconds) = reader::read(&file);
+        assert_eq!(pictures.len(), frames.len());
+        assert!(pictures.iter().zip(&frames).all(|(picture, frame)| *picture == with_opacity(frame, shape)));
+        assert_eq!(milliseconds.iter().sum::<u32>(), 167, "five thirtieths of a second, without drift");
     }
 }
 
@@ -64,20 +67,22 @@ fn apng_films_are_lossless() {
         let mut reader = png::Decoder::new(Cursor::new(file)).read_info().expect("PNG");
         let control = *reader.info().animation_control().expect("animated");
         assert_eq!((control.num_frames as usize, control.num_plays), (frames.len(), 0));
-        let mut canvas = vec![0; shape.bytes()];
+        let mut canvas = vec![0; shape.width as usize * shape.height as usize * 4];
         for frame in &frames {
-            let mut part = vec![0; shape.bytes()];
+            let mut part = vec![0; canvas.len()];
             reader.next_frame(&mut part).expect("a frame");
             let control = *reader.info().frame_control().expect("a frame");
-            assert_eq!(control.blend_op, png::BlendOp::Source);
-            let channels = shape.channels();
-            let row = control.width as usize * channels;
-            for y in 0..control.height as usize {
-                let at = ((control.y_offset as usize + y) * shape.width as usize + control.x_offset as usize)
-                    * channels;
-                canvas[at..at + row].copy_from_slice(&part[y * row..(y + 1) * row]);
+            let is_over = control.blend_op == png::BlendOp::Over;
+            let width = control.width as usize;
+            for (i, pixel) in part.chunks_exact(4).take(width * control.height as usize).enumerate() {
+                let (x, y) = (control.x_offset as usize + i % width, control.y_offset as usize + i / width);
+                assert!(!is_over || matches!(pixel[3], 0 | 255), "nothing is mixed");
+                if !is_over || pixel[3] > 0 {
+                    let at = (y * shape.width as usize + x) * 4;
+                    canvas[at..at + 4].copy_from_slice(pixel);
+                }
             }
-            assert!(canvas == *frame);
+            assert!(canvas == with_opacity(frame, shape));
         }
     }
 }
@@ -106,6 +111,31 @@ fn gif_films_keep_the_colours_of_few() {
     assert!(decoder.read_next_frame().expect("GIF").is_none());
 }
 
+/// A film of one frame, and one whose frames have nothing in common, and more colours than a palette.
+#[test]
+fn gif_films_are_near_to_many_colours() {
+    let shape = Shape { width: 64, height: 64, has_alpha: false };
+    let frame = |k: u32| -> Vec<u8> {
+        (0..64 * 64_u32).flat_map(|i| [i % 64 * 4, i / 64 * 4, (i % 64 + k) * 2].map(|x| x as u8)).collect()
+    };
+    for frames in [vec![frame(0)], vec![frame(0), frame(30)]] {
+        let file = film(Format::Gif, shape, &frames);
+        let mut options = ::gif::DecodeOptions::new();
+        options.set_color_output(::gif::ColorOutput::RGBA);
+        let mut decoder = options.read_info(&file[..]).expect("GIF");
+        let mut canvas = vec![0; shape.bytes()];
+        for frame in &frames {
+            let part = decoder.read_next_frame().expect("GIF").expect("a frame");
+            assert_eq!((part.width, part.height), (64, 64), "all has changed");
+            for (i, pixel) in part.buffer.chunks_exact(4).enumerate().filter(|(_, pixel)| pixel[3] > 0) {
+                canvas[3 * i..3 * i + 3].copy_from_slice(&pixel[..3]);
+            }
+            let worst = canvas.iter().zip(frame).map(|(a, b)| a.abs_diff(*b)).max();
+            assert!(worst <= Some(16), "{worst:?}");
+        }
+    }
+}
+
 #[test]
 fn raw_video_has_three_planes_a_frame() {
     let shape = SHAPES[0];
@@ -119,11 +149,11 @@ fn raw_video_has_three_planes_a_frame() {
 fn impossible_films_are_errors() {
     let shape = SHAPES[1];
     let mut out = Cursor::new(Vec::new());
-    assert!(Film::begin(Format::Gif, &mut out, shape, vec![1.0]).is_err(), "transparent");
-    assert!(Film::begin(Format::Webp, &mut out, shape, Vec::new()).is_err(), "no frames");
+    assert!(Film::begin(Format::Gif, &mut out, shape, vec![1.0], 1).is_err(), "transparent");
+    assert!(Film::begin(Format::Webp, &mut out, shape, Vec::new(), 1).is_err(), "no frames");
     let wide = Shape { width: 20_000, height: 1, has_alpha: false };
-    assert!(Film::begin(Format::Webp, &mut out, wide, vec![1.0]).is_err(), "too wide");
-    let mut film = Film::begin(Format::Apng, &mut out, shape, vec![1.0, 2.0]).expect("a film");
+    assert!(Film::begin(Format::Webp, &mut out, wide, vec![1.0], 1).is_err(), "too wide");
+    let mut film = Film::begin(Format::Apng, &mut out, shape, vec![1.0, 2.0], 1).expect("a film");
     assert!(film.add(&[0; 7]).is_err(), "another size");
     film.add(&vec![0; shape.bytes()]).expect("a frame");
     assert!(film.finish().is_err(), "a frame is missing");
