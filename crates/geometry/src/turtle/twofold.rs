@@ -60,6 +60,14 @@ impl Twofold {
     /// `self * a + other * b`
     fn combined(&self, a: f64, other: &Twofold, b: f64) -> Twofold {
         let mut result = *self;
+        if a == 0.0 && b.abs() == 1.0 {
+            // A right angle: all products are exact, and the sums of the general way are these.
+            for i in 0..3 {
+                let low = 0.0 + self.low[i] * a + other.low[i] * b;
+                (result.high[i], result.low[i]) = two_sum(self.high[i] * a + other.high[i] * b, low);
+            }
+            return result;
+        }
         let [by_a, by_b] = [a, b].map(Split::new);
         for i in 0..3 {
             let (p, p_error) = Split::new(self.high[i]).times(by_a);
@@ -71,22 +79,26 @@ impl Twofold {
         result
     }
 
-    /// Length, squared, minus 1: the excess of a vector that is nearly of unit length.
-    fn excess(&self) -> f64 {
+    /// Brings a nearly unit vector to unit length (one step of Newton's method): with its length, squared, minus 1, times -1/2 of it is added.
+    fn unit(&self) -> Twofold {
+        let splits = [0, 1, 2].map(|i| Split::new(self.high[i]));
         let (mut sum, mut low) = (-1.0, 0.0);
-        for i in 0..3 {
-            let high = Split::new(self.high[i]);
+        for (i, high) in splits.into_iter().enumerate() {
             let (square, square_error) = high.times(high);
             let (next, error) = two_sum(sum, square);
             sum = next;
             low += error + square_error + 2.0 * self.high[i] * self.low[i];
         }
-        sum + low
-    }
-
-    /// Brings a nearly unit vector to unit length (one step of Newton's method).
-    fn unit(&self) -> Twofold {
-        self.combined(1.0, self, -0.5 * self.excess())
+        let factor = -0.5 * (sum + low);
+        let mut result = *self;
+        let by_factor = Split::new(factor);
+        for (i, high) in splits.into_iter().enumerate() {
+            let (q, q_error) = high.times(by_factor);
+            let (sum, error) = two_sum(self.high[i], q);
+            let low = error + 0.0 + q_error + self.low[i] + self.low[i] * factor;
+            (result.high[i], result.low[i]) = two_sum(sum, low);
+        }
+        result
     }
 
     /// Two vectors turned in their plane, the first towards the second.
