@@ -200,6 +200,15 @@ pub(super) fn field_of_view(text: &str) -> Result<f64, String> {
     }
 }
 
+pub(super) fn turn(text: &str) -> Result<f64, String> {
+    /// A hundred turns.
+    const MOST: f64 = 36_000.0;
+    match number(text)? {
+        x if x.abs() <= MOST => Ok(x),
+        _ => Err(format!("must be between -{MOST} and {MOST} degrees; a full turn has 360")),
+    }
+}
+
 pub(super) fn layout(text: &str) -> Result<Layout, String> {
     let names: Vec<&str> = Layout::NAMED.iter().map(|(name, _)| *name).collect();
     let found = Layout::NAMED.iter().find(|(name, _)| *name == text);

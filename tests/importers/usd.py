@@ -7,6 +7,12 @@ import numpy as np
 from pxr import Usd, UsdGeom
 
 
+def name_of(prim):
+    """The name of a module, from that of its prim."""
+    found = re.fullmatch(r"(.+)_([0-9a-z]{13})((_\d+)?)", prim)
+    return f"{found[1]}.{found[2]}{found[3].replace('_', '.')}" if found else prim
+
+
 class UsdFile:
     def __init__(self, path):
         self.stage = Usd.Stage.Open(path)
@@ -22,7 +28,7 @@ class UsdFile:
         for prim in self.stage.GetPrimAtPath("/Plant").GetChildren():
             parts = [prim] if prim.IsA(UsdGeom.Mesh) else [p for p in prim.GetChildren() if p.IsA(UsdGeom.Mesh)]
             vertices, triangles, count, stem = [], [], 0, False
-            for part in parts:
+            for part in sorted(parts, key=lambda part: part.GetName()):
                 mesh, matrix = UsdGeom.Mesh(part), np.array(cache.GetLocalToWorldTransform(part))
                 hidden = mesh.ComputeVisibility(code) == "invisible" or abs(np.linalg.det(matrix[:3, :3])) < 1e-30
                 if hidden:
@@ -33,8 +39,7 @@ class UsdFile:
                 count += len(places)
                 stem = stem or not (mesh.GetNormalsAttr().GetNumTimeSamples() or part.HasAttribute("xformOp:scale"))
             if vertices:
-                found = re.fullmatch(r"(.+)_([0-9a-z]{13})((_\d+)?)", prim.GetName())
-                name = f"{found[1]}.{found[2]}{found[3].replace('_', '.')}" if found else prim.GetName()
+                name = name_of(prim.GetName())
                 shown[name] = np.vstack(vertices), np.vstack(triangles), {"name": name, "stem": stem}
         return shown
 

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# usd.sh [VENV]: writes some models as USD files, runs the validators of OpenUSD on them and compares them with OBJ files at random times. VENV is a
-# Python environment with usd-core and numpy; without it one is made in a temporary folder, from PyPI. DLSYS is the program.
+# usd.sh [VENV [BLENDER]]: writes some models as USD files, runs the validators of OpenUSD on them and compares them with OBJ files at random times. VENV is a
+# Python environment with usd-core and numpy; without it one is made in a temporary folder, from PyPI. BLENDER is one with bpy and numpy; without it Blender is left
+# out. DLSYS is the program.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 models=$here/../../models
@@ -20,3 +21,11 @@ done
 for model in leaf lychnis campanula; do
     "$venv/bin/python" "$here/compare.py" "$dlsys" "$models/$model.dls" "$out/$model.usda"
 done
+if [ -x "${2:-}/bin/python" ]; then
+    for model in leaf lychnis campanula; do
+        "$2/bin/python" "$here/blender_usd.py" show "$out/$model.usda" "$out/$model.npz"
+        "$venv/bin/python" "$here/blender_usd.py" compare "$out/$model.usda" "$out/$model.npz"
+    done
+else
+    echo "SKIPPED: no Python with bpy and numpy is named for Blender"
+fi

@@ -73,6 +73,12 @@ impl Camera {
         Camera { view, eye: Some(Eye { x, y, focus, distance }) }
     }
 
+    /// The camera that has gone round the axis y by this angle, in degrees.
+    pub(super) fn turned(self, degrees: f64) -> Camera {
+        // The eye is given in the axes of the view, which turn with it.
+        Camera { view: self.view.turned(degrees), ..self }
+    }
+
     /// The unit vector from a point to the viewer.
     pub(super) fn towards(&self, p: Point) -> Vector {
         match &self.eye {

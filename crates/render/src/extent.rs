@@ -85,6 +85,23 @@ pub(super) struct Shadow {
 impl Shadow {
     const EMPTY: Shadow = Shadow { x: Outline::EMPTY, y: Outline::EMPTY };
 
+    /// The shadow, in a view, of all that a profile passes when it turns round the axis y: see [`Extent::profile`].
+    pub(super) fn of_profile(profile: &Shadow, view: &View) -> Shadow {
+        let (sin, cos) = view.inclination();
+        let mut shadow = Shadow::EMPTY;
+        for [radius, height] in profile.x.corners() {
+            for k in 0..LINES {
+                // The support function of a level circle about the axis.
+                let (s, c) = sin_cos_degrees(STEP * k as f64);
+                let x = height * sin * s + radius.abs() * c.hypot(cos * s);
+                let y = height * (cos * c + sin * s) + radius.abs() * (cos * s - sin * c).abs();
+                shadow.x.0[k] = shadow.x.0[k].max(x);
+                shadow.y.0[k] = shadow.y.0[k].max(y);
+            }
+        }
+        shadow
+    }
+
     fn merge(&mut self, other: &Shadow, radius: f64) {
         self.x.merge(&other.x, radius);
         self.y.merge(&other.y, radius);
@@ -113,8 +130,17 @@ impl Extent {
 
     /// The extent of one scene.
     pub(super) fn of(scene: &Scene, view: &View) -> Extent {
+        Extent::seen(scene, |p| view.see(p))
+    }
+
+    /// The extent of one scene in the plane of the distance from the axis y (as x) and of the height (as z).
+    pub(super) fn profile(scene: &Scene) -> Extent {
+        Extent::seen(scene, |p| Point::new(p.x.hypot(p.z), 0.0, p.y))
+    }
+
+    fn seen(scene: &Scene, see: impl Fn(Point) -> Point) -> Extent {
         let directions: [(f64, f64); LINES / 2] = from_fn(|k| sin_cos_degrees(STEP * k as f64));
-        let mut seen = Seen { extent: Extent::EMPTY, view, directions };
+        let mut seen = Seen { extent: Extent::EMPTY, see, directions };
         scene.reach(&mut seen);
         seen.extent
     }
@@ -141,19 +167,19 @@ impl Extent {
 }
 
 /// An extent that grows.
-struct Seen<'v> {
+struct Seen<S> {
     extent: Extent,
-    view: &'v View,
+    see: S,
     directions: [(f64, f64); LINES / 2],
 }
 
-impl Reach for Seen<'_> {
+impl<S: Fn(Point) -> Point> Reach for Seen<S> {
     fn covers(&self, rough: impl Iterator<Item = Point>) -> bool {
         let [far, near] = self.extent.depth;
         let known = &self.extent.known;
         let mut rough = rough;
         rough.all(|p| {
-            let p = self.view.see(p);
+            let p = (self.see)(p);
             far < p.z
                 && p.z < near
                 && known.x.encloses(p.x, p.z, &self.directions)
@@ -162,7 +188,7 @@ impl Reach for Seen<'_> {
     }
 
     fn include(&mut self, p: Point, width: Width) {
-        let (extent, p) = (&mut self.extent, self.view.see(p));
+        let (extent, p) = (&mut self.extent, (self.see)(p));
         let include = |shadow: &mut Shadow, radius: f64| {
             shadow.x.include(p.x, p.z, radius, &self.directions);
             shadow.y.include(p.y, p.z, radius, &self.directions);

@@ -4,11 +4,11 @@ use std::borrow::Cow;
 
 use super::camera::Camera;
 use super::crowd::Crowd;
-use super::extent::Extent;
+use super::extent::{Extent, Shadow};
 use super::light::Light;
 use super::tube::TubeStyle;
 use super::{Page, View, number, painter};
-use dlsys_geometry::scene::{Bounds, Point, Scene, Surroundings, Width};
+use dlsys_geometry::scene::{Bounds, Point, Scene, Surroundings, Width, sin_cos_degrees};
 
 /// Drawings less deep than this part of their extent are flat.
 const FLAT: f64 = 1e-6;
@@ -29,6 +29,8 @@ pub struct Survey {
     /// Cameras that the model declares count.
     follows_cameras: bool,
     has_camera: bool,
+    /// What is seen is a profile, which turns.
+    turns: bool,
     /// The surroundings of the first frame.
     first: Option<Surroundings>,
 }
@@ -47,6 +49,7 @@ impl Survey {
             zoom: 1.0,
             follows_cameras: true,
             has_camera: false,
+            turns: false,
             first: None,
         }
     }
@@ -72,6 +75,11 @@ impl Survey {
         Survey { field: Some(field), ..self }
     }
 
+    /// On a turntable: the plant fits into the picture from all azimuths ([`Fit::turned`]).
+    pub fn on_a_turntable(self) -> Survey {
+        Survey { turns: true, ..self }
+    }
+
     /// With one width for all lines, whatever the model says; [`fit_of_width`](Survey::fit_of_width) takes it.
     pub fn with_one_width(self) -> Survey {
         Survey { has_one_width: true, ..self }
@@ -84,7 +92,7 @@ impl Survey {
         let around = joined(&self.declared, &scene.surroundings);
         self.first.get_or_insert_with(|| around.clone());
         self.has_camera |= around.camera.is_some() && self.follows_cameras;
-        self.seen.merge(&Extent::of(scene, &self.view));
+        self.seen.merge(&if self.turns { Extent::profile(scene) } else { Extent::of(scene, &self.view) });
         self.crowd.merge(Crowd::of(scene));
     }
 
@@ -110,6 +118,12 @@ impl Survey {
         self.fit_of_width(self.crowd.default_width(&self.space))
     }
 
+    /// Outlines around everything, from all azimuths on a turntable.
+    fn shadow(&self, default_width: f64) -> Option<Shadow> {
+        let shadow = self.seen.shadow(default_width)?;
+        Some(if self.turns { Shadow::of_profile(&shadow, &self.view) } else { shadow })
+    }
+
     /// The values that all frames share if lines of default width are this wide, in scene units.
     pub fn fit_of_width(&self, default_width: f64) -> Fit {
         let usual = self.space.default_width();
@@ -118,12 +132,16 @@ impl Survey {
         // Where stems are wider than everything is long, their width is what there is to see.
         let whole = bounds.map_or(0.0, |[low, high]| (high - low).max());
         let size = extent.max(whole - extent);
-        let shadow = self.seen.shadow(default_width);
+        let shadow = self.shadow(default_width);
         let camera = match (self.field, &shadow) {
             (Some(field), Some(shadow)) => Camera::perspective(self.view, field, shadow),
             _ => Camera::orthographic(self.view),
         };
-        let depths = self.seen.depth().unwrap_or_default().map(|z| camera.depth(z));
+        let depth = match &shadow {
+            Some(shadow) if self.turns => Some(shadow.x.depth()),
+            _ => self.seen.depth(),
+        };
+        let depths = depth.unwrap_or_default().map(|z| camera.depth(z));
         Fit {
             camera,
             default_width,
@@ -141,6 +159,7 @@ impl Survey {
             declared: self.declared.clone(),
             zoom: self.zoom,
             follows_cameras: self.follows_cameras,
+            turn: 0.0,
         }
     }
 }
@@ -171,6 +190,8 @@ pub struct Fit {
     declared: Surroundings,
     zoom: f64,
     follows_cameras: bool,
+    /// By how many degrees cameras have gone round.
+    turn: f64,
 }
 
 /// The shape of pictures of declared cameras: width by height.
@@ -196,6 +217,12 @@ impl Fit {
         const FINEST: f64 = 5e-7;
         let size = self.accuracy / Fit::ACCURACY;
         Fit { accuracy: accuracy.max(size * FINEST), ..self }
+    }
+
+    /// The same for a camera that has gone round the axis y by this angle, in degrees from the front towards the side: cameras of flags and of the model round the vertical axis through their aim.
+    /// After [`Survey::on_a_turntable`], everything fits into the picture.
+    pub fn turned(self, degrees: f64) -> Fit {
+        Fit { camera: self.camera.turned(degrees), turn: self.turn + degrees, ..self }
     }
 
     /// The same for meshes: lines of default width have a fixed part of the extent, however crowded they are.
@@ -240,7 +267,15 @@ impl Fit {
     /// The fit and the page of one frame, which differ from the others where a camera is declared.
     pub fn for_frame(&self, scene: &Scene, page: &Page) -> (Fit, Page) {
         let declared = self.surroundings(scene).camera.filter(|_| self.follows_cameras);
-        let camera = declared.and_then(|at| Some((Camera::at(at.eye, at.aim)?, at)));
+        let camera = declared.and_then(|mut at| {
+            if self.turn != 0.0 {
+                let (sin, cos) = sin_cos_degrees(self.turn);
+                let away = at.eye - at.aim;
+                at.eye.x = at.aim.x + away.x * cos + away.z * sin;
+                at.eye.z = at.aim.z + away.z * cos - away.x * sin;
+            }
+            Some((Camera::at(at.eye, at.aim)?, at))
+        });
         let Some((camera, at)) = camera else { return (self.clone(), *page) };
         let [width, height] = page.pixels.map(f64::from);
         let slope = (at.angle.clamp(*Camera::FIELDS.start(), *Camera::FIELDS.end()) / 2.0).to_radians().tan();
@@ -327,6 +362,68 @@ impl Picture {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use dlsys_geometry::scene::{MaterialId, Owner, Polygon, Vector, Viewpoint};
+    use dlsys_tree::Lineage;
+
+    #[test]
+    fn a_turntable_has_room_for_all_azimuths_and_little_more() {
+        let mut scene = Scene::default();
+        let owner = scene.add_owner(Owner { name: "P".into(), lineage: Lineage::of_axiom(0) });
+        let vertices =
+            [[0.2, 0.0, 0.1], [3.0, 1.0, 0.5], [-1.0, 4.0, -2.5], [0.0, 5.0, 0.3]].map(Point::from).to_vec();
+        scene.polygons.push(Polygon { vertices, material: MaterialId::LEAF, owner });
+        for (view, field) in
+            [("front", None), ("30,20", None), ("-70,-50", None), ("top", None), ("10,15", Some(50.0))]
+        {
+            let view: View = view.parse().expect("a view");
+            let survey = Survey::new(view).on_a_turntable();
+            let mut survey = match field {
+                Some(field) => survey.with_perspective(field),
+                None => survey,
+            };
+            survey.add(&scene);
+            let fit = survey.fit();
+            let [left, bottom, width, height] = fit.picture.area;
+            let margin = Picture::MARGIN / (1.0 + 2.0 * Picture::MARGIN) * width.max(height);
+            let mut reached = [f64::INFINITY; 4];
+            for degrees in 0..360 {
+                let turned = fit.clone().turned(f64::from(degrees));
+                assert_eq!(turned.picture, fit.picture);
+                for p in scene.polygons[0].vertices.iter().map(|p| turned.camera.project(*p)) {
+                    let room = [p.x - left, left + width - p.x, p.y - bottom, bottom + height - p.y];
+                    reached = [0, 1, 2, 3].map(|i| reached[i].min(room[i]));
+                }
+            }
+            assert!(
+                reached.iter().all(|room| *room > 0.999 * margin),
+                "{view}: {reached:?}, margin {margin}"
+            );
+            assert!(
+                reached[..2].iter().all(|room| *room < margin + 0.05 * width),
+                "{view}: {reached:?}, margin {margin}"
+            );
+        }
+    }
+
+    #[test]
+    fn declared_cameras_go_round_their_aim() {
+        let mut scene = Scene::default();
+        let at = Viewpoint { eye: Point::new(1.0, 2.0, 9.0), aim: Point::new(1.0, 1.0, 4.0), angle: 40.0 };
+        scene.surroundings.camera = Some(at);
+        let mut survey = Survey::new(View::FRONT).on_a_turntable();
+        survey.add(&scene);
+        let page = Page::new(survey.fit().picture, crate::Size::default(), None).expect("a page");
+        let (fit, _) = survey.fit().turned(90.0).for_frame(&scene, &page);
+        assert!((fit.camera.view().towards() - Vector::new(5.0, 1.0, 0.0).normalize()).norm() < 1e-12);
+        // Its aim stays in the middle of the picture.
+        let (before, _) = survey.fit().for_frame(&scene, &page);
+        let middle = |fit: &Fit| {
+            let [left, bottom, width, height] = fit.picture.area;
+            let aim = fit.camera.project(at.aim);
+            [aim.x - left - width / 2.0, aim.y - bottom - height / 2.0]
+        };
+        assert!([middle(&fit), middle(&before)].iter().flatten().all(|x| x.abs() < 1e-9));
+    }
 
     #[test]
     fn pictures_have_a_margin_and_a_shape() {

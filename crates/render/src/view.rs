@@ -47,6 +47,20 @@ impl View {
         Ok(View { azimuth, elevation, right, up: towards.cross(&right), towards })
     }
 
+    /// The view of a viewer that has gone round the axis y by this angle, in degrees.
+    pub(super) fn turned(&self, degrees: f64) -> View {
+        let (sin_a, cos_a) = sin_cos_degrees(self.azimuth + degrees);
+        let level = self.up.y;
+        let towards = Vector::new(sin_a * level, self.towards.y, cos_a * level);
+        let right = Vector::new(cos_a, 0.0, -sin_a);
+        View { azimuth: self.azimuth + degrees, right, up: towards.cross(&right), towards, ..*self }
+    }
+
+    /// Sine and cosine of the elevation.
+    pub(super) fn inclination(&self) -> (f64, f64) {
+        (self.towards.y, self.up.y)
+    }
+
     /// The unit vector towards the viewer.
     pub(super) fn towards(&self) -> Vector {
         self.towards

@@ -7,7 +7,9 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use super::super::one_file::{file_of, place_of, spare};
-use super::{Clock, Failure, ModelRun, Render, count_of, flags, out_error, out_of_directory, play, size_of};
+use super::{
+    Clock, Failure, ModelRun, Render, count_of, flags, out_error, out_of_directory, play, size_of, turntable,
+};
 use crate::cli::album::Album;
 use crate::cli::args::RenderArgs;
 use crate::film::{Film, Format, Shape};
@@ -67,11 +69,12 @@ fn check(args: &RenderArgs, format: Format) -> Result<Option<PathBuf>, Failure> 
 pub fn render_run(
     args: &RenderArgs,
     format: Format,
-    run: ModelRun,
+    mut run: ModelRun,
     stale: &(dyn Fn() -> bool + Sync),
 ) -> Result<(), Failure> {
     let begun = Instant::now();
     let out = check(args, format)?;
+    turntable::repeat(args, &mut run.times);
     let mut clock = run.clock;
     let mut render = Render {
         args,
@@ -109,6 +112,9 @@ pub fn render_run(
 /// When each frame ends, in seconds; the last one lasts as long as the one before.
 fn ends(args: &RenderArgs, run: &ModelRun) -> Vec<f64> {
     let times = &run.times;
+    if let Some(ends) = turntable::ends(times) {
+        return ends;
+    }
     let seconds = args.speed.map_or(run.session.model.scenery.units.time, |speed| 1.0 / speed);
     let first = times.first().copied().unwrap_or(0.0);
     let mut ends: Vec<f64> = times.iter().skip(1).map(|t| (t - first) * seconds).collect();
@@ -139,6 +145,7 @@ fn film(
     };
     let ends = ends(render.args, render.run);
     let mut film = Film::begin(format, target, shape, ends, render.threads).map_err(failed)?;
+    let angles = turntable::angles(render.args, &render.run.times);
     let mut progress = render.bar("writing", render.run.times.len());
     let stats = play(
         render.run,
@@ -146,7 +153,7 @@ fn film(
         render.threads_for(&writer.page),
         clock,
         None,
-        |_, scene| writer.pixels(scene),
+        |frame, scene| turntable::turned(writer, &angles, frame.index).pixels(scene),
         |pixels| {
             film.add(&pixels).map_err(failed)?;
             progress.inc();

@@ -26,15 +26,17 @@ pub fn survey(args: &RenderArgs) -> Result<Survey, Failure> {
         Some(field) => survey.with_perspective(field),
         None => survey,
     };
+    let survey = if args.orbit.is_some() { survey.on_a_turntable() } else { survey };
     let has_view = args.view.is_some() || args.perspective.is_some();
     Ok(if has_view { survey.without_cameras() } else { survey })
 }
 
 /// Flags that are for pictures, and whether they are given.
-pub fn of_pictures(args: &RenderArgs) -> [(&'static str, bool); 9] {
+pub fn of_pictures(args: &RenderArgs) -> [(&'static str, bool); 10] {
     [
         ("--perspective", args.perspective.is_some()),
         ("--camera", args.camera.is_some()),
+        ("--orbit", args.orbit.is_some()),
         ("--zoom", args.zoom.is_some()),
         ("--light", args.light.is_some()),
         ("--sky", args.sky.is_some()),
@@ -85,6 +87,20 @@ pub fn agree(args: &RenderArgs, format: Format) -> Result<(), Failure> {
 
 /// Refuses flags of another layout.
 pub fn of_layouts(args: &RenderArgs) -> Result<(), Failure> {
+    if args.orbit.is_some() && args.layout != Layout::Frames {
+        return Err(usage(format!(
+            "--orbit does not go with --layout {}: the camera turns from frame to frame, so choose a film (--format webp, apng, gif or y4m) or a file for each frame",
+            args.layout.name()
+        )));
+    }
+    let mut times: Vec<f64> = args.shared.at.iter().flatten().copied().collect();
+    times.sort_by(f64::total_cmp);
+    times.dedup();
+    if args.orbit_frames.is_some() && times.len() != 1 {
+        return Err(usage(
+            "--orbit-frames is for a plant that stands still, with one time: `--at T`; with several times each has its frame",
+        ));
+    }
     let of_layout = [
         ("--columns", args.columns.is_some(), Layout::Grid),
         ("--no-captions", args.no_captions, Layout::Grid),

@@ -5,8 +5,10 @@
 //! cheaper than keeping every frame in memory. Frames are drawn and written on other threads while the simulation
 //! continues; files do not depend on the number of threads.
 
+pub(super) mod args;
 mod film;
 pub(super) mod flags;
+mod turntable;
 mod watch;
 
 use std::collections::HashMap;
@@ -57,6 +59,7 @@ fn once(args: &RenderArgs, stale: &(dyn Fn() -> bool + Sync)) -> Result<(), Fail
 /// Renders specimens with several seeds, to one scale. All are measured before anything is written.
 fn specimens(args: &RenderArgs, format: Format, mut run: ModelRun, seeds: Seeds) -> Result<(), Failure> {
     let begun = Instant::now();
+    turntable::repeat(args, &mut run.times);
     let never = || false;
     let threads = flags::threads(args);
     let mut survey = flags::survey(args)?;
@@ -103,7 +106,7 @@ fn specimens(args: &RenderArgs, format: Format, mut run: ModelRun, seeds: Seeds)
 /// Renders a model that has been read.
 pub fn render_run(
     args: &RenderArgs,
-    run: ModelRun,
+    mut run: ModelRun,
     stale: &(dyn Fn() -> bool + Sync),
 ) -> Result<(), Failure> {
     let begun = Instant::now();
@@ -114,6 +117,7 @@ pub fn render_run(
     };
     let survey = flags::survey(args)?;
     flags::agree(args, format)?;
+    turntable::repeat(args, &mut run.times);
     let mut clock = run.clock;
     let threads = flags::threads(args);
     let album = Some(Album::default());
@@ -248,7 +252,9 @@ impl Render<'_> {
         // With fewer frames than threads, several threads share a frame.
         writer.threads = (self.threads / count.max(1)).max(1);
         let staging = directory.staging();
+        let angles = turntable::angles(self.args, &self.run.times);
         let work = |frame: &Frame, scene: &Scene| {
+            let writer = turntable::turned(&writer, &angles, frame.index);
             let file = FrameDirectory::frame_name(frame.index, count, writer.format.extension());
             let companion = writer.companion(scene).filter(|_| frame.index == 0);
             let title = format!("{}, t = {}", self.title(), frame.time);
@@ -370,6 +376,9 @@ impl Render<'_> {
             "parameters": parameters,
             "seed": run.settings.seed,
         });
+        if let Some(degrees) = args.orbit {
+            described["orbit"] = degrees.into();
+        }
         if settings.method.is_fixed_step() {
             described["step_size"] = settings.step_size.into();
         } else {

@@ -1,0 +1,137 @@
+//! Arguments of `dlsys render`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::cli::shared::SharedArgs;
+use crate::cli::values::{
+    Background, LineWidth, RenderFormat, Seeds, Sky, background, bend_pixels, bytes, camera, columns,
+    direction, field_of_view, layout, line_width, pixels, positive, render_format, seeds, size, sky, threads,
+    turn, zoom,
+};
+use crate::render::{Format, Layout};
+use crate::scene::{Vector, Viewpoint};
+
+/// How the paper's figures are made.
+pub const RENDER_EXAMPLES: &str = "\
+Examples:
+  dlsys render models/lychnis.dls -o out --format png --perspective 40 --view 30,20
+      pixels, in perspective, from azimuth 30 and elevation 20 degrees
+  dlsys render models/lychnis.dls -o lychnis.webp --format webp --orbit 360
+      a film of the growing plant, round which the camera goes
+  dlsys render models/dragon.dls -o fig6 --layout overlay --from 0 --to 1 --step 0.125
+      figure 6 of the paper, upper left: stages over one another, the older the fainter
+  dlsys render models/anabaena.dls -o fig7 --layout stack
+      figure 7: a line for each frame, one below the other
+  dlsys render models/leaf.dls -o fig9 --layout grid --at 0.5,2.15,3,4,5,6,9
+      figure 9: a row of stages with their times";
+
+#[derive(Debug, Args)]
+pub struct RenderArgs {
+    #[command(flatten)]
+    pub shared: SharedArgs,
+    /// Render specimens with these seeds, both ends included, each into a directory seed-N of its own; all are drawn to
+    /// one scale
+    #[arg(long, value_name = "A..B", value_parser = seeds, conflicts_with_all = ["seed", "events", "stats", "watch"])]
+    pub seeds: Option<Seeds>,
+    /// Directory for the frames; made if it is not there. With a format of whole animations (glb, usda, webp, apng, gif, y4m) the file, or a folder for it; - is
+    /// standard output, for y4m
+    #[arg(short, long = "out", value_name = "DIR")]
+    pub out: PathBuf,
+    /// File format of the frames, or of the whole animation
+    #[arg(long, value_parser = render_format(), default_value = Format::SVG.extension())]
+    pub format: RenderFormat,
+    /// With a format of whole animations: units of the model's time in a second of the animation [default: 1, or, with `units … time S`, 1/S]
+    #[arg(long, value_name = "V", allow_negative_numbers = true, value_parser = positive)]
+    pub speed: Option<f64>,
+    /// A file for each frame, or all frames on one sheet
+    ///
+    /// frames: a file for each frame. overlay: all in one place, the older the fainter. stack: each below the one before,
+    /// aligned on the plant's origin; for flat plants such as filaments. grid: in rows, aligned on the ground, each with
+    /// its time. All frames of a sheet have one scale. The sheet is written as overlay.svg, stack.svg or grid.svg (or
+    /// .png).
+    #[arg(long, default_value = "frames", value_parser = layout, value_name = "frames|overlay|stack|grid")]
+    pub layout: Layout,
+    /// With --layout grid: frames in a row [default: all in one]
+    #[arg(long, value_name = "N", value_parser = columns)]
+    pub columns: Option<usize>,
+    /// With --layout grid: do not write the time below each frame
+    #[arg(long)]
+    pub no_captions: bool,
+    /// With --layout stack: from one line to the next, in scene units [default: the height of the highest]
+    #[arg(long, value_name = "H", allow_negative_numbers = true, value_parser = positive)]
+    pub row_height: Option<f64>,
+    /// Direction of view: front, side, top, or AZIMUTH,ELEVATION in degrees [default: the model's `camera`, or front]
+    #[arg(long, allow_hyphen_values = true)]
+    pub view: Option<String>,
+    /// Turntable: the camera goes round the plant's vertical axis by so many degrees over the film, or over the frames; negative for the other way
+    ///
+    /// Round the axis through the origin; round the one through its aim if the camera is given by --camera or declared. The plant fits into the picture at all
+    /// angles. A full turn of 360 degrees is a loop: the frame after the last would be like the first. With one time, such as --at 5, the plant stands still.
+    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true, value_parser = turn)]
+    pub orbit: Option<f64>,
+    /// With --orbit and one time: frames, 25 in a second of a film [default: 120]
+    #[arg(long, value_name = "N", value_parser = columns, requires = "orbit")]
+    pub orbit_frames: Option<usize>,
+    /// A camera in perspective: eye/aim, or eye/aim/angle of view in degrees across the smaller side (1 to 120) [default angle: 40]
+    ///
+    /// Points in scene units, such as 4,2,6/0,1,0/35.
+    #[arg(long, value_name = "X,Y,Z/X,Y,Z", allow_hyphen_values = true, value_parser = camera, conflicts_with_all = ["view", "perspective"])]
+    pub camera: Option<Viewpoint>,
+    /// Magnify pictures about their middle
+    #[arg(long, value_name = "K", allow_negative_numbers = true, value_parser = zoom)]
+    pub zoom: Option<f64>,
+    /// Direction towards the sun, such as 1,2,1: its light casts shadows
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = direction)]
+    pub light: Option<Vector>,
+    /// Colours of the sky at the zenith and at the horizon, such as "#6fa3e0,#e8f0f8": light from all over it, and the background
+    #[arg(long, value_name = "COLOUR,COLOUR", value_parser = sky)]
+    pub sky: Option<Sky>,
+    /// Largest distance of the drawing from a curved surface, in scene units [default: 1/2000 of the extent of the
+    /// whole animation]
+    ///
+    /// Applies to stems and Bézier patches, with at most 4096 sides of a stem and 64 pieces on an edge of a patch. The leaf
+    /// @L, the flower @K and meshes from files are not subdivided.
+    #[arg(long, value_name = "L", value_parser = positive)]
+    pub accuracy: Option<f64>,
+    /// Largest error, in pixels, of plants of other models that move in the wind by the modes of their class (0 to 100; 0: all are solved)
+    ///
+    /// For --format png, in scenes with a camera. The error is measured on a sample; without a camera, all plants are solved. Plants of nearly the same age share a drawing where
+    /// that moves no point by more than this.
+    #[arg(long, value_name = "PIXELS", allow_negative_numbers = true, default_value = "0.5", value_parser = bend_pixels)]
+    pub bend_pixels: f64,
+    /// Draw in perspective with this field of view (1 to 120 degrees), filled by the drawings of all times [default:
+    /// orthographic]
+    #[arg(long, value_name = "DEGREES", value_parser = field_of_view)]
+    pub perspective: Option<f64>,
+    /// Width of pictures in pixels; the height follows [default: 1000 on the larger side]
+    #[arg(long, value_name = "PIXELS", value_parser = pixels)]
+    pub width: Option<u32>,
+    /// Width and height of pictures in pixels
+    #[arg(long, value_name = "WxH", value_parser = size, conflicts_with = "width")]
+    pub size: Option<(u32, u32)>,
+    /// Background of pictures: "#rrggbb" or none (transparent) [default: #fbfaf5]
+    #[arg(long, value_name = "COLOUR", value_parser = background)]
+    pub background: Option<Background>,
+    /// Width of all lines of pictures, whatever the model says: in pixels, such as 1px, or in the model's units [default:
+    /// the widths of the model; 0.8 % of the largest extent for lines without one, less where they are crowded]
+    #[arg(long, value_name = "WIDTH", value_parser = line_width)]
+    pub line_width: Option<LineWidth>,
+    /// More bytes than this, in all files of the render, are an error, such as 500MB
+    #[arg(long, value_name = "BYTES", default_value = "10GB", value_parser = bytes)]
+    pub max_output: u64,
+    /// Number of threads that draw and write during the simulation, with no effect on the files [default: one for each core]
+    #[arg(long, value_name = "N", value_parser = threads)]
+    pub threads: Option<usize>,
+    /// Write into a directory that holds other files
+    #[arg(long)]
+    pub force: bool,
+    /// Render again whenever the model, or a file that it names, is saved, until Ctrl-C. Errors are shown, and
+    /// the frames of the last valid model stay
+    #[arg(long)]
+    pub watch: bool,
+    /// Print no summary and show no progress
+    #[arg(short, long)]
+    pub quiet: bool,
+}
