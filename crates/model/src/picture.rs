@@ -110,6 +110,12 @@ impl Picture {
         &self.levels[0].texels
     }
 
+    /// The texels of the largest copy that is no wider and no higher than this.
+    pub fn small(&self, side: usize) -> &[[u8; 4]] {
+        let fits = |level: &&Level| level.size[0].max(level.size[1]) <= side.max(1);
+        self.levels.iter().find(fits).map_or(&[], |level| &level.texels)
+    }
+
     /// Whether some of it is cut out.
     pub fn is_cut_out(&self) -> bool {
         self.is_cut_out

@@ -48,6 +48,11 @@ impl Mapping {
         let step = |by: [f64; 3]| [0, 1].map(|k| (by[k] - at[k] * by[2]) / m);
         Footprint { at, steps: [step(self.right), step(self.down)] }
     }
+
+    /// What a pixel shows whose middle is between the corners, with these weights.
+    pub(super) fn print_between(&self, corners: [Pinned; 3], weights: [f64; 3]) -> Footprint {
+        self.print([0, 1].map(|k| (0..3).map(|i| corners[i].at[k] * weights[i]).sum()))
+    }
 }
 
 /// What is cut out of a triangle.

@@ -280,8 +280,7 @@ impl Shot<'_> {
     /// The colour of a triangle at a place between its corners.
     fn color(&self, n: usize, weights: [f64; 3]) -> Color {
         let pictured = self.picture(n).and_then(|(texture, pinned)| {
-            let at = [0, 1].map(|k| (0..3).map(|i| pinned[i].at[k] * weights[i]).sum());
-            Some(texture.color(&Mapping::new(pinned)?.print(at)))
+            Some(texture.color(&Mapping::new(pinned)?.print_between(pinned, weights)))
         });
         match pictured {
             Some(channels) => {

@@ -235,6 +235,11 @@ impl Palette {
         &self.materials
     }
 
+    /// The ids of all materials.
+    pub fn ids(&self) -> impl Iterator<Item = MaterialId> + use<> {
+        (0..self.materials.len() as u32).map(MaterialId)
+    }
+
     /// The material with a number of this palette.
     pub fn get(&self, id: MaterialId) -> &Material {
         &self.materials[id.index()]

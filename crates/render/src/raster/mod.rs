@@ -414,7 +414,7 @@ mod tests {
                 .collect();
             let image = drawn(size, &triangles);
             let (places, corners) = (size[0] * size[1], |n: usize| triangles[n].0);
-            let all = (triangles.len(), corners);
+            let all = (triangles.len(), corners, |_| None);
             let found = cells::nearest(&SIXTEEN, size, all, (places, |at| at), |_| true);
             let mut differing = 0;
             for (pixel, numbers) in image.pixels.iter().zip(&found.numbers) {
