@@ -59,7 +59,7 @@ pub use kind::{
 };
 pub use measure::Measure;
 pub use physics::{FieldCache, Flow, Primitive, Spectrum, Tissue, Units, Wind};
-pub use picture::{Footprint, Picture, Texture};
+pub use picture::{Drawn, Footprint, Picture, Texture};
 pub use remedy::{Boundary, Remedy};
 pub use rule::{Interpretation, Outcome, Pattern, Produce, Rule, Solve, Switch};
 pub use scenery::{Camera, Plant, Scenery};

@@ -34,6 +34,22 @@ pub struct Picture {
     /// The last copy that tells what is cut out.
     last_cut: usize,
     is_cut_out: bool,
+    /// By row of blocks of [`BLOCK`] texels along each side: whether all of a block is drawn, or nothing of it.
+    blocks: Vec<Drawn>,
+}
+
+/// Texels along a side of a block.
+const BLOCK: usize = 8;
+
+/// How much of a part of a picture is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Drawn {
+    /// Nothing of it.
+    Nothing,
+    /// Some of it, perhaps.
+    Some,
+    /// All of it.
+    All,
 }
 
 #[derive(Debug)]
@@ -97,7 +113,8 @@ impl Picture {
                 && (level.part(level.drawn) - part).abs() <= MOST_OFF
         };
         let last_cut = levels.iter().take_while(tells).count().saturating_sub(1);
-        Some(Picture { path: path.into(), file, levels, last_cut, is_cut_out })
+        let blocks = levels.first().map_or_else(Vec::new, Level::blocks);
+        Some(Picture { path: path.into(), file, levels, last_cut, is_cut_out, blocks })
     }
 
     /// Width and height in texels.
@@ -161,6 +178,32 @@ impl Texture {
             opacity += f64::from(texel[3]) * weight;
         }
         opacity >= f64::from(level.drawn) - 0.5
+    }
+
+    /// How much is drawn between two opposite places and up to `apart` texels around; most parts of a leaf are far from its edge.
+    pub fn drawn(&self, [low, high]: [[f64; 2]; 2], apart: f64) -> Drawn {
+        const MOST: usize = 9;
+        let picture = &self.picture;
+        let margin = 1.5 + 2.0 * apart;
+        let rows = picture.size()[0].div_ceil(BLOCK);
+        let mut ranges = [(0, 0); 2];
+        for (k, range) in ranges.iter_mut().enumerate() {
+            let side = picture.size()[k] as f64;
+            let (from, to) = if k == 0 { (low[0], high[0]) } else { (1.0 - high[1], 1.0 - low[1]) };
+            let (from, to) = (from * side - margin, to * side + margin);
+            // Beyond its edges a picture is repeated or goes on: that is left to the places themselves.
+            if !(from >= 0.0 && to < side) {
+                return Drawn::Some;
+            }
+            *range = (from as usize / BLOCK, to as usize / BLOCK);
+        }
+        let [(left, right), (top, bottom)] = ranges;
+        if (right - left + 1) * (bottom - top + 1) > MOST {
+            return Drawn::Some;
+        }
+        let first = picture.blocks[top * rows + left];
+        let mut all = (top..=bottom).flat_map(|row| &picture.blocks[row * rows + left..=row * rows + right]);
+        if all.all(|block| *block == first) { first } else { Drawn::Some }
     }
 
     /// The copies whose texels are as large as the shorter side of a part of the picture, as a number with a fraction; the longer side; and how many means
@@ -265,6 +308,22 @@ impl Level {
         Level { size, texels, drawn: DRAWN }
     }
 
+    /// Whether all or nothing of each block is drawn in this copy and in all smaller ones: all of it is fully opaque, or fully transparent.
+    fn blocks(&self) -> Vec<Drawn> {
+        let [columns, rows] = self.size.map(|side| side.div_ceil(BLOCK));
+        let mut blocks: Vec<Option<Drawn>> = vec![None; columns * rows];
+        for (i, texel) in self.texels.iter().enumerate() {
+            let own = match texel[3] {
+                0 => Drawn::Nothing,
+                255 => Drawn::All,
+                _ => Drawn::Some,
+            };
+            let block = &mut blocks[i / self.size[0] / BLOCK * columns + i % self.size[0] / BLOCK];
+            *block = Some(if block.is_none_or(|known| known == own) { own } else { Drawn::Some });
+        }
+        blocks.into_iter().map(|block| block.unwrap_or(Drawn::Some)).collect()
+    }
+
     /// The part of the texels that are at least so opaque.
     fn part(&self, least: u8) -> f64 {
         self.texels.iter().filter(|texel| texel[3] >= least).count() as f64 / self.texels.len() as f64
@@ -339,6 +398,32 @@ mod tests {
             let drawn = places.filter(|at| needles.is_drawn(*at, apart)).count() as f64 / 40_000.0;
             assert!((drawn - 0.25).abs() < 0.13, "{apart}: {drawn}");
         }
+    }
+
+    /// A block that counts as drawn or open is so at every place in it, at any distance of places.
+    #[test]
+    fn blocks_agree_with_places() {
+        let disc = texture([280, 200], |x, y| {
+            let away = (x as f64 - 140.0).hypot(y as f64 - 100.0);
+            [9, 9, 9, (128.0 + 60.0 * (80.0 - away)).clamp(0.0, 255.0) as u8]
+        });
+        let mut sure = 0;
+        for apart in [0.0, 1.0, 3.0] {
+            for i in 0..900 {
+                let low = [f64::from(i % 30) / 30.0, f64::from(i / 30) / 30.0];
+                let high = low.map(|x| x + 0.03);
+                let known = disc.drawn([low, high], apart);
+                let places = [low, high, [low[0], high[1]], [high[0], low[1]]];
+                let drawn = places.map(|at| disc.is_drawn(at, apart));
+                match known {
+                    Drawn::All => assert_eq!(drawn, [true; 4], "{low:?} {apart}"),
+                    Drawn::Nothing => assert_eq!(drawn, [false; 4], "{low:?} {apart}"),
+                    Drawn::Some => continue,
+                }
+                sure += 1;
+            }
+        }
+        assert!(sure > 1350, "{sure}");
     }
 
     #[test]

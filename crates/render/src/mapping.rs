@@ -3,7 +3,7 @@
 //! Places in a picture are no linear functions of places in pixels where what is nearer is larger; but each of them times the magnification is, and so is
 //! the magnification itself (Heckbert and Moreton 1991, *Interpolation for polygon texture mapping and shading*).
 
-use dlsys_geometry::scene::{Footprint, Texture};
+use dlsys_geometry::scene::{Drawn, Footprint, Texture};
 
 /// The picture on a triangle, as functions of a place in pixels.
 #[derive(Clone, Copy, Debug)]
@@ -73,10 +73,21 @@ impl<'t> Cut<'t> {
     /// Whether the triangle is drawn at a place in it.
     pub(super) fn is_drawn(&self, at: [f64; 2]) -> bool {
         let print = self.mapping.print(at);
+        self.texture.is_drawn(print.at, self.apart(&print))
+    }
+
+    /// Distance in texels of the places at which it is decided.
+    fn apart(&self, Footprint { steps: [a, b], .. }: &Footprint) -> f64 {
         let [width, height] = self.texture.picture.size().map(|side| side as f64);
-        let [a, b] = print.steps;
-        let texels = (a[0] * b[1] - a[1] * b[0]).abs() * width * height;
-        self.texture.is_drawn(print.at, texels.sqrt() * self.part)
+        ((a[0] * b[1] - a[1] * b[0]).abs() * width * height).sqrt() * self.part
+    }
+
+    /// How much of the triangle is drawn in a pixel.
+    pub(super) fn in_pixel(&self, [column, row]: [usize; 2]) -> Drawn {
+        let print = self.mapping.print([column as f64 + 0.5, row as f64 + 0.5]);
+        let reach = [0, 1].map(|k| print.steps[0][k].abs() + print.steps[1][k].abs());
+        let corner = |sign: f64| [0, 1].map(|k| print.at[k] + sign * reach[k]);
+        self.texture.drawn([corner(-1.0), corner(1.0)], self.apart(&print))
     }
 }
 

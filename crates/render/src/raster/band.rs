@@ -10,6 +10,7 @@ use super::fragments::{Cover, Fragment, Fragments, Places, places};
 use super::plane::{Plane, Ready};
 use super::{BAND, EQUAL, Pattern, Place, STEPS, Triangles};
 use crate::mapping::Cut;
+use dlsys_geometry::scene::Drawn;
 
 /// Nothing is drawn in the pixel.
 const NOTHING: u32 = u32::MAX;
@@ -104,15 +105,23 @@ impl<const N: usize> Band<N> {
                 if near + EQUAL < pixel.far {
                     continue;
                 }
-                let is_full = (here[0] + least[0]) | (here[1] + least[1]) | (here[2] + least[2]) >= 0;
+                let drawn = cut.map_or(Drawn::All, |cut| cut.in_pixel([column, row]));
+                if drawn == Drawn::Nothing {
+                    continue;
+                }
+                let is_full = drawn == Drawn::All
+                    && (here[0] + least[0]) | (here[1] + least[1]) | (here[2] + least[2]) >= 0;
                 let is_later = pixel.seen != MIXED && place > pixel.seen;
                 let is_nearer = far > pixel.near + EQUAL || (is_later && far + EQUAL >= pixel.near);
-                if is_full && cut.is_none() && (pixel.seen == NOTHING || is_nearer) {
+                if is_full && (pixel.seen == NOTHING || is_nearer) {
                     *pixel = Pixel { seen: place, far, near: near.max(pixel.near) };
                     continue;
                 }
                 let covered = cover.get_or_insert_with(|| Cover::new(&sides, &self.places)).mask(here);
-                let mask = cut.map_or(covered, |cut| left_of(cut, covered, [column, row], &self.places));
+                let mask = match cut.filter(|_| drawn == Drawn::Some) {
+                    Some(cut) => left_of(cut, covered, [column, row], &self.places),
+                    None => covered,
+                };
                 if mask == 0 {
                     continue;
                 }
