@@ -77,18 +77,25 @@ fn paint(model: &Model, string: &ModuleString) {
 struct Same<'b>(&'b [u8]);
 
 impl Files for Same<'_> {
-    fn read(&self, _: &Path, limit: u64) -> Result<Vec<u8>, String> {
-        Ok(self.0[..self.0.len().min(limit as usize)].to_vec())
+    fn read(&self, path: &Path, limit: u64) -> Result<Vec<u8>, String> {
+        let bytes: &[u8] = match path.to_str() {
+            Some("spot.png") => include_bytes!("../seeds/spot.png"),
+            Some("square.obj") => include_bytes!("../seeds/square.obj"),
+            _ => self.0,
+        };
+        Ok(bytes[..bytes.len().min(limit as usize)].to_vec())
     }
 }
 
-/// Reads the input as a table, as surfaces in both formats, and as a part of a model; draws the surfaces.
+/// Reads the input as a table, as surfaces in both formats, as a surface with a picture, as a picture, and as a part of a model; draws the surfaces.
 pub fn files(bytes: &[u8]) {
     for text in [
         "table g from \"input.csv\"\ninitial string: A(0)\nA(x): solve dx/dt = g(x)\ninterpret A(x): F(g(t))\n",
         "table monotone g from \"input.csv\" column \"rain\"\ninitial string: A(0)\nA(x): solve dx/dt = g(x)\n",
         "surface @M from \"input.s\"\ninitial string: F(1) @M(2)\n",
         "surface @M from \"input.obj\"\ninitial string: F(1) @M(2)\n",
+        "surface @M from \"input.obj\" texture \"spot.png\"\ninitial string: F(1) @M(2)\n",
+        "surface @M from \"square.obj\" texture \"input.png\"\ninitial string: F(1) @M(2)\n",
         "include \"input.dls\"\ninitial string: A(1)\n",
     ] {
         let source = Source::from_bytes("input.dls", text.as_bytes().to_vec()).expect("text");

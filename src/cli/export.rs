@@ -9,14 +9,14 @@ use super::args::{RenderArgs, RunArgs};
 use super::common::{Clock, Failure, ModelRun, count_of, out_error, size_of};
 use super::events::EventLog;
 use super::frame_source::{Frame, Pass, play_at};
-use super::one_file::{file_of, save, spare};
+use super::one_file::{file_of, save, spare, spare_copy};
 use super::progress::Progress;
 use super::render::flags::of_pictures;
 use super::shared::SharedArgs;
 use crate::diagnostic::Diagnostic;
 use crate::interchange::{self, Error, Growth, Options, grow};
 use crate::interrupt;
-use crate::render::{Fit, Format, FrameWriter, Layout, Survey, View};
+use crate::render::{Companion, Fit, Format, FrameWriter, Layout, Survey, View};
 use crate::scene::Scene;
 use crate::sim::Stats;
 
@@ -183,6 +183,13 @@ fn write(order: &Order<'_>, run: ModelRun, stale: &dyn Fn() -> bool) -> Result<(
             size_of(order.limit)
         )));
     }
+    let companions = growth.companions(order.format);
+    for companion in &companions {
+        spare_copy(&order.out.with_file_name(&companion.name), &companion.bytes, order.force)?;
+    }
+    for Companion { name, bytes } in &companions {
+        save(&order.out.with_file_name(name), bytes)?;
+    }
     save(&order.out, &bytes)?;
     clock.output += before.elapsed();
     run.write_stats(order.shared, clock, stats)?;
@@ -190,8 +197,9 @@ fn write(order: &Order<'_>, run: ModelRun, stale: &dyn Fn() -> bool) -> Result<(
         return Ok(());
     }
     let seconds = begun.elapsed().as_secs_f64();
+    let beside: String = companions.iter().map(|companion| format!(", with {}", companion.name)).collect();
     let mut line = format!(
-        "{}: {}, {}, {}, in {seconds:.2} s\n",
+        "{}{beside}: {}, {}, {}, in {seconds:.2} s\n",
         order.out.display(),
         count_of(growth.nodes(), "node"),
         match growth.lives() {

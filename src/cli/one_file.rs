@@ -55,6 +55,18 @@ pub fn spare(
     )))
 }
 
+/// Refuses to write a copy of a picture over a file with another content.
+pub fn spare_copy(out: &Path, bytes: &[u8], force: bool) -> Result<(), Failure> {
+    let is_same = || std::fs::read(out).is_ok_and(|known| known.is_empty() || known == bytes);
+    if force || !out.exists() || is_same() {
+        return Ok(());
+    }
+    Err(usage(format!(
+        "{} is there and is another file than the picture that would be copied to it: choose another folder, or add --force",
+        out.display()
+    )))
+}
+
 /// The folder and the name of a file; the folder is made if it is not there.
 pub fn place_of(out: &Path) -> Result<(&Path, String), Failure> {
     let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));

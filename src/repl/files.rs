@@ -121,7 +121,7 @@ impl LoadedModel<'_> {
         let path = PathBuf::from(name);
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_lowercase();
         self.replay()?;
-        let (bytes, companion) = match extension.as_str() {
+        let (bytes, companions) = match extension.as_str() {
             "json" | "txt" => {
                 let printer = Printer::new(&self.session.model);
                 let string = self.string(state)?;
@@ -130,7 +130,7 @@ impl LoadedModel<'_> {
                     "json" => printer.json(string, &mut text),
                     _ => printer.text(string, &mut text),
                 }
-                (text.into_bytes(), None)
+                (text.into_bytes(), Vec::new())
             }
             other => {
                 let format: Format = other.parse().map_err(|_| {
@@ -155,17 +155,20 @@ impl LoadedModel<'_> {
                 let model = &self.session.model;
                 let name = model.title.as_deref().unwrap_or(&self.session.source.name);
                 let title = format!("{name}, t = {}", brief(self.time().unwrap_or(0.0), 9));
-                (writer.write(&scene, &title), writer.companion(&scene))
+                (writer.write(&scene, &title), writer.companions(&scene))
             }
         };
         let beside = |name: &str| path.with_file_name(name);
         spare(&path, force, state)?;
-        if let Some((name, bytes)) = &companion {
-            spare(&beside(name), force, state)?;
-            write(&beside(name), bytes, state)?;
+        for companion in &companions {
+            spare(&beside(&companion.name), force, state)?;
+        }
+        for companion in &companions {
+            write(&beside(&companion.name), &companion.bytes, state)?;
         }
         write(&path, &bytes, state)?;
-        let with = companion.map_or(String::new(), |(name, _)| format!(", with {name}"));
+        let names: Vec<&str> = companions.iter().map(|companion| &*companion.name).collect();
+        let with = if names.is_empty() { String::new() } else { format!(", with {}", names.join(", ")) };
         state.say(&format!("{}: {} bytes{with}\n", path.display(), bytes.len()))
     }
 }

@@ -44,8 +44,8 @@ fn golden_files() {
     let mut writer = FrameWriter::new(Format::OBJ, fit(&bend, "front"));
     writer.sides = 4;
     assert_golden("bend.obj", &String::from_utf8(writer.write(&bend, "a bend")).expect("UTF-8"));
-    let (name, materials) = writer.companion(&bend).expect("a material library");
-    assert_golden(name, &String::from_utf8(materials).expect("UTF-8"));
+    let [library] = &writer.companions(&bend)[..] else { panic!("a material library") };
+    assert_golden(&library.name, &String::from_utf8(library.bytes.clone()).expect("UTF-8"));
 }
 
 /// All elements of an SVG that are drawn.
@@ -133,8 +133,8 @@ fn read_obj(text: &str) -> Vec<tobj::Model> {
     let options = tobj::LoadOptions { single_index: false, ..Default::default() };
     let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, |_| {
         let materials = FrameWriter::new(Format::OBJ, fit(&Scene::default(), "front"));
-        let (_, bytes) = materials.companion(&Scene::default()).expect("a material library");
-        tobj::load_mtl_buf(&mut bytes.as_slice())
+        let library = materials.companions(&Scene::default()).remove(0);
+        tobj::load_mtl_buf(&mut library.bytes.as_slice())
     })
     .expect("an OBJ");
     models

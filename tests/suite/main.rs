@@ -52,6 +52,7 @@ mod strain;
 mod strain_runs;
 mod surroundings;
 mod sway;
+mod textures;
 mod usd;
 mod usd_reader;
 mod verify;

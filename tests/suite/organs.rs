@@ -216,8 +216,8 @@ fn colours_and_gradients_reach_pictures_and_materials() {
     for color in ["#e573a5", "#7d5a3c", "#bfae9f", "#ffffff"] {
         assert!(svg.contains(color), "{color}");
     }
-    let (_, materials) = writer(&scene, Format::OBJ).companion(&scene).expect("a library");
-    let materials = String::from_utf8(materials).expect("UTF-8");
+    let [library] = &writer(&scene, Format::OBJ).companions(&scene)[..] else { panic!("a library") };
+    let materials = String::from_utf8(library.bytes.clone()).expect("UTF-8");
     assert_eq!(materials.matches("newmtl dry-").count(), 64);
     assert!(materials.contains("newmtl rose\n"));
     let used: Vec<String> =

@@ -7,7 +7,8 @@ use crate::scope::Scope;
 use crate::surface;
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{
-    Appearance, BUILT_IN_COLORS, COMMAND_SURFACES, Contour, Gradient, NamedColor, Rgb, SurfaceShape, Tropism,
+    Appearance, BUILT_IN_COLORS, COMMAND_SURFACES, Contour, Gradient, NamedColor, Picture, Rgb, SurfaceShape,
+    Texture, Tropism,
 };
 use dlsys_syntax::Files;
 use dlsys_syntax::ast::{Document, Expression, Item, Name, Text};
@@ -44,9 +45,10 @@ pub fn build(document: &Document, scope: &mut Scope, files: &dyn Files) -> Appea
                 }
                 appearance.gradients.push(Gradient { name: name.text.clone(), stops });
             }
-            Item::Surface { name, file } => {
-                let (known, file) = (&appearance.surfaces, file);
-                if let Some(shape) = surface(name, file, *span, known, scope, files) {
+            Item::Surface { name, file, texture } => {
+                let known = &appearance.surfaces;
+                let on_it = texture.as_ref().and_then(|text| picture(text, known, scope, files));
+                if let Some(shape) = surface((name, file, on_it), *span, known, scope, files) {
                     appearance.surfaces.push(Arc::new(shape));
                 }
             }
@@ -106,9 +108,40 @@ pub fn color(text: &Text, scope: &mut Scope) -> Option<Rgb> {
     }
 }
 
+/// The picture on a surface, one with those of other surfaces if it is the same.
+fn picture(
+    text: &Text,
+    known: &[Arc<SurfaceShape>],
+    scope: &mut Scope,
+    files: &dyn Files,
+) -> Option<Arc<Picture>> {
+    let pictures = || known.iter().filter_map(|shape| shape.texture.as_ref()).map(|texture| &texture.picture);
+    if let Some(same) = pictures().find(|picture| *picture.path == *text.text) {
+        return Some(same.clone());
+    }
+    let read = surface::read_picture(&text.text, files).and_then(|picture| {
+        let mut all: Vec<&Arc<Picture>> = Vec::new();
+        for picture in pictures() {
+            if !all.iter().any(|known| Arc::ptr_eq(known, picture)) {
+                all.push(picture);
+            }
+        }
+        let texels: usize = all.iter().map(|picture| picture.texels().len()).sum();
+        surface::within_limit(texels + picture.texels().len()).map(|()| Arc::new(picture))
+    });
+    read.map_err(|fault| {
+        let mut diagnostic = Diagnostic::error(format!("the picture `{}` cannot be read", text.text));
+        diagnostic = diagnostic.at(text.span, fault.what);
+        scope.diagnostics.push(match fault.help {
+            Some(help) => diagnostic.help(help),
+            None => diagnostic,
+        });
+    })
+    .ok()
+}
+
 fn surface(
-    name: &Name,
-    file: &Text,
+    (name, file, picture): (&Name, &Text, Option<Arc<Picture>>),
     span: Span,
     known: &[Arc<SurfaceShape>],
     scope: &mut Scope,
@@ -131,8 +164,12 @@ fn surface(
         );
         return None;
     }
-    match surface::read(&file.text, files) {
-        Ok(shape) => Some(SurfaceShape { name: name.text.to_string(), span, ..shape }),
+    match surface::read(&file.text, picture.is_some(), files) {
+        Ok(shape) => {
+            let repeats = shape.places.iter().flatten().any(|x| !(0.0..=1.0).contains(x));
+            let texture = picture.map(|picture| Texture { picture, repeats });
+            Some(SurfaceShape { name: name.text.to_string(), span, texture, ..shape })
+        }
         Err(fault) => {
             let place = match fault.line {
                 Some(line) => format!("{}, line {line}: {}", file.text, fault.what),

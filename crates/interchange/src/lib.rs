@@ -48,6 +48,7 @@ use std::collections::HashMap;
 
 use dlsys_geometry::scene::{Color, Palette};
 use dlsys_model::Model;
+use dlsys_render::Companion;
 use dlsys_session::{Nursery, Session, sways};
 use dlsys_sim::Settings;
 pub use error::Error;
@@ -249,6 +250,15 @@ impl Growth {
             Format::Glb => glb::file(self),
             Format::Usda => Ok(usd::file(self)),
         }
+    }
+
+    /// The files that the file in a format refers to, beside it: the pictures on surfaces. A GLB file has them in it.
+    pub fn companions(&self, format: Format) -> Vec<Companion> {
+        let all = match format {
+            Format::Glb => Vec::new(),
+            Format::Usda => dlsys_render::pictures(&self.palette),
+        };
+        all.into_iter().map(|(picture, name)| Companion { name, bytes: picture.file.clone() }).collect()
     }
 
     /// The floor that the model declares: the corners of a large square, in metres, and its triangles.

@@ -183,6 +183,18 @@ impl Layout {
         self.pieces.push(Piece { primitive, first, shape });
     }
 
+    /// By primitive, where its corners lie in the picture of its material, as meshes have it; empty without a picture.
+    pub(crate) fn pinned(&self) -> Vec<Vec<[f32; 2]>> {
+        let mut all = vec![Vec::new(); self.primitives.len()];
+        for piece in &self.pieces {
+            if let PieceShape::Surface(mesh, corners, _) = &piece.shape {
+                let places = corners.iter().filter_map(|&corner| mesh.places.get(corner as usize));
+                all[piece.primitive].extend(places.map(|place| place.map(|x| x as f32)));
+            }
+        }
+        all
+    }
+
     /// Where the corners lie for these numbers, by primitive. Where a normal has no direction it is zero.
     pub(crate) fn places(&self, numbers: &[f32]) -> Vec<Places> {
         let mut places = vec![Places::default(); self.primitives.len()];

@@ -4,6 +4,7 @@
 
 use std::sync::Arc;
 
+use crate::Texture;
 use dlsys_diagnostic::Span;
 
 /// The declarations `color`, `gradient`, `surface`, `contour` and `tropism` of a model.
@@ -70,6 +71,11 @@ pub struct SurfaceShape {
     pub normals: Vec<[f64; 3]>,
     /// Indices of three vertices each, counter-clockwise as seen from the front.
     pub triangles: Vec<[u32; 3]>,
+    /// Where each vertex lies in the picture on the surface: see [`Picture`](crate::Picture); empty without a picture. A patch has the whole
+    /// picture on it: columns go to the right, rows up.
+    pub places: Vec<[f64; 2]>,
+    /// The picture on the surface.
+    pub texture: Option<Texture>,
     /// The materials of the file.
     pub materials: Vec<NamedColor>,
     /// Index of the material of each triangle; empty if no triangle has one.

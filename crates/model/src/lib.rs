@@ -38,6 +38,7 @@ mod condition;
 mod kind;
 mod measure;
 mod physics;
+mod picture;
 mod remedy;
 mod rule;
 mod scenery;
@@ -58,6 +59,7 @@ pub use kind::{
 };
 pub use measure::Measure;
 pub use physics::{FieldCache, Flow, Primitive, Spectrum, Tissue, Units, Wind};
+pub use picture::{Drawn, Footprint, Picture, Texture};
 pub use remedy::{Boundary, Remedy};
 pub use rule::{Interpretation, Outcome, Pattern, Produce, Rule, Solve, Switch};
 pub use scenery::{Camera, Plant, Scenery};

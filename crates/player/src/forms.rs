@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use super::stage::{Form, Stage};
-use dlsys_geometry::scene::{Color, Mesh, Palette, PatchSet, Point, Surface, Vector};
+use dlsys_geometry::scene::{Color, Mesh, Palette, PatchSet, Point, Surface, Texture, Vector};
 use dlsys_render::{normal, triangulate};
 
 /// A surface before it is placed.
@@ -57,6 +57,10 @@ pub struct MeshForm {
     pub vertices: Vec<MeshVertex>,
     /// Triangles by the numbers of their corners, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
+    /// Where each corner lies in the picture; empty without one.
+    pub places: Vec<[f64; 2]>,
+    /// The picture on it.
+    pub texture: Option<Texture>,
 }
 
 impl Forms {
@@ -137,7 +141,9 @@ impl Forms {
             MeshSource::Mesh(mesh) => mesh.clone(),
             MeshSource::Patches(patches, largest) => patches.mesh(accuracy / largest.max(f64::MIN_POSITIVE)),
         };
-        let mut form = MeshForm::default();
+        let pictured = mesh.faces.first().filter(|_| !mesh.places.is_empty());
+        let texture = pictured.and_then(|face| palette.texture(face.material).cloned());
+        let mut form = MeshForm { texture, ..MeshForm::default() };
         let mut known = HashMap::new();
         for face in &mesh.faces {
             form.triangles.push(face.corners.map(|corner| {
@@ -148,6 +154,7 @@ impl Forms {
                         color: palette.get(face.material).color,
                         takes_tint: face.takes_tint,
                     });
+                    form.places.extend(mesh.places.get(corner as usize));
                     (form.vertices.len() - 1) as u32
                 })
             }));

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::encode;
 use super::forms::MeshForm;
 use super::recording::Recording;
-use dlsys_geometry::scene::Material;
+use dlsys_geometry::scene::{Material, Texture};
 use dlsys_render::{GENERATOR, Spoke};
 
 const PAGE: &str = include_str!("page/page.html");
@@ -68,7 +68,13 @@ fn escaped(text: &str) -> String {
 fn description(recording: &Recording, outlines: &[Vec<Spoke>]) -> Value {
     let Recording { history, palette, forms, .. } = recording;
     let color = |material: &Material| material.color.to_string();
-    let meshes = (0..forms.meshes()).map(|i| mesh(&forms.mesh_form(i, recording.accuracy, palette)));
+    let mut pictures: Vec<Texture> = Vec::new();
+    let meshes: Vec<Value> = (0..forms.meshes())
+        .map(|i| mesh(&forms.mesh_form(i, recording.accuracy, palette), &mut pictures))
+        .collect();
+    let pictures = pictures.iter().map(|texture| {
+        json!({ "file": encode::base64(&texture.picture.file), "size": texture.picture.size(), "repeats": texture.repeats })
+    });
     let parameters = recording.parameters.iter().map(|p| {
         let range = p.range.map(|(low, high)| json!([low, high]));
         json!({ "name": p.name, "value": p.value, "range": range })
@@ -87,7 +93,8 @@ fn description(recording: &Recording, outlines: &[Vec<Spoke>]) -> Value {
         "leftOut": history.left_out,
         "palette": palette.materials().iter().map(color).collect::<Vec<_>>(),
         "outlines": outlines.iter().map(|outline| spokes(outline)).collect::<Vec<_>>(),
-        "meshes": meshes.collect::<Vec<_>>(),
+        "meshes": meshes,
+        "pictures": pictures.collect::<Vec<_>>(),
         "cuts": forms.cuts(),
         "unit": recording.unit,
         "extent": recording.extent,
@@ -123,8 +130,9 @@ fn spokes(outline: &[Spoke]) -> Vec<f64> {
     numbers.flatten().map(|x| rounded(x, 6)).collect()
 }
 
-/// Places in parts of the mesh's unit; colours as numbers, less one and negative where the thing's colour replaces them.
-fn mesh(form: &MeshForm) -> Value {
+/// Places in parts of the mesh's unit; colours as numbers, less one and negative where the thing's colour replaces them; the number of the picture, and where
+/// corners lie in that.
+fn mesh(form: &MeshForm, pictures: &mut Vec<Texture>) -> Value {
     let vertices = &form.vertices;
     let flat = |of: &dyn Fn(usize) -> [f64; 3], decimals| {
         (0..vertices.len()).flat_map(of).map(|x| rounded(x, decimals)).collect::<Vec<_>>()
@@ -134,7 +142,17 @@ fn mesh(form: &MeshForm) -> Value {
         let rgb = r << 16 | g << 8 | b;
         if v.takes_tint { -rgb - 1 } else { rgb }
     });
+    let picture = form.texture.as_ref().map(|texture| {
+        let known = pictures.iter().position(|known| known == texture);
+        known.unwrap_or_else(|| {
+            pictures.push(texture.clone());
+            pictures.len() - 1
+        })
+    });
+    let pinned: Vec<f64> = form.places.iter().flatten().map(|x| rounded(*x, 5)).collect();
     json!({
+        "picture": picture,
+        "pinned": pinned,
         "places": flat(&|i| vertices[i].place.coords.into(), 6),
         "normals": flat(&|i| vertices[i].normal.into(), 4),
         "colors": colors.collect::<Vec<_>>(),

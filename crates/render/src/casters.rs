@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use super::Fit;
 use super::draft::{Detail, Draft};
 use super::triangles::Triangle;
-use dlsys_geometry::scene::{MaterialId, Placement, Point, Scene, Vector};
+use dlsys_geometry::scene::{MaterialId, Placement, Point, Scene, Texture, Vector};
 
 /// Triangles and thin stems in a batch.
 const BATCH: usize = 1 << 16;
@@ -18,19 +18,22 @@ const KEPT: usize = 2_000_000;
 
 /// Triangles and thin stems, relative to the middle of the box around everything.
 #[derive(Default)]
-pub(super) struct Batch {
+pub(super) struct Batch<'s> {
     pub(super) vertices: Vec<[f32; 3]>,
     /// Corners by number of a vertex.
     pub(super) triangles: Vec<[u32; 3]>,
+    /// Triangles of which parts are cut out: corners, their places in the picture, and that.
+    pub(super) cut: Vec<([u32; 3], [[f64; 2]; 3], &'s Texture)>,
     /// Ends and radii.
     pub(super) lines: Vec<([[f32; 3]; 2], [f32; 2])>,
 }
 
-impl Batch {
+impl Batch<'_> {
     /// Begins the next one with the vertices from this one on.
     fn begin(&mut self, first: usize) {
         self.vertices.drain(..first);
         self.triangles.clear();
+        self.cut.clear();
         self.lines.clear();
     }
 }
@@ -178,7 +181,7 @@ impl<'s> Casters<'s> {
             let p = p.coords - self.middle;
             [p.x as f32, p.y as f32, p.z as f32]
         };
-        let full = |batch: &Batch| batch.triangles.len() + batch.lines.len() >= BATCH;
+        let full = |batch: &Batch| batch.triangles.len() + batch.cut.len() + batch.lines.len() >= BATCH;
         for (group, kept) in self.groups.iter().zip(&self.drafts) {
             let made = kept.is_none().then(|| self.draft(group));
             let Some(draft) = kept.as_ref().or(made.as_ref()) else { continue };
@@ -189,7 +192,11 @@ impl<'s> Casters<'s> {
                 let placed = vertices.map(|&p| relative(place.map_or(p, |place| place.point(p))));
                 batch.vertices.extend(placed);
                 for face in self.faces(draft, place) {
-                    batch.triangles.push(face.corners.map(|(v, _)| first + v));
+                    let corners = face.corners.map(|(v, _)| first + v);
+                    match draft.cut_out(face) {
+                        None => batch.triangles.push(corners),
+                        Some((places, texture)) => batch.cut.push((corners, places, texture)),
+                    }
                     if full(&batch) {
                         visit(&batch);
                         // The other triangles have the same vertices.

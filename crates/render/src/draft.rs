@@ -8,9 +8,9 @@
 //! stem of less than [`THIN`] pixels is a ribbon: two triangles, of the right width from any side. A plant of another model has drafts
 //! of its own, one for each power of two of its size in the picture, which all plants of that look share.
 
-use super::triangles::{Solid, Triangles};
+use super::triangles::{Solid, Triangle, Triangles};
 use super::tube::{TubeStyle, Tubes, sides_for};
-use dlsys_geometry::scene::{MaterialId, Placement, Point, Scene, Vector};
+use dlsys_geometry::scene::{MaterialId, Placement, Point, Scene, Texture, Vector};
 
 /// Greatest distance of triangles from curved surfaces, in pixels. It is a bound that holds for the worst of surfaces; measured on petals
 /// and leaves, the distance is a fifth of it.
@@ -109,6 +109,16 @@ impl<'s> Draft<'s> {
             }
         }
         Draft { scene, default_width, mesh, thin, next }
+    }
+
+    /// Of a triangle of which parts are cut out: where its corners lie in the picture, and that.
+    pub(super) fn cut_out(&self, face: &Triangle) -> Option<([[f64; 2]; 3], &'s Texture)> {
+        if self.mesh.places.is_empty() {
+            return None;
+        }
+        let texture = self.scene.palette.texture(face.material)?;
+        let places = face.corners.map(|(vertex, _)| self.mesh.places[vertex as usize]);
+        texture.picture.is_cut_out().then_some((places, texture))
     }
 
     /// How many triangles there are.

@@ -31,6 +31,8 @@ pub struct Survey {
     has_camera: bool,
     /// What is seen is a profile, which turns.
     turns: bool,
+    /// There are pictures on surfaces.
+    has_pictures: bool,
     /// The surroundings of the first frame.
     first: Option<Surroundings>,
 }
@@ -50,6 +52,7 @@ impl Survey {
             follows_cameras: true,
             has_camera: false,
             turns: false,
+            has_pictures: false,
             first: None,
         }
     }
@@ -93,6 +96,7 @@ impl Survey {
         self.first.get_or_insert_with(|| around.clone());
         self.has_camera |= around.camera.is_some() && self.follows_cameras;
         self.seen.merge(&if self.turns { Extent::profile(scene) } else { Extent::of(scene, &self.view) });
+        self.has_pictures |= scene.palette.has_textures();
         self.crowd.merge(Crowd::of(scene));
     }
 
@@ -101,6 +105,7 @@ impl Survey {
         self.space.merge(&other.space);
         self.crowd.merge(other.crowd);
         self.has_camera |= other.has_camera;
+        self.has_pictures |= other.has_pictures;
         if self.first.is_none() {
             self.first.clone_from(&other.first);
         }
@@ -155,7 +160,7 @@ impl Survey {
             light: Light::new(depths, extent),
             meshes: (usual, self.space.corners(usual)),
             has_one_width: self.has_one_width,
-            has_depth: depths[1] - depths[0] > FLAT * extent,
+            has_regions: depths[1] - depths[0] > FLAT * extent || self.has_pictures,
             declared: self.declared.clone(),
             zoom: self.zoom,
             follows_cameras: self.follows_cameras,
@@ -185,8 +190,8 @@ pub struct Fit {
     meshes: (f64, Option<[Point; 2]>),
     /// All lines have the default width.
     has_one_width: bool,
-    /// Its depth is more than rounding.
-    has_depth: bool,
+    /// Its depth is more than rounding, or there are pictures on surfaces.
+    has_regions: bool,
     declared: Surroundings,
     zoom: f64,
     follows_cameras: bool,
@@ -241,10 +246,10 @@ impl Fit {
         Bounds::of(&self.drawn(Cow::Borrowed(scene))).corners(self.default_width)
     }
 
-    /// True if SVG pictures are made of visible regions: the animation has depth. Without depth nothing is hidden, and every element
-    /// keeps its exact shape.
+    /// True if SVG pictures are made of visible regions: the animation has depth, or there are pictures on surfaces. Without depth nothing is hidden,
+    /// and every element keeps its exact shape.
     pub(super) fn has_visible_regions(&self) -> bool {
-        self.has_depth
+        self.has_regions
     }
 
     /// How stems become tubes. Without depth they are lines of a diagram, and their joints keep their shape.

@@ -55,6 +55,11 @@ impl Lens {
         Point::new((column as f64 + 0.5 - b) / a, (c - row as f64 - 0.5) / a, depth / self.depth)
     }
 
+    /// How much larger things are at a depth of the rasteriser than in the plane of focus.
+    pub(super) fn magnification(&self, depth: f64) -> f64 {
+        self.camera.magnification(depth / self.depth)
+    }
+
     /// The most pixels in a scene unit within a ball; `None` if it is outside of the picture.
     pub(super) fn scale_of(&self, centre: Point, radius: f64) -> Option<f64> {
         let towards = self.camera.towards(centre) * radius;

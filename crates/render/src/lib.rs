@@ -65,6 +65,7 @@ mod lens;
 mod light;
 mod lighting;
 mod manifest;
+mod mapping;
 mod name;
 mod number;
 mod page;
@@ -87,13 +88,13 @@ mod view;
 pub use camera::Camera;
 pub use error::Error;
 pub use fit::{CAMERA_SHAPE, Fit, Picture, Survey};
-pub use formats::{Content, Description, Drawing, Exporter, Format};
+pub use formats::{Companion, Content, Description, Drawing, Exporter, Format};
 pub use frames::{FrameDirectory, MANIFEST, Staged, Staging, aside, replace};
 pub use layout::{Layout, Sheet, Spacing};
 pub use lengths::{CrossSection, Length, cross_section, lengths};
 pub use light::Light;
 pub use manifest::{FrameRecord, Manifest};
-pub use name::plain as plain_name;
+pub use name::{pictures, plain as plain_name};
 pub use number::push as push_number;
 pub use page::{Page, Size};
 pub use sheet::{Assembly, Part, SheetWriter};
@@ -179,9 +180,9 @@ impl FrameWriter {
         formats::png::drawn(scene, &fit, &page, self.threads)
     }
 
-    /// The file that all frames refer to, if there is one: its name and its bytes.
-    pub fn companion(&self, scene: &Scene) -> Option<(&'static str, Vec<u8>)> {
-        self.format.exporter().companion(scene)
+    /// The files that all frames refer to: the material library of OBJ files, and the pictures on surfaces.
+    pub fn companions(&self, scene: &Scene) -> Vec<Companion> {
+        self.format.exporter().companions(scene)
     }
 }
 

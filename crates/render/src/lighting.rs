@@ -7,7 +7,7 @@ use super::casters::Casters;
 use super::lens::Lens;
 use super::light::{GLOSS, SHARPNESS, Spot, TRANSMITTED};
 use super::shadow::Maps;
-use super::{Fit, Page, floor, light};
+use super::{Camera, Fit, Page, floor, light};
 use dlsys_geometry::scene::{Color, MaterialId, Point, Scene, Vector};
 
 /// Strengths of light on what is fully exposed to it: the sky's beside a sun and alone, the sun's, and what the ground throws back.
@@ -134,6 +134,11 @@ impl<'a> Lighting<'a> {
         // As the drawing gains depth.
         let relief = self.fit.light.relief();
         1.0 + relief * (strength - 1.0)
+    }
+
+    /// The camera that sees it.
+    pub(super) fn camera(&self) -> &Camera {
+        &self.fit.camera
     }
 
     /// Whether the light is a declared one, which casts shadows.

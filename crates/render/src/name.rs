@@ -1,10 +1,11 @@
-//! Names of modules in files: the same from frame to frame, and unique within one.
+//! Names of modules in files: the same from frame to frame, and unique within one. And names of copies of pictures.
 
 use std::collections::{HashMap, HashSet};
 use std::fmt::Write;
+use std::path::Path;
 use std::sync::Arc;
 
-use dlsys_geometry::scene::{Owner, OwnerId, Scene};
+use dlsys_geometry::scene::{Owner, OwnerId, Palette, Picture, Scene};
 
 /// The names of the modules of a scene, `KIND` + separator + `LINEAGE`: the name of a kind and the
 /// identity of the module ([`Lineage::name`](dlsys_tree::Lineage::name)). They consist of ASCII letters, digits,
@@ -83,6 +84,29 @@ pub fn plain(name: &str) -> String {
         }
     }
     if out.is_empty() { "module".to_owned() } else { out }
+}
+
+/// The pictures of a palette, each once, with plain names of files for them: that of the model's file, as far as it is plain. No two differ in the case
+/// of letters only, which some file systems take for one.
+pub fn pictures(palette: &Palette) -> Vec<(Arc<Picture>, String)> {
+    let mut named: Vec<(Arc<Picture>, String)> = Vec::new();
+    for texture in palette.materials().iter().filter_map(|material| material.texture.as_ref()) {
+        let picture = &texture.picture;
+        if named.iter().any(|(known, _)| known == picture) {
+            continue;
+        }
+        let stem = Path::new(&*picture.path).file_stem().map(|stem| stem.to_string_lossy());
+        let stem = plain(stem.as_deref().unwrap_or_default());
+        let is_free = |name: &str| named.iter().all(|(_, known)| !known.eq_ignore_ascii_case(name));
+        let mut name = format!("{stem}.png");
+        let mut count = 1;
+        while !is_free(&name) {
+            count += 1;
+            name = format!("{stem}-{count}.png");
+        }
+        named.push((picture.clone(), name));
+    }
+    named
 }
 
 #[cfg(test)]

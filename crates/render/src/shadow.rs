@@ -11,6 +11,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use super::casters::{Batch, Casters};
+use super::mapping::{Cut, Pinned};
 use dlsys_geometry::scene::Vector;
 
 /// Places of the sky from which light comes; fewer where there are more triangles than [`MANY`].
@@ -64,7 +65,18 @@ impl Map {
         };
         let placed: Vec<[f32; 3]> = batch.vertices.iter().map(place).collect();
         for corners in &batch.triangles {
-            self.fill(corners.map(|v| placed[v as usize]));
+            self.fill(corners.map(|v| placed[v as usize]), |_| true);
+        }
+        for (corners, places, texture) in &batch.cut {
+            let corners = corners.map(|v| placed[v as usize]);
+            let pinned = [0, 1, 2].map(|k| Pinned {
+                at: [corners[k][0].into(), corners[k][1].into()],
+                place: places[k],
+                magnification: 1.0,
+            });
+            if let Some(cut) = Cut::new(texture, pinned, 1) {
+                self.fill(corners, |at| cut.is_drawn(at.map(f64::from)));
+            }
         }
         for ([a, b], radii) in &batch.lines {
             let [a, b] = [place(a), place(b)];
@@ -89,12 +101,12 @@ impl Map {
         };
         let [p, q] = [corner(a, radii[0], -0.7, 1.0), corner(a, radii[0], -0.7, -1.0)];
         let [s, t] = [corner(b, radii[1], 0.7, 1.0), corner(b, radii[1], 0.7, -1.0)];
-        self.fill([p, q, t]);
-        self.fill([p, t, s]);
+        self.fill([p, q, t], |_| true);
+        self.fill([p, t, s], |_| true);
     }
 
-    /// Keeps the nearest of a triangle in each cell whose middle it covers; on its edge counts as within.
-    fn fill(&mut self, [p, q, r]: [[f32; 3]; 3]) {
+    /// Keeps the nearest of a triangle in each cell whose middle it covers, if it `is_drawn` there; on its edge counts as within.
+    fn fill(&mut self, [p, q, r]: [[f32; 3]; 3], is_drawn: impl Fn([f32; 2]) -> bool) {
         // Most triangles are smaller than a cell and cover the middle of none.
         let range = |k: usize| {
             let low = p[k].min(q[k]).min(r[k]) + 0.5;
@@ -123,6 +135,9 @@ impl Map {
                     ((b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])) * scale
                 };
                 if side(p, q) < 0.0 || side(q, r) < 0.0 || side(r, p) < 0.0 {
+                    continue;
+                }
+                if !is_drawn([x, y]) {
                     continue;
                 }
                 let depth = p[2] + slope[0] * (x - p[0]) + slope[1] * (y - p[1]);

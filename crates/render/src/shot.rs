@@ -8,9 +8,10 @@ use super::draft::Draft;
 use super::lens::Lens;
 use super::light::Spot;
 use super::lighting::Lighting;
+use super::mapping::{Cut, Mapping, Pinned};
 use super::raster::{self, Image, Pattern, Place};
 use super::stage::{Part, Stage};
-use dlsys_geometry::scene::{Color, Vector};
+use dlsys_geometry::scene::{Color, Texture, Vector};
 
 /// Most triangles that are in memory at a time: a picture with more is drawn in strips, if these have fewer.
 const MOST: usize = 6_000_000;
@@ -38,8 +39,12 @@ struct Shot<'a> {
     lens: &'a Lens,
     lighting: &'a Lighting<'a>,
     colors: &'a [Color],
+    /// By number of a colour: the picture in place of it.
+    textures: &'a [Option<&'a Texture>],
     rows: Range<usize>,
     places: Vec<Place>,
+    /// By number of a place: where it lies in a picture; of the last ones that have no picture nothing.
+    pinned: Vec<[f32; 2]>,
     normals: Vec<[f32; 3]>,
     faces: Vec<Face>,
     surface: u32,
@@ -59,8 +64,10 @@ pub(super) fn draw<const N: usize>(
         lens,
         lighting,
         colors: &stage.colors,
+        textures: &stage.textures,
         rows: 0..0,
         places: Vec::new(),
+        pinned: Vec::new(),
         normals: Vec::new(),
         faces: Vec::new(),
         surface: 0,
@@ -105,7 +112,7 @@ impl Shot<'_> {
     fn add_block(&mut self, block: &[&Part], stage: &Stage, threads: usize) {
         let made: Vec<OnceLock<Shot>> = block.iter().map(|_| OnceLock::new()).collect();
         let next = AtomicUsize::new(0);
-        let Shot { lens, lighting, colors, ref rows, .. } = *self;
+        let Shot { lens, lighting, colors, textures, ref rows, .. } = *self;
         let make = || {
             loop {
                 let number = next.fetch_add(1, Ordering::Relaxed);
@@ -115,8 +122,10 @@ impl Shot<'_> {
                         lens,
                         lighting,
                         colors,
+                        textures,
                         rows: rows.clone(),
                         places: Vec::new(),
+                        pinned: Vec::new(),
                         normals: Vec::new(),
                         faces: Vec::new(),
                         surface: 0,
@@ -134,6 +143,10 @@ impl Shot<'_> {
             let (vertex, normal, surface) =
                 (self.places.len() as u32, self.normals.len() as u32, self.surface);
             self.places.extend_from_slice(&shot.places);
+            if !shot.pinned.is_empty() {
+                self.pinned.resize(vertex as usize, [0.0; 2]);
+                self.pinned.extend_from_slice(&shot.pinned);
+            }
             self.normals.extend_from_slice(&shot.normals);
             self.faces.extend(shot.faces.iter().map(|face| Face {
                 corners: face.corners.map(|v| vertex + v),
@@ -147,6 +160,7 @@ impl Shot<'_> {
 
     fn clear(&mut self) {
         self.places.clear();
+        self.pinned.clear();
         self.normals.clear();
         self.faces.clear();
         self.surface = 0;
@@ -168,6 +182,10 @@ impl Shot<'_> {
                 self.normals.extend(mesh.normals.iter().map(|&n| lens.normal(place.turned(n))));
             }
         }
+        if !mesh.places.is_empty() {
+            self.pinned.resize(vertex as usize, [0.0; 2]);
+            self.pinned.extend(mesh.places.iter().map(|place| place.map(|x| x as f32)));
+        }
         let first = self.surface;
         for face in &mesh.faces {
             self.surface = first + face.surface;
@@ -177,6 +195,7 @@ impl Shot<'_> {
         }
         if self.faces.last().is_none_or(|face| face.corners[0] < vertex) {
             self.places.truncate(vertex as usize);
+            self.pinned.truncate(vertex as usize);
             self.normals.truncate(normal as usize);
         }
         for ribbon in draft.ribbons(place, |p| lens.camera.towards(p)) {
@@ -243,6 +262,36 @@ impl Shot<'_> {
 /// The look of the floor.
 const FLOOR: u32 = u32::MAX;
 
+impl Shot<'_> {
+    /// The picture on a triangle, and where its corners are.
+    fn picture(&self, n: usize) -> Option<(&Texture, [Pinned; 3])> {
+        let face = &self.faces[n];
+        let texture = self.textures.get((face.look >> 1) as usize).copied().flatten()?;
+        let pinned = face.corners.map(|corner| {
+            let Place { x, y, depth } = self.places[corner as usize];
+            let place = self.pinned.get(corner as usize).copied().unwrap_or_default();
+            let magnification = self.lens.magnification(depth.into());
+            let at = [x, y].map(|at| f64::from(at) / raster::STEPS as f64);
+            Pinned { at, place: place.map(f64::from), magnification }
+        });
+        Some((texture, pinned))
+    }
+
+    /// The colour of a triangle at a place between its corners.
+    fn color(&self, n: usize, weights: [f64; 3]) -> Color {
+        let pictured = self.picture(n).and_then(|(texture, pinned)| {
+            Some(texture.color(&Mapping::new(pinned)?.print_between(pinned, weights)))
+        });
+        match pictured {
+            Some(channels) => {
+                let [red, green, blue] = channels.map(|channel| (channel + 0.5) as u8);
+                Color { red, green, blue }
+            }
+            None => self.colors[(self.faces[n].look >> 1) as usize],
+        }
+    }
+}
+
 impl raster::Triangles for Shot<'_> {
     fn count(&self) -> usize {
         self.faces.len()
@@ -254,6 +303,11 @@ impl raster::Triangles for Shot<'_> {
 
     fn surface(&self, n: usize) -> u32 {
         self.faces[n].surface
+    }
+
+    fn cut(&self, n: usize, count: usize) -> Option<Cut<'_>> {
+        let (texture, pinned) = self.picture(n)?;
+        Cut::new(texture, pinned, count)
     }
 
     fn shade(&self, n: usize, pixel: [usize; 2], weights: [f64; 3]) -> [u8; 4] {
@@ -274,7 +328,7 @@ impl raster::Triangles for Shot<'_> {
         let normal =
             normal.try_normalize(1e-12).unwrap_or_else(Vector::z) * if is_front { 1.0 } else { -1.0 };
         let spot = Spot { normal, seen, is_thin: face.look & 1 == 1 };
-        let color = self.colors[(face.look >> 1) as usize];
+        let color = self.color(n, weights);
         let Color { red, green, blue } = self.lighting.color(color, self.lighting.strength(&spot));
         [red, green, blue, 255]
     }

@@ -11,7 +11,7 @@ use std::sync::OnceLock;
 use super::Fit;
 use super::draft::{Detail, Draft};
 use super::lens::Lens;
-use dlsys_geometry::scene::{Color, Placement, Plant, Point, Scene};
+use dlsys_geometry::scene::{Color, Placement, Plant, Point, Scene, Texture};
 
 /// A plant is near if its nearest point is so many times as large in the picture as its middle.
 const NEAR: f64 = 1.5;
@@ -46,6 +46,8 @@ pub(super) struct Stage<'s> {
     pub(super) parts: Vec<Part>,
     /// All palettes, one after the other.
     pub(super) colors: Vec<Color>,
+    /// The pictures in place of colours; none if no palette has any.
+    pub(super) textures: Vec<Option<&'s Texture>>,
     fit: &'s Fit,
     lens: &'s Lens,
 }
@@ -55,6 +57,7 @@ struct Plan<'s> {
     wanted: Vec<Wanted<'s>>,
     parts: Vec<Part>,
     colors: Vec<Color>,
+    textures: Vec<Option<&'s Texture>>,
     /// The looks of plants so far by the address of their scene, and their drafts by their size, in half powers of two; plants in plants share them.
     looks: HashMap<usize, Option<Look>>,
     drafted: HashMap<(usize, i32), usize>,
@@ -92,10 +95,12 @@ impl<'s> Stage<'s> {
         let mut plan = Plan {
             wanted: Vec::new(),
             parts: vec![Part { draft: 0, place: None, colors: 0, rows: 0..lens.size[1] }],
-            colors: scene.palette.materials().iter().map(|material| material.color).collect(),
+            colors: Vec::new(),
+            textures: Vec::new(),
             looks: HashMap::new(),
             drafted: HashMap::new(),
         };
+        plan.add_colors(scene);
         plan.add_plants(scene, None, lens);
         let detail = Detail {
             scale_at: |p: Point| lens.scale_at(p),
@@ -106,7 +111,16 @@ impl<'s> Stage<'s> {
         };
         let shared = plan.wanted.iter().map(|_| OnceLock::new()).collect();
         let scene = Draft::new(scene, fit.default_width, &detail);
-        Stage { scene, wanted: plan.wanted, shared, parts: plan.parts, colors: plan.colors, fit, lens }
+        Stage {
+            scene,
+            wanted: plan.wanted,
+            shared,
+            parts: plan.parts,
+            colors: plan.colors,
+            textures: plan.textures,
+            fit,
+            lens,
+        }
     }
 
     /// Passes on the draft of a part. One that no other part shares is made for that, and dropped.
@@ -178,11 +192,22 @@ impl<'s> Plan<'s> {
         }
     }
 
+    /// Adds the colours of a palette, and tells the number of the first one.
+    fn add_colors(&mut self, scene: &'s Scene) -> u32 {
+        let first = self.colors.len();
+        let materials = scene.palette.materials();
+        self.colors.extend(materials.iter().map(|material| material.color));
+        if scene.palette.has_textures() {
+            self.textures.resize(first, None);
+            self.textures.extend(materials.iter().map(|material| material.texture.as_ref()));
+        }
+        first as u32
+    }
+
     /// `None` if nothing is drawn.
-    fn look(&mut self, plant: &Plant) -> Option<Look> {
+    fn look(&mut self, plant: &'s Plant) -> Option<Look> {
         let [low, high] = plant.bounds()?;
-        let colors = self.colors.len() as u32;
-        self.colors.extend(plant.scene.palette.materials().iter().map(|material| material.color));
+        let colors = self.add_colors(&plant.scene);
         Some(Look {
             default_width: plant.default_width(),
             centre: nalgebra::center(&low, &high),

@@ -82,8 +82,13 @@ impl Text {
 
     #[cold]
     fn slow_triple(&mut self, keyword: &[u8], v: &Vector, decimals: usize) {
+        self.numbers(keyword, v.as_slice(), decimals);
+    }
+
+    /// Appends a keyword and numbers, rounded to so many decimals.
+    pub(super) fn numbers(&mut self, keyword: &[u8], numbers: &[f64], decimals: usize) {
         let mut line = String::new();
-        for &x in v.iter() {
+        for &x in numbers {
             line.push(' ');
             number::push(&mut line, x, decimals);
         }

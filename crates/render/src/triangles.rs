@@ -18,11 +18,19 @@ use dlsys_geometry::scene::{MaterialId, OwnerId, Point, Scene, Segment, Surface,
 pub(super) trait Points {
     fn vertex(&mut self, at: impl FnOnce() -> Point);
     fn normal(&mut self, of: impl FnOnce() -> Vector);
+
+    /// The places in a picture of the vertices that came last.
+    fn places(&mut self, _places: &[[f64; 2]]) {}
 }
 
 /// Takes triangles; corners are counter-clockwise, seen from outside, each a vertex and a normal by number.
 pub(super) trait Faces {
     fn face(&mut self, corners: [(u32, u32); 3]);
+
+    /// A triangle under a picture: of each corner also the number of its place in that.
+    fn pictured(&mut self, corners: [(u32, u32); 3], _places: [u32; 3]) {
+        self.face(corners);
+    }
 
     /// The side between two rings of as many corners, the second one further along. At a point a side has one triangle.
     fn strip(&mut self, from: Ring, to: Ring) {
@@ -88,11 +96,13 @@ pub(super) struct Solid<'s> {
     pub(super) scene: &'s Scene,
     tubes: Tubes<'s>,
     placed: Cow<'s, [Surface]>,
-    /// Numbers of the first vertices and normals of each polygon and surface.
+    /// Numbers of the first vertices and normals of each polygon and surface; of surfaces also of the first places in pictures.
     polygons: Vec<[u32; 2]>,
-    surfaces: Vec<[u32; 2]>,
+    surfaces: Vec<[u32; 3]>,
     /// Numbers of all vertices and normals.
     pub(super) counts: [u32; 2],
+    /// Whether anything has places in a picture.
+    pub(super) has_places: bool,
 }
 
 impl<'s> Solid<'s> {
@@ -111,9 +121,15 @@ impl<'s> Solid<'s> {
             first
         };
         let polygons = scene.polygons.iter().map(|polygon| number(polygon.vertices.len(), 1)).collect();
-        let surfaces = placed.iter().map(|s| number(s.mesh.vertices.len(), s.mesh.normals.len()));
+        let mut places = 0_u32;
+        let surfaces = placed.iter().map(|s| {
+            let [vertex, normal] = number(s.mesh.vertices.len(), s.mesh.normals.len());
+            let first = places;
+            places = places.saturating_add(s.mesh.places.len() as u32);
+            [vertex, normal, first]
+        });
         let surfaces = surfaces.collect();
-        Solid { scene, tubes, placed, polygons, surfaces, counts }
+        Solid { scene, tubes, placed, polygons, surfaces, counts, has_places: places > 0 }
     }
 
     /// Number of items: pieces of stems, polygons, surfaces.
@@ -191,6 +207,9 @@ impl<'s> Solid<'s> {
                     }
                     for &n in &surface.mesh.normals {
                         out.normal(|| surface.placement.normal(n));
+                    }
+                    if !surface.mesh.places.is_empty() {
+                        out.places(&surface.mesh.places);
                     }
                 }
             }
@@ -276,9 +295,14 @@ impl<'s> Solid<'s> {
                 }
             }
             Item::Surface(i) => {
-                let [vertex, normal] = self.surfaces[i];
-                for face in &self.placed[i].mesh.faces[run.faces.clone()] {
-                    out.face(face.corners.map(|k| (vertex + k, normal + k)));
+                let [vertex, normal, place] = self.surfaces[i];
+                let mesh = &self.placed[i].mesh;
+                for face in &mesh.faces[run.faces.clone()] {
+                    let corners = face.corners.map(|k| (vertex + k, normal + k));
+                    match mesh.places.is_empty() {
+                        true => out.face(corners),
+                        false => out.pictured(corners, face.corners.map(|k| place + k)),
+                    }
                 }
             }
         }
@@ -299,6 +323,8 @@ pub(super) struct Triangle {
 pub(super) struct Triangles {
     pub(super) vertices: Vec<Point>,
     pub(super) normals: Vec<Vector>,
+    /// By vertex: where it lies in the picture of its material. Empty if nothing has a picture.
+    pub(super) places: Vec<[f64; 2]>,
     pub(super) faces: Vec<Triangle>,
     /// By number of a surface: the segment that it is a part of.
     pub(super) segments: Vec<Option<u32>>,
@@ -317,6 +343,11 @@ impl Points for Triangles {
     fn normal(&mut self, of: impl FnOnce() -> Vector) {
         self.normals.push(of());
     }
+
+    fn places(&mut self, places: &[[f64; 2]]) {
+        self.places.resize(self.vertices.len() - places.len(), [0.0; 2]);
+        self.places.extend(places);
+    }
 }
 
 impl Faces for Triangles {
@@ -333,6 +364,7 @@ impl Triangles {
         let mut mesh = Triangles {
             vertices: Vec::with_capacity(vertices),
             normals: Vec::with_capacity(normals),
+            places: Vec::new(),
             faces: Vec::with_capacity(2 * vertices),
             segments: vec![None],
             owner: OwnerId::default(),
@@ -341,6 +373,9 @@ impl Triangles {
             is_thin: false,
         };
         solid.points(0..solid.len(), &mut mesh);
+        if solid.has_places {
+            mesh.places.resize(mesh.vertices.len(), [0.0; 2]);
+        }
         let mut items = solid.by_owner();
         items.retain(|&n| match solid.item(n as usize) {
             Item::Stem(piece) => kept(solid.tubes.segment(piece)),

@@ -259,12 +259,14 @@ pub enum Item {
         /// The colours as `#rrggbb` or `#rgb`.
         stops: Vec<Text>,
     },
-    /// `surface @name from "file"`: patches or a mesh that the module `@name` draws.
+    /// `surface @name from "file" texture "picture"`: patches or a mesh that the module `@name` draws.
     Surface {
         /// The name with its mark.
         name: Name,
         /// The path, relative to the folder of the model.
         file: Text,
+        /// The path of the picture on the surface, likewise.
+        texture: Option<Text>,
     },
     /// `contour name = points`: the cross-section of stems.
     Contour {

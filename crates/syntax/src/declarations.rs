@@ -190,12 +190,12 @@ pub static DECLARATIONS: [Declaration; 30] = [
         ..row("gradient", Rule::gradient_item)
     },
     Declaration {
-        usage: "@NAME from \"FILE\"",
-        summary: "a surface from a file (.s or .obj), drawn by `@NAME(s)` at the size s",
+        usage: "@NAME from \"FILE\" texture \"PICTURE\"",
+        summary: "a surface from a file (.s or .obj), drawn by `@NAME(s)` at the size s, perhaps with a picture (.png) on it",
         category: Category::Looks,
         named: Named::Surface,
         repeats: Repeats::PerName("surface"),
-        options: &[option("from", Follow::Text)],
+        options: &[option("from", Follow::Text), option("texture", Follow::Text)],
         written: "a surface is written `surface @P from \"petal.s\"`",
         ..row("surface", Rule::surface_item)
     },

@@ -56,7 +56,9 @@ pub(crate) fn read(builder: &mut Builder, pair: Pair) -> Built<Item> {
         }
         Rule::color_item => Item::Color { name: parts.name(), value: parts.text() },
         Rule::gradient_item => Item::Gradient { name: parts.name(), stops: parts.texts() },
-        Rule::surface_item => Item::Surface { name: parts.name(), file: parts.text() },
+        Rule::surface_item => {
+            Item::Surface { name: parts.name(), file: parts.text(), texture: parts.text_if_any() }
+        }
         Rule::contour_item => Item::Contour { name: parts.name(), points: parts.points()? },
         Rule::tropism_item => {
             Item::Tropism { direction: parts.triple()?, strength: parts.expression_if_any()? }
@@ -126,7 +128,10 @@ pub(crate) fn write(expressions: &Expressions, item: &Item) -> String {
             let stops: Vec<String> = stops.iter().map(|stop| format!("\"{}\"", stop.text)).collect();
             format!("gradient {} = {}", name.text, stops.join(", "))
         }
-        Item::Surface { name, file } => format!("surface {} from \"{}\"", name.text, file.text),
+        Item::Surface { name, file, texture } => {
+            let texture = texture.as_ref().map(|t| format!(" texture \"{}\"", t.text)).unwrap_or_default();
+            format!("surface {} from \"{}\"{texture}", name.text, file.text)
+        }
         Item::Contour { name, points } => {
             format!("contour {} = {}", name.text, written_points(expressions, points))
         }

@@ -163,7 +163,7 @@ fn main() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let mut corpus = Vec::new();
     match name {
-        "files" => collect(&root.join("fuzz/seeds"), &["csv", "s", "obj", "mtl", "dls"], &mut corpus),
+        "files" => collect(&root.join("fuzz/seeds"), &["csv", "s", "obj", "mtl", "png", "dls"], &mut corpus),
         _ => {
             collect(&root.join("models"), &["dls"], &mut corpus);
             collect(&root.join("tests/errors"), &["dls"], &mut corpus);

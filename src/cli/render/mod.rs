@@ -27,8 +27,8 @@ use super::frame_source::{Frame, Pass, play};
 use super::progress::Progress;
 use super::values::{RenderFormat, Seeds};
 use crate::render::{
-    self, Content, Fit, Format, FrameDirectory, FrameRecord, FrameWriter, Layout, Manifest, Page, Picture,
-    Sheet, SheetWriter, Survey,
+    self, Companion, Content, Fit, Format, FrameDirectory, FrameRecord, FrameWriter, Layout, Manifest, Page,
+    Picture, Sheet, SheetWriter, Survey,
 };
 use crate::scene::Scene;
 use crate::session::SwayReport;
@@ -256,12 +256,12 @@ impl Render<'_> {
         let work = |frame: &Frame, scene: &Scene| {
             let writer = turntable::turned(&writer, &angles, frame.index);
             let file = FrameDirectory::frame_name(frame.index, count, writer.format.extension());
-            let companion = writer.companion(scene).filter(|_| frame.index == 0);
+            let companions = if frame.index == 0 { writer.companions(scene) } else { Vec::new() };
             let title = format!("{}, t = {}", self.title(), frame.time);
             let staged = staging
                 .write(|file| writer.write_to(scene, &title, file))
                 .map_err(|error| explain(error, frame, scene));
-            (record(&writer.fit, frame, scene, file), companion, staged)
+            (record(&writer.fit, frame, scene, file), companions, staged)
         };
         let mut progress = self.bar("writing", count);
         let stats = play(
@@ -271,10 +271,10 @@ impl Render<'_> {
             clock,
             None,
             work,
-            |(record, companion, staged)| {
+            |(record, companions, staged)| {
                 let staged = staged?;
-                if let Some((name, bytes)) = companion {
-                    directory.write(name, &bytes).map_err(out_of_directory)?;
+                for Companion { name, bytes } in companions {
+                    directory.write(&name, &bytes).map_err(out_of_directory)?;
                 }
                 directory.put(&record.file, staged).map_err(out_of_directory)?;
                 manifest.frames.push(record);

@@ -1,5 +1,5 @@
-//! Triangle meshes from Wavefront OBJ: `v`, `vn` and `f`, with the colours that `mtllib` and `usemtl` name; other lines
-//! are ignored.
+//! Triangle meshes from Wavefront OBJ: `v`, `vn` and `f`, with the colours that `mtllib` and `usemtl` name, and `vt` if there is a picture on
+//! the mesh; other lines are ignored.
 //!
 //! The axes are those of exported OBJ files, so that an exported drawing can be used as a surface: the turtle is at the
 //! origin with the heading `+Y`, up `+Z` and left `-X`. Faces with more than three corners are triangulated as a fan about
@@ -12,14 +12,28 @@ use super::{PART_LIMIT, SurfaceError, number, shown};
 use dlsys_model::SurfaceShape;
 use dlsys_syntax::Files;
 
-/// A corner of a face: vertex and, perhaps, normal, by number from 0.
-type Corner = (u32, Option<u32>);
+/// A corner of a face: vertex and, perhaps, normal, and place in the picture if there is one, by number from 0.
+type Corner = (u32, Option<u32>, Option<u32>);
+
+/// The lines with numbers so far.
+#[derive(Default)]
+struct Lists {
+    points: Vec<[f64; 3]>,
+    directions: Vec<[f64; 3]>,
+    /// With a picture on the mesh, places in it.
+    places: Option<Vec<[f64; 2]>>,
+}
 
 /// Reads the mesh of a file, and the material libraries beside it.
-pub(super) fn parse(text: &str, path: &str, files: &dyn Files) -> Result<SurfaceShape, SurfaceError> {
+pub(super) fn parse(
+    text: &str,
+    path: &str,
+    has_picture: bool,
+    files: &dyn Files,
+) -> Result<SurfaceShape, SurfaceError> {
     let mut library = Library::default();
     let mut material = None;
-    let (mut points, mut directions): (Vec<[f64; 3]>, Vec<[f64; 3]>) = (Vec::new(), Vec::new());
+    let mut lists = Lists { places: has_picture.then(Vec::new), ..Lists::default() };
     let mut faces: Vec<([Corner; 3], Option<u32>)> = Vec::new();
     let mut corners: Vec<Corner> = Vec::new();
     let mut lines = text.lines().enumerate();
@@ -41,14 +55,20 @@ pub(super) fn parse(text: &str, path: &str, files: &dyn Files) -> Result<Surface
         }
         let mut words = line.split_whitespace();
         match words.next() {
-            Some("v") => points.push(turned(&mut words, at)?),
-            Some("vn") => directions.push(turned(&mut words, at)?),
+            Some("v") => lists.points.push(turned(&mut words, at)?),
+            Some("vn") => lists.directions.push(turned(&mut words, at)?),
+            Some("vt") => {
+                if let Some(places) = &mut lists.places {
+                    let mut next = || words.next().map_or(Ok(0.0), |word| number(word, at));
+                    places.push([next()?, next()?]);
+                }
+            }
             Some("mtllib") => words.try_for_each(|name| library.add(name, path, files))?,
             Some("usemtl") => material = words.next().and_then(|name| library.find(name)),
             Some("f") => {
                 corners.clear();
                 for word in words.take_while(|word| !word.starts_with('#')) {
-                    corners.push(corner(word, points.len(), directions.len(), at)?);
+                    corners.push(corner(word, &lists, at)?);
                 }
                 if corners.len() < 3 {
                     return Err(SurfaceError::at(at, "a face has three corners or more"));
@@ -66,7 +86,7 @@ pub(super) fn parse(text: &str, path: &str, files: &dyn Files) -> Result<Surface
     if faces.is_empty() {
         return Err(SurfaceError::whole("the file has no faces").help("faces are lines such as `f 1 2 3`"));
     }
-    let shape = build(&points, &directions, &faces);
+    let shape = build(&lists, &faces);
     Ok(SurfaceShape { materials: library.into_colors(), ..shape })
 }
 
@@ -81,8 +101,7 @@ fn turned<'t>(words: &mut impl Iterator<Item = &'t str>, line: usize) -> Result<
 }
 
 /// `v`, `v/vt`, `v//vn` or `v/vt/vn`; numbers count from 1, negative ones backwards from the last.
-fn corner(word: &str, points: usize, directions: usize, line: usize) -> Result<Corner, SurfaceError> {
-    let mut parts = word.split('/');
+fn corner(word: &str, lists: &Lists, line: usize) -> Result<Corner, SurfaceError> {
     let index = |part: &str, count: usize, what: &str| {
         let number: Option<i64> = part.parse().ok();
         let place = match number {
@@ -97,27 +116,52 @@ fn corner(word: &str, points: usize, directions: usize, line: usize) -> Result<C
             }
         }
     };
-    let vertex = index(parts.next().unwrap_or_default(), points, "vertex")?;
-    let normal = match parts.nth(1) {
-        Some(part) if !part.is_empty() => Some(index(part, directions, "normal")?),
-        _ => None,
+    let mut parts = word.split('/');
+    let vertex = index(parts.next().unwrap_or_default(), lists.points.len(), "vertex")?;
+    let (of_picture, of_normal) = (parts.next().unwrap_or_default(), parts.next().unwrap_or_default());
+    let place = match &lists.places {
+        None => None,
+        Some(places) if places.is_empty() || of_picture.is_empty() => return Err(unplaced(places, line)),
+        Some(places) => Some(index(of_picture, places.len(), "texture coordinate")?),
     };
-    Ok((vertex, normal))
+    let normal = match of_normal {
+        "" => None,
+        part => Some(index(part, lists.directions.len(), "normal")?),
+    };
+    Ok((vertex, normal, place))
 }
 
-/// One vertex for each pair of point and normal in the faces.
-fn build(points: &[[f64; 3]], directions: &[[f64; 3]], faces: &[([Corner; 3], Option<u32>)]) -> SurfaceShape {
-    let smooth = faces.iter().flat_map(|(face, _)| face).any(|(_, normal)| normal.is_none());
+/// A face of a mesh with a picture does not say where it lies in that.
+fn unplaced(places: &[[f64; 2]], line: usize) -> SurfaceError {
+    let what = match places {
+        [] => "there are no texture coordinates (`vt`) before this face",
+        _ => "this corner has no texture coordinate: `v/vt` or `v/vt/vn`",
+    };
+    SurfaceError::at(line, what).help(
+        "export the mesh with its texture coordinates (UV), or leave out `texture`; Bézier patches (`.s`) need none",
+    )
+}
+
+/// One vertex for each pair of point and normal in the faces, and place in a picture.
+fn build(lists: &Lists, faces: &[([Corner; 3], Option<u32>)]) -> SurfaceShape {
+    let is_smooth = faces.iter().flat_map(|(face, _)| face).any(|(_, normal, _)| normal.is_none());
+    // A vertex with several places in the picture must not show where the picture is cut.
+    let smooth = (is_smooth && lists.places.is_some()).then(|| smooth_normals(&lists.points, faces));
     let mut numbers: HashMap<Corner, u32> = HashMap::new();
     let mut shape = SurfaceShape::default();
     for (face, material) in faces {
-        let triangle = face.map(|(vertex, normal)| {
+        let triangle = face.map(|(vertex, normal, place)| {
             // If a corner has no normal, all normals are computed from the faces.
-            let normal = normal.filter(|_| !smooth);
-            *numbers.entry((vertex, normal)).or_insert_with(|| {
-                shape.vertices.push(points[vertex as usize]);
-                if let Some(normal) = normal {
-                    shape.normals.push(directions[normal as usize]);
+            let normal = normal.filter(|_| !is_smooth);
+            *numbers.entry((vertex, normal, place)).or_insert_with(|| {
+                shape.vertices.push(lists.points[vertex as usize]);
+                match (normal, &smooth) {
+                    (Some(normal), _) => shape.normals.push(lists.directions[normal as usize]),
+                    (None, Some(smooth)) => shape.normals.push(smooth[vertex as usize]),
+                    (None, None) => {}
+                }
+                if let Some((places, place)) = lists.places.as_ref().zip(place) {
+                    shape.places.push(places[place as usize]);
                 }
                 shape.vertices.len() as u32 - 1
             })
@@ -130,6 +174,20 @@ fn build(points: &[[f64; 3]], directions: &[[f64; 3]], faces: &[([Corner; 3], Op
     shape
 }
 
+/// For each point the sum of the normals of its triangles, by their areas.
+fn smooth_normals(points: &[[f64; 3]], faces: &[([Corner; 3], Option<u32>)]) -> Vec<[f64; 3]> {
+    let mut normals = vec![[0.0; 3]; points.len()];
+    for (face, _) in faces {
+        let [p, q, r] = face.map(|(vertex, ..)| points[vertex as usize]);
+        let [a, b] = [q, r].map(|to| [0, 1, 2].map(|k| to[k] - p[k]));
+        let area = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+        for (vertex, ..) in face {
+            (0..3).for_each(|k| normals[*vertex as usize][k] += area[k]);
+        }
+    }
+    normals
+}
+
 #[cfg(test)]
 mod tests {
     use std::path::Path;
@@ -138,7 +196,7 @@ mod tests {
     use dlsys_syntax::NoFiles;
 
     fn parse(text: &str) -> Result<SurfaceShape, SurfaceError> {
-        super::parse(text, "mesh.obj", &NoFiles)
+        super::parse(text, "mesh.obj", false, &NoFiles)
     }
 
     /// A folder with one file in it.
@@ -155,8 +213,8 @@ mod tests {
         let text = "mtllib lost.mtl colours.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n\
                     usemtl red\nf 1 2 3\nusemtl none\nf 1 2 3\nusemtl green\nf 1 2 3\n";
         let library = "newmtl red\nKa 0 0 0\nKd 1 0 0\nnewmtl green\nKd 0 0.5 0\n";
-        let shape =
-            super::parse(text, "organs/mesh.obj", &Beside("organs/colours.mtl", library)).expect("a mesh");
+        let shape = super::parse(text, "organs/mesh.obj", false, &Beside("organs/colours.mtl", library))
+            .expect("a mesh");
         assert_eq!(shape.painted, [None, Some(0), None, Some(1)]);
         assert_eq!(shape.materials.iter().map(|m| m.rgb).collect::<Vec<_>>(), [0xff0000, 0x008000]);
         assert_eq!(parse(text).expect("a mesh without colours").materials, []);
@@ -191,5 +249,34 @@ mod tests {
         assert_eq!(fault("v 0 0 0\nf 1 1").what, "a face has three corners or more");
         assert_eq!(fault("v 0 0 0\n").what, "the file has no faces");
         assert_eq!(fault("v 0 0 0\nf 1//1 1 1").what, "there is no normal `1` before this face");
+    }
+
+    /// Where a picture is cut, a vertex has two places in it and one normal; without a picture, nothing of that is read.
+    #[test]
+    fn with_a_picture_vertices_have_their_places_in_it() {
+        let text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 1\nvt 0 0\nvt 1 0 0\nvt 1 1\nvt 0.5 0.25\n\
+                    f 1/1 2/2 3/3\nf 1/4 3/3 4/-1\n";
+        let with = super::parse(text, "mesh.obj", true, &NoFiles).expect("a mesh");
+        assert_eq!(with.places, [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.5, 0.25], [0.5, 0.25]]);
+        assert_eq!(with.triangles, [[0, 1, 2], [3, 2, 4]]);
+        assert_eq!((with.normals[0], with.vertices[0]), (with.normals[3], with.vertices[3]));
+        let without = parse(text).expect("a mesh");
+        assert_eq!((without.vertices.len(), without.places.len(), without.normals.len()), (4, 0, 0));
+    }
+
+    #[test]
+    fn a_picture_needs_places() {
+        let fault = |text: &str| super::parse(text, "mesh.obj", true, &NoFiles).expect_err("a fault");
+        let corners = "v 0 0 0\nv 1 0 0\nv 1 1 0\n";
+        let none = fault(&format!("{corners}f 1 2 3"));
+        assert_eq!(
+            (none.line, &*none.what),
+            (Some(4), "there are no texture coordinates (`vt`) before this face")
+        );
+        let some = fault(&format!("{corners}vt 0 0\nf 1/1 2/1 3"));
+        assert_eq!(some.what, "this corner has no texture coordinate: `v/vt` or `v/vt/vn`");
+        let far = fault(&format!("{corners}vt 0 0\nf 1/1 2/2 3/1"));
+        assert_eq!(far.what, "there is no texture coordinate `2` before this face");
+        assert_eq!(fault("vt 0 x").line, Some(1));
     }
 }

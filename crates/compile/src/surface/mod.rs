@@ -1,13 +1,16 @@
 //! Surfaces from files: Bézier patches as the plant modelling tools of Calgary write them (`*.s`), and
-//! triangle meshes (`*.obj`).
+//! triangle meshes (`*.obj`); and the pictures on them (`*.png`).
 //!
 //! The contents of files come from a [`Files`], which the caller provides.
 
 mod materials;
 mod mesh;
 mod patches;
+mod picture;
 
 use std::path::Path;
+
+pub use picture::{read as read_picture, within_limit};
 
 use dlsys_model::SurfaceShape;
 use dlsys_syntax::{Files, is_inside};
@@ -42,16 +45,16 @@ impl SurfaceError {
     }
 }
 
-/// Reads a surface; the caller fills in its name and place.
-pub fn read(path: &str, files: &dyn Files) -> Result<SurfaceShape, SurfaceError> {
+/// Reads a surface, with places of its vertices in a picture if there is one on it; the caller fills in its name, its place and the picture.
+pub fn read(path: &str, has_picture: bool, files: &dyn Files) -> Result<SurfaceShape, SurfaceError> {
     if !is_inside(path) {
         return Err(SurfaceError::whole("the path leaves the model's folder")
             .help("surfaces stand in the folder of the model or below it, as in `\"surfaces/petal.s\"`"));
     }
     let extension = Path::new(path).extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
-    let parse = match extension.as_deref() {
-        Some("s") => |text: &str, _: &str, _: &dyn Files| patches::parse(text),
-        Some("obj") => mesh::parse,
+    let is_mesh = match extension.as_deref() {
+        Some("s") => false,
+        Some("obj") => true,
         _ => {
             return Err(SurfaceError::whole("this is no kind of surface file")
                 .help("known are `.s` (Bézier patches) and `.obj` (Wavefront meshes)"));
@@ -61,7 +64,8 @@ pub fn read(path: &str, files: &dyn Files) -> Result<SurfaceShape, SurfaceError>
         SurfaceError::whole(what)
             .help("put it into the folder of the model's file or below; the path begins there")
     })?;
-    parse(&String::from_utf8_lossy(&bytes), path, files)
+    let text = String::from_utf8_lossy(&bytes);
+    if is_mesh { mesh::parse(&text, path, has_picture, files) } else { patches::parse(&text) }
 }
 
 /// A number of a surface file.

@@ -8,6 +8,8 @@
 use std::borrow::Cow;
 use std::fmt;
 
+use dlsys_model::Texture;
+
 /// A colour of the sRGB space, 8 bits a channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Color {
@@ -83,8 +85,17 @@ impl MaterialId {
 pub struct Material {
     /// ASCII letters, digits, `_` and `-`; no two materials of a palette share one.
     pub name: Cow<'static, str>,
-    /// Its colour in full light.
+    /// Its colour in full light; with a texture, the mean of that.
     pub color: Color,
+    /// The picture that is seen in place of the colour.
+    pub texture: Option<Texture>,
+}
+
+impl Material {
+    /// Of one colour.
+    fn plain(name: impl Into<Cow<'static, str>>, color: Color) -> Material {
+        Material { name: name.into(), color, texture: None }
+    }
 }
 
 /// Materials of each gradient.
@@ -128,8 +139,7 @@ const BUILT_IN: usize = DEFAULT.len() - MaterialId::NAMED;
 
 impl Default for Palette {
     fn default() -> Palette {
-        let materials =
-            DEFAULT.iter().map(|&(name, rgb)| Material { name: name.into(), color: Color::hex(rgb) });
+        let materials = DEFAULT.iter().map(|&(name, rgb)| Material::plain(name, Color::hex(rgb)));
         let (own, colors) = (DEFAULT.len(), BUILT_IN);
         Palette { materials: materials.collect(), own, colors, gradients: 0 }
     }
@@ -156,14 +166,14 @@ impl Palette {
         let mut palette = Palette { materials: self.materials.clone(), own, colors: BUILT_IN, gradients: 0 };
         for (name, color) in colors {
             let name = palette.free_name(name);
-            palette.materials.push(Material { name: name.into(), color });
+            palette.materials.push(Material::plain(name, color));
             palette.colors += 1;
         }
         for (name, stops) in gradients {
             let name = palette.free_name(name);
             for step in 0..GRADIENT_STEPS {
                 let color = blend(&stops, step as f64 / (GRADIENT_STEPS - 1) as f64);
-                palette.materials.push(Material { name: format!("{name}-{step:02}").into(), color });
+                palette.materials.push(Material::plain(format!("{name}-{step:02}"), color));
             }
             palette.gradients += 1;
         }
@@ -178,8 +188,25 @@ impl Palette {
     /// Adds a material without a number, for example that of a surface.
     pub fn add(&mut self, name: &str, color: Color) -> MaterialId {
         let name = self.free_name(name);
-        self.materials.push(Material { name: name.into(), color });
+        self.materials.push(Material::plain(name, color));
         MaterialId(self.materials.len() as u32 - 1)
+    }
+
+    /// Adds a material with a texture.
+    pub fn add_textured(&mut self, name: &str, texture: &Texture) -> MaterialId {
+        let id = self.add(name, Color::hex(texture.picture.mean()));
+        self.materials[id.index()].texture = Some(texture.clone());
+        id
+    }
+
+    /// The texture of a material.
+    pub fn texture(&self, id: MaterialId) -> Option<&Texture> {
+        self.get(id).texture.as_ref()
+    }
+
+    /// Whether any material has a texture.
+    pub fn has_textures(&self) -> bool {
+        self.materials.iter().any(|material| material.texture.is_some())
     }
 
     /// A name in ASCII that no material has, and none of a gradient of that name would.
@@ -206,6 +233,11 @@ impl Palette {
     /// All materials, in the order of their ids.
     pub fn materials(&self) -> &[Material] {
         &self.materials
+    }
+
+    /// The ids of all materials.
+    pub fn ids(&self) -> impl Iterator<Item = MaterialId> + use<> {
+        (0..self.materials.len() as u32).map(MaterialId)
     }
 
     /// The material with a number of this palette.

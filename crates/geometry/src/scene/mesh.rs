@@ -12,6 +12,8 @@ pub struct Mesh {
     pub vertices: Vec<Point>,
     /// One unit normal for each vertex.
     pub normals: Vec<Vector>,
+    /// Where each vertex lies in the picture on the mesh: to the right and up, from its lower left corner, each in parts of its side. Empty if there is none.
+    pub places: Vec<[f64; 2]>,
     /// The triangles.
     pub faces: Vec<Face>,
     /// The box around it, once that was needed.
@@ -47,6 +49,7 @@ impl Mesh {
         Mesh {
             vertices: Vec::new(),
             normals: Vec::new(),
+            places: Vec::new(),
             faces: Vec::new(),
             bounds: OnceLock::new(),
             coarser: Coarser::default(),
@@ -95,13 +98,14 @@ impl Mesh {
         let side = accuracy / 3_f64.sqrt();
         let mut mesh = Mesh::new();
         let mut cells: HashMap<[i64; 3], u32> = HashMap::new();
-        let numbers: Vec<u32> = (self.vertices.iter().zip(&self.normals))
-            .map(|(vertex, normal)| {
+        let numbers: Vec<u32> = (self.vertices.iter().zip(&self.normals).enumerate())
+            .map(|(i, (vertex, normal))| {
                 let cell = [0, 1, 2].map(|k| (vertex[k] / side).floor() as i64);
                 let number = *cells.entry(cell).or_insert(mesh.vertices.len() as u32);
                 if number as usize == mesh.vertices.len() {
                     mesh.vertices.push(*vertex);
                     mesh.normals.push(Vector::zeros());
+                    mesh.places.extend(self.places.get(i));
                 }
                 mesh.normals[number as usize] += normal;
                 number
@@ -168,6 +172,12 @@ impl Mesh {
         for ((normal, mean), _) in normals.iter_mut().zip(means).zip(wrong).filter(|(_, wrong)| *wrong) {
             *normal = mean.try_normalize(1e-300).unwrap_or(*normal);
         }
+    }
+
+    /// This mesh under a picture, with the place of each vertex in that. No colour replaces it.
+    pub fn under_picture(mut self, places: Vec<[f64; 2]>) -> Mesh {
+        self.faces.iter_mut().for_each(|face| face.takes_tint = false);
+        Mesh { places, ..self }
     }
 
     /// A mesh of triangles, each with its corners and its material. Where there are no normals, each vertex gets the mean of its triangles'.

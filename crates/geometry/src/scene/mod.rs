@@ -28,6 +28,7 @@ mod surroundings;
 
 pub use bounds::Bounds;
 pub use degrees::sin_cos_degrees;
+pub use dlsys_model::{Drawn, Footprint, Picture, Texture};
 pub use element::{Placement, Polygon, Segment, Surface, Width};
 pub use material::{Color, GRADIENT_STEPS, Material, MaterialId, Palette};
 pub use mesh::{Face, Mesh};

@@ -80,7 +80,8 @@ impl Patch {
         let scale = if reach > 0.0 { reach } else { 1.0 };
         let unit = self.net.map(|row| row.map(|p| Point::from((p - origin) / scale)));
         let mut mesh = Mesh::new();
-        tessellate(&unit, accuracy / scale, steps, self.material, false, &mut mesh);
+        let paint = Paint { material: self.material, takes_tint: false, has_picture: false };
+        tessellate(&unit, accuracy / scale, steps, paint, &mut mesh);
         let placement = Placement::uniform(origin, [Vector::x(), Vector::y(), Vector::z()], scale);
         Surface { mesh: Arc::new(mesh), patches: None, placement, tint: None, owner: self.owner }
     }
@@ -95,6 +96,8 @@ pub struct PatchFace {
     pub material: MaterialId,
     /// Whether a colour that the model chooses replaces the material.
     pub takes_tint: bool,
+    /// Whether a picture is on it, the whole of it: columns go to its right, rows up.
+    pub has_picture: bool,
 }
 
 /// A curved surface in coordinates of its own, drawn many times, at any size: patches, or a ball.
@@ -157,7 +160,9 @@ impl PatchSet {
             match &self.shape {
                 Curved::Patches(faces) => {
                     for face in faces {
-                        tessellate(&face.net, accuracy, steps, face.material, face.takes_tint, &mut mesh);
+                        let PatchFace { material, takes_tint, has_picture, .. } = *face;
+                        let paint = Paint { material, takes_tint, has_picture };
+                        tessellate(&face.net, accuracy, steps, paint, &mut mesh);
                     }
                 }
                 Curved::Ball(material) => mesh = ball::mesh(accuracy, FINEST, *material),
@@ -181,15 +186,16 @@ pub(super) fn column(net: &Net, c: usize) -> [Point; 4] {
     net.map(|row| row[c])
 }
 
-/// Adds the triangles of a patch.
-fn tessellate(
-    net: &Net,
-    accuracy: f64,
-    steps: Steps,
+/// What the triangles of a patch look like.
+#[derive(Clone, Copy)]
+struct Paint {
     material: MaterialId,
     takes_tint: bool,
-    mesh: &mut Mesh,
-) {
+    has_picture: bool,
+}
+
+/// Adds the triangles of a patch.
+fn tessellate(net: &Net, accuracy: f64, steps: Steps, paint: Paint, mesh: &mut Mesh) {
     let accuracy = if accuracy > 0.0 { accuracy } else { f64::MIN_POSITIVE };
     // Half of the deviation for the edge, half for the triangles that lead to it.
     let [bottom, top, left, right] = edges(net).map(|edge| steps.of_edge(&edge, accuracy / 2.0));
@@ -222,6 +228,9 @@ fn tessellate(
             let (point, normal) = found.unwrap_or_else(|| (point(net, u, v), normal(net, u, v)));
             mesh.vertices.push(point);
             mesh.normals.push(normal);
+            if paint.has_picture {
+                mesh.places.push([u, v]);
+            }
         }
         *place
     };
@@ -237,7 +246,7 @@ fn tessellate(
             let distinct = i > 0 && j > 0 && i + 1 < columns && j + 1 < rows;
             let other = !distinct && quality(mesh, &cuts[1 - chosen]) > 1.5 * quality(mesh, &cuts[chosen]);
             for corners in cuts[if other { 1 - chosen } else { chosen }] {
-                mesh.add_face(corners, material, takes_tint);
+                mesh.add_face(corners, paint.material, paint.takes_tint);
             }
         }
     }
@@ -347,6 +356,8 @@ fn halves(net: &Net) -> [Net; 2] {
 mod tests {
     use super::*;
 
+    const PAINT: Paint = Paint { material: MaterialId::LEAF, takes_tint: true, has_picture: true };
+
     /// A net over the unit square, raised by a function.
     fn raised(height: impl Fn(f64, f64) -> f64) -> Net {
         [0.0, 1.0, 2.0, 3.0].map(|r| [0.0, 1.0, 2.0, 3.0].map(|c| Point::new(c / 3.0, r / 3.0, height(c, r))))
@@ -354,7 +365,7 @@ mod tests {
 
     fn mesh(net: &Net, accuracy: f64) -> Mesh {
         let mut mesh = Mesh::new();
-        tessellate(net, accuracy, Steps::Powers, MaterialId::LEAF, true, &mut mesh);
+        tessellate(net, accuracy, Steps::Powers, PAINT, &mut mesh);
         mesh
     }
 
@@ -376,6 +387,11 @@ mod tests {
                 let middle = Point::from((a.coords + b.coords + c.coords) / 3.0);
                 // x and y of this net are its parameters.
                 worst = worst.max((point(&net, middle.x, middle.y) - middle).norm());
+                // And the places in a picture.
+                for i in face.corners.map(|i| i as usize) {
+                    let [u, v] = mesh.places[i];
+                    assert!((mesh.vertices[i].x - u).abs() + (mesh.vertices[i].y - v).abs() < 1e-12);
+                }
             }
             assert!(worst <= accuracy, "{worst} > {accuracy}");
             let area: f64 = mesh
@@ -456,6 +472,7 @@ mod tests {
             net: raised(|c, r| (c * r).sin()),
             material: MaterialId::LEAF,
             takes_tint: true,
+            has_picture: false,
         }]);
         assert!(Arc::ptr_eq(&set.mesh(0.01), &set.mesh(0.011)));
         assert!(set.mesh(0.0).faces.len() <= 2 * FINEST * FINEST);
@@ -468,7 +485,7 @@ mod tests {
         let net = raised(|c, r| 0.3 * (c * 1.7).sin() + 0.2 * c * r - 0.15 * r * r);
         for accuracy in [0.1, 1e-2, 1e-3] {
             let mut draft = Mesh::new();
-            tessellate(&net, accuracy, Steps::Whole, MaterialId::LEAF, true, &mut draft);
+            tessellate(&net, accuracy, Steps::Whole, PAINT, &mut draft);
             let strict = mesh(&net, accuracy).faces.len();
             assert!(draft.faces.len() <= strict && (accuracy > 5e-3 || draft.faces.len() < strict));
             for face in &draft.faces {

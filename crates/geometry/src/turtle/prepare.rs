@@ -60,24 +60,34 @@ fn palette(appearance: &Appearance, known: &Palette) -> Palette {
     )
 }
 
-/// Surfaces from files are in the colours that they bring with them, or in that of leaves, unless another is chosen.
+/// Surfaces from files are in the colours that they bring with them, or in that of leaves, unless another is chosen. A picture on a surface stands in place of all of these.
 fn shape(surface: &SurfaceShape, palette: &mut Palette) -> Shape {
     let point = |p: &[f64; 3]| Point::new(p[0], p[1], p[2]);
+    let pictured = surface.texture.as_ref().map(|texture| {
+        let name = surface.name.trim_start_matches('@');
+        palette.add_textured(name, texture)
+    });
     if surface.patches.is_empty() {
         let vertices = surface.vertices.iter().map(point).collect();
         let normals: Vec<Vector> = surface.normals.iter().map(|n| point(n).coords).collect();
+        let materials = if pictured.is_none() { &surface.materials[..] } else { &[] };
         let own: Vec<MaterialId> =
-            surface.materials.iter().map(|m| palette.add(&m.name, Color::hex(m.rgb))).collect();
+            materials.iter().map(|m| palette.add(&m.name, Color::hex(m.rgb))).collect();
         let painted = |i: usize| surface.painted.get(i).copied().flatten();
         let material = |i: usize| painted(i).and_then(|n| own.get(n as usize)).copied();
         let triangles = (surface.triangles.iter().enumerate())
-            .map(|(i, corners)| (*corners, material(i).unwrap_or(MaterialId::LEAF)));
-        return Shape::of_mesh(Mesh::of_triangles(vertices, &normals, triangles));
+            .map(|(i, corners)| (*corners, pictured.or_else(|| material(i)).unwrap_or(MaterialId::LEAF)));
+        let mesh = Mesh::of_triangles(vertices, &normals, triangles);
+        return Shape::of_mesh(match pictured {
+            Some(_) => mesh.under_picture(surface.places.clone()),
+            None => mesh,
+        });
     }
     let face = |net: &[[f64; 3]; 16]| PatchFace {
         net: [0, 4, 8, 12].map(|row| [0, 1, 2, 3].map(|column| point(&net[row + column]))),
-        material: MaterialId::LEAF,
-        takes_tint: true,
+        material: pictured.unwrap_or(MaterialId::LEAF),
+        takes_tint: pictured.is_none(),
+        has_picture: pictured.is_some(),
     };
     Shape::of_patches(surface.patches.iter().map(face).collect())
 }

@@ -114,7 +114,7 @@ fn make_petal() -> Vec<PatchFace> {
         row([0.62, 0.14], [0.72, 0.02], [0.36, 0.14]),
         row([0.88, 0.03], [1.05, -0.03], [0.25, 0.14]),
     ];
-    vec![PatchFace { net, material: MaterialId::PETAL, takes_tint: true }]
+    vec![PatchFace { net, material: MaterialId::PETAL, takes_tint: true, has_picture: false }]
 }
 
 /// Each quarter has its rows from base to tip; its columns go round so that the front is outside.
@@ -128,7 +128,7 @@ fn make_bud() -> Vec<PatchFace> {
             let arc = [(1.0, 0.0), (1.0, HANDLE), (HANDLE, 1.0), (0.0, 1.0)]
                 .map(|(a, b)| (a * cos - b * sin, a * sin + b * cos));
             let net = PROFILE.map(|(x, radius)| arc.map(|(y, z)| Point::new(x, radius * y, radius * z)));
-            PatchFace { net, material: MaterialId::SEPAL, takes_tint: true }
+            PatchFace { net, material: MaterialId::SEPAL, takes_tint: true, has_picture: false }
         })
         .collect()
 }

@@ -2,8 +2,11 @@
 
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
+use std::path::Path;
+use std::sync::Arc;
 
-use super::document::{Accessor, Bytes, Document, View};
+use super::document::{Accessor, Bytes, Document, Image, View};
+use dlsys_geometry::scene::Picture;
 
 const UNSIGNED_SHORT: u32 = 5123;
 const UNSIGNED_INT: u32 = 5125;
@@ -11,10 +14,11 @@ const FLOAT: u32 = 5126;
 const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 
-/// Views of the buffer: attributes of corners, triangles, tracks.
+/// Views of the buffer: attributes of corners, triangles, tracks, places in pictures; a view for each picture follows.
 const ATTRIBUTES: usize = 0;
 const TRIANGLES: usize = 1;
 const TRACKS: usize = 2;
+const PLACES: usize = 3;
 
 /// What vectors are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,7 +34,8 @@ pub(super) enum Kind {
 /// Accessors and bytes.
 #[derive(Debug, Default)]
 pub(super) struct Buffer {
-    views: [Vec<u8>; 3],
+    views: [Vec<u8>; 4],
+    pictures: Vec<Arc<Picture>>,
     accessors: Vec<Accessor>,
     /// Accessors by a hash of all that they are, bytes included.
     known: HashMap<u64, Vec<usize>>,
@@ -54,6 +59,20 @@ impl Buffer {
 
     pub(super) fn turns(&mut self, values: &[[f32; 4]]) -> usize {
         self.floats(values.as_flattened(), 4, "VEC4", TRACKS, false)
+    }
+
+    /// Places of corners in a picture.
+    pub(super) fn places(&mut self, values: &[[f32; 2]]) -> usize {
+        self.floats(values.as_flattened(), 2, "VEC2", PLACES, false)
+    }
+
+    /// The file of a picture; returns its number among the images.
+    pub(super) fn picture(&mut self, picture: &Arc<Picture>) -> usize {
+        let known = self.pictures.iter().position(|known| known == picture);
+        known.unwrap_or_else(|| {
+            self.pictures.push(picture.clone());
+            self.pictures.len() - 1
+        })
     }
 
     /// Numbers of corners.
@@ -125,8 +144,9 @@ impl Buffer {
     /// Puts accessors and views into the document and returns the bytes of its buffer.
     pub(super) fn finish(self, document: &mut Document) -> Vec<u8> {
         let mut bytes = Vec::new();
-        let mut numbers = [0; 3];
-        let kinds = [(Some(12), Some(ARRAY_BUFFER)), (None, Some(ELEMENT_ARRAY_BUFFER)), (None, None)];
+        let mut numbers = [0; 4];
+        let attributes = |width| (Some(width), Some(ARRAY_BUFFER));
+        let kinds = [attributes(12), (None, Some(ELEMENT_ARRAY_BUFFER)), (None, None), attributes(8)];
         for ((view, number), (byte_stride, target)) in self.views.iter().zip(&mut numbers).zip(kinds) {
             if view.is_empty() {
                 continue;
@@ -135,6 +155,21 @@ impl Buffer {
             let (byte_offset, byte_length) = (bytes.len(), view.len());
             document.buffer_views.push(View { buffer: 0, byte_offset, byte_length, byte_stride, target });
             bytes.extend(view);
+        }
+        for picture in &self.pictures {
+            let view = View {
+                buffer: 0,
+                byte_offset: bytes.len(),
+                byte_length: picture.file.len(),
+                byte_stride: None,
+                target: None,
+            };
+            let stem = Path::new(&*picture.path).file_stem().unwrap_or_default();
+            let (name, buffer_view) = (stem.to_string_lossy().into_owned(), document.buffer_views.len());
+            document.images.push(Image { name, buffer_view, mime_type: "image/png" });
+            document.buffer_views.push(view);
+            bytes.extend(&picture.file);
+            bytes.resize(bytes.len().next_multiple_of(4), 0);
         }
         document.accessors = self.accessors;
         for accessor in &mut document.accessors {

@@ -16,6 +16,12 @@ pub(super) struct Document {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) materials: Vec<Material>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) textures: Vec<Texture>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) images: Vec<Image>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) samplers: Vec<Sampler>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) animations: Vec<Animation>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) accessors: Vec<Accessor>,
@@ -79,12 +85,56 @@ pub(super) struct Material {
     pub(super) pbr: Pbr,
     #[serde(rename = "doubleSided")]
     pub(super) double_sided: bool,
+    #[serde(rename = "alphaMode", skip_serializing_if = "Option::is_none")]
+    pub(super) alpha_mode: Option<&'static str>,
+}
+
+#[derive(Debug, PartialEq, Serialize)]
+pub(super) struct Texture {
+    pub(super) sampler: usize,
+    pub(super) source: usize,
+}
+
+#[derive(Debug, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Image {
+    pub(super) name: String,
+    pub(super) buffer_view: usize,
+    pub(super) mime_type: &'static str,
+}
+
+#[derive(Debug, PartialEq, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Sampler {
+    pub(super) mag_filter: u32,
+    pub(super) min_filter: u32,
+    pub(super) wrap_s: u32,
+    pub(super) wrap_t: u32,
+}
+
+impl Sampler {
+    /// Linear between texels and between copies of the picture; beyond its edges it is repeated, or these go on.
+    pub(super) fn of(repeats: bool) -> Sampler {
+        const LINEAR: u32 = 9729;
+        const LINEAR_MIPMAP_LINEAR: u32 = 9987;
+        const REPEAT: u32 = 10497;
+        const CLAMP_TO_EDGE: u32 = 33071;
+        let wrap = if repeats { REPEAT } else { CLAMP_TO_EDGE };
+        Sampler { mag_filter: LINEAR, min_filter: LINEAR_MIPMAP_LINEAR, wrap_s: wrap, wrap_t: wrap }
+    }
+}
+
+#[derive(Debug, Serialize)]
+pub(super) struct TextureInfo {
+    pub(super) index: usize,
 }
 
 #[derive(Debug, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Pbr {
     pub(super) base_color_factor: [f32; 4],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) base_color_texture: Option<TextureInfo>,
     pub(super) metallic_factor: f32,
     pub(super) roughness_factor: f32,
 }
@@ -92,7 +142,7 @@ pub(super) struct Pbr {
 impl Pbr {
     /// A dull surface of this colour.
     pub(super) fn of(base_color_factor: [f32; 4]) -> Pbr {
-        Pbr { base_color_factor, metallic_factor: 0.0, roughness_factor: 0.8 }
+        Pbr { base_color_factor, base_color_texture: None, metallic_factor: 0.0, roughness_factor: 0.8 }
     }
 }
 

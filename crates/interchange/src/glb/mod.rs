@@ -10,7 +10,7 @@ mod normals;
 
 use std::collections::{BTreeMap, HashMap};
 
-use dlsys_geometry::scene::MaterialId;
+use dlsys_geometry::scene::{self, MaterialId};
 use dlsys_render::{GENERATOR, plain_name};
 use serde_json::json;
 
@@ -20,7 +20,9 @@ use crate::motion::{Clock, Moved};
 use crate::stem::Corner;
 use crate::{Error, Growth, linear};
 use buffer::{Buffer, Kind};
-use document::{Animation, Asset, Document, Material, Mesh, Node, Pbr, Primitive, Scene};
+use document::{
+    Animation, Asset, Document, Material, Mesh, Node, Pbr, Primitive, Sampler, Scene, Texture, TextureInfo,
+};
 
 /// Normals of shapes that differ by less than this are those of the mesh.
 const SAME_NORMAL: f32 = 0.01;
@@ -138,6 +140,7 @@ impl Writer<'_> {
 
     fn primitives(&mut self, layout: &Layout, all: &[Vec<Places>]) -> Vec<Primitive> {
         let mut primitives = Vec::new();
+        let pinned = layout.pinned();
         for (i, (material, triangles)) in layout.primitives.iter().enumerate() {
             if triangles.is_empty() {
                 continue;
@@ -157,10 +160,15 @@ impl Writer<'_> {
                 target
             });
             let targets: Vec<_> = targets.collect();
-            let attributes = BTreeMap::from([
+            let mut attributes = BTreeMap::from([
                 ("POSITION", self.buffer.vectors(&base.positions, Kind::Place)),
                 ("NORMAL", self.buffer.vectors(&base.normals, Kind::Normal)),
             ]);
+            if !pinned[i].is_empty() {
+                // Down from the upper edge.
+                let places: Vec<[f32; 2]> = pinned[i].iter().map(|[u, v]| [*u, 1.0 - v]).collect();
+                attributes.insert("TEXCOORD_0", self.buffer.places(&places));
+            }
             let indices = self.buffer.indices(triangles);
             let material = self.material(Some(*material));
             primitives.push(Primitive { attributes, indices, material, targets });
@@ -214,16 +222,33 @@ impl Writer<'_> {
 
     /// The number of a material; `None` is the floor.
     fn material(&mut self, id: Option<MaterialId>) -> usize {
-        let (palette, floor) = (self.cutter.palette, self.growth.floor_color);
-        let materials = &mut self.document.materials;
-        *self.materials.entry(id).or_insert_with(|| {
-            let (name, color) = match id.and_then(|id| palette.materials().get(id.index())) {
-                Some(material) => (material.name.to_string(), material.color),
-                None => ("ground".to_owned(), floor),
-            };
-            materials.push(Material { name, pbr: Pbr::of(linear(color)), double_sided: true });
-            materials.len() - 1
-        })
+        if let Some(&known) = self.materials.get(&id) {
+            return known;
+        }
+        let found = id.and_then(|id| self.cutter.palette.materials().get(id.index()));
+        let (name, color) = match found {
+            Some(material) => (material.name.to_string(), material.color),
+            None => ("ground".to_owned(), self.growth.floor_color),
+        };
+        let mut pbr = Pbr::of(linear(color));
+        let mut alpha_mode = None;
+        if let Some(texture) = found.and_then(|material| material.texture.as_ref()) {
+            // The factor is multiplied with the picture.
+            pbr.base_color_factor = [1.0; 4];
+            pbr.base_color_texture = Some(TextureInfo { index: self.texture(texture) });
+            alpha_mode = texture.picture.is_cut_out().then_some("MASK");
+        }
+        let number = self.document.materials.len();
+        self.document.materials.push(Material { name, pbr, double_sided: true, alpha_mode });
+        self.materials.insert(id, number);
+        number
+    }
+
+    /// The number of a texture.
+    fn texture(&mut self, texture: &scene::Texture) -> usize {
+        let sampler = number_of(&mut self.document.samplers, Sampler::of(texture.repeats));
+        let source = self.buffer.picture(&texture.picture);
+        number_of(&mut self.document.textures, Texture { sampler, source })
     }
 
     /// The floor that the model declares, as a large square.
@@ -264,6 +289,15 @@ impl Writer<'_> {
         }
         Ok(file)
     }
+}
+
+/// The number of an item of a list, to which it is added unless it is there.
+fn number_of<T: PartialEq>(all: &mut Vec<T>, item: T) -> usize {
+    let known = all.iter().position(|known| *known == item);
+    known.unwrap_or_else(|| {
+        all.push(item);
+        all.len() - 1
+    })
 }
 
 /// A shape as differences from the base; where it has no normal, it has that of the base.

@@ -9,8 +9,8 @@ mod text;
 
 use std::collections::HashMap;
 
-use dlsys_geometry::scene::{Color, MaterialId};
-use dlsys_render::{GENERATOR, plain_name, push_number};
+use dlsys_geometry::scene::{Color, MaterialId, Texture};
+use dlsys_render::{GENERATOR, pictures, plain_name, push_number};
 
 use crate::life::Life;
 use crate::mesh::Cutter;
@@ -26,6 +26,7 @@ const RATE: f64 = 24.0;
 const OF_NORMALS: usize = 2;
 const OF_TURNS: usize = 6;
 const OF_COLORS: usize = 4;
+const OF_PLACES: usize = 5;
 /// The last decimal of points, in parts of the accuracy.
 const LAST_DECIMAL: f64 = 0.05;
 
@@ -131,31 +132,39 @@ impl Writer<'_> {
         let mut used: Vec<MaterialId> = primitives.map(|primitive| primitive.material).collect();
         used.sort_by_key(|id| id.index());
         used.dedup();
-        let mut all: Vec<(Option<MaterialId>, &str, Color)> = Vec::new();
+        let mut all: Vec<(Option<MaterialId>, &str, Color, Option<&Texture>)> = Vec::new();
         for id in used {
             if let Some(material) = self.growth.palette.materials().get(id.index()) {
-                all.push((Some(id), &material.name, material.color));
+                all.push((Some(id), &material.name, material.color, material.texture.as_ref()));
             }
         }
         if self.growth.options.floor.is_some() {
-            all.push((None, "ground", self.growth.floor_color));
+            all.push((None, "ground", self.growth.floor_color, None));
         }
+        let pictures = pictures(&self.growth.palette);
         let mut names = Identifiers::default();
         text.block("def Scope \"Materials\" ", BRACES, |text| {
-            for (id, name, color) in all {
+            for (id, name, color, texture) in all {
                 let name = names.choose(name);
                 let path = format!("/Plant/Materials/{name}");
                 text.block(&format!("def Material \"{name}\" "), BRACES, |text| {
                     text.line(&format!("token outputs:surface.connect = <{path}/Shader.outputs:surface>"));
                     text.block("def Shader \"Shader\" ", BRACES, |text| {
                         text.line("uniform token info:id = \"UsdPreviewSurface\"");
-                        text.long("color3f inputs:diffuseColor = ", |out| {
-                            tuple(out, rgb(color), OF_COLORS);
-                        });
+                        match texture {
+                            Some(texture) => colors_of(text, &path, texture),
+                            None => text.long("color3f inputs:diffuseColor = ", |out| {
+                                tuple(out, rgb(color), OF_COLORS);
+                            }),
+                        }
                         text.line("float inputs:metallic = 0");
                         text.line("float inputs:roughness = 0.8");
                         text.line("token outputs:surface");
                     });
+                    for (_, file) in pictures.iter().filter(|(p, _)| texture.is_some_and(|t| t.picture == *p))
+                    {
+                        readers(text, &path, file, texture.is_some_and(|texture| texture.repeats));
+                    }
                 });
                 self.materials.insert(id, name);
             }
@@ -185,7 +194,7 @@ impl Writer<'_> {
             Some(id) => self.growth.palette.materials().get(id.index()).map(|material| material.color),
             None => Some(self.growth.floor_color),
         };
-        let Primitive { triangles, points, normals, .. } = primitive;
+        let Primitive { triangles, pinned, points, normals, .. } = primitive;
         text.prim(
             &format!("def Mesh \"{name}\""),
             |text| text.line("prepend apiSchemas = [\"MaterialBindingAPI\"]"),
@@ -213,6 +222,14 @@ impl Writer<'_> {
                 if let Some(color) = color {
                     text.long("color3f[] primvars:displayColor = ", |out| {
                         list(out, &[rgb(color)], |out, rgb| tuple(out, rgb, OF_COLORS));
+                    });
+                }
+                if !pinned.is_empty() {
+                    text.block("texCoord2f[] primvars:st ", PARENTHESES, |text| {
+                        text.line("interpolation = \"vertex\"")
+                    });
+                    text.long("texCoord2f[] primvars:st = ", |out| {
+                        list(out, pinned, |out, place| tuple(out, place.map(f64::from), OF_PLACES));
                     });
                 }
                 text.line("uniform token subdivisionScheme = \"none\"");
@@ -341,9 +358,38 @@ impl Writer<'_> {
         let Some((positions, triangles)) = self.growth.floor() else { return };
         let normals = Samples::still(vec![[0.0, 1.0, 0.0]; positions.len()]);
         let (material, points) = (MaterialId::LEAF, Samples::still(positions));
-        let primitive = Primitive { material, triangles, points, normals };
+        let primitive = Primitive { material, triangles, pinned: Vec::new(), points, normals };
         self.mesh(text, "ground", None, (&primitive, None));
     }
+}
+
+/// The inputs of a surface that come from its picture.
+fn colors_of(text: &mut Text, path: &str, texture: &Texture) {
+    text.line(&format!("color3f inputs:diffuseColor.connect = <{path}/Picture.outputs:rgb>"));
+    if texture.picture.is_cut_out() {
+        text.line(&format!("float inputs:opacity.connect = <{path}/Picture.outputs:a>"));
+        text.line("float inputs:opacityThreshold = 0.5");
+    }
+}
+
+/// The reader of a picture that stands beside the layer, and that of the places of corners in it.
+fn readers(text: &mut Text, path: &str, file: &str, repeats: bool) {
+    let wrap = if repeats { "repeat" } else { "clamp" };
+    text.block("def Shader \"Picture\" ", BRACES, |text| {
+        text.line("uniform token info:id = \"UsdUVTexture\"");
+        text.line(&format!("asset inputs:file = @./{file}@"));
+        text.line("token inputs:sourceColorSpace = \"sRGB\"");
+        text.line(&format!("float2 inputs:st.connect = <{path}/Places.outputs:result>"));
+        text.line(&format!("token inputs:wrapS = \"{wrap}\""));
+        text.line(&format!("token inputs:wrapT = \"{wrap}\""));
+        text.line("float outputs:a");
+        text.line("float3 outputs:rgb");
+    });
+    text.block("def Shader \"Places\" ", BRACES, |text| {
+        text.line("uniform token info:id = \"UsdPrimvarReader_float2\"");
+        text.line("string inputs:varname = \"st\"");
+        text.line("float2 outputs:result");
+    });
 }
 
 /// When it is visible; each value holds from its time on. The scale begins to be more than 0, or has become 0, at these times.

@@ -36,6 +36,8 @@ impl<T> Samples<T> {
 pub(super) struct Primitive {
     pub(super) material: MaterialId,
     pub(super) triangles: Vec<u32>,
+    /// Where the corners lie in the picture of the material; empty without one.
+    pub(super) pinned: Vec<[f32; 2]>,
     pub(super) points: Samples<Vec<[f32; 3]>>,
     pub(super) normals: Samples<Vec<[f32; 3]>>,
 }
@@ -114,13 +116,15 @@ fn primitives(life: &Life, cutter: &Cutter<'_>, ages: &[f64], numbers: &[Vec<f32
     for own in numbers {
         places.iter_mut().zip(layout.places(own)).for_each(|(all, own)| all.push(own));
     }
-    let all = layout.primitives.into_iter().zip(places).filter(|((_, triangles), _)| !triangles.is_empty());
-    all.map(|((material, triangles), shapes)| {
+    let pinned = layout.pinned();
+    let all = layout.primitives.into_iter().zip(pinned).zip(places);
+    let all = all.filter(|(((_, triangles), _), _)| !triangles.is_empty());
+    all.map(|(((material, triangles), pinned), shapes)| {
         let (points, mut normals): (Vec<_>, Vec<_>) =
             shapes.into_iter().map(|places| (places.positions, places.normals)).unzip();
         complete(&mut normals);
         let points = Samples::at(ages.to_vec(), points);
-        Primitive { material, triangles, points, normals: few(ages, normals) }
+        Primitive { material, triangles, pinned, points, normals: few(ages, normals) }
     })
     .collect()
 }
@@ -181,6 +185,7 @@ fn stem(life: &Life, cutter: &Cutter<'_>, (contour, size): (Option<u32>, f32), w
     Primitive {
         material: life.paint.first().copied().flatten().unwrap_or(MaterialId::STEM),
         triangles: tube.triangles.iter().flatten().copied().collect(),
+        pinned: Vec::new(),
         points: Samples::at(life.ages.clone(), points.collect()),
         normals: Samples::still(normals),
     }

@@ -1,8 +1,9 @@
 // What is to be seen at a time as triangles, made here: corners in one array, to be drawn in one go. That suits programs that
 // stand in for a graphics processor as well as real ones, and looking from elsewhere needs nothing new.
 
-// Numbers of a corner: place, normal, and its colour in four bytes.
+// Numbers of a corner: place, normal, and its colour in four bytes; and, where there are pictures, its place in one, and which.
 const CORNER = 7;
+const PIN = 3;
 // A patch has at most so many pieces to a side, as a power of two.
 const FINEST = 4;
 
@@ -11,7 +12,10 @@ class Geometry {
     this.recording = recording;
     this.palette = recording.palette.map((hex) => bytesOf(parseInt(hex.slice(1), 16)));
     this.outlines = recording.outlines.map(tubeForm);
-    this.meshes = recording.meshes.map(({ places, normals, colors, triangles }) => ({
+    this.hasPictures = recording.pictures.length > 0;
+    this.meshes = recording.meshes.map(({ places, normals, colors, triangles, picture, pinned }) => ({
+      picture,
+      pinned: Float32Array.from(pinned),
       places: Float32Array.from(places),
       normals: Float32Array.from(normals),
       colors: Uint32Array.from(colors, (color) => bytesOf(color < 0 ? -color - 1 : color)),
@@ -22,6 +26,7 @@ class Geometry {
     this.cuts = recording.cuts.map((cut) => Uint32Array.from(cut.flat()));
     this.corners = new Float32Array(CORNER * 4096);
     this.colors = new Uint32Array(this.corners.buffer);
+    this.pins = new Float32Array(this.hasPictures ? PIN * 4096 : 0);
     this.triangles = new Uint32Array(3 * 4096);
     this.net = new Float32Array(64);
     this.levels = new Uint8Array(8);
@@ -65,6 +70,15 @@ class Geometry {
       this.triangles = more;
     }
     const { count, used } = this;
+    if (this.hasPictures) {
+      const pins = PIN * (count + corners);
+      if (pins > this.pins.length) {
+        const more = new Float32Array(2 * pins);
+        more.set(this.pins);
+        this.pins = more;
+      }
+      this.pins.fill(-1, PIN * count, pins);
+    }
     for (let i = 0; i < triangles.length; i++) this.triangles[used + i] = count + triangles[i];
     this.used += triangles.length;
     this.count += corners;
@@ -139,7 +153,7 @@ class Geometry {
   }
 
   // Its third axis is the product of the others, unless it has a size of its own.
-  addMesh({ places, normals, colors, tinted, triangles }, color, plain, stretched = false) {
+  addMesh({ places, normals, colors, tinted, triangles, picture, pinned }, color, plain, stretched = false) {
     const [ox, oy, oz, ax, ay, az, bx, by, bz] = this.net;
     const inverse = (x, y, z) => 1 / (x * x + y * y + z * z || Infinity);
     const each = Math.sqrt(inverse(ax, ay, az));
@@ -151,6 +165,14 @@ class Geometry {
       ? [inverse(ax, ay, az), inverse(bx, by, bz), inverse(cx, cy, cz)]
       : [each, each, each];
     let at = this.begin(colors.length, triangles);
+    if (picture !== null) {
+      const { repeats } = this.recording.pictures[picture];
+      for (let i = 0, pin = PIN * (this.count - colors.length); i < colors.length; i++, pin += PIN) {
+        this.pins[pin] = pinned[2 * i];
+        this.pins[pin + 1] = pinned[2 * i + 1];
+        this.pins[pin + 2] = 2 * picture + (repeats ? 1 : 0);
+      }
+    }
     for (let i = 0; i < colors.length; i++, at += CORNER) {
       const [x, y, z] = [places[3 * i], places[3 * i + 1], places[3 * i + 2]];
       const [p, q, r] = [normals[3 * i] * ea, normals[3 * i + 1] * eb, normals[3 * i + 2] * ec];

@@ -22,7 +22,9 @@ class Painter {
     this.recording = recording;
     this.geometry = new Geometry(recording);
     const { surface, light } = recording.shaders;
-    const program = (this.program = this.compiled(surface, light));
+    const { hasPictures } = this.geometry;
+    const option = hasPictures ? "#define PICTURES\nprecision highp sampler2DArray;\n" : "";
+    const program = (this.program = this.compiled(option + surface, option + light));
     const uniforms = ["view", "projection", "relief", "falloff", "near", "sun", "zenith", "tint"];
     this.places = Object.fromEntries(uniforms.map((name) => [name, gl.getUniformLocation(program, name)]));
     gl.useProgram(program);
@@ -32,6 +34,16 @@ class Painter {
       const place = gl.getAttribLocation(program, name);
       gl.enableVertexAttribArray(place);
       gl.vertexAttribPointer(place, count, type, type !== gl.FLOAT, 4 * CORNER, offset);
+    }
+    if (hasPictures) {
+      this.pins = gl.createBuffer();
+      gl.bindBuffer(gl.ARRAY_BUFFER, this.pins);
+      const place = gl.getAttribLocation(program, "pin");
+      gl.enableVertexAttribArray(place);
+      gl.vertexAttribPointer(place, PIN, gl.FLOAT, false, 4 * PIN, 0);
+      // What is cut out has edges as smooth as those of triangles.
+      if (!this.software) gl.enable(gl.SAMPLE_ALPHA_TO_COVERAGE);
+      gl.uniform1f(gl.getUniformLocation(program, "smooth_edges"), this.software ? 0 : 1);
     }
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
     gl.enable(gl.DEPTH_TEST);
@@ -53,11 +65,47 @@ class Painter {
     return program;
   }
 
+  // Unpacks the pictures into the layers of one texture, all of one size: that of the largest, as far as that goes.
+  async unpack() {
+    const { gl } = this;
+    const { pictures } = this.recording;
+    if (!pictures.length) {
+      this.isReady = true;
+      return;
+    }
+    const power = (side) => 2 ** Math.ceil(Math.log2(Math.max(1, side)));
+    const most = Math.min(gl.getParameter(gl.MAX_TEXTURE_SIZE), pictures.length > 8 ? 1024 : 2048);
+    const [width, height] = [0, 1].map((k) => Math.min(most, Math.max(...pictures.map(({ size }) => power(size[k])))));
+    gl.activeTexture(gl.TEXTURE0);
+    gl.bindTexture(gl.TEXTURE_2D_ARRAY, gl.createTexture());
+    const levels = 1 + Math.log2(Math.max(width, height));
+    gl.texStorage3D(gl.TEXTURE_2D_ARRAY, levels, gl.RGBA8, width, height, pictures.length);
+    // Colours times opacity, so that nothing of the colour of what is cut out gets into the mean.
+    const options = { resizeWidth: width, resizeHeight: height, resizeQuality: "high", premultiplyAlpha: "premultiply" };
+    for (const [layer, { file }] of pictures.entries()) {
+      const bytes = Uint8Array.from(atob(file), (c) => c.charCodeAt(0));
+      const image = await createImageBitmap(new Blob([bytes], { type: "image/png" }), options);
+      gl.texSubImage3D(gl.TEXTURE_2D_ARRAY, 0, 0, 0, layer, width, height, 1, gl.RGBA, gl.UNSIGNED_BYTE, image);
+      image.close();
+    }
+    gl.generateMipmap(gl.TEXTURE_2D_ARRAY);
+    gl.texParameteri(gl.TEXTURE_2D_ARRAY, gl.TEXTURE_MIN_FILTER, gl.LINEAR_MIPMAP_LINEAR);
+    for (const wrap of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D_ARRAY, wrap, gl.CLAMP_TO_EDGE);
+    const sharp = gl.getExtension("EXT_texture_filter_anisotropic");
+    if (sharp) gl.texParameterf(gl.TEXTURE_2D_ARRAY, sharp.TEXTURE_MAX_ANISOTROPY_EXT, 8);
+    this.isReady = true;
+  }
+
   // Takes in what is to be seen; see Geometry.
   stage(frame, detail) {
     const { gl, geometry } = this;
     geometry.stage(frame, detail);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.corners);
     gl.bufferData(gl.ARRAY_BUFFER, geometry.corners.subarray(0, CORNER * geometry.count), gl.STREAM_DRAW);
+    if (this.pins) {
+      gl.bindBuffer(gl.ARRAY_BUFFER, this.pins);
+      gl.bufferData(gl.ARRAY_BUFFER, geometry.pins.subarray(0, PIN * geometry.count), gl.STREAM_DRAW);
+    }
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, geometry.triangles.subarray(0, geometry.used), gl.STREAM_DRAW);
     this.triangles = geometry.used / 3;
   }
@@ -75,8 +123,9 @@ class Painter {
     gl.uniform3fv(places.tint, mean.map((c) => c / Math.max(1e-3, ...mean)));
   }
 
-  // Draws what was taken in last.
+  // Draws what was taken in last, once pictures are unpacked.
   paint(camera, width, height) {
+    if (!this.isReady) return;
     const { gl, places } = this;
     const { view, projection, near } = camera.matrices(width / height);
     const { extent, size } = this.recording;

@@ -403,8 +403,11 @@ function shown(time) {
     const recording = JSON.parse(part("description"));
     recording.tracks = decodeTracks(await inflated(part("tracks")), recording.unit);
     // For whoever wants to steer it from outside: dlsys.seek(2), dlsys.play(), dlsys.look(30, 20).
-    window.dlsys = new Player(recording);
-    window.dlsys.play();
+    const player = new Player(recording);
+    await player.painter.unpack();
+    player.stale = true;
+    window.dlsys = player;
+    player.play();
   } catch (error) {
     document.getElementById("notice").textContent = `The plant cannot be shown: ${error.message}.`;
     console.error(error);

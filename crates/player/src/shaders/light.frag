@@ -17,6 +17,15 @@ uniform vec3 zenith;
 // Tint of the light of a declared sky; its first number is negative if there is neither sun nor sky.
 uniform vec3 tint;
 
+#ifdef PICTURES
+in vec2 place;
+flat in float picture;
+// Colours times opacity.
+uniform sampler2DArray pictures;
+// Whether samples of a pixel count by opacity.
+uniform float smooth_edges;
+#endif
+
 out vec4 painted;
 
 const vec3 LAMP = vec3(-0.36, 0.583, 0.728361861);
@@ -32,6 +41,23 @@ void main() {
     // Of what is seen from behind, the back is lit.
     if (!gl_FrontFacing) normal = -normal;
     vec3 color = shade;
+    float opacity = 1.0;
+#ifdef PICTURES
+    // Derivatives are those of all pixels, before any of them goes another way.
+    vec2 down = vec2(place.x, 1.0 - place.y);
+    vec2 right_by = dFdx(down), up_by = dFdy(down);
+    if (picture >= 0.0) {
+        int number = int(picture + 0.5);
+        vec2 at = (number & 1) == 1 ? fract(down) : down;
+        vec4 texel = textureGrad(pictures, vec3(at, float(number >> 1)), right_by, up_by);
+        color = texel.rgb / max(texel.a, 1.0 / 255.0);
+        opacity = texel.a;
+    }
+    float slope = fwidth(opacity);
+    opacity = clamp((opacity - 0.5) / max(slope, 1e-3) + 0.5, 0.0, 1.0);
+    if (smooth_edges < 0.5) opacity = step(0.5, opacity);
+    if (opacity <= 0.0) discard;
+#endif
     float strength;
     if (tint.r < 0.0) {
         vec3 half_way = normalize(LAMP + vec3(0.0, 0.0, 1.0));
@@ -57,5 +83,5 @@ void main() {
     vec3 lit = strength <= 1.0
         ? color * (shadow + (1.0 - shadow) * strength)
         : color + (1.0 - color) * (strength - 1.0);
-    painted = vec4(clamp(lit, 0.0, 1.0), 1.0);
+    painted = vec4(clamp(lit, 0.0, 1.0), opacity);
 }

@@ -63,10 +63,19 @@ pub trait Exporter: Sync {
     /// Those of `out`, and what the format cannot hold.
     fn write(&self, drawing: Drawing<'_>, out: &mut (dyn Write + Send)) -> io::Result<()>;
 
-    /// The file that all frames refer to, if there is one: its name and its bytes.
-    fn companion(&self, _scene: &Scene) -> Option<(&'static str, Vec<u8>)> {
-        None
+    /// The files that all frames refer to.
+    fn companions(&self, _scene: &Scene) -> Vec<Companion> {
+        Vec::new()
     }
+}
+
+/// A file that others refer to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Companion {
+    /// Its plain name; it stands beside them.
+    pub name: String,
+    /// Its content.
+    pub bytes: Vec<u8>,
 }
 
 /// A file format for frames.

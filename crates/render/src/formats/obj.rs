@@ -5,20 +5,23 @@
 //!
 //! The mesh is never in memory as a whole: parts of the text are made on several threads and written at once.
 
-use super::{Content, Description, Drawing, Exporter};
+use super::{Companion, Content, Description, Drawing, Exporter};
 use std::io::{self, Write};
 use std::ops::Range;
+use std::sync::Arc;
 
-use crate::name::Names;
+use crate::name::{Names, pictures};
 use crate::text::{Corner, Text};
 use crate::triangles::{Faces, Points, Ring, Solid};
 use crate::{GENERATOR, Page, floor, number, relay};
-use dlsys_geometry::scene::{MaterialId, OwnerId, Palette, Point, Scene, Vector};
+use dlsys_geometry::scene::{MaterialId, OwnerId, Palette, Picture, Point, Scene, Texture, Vector};
 
 /// Name of the material library that all frames refer to.
 const MATERIALS: &str = "materials.mtl";
 /// Decimals of a normal.
 const NORMAL_DECIMALS: usize = 4;
+/// Decimals of a place in a picture: a hundredth of a texel of the largest one.
+const PLACE_DECIMALS: usize = 6;
 /// Approximate number of points of a part of the text: some hundred kilobytes, which fit into a cache.
 const PART: usize = 6000;
 
@@ -26,6 +29,7 @@ const PART: usize = 6000;
 enum Part {
     Vertices(Range<usize>),
     Normals(Range<usize>),
+    Places(Range<usize>),
     Faces(Range<usize>),
 }
 
@@ -54,6 +58,7 @@ impl Exporter for Obj {
         let faces = whole_groups(&solid, &order);
         let parts: Vec<Part> = (points.iter().cloned().map(Part::Vertices))
             .chain(points.iter().cloned().map(Part::Normals))
+            .chain(points.iter().filter(|_| solid.has_places).cloned().map(Part::Places))
             .chain(faces.into_iter().map(Part::Faces))
             .collect();
         let title: String = title.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
@@ -67,19 +72,24 @@ impl Exporter for Obj {
                     solid.points(items.clone(), &mut Vertices { text: &mut draft.text, decimals });
                 }
                 Part::Normals(items) => solid.points(items.clone(), &mut Normals { text: &mut draft.text }),
+                Part::Places(items) => solid.points(items.clone(), &mut Places { text: &mut draft.text }),
                 Part::Faces(items) => draft.groups(&solid, &names, &order[items.clone()]),
             }
         };
         relay::write(writer.threads, parts.len(), make, |draft| draft.text.bytes(), out)
     }
 
-    fn companion(&self, scene: &Scene) -> Option<(&'static str, Vec<u8>)> {
+    fn companions(&self, scene: &Scene) -> Vec<Companion> {
         let scene = scene.flattened();
         let mut palette = scene.palette.clone();
         if scene.surroundings.floor.is_some() {
             palette.add("ground", Page::BACKGROUND);
         }
-        Some((MATERIALS, materials(&palette)))
+        let pictures = pictures(&palette);
+        let library = Companion { name: MATERIALS.to_owned(), bytes: materials(&palette, &pictures) };
+        let copies = pictures.into_iter();
+        let copies = copies.map(|(picture, name)| Companion { name, bytes: picture.file.clone() });
+        [library].into_iter().chain(copies).collect()
     }
 }
 
@@ -123,6 +133,21 @@ impl Points for Normals<'_> {
 
     fn normal(&mut self, of: impl FnOnce() -> Vector) {
         self.text.triple(b"vn", &of(), NORMAL_DECIMALS);
+    }
+}
+
+/// Writes places in pictures only.
+struct Places<'t> {
+    text: &'t mut Text,
+}
+
+impl Points for Places<'_> {
+    fn vertex(&mut self, _: impl FnOnce() -> Point) {}
+
+    fn normal(&mut self, _: impl FnOnce() -> Vector) {}
+
+    fn places(&mut self, places: &[[f64; 2]]) {
+        places.iter().for_each(|place| self.text.numbers(b"vt", place, PLACE_DECIMALS));
     }
 }
 
@@ -181,6 +206,16 @@ impl Faces for Draft {
         self.text.line(|line| line.face([&a, &b, &c]));
     }
 
+    fn pictured(&mut self, corners: [(u32, u32); 3], places: [u32; 3]) {
+        self.text.words(&[b"f"]);
+        for ((vertex, normal), place) in corners.into_iter().zip(places) {
+            // OBJ counts from 1.
+            let [vertex, place, normal] = [vertex, place, normal].map(|number| u64::from(number) + 1);
+            self.text.words(&[format!(" {vertex}/{place}/{normal}").as_bytes()]);
+        }
+        self.text.words(&[b"\n"]);
+    }
+
     fn strip(&mut self, from: Ring, to: Ring) {
         if self.high.of == Some(from) {
             std::mem::swap(&mut self.low, &mut self.high);
@@ -214,16 +249,24 @@ impl Faces for Draft {
     }
 }
 
-/// The material library.
-fn materials(palette: &Palette) -> Vec<u8> {
+/// The material library. Programs multiply the picture by `Kd`, or leave that out.
+fn materials(palette: &Palette, pictures: &[(Arc<Picture>, String)]) -> Vec<u8> {
     let mut out = Text::default();
     out.words(&[b"# ", GENERATOR.as_bytes(), b"\n"]);
     for material in palette.materials() {
         out.words(&[b"\nnewmtl ", material.name.as_bytes(), b"\n"]);
+        let color = if material.texture.is_some() { [1.0; 3] } else { material.color.channels() };
         for (keyword, strength) in [(b"Ka", 0.2), (b"Kd", 1.0)] {
-            out.triple(keyword, &(Vector::from(material.color.channels()) * strength), NORMAL_DECIMALS);
+            out.triple(keyword, &(Vector::from(color) * strength), NORMAL_DECIMALS);
         }
         out.words(&[b"Ks 0.05 0.05 0.05\nNs 20\nd 1\nillum 2\n"]);
+        let Some(Texture { picture, .. }) = &material.texture else { continue };
+        for (_, name) in pictures.iter().filter(|(known, _)| known == picture) {
+            out.words(&[b"map_Kd ", name.as_bytes(), b"\n"]);
+            if picture.is_cut_out() {
+                out.words(&[b"map_d ", name.as_bytes(), b"\n"]);
+            }
+        }
     }
     out.bytes().to_vec()
 }

@@ -6,12 +6,13 @@ use super::{Content, Description, Drawing, Exporter};
 use crate::lens::Lens;
 use crate::light::Spot;
 use crate::lighting::Lighting;
+use crate::mapping::{Cut, Mapping, Pinned};
 use crate::raster::{self, Corner, Image};
 use crate::sky::Sky;
 use crate::stage::Stage;
 use crate::triangles::Triangles;
 use crate::{Fit, Page, Smoothness, shot};
-use dlsys_geometry::scene::{Color, MaterialId, Point, Scene, Vector};
+use dlsys_geometry::scene::{Color, MaterialId, Palette, Point, Scene, Texture, Vector};
 
 /// How far a tube's outline may be from a circle, in pixels.
 const ROUNDNESS: f64 = 0.1;
@@ -80,13 +81,14 @@ pub(crate) struct Lit<'m> {
     seen: Vec<Point>,
     normals: Vec<Vector>,
     scale: f64,
+    palette: &'m Palette,
 }
 
 impl<'m> Lit<'m> {
     /// The triangles of a scene, whose floor has a material of its own. A point that the camera sees at x, y is at `a x + b` and
     /// `c - a y` pixels.
     pub(crate) fn new(
-        scene: &Scene,
+        scene: &'m Scene,
         mesh: &'m Triangles,
         fit: &'m Fit,
         [a, b, c]: [f64; 3],
@@ -104,7 +106,35 @@ impl<'m> Lit<'m> {
             seen,
             normals,
             scale,
+            palette: &scene.palette,
         }
+    }
+
+    /// The picture on a triangle, and where its corners are.
+    fn picture(&self, n: usize) -> Option<(&'m Texture, [Pinned; 3])> {
+        if self.mesh.places.is_empty() {
+            return None;
+        }
+        let face = &self.mesh.faces[n];
+        let texture = self.palette.texture(face.material)?;
+        let pinned = face.corners.map(|(vertex, _)| {
+            let [x, y, z] = self.places[vertex as usize];
+            let magnification = self.lighting.camera().magnification(z);
+            Pinned { at: [x, y], place: self.mesh.places[vertex as usize], magnification }
+        });
+        Some((texture, pinned))
+    }
+
+    /// What is cut out of a triangle, decided so many times in a pixel.
+    pub(crate) fn cut(&self, n: usize, count: usize) -> Option<Cut<'m>> {
+        let (texture, pinned) = self.picture(n)?;
+        Cut::new(texture, pinned, count)
+    }
+
+    /// The colour of a picture at a place between the corners of a triangle; `None` if none is on it.
+    pub(crate) fn pictured(&self, n: usize, weights: impl FnOnce() -> [f64; 3]) -> Option<[f64; 3]> {
+        let (texture, pinned) = self.picture(n)?;
+        Some(texture.color(&Mapping::new(pinned)?.print_between(pinned, weights())))
     }
 
     /// Moves the origin of pixels to another one.
@@ -147,18 +177,18 @@ impl<'m> Lit<'m> {
         &self.lighting
     }
 
-    /// The colour of a material in light of this strength, before a background.
+    /// The colour of a material, or one of its tones, in light of this strength, before a background.
     pub(crate) fn color(
         &self,
-        scene: &Scene,
         material: MaterialId,
+        tone: Option<Color>,
         strength: f64,
         background: Option<Color>,
     ) -> Color {
         if self.floor == Some(material) {
             return self.lighting.floor_over(background, strength);
         }
-        self.lighting.color(scene.palette.get(material).color, strength)
+        self.lighting.color(tone.unwrap_or(self.palette.get(material).color), strength)
     }
 }
 

@@ -9,6 +9,8 @@ use std::ops::Range;
 use super::fragments::{Cover, Fragment, Fragments, Places, places};
 use super::plane::{Plane, Ready};
 use super::{BAND, EQUAL, Pattern, Place, STEPS, Triangles};
+use crate::mapping::Cut;
+use dlsys_geometry::scene::Drawn;
 
 /// Nothing is drawn in the pixel.
 const NOTHING: u32 = u32::MAX;
@@ -61,19 +63,20 @@ impl<const N: usize> Band<N> {
         self.planes.clear();
         self.planes.resize(numbers.len(), Plane::NONE);
         for place in nearest_first(triangles, numbers) {
-            let corners = triangles.corners(numbers[place] as usize);
+            let number = numbers[place] as usize;
+            let corners = triangles.corners(number);
             let Some(ready) = Ready::new(corners, self.width, &rows) else { continue };
             self.planes[place] = ready.plane;
             let place = place as u32;
             let [first, last] = ready.columns;
             let [from, end] = self.touched;
             self.touched = if from == end { [first, last + 1] } else { [from.min(first), end.max(last + 1)] };
-            self.fill(&ready, place, rows.start);
+            self.fill(&ready, triangles.cut(number, N).as_ref(), place, rows.start);
         }
     }
 
     /// Draws a triangle.
-    fn fill(&mut self, ready: &Ready, place: u32, top: usize) {
+    fn fill(&mut self, ready: &Ready, cut: Option<&Cut<'_>>, place: u32, top: usize) {
         let plane = ready.plane;
         let [lowest, highest] = plane.reach();
         let sides = ready.sides;
@@ -102,14 +105,23 @@ impl<const N: usize> Band<N> {
                 if near + EQUAL < pixel.far {
                     continue;
                 }
-                let is_full = (here[0] + least[0]) | (here[1] + least[1]) | (here[2] + least[2]) >= 0;
+                let drawn = cut.map_or(Drawn::All, |cut| cut.in_pixel([column, row]));
+                if drawn == Drawn::Nothing {
+                    continue;
+                }
+                let is_full = drawn == Drawn::All
+                    && (here[0] + least[0]) | (here[1] + least[1]) | (here[2] + least[2]) >= 0;
                 let is_later = pixel.seen != MIXED && place > pixel.seen;
                 let is_nearer = far > pixel.near + EQUAL || (is_later && far + EQUAL >= pixel.near);
                 if is_full && (pixel.seen == NOTHING || is_nearer) {
                     *pixel = Pixel { seen: place, far, near: near.max(pixel.near) };
                     continue;
                 }
-                let mask = cover.get_or_insert_with(|| Cover::new(&sides, &self.places)).mask(here);
+                let covered = cover.get_or_insert_with(|| Cover::new(&sides, &self.places)).mask(here);
+                let mask = match cut.filter(|_| drawn == Drawn::Some) {
+                    Some(cut) => left_of(cut, covered, [column, row], &self.places),
+                    None => covered,
+                };
                 if mask == 0 {
                     continue;
                 }
@@ -158,6 +170,16 @@ impl<const N: usize> Band<N> {
             }
         }
     }
+}
+
+/// The samples of a mask that are not cut out.
+fn left_of<const N: usize>(cut: &Cut<'_>, mask: u32, [column, row]: [usize; 2], [xs, ys]: &Places<N>) -> u32 {
+    let mut left = 0;
+    for s in (0..N).filter(|s| mask >> s & 1 == 1) {
+        let at = |pixel: usize, step: f32| pixel as f64 + f64::from(step) / STEPS as f64;
+        left |= u32::from(cut.is_drawn([at(column, xs[s]), at(row, ys[s])])) << s;
+    }
+    left
 }
 
 /// Triangles by their places in a list, those of a surface together, and surfaces that come nearer first: what is behind is then passed

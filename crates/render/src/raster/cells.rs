@@ -1,6 +1,7 @@
 //! Which triangle is the nearest in pixels, at one sample or at several: for the outlines of visible regions.
 
 use super::{Corner, EQUAL, Pattern, STEPS, Triangle};
+use crate::mapping::Cut;
 
 /// The pattern of one sample, in the middle of a pixel.
 pub(crate) const MIDDLE: Pattern<1> = [(0, 0)];
@@ -14,18 +15,18 @@ pub(crate) struct Nearest<const N: usize> {
     pub(crate) depths: Vec<[f32; N]>,
 }
 
-/// Finds the nearest of `count` triangles at each sample of the pixels that have a `place` below `places`. Of two at the same
+/// Finds the nearest of `count` triangles, given their corners and what is cut out of them, at each sample of the pixels that have a `place` below `places`. Of two at the same
 /// depth it is the later. Triangles that are known to be `seen` come first, so that most others are hidden by then.
-pub(crate) fn nearest<const N: usize>(
+pub(crate) fn nearest<'c, const N: usize>(
     pattern: &Pattern<N>,
     size: [usize; 2],
-    (count, corners): (usize, impl Fn(usize) -> [Corner; 3]),
+    (count, corners, cut): (usize, impl Fn(usize) -> [Corner; 3], impl Fn(usize) -> Option<Cut<'c>>),
     (places, place): (usize, impl Fn(usize) -> usize),
     seen: impl Fn(usize) -> bool,
 ) -> Nearest<N> {
     let mut nearest = Nearest { numbers: vec![[0; N]; places], depths: vec![[f32::NEG_INFINITY; N]; places] };
     for number in (0..count).filter(|number| seen(*number)) {
-        nearest.add(pattern, size, (number, corners(number)), &place, |_, _| true);
+        nearest.add(pattern, size, (number, corners(number), cut(number)), &place, |_, _| true);
     }
     if (0..count).all(&seen) {
         return nearest;
@@ -34,7 +35,7 @@ pub(crate) fn nearest<const N: usize>(
     let far: Vec<f32> = nearest.depths.iter().map(farthest).collect();
     let is_open = |place: usize, depth: f64| far.get(place).is_some_and(|far| depth as f32 + EQUAL >= *far);
     for number in (0..count).filter(|number| !seen(*number)) {
-        nearest.add(pattern, size, (number, corners(number)), &place, is_open);
+        nearest.add(pattern, size, (number, corners(number), cut(number)), &place, is_open);
     }
     nearest
 }
@@ -45,7 +46,7 @@ impl<const N: usize> Nearest<N> {
         &mut self,
         pattern: &Pattern<N>,
         [width, height]: [usize; 2],
-        (number, corners): (usize, [Corner; 3]),
+        (number, corners, cut): (usize, [Corner; 3], Option<Cut<'_>>),
         place: impl Fn(usize) -> usize,
         is_open: impl Fn(usize, f64) -> bool,
     ) {
@@ -89,8 +90,11 @@ impl<const N: usize> Nearest<N> {
                     if (corner[0] + at[0][s]) | (corner[1] + at[1][s]) | (corner[2] + at[2][s]) < 0 {
                         continue;
                     }
-                    let depth =
-                        origin + right * (column as f64 + offset(x)) + down * (row as f64 + offset(y));
+                    let (x, y) = (column as f64 + offset(x), row as f64 + offset(y));
+                    if cut.as_ref().is_some_and(|cut| !cut.is_drawn([x, y])) {
+                        continue;
+                    }
+                    let depth = origin + right * x + down * y;
                     let depth = depth.clamp(least, greatest) as f32;
                     let is_later = number > numbers[s];
                     if depth > depths[s] + EQUAL || is_later && depth + EQUAL >= depths[s] {

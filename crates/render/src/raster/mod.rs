@@ -17,6 +17,7 @@ mod plane;
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
+use super::mapping::Cut;
 use band::Band;
 
 /// Rows in a band.
@@ -91,6 +92,11 @@ pub(super) trait Triangles: Sync {
 
     /// The surface that it belongs to: in a pixel, triangles of one surface have one shade.
     fn surface(&self, n: usize) -> u32;
+
+    /// What is cut out of it, decided so many times in a pixel.
+    fn cut(&self, _n: usize, _count: usize) -> Option<Cut<'_>> {
+        None
+    }
 
     /// Red, green and blue, each times the opacity, and the opacity, in a pixel (column and row), at a place between the corners
     /// that has these weights.
@@ -408,7 +414,7 @@ mod tests {
                 .collect();
             let image = drawn(size, &triangles);
             let (places, corners) = (size[0] * size[1], |n: usize| triangles[n].0);
-            let all = (triangles.len(), corners);
+            let all = (triangles.len(), corners, |_| None);
             let found = cells::nearest(&SIXTEEN, size, all, (places, |at| at), |_| true);
             let mut differing = 0;
             for (pixel, numbers) in image.pixels.iter().zip(&found.numbers) {

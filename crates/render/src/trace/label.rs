@@ -3,6 +3,7 @@
 use std::collections::{HashMap, HashSet};
 
 use super::regions::{COVERED, NOTHING, Regions, Sample};
+use super::tones::{MOST, Tones};
 use crate::formats::png::Lit;
 use crate::raster::cells::{self, Nearest};
 use crate::raster::{Pattern, SIXTEEN};
@@ -36,11 +37,12 @@ impl Shade {
 /// A module and a material.
 pub type Look = (OwnerId, MaterialId);
 
-/// What is painted at once: all of one look, or of that a segment which is painted with a gradient.
+/// What is painted at once: all of one look, or of that a segment which is painted with a gradient, or one tone of its picture.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Item {
     pub look: Look,
     pub stem: Option<u32>,
+    pub tone: u8,
 }
 
 /// The stems that are not painted by their shades: the looks that will be drawn as strokes over everything else, and the segments that
@@ -58,14 +60,14 @@ impl Stems {
         let look = (face.owner, face.material);
         let segment = mesh.segments.get(face.surface as usize).copied().flatten();
         let stem = segment.filter(|segment| self.gradients.contains(segment));
-        (segment.is_none() || !self.strokes.contains(&look)).then_some(Item { look, stem })
+        (segment.is_none() || !self.strokes.contains(&look)).then_some(Item { look, stem, tone: 0 })
     }
 }
 
 /// The number of the nearest triangle in the middle of each cell plus 1, or 0; and its depth.
 pub fn nearest(mesh: &Triangles, lit: &Lit, [width, height]: [usize; 2]) -> Nearest<1> {
     let count = mesh.faces.len();
-    let triangles = (count, |n| lit.corners(n));
+    let triangles = (count, |n| lit.corners(n), |n| lit.cut(n, 1));
     cells::nearest(&cells::MIDDLE, [width, height], triangles, (width * height, |cell| cell), |_| true)
 }
 
@@ -76,7 +78,7 @@ pub fn label(
     lit: &Lit,
     numbers: &[[u32; 1]],
     [width, height]: [usize; 2],
-    stems: &Stems,
+    (stems, tones): (&Stems, &Tones),
     is_fine: bool,
 ) -> (Regions, Vec<Shade>) {
     // Regions are numbered as they are found, then in the order of painting.
@@ -89,10 +91,14 @@ pub fn label(
     let strengths = strengths(lit, numbers, width, has_shades);
     for (cell, label) in labels.iter_mut().enumerate() {
         let Some(n) = (numbers[cell][0] as usize).checked_sub(1) else { continue };
-        let Some(item) = item_of[n] else {
+        let Some(mut item) = item_of[n] else {
             *label = COVERED;
             continue;
         };
+        let weights = || cells::weights(lit.corners(n), [cell % width, cell / width]);
+        if let Some(color) = lit.pictured(n, weights) {
+            item.tone = tones.nearest(item.look.1, color);
+        }
         let strength = f64::from(strengths[cell]);
         let step = step_of(strength);
         let key = (item, step);
@@ -118,16 +124,21 @@ pub fn label(
 
     let (items, of_item) = items(&shades);
     let (places, chosen) = edges(&labels, &items, &shades, width);
-    let at_edges = Edges { lit, numbers, width, height, places: &places, count: chosen };
+    let at_edges =
+        Edges { lit, numbers, width, height, places: &places, count: chosen, tones, of_item: &of_item };
     // Faces of one item follow one another.
     let mut last = (None, NOTHING);
-    let face_items: Vec<(u32, bool)> = (item_of.iter())
+    let face_items: Vec<FaceItem> = (item_of.iter())
         .map(|item| {
-            let Some(known) = item else { return (COVERED, false) };
+            let Some(known) = item else {
+                return FaceItem { item: None, number: COVERED, has_shades: false };
+            };
             if last.0 != *item {
-                last = (*item, of_item.get(known).copied().unwrap_or(NOTHING));
+                // Of a picture any tone that there is.
+                let mut toned = (0..MOST as u8).map(|tone| of_item.get(&Item { tone, ..*known }));
+                last = (*item, toned.find_map(|number| number.copied()).unwrap_or(NOTHING));
             }
-            (last.1, known.stem.is_none())
+            FaceItem { item: *item, number: last.1, has_shades: known.stem.is_none() }
         })
         .collect();
     let samples = match is_fine {
@@ -140,6 +151,13 @@ pub fn label(
     (Regions { width, labels, places, samples, per_cell, items, steps, strengths, least }, shades)
 }
 
+/// The item of a triangle without its tone, the number of that with some tone, and whether it has shades.
+struct FaceItem {
+    item: Option<Item>,
+    number: u32,
+    has_shades: bool,
+}
+
 /// Cells at the edges of items and at creases: those that have a place below `count`.
 struct Edges<'a> {
     lit: &'a Lit<'a>,
@@ -149,24 +167,27 @@ struct Edges<'a> {
     height: usize,
     places: &'a [u32],
     count: usize,
+    tones: &'a Tones,
+    of_item: &'a HashMap<Item, u32>,
 }
 
 impl Edges<'_> {
-    /// What is seen at the samples of these cells, one cell after another. Of each triangle its item is given, and whether it has shades.
-    fn samples<const N: usize>(&self, pattern: &Pattern<N>, items: &[(u32, bool)]) -> Vec<Sample> {
+    /// What is seen at the samples of these cells, one cell after another.
+    fn samples<const N: usize>(&self, pattern: &Pattern<N>, items: &[FaceItem]) -> Vec<Sample> {
         let place = |cell: usize| self.places[cell] as usize;
         let corners = |n: usize| self.lit.corners(n);
         let mut in_front = vec![false; items.len() + 1];
         self.numbers.iter().for_each(|[number]| in_front[*number as usize] = true);
-        let (triangles, size) = ((items.len(), corners), [self.width, self.height]);
+        let (triangles, size) = ((items.len(), corners, |n| self.lit.cut(n, N)), [self.width, self.height]);
         let seen = cells::nearest(pattern, size, triangles, (self.count, place), |n| in_front[n + 1]).numbers;
         let sample = |number: u32, cell: usize| {
             let Some(n) = (number as usize).checked_sub(1) else { return Sample { item: NOTHING, step: 0 } };
-            let (item, has_shades) = items[n];
+            let FaceItem { number: item, has_shades, .. } = items[n];
             if item >= COVERED || !has_shades {
                 return Sample { item, step: 0 };
             }
             let weights = cells::weights(corners(n), [cell % self.width, cell / self.width]);
+            let item = self.toned(n, &items[n], weights);
             Sample { item, step: step_of(self.lit.strength(n, weights)) }
         };
         let mut samples = Vec::with_capacity(self.count * N);
@@ -183,6 +204,15 @@ impl Edges<'_> {
             }));
         }
         samples
+    }
+}
+
+impl Edges<'_> {
+    /// The number of the item of a triangle at a place between its corners: of those of its tones that there are the nearest.
+    fn toned(&self, n: usize, own: &FaceItem, weights: [f64; 3]) -> u32 {
+        let Some((item, color)) = own.item.zip(self.lit.pictured(n, || weights)) else { return own.number };
+        let tone = self.tones.nearest(item.look.1, color);
+        self.of_item.get(&Item { tone, ..item }).copied().unwrap_or(own.number)
     }
 }
 

@@ -17,6 +17,7 @@ mod contour;
 mod hidden;
 mod label;
 mod regions;
+mod tones;
 
 use std::collections::{HashMap, HashSet};
 use std::fmt::Write;
@@ -31,6 +32,7 @@ use contour::Corner;
 use dlsys_geometry::scene::{Face, OwnerId, Scene, Segment};
 use hidden::Visible;
 use label::{Look, Stems};
+use tones::Tones;
 
 /// Cells for each pixel of the page, along a side.
 const CELLS_PER_PIXEL: f64 = 2.0;
@@ -69,7 +71,8 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
     let nearest = label::nearest(&mesh, &lit, size);
     let mut visible = Visible { style, depths: &nearest.depths, labels: &[], size, placement };
     let stems = stems(scene, style, &visible, lit.lighting().is_declared());
-    let (mut regions, shades) = label::label(&mesh, &lit, &nearest.numbers, size, &stems, is_fine);
+    let tones = Tones::of(&scene.palette);
+    let (mut regions, shades) = label::label(&mesh, &lit, &nearest.numbers, size, (&stems, &tones), is_fine);
     regions.without_specks();
     let outlines = regions.outlines(shades.len());
     visible.labels = &regions.labels;
@@ -90,7 +93,10 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
         let (owner, material) = shade.item.look;
         let fill = match shade.item.stem.and_then(|stem| scene.segments.get(stem as usize)) {
             Some(segment) => strokes.fill(segment),
-            None => lit.color(scene, material, shade.strength(), style.background).to_string(),
+            None => {
+                let tone = tones.color(material, shade.item.tone);
+                lit.color(material, tone, shade.strength(), style.background).to_string()
+            }
         };
         let mut data = String::new();
         outlines.iter().for_each(|outline| push_outline(&mut data, outline, to_page, decimals));

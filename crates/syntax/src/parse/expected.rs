@@ -46,6 +46,7 @@ fn words(rule: Rule) -> Option<&'static str> {
         kw_for => "`for` and a parameter",
         kw_in => "`in` and a range",
         kw_from => "`from` and a file",
+        kw_texture => "`texture` and a picture",
         surface_name => "the name of a surface such as `@P`",
         units_part | units_word => "`length` or `time` and a value",
         wind_part | wind_word | spectrum => "an option such as `speed`",

@@ -149,6 +149,12 @@ fn hint_by_symbol(item: Rule, text: &str, at: usize, found: &str) -> Option<Stri
         (Some('m'), _) if item == Rule::surface_item && before.ends_with("from") => {
             "the name of the file is a text in quotes: `surface @P from \"petal.s\"`"
         }
+        (Some('e'), _) if item == Rule::surface_item && before.ends_with("texture") => {
+            "the name of the picture is a text in quotes: `surface @P from \"petal.s\" texture \"petal.png\"`"
+        }
+        (_, word) if item == Rule::surface_item && word.starts_with("textur") => {
+            "a picture stands behind the file of its surface: `surface @P from \"petal.s\" texture \"petal.png\"`"
+        }
         (Some('e'), _) if item == Rule::surface_item && before.ends_with("surface") => {
             "the name of a surface begins with `@`: `surface @P from \"petal.s\"`"
         }
