@@ -88,11 +88,11 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// Ticks of 1/32 s, a tolerance of a hundredth of a blob, no splitting, ten million blobs, one thread.
+    /// Ticks of 1/64 s, a tolerance of a tenth of a blob, no splitting, ten million blobs, one thread.
     fn default() -> Settings {
         Settings {
-            tick: 1.0 / 32.0,
-            tolerance: 0.01,
+            tick: 1.0 / 64.0,
+            tolerance: 0.1,
             deepest: 10,
             fixed: false,
             split: f64::INFINITY,

@@ -5,6 +5,16 @@ use dlsys_wind::Still;
 
 const SMOKE: Gas = Gas { diffusion: 4e-4, decay: 0.4, size: 0.02, mass: 1e-6, fall: -0.2 };
 
+const SETTINGS: Settings = Settings {
+    tick: 1.0 / 32.0,
+    tolerance: 0.01,
+    deepest: 10,
+    fixed: false,
+    split: f64::INFINITY,
+    most: 10_000_000,
+    threads: 1,
+};
+
 /// Eddies of many sizes, and a jump at x = 1.
 fn wind(point: Vector, time: f64) -> Vector {
     let jump = if point.x > 1.0 { 0.5 } else { 0.0 };
@@ -23,7 +33,7 @@ fn sources(tick: u64) -> [Source; 2] {
 }
 
 fn cloud(threads: usize, ticks: u64) -> Result<Cloud, Error> {
-    let mut cloud = Cloud::new(SMOKE, Settings { threads, split: 0.05, ..Settings::default() })?;
+    let mut cloud = Cloud::new(SMOKE, Settings { threads, split: 0.05, ..SETTINGS })?;
     for tick in 0..ticks {
         cloud.advance(&sources(tick), &wind)?;
     }
@@ -39,7 +49,7 @@ fn threads_and_pictures_between_do_not_matter() -> Result<(), Error> {
     let expected = all(&cloud(1, 150)?);
     assert!(expected.len() > 10_000, "{}", expected.len());
     assert!(all(&cloud(2, 150)?) == expected && all(&cloud(5, 150)?) == expected);
-    let mut looked = Cloud::new(SMOKE, Settings { threads: 2, split: 0.05, ..Settings::default() })?;
+    let mut looked = Cloud::new(SMOKE, Settings { threads: 2, split: 0.05, ..SETTINGS })?;
     for tick in 0..150 {
         looked.shown(looked.time() + 0.3 * looked.tick(), &sources(tick), &wind)?;
         looked.advance(&sources(tick), &wind)?;
@@ -52,7 +62,7 @@ fn threads_and_pictures_between_do_not_matter() -> Result<(), Error> {
 #[test]
 fn motion_is_continuous() -> Result<(), Error> {
     let gas = Gas { diffusion: 0.0, ..SMOKE };
-    let mut cloud = Cloud::new(gas, Settings::default())?;
+    let mut cloud = Cloud::new(gas, SETTINGS)?;
     let mut before: Vec<Blob> = Vec::new();
     for tick in 0..40 {
         for part in 0..16 {
@@ -76,11 +86,11 @@ fn places_between_ticks_are_those_of_shorter_ticks() -> Result<(), Error> {
     let gas = Gas { diffusion: 0.0, ..SMOKE };
     let source = [Source::at(8, Vector::new(0.5, 0.5, 0.0), 0.0, 133.3)];
     let smooth = |point: Vector, time: f64| wind(Vector::new(point.x - 1e3, point.y, point.z), time);
-    let mut short = Cloud::new(gas, Settings { tick: 1.0 / 256.0, tolerance: 1e-4, ..Settings::default() })?;
+    let mut short = Cloud::new(gas, Settings { tick: 1.0 / 256.0, tolerance: 1e-4, ..SETTINGS })?;
     while short.time() < 39.5 / 32.0 {
         short.advance(&source, &smooth)?;
     }
-    let mut long = Cloud::new(gas, Settings::default())?;
+    let mut long = Cloud::new(gas, SETTINGS)?;
     for _ in 0..39 {
         long.advance(&source, &smooth)?;
     }
@@ -99,7 +109,7 @@ fn births_are_even_in_time_and_uniform_in_place() -> Result<(), Error> {
     let gas = Gas { diffusion: 0.0, decay: 0.0, fall: 0.0, ..SMOKE };
     let source = [Source::at(3, Vector::new(1.0, 2.0, 3.0), 0.5, 777.7)];
     let born = |tick: f64| -> Result<Vec<Blob>, Error> {
-        let mut cloud = Cloud::new(gas, Settings { tick, ..Settings::default() })?;
+        let mut cloud = Cloud::new(gas, Settings { tick, ..SETTINGS })?;
         while cloud.time() < 8.0 {
             cloud.advance(&source, &Still)?;
         }
@@ -121,7 +131,7 @@ fn births_are_even_in_time_and_uniform_in_place() -> Result<(), Error> {
 #[test]
 fn blobs_end() -> Result<(), Error> {
     let gas = Gas { decay: 10.0, ..SMOKE };
-    let mut cloud = Cloud::new(gas, Settings::default())?;
+    let mut cloud = Cloud::new(gas, SETTINGS)?;
     let source = [Source::at(3, Vector::zeros(), 0.0, 1000.0)];
     for _ in 0..96 {
         cloud.advance(&source, &Still)?;
@@ -136,7 +146,7 @@ fn blobs_end() -> Result<(), Error> {
 #[test]
 fn a_split_is_hardly_seen() -> Result<(), Error> {
     let gas = Gas { diffusion: 1e-3, decay: 0.0, size: 0.02, mass: 1.0, fall: 0.0 };
-    let mut cloud = Cloud::new(gas, Settings { split: 0.05, ..Settings::default() })?;
+    let mut cloud = Cloud::new(gas, Settings { split: 0.05, ..SETTINGS })?;
     cloud.add(Vector::zeros(), 1.0)?;
     while cloud.len() == 1 {
         cloud.advance(&[], &Still)?;
@@ -156,21 +166,20 @@ fn a_split_is_hardly_seen() -> Result<(), Error> {
 
 #[test]
 fn bad_values_are_refused() -> Result<(), Error> {
-    let settings = Settings::default();
     let refused =
         |gas: Gas, settings: Settings| Cloud::new(gas, settings).err().map(|error| error.to_string());
-    let message = refused(Gas { size: 0.0, ..SMOKE }, settings);
+    let message = refused(Gas { size: 0.0, ..SMOKE }, SETTINGS);
     assert_eq!(message.as_deref(), Some("a size of a blob (m) of 0 is out of range: expected more than 0"));
-    assert!(refused(Gas { decay: f64::NAN, ..SMOKE }, settings).is_some());
-    assert!(refused(SMOKE, Settings { split: 0.03, ..settings }).is_some());
-    assert!(refused(SMOKE, Settings { most: 1_000_000_000, ..settings }).is_some());
-    let mut cloud = Cloud::new(SMOKE, settings)?;
+    assert!(refused(Gas { decay: f64::NAN, ..SMOKE }, SETTINGS).is_some());
+    assert!(refused(SMOKE, Settings { split: 0.03, ..SETTINGS }).is_some());
+    assert!(refused(SMOKE, Settings { most: 1_000_000_000, ..SETTINGS }).is_some());
+    let mut cloud = Cloud::new(SMOKE, SETTINGS)?;
     let flood = [Source::at(1, Vector::zeros(), 0.1, 1e9)];
     assert!(matches!(cloud.advance(&flood, &Still), Err(Error::Blobs { most: 10_000_000, .. })));
-    let mut cloud = Cloud::new(SMOKE, Settings { most: 3000, split: 0.05, ..settings })?;
+    let mut cloud = Cloud::new(SMOKE, Settings { most: 3000, split: 0.05, ..SETTINGS })?;
     let end = (0..400).try_for_each(|tick| cloud.advance(&sources(tick), &wind));
     assert!(matches!(end, Err(Error::Blobs { most: 3000, .. })) && cloud.len() <= 3000);
-    let mut cloud = Cloud::new(SMOKE, settings)?;
+    let mut cloud = Cloud::new(SMOKE, SETTINGS)?;
     cloud.advance(&sources(0), &wind)?;
     let storm = |_: Vector, _: f64| Vector::repeat(f64::NAN);
     assert!(matches!(cloud.advance(&sources(1), &storm), Err(Error::Wind { .. })));

@@ -118,7 +118,8 @@ fn strained(settings: Settings) -> Result<f64, Error> {
 pub fn strain() -> Result<Vec<Convergence>, Error> {
     let mut found = Vec::new();
     for tolerance in TOLERANCES {
-        found.push((tolerance, strained(Settings { tolerance, ..Settings::default() })?));
+        let settings = Settings { tick: 1.0 / 4.0, tolerance, ..Settings::default() };
+        found.push((tolerance, strained(settings)?));
     }
     Ok(Convergence::rows("straining flow: place after 4 s (m)", 0.1 * 4_f64.exp(), &found))
 }
