@@ -32,6 +32,9 @@ pub enum Error {
         /// Where, in m.
         at: [f64; 3],
     },
+    /// A field of wind that has no value at a time, or no meaning.
+    #[error(transparent)]
+    Field(#[from] dlsys_wind::Error),
 }
 
 /// An error unless a value is finite and holds a condition.

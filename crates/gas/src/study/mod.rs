@@ -6,9 +6,11 @@ use crate::Error;
 
 mod motion;
 mod optics;
+mod speed;
 
 pub use motion::{Turns, decay, fall, gust, rotation, rotation_ticks, spreading, strain, strain_ticks};
 pub use optics::{light, random_smoke, transmittance};
+pub use speed::{Speed, pace, speeds};
 
 /// A case: computes its rows.
 pub type Case = fn() -> Result<Vec<Convergence>, Error>;

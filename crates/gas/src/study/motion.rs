@@ -162,7 +162,7 @@ impl Turns {
     }
 }
 
-/// Rigid rotation: the radius after 1,000 turns, by tolerance, with ticks of 1/256 of a turn.
+/// Rigid rotation: the radius after 1,000 turns, by tolerance, with ticks of 1/128 of a turn.
 ///
 /// # Errors
 ///
@@ -170,7 +170,7 @@ impl Turns {
 pub fn rotation() -> Result<Vec<Convergence>, Error> {
     let mut found = Vec::new();
     for tolerance in [1e-4, 1e-6, 1e-8] {
-        let settings = Settings { tick: 1.0 / 256.0, tolerance, ..Settings::default() };
+        let settings = Settings { tick: 1.0 / 128.0, tolerance, ..Settings::default() };
         found.push((tolerance, Turns::new(1000, settings)?.radius));
     }
     Ok(Convergence::rows("rigid rotation: radius after 1,000 turns (m)", 1.0, &found))
