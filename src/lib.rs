@@ -53,6 +53,7 @@
 //! | [`surround`] | wind and stems that bend, around a growing plant |
 //! | [`sway`] | mechanics of stems that bend |
 //! | [`fall`](crate::fall) | flight and landing of plates and small bodies |
+//! | [`gas`] | smoke, steam and pollen: blobs in the wind, and light through them |
 //! | [`wind`] | the velocity of the air, as a function of place and time |
 //! | [`study`] | accuracy and cost of methods; verification |
 //! | [`cli`] | the command line |
@@ -79,6 +80,7 @@ pub use dlsys_diagnostic as diagnostic;
 pub use dlsys_expr as expr;
 pub use dlsys_fall as fall;
 pub use dlsys_film as film;
+pub use dlsys_gas as gas;
 pub use dlsys_geometry::{scene, turtle};
 pub use dlsys_interchange as interchange;
 pub use dlsys_model as model;

@@ -131,10 +131,10 @@ const TREES: std::ops::Range<u64> = 48..128;
 /// Bodies that are thrown at the ground.
 const THROWS: u64 = 400;
 
-/// Exact cases, hard cases and speed of wind, stems and bodies that fall. Each table is printed when it is complete.
+/// Exact cases, hard cases and speed of wind, stems, bodies that fall and gases. Each table is printed when it is complete.
 fn surroundings(args: &ReportArgs) -> Result<(), Failure> {
     let defect = |error: String| Failure::Model(format!("error: {error}\n"));
-    let mut progress = Progress::of_printed("surroundings", 8);
+    let mut progress = Progress::of_printed("surroundings", 10);
     let mut show = |table: String| {
         progress.inc();
         progress.suspend(|| print(&format!("{table}\n")))
@@ -158,12 +158,22 @@ fn surroundings(args: &ReportArgs) -> Result<(), Failure> {
     show(study::exact_fall_table(&falls))?;
     let landings = study::Landings::new(THROWS).map_err(|error| defect(error.to_string()))?;
     show(landings.table())?;
+    let mut gases = Vec::new();
+    for case in crate::gas::study::EXACT_CASES {
+        gases.extend(case().map_err(|error| defect(error.to_string()))?);
+    }
+    show(study::exact_gas_table(&gases))?;
     let wind = crate::wind::study::statistics(SEEDS).map_err(|error| defect(error.to_string()))?;
     show(study::wind_table(&wind))?;
     show(study::speed_table().map_err(defect)?)?;
+    show(study::gas_speed_table().map_err(|error| defect(error.to_string()))?)?;
     drop(progress);
     if let Some(out) = &args.out {
-        write(out, "surroundings.csv", &study::surroundings_csv(&wind, &stems, &falls))?;
+        write(
+            out,
+            "surroundings.csv",
+            &study::surroundings_csv(&wind, &[("stems", &stems), ("falling", &falls), ("gas", &gases)]),
+        )?;
     }
     let bad = wind.iter().filter(|row| !row.holds()).count();
     let failed = hard.iter().filter(|case| case.failure.is_some()).count()

@@ -296,6 +296,8 @@ fn the_report_of_the_surroundings_has_all_its_tables() {
         "hard cases",
         "a stalk in gusts",
         "falling: exact cases",
+        "gas: exact cases",
+        "gas: speed",
         "400 of 400",
         "statistics of the turbulence",
         "speed on one core",
@@ -304,5 +306,5 @@ fn the_report_of_the_surroundings_has_all_its_tables() {
     }
     let csv = std::fs::read_to_string(folder.path().join("out/surroundings.csv")).expect("written");
     assert!(csv.lines().count() > 80 && csv.contains("stems,\"end load"), "{csv}");
-    assert!(csv.contains("falling,\"flutter"), "{csv}");
+    assert!(csv.contains("falling,\"flutter") && csv.contains("gas,\"rigid rotation"), "{csv}");
 }

@@ -3,7 +3,7 @@
 use crate::fall::{Phase, Rules, State};
 use crate::impulse::collide;
 use crate::step::Step;
-use crate::{Error, Ground, Motion, Wind};
+use crate::{Contact, Error, Ground, Motion, Wind};
 
 /// Impacts of one fall that rebound. Those behind have no restitution, so that every fall comes to an end.
 const REBOUNDS: u32 = 64;
@@ -68,7 +68,7 @@ impl Rules {
 
         let speed = after.velocity.norm() + after.spin.norm() * self.size;
         let calm = if pushed && speed < 0.1 * self.slow() { state.calm + h } else { 0.0 };
-        let phase = if calm > 4.0 * self.topple() {
+        let phase = if calm > 4.0 * self.topple() || calm > 0.0 && self.lies(ground, &after, speed) {
             after.velocity.fill(0.0);
             after.spin.fill(0.0);
             Phase::Rest
@@ -79,6 +79,33 @@ impl Rules {
         };
         let next = State { time: end, motion: after, level, phase, calm, rate: None, ..*state };
         Ok((Step::new(state.time, first, end, after), next))
+    }
+
+    /// True if a body with this speed can neither tip over nor slide on by a part of the tolerance. It feels no wind then, which could move it again.
+    fn lies(&self, ground: &Ground, motion: &Motion, speed: f64) -> bool {
+        let gravity = self.settings.air.gravity;
+        let small = 0.01 * self.resolution();
+        if speed > 0.01 * self.slow() || speed * speed > 2.0 * ground.friction * gravity * small {
+            return false;
+        }
+        // A polygon with corners in the order of their angles around the centre of mass lies within the hull of its corners.
+        let near = |contact: &&Contact| ground.gap(motion, contact) <= small;
+        let arm = |contact: &Contact| {
+            let arm = motion.turned(contact.point);
+            [arm.x, arm.z]
+        };
+        let mut corners: Vec<[f64; 2]> = self.body.contacts.iter().filter(near).map(arm).collect();
+        corners.sort_by(|a, b| libm::atan2(a[1], a[0]).total_cmp(&libm::atan2(b[1], b[0])));
+        let next = corners.iter().cycle().skip(1);
+        let reach = corners.iter().zip(next).map(|([x, z], [u, w])| {
+            let edge = libm::hypot(u - x, w - z);
+            if edge > 0.0 { (x * w - u * z) / edge } else { f64::INFINITY }
+        });
+        let reach = reach.fold(f64::INFINITY, f64::min);
+        let height = motion.position.y - ground.height;
+        let climb = libm::hypot(height, reach) - height;
+        let energy = self.dynamics.kinetic_energy(motion);
+        corners.len() > 2 && reach > 0.0 && energy < 0.5 * self.dynamics.weight() * climb
     }
 
     /// Lifts a body that rotation has brought below the ground. The kinetic energy pays for the height.

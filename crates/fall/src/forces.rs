@@ -2,6 +2,8 @@
 
 use std::f64::consts::PI;
 
+use nalgebra::Matrix3;
+
 use crate::motion::Packed;
 use crate::{Air, Body, Error, Ground, Motion, Shape, Vector, Wind};
 
@@ -107,9 +109,21 @@ impl Dynamics {
         }
     }
 
-    /// Change of the spin (axes of the body) by an impulse with a moment in N m s (axes of the world).
-    pub(crate) fn twisted(&self, motion: &Motion, moment: Vector) -> Vector {
-        motion.attitude.inverse_transform_vector(&moment).component_div(&self.inertia)
+    /// The inverses of mass and of inertia in the axes of the world: velocity by an impulse at the centre of mass (N s), angular velocity by an
+    /// impulsive moment (N m s).
+    pub(crate) fn inverse_inertia(&self, motion: &Motion) -> (Matrix3<f64>, Matrix3<f64>) {
+        let turn = motion.attitude.to_rotation_matrix().into_inner();
+        let light = match self.shape {
+            Shape::Plate => {
+                let normal = turn.column(2);
+                let along = 1.0 / (self.mass + self.added) - 1.0 / self.mass;
+                Matrix3::identity() / self.mass + normal * normal.transpose() * along
+            }
+            Shape::Lump => Matrix3::identity() / (self.mass + self.added),
+        };
+        let agile =
+            turn * Matrix3::from_diagonal(&self.inertia.map(|inertia| 1.0 / inertia)) * turn.transpose();
+        (light, agile)
     }
 
     /// Velocity of the air at the body. Air sticks to the ground: a body that touches it feels no wind, and comes to rest.

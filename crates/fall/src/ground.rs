@@ -2,7 +2,7 @@
 
 use crate::error::check;
 use crate::step::Step;
-use crate::{Body, Contact, Error, Motion};
+use crate::{Body, Contact, Error, Motion, Vector};
 
 /// A level rigid floor.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,7 +38,9 @@ impl Ground {
 
     /// Height of the lowest contact above the ground, in m; infinite without contacts.
     pub(crate) fn lowest(&self, motion: &Motion, body: &Body) -> f64 {
-        body.contacts.iter().map(|contact| self.gap(motion, contact)).fold(f64::INFINITY, f64::min)
+        let up = motion.attitude.inverse_transform_vector(&Vector::y());
+        let low = body.contacts.iter().map(|contact| up.dot(&contact.point) - contact.radius);
+        motion.position.y - self.height + low.fold(f64::INFINITY, f64::min)
     }
 
     /// The first time in a step at which a contact is lower than `-depth`, to within the time in which it sinks half of that; `None` if there
@@ -47,7 +49,13 @@ impl Ground {
     /// Between two samples, a height lies above their chord less an eighth of its largest second derivative times the square of the time between
     /// them. Intervals where that is not enough are halved, so no point dips into the ground and comes out between two samples.
     pub(crate) fn first_contact(&self, step: &Step, body: &Body, depth: f64) -> Option<f64> {
-        let curvature = step.bound(body.reach());
+        let (reach, span) = (body.reach(), step.end - step.start);
+        let curvature = step.bound(reach);
+        // High above the ground, no contact matters.
+        let lowest = step.first.position.y.min(step.last.position.y) - curvature * span * span / 8.0;
+        if lowest - reach > self.height {
+            return None;
+        }
         let height = |time: f64| self.lowest(&step.at(time), body);
         let ends = [(step.start, height(step.start)), (step.end, height(step.end))];
         let crossed = self.search(&height, curvature, depth, ends, HALVINGS)?;

@@ -177,3 +177,37 @@ fn threads_give_the_same_bits() -> Result<(), Error> {
     }
     Ok(())
 }
+
+/// A plate that lies on three contacts, its centre of mass beside them, tips over until a fourth touches the ground. It does not rest before.
+#[test]
+fn a_body_that_can_tip_over_does_not_rest() -> Result<(), Error> {
+    let corners = [[1e-4, -0.01, 0.0], [1e-4, 0.01, 0.0], [0.01, 0.0, 0.0], [-0.01, 0.0, 0.004]];
+    let contacts = corners.map(|[x, y, z]| Contact { point: Vector::new(x, y, z), radius: 0.0 });
+    let body = Body::plate(1e-4, [0.01, 0.01])?.touching(contacts.to_vec())?;
+    let release = Motion::at(Vector::zeros());
+    let mut fall = Fall::new(body, release, 0.0, Some(Ground::at(0.0)), Settings::default())?;
+    let end = fall.at(10.0, &Still)?;
+    assert!(fall.rest().is_some());
+    // About the edge at x = 1e-4, by the angle that brings the fourth contact down.
+    let tilt = end.turned(Vector::z()).angle(&Vector::y());
+    assert!((tilt - (0.004_f64 / 0.0101).atan()).abs() < 1e-3, "{tilt}");
+    Ok(())
+}
+
+/// What lies still rests at once, whatever the number of its contacts: it need not be watched.
+#[test]
+fn a_body_that_lies_rests_at_once() -> Result<(), Error> {
+    for count in [3, 8, 64] {
+        let rim = (0..count).map(|k| {
+            let angle = std::f64::consts::TAU * f64::from(k) / f64::from(count);
+            Contact { point: Vector::new(0.02 * angle.cos(), 0.01 * angle.sin(), 0.0), radius: 0.0 }
+        });
+        let body = Body::plate(1e-4, [0.02, 0.01])?.touching(rim.collect())?;
+        let release = Motion::at(Vector::new(0.0, 1e-7, 0.0));
+        let mut fall = Fall::new(body, release, 0.0, Some(Ground::at(0.0)), Settings::default())?;
+        let end = fall.at(1.0, &Still)?;
+        assert!(fall.rest().is_some_and(|time| time < 0.05), "{count}: {:?}", fall.rest());
+        assert!(end.position.norm() < 1e-6 && end.turned(Vector::z()).y > 1.0 - 1e-9, "{end:?}");
+    }
+    Ok(())
+}

@@ -13,8 +13,8 @@
 //! - `table`, `files`, `plot`: a study as text, as CSV and JSON, and as a picture; `axis`, `diagram`: parts that plots share.
 //! - `spread`, `band`: the distribution of measures over many specimens, as tables and as a plot.
 //! - `verify`: a run computed again in an independent way.
-//! - `stems`: error of drawn positions against work for stems that bend; `surroundings`, `falls`: exact cases and speed of wind, stems and
-//!   bodies that fall.
+//! - `stems`: error of drawn positions against work for stems that bend; `surroundings`, `falls`, `gases`: exact cases and speed of wind, stems,
+//!   bodies that fall and gases.
 //! - `case`, `hard`, `cases`: models with exact answers in their first lines.
 //!
 //! Runs are made one after another, never in parallel, because they are timed.
@@ -30,6 +30,7 @@ mod diagram;
 mod error;
 mod falls;
 mod files;
+mod gases;
 mod hard;
 mod order;
 mod plot;
@@ -50,6 +51,7 @@ pub use compare::{Agreement, Comparison, Difference, compare};
 pub use error::Error;
 pub use falls::{Landings, exact_fall_table};
 pub use files::{csv, hard_csv, hard_json, json};
+pub use gases::{exact_gas_table, gas_speed_table};
 pub use hard::{CaseResult, HardPlan, Mismatch, run_case};
 pub use order::{nominal_order, observed_order};
 pub use plot::svg;

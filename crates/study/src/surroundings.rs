@@ -214,24 +214,21 @@ fn wind_time() -> Result<(f64, [f64; 2]), wind::Error> {
     Ok((instant, samples))
 }
 
-/// Exact cases of wind, stems and falling as CSV.
-pub fn surroundings_csv(wind: &[wind::study::Row], stems: &[Convergence], falls: &[Convergence]) -> String {
+/// Statistics of the wind, and exact cases of other parts with their names, as CSV.
+pub fn surroundings_csv(wind: &[wind::study::Row], exact: &[(&str, &[Convergence])]) -> String {
     let quoted = |name: &str| format!("\"{}\"", name.replace('"', "\"\""));
     let mut out = "part,case,resolution,value,expected,error,bound,order\n".to_owned();
     for row in wind {
         let wind::study::Row { name, value, expected, error, bound } = row;
         out += &format!("wind,{},,{value:e},{expected:e},{error:e},{bound:e},\n", quoted(name));
     }
-    for row in stems {
-        let Convergence { case, resolution, value, expected, error, order } = row;
-        let order = order.map_or(String::new(), |order| order.to_string());
-        out += &format!("stems,{},{resolution:e},{value:e},{expected:e},{error:e},,{order}\n", quoted(case));
-    }
-    for row in falls {
-        let Convergence { case, resolution, value, expected, error, order } = row;
-        let order = order.map_or(String::new(), |order| order.to_string());
-        out +=
-            &format!("falling,{},{resolution:e},{value:e},{expected:e},{error:e},,{order}\n", quoted(case));
+    for (part, rows) in exact {
+        for row in *rows {
+            let Convergence { case, resolution, value, expected, error, order } = row;
+            let order = order.map_or(String::new(), |order| order.to_string());
+            let case = quoted(case);
+            out += &format!("{part},{case},{resolution:e},{value:e},{expected:e},{error:e},,{order}\n");
+        }
     }
     out
 }

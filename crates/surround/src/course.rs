@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use dlsys_geometry::scene::Scene;
 use dlsys_geometry::turtle::{self, FreePart};
-use dlsys_model::Model;
+use dlsys_model::{DETACH, KindId, Model};
 use dlsys_sim::{Passed, Simulation};
 use dlsys_tree::ModuleString;
 
@@ -156,8 +156,12 @@ impl<'m> Course<'m> {
         let place = *self.bending.place();
         let Some(flights) = flights else { return Ok(()) };
         let mut string = string.clone();
-        while flights.has_news(model, &string, descent) {
-            let (strains, news) = self.held_back(&string, descent, flights)?;
+        loop {
+            let new = flights.news(model, &string, descent);
+            if new.is_empty() {
+                break;
+            }
+            let (strains, news) = self.held_back(&flights.way_to(&string, &new), descent, flights)?;
             if news.is_empty() {
                 break;
             }
@@ -171,7 +175,7 @@ impl<'m> Course<'m> {
             let events = growth.take_events();
             let mut after = descent.clone();
             after.add(model, &events);
-            let (_, there) = self.held_back(&later, &after, flights)?;
+            let (_, there) = self.held_back(&flights.way_to(&later, &new), &after, flights)?;
             let times = [string.time, later.time].map(|time| place.seconds(time));
             flights.let_go(model, (news, &strains), &there, times)?;
             if !goes_on {
@@ -192,16 +196,18 @@ impl<'m> Course<'m> {
         flights: &mut Flights<'m>,
     ) -> Result<(BentStems, Vec<FreePart>), Error> {
         let model = self.model;
-        let mut strains = bent(&self.tick, descent, &self.bending, string, &mut self.scene)?;
-        strains.flown = flights.poses(model, string)?;
-        let news = flights.news(model, string, &strains)?;
-        let stems = news.iter().flat_map(|part| &part.stems);
+        let none = Descent::default();
+        let known = if holds_new(model, string, descent) { descent } else { &none };
+        let mut strains = bent(&self.tick, known, &self.bending, string, &mut self.scene)?;
+        strains.flown = flights.flown(model, string)?;
+        let parts = flights.new_parts(model, string, &strains)?;
+        let stems = parts.iter().flat_map(|part| &part.stems);
         // Stems that have taken the place of others have their strain, which a string that no longer carries them does not tell.
         if !strains.take_over(stems, descent) {
-            return Ok((strains, news));
+            return Ok((strains, parts));
         }
-        let news = flights.news(model, string, &strains)?;
-        Ok((strains, news))
+        let parts = flights.new_parts(model, string, &strains)?;
+        Ok((strains, parts))
     }
 
     /// Goes on to the next tick; returns the one that is past.
@@ -231,4 +237,24 @@ impl Past {
     pub(crate) fn size(&self) -> usize {
         self.tick.size() + 1
     }
+}
+
+/// True if a production since the tick has made a module that is not behind an `@D`: its stems have the strains of others, which a drawing tells.
+fn holds_new(model: &Model, string: &ModuleString, descent: &Descent) -> bool {
+    let mut freed = vec![false];
+    for module in string.iter() {
+        let is_free = freed.last().copied().unwrap_or_default();
+        match module.kind {
+            KindId::OPEN => freed.push(is_free),
+            KindId::CLOSE => drop(freed.pop()),
+            kind if model.kinds.get(kind).base() == DETACH => {
+                freed.pop();
+                freed.push(true);
+            }
+            _ if is_free => {}
+            _ if descent.line(module.lineage.id).nth(1).is_some() => return true,
+            _ => {}
+        }
+    }
+    false
 }

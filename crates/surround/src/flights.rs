@@ -4,13 +4,13 @@
 //! it, and the velocity that it has there: both from two drawings, the second a little later, as if the branch still held it. So
 //! growth, stems in the wind, and other flights give their motion to what they let go.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 use dlsys_fall::{self as fall, Attitude, Fall, Ground};
 use dlsys_geometry::scene::{Point, Scene};
 use dlsys_geometry::turtle::{self, FreePart, Origin, PartKey, Pose, StemKey};
-use dlsys_model::Model;
+use dlsys_model::{KindId, Model, Successor};
 use dlsys_sim::Event;
 use dlsys_sway::{Matrix, Vector};
 use dlsys_tree::ModuleString;
@@ -47,6 +47,8 @@ struct Release {
 pub(crate) struct Flights<'m> {
     /// The kinds that hold an `@D`.
     lets_go: Vec<bool>,
+    /// Branches leave nothing behind: no polygon that is begun in one module has corners in others.
+    prunes: bool,
     /// Where the drawing of a module is an interpretation, a part of it goes on in that which takes its place.
     parts: HashMap<PartKey, usize>,
     releases: Vec<Release>,
@@ -82,6 +84,7 @@ impl<'m> Flights<'m> {
         let settings = fall::Settings { tolerance: tolerance.clamp(1e-12, 0.1), ..Default::default() };
         lets_go.contains(&true).then(|| Flights {
             lets_go,
+            prunes: !has_open_polygons(model),
             parts: HashMap::new(),
             releases: Vec::new(),
             frozen: Arc::default(),
@@ -99,10 +102,10 @@ impl<'m> Flights<'m> {
         successors.iter().any(|successor| successor.kinds().any(|kind| self.lets_go[kind.index()]))
     }
 
-    /// True if a string holds a module that may let go of something, and that is not known. Flights of modules that a production has
-    /// replaced go on in those that take their place.
-    pub(crate) fn has_news(&mut self, model: &Model, string: &ModuleString, descent: &Descent) -> bool {
-        let mut has_news = false;
+    /// The modules of a string that may let go of something, and that are not known, by [`id`](dlsys_tree::Lineage::id). Flights of modules
+    /// that a production has replaced go on in those that take their place.
+    pub(crate) fn news(&mut self, model: &Model, string: &ModuleString, descent: &Descent) -> HashSet<u64> {
+        let mut news = HashSet::new();
         for module in string.iter().filter(|module| self.lets_go[module.kind.index()]) {
             let id = module.lineage.id;
             if self.parts.contains_key(&PartKey { module: id, number: 0 }) {
@@ -114,7 +117,7 @@ impl<'m> Flights<'m> {
             let known =
                 before.map(|module| PartKey { module, number: 0 }).find(|key| self.parts.contains_key(key));
             let Some(known) = known else {
-                has_news = true;
+                news.insert(id);
                 continue;
             };
             for number in 0.. {
@@ -122,11 +125,42 @@ impl<'m> Flights<'m> {
                 self.parts.insert(PartKey { module: id, number }, release);
             }
         }
-        has_news
+        news
+    }
+
+    /// The string without the branches in which none of these modules is. They are drawn alike in it, and at a small part of the cost.
+    pub(crate) fn way_to(&self, string: &ModuleString, modules: &HashSet<u64>) -> ModuleString {
+        if !self.prunes {
+            return string.clone();
+        }
+        // Places of the brackets that are open, with the length that the list of places had before each.
+        let mut kept: Vec<usize> = Vec::new();
+        let mut open: Vec<(usize, bool)> = Vec::new();
+        for (place, module) in string.iter().enumerate() {
+            match module.kind {
+                KindId::OPEN => open.push((kept.len(), false)),
+                _ if modules.contains(&module.lineage.id) && !module.kind.is_bracket() => {
+                    open.iter_mut().for_each(|(_, needed)| *needed = true);
+                }
+                _ => {}
+            }
+            kept.push(place);
+            if module.kind == KindId::CLOSE
+                && let Some((before, false)) = open.pop()
+            {
+                kept.truncate(before);
+            }
+        }
+        let mut way = ModuleString::default();
+        way.reset(string.time);
+        for module in kept.into_iter().map(|place| string.get(place)) {
+            way.push(module.kind, module.parameters.iter().copied(), module.age, module.lineage);
+        }
+        way
     }
 
     /// The parts of a string that are not known.
-    pub(crate) fn news(
+    pub(crate) fn new_parts(
         &mut self,
         model: &Model,
         string: &ModuleString,
@@ -185,23 +219,34 @@ impl<'m> Flights<'m> {
         Ok(())
     }
 
-    /// Where the parts of a string are.
+    /// Where the parts of a string are; all that it has let go goes on in turn.
     pub(crate) fn poses(&mut self, model: &Model, string: &ModuleString) -> Result<Flown, Error> {
-        if self.releases.is_empty() {
-            return Ok(Flown::default());
+        let keys = self.keys(string);
+        self.advance(model, &keys, self.place.seconds(string.time))?;
+        self.flown(model, string)
+    }
+
+    /// Where the parts of a string are.
+    pub(crate) fn flown(&mut self, model: &Model, string: &ModuleString) -> Result<Flown, Error> {
+        let time = self.place.seconds(string.time);
+        let mut poses = HashMap::new();
+        for (key, release) in self.keys(string) {
+            poses.insert(key, self.pose(model, release, time)?);
         }
+        Ok(Flown { poses, frozen: Arc::clone(&self.frozen) })
+    }
+
+    /// The parts of a string that are known, with the numbers of their releases.
+    fn keys(&self, string: &ModuleString) -> Vec<(PartKey, usize)> {
         let mut keys = Vec::new();
+        if self.releases.is_empty() {
+            return keys;
+        }
         for module in string.iter().filter(|module| self.lets_go[module.kind.index()]) {
             let of = |number| PartKey { module: module.lineage.id, number };
             keys.extend((0..).map(of).map_while(|key| Some((key, *self.parts.get(&key)?))));
         }
-        let time = self.place.seconds(string.time);
-        self.advance(model, &keys, time)?;
-        let mut poses = HashMap::with_capacity(keys.len());
-        for (key, release) in keys {
-            poses.insert(key, self.pose(model, release, time)?);
-        }
-        Ok(Flown { poses, frozen: Arc::clone(&self.frozen) })
+        keys
     }
 
     /// The times at which what flies was jolted, so far, in units of the model.
@@ -252,6 +297,18 @@ impl<'m> Flights<'m> {
         let axes = inverse * axes;
         Ok(Pose { position, axes: [0, 1, 2].map(|k| axes.column(k).into_owned()) })
     }
+}
+
+/// True if a polygon may be open where a module ends.
+fn has_open_polygons(model: &Model) -> bool {
+    let count = |string: &Successor, name: &str| {
+        string.kinds().filter(|kind| model.kinds.get(*kind).name == name).count()
+    };
+    let is_odd = |string: &Successor| count(string, "{") != count(string, "}");
+    let of_rules = model.rules.iter().flat_map(|rule| &rule.produces).flat_map(|p| &p.outcome.successors);
+    let grown = std::iter::once(&model.axiom).chain(of_rules);
+    let mut drawn = model.interpretations.iter().map(|interpretation| &interpretation.drawn);
+    grown.into_iter().any(|string| count(string, "{") > 0) || drawn.any(is_odd)
 }
 
 /// The motion of a body at its release, from where the part is then and a little later.

@@ -1,0 +1,201 @@
+//! Light through blobs: transmittance, and what is scattered and emitted towards the origin of a ray.
+
+use std::sync::{Mutex, PoisonError};
+
+use crate::error::check;
+use crate::ray::between;
+use crate::tree::Tree;
+use crate::{Blob, Error, Light, Look, Ray, Span, Vector};
+
+/// The blobs of a gas in light, at an instant.
+///
+/// Transmittance is exact but for the cut of blobs at their reach. Light is that of the paper's equations 22 to 27 with single scattering: each blob is lit as
+/// its centre is, behind the gas between it and the lights, and a ray adds up intervals front to back.
+#[derive(Clone, Debug)]
+pub struct Smoke {
+    look: Look,
+    /// Sorted by the tree.
+    blobs: Vec<Blob>,
+    /// What each blob scatters and emits, in the order of the blobs.
+    colours: Vec<[f64; 3]>,
+    tree: Tree,
+    reach: f64,
+    intervals: usize,
+}
+
+/// Distance in standard deviations at which a blob ends: 1.5e-8 of its density at the centre.
+const REACH: f64 = 6.0;
+/// Intervals of a ray.
+const INTERVALS: usize = 48;
+/// Blobs that a thread lights at a time.
+const CHUNK: usize = 256;
+
+/// A blob that a ray passes.
+struct Passed {
+    blob: usize,
+    along: f64,
+    /// Mass along the whole line, in kg/m².
+    through: f64,
+}
+
+impl Smoke {
+    /// Blobs without light: for transmittance.
+    ///
+    /// # Errors
+    ///
+    /// A look out of range.
+    pub fn new(look: Look, blobs: Vec<Blob>) -> Result<Smoke, Error> {
+        Smoke::cut(look, blobs, REACH)
+    }
+
+    /// The same with blobs that end at a distance of their centres, in standard deviations: 3 has a hundredth of the density there, which a picture does not
+    /// show, and takes a fourth of the time.
+    ///
+    /// # Errors
+    ///
+    /// A look or a distance out of range.
+    pub fn cut(look: Look, mut blobs: Vec<Blob>, reach: f64) -> Result<Smoke, Error> {
+        look.check()?;
+        check("a reach of blobs", reach, (1.0..=40.0).contains(&reach), "1 to 40")?;
+        let tree = Tree::new(&mut blobs, reach);
+        Ok(Smoke { look, blobs, colours: Vec::new(), tree, reach, intervals: INTERVALS })
+    }
+
+    /// The same with another number of intervals along a ray (48). The error of light is of order 2 in their length; transmittance has none.
+    pub fn with_intervals(self, intervals: usize) -> Smoke {
+        Smoke { intervals: intervals.clamp(1, 100_000), ..self }
+    }
+
+    /// Lights the blobs. The result does not depend on the number of threads.
+    ///
+    /// # Errors
+    ///
+    /// A light without meaning.
+    pub fn lit(mut self, lights: &[Light], threads: usize) -> Result<Smoke, Error> {
+        lights.iter().try_for_each(Light::check)?;
+        let mut colours = vec![[0.0; 3]; self.blobs.len()];
+        let chunks = Mutex::new(colours.chunks_mut(CHUNK).zip(self.blobs.chunks(CHUNK)));
+        let work = || loop {
+            let next = chunks.lock().unwrap_or_else(PoisonError::into_inner).next();
+            let Some((colours, blobs)) = next else { return };
+            for (colour, blob) in colours.iter_mut().zip(blobs) {
+                *colour = self.source(&blob.centre, lights);
+            }
+        };
+        std::thread::scope(|scope| {
+            for _ in 1..threads.clamp(1, 1024) {
+                scope.spawn(work);
+            }
+            work();
+        });
+        self.colours = colours;
+        Ok(self)
+    }
+
+    /// The look of the gas.
+    pub fn look(&self) -> &Look {
+        &self.look
+    }
+
+    /// Equation 24: what the gas at a point scatters and emits.
+    fn source(&self, point: &Vector, lights: &[Light]) -> [f64; 3] {
+        let mut light = [0.0; 3];
+        for source in lights {
+            let (share, colour) = match source {
+                Light::Ambient(colour) => (1.0, colour),
+                Light::Distant { towards, colour } => {
+                    let ray = Ray { origin: *point, direction: *towards };
+                    (self.transmittance(&ray, Span::ALL), colour)
+                }
+            };
+            light = std::array::from_fn(|k| light[k] + share * colour[k]);
+        }
+        let Look { albedo, glow, .. } = self.look;
+        std::array::from_fn(|k| albedo[k] * light[k] + (1.0 - albedo[k]) * glow[k])
+    }
+
+    /// The blobs that a ray passes within a span.
+    fn passed(&self, ray: &Ray, span: Span, mut found: impl FnMut(Passed)) {
+        self.tree.along(ray, span, |range| {
+            for blob in range {
+                let Blob { centre, variance, .. } = self.blobs[blob];
+                let (along, square) = ray.nearest(&centre);
+                let room = self.reach * self.reach * variance - square;
+                if room < 0.0 {
+                    continue;
+                }
+                let half = libm::sqrt(room);
+                if along + half > span.from && along - half < span.to {
+                    found(Passed { blob, along, through: self.blobs[blob].through(square) });
+                }
+            }
+        });
+    }
+
+    /// ∫κ_t ρ ds along a span of a ray: the optical depth.
+    pub fn depth(&self, ray: &Ray, span: Span) -> f64 {
+        let mut mass = 0.0;
+        self.passed(ray, span, |Passed { blob, along, through }| {
+            let unit = 1.0 / libm::sqrt(2.0 * self.blobs[blob].variance);
+            mass += through * between((span.from - along) * unit, (span.to - along) * unit);
+        });
+        self.look.extinction * mass
+    }
+
+    /// The part of light that passes a span of a ray: e^(-depth).
+    pub fn transmittance(&self, ray: &Ray, span: Span) -> f64 {
+        libm::exp(-self.depth(ray, span))
+    }
+
+    /// The light that comes from a span of a ray to its near end, with the transmittance of the span. What is behind the gas is to be added,
+    /// times the transmittance. Blobs that have not been [lit](Smoke::lit) are black.
+    pub fn light(&self, ray: &Ray, span: Span) -> ([f64; 3], f64) {
+        let mut passed = Vec::new();
+        self.passed(ray, span, |blob| passed.push(blob));
+        let half = |found: &Passed| self.reach * libm::sqrt(self.blobs[found.blob].variance);
+        let from = passed.iter().map(|found| found.along - half(found)).fold(f64::INFINITY, f64::min);
+        let to = passed.iter().map(|found| found.along + half(found)).fold(f64::NEG_INFINITY, f64::max);
+        let (from, to) = (from.max(span.from), to.min(span.to));
+        if from >= to {
+            return ([0.0; 3], 1.0);
+        }
+        let width = (to - from) / self.intervals as f64;
+        // Mass in each interval, and what it scatters and emits.
+        let mut intervals = vec![[0.0; 4]; self.intervals];
+        for found in &passed {
+            self.share_out(found, (from, width), half(found), &mut intervals);
+        }
+        let (mut colour, mut left) = ([0.0; 3], 1.0);
+        for [red, green, blue, mass] in intervals {
+            if mass > 0.0 {
+                let passing = libm::exp(-self.look.extinction * mass);
+                let share = left * (1.0 - passing) / mass;
+                for (sum, value) in colour.iter_mut().zip([red, green, blue]) {
+                    *sum += share * value;
+                }
+                left *= passing;
+            }
+        }
+        (colour, left)
+    }
+
+    /// Adds the mass of a blob to the intervals that it reaches into.
+    fn share_out(&self, found: &Passed, (from, width): (f64, f64), half: f64, intervals: &mut [[f64; 4]]) {
+        let unit = 1.0 / libm::sqrt(2.0 * self.blobs[found.blob].variance);
+        let [red, green, blue] = self.colours.get(found.blob).copied().unwrap_or_default();
+        let last = intervals.len() - 1;
+        // Saturates below 0.
+        let index = |distance: f64| (((distance - from) / width) as usize).min(last);
+        let (first, end) = (index(found.along - half), index(found.along + half));
+        let at = |index: usize| (from + width * index as f64 - found.along) * unit;
+        let mut before = at(first);
+        for (place, interval) in intervals.iter_mut().enumerate().take(end + 1).skip(first) {
+            let after = at(place + 1);
+            let mass = found.through * between(before, after);
+            for (sum, value) in interval.iter_mut().zip([red, green, blue, 1.0]) {
+                *sum += mass * value;
+            }
+            before = after;
+        }
+    }
+}
