@@ -140,13 +140,13 @@ impl Picture {
 
     /// The mean colour of what is drawn.
     pub fn mean(&self) -> Rgb {
-        let (mut sum, mut count) = ([0_u64; 3], 0);
+        let (mut sum, mut count) = ([0_u64; 3], 0_u64);
         for texel in self.texels().iter().filter(|texel| texel[3] >= DRAWN) {
             (0..3).for_each(|k| sum[k] += u64::from(texel[k]));
             count += 1;
         }
         let [red, green, blue] =
-            sum.map(|sum| if count > 0 { ((sum + count / 2) / count) as Rgb } else { 0 });
+            sum.map(|sum| (sum + count / 2).checked_div(count).unwrap_or_default() as Rgb);
         red << 16 | green << 8 | blue
     }
 }

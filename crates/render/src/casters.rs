@@ -16,14 +16,16 @@ const BATCH: usize = 1 << 16;
 /// Most triangles of drafts that are kept from the measuring of the scene to its shadows; the others are made twice.
 const KEPT: usize = 2_000_000;
 
+/// A triangle of which parts are cut out: corners, their places in the picture, and that.
+pub(super) type CutTriangle<'s> = ([u32; 3], [[f64; 2]; 3], &'s Texture);
+
 /// Triangles and thin stems, relative to the middle of the box around everything.
 #[derive(Default)]
 pub(super) struct Batch<'s> {
     pub(super) vertices: Vec<[f32; 3]>,
     /// Corners by number of a vertex.
     pub(super) triangles: Vec<[u32; 3]>,
-    /// Triangles of which parts are cut out: corners, their places in the picture, and that.
-    pub(super) cut: Vec<([u32; 3], [[f64; 2]; 3], &'s Texture)>,
+    pub(super) cut: Vec<CutTriangle<'s>>,
     /// Ends and radii.
     pub(super) lines: Vec<([[f32; 3]; 2], [f32; 2])>,
 }
