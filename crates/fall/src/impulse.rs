@@ -114,13 +114,14 @@ fn worst(waiting: &[Bound], moving: &Moving, error: f64) -> Option<usize> {
 /// Iterates until impulses change velocities by less than `error` (m/s).
 fn settle(touches: &mut [Touch], ground: &Ground, moving: &mut Moving, error: f64) {
     let mut before = 0.0;
-    for _ in 0..SWEEPS {
+    for sweep in 1..=SWEEPS {
         let mut changed = 0.0_f64;
         for touch in &mut *touches {
             changed = changed.max(touch.correct(ground, moving));
             touch.brake(ground, moving);
         }
-        if changed <= error {
+        // The last impulses are within their cones.
+        if changed <= error || sweep == SWEEPS {
             break;
         }
         before = go_on(touches, moving, before);

@@ -14,7 +14,8 @@ pub struct Gas {
     pub size: f64,
     /// Mass of a new blob, in kg.
     pub mass: f64,
-    /// Speed relative to the air at which blobs sink, in m/s; negative ones rise.
+    /// Speed relative to the air at which blobs sink, in m/s; negative ones rise. Bodies turn the wind aside, not this speed: with it, blobs pass into
+    /// a body.
     pub fall: f64,
 }
 
