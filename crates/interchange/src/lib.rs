@@ -54,6 +54,8 @@ use dlsys_sim::Settings;
 pub use error::Error;
 use follow::{Closeness, Follower};
 use life::{Lives, Tolerance};
+use mesh::Cutter;
+use motion::Clock;
 use sample::Sampler;
 use track::Tracks;
 
@@ -231,6 +233,21 @@ pub fn grow(
 }
 
 impl Growth {
+    /// Cuts forms into triangles, with an error of a part of the accuracy.
+    fn cutter(&self, part: f64) -> Cutter<'_> {
+        Cutter {
+            catalogue: &self.tracks.catalogue,
+            palette: &self.palette,
+            contours: &self.contours,
+            accuracy: part * self.options.tolerance(),
+        }
+    }
+
+    /// The seconds of the file.
+    fn clock(&self) -> Clock {
+        Clock::new(self.first, self.last, self.options.seconds)
+    }
+
     /// Number of nodes of modules.
     pub fn nodes(&self) -> usize {
         self.tracks.phases.len()

@@ -21,6 +21,7 @@ use crate::body::rotation_vector;
 use crate::descent::Descent;
 use crate::loose::{Loose, stand};
 use crate::place::Place;
+use crate::points::{Pair, rigid_motion};
 use crate::weather::{Gusts, Sampler};
 
 /// Most parts that one model may let go.
@@ -351,19 +352,6 @@ fn mean_motion(
         .iter()
         .zip(&there.points)
         .map(|((from, _), (to, _))| (at(from), (at(to) - at(from)) / seconds));
-    let pairs: Vec<(Vector, Vector)> = pairs.collect();
-    let count = pairs.len() as f64;
-    let middle = pairs.iter().map(|(point, _)| *point).sum::<Vector>() / count;
-    let mean = pairs.iter().map(|(_, velocity)| *velocity).sum::<Vector>() / count;
-    let (mut spread, mut moment) = (Matrix::zeros(), Vector::zeros());
-    for (point, velocity) in &pairs {
-        let arm = point - middle;
-        spread += Matrix::identity() * arm.norm_squared() - arm * arm.transpose();
-        moment += arm.cross(&(velocity - mean));
-    }
-    // Points in one line do not tell the rotation about it.
-    let scale = spread.trace();
-    let inverse = (spread / scale).try_inverse().filter(|inverse| inverse.norm() < 1e9)?;
-    let spin = inverse * moment / scale;
-    Some((mean + spin.cross(&(loose.centre - middle)), spin))
+    let found = rigid_motion(&pairs.collect::<Vec<Pair>>(), loose.centre);
+    found.is_determined.then_some((found.velocity, found.spin))
 }

@@ -28,7 +28,7 @@ mod flights;
 mod loose;
 mod motion;
 mod place;
-mod rigid;
+mod points;
 mod solids;
 mod survey;
 mod weather;

@@ -8,6 +8,7 @@ use dlsys_tree::ModuleString;
 
 use crate::bending::BentStems;
 use crate::body::{density, frame, thickness};
+use crate::points::{directions, outermost};
 use crate::{Error, Place};
 
 /// A part that is let go, where it is at an instant.
@@ -32,8 +33,6 @@ const CLOSED: f64 = 0.3;
 
 /// Number of directions in which the outermost point of a part is a contact: the most that a body may have.
 const DIRECTIONS: usize = 64;
-/// In radians.
-const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
 
 impl Loose {
     /// The body of a part; `None` if it has no mass.
@@ -142,24 +141,15 @@ fn volume(piece: &Piece, tissues: &[Tissue], metre: f64) -> f64 {
 /// The outermost points of a part in directions all around, in the axes of its body.
 fn contacts(part: &FreePart, (centre, axes): (Vector, &Matrix), half: [f64; 3], metre: f64) -> Vec<Contact> {
     let inverse = axes.transpose();
-    let place = |(point, radius): &(dlsys_geometry::scene::Point, f64)| Contact {
-        point: inverse * (point.coords * metre - centre),
-        radius: radius * metre,
+    let place = |(point, radius): &(dlsys_geometry::scene::Point, f64)| {
+        (inverse * (point.coords * metre - centre), radius * metre)
     };
-    let points: Vec<Contact> = part.points.iter().map(place).collect();
-    let mut found: Vec<Contact> = Vec::new();
-    for k in 0..DIRECTIONS {
-        // Evenly over a sphere along a spiral of the golden angle, in proportion to the extents: all around a long leaf, not its ends only.
-        let height = 1.0 - (2 * k + 1) as f64 / DIRECTIONS as f64;
-        let (sin, cos) = (GOLDEN_ANGLE * k as f64).sin_cos();
-        let across = (1.0 - height * height).sqrt();
-        let direction = Vector::new(across * cos / half[0], across * sin / half[1], height / half[2]);
-        let Some(direction) = direction.try_normalize(0.0) else { continue };
-        let reach = |contact: &Contact| direction.dot(&contact.point) + contact.radius;
-        let farthest = points.iter().max_by(|a, b| reach(a).total_cmp(&reach(b)));
-        found.extend(farthest.filter(|farthest| !found.contains(farthest)));
-    }
-    found
+    let balls: Vec<(Vector, f64)> = part.points.iter().map(place).collect();
+    // In proportion to the extents: all around a long leaf, not its ends only.
+    let ways = directions(DIRECTIONS).map(|way| Vector::from_fn(|k, _| way[k] / half[k]));
+    let ways = ways.filter_map(|way| way.try_normalize(0.0));
+    let contact = |i: usize| Contact { point: balls[i].0, radius: balls[i].1 };
+    outermost(&balls, ways).into_iter().map(contact).collect()
 }
 
 /// The turtle's frame at the `@D` of a part in the scene: where it is in m, and its axes.

@@ -20,7 +20,7 @@ use nalgebra::Vector3;
 
 use crate::descent::Descent;
 use crate::place::Place;
-use crate::rigid::{Pair, rigid_motion};
+use crate::points::{Pair, RigidMotion, directions, outermost, rigid_motion};
 use crate::{CLOCK, Error};
 
 /// Instants in a tick.
@@ -35,8 +35,6 @@ const DIRECTIONS: usize = 64;
 const ROUNDING: f64 = 0.02;
 /// Points that stand for a ball that is larger than the rounding.
 const BALL_POINTS: usize = 32;
-/// In radians.
-const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
 
 /// The bodies of a model at any time.
 pub(crate) struct Solids<'m> {
@@ -211,7 +209,7 @@ impl Body {
         let moved: Vec<Pair> =
             pairs().zip(&between).map(|(((a, _), (b, _)), (p, _))| (*p, (b - a) * rate)).collect();
         let hull = hull(&between)?;
-        let (velocity, spin) = rigid_motion(&moved, hull.centre(0.0));
+        let RigidMotion { velocity, spin, .. } = rigid_motion(&moved, hull.centre(0.0));
         Some(hull.moving(velocity, spin))
     }
 }
@@ -239,23 +237,7 @@ fn corners(points: &[(Vector3<f64>, f64)]) -> Arc<[usize]> {
     if points.len() <= DIRECTIONS {
         return (0..points.len()).collect();
     }
-    let mut chosen: Vec<usize> = directions(DIRECTIONS)
-        .filter_map(|way| {
-            let reach = |i: usize| way.dot(&points[i].0) + points[i].1;
-            (0..points.len()).max_by(|a, b| reach(*a).total_cmp(&reach(*b)))
-        })
-        .collect();
+    let mut chosen = outermost(points, directions(DIRECTIONS));
     chosen.sort_unstable();
-    chosen.dedup();
     chosen.into()
-}
-
-/// Directions evenly over a sphere, along a spiral of the golden angle.
-fn directions(count: usize) -> impl Iterator<Item = Vector3<f64>> {
-    (0..count).map(move |k| {
-        let height = 1.0 - (2 * k + 1) as f64 / count as f64;
-        let (sin, cos) = (GOLDEN_ANGLE * k as f64).sin_cos();
-        let across = (1.0 - height * height).sqrt();
-        Vector3::new(across * cos, height, across * sin)
-    })
 }

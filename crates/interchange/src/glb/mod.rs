@@ -26,6 +26,8 @@ use document::{
 
 /// Normals of shapes that differ by less than this are those of the mesh.
 const SAME_NORMAL: f32 = 0.01;
+/// Part of the accuracy that triangles take.
+const OF_TRIANGLES: f64 = 0.36;
 
 /// A file that is being made.
 struct Writer<'a> {
@@ -42,17 +44,10 @@ struct Writer<'a> {
 
 /// The bytes of the file of a run.
 pub(crate) fn file(growth: &Growth) -> Result<Vec<u8>, Error> {
-    let cutter = Cutter {
-        catalogue: &growth.tracks.catalogue,
-        palette: &growth.palette,
-        contours: &growth.contours,
-        accuracy: 0.36 * growth.options.tolerance(),
-    };
-    let clock = Clock::new(growth.first, growth.last, growth.options.seconds);
     let mut writer = Writer {
         growth,
-        cutter,
-        clock,
+        cutter: growth.cutter(OF_TRIANGLES),
+        clock: growth.clock(),
         buffer: Buffer::default(),
         document: Document::default(),
         materials: HashMap::new(),

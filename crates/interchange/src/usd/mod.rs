@@ -51,17 +51,11 @@ struct Writer<'a> {
 /// The text of a run.
 pub(crate) fn file(growth: &Growth) -> Vec<u8> {
     let tolerance = growth.options.tolerance();
-    let cutter = Cutter {
-        catalogue: &growth.tracks.catalogue,
-        palette: &growth.palette,
-        contours: &growth.contours,
-        accuracy: OF_TRIANGLES * tolerance,
-    };
     let decimals = (-(LAST_DECIMAL * tolerance).log10()).ceil().clamp(0.0, 300.0) as usize;
     let mut writer = Writer {
         growth,
-        cutter,
-        clock: Clock::new(growth.first, growth.last, growth.options.seconds),
+        cutter: growth.cutter(OF_TRIANGLES),
+        clock: growth.clock(),
         decimals,
         text: Text::default(),
         materials: HashMap::new(),
