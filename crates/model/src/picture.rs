@@ -423,7 +423,8 @@ mod tests {
                 sure += 1;
             }
         }
-        assert!(sure > 1350, "{sure}");
+        // Of 1,800 places at the first two distances; at the third, most meet more blocks than are looked at.
+        assert!(sure > 900, "{sure}");
     }
 
     #[test]
