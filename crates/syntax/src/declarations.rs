@@ -191,7 +191,7 @@ pub static DECLARATIONS: [Declaration; 30] = [
     },
     Declaration {
         usage: "@NAME from \"FILE\" texture \"PICTURE\"",
-        summary: "a surface from a file (.s or .obj), drawn by `@NAME(s)` at the size s, perhaps with a picture (.png) on it",
+        summary: "a surface from a file (.s or .obj), perhaps with a picture; `@NAME(s)` draws it",
         category: Category::Looks,
         named: Named::Surface,
         repeats: Repeats::PerName("surface"),

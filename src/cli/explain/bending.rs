@@ -329,7 +329,7 @@ fn part(
         reasons.push("the wind moves them".to_owned());
     }
     if !scene.scenery.solids.is_empty() {
-        reasons.push("so does the air that bodies push aside (`solid`)".to_owned());
+        reasons.push("the air that bodies push aside moves them (`solid`)".to_owned());
     }
     if !sagging.is_empty() {
         reasons.push(format!("their weight does (`sag`: {})", sagging.join(", ")));
