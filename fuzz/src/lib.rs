@@ -5,7 +5,7 @@ use std::path::Path;
 use dlsys::compile::Files;
 use dlsys::diagnostic::Source;
 use dlsys::model::Model;
-use dlsys::render::{Format, FrameWriter, Survey, View};
+use dlsys::render::{Format, FrameWriter, Page, Size, Survey, View};
 use dlsys::session::Session;
 use dlsys::sim::{Settings, Simulation};
 use dlsys::tree::ModuleString;
@@ -56,6 +56,9 @@ pub fn draw(bytes: &[u8]) {
     run(bytes, |session, string| paint(&session.model, string));
 }
 
+/// The larger side of a picture.
+const PIXELS: u32 = 240;
+
 fn paint(model: &Model, string: &ModuleString) {
     let mut scene = dlsys::turtle::blank(model);
     if dlsys::turtle::draw(model, string, &mut scene).is_err() {
@@ -65,7 +68,12 @@ fn paint(model: &Model, string: &ModuleString) {
     survey.add(&scene);
     let fit = survey.fit();
     for format in [Format::SVG, Format::PNG, Format::OBJ] {
-        let bytes = FrameWriter::new(format, fit.clone()).write(&scene, "a frame");
+        let mut writer = FrameWriter::new(format, fit.clone());
+        // Small pictures, so that more of them are tried: with light, a large one takes seconds in this build.
+        if let Ok(page) = Page::new(writer.page.picture, Size::Larger(PIXELS), writer.page.background) {
+            writer.page = page;
+        }
+        let bytes = writer.write(&scene, "a frame");
         if format == Format::SVG {
             let text = String::from_utf8(bytes).expect("text");
             assert!(!text.contains("NaN") && !text.contains("\"inf") && !text.contains("-inf"), "{text}");
