@@ -174,6 +174,18 @@ fn bodies_that_cannot_push_the_wind_are_refused() {
     assert!(message(&loops, 0.0).contains("whose rules read `strain`"), "{}", message(&loops, 0.0));
     let many = "wind 1, 0, 0 speed 1\nsolid Ball\ninitial string: for i in 1 .. 1001: ( [ Ball ] )\ninterpret Ball: @O(1)\n";
     assert_eq!(message(many, 0.0), "more than 1000 bodies push the wind at t = 0");
+    // Nothing runs away: neither with the time that is asked for, nor beyond the seconds that a run may take.
+    let post = "wind 1, 0, 0 speed 1\nsolid Ball\ninitial string: Ball\ninterpret Ball: @O(1)\n";
+    assert!(
+        message(post, 1e9).starts_with("the surroundings take more than 1e7 steps"),
+        "{}",
+        message(post, 1e9)
+    );
+    let session = read(post);
+    let settings = Settings { max_seconds: 0.05, ..Settings::default() };
+    let limited = Weather::of(&session.model, settings).expect("a wind").expect("there is one");
+    assert!(limited.at(0.1).is_ok());
+    assert!(matches!(limited.at(200_000.0), Err(Error::OutOfTime { .. })));
     // Growth that fails is reported for the times that it does not reach, and for no others.
     let ends = "wind 1, 0, 0 speed 1\nsolid Ball\ninitial string: Ball(0)\nBall(x): if x < 1 solve dx/dt = 1\n\
         interpret Ball(x): @O(1)\n";

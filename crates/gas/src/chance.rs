@@ -1,23 +1,26 @@
 //! Random numbers as functions of keys: of a source and the number of a blob, not of the order of computation.
 
+use dlsys_wind::Draw;
+
 use crate::Vector;
 
 /// A source of independent numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Chance(pub(crate) u64);
+pub(crate) struct Chance(Draw);
 
 impl Chance {
-    /// The source that belongs to a key within this one: the finalizer of SplitMix64 (Steele, Lea, Flood 2014).
+    pub(crate) fn new(seed: u64) -> Chance {
+        Chance(Draw::new(seed))
+    }
+
+    /// The source that belongs to a key within this one.
     pub(crate) fn of(self, key: u64) -> Chance {
-        let mut z = self.0.rotate_left(23).wrapping_add(key).wrapping_add(0x9e37_79b9_7f4a_7c15);
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        Chance(z ^ (z >> 31))
+        Chance(self.0.of(key))
     }
 
     /// Uniformly distributed in the open interval from 0 to 1.
     pub(crate) fn unit(self) -> f64 {
-        ((self.0 >> 12) as f64 + 0.5) / (1_u64 << 52) as f64
+        self.0.unit()
     }
 
     /// Uniformly distributed over directions (Archimedes: heights on a sphere are uniform).
@@ -55,11 +58,11 @@ mod tests {
         let count = 100_000;
         let (mut mean, mut square, mut axes) = (Vector::zeros(), Vector::zeros(), Vector::zeros());
         for k in 0..count {
-            let place = Chance(7).of(k).in_ball();
+            let place = Chance::new(7).of(k).in_ball();
             assert!(place.norm() <= 1.0);
             mean += place;
             square += place.component_mul(&place);
-            let [a, b, c] = Chance(7).of(k).axes();
+            let [a, b, c] = Chance::new(7).of(k).axes();
             assert!(a.dot(&b).abs() < 1e-12 && (a.cross(&b) - c).norm() < 1e-12);
             axes += c.component_mul(&c);
         }

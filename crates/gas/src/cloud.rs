@@ -87,7 +87,7 @@ impl Cloud {
         check("a share of the mass of a new blob", share, share > 0.0, "more than 0")?;
         self.room(1)?;
         let (time, variance) = (self.time, self.gas.size * self.gas.size);
-        let chance = Chance(self.number).of(self.len() as u64);
+        let chance = Chance::new(self.number).of(self.len() as u64);
         self.blobs.push(Birth { centre, born: time, since: time, variance, share, chance });
         Ok(())
     }
@@ -170,7 +170,7 @@ impl Cloud {
         }
         let count = libm::floor(all);
         self.room(count as usize)?;
-        let chance = Chance(0x6761_7365).of(source.id);
+        let chance = Chance::new(0x6761_7365).of(source.id);
         for k in 0..count as u64 {
             let since = ((k + 1) as f64 - due) / source.rate;
             let born = self.time + since;

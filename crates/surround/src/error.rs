@@ -144,7 +144,7 @@ pub enum Error {
         limit: f64,
         /// The time in units of the model.
         time: f64,
-        /// The declaration of the first tissue, or the first `@D`.
+        /// The declaration of the first tissue, the first `@D`, or the first body.
         span: Span,
     },
     /// Too many steps up to the time that is asked for.
@@ -156,7 +156,7 @@ pub enum Error {
         time: f64,
         /// Seconds in a unit of time.
         seconds: f64,
-        /// The declaration of the first tissue, or the first `@D`.
+        /// The declaration of the first tissue, the first `@D`, or the first body.
         span: Span,
     },
 }
@@ -239,12 +239,11 @@ impl Error {
                 .at(*span, "declared here")
                 .note("its growth would follow the wind, and the wind its bodies, at one and the same time")
                 .help("leave out `solid`, or let the rules do without `strain`"),
-            Error::TooManySolids { most, time, span } => Diagnostic::error(format!(
-                "more than {most} bodies push the wind at t = {}",
-                brief(*time, 8)
-            ))
-            .at(*span, "of this name is the first one beyond")
-            .help("draw several bodies in one module, or name fewer modules"),
+            Error::TooManySolids { most, time, span } => {
+                Diagnostic::error(format!("more than {most} bodies push the wind at t = {}", brief(*time, 8)))
+                    .at(*span, "of this name is the first one beyond")
+                    .help("draw several bodies in one module, or name fewer modules")
+            }
             Error::TooManyParts { most, span, .. } => {
                 let diagnostic = Diagnostic::error(self.to_string());
                 let diagnostic = match span {
@@ -265,7 +264,9 @@ impl Error {
             ))
             .at(
                 *span,
-                format!("what is passive moves in steps of a thirtieth of a second, and a unit of t is {seconds} s"),
+                format!(
+                    "this is followed in steps of a thirtieth of a second, and a unit of t is {seconds} s"
+                ),
             )
             .help("`units time S` is the pace of the film: seconds of motion in a unit of t, such as 1"),
         }

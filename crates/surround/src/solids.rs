@@ -9,16 +9,19 @@
 
 use std::collections::{HashMap, VecDeque};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
+use dlsys_diagnostic::Span;
 use dlsys_geometry::scene::Scene;
 use dlsys_geometry::turtle::{self, Passive, SolidBody};
-use dlsys_model::Model;
+use dlsys_model::{Model, Units};
 use dlsys_sim::{Settings, Simulation};
 use dlsys_tree::ModuleString;
 use dlsys_wind::{Hull, Obstacle};
 use nalgebra::Vector3;
 
 use crate::descent::Descent;
+use crate::motion::MOST_TICKS;
 use crate::place::Place;
 use crate::points::{Pair, RigidMotion, directions, outermost, rigid_motion};
 use crate::{CLOCK, Error};
@@ -27,7 +30,7 @@ use crate::{CLOCK, Error};
 const PARTS: f64 = 4.0;
 /// Most bodies at one instant: each place in the wind is compared with all of them.
 const MOST_BODIES: usize = 1000;
-/// Most points of the instants that are kept.
+/// Most points of the instants that are kept, each of which counts as one more.
 const MOST_KEPT: usize = 200_000;
 /// Directions in which the outermost point of a body with many points is a corner of its hull.
 const DIRECTIONS: usize = 64;
@@ -52,8 +55,10 @@ struct Track<'m> {
     /// The number of the first instant that is kept.
     first: u64,
     kept: VecDeque<Vec<Body>>,
-    /// The sum of the numbers of points of those kept.
-    points: usize,
+    /// The sum of the sizes of those kept.
+    size: usize,
+    /// Time that it has taken so far.
+    spent: Duration,
 }
 
 /// A body at an instant.
@@ -88,16 +93,21 @@ impl<'m> Solids<'m> {
     /// The bodies at a time in s.
     ///
     /// # Errors
-    /// The growth up to that time fails, or a body cannot be one.
+    /// The growth up to that time fails or takes too long, or a body cannot be one.
     pub(crate) fn at(&self, seconds: f64) -> Result<Vec<Arc<dyn Obstacle>>, Error> {
         let place = (seconds / CLOCK * PARTS).max(0.0);
-        let (number, part) = (place.floor(), place.fract());
-        let number = number as u64;
+        if place > MOST_TICKS * PARTS {
+            let Units { time: second, .. } = self.place.units;
+            let time = self.place.time_at(seconds);
+            return Err(Error::TooLong { most: MOST_TICKS, time, seconds: second, span: self.span() });
+        }
+        let (number, part) = (place as u64, place.fract());
         let mut track = self.track.lock().unwrap_or_else(PoisonError::into_inner);
         if track.as_ref().is_none_or(|track| number < track.first) {
             let growth = Simulation::new(self.model, self.settings)?;
             let (scene, string) = (turtle::blank(self.model), ModuleString::default());
-            *track = Some(Track { growth, scene, string, first: 0, kept: VecDeque::new(), points: 0 });
+            let (kept, spent) = (VecDeque::new(), track.as_ref().map_or(Duration::ZERO, |track| track.spent));
+            *track = Some(Track { growth, scene, string, first: 0, kept, size: 0, spent });
         }
         let Some(track) = track.as_mut() else { return Ok(Vec::new()) };
         track.go_to(self, number)?;
@@ -115,24 +125,35 @@ impl<'m> Solids<'m> {
         let hulls = here.iter().zip(ends).filter_map(|(body, end)| body.hull(end, part));
         Ok(hulls.map(|hull| Arc::new(hull) as Arc<dyn Obstacle>).collect())
     }
+
+    /// The first name in the declaration.
+    fn span(&self) -> Span {
+        self.model.scenery.solids.first().map(|(_, span)| *span).unwrap_or_default()
+    }
 }
 
 impl Track<'_> {
     /// Goes on until an instant is kept, and keeps at least two.
     fn go_to(&mut self, solids: &Solids, number: u64) -> Result<(), Error> {
+        // Without a limit the clock is not asked.
+        let limit = solids.settings.max_seconds;
         while self.first + self.kept.len() as u64 <= number {
             let next = self.first + self.kept.len() as u64;
             let time = solids.place.time_at(next as f64 * (CLOCK / PARTS));
+            let begun = limit.is_finite().then(Instant::now);
             self.growth.at(time.max(0.0), &mut self.string)?;
             let mut descent = Descent::default();
             descent.add(solids.model, &self.growth.take_events());
             let bodies = self.bodies(solids, &descent)?;
-            self.points += bodies.iter().map(|body| body.points.len()).sum::<usize>();
+            self.size += size(&bodies);
             self.kept.push_back(bodies);
-            while self.points > MOST_KEPT && self.kept.len() > 3 {
-                let past = self.kept.pop_front().unwrap_or_default();
-                self.points -= past.iter().map(|body| body.points.len()).sum::<usize>();
+            while self.size > MOST_KEPT && self.kept.len() > 3 {
+                self.size -= self.kept.pop_front().map_or(0, |past| size(&past));
                 self.first += 1;
+            }
+            self.spent += begun.map_or(Duration::ZERO, |begun| begun.elapsed());
+            if self.spent.as_secs_f64() > limit {
+                return Err(Error::OutOfTime { limit, time, span: solids.span() });
             }
         }
         Ok(())
@@ -171,10 +192,15 @@ impl Track<'_> {
     }
 
     /// The declaration of a body.
-    fn span(&self, solids: &Solids, solid: &SolidBody) -> dlsys_diagnostic::Span {
+    fn span(&self, solids: &Solids, solid: &SolidBody) -> Span {
         let mut declared = solids.model.scenery.solids.iter();
         declared.find(|(kind, _)| *kind == solid.origin.kind).map(|(_, span)| *span).unwrap_or_default()
     }
+}
+
+/// Points of the bodies of an instant, and one for itself.
+fn size(bodies: &[Body]) -> usize {
+    1 + bodies.iter().map(|body| body.points.len()).sum::<usize>()
 }
 
 impl Body {

@@ -4,9 +4,12 @@
 //! cheaper.
 
 use std::hint::black_box;
+use std::sync::Arc;
 use std::time::Instant;
 
-use dlsys_wind::{Description, Error, Field, Ground, Signal, Snapshot, Spectrum, Sphere, study};
+use dlsys_wind::{
+    Description, Error, Field, Ground, Hull, Obstacle, Signal, Snapshot, Spectrum, Sphere, study,
+};
 use nalgebra::Vector3;
 
 const ROUNDS: usize = 31;
@@ -66,6 +69,16 @@ fn main() -> Result<(), Error> {
     let ball = Sphere::fixed(Vector3::new(1.0, 0.5, 2.0), 0.1);
     let around = Description { obstacles: vec![Box::new(ball)], ..gusty(5.0.into()) };
     sample("velocity along a stem of 1 m through a ball", &Field::new(around)?.at(1.0)?, &stem);
+
+    let free = Field::new(gusty(5.0.into()))?.at(1.0)?;
+    let corner = |k: usize| Vector3::new((k & 1) as f64, (k >> 1 & 1) as f64, (k >> 2) as f64) * 0.2;
+    let boxed = Hull::new((0..8).map(|k| corner(k) + Vector3::new(0.9, 0.4, 1.9)).collect(), 0.01);
+    let boxed = boxed.map(|hull| Arc::new(hull) as Arc<dyn Obstacle>);
+    let among = free.among(boxed.as_slice())?;
+    sample("velocity along a stem of 1 m through a box", &among, &stem);
+    let close: Vec<Vector3<f64>> =
+        (0..1000).map(|k| Vector3::new(0.895, 0.4 + 0.0002 * f64::from(k), 2.0)).collect();
+    sample("velocity in the layer of a box", &among, &close);
 
     let mut time = 0.0;
     let snapshot = |field: &Field, time: &mut f64| {

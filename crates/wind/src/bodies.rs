@@ -65,8 +65,7 @@ impl Body {
         let (turning, turning_first) = turning(self.spin, r);
         let a = potential + relative.cross(&r) - self.potential - self.stretching * r - turning;
         let first = derivatives + relative.cross_matrix() - self.stretching - turning_first;
-        let normal = self.obstacle.normal(x, time);
-        let bending = self.obstacle.normal_gradient(x, time);
+        let (normal, bending) = self.obstacle.bending(x, time);
         // The tangential part a - n(n·a), and its curl; the normal has none.
         let outward = normal.dot(&a);
         let along = a - normal * outward;

@@ -79,23 +79,28 @@ impl Obstacle for Hull {
         self.layer
     }
 
-    /// Zero over a face; around an edge, the normal turns in one direction; around a corner, in two.
-    fn normal_gradient(&self, point: Vector3<f64>, _: f64) -> Matrix3<f64> {
-        let Nearest { way, corners } = Nearest::of(&self.points, point);
+    fn normal_gradient(&self, point: Vector3<f64>, time: f64) -> Matrix3<f64> {
+        self.bending(point, time).1
+    }
+
+    /// Over a face the normal does not turn; around an edge, it turns in one direction; around a corner, in two.
+    fn bending(&self, point: Vector3<f64>, _: f64) -> (Vector3<f64>, Matrix3<f64>) {
+        let Nearest { way, simplex } = Nearest::of(&self.points, point);
         let distance = way.norm();
         if distance == 0.0 {
-            return Matrix3::zeros();
+            return (Vector3::y(), Matrix3::zeros());
         }
         let normal = way / distance;
         let across = Matrix3::identity() - normal * normal.transpose();
-        match corners[..] {
+        let gradient = match *simplex.corners() {
             [_] => across / distance,
             [a, b] => {
                 let edge = (b - a).normalize();
                 (across - edge * edge.transpose()) / distance
             }
             _ => Matrix3::zeros(),
-        }
+        };
+        (normal, gradient)
     }
 }
 
@@ -117,63 +122,85 @@ fn middle_extent(points: &[Vector3<f64>], centre: Vector3<f64>) -> f64 {
     extents[1]
 }
 
+/// Up to four corners.
+#[derive(Clone, Copy)]
+struct Simplex {
+    corners: [Vector3<f64>; 4],
+    count: usize,
+}
+
+impl Simplex {
+    fn of(corners: impl IntoIterator<Item = Vector3<f64>>) -> Simplex {
+        let mut simplex = Simplex { corners: [Vector3::zeros(); 4], count: 0 };
+        corners.into_iter().for_each(|corner| simplex.push(corner));
+        simplex
+    }
+
+    fn push(&mut self, corner: Vector3<f64>) {
+        self.corners[self.count] = corner;
+        self.count += 1;
+    }
+
+    fn corners(&self) -> &[Vector3<f64>] {
+        &self.corners[..self.count]
+    }
+
+    /// The point that is nearest to the origin, and the corners of the part that it lies in.
+    fn nearest(&self) -> (Vector3<f64>, Simplex) {
+        let mut best = (Vector3::repeat(f64::INFINITY), *self);
+        for chosen in 1_u8..1 << self.count {
+            let part = (0..self.count).filter(|i| chosen >> i & 1 == 1).map(|i| self.corners[i]);
+            let part = Simplex::of(part);
+            let found = match *part.corners() {
+                [a] => Some(a),
+                [a, b] => on_edge(a, b),
+                [a, b, c] => on_triangle(a, b, c),
+                _ => is_within(part.corners).then(Vector3::zeros),
+            };
+            if let Some(found) = found.filter(|found| found.norm_squared() < best.0.norm_squared()) {
+                best = (found, part);
+            }
+        }
+        best
+    }
+}
+
 /// The point of a convex hull that is nearest to a place.
 struct Nearest {
     /// From that point to the place; 0 within the hull.
     way: Vector3<f64>,
-    /// The corners of the smallest part of the surface that the point lies in: a corner, an edge or a triangle.
-    corners: Vec<Vector3<f64>>,
+    /// The smallest part of the surface that the point lies in, a corner, an edge or a triangle, relative to the place.
+    simplex: Simplex,
 }
 
 impl Nearest {
     /// By the method of Gilbert, Johnson and Keerthi (1988): the nearest point of a simplex of corners, which takes in a corner that is
     /// nearer as long as there is one.
     fn of(points: &[Vector3<f64>], place: Vector3<f64>) -> Nearest {
-        let seen = |corner: &Vector3<f64>| corner - place;
-        let mut simplex: Vec<Vector3<f64>> = points.first().map(seen).into_iter().collect();
-        let mut nearest = simplex.first().copied().unwrap_or_default();
+        let mut nearest = points.first().map_or_else(Vector3::zeros, |corner| corner - place);
+        let mut simplex = Simplex::of([nearest]);
         for _ in 0..STEPS {
-            let along = |corner: &Vector3<f64>| (corner - place).dot(&nearest);
+            let along = |corner: &Vector3<f64>| corner.dot(&nearest);
             let Some(next) = points.iter().min_by(|a, b| along(a).total_cmp(&along(b))) else { break };
-            let next = seen(next);
+            let next = next - place;
             let gain = nearest.norm_squared() - next.dot(&nearest);
-            if gain <= 1e-14 * nearest.norm_squared() || simplex.contains(&next) {
+            if gain <= 1e-14 * nearest.norm_squared() || simplex.corners().contains(&next) {
                 break;
             }
-            simplex.push(next);
-            let (found, part) = of_simplex(&simplex);
+            let mut larger = simplex;
+            larger.push(next);
+            let (found, part) = larger.nearest();
             // Rounding: there is no progress any more.
             if found.norm_squared() >= nearest.norm_squared() {
-                simplex.pop();
                 break;
             }
             (nearest, simplex) = (found, part);
-            if simplex.len() == 4 {
+            if simplex.count == 4 {
                 break;
             }
         }
-        Nearest { way: -nearest, corners: simplex.iter().map(|corner| corner + place).collect() }
+        Nearest { way: -nearest, simplex }
     }
-}
-
-/// The point of a simplex that is nearest to the origin, and the corners of the part that it lies in.
-fn of_simplex(corners: &[Vector3<f64>]) -> (Vector3<f64>, Vec<Vector3<f64>>) {
-    let mut best = (Vector3::repeat(f64::INFINITY), Vec::new());
-    for chosen in 1_u8..1 << corners.len() {
-        let part: Vec<Vector3<f64>> =
-            (0..corners.len()).filter(|i| chosen >> i & 1 == 1).map(|i| corners[i]).collect();
-        let found = match part[..] {
-            [a] => Some(a),
-            [a, b] => on_edge(a, b),
-            [a, b, c] => on_triangle(a, b, c),
-            [a, b, c, d] => is_within([a, b, c, d]).then(Vector3::zeros),
-            _ => None,
-        };
-        if let Some(found) = found.filter(|found| found.norm_squared() < best.0.norm_squared()) {
-            best = (found, part);
-        }
-    }
-    best
 }
 
 /// The foot of the perpendicular from the origin, if it lies between the ends.

@@ -74,5 +74,6 @@ pub use field::Field;
 pub use hull::Hull;
 pub use obstacle::{Ground, Height, Obstacle, Sphere};
 pub use primitives::Flow;
+pub use random::Draw;
 pub use snapshot::{Snapshot, grid};
 pub use spectrum::{Spectrum, correlations, von_karman_length};

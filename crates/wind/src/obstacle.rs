@@ -30,6 +30,11 @@ pub trait Obstacle: fmt::Debug + Send + Sync {
     /// The direction away from the surface at a point outside: the gradient of the distance, of length 1.
     fn normal(&self, point: Vector3<f64>, time: f64) -> Vector3<f64>;
 
+    /// [`normal`](Obstacle::normal) and [`normal_gradient`](Obstacle::normal_gradient) at once.
+    fn bending(&self, point: Vector3<f64>, time: f64) -> (Vector3<f64>, Matrix3<f64>) {
+        (self.normal(point, time), self.normal_gradient(point, time))
+    }
+
     /// The velocity of the centre in m/s.
     fn velocity(&self, time: f64) -> Vector3<f64>;
 

@@ -5,18 +5,20 @@
 
 use crate::turns::cos_sin;
 
-/// A source of independent numbers, by keys.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Draw(u64);
+/// A source of independent random numbers, by keys: a number is a function of the seed and of the keys that lead to it, not of the order of
+/// computation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Draw(u64);
 
 impl Draw {
     /// The source that belongs to a seed.
-    pub(crate) fn new(seed: u64) -> Draw {
+    pub fn new(seed: u64) -> Draw {
         Draw(0x7769_6e64).of(seed)
     }
 
     /// The source that belongs to a key within this one.
-    pub(crate) fn of(self, key: u64) -> Draw {
+    #[must_use]
+    pub fn of(self, key: u64) -> Draw {
         let mut z = self.0.rotate_left(23).wrapping_add(key).wrapping_add(0x9e37_79b9_7f4a_7c15);
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -24,7 +26,7 @@ impl Draw {
     }
 
     /// Uniformly distributed in the open interval from 0 to 1.
-    pub(crate) fn unit(self) -> f64 {
+    pub fn unit(self) -> f64 {
         ((self.0 >> 12) as f64 + 0.5) / (1u64 << 52) as f64
     }
 

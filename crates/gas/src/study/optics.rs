@@ -8,7 +8,7 @@ use crate::{Blob, Error, Light, Look, Ray, Smoke, Span, Vector};
 /// Blobs of many sizes in a ball of radius 1 around the origin.
 pub fn random_smoke(seed: u64, count: u64) -> Vec<Blob> {
     let blob = |k: u64| {
-        let chance = Chance(seed).of(k);
+        let chance = Chance::new(seed).of(k);
         let size = 0.02 + 0.2 * chance.of(10).unit();
         Blob { centre: chance.in_ball(), variance: size * size, mass: 1e-3 * chance.of(11).unit() }
     };
