@@ -32,11 +32,12 @@ pub fn survey(args: &RenderArgs) -> Result<Survey, Failure> {
 }
 
 /// Flags that are for pictures, and whether they are given.
-pub fn of_pictures(args: &RenderArgs) -> [(&'static str, bool); 10] {
+pub fn of_pictures(args: &RenderArgs) -> [(&'static str, bool); 11] {
     [
         ("--perspective", args.perspective.is_some()),
         ("--camera", args.camera.is_some()),
         ("--orbit", args.orbit.is_some()),
+        ("--shutter", args.shutter.is_some()),
         ("--zoom", args.zoom.is_some()),
         ("--light", args.light.is_some()),
         ("--sky", args.sky.is_some()),
@@ -67,6 +68,12 @@ pub fn agree(args: &RenderArgs, format: Format) -> Result<(), Failure> {
             name.display()
         )));
     }
+    if args.shutter.is_some() && format.content() != Content::Pixels {
+        return Err(usage(format!(
+            "--shutter averages pixels, and {} files have none; choose --format png, or a film (webp, apng, gif or y4m)",
+            format.extension().to_uppercase()
+        )));
+    }
     if format.content() == Content::Mesh {
         if args.layout != Layout::Frames {
             return Err(usage(format!(
@@ -90,6 +97,12 @@ pub fn of_layouts(args: &RenderArgs) -> Result<(), Failure> {
     if args.orbit.is_some() && args.layout != Layout::Frames {
         return Err(usage(format!(
             "--orbit does not go with --layout {}: the camera turns from frame to frame, so choose a film (--format webp, apng, gif or y4m) or a file for each frame",
+            args.layout.name()
+        )));
+    }
+    if args.shutter.is_some() && args.layout != Layout::Frames {
+        return Err(usage(format!(
+            "--shutter does not go with --layout {}: stages on a sheet are sharp; choose a film (--format webp, apng, gif or y4m) or a file for each frame",
             args.layout.name()
         )));
     }
