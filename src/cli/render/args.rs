@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::cli::shared::SharedArgs;
+use crate::cli::shared::{SharedArgs, Topology};
 use crate::cli::values::{
     Background, LineWidth, RenderFormat, Seeds, Sky, background, bend_pixels, bytes, camera, columns,
     direction, field_of_view, layout, line_width, pixels, positive, render_format, seeds, shutter, size, sky,
@@ -45,6 +45,9 @@ pub struct RenderArgs {
     /// With a format of whole animations: units of the model's time in a second of the animation [default: 1, or, with `units … time S`, 1/S]
     #[arg(long, value_name = "V", allow_negative_numbers = true, value_parser = positive)]
     pub speed: Option<f64>,
+    /// With --format usda: whether meshes keep their triangles
+    #[arg(long, value_enum, default_value_t = Topology::Constant)]
+    pub topology: Topology,
     /// A file for each frame, or all frames on one sheet
     ///
     /// frames: a file for each frame. overlay: all in one place, the older the fainter. stack: each below the one before,

@@ -2,6 +2,7 @@
 
 use crate::cli::args::RenderArgs;
 use crate::cli::common::Failure;
+use crate::cli::shared::Topology;
 use crate::cli::values::{Background, LineWidth, Sky};
 use crate::render::{CAMERA_SHAPE, Content, Fit, Format, Layout, Page, Picture, Size, Spacing, Survey, View};
 use crate::scene::Surroundings;
@@ -94,6 +95,11 @@ pub fn agree(args: &RenderArgs, format: Format) -> Result<(), Failure> {
 
 /// Refuses flags of another layout.
 pub fn of_layouts(args: &RenderArgs) -> Result<(), Failure> {
+    if args.topology == Topology::Varying {
+        return Err(usage(
+            "--topology is for --format usda, whose meshes keep their triangles or change them; leave it out",
+        ));
+    }
     if args.orbit.is_some() && args.layout != Layout::Frames {
         return Err(usage(format!(
             "--orbit does not go with --layout {}: the camera turns from frame to frame, so choose a film (--format webp, apng, gif or y4m) or a file for each frame",
