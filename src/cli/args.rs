@@ -8,6 +8,7 @@ use super::fmt::FmtArgs;
 use super::new::NewArgs;
 use super::render::args::RENDER_EXAMPLES;
 pub use super::render::args::RenderArgs;
+use super::shared::Topology;
 use super::shared::{BudgetArgs, RunFormat, SharedArgs, SolverArgs, TextFormat};
 use super::shell::{self, CompletionsArgs, ManArgs};
 use super::values::{
@@ -252,6 +253,9 @@ pub struct FileArgs {
     /// With --format glb or usda: units of the model's time in a second of the animation [default: 1, or, with `units … time S`, 1/S]
     #[arg(long, value_name = "V", allow_negative_numbers = true, value_parser = positive)]
     pub speed: Option<f64>,
+    /// With --format usda: whether meshes keep their triangles. varying: a mesh for each material whose triangles change from frame to frame, with velocities
+    #[arg(long, value_enum, default_value_t = Topology::Constant)]
+    pub topology: Topology,
     /// With --format glb or usda: write over a file of another kind
     #[arg(long)]
     pub force: bool,
