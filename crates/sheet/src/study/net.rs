@@ -146,7 +146,7 @@ impl Catch {
 pub fn throw_steps(end: f64) -> Result<Vec<(f64, [f64; 2], Catch)>, Error> {
     let exact = catch(Coupling::TwoWay, end, Settings { tolerance: 1e-4, ..Settings::default() })?;
     let mut rows = Vec::new();
-    for step in [TICK, TICK / 4.0, TICK / 16.0] {
+    for step in [TICK / 16.0, TICK / 32.0, TICK / 64.0] {
         let found =
             catch(Coupling::TwoWay, end, Settings { longest: step, fixed: true, ..Settings::default() })?;
         rows.push((step, found.distance(&exact), found));
