@@ -180,9 +180,14 @@ fn surroundings(args: &ReportArgs) -> Result<(), Failure> {
     show(study::sheet_speed_table().map_err(|error| defect(error.to_string()))?)?;
     drop(progress);
     if let Some(out) = &args.out {
-        let exact: [(&str, &[_]); 4] =
-            [("stems", &stems), ("falling", &falls), ("gas", &gases), ("sheets", &sheets)];
-        write(out, "surroundings.csv", &study::surroundings_csv(&wind, &exact))?;
+        write(
+            out,
+            "surroundings.csv",
+            &study::surroundings_csv(
+                &wind,
+                &[("stems", &stems), ("falling", &falls), ("gas", &gases), ("sheets", &sheets)],
+            ),
+        )?;
     }
     let bad = wind.iter().filter(|row| !row.holds()).count();
     let failed = hard.iter().filter(|case| case.failure.is_some()).count()
