@@ -117,8 +117,6 @@ impl Map {
         if left >= right || bottom >= top {
             return;
         }
-        // A long stem has triangles of thousands of cells by a part of one, whose depths cancel: 32 bits leave dark slits on it.
-        let [p, q, r] = [p, q, r].map(|corner| corner.map(f64::from));
         let area = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
         if area == 0.0 || !area.is_finite() {
             return;
@@ -130,21 +128,21 @@ impl Map {
         ];
         let (least, most) = (p[2].min(q[2]).min(r[2]), p[2].max(q[2]).max(r[2]));
         for row in bottom..top {
-            let y = row as f64 + 0.5;
+            let y = row as f32 + 0.5;
             for column in left..right {
-                let x = column as f64 + 0.5;
-                let side = |a: [f64; 3], b: [f64; 3]| {
+                let x = column as f32 + 0.5;
+                let side = |a: [f32; 3], b: [f32; 3]| {
                     ((b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])) * scale
                 };
                 if side(p, q) < 0.0 || side(q, r) < 0.0 || side(r, p) < 0.0 {
                     continue;
                 }
-                if !is_drawn([x as f32, y as f32]) {
+                if !is_drawn([x, y]) {
                     continue;
                 }
                 let depth = p[2] + slope[0] * (x - p[0]) + slope[1] * (y - p[1]);
                 let held = &mut self.depths[row * self.size[0] + column];
-                *held = held.max(depth.clamp(least, most) as f32);
+                *held = held.max(depth.clamp(least, most));
             }
         }
     }

@@ -216,6 +216,10 @@ fn read_axiom(text: &str, item: &RawItem, builder: &mut build::Builder) -> Resul
     let words: Vec<&str> = head.split_whitespace().collect();
     let Some(mut at) = item.after_colon.filter(|_| matches!(words[..], ["axiom"] | ["initial", "string"]))
     else {
+        let line = text[item.start..item.end].lines().next().unwrap_or_default();
+        if let Some(said) = foreign_syntax::line(line, item.start) {
+            return Err(Box::new(said));
+        }
         return Err(Box::new(
             Diagnostic::error("the initial string is written `initial string: …` or `axiom: …`")
                 .at(
@@ -226,7 +230,7 @@ fn read_axiom(text: &str, item: &RawItem, builder: &mut build::Builder) -> Resul
                         "expected a `:` after this"
                     },
                 )
-                .help(advice::initial_string(text[item.start..item.end].lines().next().unwrap_or_default())),
+                .help(advice::initial_string(line)),
         ));
     };
     let mut modules: Vec<Part> = Vec::new();
