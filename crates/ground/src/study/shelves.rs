@@ -1,0 +1,97 @@
+//! Shelves and vessels that carry as much as they can.
+
+use dlsys_wind::study::Convergence;
+
+use super::{SLOPE, SWEEPS, dry, heap};
+use crate::{Error, Extent, Ground, Relief};
+
+/// Half the width of shelves and vessels, in m.
+const HALF: f64 = 0.5;
+/// Depth of the space around them, in m.
+const BELOW: f64 = 3.0;
+/// Columns in half the width.
+const FINENESS: [i32; 3] = [4, 8, 16];
+
+/// What lies on columns for which `on` holds after all that was piled up has slipped off, in m³.
+fn carried(
+    cell: f64,
+    n: i32,
+    bed: impl Fn(f64, f64) -> f64 + Send + Sync + 'static,
+    on: impl Fn(f64, f64) -> bool + Copy + Send + Sync + 'static,
+) -> Result<f64, Error> {
+    let pile = move |x: f64, z: f64| if on(x, z) { 1.2 * HALF } else { 0.0 };
+    let mut ground = heap(cell, Extent::around(3 * n), dry(SLOPE), Relief::function(bed), pile)?;
+    ground.settle(SWEEPS)?;
+    Ok(volume(&ground, on))
+}
+
+/// Volume of the loose material on columns for which `on` holds, in m³.
+fn volume(ground: &Ground, on: impl Fn(f64, f64) -> bool) -> f64 {
+    let (cell, Extent { x, z }) = (ground.cell(), ground.extent());
+    let mut sum = 0.0;
+    for k in z[0]..=z[1] {
+        for i in x[0]..=x[1] {
+            if on(f64::from(i) * cell, f64::from(k) * cell) {
+                sum += ground.loose(i, k);
+            }
+        }
+    }
+    sum * cell * cell
+}
+
+/// A full disc of radius 0.5 m: volume.
+///
+/// # Errors
+///
+/// More sweeps or memory than allowed, which is a defect.
+pub fn disc() -> Result<Vec<Convergence>, Error> {
+    let on = |x: f64, z: f64| x.hypot(z) <= HALF;
+    let mut found = Vec::new();
+    for n in FINENESS {
+        let bed = move |x: f64, z: f64| if on(x, z) { 0.0 } else { -BELOW };
+        found.push((f64::from(n), carried(HALF / f64::from(n), n, bed, on)?));
+    }
+    let exact = std::f64::consts::PI * SLOPE * HALF * HALF * HALF / 3.0;
+    Ok(Convergence::rows("full shelf, a disc: volume (m³)", exact, &found))
+}
+
+/// A full square with sides of 1 m: volume.
+///
+/// # Errors
+///
+/// More sweeps or memory than allowed, which is a defect.
+pub fn square() -> Result<Vec<Convergence>, Error> {
+    let on = |x: f64, z: f64| x.abs().max(z.abs()) <= HALF * (1.0 + 1e-9);
+    let mut found = Vec::new();
+    for n in FINENESS {
+        let bed = move |x: f64, z: f64| if on(x, z) { 0.0 } else { -BELOW };
+        found.push((f64::from(n), carried(HALF / f64::from(n), n, bed, on)?));
+    }
+    let exact = SLOPE * (2.0 * HALF).powi(3) / 6.0;
+    Ok(Convergence::rows("full shelf, a square: volume (m³)", exact, &found))
+}
+
+/// A full box of 1 m × 1 m × 0.25 m: volume.
+///
+/// # Errors
+///
+/// More sweeps or memory than allowed, which is a defect.
+pub fn bucket() -> Result<Vec<Convergence>, Error> {
+    let depth = 0.25;
+    let mut found = Vec::new();
+    for n in FINENESS {
+        // The walls stand between columns, and are a column thick.
+        let cell = HALF / (f64::from(n) + 0.5);
+        let (half, wall) = (HALF, HALF + cell);
+        let on = move |x: f64, z: f64| x.abs().max(z.abs()) <= half;
+        let bed = move |x: f64, z: f64| match x.abs().max(z.abs()) {
+            r if r <= half => 0.0,
+            r if r <= wall => depth,
+            _ => -BELOW,
+        };
+        found.push((f64::from(n), carried(cell, n, bed, on)?));
+    }
+    let width = 2.0 * HALF;
+    let exact = width * width * depth + SLOPE * width.powi(3) / 6.0;
+    Ok(Convergence::rows("full box: volume (m³)", exact, &found))
+}
