@@ -1,9 +1,10 @@
-//! Prints the exact cases and the speed of sweeps.
+//! Prints the exact cases and the speed of sweeps; only the latter with the argument `speed`.
 
 use dlsys_ground::{Error, study};
 
 fn main() -> Result<(), Error> {
-    for case in study::EXACT_CASES {
+    let only_speed = std::env::args().nth(1).is_some_and(|word| word == "speed");
+    for case in study::EXACT_CASES.into_iter().filter(|_| !only_speed) {
         let begun = std::time::Instant::now();
         for row in case()? {
             let order = row.order.map_or(String::new(), |order| format!("{order:.2}"));
