@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::error::check;
+use crate::graph::Graph;
 use crate::kernel::Law;
 use crate::load::Floors;
 use crate::material::REST;
@@ -94,6 +95,8 @@ pub struct Ground {
     pub(crate) feet: Arc<BTreeMap<u64, Arc<Foot>>>,
     /// Floors on bodies, and whether what lies on them may slip.
     pub(crate) floors: Arc<Floors>,
+    /// Their graph; none where it has to be made anew.
+    pub(crate) graph: Option<Arc<Graph>>,
     pub(crate) stirred: bool,
     pub(crate) book: Book,
 }
@@ -164,6 +167,7 @@ impl Ground {
             strained,
             feet: Arc::default(),
             floors: Arc::default(),
+            graph: None,
             stirred: false,
             fresh: setup.steep.clone(),
             setup: Arc::new(setup),

@@ -145,18 +145,17 @@ impl Block {
 
     /// Edges down from bare columns and to full ones count as level.
     fn walls(&mut self, law: &Law, at: usize, n: usize, has_next: bool, traits: Traits) {
-        let (w, film) = (self.width, law.film);
+        let w = self.width;
         let Block { loose, room, ex, ez, .. } = self;
-        let closed = |e: f64, low: usize, high: usize| {
-            let (upper, lower) = if e > 0.0 { (high, low) } else { (low, high) };
-            (traits.bare && loose[upper] <= film) || (traits.roofed && room[lower] <= film)
-        };
-        for here in at..at + n {
-            if here + 1 < at + n && closed(ex[here], here, here + 1) {
-                ex[here] = 0.0;
+        let along_z = has_next.then_some((&mut ez[at..at + n], w));
+        for (e, step) in [(&mut ex[at..at + n - 1], 1)].into_iter().chain(along_z) {
+            let count = e.len();
+            let [low, high] = [at, at + step].map(|from| from..from + count);
+            if traits.bare {
+                close(e, &loose[low.clone()], &loose[high.clone()], law.film);
             }
-            if has_next && closed(ez[here], here, here + w) {
-                ez[here] = 0.0;
+            if traits.roofed {
+                close(e, &room[high], &room[low], law.film);
             }
         }
     }
@@ -321,6 +320,15 @@ impl Block {
                 moved
             }
         }
+    }
+}
+
+/// Sets differences from low to high to 0 where the value at the upper end, of those at both ends, is at most `least`. With the ends exchanged, it is that at the
+/// lower end.
+fn close(e: &mut [f64], low: &[f64], high: &[f64], least: f64) {
+    for ((e, low), high) in e.iter_mut().zip(low).zip(high) {
+        let upper = if *e > 0.0 { *high } else { *low };
+        *e = if upper > least { *e } else { 0.0 };
     }
 }
 

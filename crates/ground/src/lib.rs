@@ -68,6 +68,7 @@
 
 mod clock;
 mod error;
+mod graph;
 mod ground;
 mod kernel;
 mod load;

@@ -211,6 +211,7 @@ impl Ground {
     }
 
     fn set_roof(&mut self, (i, k): (i32, i32), roof: i64) {
+        self.graph = None;
         let (key, index) = self.setup.place(i, k);
         let count = self.setup.settings.side * self.setup.settings.side;
         let roofs = Arc::make_mut(&mut self.roofs);

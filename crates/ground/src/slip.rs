@@ -3,6 +3,7 @@
 //! A sweep moves material along all edges at once, from the heights that it finds. It computes only squares that have a column that slipped in the
 //! sweep before, or was changed. So what happens far away changes nothing here, and the order of tiles and the number of threads do not matter.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use crate::ground::TAU;
@@ -16,8 +17,14 @@ const HALO: usize = 2;
 /// Fewest tiles for which threads are started.
 const MANY: usize = 32;
 
+/// In the place of a neighbour: the column is far beyond an edge, where nothing depends on it.
+const FAR: usize = 3;
+
 /// The neighbours of a tile and itself, in rows; none beyond the edges.
 type Around<'a> = [Option<&'a Tile>; 9];
+
+/// Rows of a block and places in them.
+type Area = (Range<usize>, Range<usize>);
 
 /// New loose material of a tile, and which columns slipped.
 struct Outcome {
@@ -69,10 +76,7 @@ impl Ground {
     /// One sweep of the ground and of what lies on bodies.
     pub(crate) fn step(&mut self, law: &Law) -> Result<(), Error> {
         self.sweep(law)?;
-        if self.stirred || self.floors_are_stirred() {
-            self.stirred = self.sweep_loads(law)?;
-        }
-        Ok(())
+        self.sweep_loads(law)
     }
 
     /// One sweep of the ground.
@@ -201,6 +205,8 @@ struct Worker<'a> {
     ground: &'a Ground,
     law: &'a Law,
     block: Block,
+    /// For each place along x and along z, from two before the tile on: which of the three neighbours has that column, and where.
+    images: [Vec<(usize, usize)>; 2],
     /// Bits of the columns of a row that are awake, from two before the tile on.
     awake: Vec<u64>,
 }
@@ -208,7 +214,13 @@ struct Worker<'a> {
 impl<'a> Worker<'a> {
     fn new(ground: &'a Ground, law: &'a Law) -> Worker<'a> {
         let width = ground.setup.settings.side + 2 * HALO;
-        Worker { ground, law, block: Block::new(width), awake: vec![0; width] }
+        Worker {
+            ground,
+            law,
+            block: Block::new(width),
+            images: [vec![(FAR, 0); width], vec![(FAR, 0); width]],
+            awake: vec![0; width],
+        }
     }
 
     /// What a sweep makes of a tile; none if nothing in it can move.
@@ -218,31 +230,32 @@ impl<'a> Worker<'a> {
         let tiles: Around = around(key).map(|key| ground.tiles.get(&key).map(|tile| &**tile));
         let tile = tiles[4]?;
         let inside = ground.setup.description.extent.surrounds(key, ground.setup.side);
-        self.gather_awake(key, &tiles, inside);
+        self.find_images(key);
+        self.gather_awake(&tiles, inside);
         let (rows, places) = if full { (HALO..HALO + side, HALO..HALO + side) } else { self.reach(side)? };
         let around = (rows.start - HALO..rows.end + HALO, places.start - HALO..places.end + HALO);
         let mut traits = Traits::default();
         if inside {
             self.gather(&tiles, &around.0);
         } else {
-            self.gather_mirrored(key, &tiles, &around.0);
+            self.gather_mirrored(&tiles, &around);
         }
         let width = self.block.width;
         let wanted = u64::MAX >> (64 - around.1.len()) << around.1.start;
         traits.varied = around.0.clone().any(|r| self.awake[r] & wanted != wanted)
             || tiles.iter().flatten().any(|tile| tile.pressed || tile.slope.is_some());
-        traits.roofed =
-            !ground.roofs.is_empty() && self::around(key).iter().any(|key| ground.roofs.contains_key(key));
+        let roofs = self::around(key).map(|key| ground.roofs.get(&key).map(|roofs| &**roofs));
+        traits.roofed = roofs.iter().any(Option::is_some);
         traits.bare = around.0.clone().any(|r| {
             let row = &self.block.loose[r * width + around.1.start..r * width + around.1.end];
             let bare = row.iter().fold(0, |bare, loose| bare | u64::from(*loose <= self.law.film));
             bare != 0
         });
         if traits.varied {
-            self.gather_slopes(key, &tiles, &around.0);
+            self.gather_slopes(&tiles, &around);
         }
         if traits.roofed {
-            self.gather_roofs(key, &tiles, &around.0);
+            self.gather_roofs(&roofs, &tiles, &around);
         }
         self.block.flow(self.law, &rows, &places, traits);
         let mut loose = tile.loose.clone();
@@ -268,7 +281,7 @@ impl<'a> Worker<'a> {
     }
 
     /// Rows of the block and places in them that a flux can reach; none if nothing near is awake.
-    fn reach(&self, side: usize) -> Option<(std::ops::Range<usize>, std::ops::Range<usize>)> {
+    fn reach(&self, side: usize) -> Option<Area> {
         let near = ((1 << (side + 2)) - 1) << 1;
         let rows = 1..side + 3;
         let first = rows.clone().find(|r| self.awake[*r] & near != 0)?;
@@ -290,34 +303,43 @@ impl<'a> Worker<'a> {
         ([tiles[3 * band], tiles[3 * band + 1], tiles[3 * band + 2]], row)
     }
 
-    fn gather_awake(&mut self, key: Key, tiles: &Around, inside: bool) {
-        let side = self.ground.setup.settings.side;
-        let setup = &self.ground.setup;
-        for r in 0..self.block.width {
-            let (three, row) = Self::neighbours(tiles, r, side);
-            let bits = three.map(|tile| tile.map_or(0, |tile| u64::from(tile.awake[row])));
-            self.awake[r] = (bits[0] >> (side - HALO)) | (bits[1] << HALO) | ((bits[2] & 3) << (HALO + side));
-        }
-        if inside {
-            return;
-        }
-        // Beyond the edges, columns are awake that are images of such.
-        for r in 0..self.block.width {
-            for c in 0..self.block.width {
-                let (i, k) = self.column(key, r, c);
-                if !setup.description.extent.contains(i, k) {
-                    let (i, k) = setup.description.extent.mirrored(i, k);
-                    let (key, index) = setup.place(i, k);
-                    let tile = self.ground.tiles.get(&key);
-                    let awake = tile.is_some_and(|tile| tile.awake[index / side] >> (index % side) & 1 != 0);
-                    self.awake[r] = self.awake[r] & !(1 << c) | u64::from(awake) << c;
-                }
+    /// Finds the columns that stand for those of the block: themselves, or their mirror images.
+    fn find_images(&mut self, key: Key) {
+        let (side, extent) = (self.ground.setup.side, self.ground.extent());
+        for n in 0..self.block.width {
+            let beyond = |at: i32| at * side + n as i32 - HALO as i32;
+            let (i, k) = extent.mirrored(beyond(key.0), beyond(key.1));
+            for (images, (at, middle)) in self.images.iter_mut().zip([(i, key.0), (k, key.1)]) {
+                let near = at.div_euclid(side) - middle + 1;
+                let near = if (0..3).contains(&near) { near as usize } else { FAR };
+                images[n] = (near, at.rem_euclid(side) as usize);
             }
         }
     }
 
+    fn gather_awake(&mut self, tiles: &Around, inside: bool) {
+        let side = self.ground.setup.settings.side;
+        for r in 0..self.block.width {
+            self.awake[r] = if inside {
+                let (three, row) = Self::neighbours(tiles, r, side);
+                let bits = three.map(|tile| tile.map_or(0, |tile| u64::from(tile.awake[row])));
+                (bits[0] >> (side - HALO)) | (bits[1] << HALO) | ((bits[2] & 3) << (HALO + side))
+            } else {
+                // Beyond the edges, columns are awake that are images of such.
+                let (band, row) = self.images[1][r];
+                let bits = |near: usize| {
+                    let tile = if band < FAR { tiles[3 * band + near] } else { None };
+                    tile.map_or(0, |tile| u64::from(tile.awake[row]))
+                };
+                let bits = [bits(0), bits(1), bits(2), 0];
+                let places = self.images[0].iter().enumerate();
+                places.fold(0, |all, (c, (near, place))| all | (bits[*near] >> place & 1) << c)
+            };
+        }
+    }
+
     /// Heights and loose material of rows of the block.
-    fn gather(&mut self, tiles: &Around, rows: &std::ops::Range<usize>) {
+    fn gather(&mut self, tiles: &Around, rows: &Range<usize>) {
         let (side, width) = (self.ground.setup.settings.side, self.block.width);
         for r in rows.clone() {
             let (three, row) = Self::neighbours(tiles, r, side);
@@ -340,72 +362,57 @@ impl<'a> Worker<'a> {
         }
     }
 
-    /// The column at a row and a place of the block.
-    fn column(&self, (p, q): Key, r: usize, c: usize) -> (i32, i32) {
-        let (side, halo) = (self.ground.setup.side, HALO as i32);
-        (p * side + c as i32 - halo, q * side + r as i32 - halo)
-    }
-
-    /// Calls a function with each place of rows of the block, the tile of the column that is there, and its number and the index in it. Columns far
-    /// beyond the edges are left out: nothing depends on them.
+    /// Calls a function with each place in rows and places of the block, the tile of the column that is there, and its number and the index in it.
     fn each(
         &mut self,
-        key: Key,
         tiles: &Around,
-        rows: &std::ops::Range<usize>,
+        (rows, places): &Area,
         mut put: impl FnMut(&mut Block, usize, &Tile, usize, usize),
     ) {
-        let setup = &self.ground.setup;
+        let (side, width) = (self.ground.setup.settings.side, self.block.width);
         for r in rows.clone() {
-            for c in 0..self.block.width {
-                let (i, k) = self.column(key, r, c);
-                let (i, k) = setup.description.extent.mirrored(i, k);
-                let ((p, q), index) = setup.place(i, k);
-                let (dp, dq) = (p - key.0 + 1, q - key.1 + 1);
-                if (0..3).contains(&dp) && (0..3).contains(&dq) {
-                    let number = (3 * dq + dp) as usize;
-                    if let Some(tile) = tiles[number] {
-                        let at = r * self.block.width + c;
-                        put(&mut self.block, at, tile, number, index);
-                    }
+            let (band, row) = self.images[1][r];
+            if band == FAR {
+                continue;
+            }
+            let three = [tiles[3 * band], tiles[3 * band + 1], tiles[3 * band + 2], None];
+            for (c, &(near, place)) in places.clone().zip(&self.images[0][places.clone()]) {
+                if let Some(tile) = three[near] {
+                    put(&mut self.block, r * width + c, tile, 3 * band + near, row * side + place);
                 }
             }
         }
     }
 
-    fn gather_mirrored(&mut self, key: Key, tiles: &Around, rows: &std::ops::Range<usize>) {
-        self.each(key, tiles, rows, |block, at, tile, _, index| {
+    fn gather_mirrored(&mut self, tiles: &Around, around: &Area) {
+        self.each(tiles, around, |block, at, tile, _, index| {
             block.height[at] = to_float(tile.top(index));
             block.loose[at] = to_float(tile.loose[index]);
         });
     }
 
-    fn gather_slopes(&mut self, key: Key, tiles: &Around, rows: &std::ops::Range<usize>) {
+    fn gather_slopes(&mut self, tiles: &Around, around: &Area) {
         let (ground, law, width) = (self.ground, self.law, self.block.width);
+        let (rows, places) = around;
         if tiles.iter().flatten().any(|tile| tile.pressed || tile.slope.is_some()) {
             let inner = law.slope * (ground.soil().inner_slope() / ground.soil().slope());
-            self.each(key, tiles, rows, |block, at, tile, _, index| {
-                block.slope[at] = match &tile.slope {
-                    _ if tile.pressed && tile.packed[index] > 0 => inner,
-                    Some(slope) => slope[index],
-                    None => law.slope,
-                };
+            self.each(tiles, around, |block, at, tile, _, index| {
+                let outer = tile.slope.as_ref().map_or(law.slope, |slope| slope[index]);
+                block.slope[at] = if tile.packed[index] > 0 { inner } else { outer };
             });
         } else {
             self.block.slope[rows.start * width..rows.end * width].fill(law.slope);
         }
         for r in rows.clone() {
             let (bits, row) = (self.awake[r], &mut self.block.ratio[r * width..(r + 1) * width]);
-            for (c, ratio) in row.iter_mut().enumerate() {
-                *ratio = if bits >> c & 1 != 0 { law.rest } else { ground.setup.start };
+            for c in places.clone() {
+                row[c] = if bits >> c & 1 != 0 { law.rest } else { ground.setup.start };
             }
         }
     }
 
-    fn gather_roofs(&mut self, key: Key, tiles: &Around, rows: &std::ops::Range<usize>) {
-        let ground = self.ground;
-        let roofs = around(key).map(|key| ground.roofs.get(&key));
-        self.each(key, tiles, rows, |block, at, tile, number, index| {
+    fn gather_roofs(&mut self, roofs: &[Option<&[i64]>; 9], tiles: &Around, around: &Area) {
+        self.each(tiles, around, |block, at, tile, number, index| {
             let roof = roofs[number].map_or(i64::MAX, |roofs| roofs[index]);
             block.room[at] = if roof == i64::MAX { f64::INFINITY } else { to_float(roof - tile.top(index)) };
         });

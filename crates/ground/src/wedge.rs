@@ -129,6 +129,9 @@ impl Ground {
         tile.bonded[index] -= part;
         tile.loose[index] += (volume >> 16) as i64;
         self.book.swollen += volume & 0xffff;
+        if part > 0 {
+            self.graph = None;
+        }
         Ok(())
     }
 }
