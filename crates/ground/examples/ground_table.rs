@@ -4,7 +4,7 @@ use dlsys_ground::{Error, study};
 
 fn main() -> Result<(), Error> {
     let only_speed = std::env::args().nth(1).is_some_and(|word| word == "speed");
-    for case in study::EXACT_CASES.into_iter().filter(|_| !only_speed) {
+    for case in study::EXACT_CASES.into_iter().chain([study::SLOW_CASE]).filter(|_| !only_speed) {
         let begun = std::time::Instant::now();
         for row in case()? {
             let order = row.order.map_or(String::new(), |order| format!("{order:.2}"));

@@ -26,6 +26,7 @@ impl Ground {
             }
             parts.push(count as u32);
         }
+        self.poured_on = !pours.is_empty();
         self.keep_bodies(bodies)?;
         let (law, sweeps) = (self.setup.law, self.setup.sweeps);
         for body in bodies {

@@ -24,6 +24,8 @@ pub(crate) struct Graph {
     /// Heights of what is below and above what can slip, of each node.
     base: Vec<i64>,
     ceiling: Vec<i64>,
+    /// The bodies of floors; none for the ground.
+    owner: Vec<Option<u64>>,
     /// What can be beside a floor, from the lowest on: those of all directions of all floors one after the other, and where each list begins.
     near: Vec<u32>,
     starts: Vec<u32>,
@@ -45,6 +47,28 @@ impl Graph {
         below.or(all.first()).map(|node| *node as usize)
     }
 
+    /// A floor ends half a column beyond its last one, so what lies there is not steeper than from its surface down to that edge.
+    fn rise_to_edge(
+        &self,
+        rise: i64,
+        load: &[i64],
+        [upper, lower]: [usize; 2],
+        (floor, side): (usize, usize),
+    ) -> i64 {
+        if self.owner[upper].is_none() {
+            return rise;
+        }
+        let mut most = 2 * load[upper];
+        if lower != self.indices.len() + floor {
+            // The slope of the floor goes on to its edge: it is that from the neighbour on the other side.
+            let behind = self.beside(4 * floor + (side ^ 1), self.base[upper] + load[upper]);
+            let behind = behind.filter(|behind| self.owner[*behind] == self.owner[upper]);
+            most += behind.map_or(0, |behind| self.base[behind] - self.base[upper]);
+        }
+        let most = most.max(0);
+        rise.clamp(-most, most)
+    }
+
     /// Fluxes of the four triangles at each floor.
     fn fluxes(&self, law: &Law, load: &[i64]) -> Vec<Flux> {
         let film = law.film as i64;
@@ -57,6 +81,11 @@ impl Graph {
                 let Some(other) = self.beside(4 * floor + side, top) else { continue };
                 let rise = self.base[other] + load[other] - top;
                 let (upper, lower) = if rise > 0 { (other, node) } else { (node, other) };
+                let rise = if self.owner[upper] == self.owner[lower] {
+                    rise
+                } else {
+                    self.rise_to_edge(rise, load, [upper, lower], (floor, side))
+                };
                 let full = self.ceiling[lower] != i64::MAX
                     && self.ceiling[lower] - self.base[lower] - load[lower] <= film;
                 if load[upper] > film && !full {
@@ -125,8 +154,7 @@ impl Ground {
         }
         places.sort_unstable();
         places.dedup();
-        let mut graph =
-            Graph { indices: places.iter().map(|place| place.1).collect(), ..Graph::default() };
+        let mut graph = Graph { indices: places.iter().map(|place| place.1).collect(), ..Graph::default() };
         for tile in places.chunk_by(|a, b| a.0 == b.0) {
             let (key, first) = (tile[0].0, graph.base.len());
             self.ensure(key)?;
@@ -135,6 +163,7 @@ impl Ground {
             for (_, index) in tile {
                 graph.base.push(stored.map_or(0, |tile| tile.base(*index)));
                 graph.ceiling.push(roofs.map_or(i64::MAX, |roofs| roofs[*index]));
+                graph.owner.push(None);
             }
             graph.tiles.push((key, first..first + tile.len()));
         }
@@ -148,6 +177,7 @@ impl Ground {
             let first = graph.base.len();
             graph.base.extend(floors.iter().map(|floor| floor.base));
             graph.ceiling.extend(floors.iter().map(|floor| floor.ceiling));
+            graph.owner.extend(floors.iter().map(|floor| Some(floor.body)));
             if let Some(number) = number(*column) {
                 over[number] = first..graph.base.len();
             }

@@ -98,6 +98,8 @@ pub struct Ground {
     /// Their graph; none where it has to be made anew.
     pub(crate) graph: Option<Arc<Graph>>,
     pub(crate) stirred: bool,
+    /// Whether something is poured in this tick, which bodies far above the ground may catch.
+    pub(crate) poured_on: bool,
     pub(crate) book: Book,
 }
 
@@ -169,6 +171,7 @@ impl Ground {
             floors: Arc::default(),
             graph: None,
             stirred: false,
+            poured_on: false,
             fresh: setup.steep.clone(),
             setup: Arc::new(setup),
             tiles: Arc::default(),

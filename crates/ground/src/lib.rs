@@ -7,7 +7,7 @@
 //! - [`Soil`]: angles of repose, mobility, cohesion and weight of a material.
 //! - [`Ground`]: the columns at an instant; a value, whose clones share what has not changed. [`Ground::advance`] makes the next tick.
 //! - [`Pour`]: material that is added, on a disc or everywhere.
-//! - [`Body`]: a closed mesh that presses, pushes and carries.
+//! - [`Body`]: a closed mesh that presses, pushes and carries, or a shelf that only carries.
 //! - [`Mesh`]: the surface as triangles.
 //! - [`study`]: exact cases with their errors and orders.
 //!

@@ -91,26 +91,31 @@ impl Ground {
 
     /// Whether something lies on a body.
     pub(crate) fn carries(&self, body: u64) -> bool {
-        self.floors.values().flatten().any(|floor| floor.body == body && floor.load > 0)
+        let columns = self.feet.get(&body).into_iter().flat_map(|foot| &foot.floors);
+        let mut floors = columns.filter_map(|column| self.floors.get(column)).flatten();
+        floors.any(|floor| floor.body == body && floor.load > 0)
     }
 
     /// Takes a body's floors away and returns what lay on them, with the triangles.
     pub(crate) fn take_floors(&mut self, body: u64) -> Vec<((i32, i32), Floor)> {
-        if self.floors.values().flatten().all(|floor| floor.body != body) {
+        let Some(foot) = self.feet.get(&body).cloned().filter(|foot| !foot.floors.is_empty()) else {
             return Vec::new();
-        }
+        };
         self.graph = None;
         let mut taken = Vec::new();
         let floors = Arc::make_mut(&mut self.floors);
-        floors.retain(|column, floors| {
-            floors.retain(|floor| {
+        for column in &foot.floors {
+            let Some(all) = floors.get_mut(column) else { continue };
+            all.retain(|floor| {
                 if floor.body == body && floor.load > 0 {
                     taken.push((*column, *floor));
                 }
                 floor.body != body
             });
-            !floors.is_empty()
-        });
+            if all.is_empty() {
+                floors.remove(column);
+            }
+        }
         taken
     }
 

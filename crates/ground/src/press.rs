@@ -8,11 +8,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use crate::load::{Floor, Parcel};
-use crate::spans::{Place, Span, carried, join, of_mesh, of_way};
+use crate::spans::{Place, Span, carried, join, of_mesh, of_surface, of_way};
 use crate::tile::QUANTA;
 use crate::{Error, Ground, Vector};
 
-/// A closed mesh of triangles and its way in a tick.
+/// A closed mesh of triangles, or a shelf, and its way in a tick.
 #[derive(Clone, Debug)]
 pub struct Body {
     /// Its identity, by which it is found again in the next tick.
@@ -25,6 +25,8 @@ pub struct Body {
     pub from: Arc<[Vector]>,
     /// The same points at the end; they move uniformly.
     pub to: Arc<[Vector]>,
+    /// Whether it is a shelf: a surface without thickness, open or closed, as of leaves. It carries what falls onto it, and does not press.
+    pub shelf: bool,
 }
 
 /// What a body covers: the lowest underside over each column, in quanta.
@@ -32,6 +34,25 @@ pub struct Body {
 pub(crate) struct Foot {
     places: Vec<Place>,
     undersides: BTreeMap<(i32, i32), i64>,
+    /// First and last column with an underside along x and z.
+    reach: Option<[[i32; 2]; 2]>,
+    /// Columns with floors of the body.
+    pub floors: Vec<(i32, i32)>,
+    /// Whether its spans were computed: they are not where a body can neither press nor carry anything.
+    spanned: bool,
+}
+
+/// The box around columns.
+fn reach_of<'a>(columns: impl Iterator<Item = &'a (i32, i32)>) -> Option<[[i32; 2]; 2]> {
+    columns.fold(None, |reach, &(i, k)| {
+        let [x, z] = reach.unwrap_or([[i; 2], [k; 2]]);
+        Some([[x[0].min(i), x[1].max(i)], [z[0].min(k), z[1].max(k)]])
+    })
+}
+
+fn meet(a: Option<[[i32; 2]; 2]>, b: Option<[[i32; 2]; 2]>) -> bool {
+    let along = |a: [i32; 2], b: [i32; 2]| a[0] <= b[1] && b[0] <= a[1];
+    a.zip(b).is_some_and(|(a, b)| along(a[0], b[0]) && along(a[1], b[1]))
 }
 
 /// Material that reaches into a body by less than this counts as touching it, in quanta; a millionth of a cell.
@@ -47,7 +68,7 @@ const AROUND: [(i32, i32); 8] = [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-
 impl Body {
     /// A body that stands still.
     pub fn still(id: u64, name: &str, triangles: Arc<[[u32; 3]]>, points: Arc<[Vector]>) -> Body {
-        Body { id, name: name.to_owned(), triangles, from: points.clone(), to: points }
+        Body { id, name: name.to_owned(), triangles, from: points.clone(), to: points, shelf: false }
     }
 
     pub(crate) fn check(&self) -> Result<(), Error> {
@@ -92,23 +113,35 @@ impl Ground {
         let cell = self.cell();
         let places = body.places(part, cell)?;
         let before = self.feet.get(&body.id).cloned();
-        if before.as_ref().is_some_and(|foot| foot.places == places) {
+        if before.as_ref().is_some_and(|foot| foot.places == places && (foot.spanned || !self.poured_on)) {
             return Ok(());
         }
-        let mut foot = Foot { places, undersides: BTreeMap::new() };
+        let mut foot = Foot { places, ..Foot::default() };
         let (mut spans, mut way) = (Vec::new(), Vec::new());
         let near = |foot: &Foot| self.is_near(&foot.places);
-        if near(&foot) || before.as_deref().is_some_and(near) || self.carries(body.id) {
-            spans = of_mesh(&body.name, &foot.places, &body.triangles, cell)?;
-            for span in spans.iter().rev() {
-                foot.undersides.insert(span.column, span.bottom);
-            }
-            way = spans.clone();
-            if let Some(before) = before.as_ref().filter(|before| before.places.len() == foot.places.len()) {
-                way.extend(of_way(&before.places, &foot.places, &body.triangles));
-                join(&mut way);
+        foot.spanned =
+            self.poured_on || near(&foot) || before.as_deref().is_some_and(near) || self.carries(body.id);
+        if foot.spanned {
+            if body.shelf {
+                // Under the ground it is not there.
+                spans = of_surface(&foot.places, &body.triangles);
+                spans.retain(|span| span.top >= self.top(span.column.0, span.column.1));
+            } else {
+                spans = of_mesh(&body.name, &foot.places, &body.triangles, cell)?;
+                for span in spans.iter().rev() {
+                    foot.undersides.insert(span.column, span.bottom);
+                }
+                way = spans.clone();
+                let passed = before.as_ref().filter(|before| before.places.len() == foot.places.len());
+                if let Some(before) = passed {
+                    way.extend(of_way(&before.places, &foot.places, &body.triangles));
+                    join(&mut way);
+                }
             }
         }
+        foot.reach = reach_of(foot.undersides.keys());
+        foot.floors = spans.iter().map(|span| span.column).collect();
+        foot.floors.dedup();
         self.check_inside(body, &way)?;
         let heading = heading(before.as_deref(), &foot);
         let parcels = self.take_loads(body, before.as_deref(), &foot);
@@ -192,11 +225,13 @@ impl Ground {
             Some(foot) => feet.insert(id, Arc::new(foot)),
             None => feet.remove(&id),
         };
+        let reach = reach_of(columns.iter());
+        let near: Vec<_> = self.feet.values().filter(|foot| meet(foot.reach, reach)).cloned().collect();
         for &(i, k) in &columns {
             if !self.extent().contains(i, k) {
                 continue;
             }
-            let all = self.feet.values().filter_map(|foot| foot.undersides.get(&(i, k)));
+            let all = near.iter().filter_map(|foot| foot.undersides.get(&(i, k)));
             let roof = all.copied().min().unwrap_or(i64::MAX);
             self.set_roof((i, k), roof);
         }

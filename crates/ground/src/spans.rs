@@ -168,6 +168,19 @@ pub(crate) fn of_mesh(
     }
 }
 
+/// The heights of a surface without thickness over columns, as spans without height.
+pub(crate) fn of_surface(places: &[Place], triangles: &[[u32; 3]]) -> Vec<Span> {
+    let mut scan = Scan::default();
+    for (number, triangle) in triangles.iter().enumerate() {
+        scan.triangle(number, triangle.map(|n| places[n as usize]));
+    }
+    scan.hits.sort_unstable();
+    let span = |&((k, i), height, _, lid): &Hit| Span { column: (i, k), bottom: height, top: height, lid };
+    let mut spans: Vec<_> = scan.hits.iter().map(span).collect();
+    join(&mut spans);
+    spans
+}
+
 /// The spans of what a mesh passes on its way between two places, without those at its ends.
 pub(crate) fn of_way(from: &[Place], to: &[Place], triangles: &[[u32; 3]]) -> Vec<Span> {
     let (mut scan, mut spans) = (Scan::default(), Vec::new());

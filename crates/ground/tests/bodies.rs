@@ -50,7 +50,7 @@ fn placed(points: &[Vector], rotation: &Rotation3<f64>, at: Vector) -> Arc<[Vect
 }
 
 fn body(triangles: &Arc<[[u32; 3]]>, from: Arc<[Vector]>, to: Arc<[Vector]>) -> Body {
-    Body { id: 7, name: "a body".to_owned(), triangles: triangles.clone(), from, to }
+    Body { id: 7, name: "a body".to_owned(), triangles: triangles.clone(), from, to, shelf: false }
 }
 
 #[test]
@@ -246,5 +246,42 @@ fn the_mesh_has_no_cracks_and_the_height_of_the_ground() -> Outcome {
     }
     // Few triangles where nothing has happened.
     assert!(mesh.triangles.len() < 2 * 120 * 120 / 2, "{}", mesh.triangles.len());
+    Ok(())
+}
+
+#[test]
+fn a_shelf_carries_presses_nothing_and_sheds_when_it_is_steep() -> Outcome {
+    let mut ground = level(Soil::sand(), 0.05)?;
+    let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+    let points: Vec<_> = corners.map(|[x, z]| Vector::new(0.105 * x, 0.0, 0.105 * z)).into();
+    let triangles: Arc<[[u32; 3]]> = [[0, 2, 1], [0, 3, 2]].into();
+    let shelf = |from: (f64, f64), to: (f64, f64)| {
+        let at = |(height, lean): (f64, f64)| {
+            let turn = Rotation3::from_axis_angle(&Vector::z_axis(), lean);
+            placed(&points, &turn, Vector::new(0.0, height, 0.0))
+        };
+        Body { shelf: true, ..body(&triangles, at(from), at(to)) }
+    };
+    // Through the ground and up again: nothing is moved.
+    let before = ground.clone();
+    ground.advance(&[], &[shelf((0.2, 0.0), (-0.02, 0.3))])?;
+    ground.advance(&[], &[shelf((-0.02, 0.3), (0.2, 0.0))])?;
+    ground.advance(&[], &[shelf((0.2, 0.0), (0.2, 0.0))])?;
+    assert!((-60..=60).all(|i| ground.column(i, 0) == before.column(i, 0)));
+    // High above the ground, it catches what is poured from then on. As full as it can be: a pyramid with the slope of the sand over all of its width.
+    let pour = Pour { id: 0, place: Place::Disc { centre: [0.0; 2], radius: 0.05 }, rate: 0.2 };
+    ground.advance(&[pour], &[shelf((0.2, 0.0), (0.2, 0.0))])?;
+    ground.settle(200_000)?;
+    let exact = ground.soil().slope() * 0.21_f64.powi(3) / 6.0;
+    assert!((ground.carried() / exact - 1.0).abs() < 0.03, "{} of {exact}", ground.carried());
+    assert_eq!(ground.imbalance(), 0);
+    // Steeper than the sand can lie, it is empty.
+    for tick in 0..60 {
+        let lean = |tick: u32| (0.2, f64::from(tick) / 60.0);
+        ground.advance(&[], &[shelf(lean(tick), lean(tick + 1))])?;
+    }
+    ground.settle(200_000)?;
+    assert!(ground.carried() < 1e-3 * exact, "{} of {exact}", ground.carried());
+    assert_eq!(ground.imbalance(), 0);
     Ok(())
 }

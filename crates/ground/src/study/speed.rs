@@ -81,5 +81,10 @@ pub fn speeds() -> Result<Vec<Speed>, Error> {
     push("a runner for 3 s, nine prints at 1 cm", super::runner()?, "s");
     push("90 × 90 posts with a blade", super::posts()?, "ticks a second");
     push("256 × 256 columns with a torus of 4,000 triangles", super::sandbox()?, "ticks a second");
+    for count in [1, 10, 100] {
+        let [time, stored] = super::footprints(count)?;
+        push(&format!("a tick with {count} footprints on 4096 × 512"), time, "ms");
+        push(&format!("columns in memory with {count} footprints"), stored, "thousand of 2,097 thousand");
+    }
     Ok(all)
 }

@@ -72,6 +72,7 @@ impl Digging {
                 triangles: self.triangles.clone(),
                 from: self.points(self.place),
                 to: self.points(next),
+                shelf: false,
             };
             self.ground.advance(&[], &[body])?;
             self.place = next;
