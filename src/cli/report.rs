@@ -191,7 +191,13 @@ fn surroundings(args: &ReportArgs) -> Result<(), Failure> {
             "surroundings.csv",
             &study::surroundings_csv(
                 &wind,
-                &[("stems", &stems), ("falling", &falls), ("gas", &gases), ("sheets", &sheets), ("ground", &grounds)],
+                &[
+                    ("stems", &stems),
+                    ("falling", &falls),
+                    ("gas", &gases),
+                    ("sheets", &sheets),
+                    ("ground", &grounds),
+                ],
             ),
         )?;
     }

@@ -235,6 +235,15 @@ impl Ground {
             let roof = all.copied().min().unwrap_or(i64::MAX);
             self.set_roof((i, k), roof);
         }
+        let mut keys: Vec<_> = columns.iter().map(|(i, k)| self.setup.place(*i, *k).0).collect();
+        keys.sort_unstable();
+        keys.dedup();
+        let roofs = Arc::make_mut(&mut self.roofs);
+        for key in keys {
+            if roofs.get(&key).is_some_and(|tile| tile.iter().all(|roof| *roof == i64::MAX)) {
+                roofs.remove(&key);
+            }
+        }
         // Columns under a body that touches them, or did, and those around it.
         let touched = lowest.into_iter().filter(|((i, k), underside)| {
             self.extent().contains(*i, *k) && underside - (1 << 32) <= self.top(*i, *k)
@@ -255,9 +264,6 @@ impl Ground {
         }
         let tile = roofs.entry(key).or_insert_with(|| vec![i64::MAX; count].into());
         Arc::make_mut(tile)[index] = roof;
-        if tile.iter().all(|roof| *roof == i64::MAX) {
-            roofs.remove(&key);
-        }
     }
 
     /// Height of what is above a column, in quanta.

@@ -74,6 +74,15 @@ pub(crate) struct Scan {
 impl Scan {
     /// Adds a triangle. Lines that pass its edges belong to one side of them.
     pub fn triangle(&mut self, number: usize, [a, b, c]: [Place; 3]) {
+        let (low, high) = (a.x.min(b.x).min(c.x), a.x.max(b.x).max(c.x));
+        let (near, far) = (a.z.min(b.z).min(c.z), a.z.max(b.z).max(c.z));
+        let rows = Place::cells(near, true)..=Place::cells(far, false);
+        let places = Place::cells(low, true)..=Place::cells(high, false);
+        if rows.is_empty() || places.is_empty() {
+            return;
+        }
+        // Products of numbers below 2^30 need no wide integers.
+        let cross = if high - low < 1 << 30 && far - near < 1 << 30 { cross_of_near } else { cross };
         let area = cross(a, b, c);
         let ([b, c], side) = match area {
             0 => return,
@@ -81,11 +90,9 @@ impl Scan {
             _ => ([c, b], 1),
         };
         let area = area.abs();
-        let (low, high) = (a.x.min(b.x).min(c.x), a.x.max(b.x).max(c.x));
-        let (near, far) = (a.z.min(b.z).min(c.z), a.z.max(b.z).max(c.z));
         let lattice = LATTICE as i64;
-        for k in Place::cells(near, true)..=Place::cells(far, false) {
-            for i in Place::cells(low, true)..=Place::cells(high, false) {
+        for k in rows {
+            for i in places.clone() {
                 let at = Place { x: i64::from(i) * lattice, z: i64::from(k) * lattice, y: 0 };
                 let weights = [(b, c), (c, a), (a, b)].map(|(from, to)| {
                     let weight = cross(from, to, at);
@@ -130,6 +137,11 @@ impl Scan {
 /// Twice the area of a triangle in plan; positive if it turns from x to z.
 fn cross(a: Place, b: Place, c: Place) -> i128 {
     i128::from(b.x - a.x) * i128::from(c.z - a.z) - i128::from(c.x - a.x) * i128::from(b.z - a.z)
+}
+
+/// As [`cross`], of places within 2^30.
+fn cross_of_near(a: Place, b: Place, c: Place) -> i128 {
+    i128::from((b.x - a.x) * (c.z - a.z) - (c.x - a.x) * (b.z - a.z))
 }
 
 /// Puts spans in order, and joins those of a column that touch.

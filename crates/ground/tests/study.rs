@@ -48,9 +48,12 @@ fn a_cone_is_as_wide_between_the_axes_as_along_them() -> Outcome {
 
 #[test]
 fn shelves_and_vessels_carry_what_they_can() -> Outcome {
-    // Material on columns at the edge slips off, so a shelf is narrower by half a column or one.
-    check(&study::disc()?, 0.6, 0.25);
-    check(&study::square()?, 1.5, 0.01);
+    // The rim of a disc runs in steps along columns.
+    check(&study::disc()?, 0.6, 0.07);
+    let square = study::square()?;
+    check(&square, 1.4, 0.003);
+    // Four times the columns: an order of 1.5 and more from the first to the last.
+    assert!(square[2].error < square[0].error / 8.0, "{square:#?}");
     check(&study::bucket()?, 0.7, 0.05);
     Ok(())
 }
