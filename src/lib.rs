@@ -54,6 +54,7 @@
 //! | [`sway`] | mechanics of stems that bend |
 //! | [`fall`](crate::fall) | flight and landing of plates and small bodies |
 //! | [`gas`] | smoke, steam and pollen: blobs in the wind, and light through them |
+//! | [`ground`] | sand, mud, snow and soil as columns that slip, stand, are poured, pressed and carried |
 //! | [`sheet`] | flexible surfaces and nets, and their contact with solids |
 //! | [`wind`] | the velocity of the air, as a function of place and time |
 //! | [`study`] | accuracy and cost of methods; verification |
@@ -83,6 +84,7 @@ pub use dlsys_fall as fall;
 pub use dlsys_film as film;
 pub use dlsys_gas as gas;
 pub use dlsys_geometry::{scene, turtle};
+pub use dlsys_ground as ground;
 pub use dlsys_interchange as interchange;
 pub use dlsys_model as model;
 pub use dlsys_ode as ode;

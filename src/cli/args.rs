@@ -365,7 +365,7 @@ pub struct ReportArgs {
     /// status 1 if any fails
     #[arg(long, value_name = "DIR", num_args = 0..=1)]
     pub hard: Option<Option<PathBuf>>,
-    /// Exact cases of the wind, of stems that bend, of bodies that fall, of gases and of sheets (statistics of turbulence, beams, buckling, vibrations, flutter, landing, energy, light, membranes, contact)
+    /// Exact cases of the wind, of stems that bend, of bodies that fall, of gases, of sheets and of ground (statistics of turbulence, beams, buckling, vibrations, flutter, landing, energy, light, membranes, contact, heaps)
     /// with errors and orders, hard cases, error against work of the implicit methods, and speed. Exit status 1 if a statistic is out of its bound or a hard case fails
     #[arg(long, conflicts_with_all = ["hard", "verify", "methods", "tolerances", "step_sizes", "slices", "at", "from", "settings"])]
     pub surroundings: bool,

@@ -133,10 +133,10 @@ const THROWS: u64 = 400;
 /// Solids that move into a sheet.
 const PASSES: u64 = 100;
 
-/// Exact cases, hard cases and speed of wind, stems, bodies that fall, gases and sheets. Each table is printed when it is complete.
+/// Exact cases, hard cases and speed of wind, stems, bodies that fall, gases, sheets and ground. Each table is printed when it is complete.
 fn surroundings(args: &ReportArgs) -> Result<(), Failure> {
     let defect = |error: String| Failure::Model(format!("error: {error}\n"));
-    let mut progress = Progress::of_printed("surroundings", 14);
+    let mut progress = Progress::of_printed("surroundings", 16);
     let mut show = |table: String| {
         progress.inc();
         progress.suspend(|| print(&format!("{table}\n")))
@@ -173,11 +173,17 @@ fn surroundings(args: &ReportArgs) -> Result<(), Failure> {
     show(study::net_table().map_err(|error| defect(error.to_string()))?)?;
     let passes = study::Passes::new(PASSES);
     show(passes.table())?;
+    let mut grounds = Vec::new();
+    for case in crate::ground::study::EXACT_CASES {
+        grounds.extend(case().map_err(|error| defect(error.to_string()))?);
+    }
+    show(study::exact_ground_table(&grounds))?;
     let wind = crate::wind::study::statistics(SEEDS).map_err(|error| defect(error.to_string()))?;
     show(study::wind_table(&wind))?;
     show(study::speed_table().map_err(defect)?)?;
     show(study::gas_speed_table().map_err(|error| defect(error.to_string()))?)?;
     show(study::sheet_speed_table().map_err(|error| defect(error.to_string()))?)?;
+    show(study::ground_speed_table().map_err(|error| defect(error.to_string()))?)?;
     drop(progress);
     if let Some(out) = &args.out {
         write(
@@ -185,7 +191,13 @@ fn surroundings(args: &ReportArgs) -> Result<(), Failure> {
             "surroundings.csv",
             &study::surroundings_csv(
                 &wind,
-                &[("stems", &stems), ("falling", &falls), ("gas", &gases), ("sheets", &sheets)],
+                &[
+                    ("stems", &stems),
+                    ("falling", &falls),
+                    ("gas", &gases),
+                    ("sheets", &sheets),
+                    ("ground", &grounds),
+                ],
             ),
         )?;
     }

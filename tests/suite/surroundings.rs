@@ -301,6 +301,8 @@ fn the_report_of_the_surroundings_has_all_its_tables() {
         "sheets: exact cases",
         "a net of 0.03 kg",
         "sheets: speed",
+        "ground: exact cases",
+        "ground: speed",
         "400 of 400",
         "statistics of the turbulence",
         "speed on one core",
@@ -310,5 +312,5 @@ fn the_report_of_the_surroundings_has_all_its_tables() {
     let csv = std::fs::read_to_string(folder.path().join("out/surroundings.csv")).expect("written");
     assert!(csv.lines().count() > 80 && csv.contains("stems,\"end load"), "{csv}");
     assert!(csv.contains("falling,\"flutter") && csv.contains("gas,\"rigid rotation"), "{csv}");
-    assert!(csv.contains("sheets,\"chain between"), "{csv}");
+    assert!(csv.contains("sheets,\"chain between") && csv.contains("ground,\"collapsing cylinder"), "{csv}");
 }

@@ -13,8 +13,8 @@
 //! - `table`, `files`, `plot`: a study as text, as CSV and JSON, and as a picture; `axis`, `diagram`: parts that plots share.
 //! - `spread`, `band`: the distribution of measures over many specimens, as tables and as a plot.
 //! - `verify`: a run computed again in an independent way.
-//! - `stems`: error of drawn positions against work for stems that bend; `surroundings`, `falls`, `gases`, `sheets`: exact cases and speed of
-//!   wind, stems, bodies that fall, gases and sheets.
+//! - `stems`: error of drawn positions against work for stems that bend; `surroundings`, `falls`, `gases`, `sheets`, `grounds`: exact cases and
+//!   speed of wind, stems, bodies that fall, gases, sheets and ground.
 //! - `case`, `hard`, `cases`: models with exact answers in their first lines.
 //!
 //! Runs are made one after another, never in parallel, because they are timed.
@@ -31,6 +31,7 @@ mod error;
 mod falls;
 mod files;
 mod gases;
+mod grounds;
 mod hard;
 mod order;
 mod plot;
@@ -53,6 +54,7 @@ pub use error::Error;
 pub use falls::{Landings, exact_fall_table};
 pub use files::{csv, hard_csv, hard_json, json};
 pub use gases::{exact_gas_table, gas_speed_table};
+pub use grounds::{exact_ground_table, ground_speed_table};
 pub use hard::{CaseResult, HardPlan, Mismatch, run_case};
 pub use order::{nominal_order, observed_order};
 pub use plot::svg;

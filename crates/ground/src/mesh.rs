@@ -1,0 +1,145 @@
+//! The surface as triangles: every column where the ground is uneven, few where it is flat, and no cracks between.
+//!
+//! A tile is divided into squares of 1, 2, 4 ... columns. Where a square meets a tile with smaller ones, it gets their corners too, and becomes a fan
+//! around its middle.
+
+use std::collections::{BTreeMap, HashMap};
+
+use crate::tile::{Key, QUANTA};
+use crate::{Ground, Vector};
+
+/// A surface of triangles.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mesh {
+    /// Points in m.
+    pub points: Vec<Vector>,
+    /// Triangles as numbers of points, counterclockwise as seen from above.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// How far an untouched surface may lie beside the triangles that stand for it, in columns.
+const FLAT: f64 = 0.02;
+
+/// A mesh in the making.
+struct Weaver<'a> {
+    ground: &'a Ground,
+    mesh: Mesh,
+    numbers: HashMap<(i32, i32), u32>,
+}
+
+impl Ground {
+    /// The surface, from the first to the last column along each axis.
+    pub fn mesh(&self) -> Mesh {
+        let squares = self.squares();
+        let mut weaver = Weaver { ground: self, mesh: Mesh::default(), numbers: HashMap::new() };
+        for (key, size) in &squares {
+            let [x, z] = self.corners(*key);
+            for k in (z[0]..z[1]).step_by(*size as usize) {
+                for i in (x[0]..x[1]).step_by(*size as usize) {
+                    weaver.square((i, k), *size, |(i, k)| self.size_beside(&squares, *key, *size, (i, k)));
+                }
+            }
+        }
+        weaver.mesh
+    }
+
+    /// First and last corner of the squares of a tile along x and z.
+    fn corners(&self, (p, q): Key) -> [[i32; 2]; 2] {
+        let (side, extent) = (self.setup.side, self.extent());
+        let range = |at: i32, [from, to]: [i32; 2]| [(at * side).max(from), (at * side + side).min(to)];
+        [range(p, extent.x), range(q, extent.z)]
+    }
+
+    /// The size of the squares of each tile.
+    fn squares(&self) -> BTreeMap<Key, i32> {
+        let (side, extent) = (self.setup.side, self.extent());
+        let tiles = |[from, to]: [i32; 2]| from.div_euclid(side)..=(to - 1).max(from).div_euclid(side);
+        let keys = tiles(extent.x).flat_map(|p| tiles(extent.z).map(move |q| (p, q)));
+        keys.map(|key| (key, self.square_size(key))).collect()
+    }
+
+    /// The largest size of squares that divides a tile and follows its surface.
+    fn square_size(&self, key: Key) -> i32 {
+        let [x, z] = self.corners(key);
+        let stored = (0..4).any(|n| self.tiles.contains_key(&(key.0 + n % 2, key.1 + n / 2)));
+        let even = self.setup.description.bed.is_level() && self.setup.description.depth.is_level();
+        let room = if stored { 0.0 } else { FLAT * QUANTA };
+        let mut size = self.setup.side;
+        while size > 1 {
+            let divides = (x[1] - x[0]) % size == 0 && (z[1] - z[0]) % size == 0;
+            if divides && (even && !stored || self.follows(x, z, size, room)) {
+                return size;
+            }
+            size /= 2;
+        }
+        1
+    }
+
+    /// Whether the surface lies within some quanta of squares of a size.
+    fn follows(&self, x: [i32; 2], z: [i32; 2], size: i32, room: f64) -> bool {
+        let part = |n: i32| f64::from(n) / f64::from(size);
+        (z[0]..z[1]).step_by(size as usize).all(|k| {
+            (x[0]..x[1]).step_by(size as usize).all(|i| {
+                let corner = |di: i32, dk: i32| self.top(i + di, k + dk) as f64;
+                let [a, b, c, d] = [corner(0, 0), corner(size, 0), corner(0, size), corner(size, size)];
+                (0..=size).all(|dk| {
+                    (0..=size).all(|di| {
+                        let (u, v) = (part(di), part(dk));
+                        let plane = (a * (1.0 - u) + b * u) * (1.0 - v) + (c * (1.0 - u) + d * u) * v;
+                        (corner(di, dk) - plane).abs() <= room
+                    })
+                })
+            })
+        })
+    }
+
+    /// The size of the squares on the other side of the edge of a square; its own within a tile.
+    fn size_beside(&self, squares: &BTreeMap<Key, i32>, key: Key, size: i32, (i, k): (i32, i32)) -> i32 {
+        let other = self.setup.place(i, k).0;
+        if other == key { size } else { squares.get(&other).copied().unwrap_or(size) }
+    }
+}
+
+impl Weaver<'_> {
+    /// The number of the point of a column.
+    fn point(&mut self, (i, k): (i32, i32)) -> u32 {
+        let (ground, points) = (self.ground, &mut self.mesh.points);
+        *self.numbers.entry((i, k)).or_insert_with(|| {
+            let cell = ground.cell();
+            points.push(Vector::new(f64::from(i) * cell, ground.column(i, k), f64::from(k) * cell));
+            points.len() as u32 - 1
+        })
+    }
+
+    /// Triangles of a square from a column on; `beside` is the size of the squares at a column.
+    fn square(&mut self, (i, k): (i32, i32), size: i32, beside: impl Fn((i32, i32)) -> i32) {
+        let half = size / 2;
+        // Corners counterclockwise from above, and a column beyond each of the edges that begin there.
+        let corners = [(i, k), (i, k + size), (i + size, k + size), (i + size, k)];
+        let beyond = [(i - 1, k + half), (i + half, k + size), (i + size, k + half), (i + half, k - 1)];
+        let mut rim = Vec::new();
+        for n in 0..4 {
+            let (from, to) = (corners[n], corners[(n + 1) % 4]);
+            let step = beside(beyond[n]).min(size);
+            for m in 0..size / step {
+                let along = |from: i32, to: i32| from + (to - from) / size * step * m;
+                rim.push((along(from.0, to.0), along(from.1, to.1)));
+            }
+        }
+        if rim.len() == 4 {
+            let [a, b, c, d] = corners.map(|corner| self.point(corner));
+            // The shorter diagonal, so that ridges and valleys are not cut.
+            let height = |corner: (i32, i32)| self.ground.top(corner.0, corner.1);
+            let first = (height(corners[0]) - height(corners[2])).abs();
+            let second = (height(corners[1]) - height(corners[3])).abs();
+            let halves = if first <= second { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] };
+            self.mesh.triangles.extend(halves);
+            return;
+        }
+        let middle = self.point((i + half, k + half));
+        let rim: Vec<u32> = rim.into_iter().map(|column| self.point(column)).collect();
+        for (n, from) in rim.iter().enumerate() {
+            self.mesh.triangles.push([middle, *from, rim[(n + 1) % rim.len()]]);
+        }
+    }
+}

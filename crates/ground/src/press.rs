@@ -1,0 +1,453 @@
+//! Bodies that press and push: what stands in their way goes to the columns around them, or is compressed.
+//!
+//! The rules of Sumner, O'Brien, Hodgins (*Animating Sand, Mud, and Snow*, 1999, section 3.2) and of Onoue, Nishita (*Virtual Sandbox*, 2003,
+//! section 3.3.2) in one: a column that a body enters is lowered to the body. A body that sinks compresses a part and presses the rest outward, along
+//! falling distance from the rim; one that moves sideways pushes all of it, to columns ahead. What comes to lie under the body is moved on.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use crate::load::{Floor, Parcel};
+use crate::spans::{Place, Span, carried, join, of_mesh, of_surface, of_way};
+use crate::tile::QUANTA;
+use crate::{Error, Ground, Vector};
+
+/// A closed mesh of triangles, or a shelf, and its way in a tick.
+#[derive(Clone, Debug)]
+pub struct Body {
+    /// Its identity, by which it is found again in the next tick.
+    pub id: u64,
+    /// Its name in messages.
+    pub name: String,
+    /// Triangles, as numbers of points.
+    pub triangles: Arc<[[u32; 3]]>,
+    /// Points at the beginning of the tick, in m.
+    pub from: Arc<[Vector]>,
+    /// The same points at the end; they move uniformly.
+    pub to: Arc<[Vector]>,
+    /// Whether it is a shelf: a surface without thickness, open or closed, as of leaves. It carries what falls onto it, and does not press.
+    pub shelf: bool,
+}
+
+/// What a body covers: the lowest underside over each column, in quanta.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Foot {
+    places: Vec<Place>,
+    undersides: BTreeMap<(i32, i32), i64>,
+    /// First and last column with an underside along x and z.
+    reach: Option<[[i32; 2]; 2]>,
+    /// Columns with floors of the body.
+    pub floors: Vec<(i32, i32)>,
+    /// Whether its spans were computed: they are not where a body can neither press nor carry anything.
+    spanned: bool,
+}
+
+/// The box around columns.
+fn reach_of<'a>(columns: impl Iterator<Item = &'a (i32, i32)>) -> Option<[[i32; 2]; 2]> {
+    columns.fold(None, |reach, &(i, k)| {
+        let [x, z] = reach.unwrap_or([[i; 2], [k; 2]]);
+        Some([[x[0].min(i), x[1].max(i)], [z[0].min(k), z[1].max(k)]])
+    })
+}
+
+fn meet(a: Option<[[i32; 2]; 2]>, b: Option<[[i32; 2]; 2]>) -> bool {
+    let along = |a: [i32; 2], b: [i32; 2]| a[0] <= b[1] && b[0] <= a[1];
+    a.zip(b).is_some_and(|(a, b)| along(a[0], b[0]) && along(a[1], b[1]))
+}
+
+/// Material that reaches into a body by less than this counts as touching it, in quanta; a millionth of a cell.
+const SKIN: i64 = 4096;
+/// Distance above the surface from which on bodies are looked at, in quanta.
+const NEAR: i64 = 8 << 32;
+/// Parts into which volumes are divided for the part that goes to the rim.
+const PARTS: i64 = 1 << 16;
+
+/// Columns around one.
+const AROUND: [(i32, i32); 8] = [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)];
+
+impl Body {
+    /// A body that stands still.
+    pub fn still(id: u64, name: &str, triangles: Arc<[[u32; 3]]>, points: Arc<[Vector]>) -> Body {
+        Body { id, name: name.to_owned(), triangles, from: points.clone(), to: points, shelf: false }
+    }
+
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        let fault = |fault| Err(Error::Body { name: self.name.clone(), fault });
+        if self.from.len() != self.to.len() {
+            return fault("has more points at one end of a tick than at the other");
+        }
+        if self.triangles.iter().flatten().any(|point| *point as usize >= self.from.len()) {
+            return fault("has a triangle with a point that does not exist");
+        }
+        Ok(())
+    }
+
+    /// The longest way of a point, in m.
+    pub(crate) fn way(&self) -> f64 {
+        self.from.iter().zip(self.to.iter()).map(|(from, to)| (to - from).norm()).fold(0.0, f64::max)
+    }
+
+    /// Its points at a part of the tick.
+    fn places(&self, part: f64, cell: f64) -> Result<Vec<Place>, Error> {
+        let place = |(from, to): (&Vector, &Vector)| {
+            let point = if part >= 1.0 { *to } else { from + (to - from) * part };
+            Place::new(&point, cell)
+        };
+        let places = self.from.iter().zip(self.to.iter()).map(place).collect::<Option<_>>();
+        let fault = "has a point that is not a number, or too far away";
+        places.ok_or_else(|| Error::Body { name: self.name.clone(), fault })
+    }
+}
+
+/// A direction in plan, as integers, and whether a body sinks more than it moves along it.
+#[derive(Clone, Copy, Debug)]
+struct Heading {
+    x: i64,
+    z: i64,
+    sinks: bool,
+}
+
+impl Ground {
+    /// Moves a body to a part of its way in the tick.
+    pub(crate) fn move_body(&mut self, body: &Body, part: f64) -> Result<(), Error> {
+        let cell = self.cell();
+        let places = body.places(part, cell)?;
+        let before = self.feet.get(&body.id).cloned();
+        if before.as_ref().is_some_and(|foot| foot.places == places && (foot.spanned || !self.poured_on)) {
+            return Ok(());
+        }
+        let mut foot = Foot { places, ..Foot::default() };
+        let (mut spans, mut way) = (Vec::new(), Vec::new());
+        let near = |foot: &Foot| self.is_near(&foot.places);
+        foot.spanned =
+            self.poured_on || near(&foot) || before.as_deref().is_some_and(near) || self.carries(body.id);
+        if foot.spanned {
+            if body.shelf {
+                // Under the ground it is not there.
+                spans = of_surface(&foot.places, &body.triangles);
+                spans.retain(|span| span.top >= self.top(span.column.0, span.column.1));
+            } else {
+                spans = of_mesh(&body.name, &foot.places, &body.triangles, cell)?;
+                for span in spans.iter().rev() {
+                    foot.undersides.insert(span.column, span.bottom);
+                }
+                way = spans.clone();
+                let passed = before.as_ref().filter(|before| before.places.len() == foot.places.len());
+                if let Some(before) = passed {
+                    way.extend(of_way(&before.places, &foot.places, &body.triangles));
+                    join(&mut way);
+                }
+            }
+        }
+        foot.reach = reach_of(foot.undersides.keys());
+        foot.floors = spans.iter().map(|span| span.column).collect();
+        foot.floors.dedup();
+        self.check_inside(body, &way)?;
+        let heading = heading(before.as_deref(), &foot);
+        let parcels = self.take_loads(body, before.as_deref(), &foot);
+        self.cover(body.id, before.as_deref(), Some(foot))?;
+        self.add_floors(floors(body.id, &spans));
+        self.stirred |= !spans.is_empty() || !parcels.is_empty();
+        self.displace(body.id, &way, heading)?;
+        for parcel in parcels {
+            self.put(body.id, parcel)?;
+        }
+        Ok(())
+    }
+
+    /// Takes the loads from a body's floors, and returns where they are after it has moved.
+    fn take_loads(&mut self, body: &Body, before: Option<&Foot>, after: &Foot) -> Vec<Parcel> {
+        let before = before.filter(|before| before.places.len() == after.places.len());
+        let moved = |((i, k), floor): ((i32, i32), Floor)| {
+            let triangle = body.triangles.get(floor.triangle as usize);
+            let way = before.zip(triangle).map(|(before, triangle)| {
+                let corners = triangle.map(|n| (before.places[n as usize], after.places[n as usize]));
+                carried(corners, (i, k), floor.offset)
+            });
+            let (column, offset, up) = way.unwrap_or(((i, k), floor.offset, 0));
+            Parcel { column, base: floor.base + up, load: floor.load, offset }
+        };
+        self.take_floors(body.id).into_iter().map(moved).collect()
+    }
+
+    /// Takes away the bodies that are not in a list.
+    pub(crate) fn keep_bodies(&mut self, bodies: &[Body]) -> Result<(), Error> {
+        let gone: Vec<u64> =
+            self.feet.keys().copied().filter(|id| bodies.iter().all(|body| body.id != *id)).collect();
+        for id in gone {
+            let before = self.feet.get(&id).cloned();
+            let loads = self.take_floors(id);
+            self.cover(id, before.as_deref(), None)?;
+            self.stirred |= !loads.is_empty();
+            for (column, floor) in loads {
+                self.drop(column, floor.top(), floor.load)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the lowest point of a body is near the surface under it.
+    fn is_near(&self, places: &[Place]) -> bool {
+        let over = |get: fn(&Place) -> i64| {
+            let all = || places.iter().map(get);
+            [all().min().unwrap_or(0) as f64, all().max().unwrap_or(0) as f64]
+        };
+        let scale = self.cell() / 65_536.0;
+        let [_, high] = self.bounds(over(|at| at.x).map(|x| x * scale), over(|at| at.z).map(|z| z * scale));
+        let [low, _] = over(|at| at.y);
+        low < high / self.cell() * QUANTA + NEAR as f64
+    }
+
+    fn check_inside(&self, body: &Body, way: &[Span]) -> Result<(), Error> {
+        let highest = |(i, k): (i32, i32)| self.top(i, k);
+        let outside = way.iter().find(|span| {
+            !self.extent().contains(span.column.0, span.column.1) && span.bottom < highest(span.column)
+        });
+        outside.map_or(Ok(()), |span| {
+            let at = [span.column.0, span.column.1].map(|at| f64::from(at) * self.cell());
+            Err(Error::Outside { name: body.name.clone(), at })
+        })
+    }
+
+    /// Puts a body's new undersides in the place of the old ones, and wakes the columns that this concerns.
+    fn cover(&mut self, id: u64, before: Option<&Foot>, after: Option<Foot>) -> Result<(), Error> {
+        let mut columns: BTreeSet<(i32, i32)> = BTreeSet::new();
+        let mut lowest: BTreeMap<(i32, i32), i64> = BTreeMap::new();
+        for foot in [before, after.as_ref()].into_iter().flatten() {
+            for (column, underside) in &foot.undersides {
+                columns.insert(*column);
+                let low = lowest.entry(*column).or_insert(*underside);
+                *low = (*low).min(*underside);
+            }
+        }
+        let feet = Arc::make_mut(&mut self.feet);
+        match after {
+            Some(foot) => feet.insert(id, Arc::new(foot)),
+            None => feet.remove(&id),
+        };
+        let reach = reach_of(columns.iter());
+        let near: Vec<_> = self.feet.values().filter(|foot| meet(foot.reach, reach)).cloned().collect();
+        for &(i, k) in &columns {
+            if !self.extent().contains(i, k) {
+                continue;
+            }
+            let all = near.iter().filter_map(|foot| foot.undersides.get(&(i, k)));
+            let roof = all.copied().min().unwrap_or(i64::MAX);
+            self.set_roof((i, k), roof);
+        }
+        let mut keys: Vec<_> = columns.iter().map(|(i, k)| self.setup.place(*i, *k).0).collect();
+        keys.sort_unstable();
+        keys.dedup();
+        let roofs = Arc::make_mut(&mut self.roofs);
+        for key in keys {
+            if roofs.get(&key).is_some_and(|tile| tile.iter().all(|roof| *roof == i64::MAX)) {
+                roofs.remove(&key);
+            }
+        }
+        // Columns under a body that touches them, or did, and those around it.
+        let touched = lowest.into_iter().filter(|((i, k), underside)| {
+            self.extent().contains(*i, *k) && underside - (1 << 32) <= self.top(*i, *k)
+        });
+        let around = touched
+            .flat_map(|((i, k), _)| std::iter::once((i, k)).chain(AROUND.map(|(di, dk)| (i + di, k + dk))));
+        let around = around.collect();
+        self.wake_all(around)
+    }
+
+    fn set_roof(&mut self, (i, k): (i32, i32), roof: i64) {
+        self.graph = None;
+        let (key, index) = self.setup.place(i, k);
+        let count = self.setup.settings.side * self.setup.settings.side;
+        let roofs = Arc::make_mut(&mut self.roofs);
+        if roof == i64::MAX && !roofs.contains_key(&key) {
+            return;
+        }
+        let tile = roofs.entry(key).or_insert_with(|| vec![i64::MAX; count].into());
+        Arc::make_mut(tile)[index] = roof;
+    }
+
+    /// Height of what is above a column, in quanta.
+    pub(crate) fn roof(&self, (i, k): (i32, i32)) -> i64 {
+        let (key, index) = self.setup.place(i, k);
+        self.roofs.get(&key).map_or(i64::MAX, |roofs| roofs[index])
+    }
+
+    /// Removes what a body has passed, and puts it around the body. What is above it comes to lie on it.
+    fn displace(&mut self, body: u64, way: &[Span], heading: Heading) -> Result<(), Error> {
+        let mut moved: BTreeMap<(i32, i32), i64> = BTreeMap::new();
+        let push = if heading.sinks { (self.soil().push * PARTS as f64).round() as i64 } else { PARTS };
+        let extent = self.extent();
+        for spans in way.chunk_by(|a, b| a.column == b.column) {
+            let (column, bottom) = (spans[0].column, spans[0].bottom);
+            if !extent.contains(column.0, column.1) {
+                continue;
+            }
+            let height = self.top(column.0, column.1);
+            let mut volume = self.lower(column, bottom)?;
+            if volume == 0 {
+                continue;
+            }
+            // From above: what is between the parts of the body stays.
+            let mut above = height;
+            for span in spans.iter().rev() {
+                let part = (height.min(above) - span.top).clamp(0, volume);
+                above = span.bottom;
+                volume -= part;
+                *moved.entry(column).or_insert(0) += self.lay(body, column, span.top, part)?;
+            }
+            let pushed = (i128::from(volume) * i128::from(push) / i128::from(PARTS)) as i64;
+            self.pack(column, volume - pushed)?;
+            *moved.entry(column).or_insert(0) += pushed;
+        }
+        moved.retain(|_, volume| *volume > 0);
+        // Each round, columns that were filled up to the body join those that material has to leave.
+        let mut full: BTreeSet<(i32, i32)> = BTreeSet::new();
+        while !moved.is_empty() {
+            full.extend(moved.keys());
+            let landed = self.spread(moved, &full, heading)?;
+            moved = BTreeMap::new();
+            for column in landed {
+                let roof = self.roof(column);
+                if roof != i64::MAX {
+                    let excess = self.lower(column, roof)?;
+                    if excess > 0 {
+                        moved.insert(column, excess);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Lays a volume onto the highest floor of a body that is not above a height, or back onto the ground, and returns what has no room there.
+    fn lay(&mut self, body: u64, (i, k): (i32, i32), height: i64, volume: i64) -> Result<i64, Error> {
+        if volume == 0 {
+            return Ok(0);
+        }
+        let floors = Arc::make_mut(&mut self.floors);
+        let all = floors.get_mut(&(i, k)).into_iter().flatten();
+        let own = all.filter(|floor| floor.body == body && floor.base <= height);
+        if let Some(floor) = own.max_by_key(|floor| floor.base) {
+            floor.load += volume;
+            return Ok(0);
+        }
+        let room = self.roof((i, k)).saturating_sub(self.top(i, k)).clamp(0, volume);
+        let (key, index) = self.setup.place(i, k);
+        self.tile_mut(key)?.loose[index] += room;
+        Ok(volume - room)
+    }
+
+    /// Lowers a column to a height and returns what was removed; nothing if it is lower, or reaches above by a skin only.
+    fn lower(&mut self, (i, k): (i32, i32), height: i64) -> Result<i64, Error> {
+        if self.top(i, k) - height <= SKIN {
+            return Ok(0);
+        }
+        self.loosen(i, k, height)?;
+        let (key, index) = self.setup.place(i, k);
+        let tile = self.tile_mut(key)?;
+        let volume = (tile.top(index) - height).clamp(0, tile.loose[index]);
+        tile.loose[index] -= volume;
+        Ok(volume)
+    }
+
+    /// Compresses a volume in a column: it counts, and takes no space.
+    fn pack(&mut self, (i, k): (i32, i32), volume: i64) -> Result<(), Error> {
+        let (key, index) = self.setup.place(i, k);
+        let tile = self.tile_mut(key)?;
+        tile.packed[index] += volume;
+        tile.pressed |= tile.packed[index] > 0;
+        Ok(())
+    }
+
+    /// Moves volumes from full columns outward, from those farthest from the rim on, and returns where they land.
+    fn spread(
+        &mut self,
+        mut moved: BTreeMap<(i32, i32), i64>,
+        full: &BTreeSet<(i32, i32)>,
+        heading: Heading,
+    ) -> Result<BTreeSet<(i32, i32)>, Error> {
+        let (contours, mut landed) = (self.contours(full), BTreeSet::new());
+        let mut order: Vec<((i32, i32), u32)> =
+            contours.iter().map(|(column, ring)| (*column, *ring)).collect();
+        order.sort_unstable_by_key(|(column, ring)| (std::cmp::Reverse(*ring), *column));
+        for (column, ring) in order {
+            let Some(volume) = moved.remove(&column) else { continue };
+            let lower = |(di, dk): &(i32, i32)| {
+                let to = (column.0 + di, column.1 + dk);
+                let outward = contours.get(&to).is_none_or(|other| *other < ring);
+                outward && self.extent().contains(to.0, to.1)
+            };
+            let ahead = |(di, dk): &(i32, i32)| heading.x * i64::from(*di) + heading.z * i64::from(*dk) >= 0;
+            let mut targets: Vec<_> = AROUND.into_iter().filter(lower).collect();
+            if !heading.sinks && targets.iter().any(ahead) {
+                targets.retain(ahead);
+            }
+            let count = targets.len() as i64;
+            let share = if count > 0 { volume / count } else { 0 };
+            // What cannot be divided equally, and what cannot go anywhere, is compressed.
+            self.pack(column, volume - share * count)?;
+            for (di, dk) in targets {
+                let to = (column.0 + di, column.1 + dk);
+                if contours.contains_key(&to) {
+                    *moved.entry(to).or_insert(0) += share;
+                } else {
+                    self.wake(to.0, to.1)?;
+                    let (key, index) = self.setup.place(to.0, to.1);
+                    self.tile_mut(key)?.loose[index] += share;
+                    landed.insert(to);
+                }
+            }
+        }
+        // Columns from which no way leads to a free one.
+        for (column, volume) in moved {
+            self.pack(column, volume)?;
+        }
+        Ok(landed)
+    }
+
+    /// Distance of full columns from those that are not, in rings.
+    fn contours(&self, full: &BTreeSet<(i32, i32)>) -> BTreeMap<(i32, i32), u32> {
+        let mut rings: BTreeMap<(i32, i32), u32> = BTreeMap::new();
+        let near = |(i, k): (i32, i32)| AROUND.map(|(di, dk)| (i + di, k + dk));
+        let free = |at: &(i32, i32)| !full.contains(at) && self.extent().contains(at.0, at.1);
+        let mut ring: Vec<_> = full.iter().copied().filter(|at| near(*at).iter().any(free)).collect();
+        let mut number = 1;
+        while !ring.is_empty() {
+            rings.extend(ring.iter().map(|at| (*at, number)));
+            number += 1;
+            let next = ring.iter().flat_map(|at| near(*at));
+            let mut next: Vec<_> = next.filter(|at| full.contains(at) && !rings.contains_key(at)).collect();
+            next.sort_unstable();
+            next.dedup();
+            ring = next;
+        }
+        rings
+    }
+}
+
+/// The floors on spans, which are in order.
+fn floors(body: u64, spans: &[Span]) -> impl Iterator<Item = ((i32, i32), Floor)> {
+    let above = move |n: usize| spans.get(n + 1).filter(move |next: &&Span| next.column == spans[n].column);
+    spans.iter().enumerate().map(move |(n, span)| {
+        let ceiling = above(n).map_or(i64::MAX, |next| next.bottom);
+        let floor = Floor { body, triangle: span.lid, base: span.top, load: 0, ceiling, offset: [0; 2] };
+        (span.column, floor)
+    })
+}
+
+/// The direction in which a body has moved.
+fn heading(before: Option<&Foot>, after: &Foot) -> Heading {
+    let Some(before) = before.filter(|before| before.places.len() == after.places.len()) else {
+        return Heading { x: 0, z: 0, sinks: true };
+    };
+    let (mut x, mut y, mut z) = (0_i128, 0_i128, 0_i128);
+    for (from, to) in before.places.iter().zip(&after.places) {
+        x += i128::from(to.x - from.x);
+        y += i128::from(to.y - from.y) >> 16;
+        z += i128::from(to.z - from.z);
+    }
+    let count = before.places.len().max(1) as i128;
+    let (x, y, z) = ((x / count) as i64, (y / count) as i64, (z / count) as i64);
+    let level = (x as f64).hypot(z as f64);
+    Heading { x, z, sinks: level <= -(y as f64) || (x == 0 && z == 0) }
+}
