@@ -32,29 +32,21 @@ impl Cord {
         0.5 * self.stiffness * stretch * stretch
     }
 
-    fn apply(&self, (along, length): (Vector, f64), v: &[Vector], delay: f64, forces: &mut [Vector]) {
-        let [a, b] = self.points;
-        let rate = along.dot(&(v[b] - v[a]));
-        let force = along * (self.stiffness * (length - self.length + delay * rate));
-        forces[a] += force;
-        forces[b] -= force;
+    /// The length.
+    pub fn strain(&self, x: &[Vector]) -> f64 {
+        self.way(x).1
     }
 
-    /// Adds forces; `delay` is τ.
-    #[inline(always)]
-    pub fn forces(&self, x: &[Vector], v: &[Vector], delay: f64, forces: &mut [Vector]) {
-        self.apply(self.way(x), v, delay, forces);
-    }
-
-    /// Adds forces and matrices. A cord under pressure has no stiffness across.
-    pub fn assemble(&self, x: &[Vector], v: &[Vector], weights: &Weights, assembly: &mut Assembly) {
+    /// Adds forces and the matrix; `base` is the length from which viscosity counts. A cord under pressure has no stiffness across.
+    pub fn assemble(&self, x: &[Vector], base: f64, weights: &Weights, assembly: &mut Assembly) {
         let (along, length) = self.way(x);
-        self.apply((along, length), v, weights.delay, assembly.forces);
+        let pull = self.stiffness * (length - self.length + weights.rate * (length - base));
         let line = along * along.transpose();
         let material = line * self.stiffness;
-        let tension = self.stiffness * (length - self.length).max(0.0) / length;
-        let across = (Matrix::identity() - line) * tension;
+        let across = (Matrix::identity() - line) * (pull.max(0.0) / length);
         let [a, b] = self.points;
+        assembly.forces[a] += along * pull;
+        assembly.forces[b] -= along * pull;
         assembly.diagonal(a, &material, &across, weights);
         assembly.diagonal(b, &material, &across, weights);
         assembly.pair(self.slot, (a, b), &-material, &-across, weights);
@@ -112,30 +104,25 @@ impl Bend {
         0.5 * self.stiffness * excess * excess
     }
 
-    fn apply(&self, turn: &Turn, v: &[Vector], delay: f64, forces: &mut [Vector]) {
-        let size = turn.turn.norm();
-        let share = if size > 0.0 { 1.0 - self.rest / size } else { 0.0 };
-        let mut rate: Vector = (0..3).map(|k| turn.by[k] * v[self.points[k]]).sum();
-        // A turn of the whole is no bending: only the size of the difference counts.
-        if size > 0.0 {
-            rate = turn.turn * (rate.dot(&turn.turn) / (size * size));
-        }
-        let moment = (turn.turn * share + rate * delay) * self.stiffness;
-        for k in 0..3 {
-            forces[self.points[k]] -= turn.by[k] * moment;
-        }
+    /// Half the square of the difference of the tangents.
+    pub fn strain(&self, x: &[Vector]) -> f64 {
+        0.5 * self.turn(x).turn.norm_squared()
     }
 
-    /// Adds forces; `delay` is τ.
-    #[inline(always)]
-    pub fn forces(&self, x: &[Vector], v: &[Vector], delay: f64, forces: &mut [Vector]) {
-        self.apply(&self.turn(x), v, delay, forces);
-    }
-
-    /// Adds forces and matrices.
-    pub fn assemble(&self, x: &[Vector], v: &[Vector], weights: &Weights, assembly: &mut Assembly) {
+    /// Adds forces and the matrix; `base` is the strain from which viscosity counts. A turn of the whole is no bending: only the size of the
+    /// difference counts.
+    pub fn assemble(&self, x: &[Vector], base: f64, weights: &Weights, assembly: &mut Assembly) {
         let turn = self.turn(x);
-        self.apply(&turn, v, weights.delay, assembly.forces);
+        let (square, size) = (turn.turn.norm_squared(), turn.turn.norm());
+        let mut share = if size > 0.0 { 1.0 - self.rest / size } else { 0.0 };
+        let largest = square.max(2.0 * base);
+        if largest > 0.0 {
+            share += weights.rate * (0.5 * square - base) / largest;
+        }
+        let moment = turn.turn * (share * self.stiffness);
+        for k in 0..3 {
+            assembly.forces[self.points[k]] -= turn.by[k] * moment;
+        }
         let zero = Matrix::zeros();
         for k in 0..3 {
             let block = turn.by[k] * turn.by[k] * self.stiffness;

@@ -83,12 +83,22 @@ impl Air {
 }
 
 impl Sheet {
+    /// The velocity of the air at each face and each cord.
+    pub(crate) fn gusts(&self, air: &Air, wind: &dyn Wind, time: f64, x: &[Vector], out: &mut Vec<Vector>) {
+        out.clear();
+        if air.density == 0.0 {
+            return;
+        }
+        let faces = self.faces.iter().map(|face| face.iter().map(|point| x[*point]).sum::<Vector>() / 3.0);
+        let cords = self.cords.iter().map(|cord| (x[cord.points[0]] + x[cord.points[1]]) / 2.0);
+        out.extend(faces.chain(cords).map(|place| wind.velocity(place, time)));
+    }
+
     /// Calls `act` for each face and each cord with its points and the drag on it.
     fn drag(
         &self,
         air: &Air,
-        wind: &dyn Wind,
-        time: f64,
+        gusts: &[Vector],
         x: &[Vector],
         v: &[Vector],
         mut act: impl FnMut(&[usize], Drag),
@@ -96,39 +106,16 @@ impl Sheet {
         if air.density == 0.0 {
             return;
         }
-        for face in &self.faces {
+        let (over_faces, over_cords) = gusts.split_at(self.faces.len());
+        for (face, gust) in self.faces.iter().zip(over_faces) {
             let [a, b, c] = face.map(|point| x[point]);
             let velocity = face.iter().map(|point| v[*point]).sum::<Vector>() / 3.0;
-            let relative = velocity - wind.velocity((a + b + c) / 3.0, time);
-            act(face, air.face(&(b - a).cross(&(c - a)), &relative));
+            act(face, air.face(&(b - a).cross(&(c - a)), &(velocity - gust)));
         }
-        for cord in &self.cords {
+        for (cord, gust) in self.cords.iter().zip(over_cords) {
             let [a, b] = cord.points;
-            let relative = (v[a] + v[b]) / 2.0 - wind.velocity((x[a] + x[b]) / 2.0, time);
+            let relative = (v[a] + v[b]) / 2.0 - gust;
             act(&cord.points, air.cord(&(x[b] - x[a]), self.tissue.thickness, &relative));
-        }
-    }
-
-    /// Adds weight and drag.
-    pub(crate) fn loads(
-        &self,
-        air: &Air,
-        wind: &dyn Wind,
-        time: f64,
-        x: &[Vector],
-        v: &[Vector],
-        forces: &mut [Vector],
-    ) {
-        self.weigh(air, forces);
-        self.drag(air, wind, time, x, v, |points, drag| {
-            let share = drag.force / points.len() as f64;
-            points.iter().for_each(|point| forces[*point] += share);
-        });
-    }
-
-    fn weigh(&self, air: &Air, forces: &mut [Vector]) {
-        for (force, mass) in forces.iter_mut().zip(&self.masses) {
-            *force += air.gravity * *mass;
         }
     }
 
@@ -136,15 +123,16 @@ impl Sheet {
     pub(crate) fn assemble_loads(
         &self,
         air: &Air,
-        wind: &dyn Wind,
-        time: f64,
+        gusts: &[Vector],
         (x, v): (&[Vector], &[Vector]),
         weights: &Weights,
         assembly: &mut Assembly,
     ) {
-        self.weigh(air, assembly.forces);
+        for (force, mass) in assembly.forces.iter_mut().zip(&self.masses) {
+            *force += air.gravity * *mass;
+        }
         let damping = weights.damping;
-        self.drag(air, wind, time, x, v, |points, drag| {
+        self.drag(air, gusts, x, v, |points, drag| {
             let count = points.len() as f64;
             for point in points {
                 assembly.forces[*point] += drag.force / count;

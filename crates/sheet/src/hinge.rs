@@ -59,6 +59,11 @@ impl Fold {
     }
 }
 
+/// An angle between -π and π.
+fn wrapped(angle: f64) -> f64 {
+    angle - std::f64::consts::TAU * libm::round(angle / std::f64::consts::TAU)
+}
+
 impl Hinge {
     /// A hinge at rest that has this part of the stiffness.
     pub fn new(points: [usize; 4], x: &[Vector], tissue: &Tissue, share: f64) -> Option<Hinge> {
@@ -73,8 +78,7 @@ impl Hinge {
 
     /// Change of the angle, between -π and π.
     fn change(&self, angle: f64) -> f64 {
-        let change = angle - self.rest;
-        change - std::f64::consts::TAU * libm::round(change / std::f64::consts::TAU)
+        wrapped(angle - self.rest)
     }
 
     /// Elastic energy in J.
@@ -92,36 +96,27 @@ impl Hinge {
         Some((self.change(fold.angle), fold.gradient.map(|part| part * share)))
     }
 
-    /// Adds forces; `delay` is τ.
-    #[inline(always)]
-    pub fn forces(&self, x: &[Vector], v: &[Vector], delay: f64, forces: &mut [Vector]) {
-        if let Some((change, gradient)) = self.fold(x) {
-            self.apply(change, &gradient, v, delay, forces);
-        }
+    /// The change of the angle.
+    pub fn strain(&self, x: &[Vector]) -> f64 {
+        Fold::of(self.points.map(|point| x[point])).map_or(0.0, |fold| self.change(fold.angle))
     }
 
-    fn apply(&self, change: f64, gradient: &[Vector; 4], v: &[Vector], delay: f64, forces: &mut [Vector]) {
-        let rate: f64 = (0..4).map(|k| gradient[k].dot(&v[self.points[k]])).sum();
-        let moment = self.stiffness * (2.0 * libm::sin(change / 2.0) + delay * rate);
-        for k in 0..4 {
-            forces[self.points[k]] -= gradient[k] * moment;
-        }
-    }
-
-    /// Adds forces, and the matrices without the turn of the gradient.
-    pub fn assemble(&self, x: &[Vector], v: &[Vector], weights: &Weights, assembly: &mut Assembly) {
+    /// Adds forces, and the matrix without the turn of the gradient; `base` is the change from which viscosity counts.
+    pub fn assemble(&self, x: &[Vector], base: f64, weights: &Weights, assembly: &mut Assembly) {
         let Some((change, gradient)) = self.fold(x) else { return };
-        self.apply(change, &gradient, v, weights.delay, assembly.forces);
-        let stiff = self.stiffness * libm::cos(change / 2.0).max(0.0);
-        let sum = stiff * weights.stiffness + self.stiffness * weights.damping * weights.delay;
+        let viscous = weights.rate * wrapped(change - base);
+        let moment = self.stiffness * (2.0 * libm::sin(change / 2.0) + viscous);
+        for k in 0..4 {
+            assembly.forces[self.points[k]] -= gradient[k] * moment;
+        }
+        let viscous = weights.material - weights.stiffness;
+        let sum = self.stiffness * (libm::cos(change / 2.0).max(0.0) * weights.stiffness + viscous);
         for (point, gradient) in self.points.into_iter().zip(&gradient) {
             let block = gradient * gradient.transpose();
-            assembly.stiffness.diagonal[point] += block * stiff;
             assembly.step.diagonal[point] += block * sum;
         }
         for (slot, (j, k)) in self.slots.into_iter().zip(PAIRS) {
             let block = gradient[j] * gradient[k].transpose();
-            assembly.stiffness.add(slot, self.points[j], self.points[k], &(block * stiff));
             assembly.step.add(slot, self.points[j], self.points[k], &(block * sum));
         }
     }
@@ -130,6 +125,7 @@ impl Hinge {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::matrix::{Blocks, Pattern};
 
     #[test]
     fn forces_are_minus_the_gradient_of_the_energy() {
@@ -140,7 +136,11 @@ mod tests {
         x[2] += Vector::new(0.05, -0.2, 0.7);
         x[1] += Vector::new(0.1, 0.2, -0.3);
         let mut forces = [Vector::zeros(); 4];
-        hinge.forces(&x, &[Vector::zeros(); 4], 0.0, &mut forces);
+        let pattern = Pattern::new(4, PAIRS.map(|(j, k)| [j, k]).to_vec());
+        let mut blocks = Blocks::default();
+        blocks.clear(&pattern);
+        let mut assembly = Assembly { forces: &mut forces, step: &mut blocks };
+        hinge.assemble(&x, 0.0, &Weights::new(0.1, 0.0), &mut assembly);
         for k in 0..4 {
             for axis in 0..3 {
                 let energy = |by: f64| {

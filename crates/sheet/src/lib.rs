@@ -21,19 +21,22 @@
 //! pressure (above 40 %) a membrane of this kind gets softer. Cords obey the law of Hooke. Bending is a moment across edges and between cords
 //! that continue each other. Material is Kelvin-Voigt: stress `E (ε + τ ε')`. Sheets do not touch themselves.
 //!
-//! Steps are of the method ROS2 (Verwer, Spee, Blom, Hundsdorfer, SIAM J. Sci. Comput. 20, 1999) with its second stage in the middle: order 2 with
-//! any approximation of the Jacobian, L-stable, so a stiff sheet needs no short steps:
+//! A step has two stages, each with all forces at its end, those of contacts and of viscosity too: order 2 and L-stable (Alexander, SIAM J. Numer.
+//! Anal. 14, 1977). Where a contact begins or ends, both stages are steps of backward Euler, of order 1, which give back nothing of what they stop:
 //!
 //! ```text
-//! (M + γhD + γ²h²K) k = h F(x, v) - γh² K v
-//! (M + γhD + γ²h²K) z = h F(x + (hv + γhk)/2, v + k/2) - M k - γ(½ - γ)h² K k
-//! v' = v + k + z,   x' = x + h v + γh (k + z) + h(½ - γ) k
+//! M (v - v̂) = s F(x, v),   x = x̂ + s v
 //! ```
 //!
-//! Each system is solved by conjugate gradients with symmetric Gauss-Seidel as preconditioner, in one thread and in one order. What would meet within a step is stopped by impulses at its beginning. Forces of contacts
-//! are those at the place that is predicted for the stage, with their stiffness in the matrix; free solids are unknowns of
-//! the same system, so momentum is kept. A step is repeated with half its length if its error is too large, if solid and sheet
-//! move by more than the solid's radius relative to each other while they are near, or if the sheet is too deep in a solid.
+//! The equations are solved by Newton's method with a search along each way; contacts are found again in each iteration, free solids are unknowns
+//! of the same system, so momentum is kept. Linear systems are solved by conjugate gradients with symmetric Gauss-Seidel as
+//! preconditioner, in one thread and in one order. A step that is linear in forces (ROS2) needs steps ten times as short for a ball in
+//! a net: forces of viscosity and of contacts turn within the step. What would meet within a step is stopped by impulses at its beginning.
+//! A step is repeated with half its length or less if its error is too large, if its equations are not solved, if solid and sheet
+//! move by more than the solid's radius relative to each other while they are near, or if the sheet gets too deep in a solid.
+//!
+//! Errors of places and velocities are controlled; but where solids touch, velocities of points jump, and those count as what they move in the step
+//! itself. A cord that is so stiff that no step resolves its vibration has order 1.
 //!
 //! # Example
 //!
@@ -69,6 +72,7 @@ mod settings;
 mod sheet;
 mod solve;
 mod solver;
+mod stage;
 mod state;
 mod step;
 pub mod study;

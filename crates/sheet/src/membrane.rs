@@ -65,17 +65,9 @@ impl Triangle {
         0.5 * q.dot(&(self.stiffness * q))
     }
 
-    /// Adds forces; `delay` is τ.
-    #[inline(always)]
-    pub fn forces(&self, x: &[Vector], v: &[Vector], delay: f64, forces: &mut [Vector]) {
-        let edges = edges(&self.points.map(|point| x[point]));
-        let pull = self.stiffness * self.strain(&edges) + self.viscous(&edges, v, delay);
-        self.apply(&edges, &pull, forces);
-    }
-
-    fn viscous(&self, now: &[Vector; 3], v: &[Vector], delay: f64) -> Vector {
-        let rates = edges(&self.points.map(|point| v[point]));
-        self.stiffness * Vector::from_fn(|i, _| now[i].dot(&rates[i]) * delay)
+    /// Half the changes of the squared edges.
+    pub fn strains(&self, x: &[Vector]) -> Vector {
+        self.strain(&edges(&self.points.map(|point| x[point])))
     }
 
     fn apply(&self, edges: &[Vector; 3], pull: &Vector, forces: &mut [Vector]) {
@@ -86,11 +78,12 @@ impl Triangle {
         }
     }
 
-    /// Adds forces, and the matrices. What pressure would take away from stiffness is left out, so that the matrices are positive.
-    pub fn assemble(&self, x: &[Vector], v: &[Vector], weights: &Weights, assembly: &mut Assembly) {
+    /// Adds forces, and the matrix; `base` are the strains from which viscosity counts. What pressure would take away from stiffness is left out,
+    /// so that the matrix is positive.
+    pub fn assemble(&self, x: &[Vector], base: &Vector, weights: &Weights, assembly: &mut Assembly) {
         let edges = edges(&self.points.map(|point| x[point]));
-        let elastic = self.stiffness * self.strain(&edges);
-        let pull = elastic + self.viscous(&edges, v, weights.delay);
+        let strain = self.strain(&edges);
+        let pull = self.stiffness * (strain + (strain - base) * weights.rate);
         self.apply(&edges, &pull, assembly.forces);
         let [a, b, c] = edges;
         let zero = Vector::zeros();
@@ -100,7 +93,7 @@ impl Triangle {
             Matrix::from_columns(&[a, -b, zero]),
         ];
         let products = gradients.map(|gradient| gradient * self.stiffness);
-        let tension = elastic.map(|pull| pull.max(0.0));
+        let tension = pull.map(|pull| pull.max(0.0));
         for i in 0..3 {
             let (j, k) = ((i + 1) % 3, (i + 2) % 3);
             let material = products[i] * gradients[i].transpose();

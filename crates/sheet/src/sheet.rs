@@ -187,27 +187,32 @@ impl Sheet {
             + self.bends.iter().map(|part| part.energy(x)).sum::<f64>()
     }
 
-    /// Adds elastic and viscous forces.
-    pub(crate) fn elastic_forces(&self, x: &[Vector], v: &[Vector], forces: &mut [Vector]) {
-        let delay = self.tissue.delay();
-        self.triangles.iter().for_each(|part| part.forces(x, v, delay, forces));
-        self.hinges.iter().for_each(|part| part.forces(x, v, delay, forces));
-        self.cords.iter().for_each(|part| part.forces(x, v, delay, forces));
-        self.bends.iter().for_each(|part| part.forces(x, v, delay, forces));
+    /// The strains of all elements: three of each triangle, one of each hinge, cord and bend.
+    pub(crate) fn strains(&self, x: &[Vector], out: &mut Vec<f64>) {
+        out.clear();
+        self.triangles.iter().for_each(|part| out.extend(part.strains(x).iter()));
+        out.extend(self.hinges.iter().map(|part| part.strain(x)));
+        out.extend(self.cords.iter().map(|part| part.strain(x)));
+        out.extend(self.bends.iter().map(|part| part.strain(x)));
     }
 
-    /// Adds elastic and viscous forces, and their matrices.
+    /// Adds elastic and viscous forces, and their matrix. Viscosity counts from the strains `base`.
     pub(crate) fn assemble_elastic(
         &self,
         x: &[Vector],
-        v: &[Vector],
+        base: &[f64],
         weights: &Weights,
         assembly: &mut Assembly,
     ) {
-        self.triangles.iter().for_each(|part| part.assemble(x, v, weights, assembly));
-        self.hinges.iter().for_each(|part| part.assemble(x, v, weights, assembly));
-        self.cords.iter().for_each(|part| part.assemble(x, v, weights, assembly));
-        self.bends.iter().for_each(|part| part.assemble(x, v, weights, assembly));
+        let (triples, rest) = base.split_at(3 * self.triangles.len());
+        for (part, base) in self.triangles.iter().zip(triples.chunks_exact(3)) {
+            part.assemble(x, &Vector::from_column_slice(base), weights, assembly);
+        }
+        let (hinges, rest) = rest.split_at(self.hinges.len());
+        let (cords, bends) = rest.split_at(self.cords.len());
+        self.hinges.iter().zip(hinges).for_each(|(part, base)| part.assemble(x, *base, weights, assembly));
+        self.cords.iter().zip(cords).for_each(|(part, base)| part.assemble(x, *base, weights, assembly));
+        self.bends.iter().zip(bends).for_each(|(part, base)| part.assemble(x, *base, weights, assembly));
     }
 }
 

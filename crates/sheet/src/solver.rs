@@ -35,7 +35,7 @@ impl Solver {
 
     /// What it did since it was made.
     pub fn counts(&self) -> Counts {
-        Counts { iterations: self.work.iterations, ..self.counts }
+        Counts { iterations: self.work.iterations(), ..self.counts }
     }
 
     /// Advances a state over a span of time (s), shows each accepted step to `observe`, and returns what the sheet did to each solid in sum. Divided by

@@ -1,15 +1,25 @@
-//! One step of ROS2 with contacts and free solids.
+//! One step: two stages, of second order or as two steps of backward Euler, with impacts before them.
+//!
+//! The second order is that of Alexander's method (*Diagonally implicit Runge-Kutta methods for stiff ODEs*, SIAM J. Numer. Anal. 14, 1977): with
+//! `s = γh` and γ = 1 - 1/√2,
+//!
+//! ```text
+//! first stage:   x̂ = x₀,                 v̂ = v₀                    → x₁, v₁ at t + γh
+//! second stage:  x̂ = x₀ + (1 - γ) h v₁,  v̂ = v₀ + (1 - γ)/γ (v₁ - v₀)  → x', v' at t + h
+//! ```
+//!
+//! The base of the second stage continues what the first one began. That is wrong where a contact begins or ends: what the first stage stopped would
+//! come back with 1.4 times its speed. There the second stage is backward Euler from the first one, `x̂ = x₁, v̂ = v₁, s = (1 - γ) h`: as the first stage is
+//! backward Euler too, nothing but the second stage is computed again.
 
 use crate::contact::{Contact, Impact, Moving};
-use crate::elastic::{Assembly, Weights};
-use crate::matrix::Blocks;
-use crate::solve::{Bodies, Free, Scratch, System};
+use crate::solve::Free;
+use crate::stage::{Base, Newton, touching};
 use crate::{Drive, Matrix, Place, Push, Rejection, Settings, Sheet, Solid, State, Vector, Wind};
 
-/// γ of ROS2: 1 - 1/√2.
+/// γ: 1 - 1/√2.
 const GAMMA: f64 = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
-/// Residual of the systems of both stages, relative to the right-hand side, and of the system that weighs the error.
-const ACCURACY: f64 = 1e-10;
+/// Residual of the system that weighs the error.
 const ROUGH: f64 = 1e-3;
 
 /// What surrounds a sheet.
@@ -24,28 +34,26 @@ pub(crate) struct Around<'a> {
 /// Working memory of steps.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Workspace {
-    numbers: Vec<Option<usize>>,
-    free: Vec<Free>,
-    stiffness: Blocks,
-    blocks: Blocks,
-    scratch: Scratch,
-    forces: Vec<Vector>,
-    right: Vec<Vector>,
-    bent: Vec<Vector>,
-    first: Vec<Vector>,
-    second: Vec<Vector>,
-    middle: State,
-    contacts: Vec<Contact>,
-    late: Vec<Contact>,
+    newton: Newton,
     places: Vec<Place>,
     /// The state at the start, after impacts.
     start: State,
+    /// The state after the first stage.
+    middle: State,
+    base: Base,
+    /// Strains at the start, and after the first stage.
+    strains: [Vec<f64>; 2],
+    /// Whether both stages are steps of backward Euler.
+    euler: bool,
+    /// Contacts at one time, and what touches at the start, after the first and after the second stage.
+    contacts: Vec<Contact>,
+    touching: [Vec<(usize, usize)>; 3],
     impacts: Vec<Impact>,
+    changes: Vec<Vector>,
     /// How far each solid and the sheet may move relative to each other, in m.
     margins: Vec<f64>,
     pub pushes: Vec<Push>,
     pub depths: Vec<f64>,
-    pub iterations: u64,
 }
 
 /// The largest error of a step: displacement in m, not a number if anything is not finite, and where.
@@ -65,7 +73,7 @@ impl Found {
 }
 
 /// The place of each solid.
-fn places(solids: &[Solid], time: f64, bodies: &[Place], out: &mut Vec<Place>) {
+pub(crate) fn places(solids: &[Solid], time: f64, bodies: &[Place], out: &mut Vec<Place>) {
     out.clear();
     let mut bodies = bodies.iter();
     for solid in solids {
@@ -82,7 +90,7 @@ fn turning(solid: &Solid, spin: Vector) -> f64 {
 }
 
 /// The inertia about the axes of the world.
-fn inertia(solid: &Solid, place: &Place) -> Option<Free> {
+pub(crate) fn inertia(solid: &Solid, place: &Place) -> Option<Free> {
     let Drive::Free { mass, inertia } = solid.drive else { return None };
     let axes = place.attitude.to_rotation_matrix().into_inner();
     Some(Free { mass, inertia: axes * Matrix::from_diagonal(&Vector::from(inertia)) * axes.transpose() })
@@ -111,20 +119,94 @@ impl Workspace {
         &mut self,
         around: Around,
         (time, h): (f64, f64),
-        before: &State,
+        start: &State,
         after: &mut State,
     ) -> Result<(), Rejection> {
-        let curb = GAMMA * (0.5 - GAMMA) * h * h;
-        self.assemble(around, time, h, before);
-        self.first = self.solve(around, h, ACCURACY)?;
-        // The second stage has the contacts of both.
-        self.middle(around, h, before);
-        self.late = self.mid_forces(around, time, h);
-        join(&mut self.contacts, &self.late);
-        self.differ(around, h, curb);
-        self.second = self.solve(around, h, ACCURACY)?;
-        self.push(around, h, curb);
-        self.finish(around, h, before, after);
+        let Around { sheet, solids, .. } = around;
+        let (first, second) = (GAMMA * h, (1.0 - GAMMA) * h);
+        self.contacts.clear();
+        for (index, solid) in solids.iter().enumerate() {
+            let place = &self.places[index];
+            sheet.contacts((index, solid), place, &start.positions, &start.velocities, &mut self.contacts);
+        }
+        touching(&self.contacts, &mut self.touching[0]);
+        sheet.strains(&start.positions, &mut self.strains[0]);
+        let base = &mut self.base;
+        base.positions.clone_from(&start.positions);
+        base.velocities.clone_from(&start.velocities);
+        base.bodies.clone_from(&start.bodies);
+        base.strains.clone_from(&self.strains[0]);
+        base.momenta.clear();
+        base.momenta
+            .extend(self.newton.free.iter().zip(&start.bodies).map(|(free, body)| free.inertia * body.spin));
+        let momenta = base.momenta.clone();
+        let middle = &mut self.middle;
+        middle.clone_from(start);
+        self.newton.solve(around, (time + first, first), base, middle)?;
+        self.newton.touching(&mut self.touching[1]);
+        let pushed = self.pushes.clone();
+        self.newton.push(sheet.len(), first, second, &mut self.pushes);
+        sheet.strains(&middle.positions, &mut self.strains[1]);
+        let turned: Vec<Vector> = middle
+            .bodies
+            .iter()
+            .zip(&self.newton.free)
+            .map(|(body, free)| free.inertia * body.spin)
+            .collect();
+        self.euler = self.touching[0] != self.touching[1];
+        if !self.euler {
+            let gain = (1.0 - GAMMA) / GAMMA;
+            for k in 0..sheet.len() {
+                let (x, v, w) = (start.positions[k], start.velocities[k], middle.velocities[k]);
+                base.positions[k] = x + w * second;
+                base.velocities[k] = v + (w - v) * gain;
+            }
+            for (number, base) in base.bodies.iter_mut().enumerate() {
+                let (body, moved) = (&start.bodies[number], &middle.bodies[number]);
+                *base = body.after(moved.velocity * second, moved.spin * second);
+                base.velocity = body.velocity + (moved.velocity - body.velocity) * gain;
+            }
+            for (base, (then, now)) in base.momenta.iter_mut().zip(momenta.iter().zip(&turned)) {
+                *base = then + (now - then) * gain;
+            }
+            for (base, (then, now)) in
+                base.strains.iter_mut().zip(self.strains[0].iter().zip(&self.strains[1]))
+            {
+                *base = then + (now - then) * gain;
+            }
+            after.clone_from(middle);
+            self.newton.solve(around, (time + h, first), base, after)?;
+            self.newton.touching(&mut self.touching[2]);
+            self.euler = self.touching[2] != self.touching[1];
+            if !self.euler {
+                self.newton.push(sheet.len(), first, first, &mut self.pushes);
+                return Ok(());
+            }
+        }
+        base.positions.clone_from(&middle.positions);
+        base.velocities.clone_from(&middle.velocities);
+        base.bodies.clone_from(&middle.bodies);
+        base.momenta = turned;
+        base.strains.clone_from(&self.strains[1]);
+        // The push of the first stage counts for its own length.
+        let share = first / second;
+        for (push, before) in self.pushes.iter_mut().zip(&pushed) {
+            push.impulse = before.impulse + (push.impulse - before.impulse) * share;
+            push.moment = before.moment + (push.moment - before.moment) * share;
+        }
+        after.clone_from(middle);
+        self.newton.solve(around, (time + h, second), base, after)?;
+        self.newton.touching(&mut self.touching[2]);
+        self.newton.push(sheet.len(), second, second, &mut self.pushes);
+        // What no contact touches falls as from rest: the place is exact.
+        let untouched = |solid: usize| self.touching[1..].iter().flatten().all(|contact| contact.0 != solid);
+        for (solid, number) in self.newton.numbers.iter().enumerate() {
+            if let Some(number) = number.filter(|_| untouched(solid)) {
+                let fall = around.settings.air.gravity * (0.5 * h * h);
+                let body = &start.bodies[number];
+                after.bodies[number].position = body.position + body.velocity * h + fall;
+            }
+        }
         Ok(())
     }
 
@@ -134,7 +216,8 @@ impl Workspace {
         self.pushes.clear();
         self.pushes.resize(solids.len(), Push::default());
         self.start.clone_from(before);
-        let Workspace { start: state, places, numbers, free, impacts, margins, pushes, .. } = self;
+        let Workspace { start: state, places, newton, impacts, margins, pushes, .. } = self;
+        let Newton { numbers, free, .. } = newton;
         let mut moving = Moving { sheet, state, places, numbers, free };
         impacts.clear();
         for (index, solid) in solids.iter().enumerate() {
@@ -143,55 +226,17 @@ impl Workspace {
         moving.settle(impacts, pushes);
     }
 
-    /// Solves the system of the step with the contacts of the stage for `right`.
-    fn solve(&mut self, around: Around, h: f64, accuracy: f64) -> Result<Vec<Vector>, Rejection> {
-        let (sheet, step) = (around.sheet, GAMMA * h);
-        let system = System {
-            pattern: &sheet.pattern,
-            blocks: &self.blocks,
-            pinned: &sheet.pinned,
-            contacts: &self.contacts,
-            numbers: &self.numbers,
-            free: &self.free,
-            weights: (step * step, step),
-        };
-        let mut x = Vec::new();
-        let solved =
-            system.solve(&self.right, &mut x, &mut self.scratch, (accuracy, around.settings.iterations));
-        let iterations = solved.map_err(|iterations| Rejection::Unsolved { iterations })?;
-        self.iterations += iterations as u64;
-        Ok(x)
-    }
-
-    /// The right-hand side of the second stage, from the forces in the middle and the first stage.
-    fn differ(&mut self, around: Around, h: f64, curb: f64) {
-        let (sheet, points) = (around.sheet, around.sheet.len());
-        self.right.clear();
-        self.right.extend(self.forces.iter().map(|force| force * h));
-        self.bent.resize(points, Vector::zeros());
-        self.stiffness.multiply(&sheet.pattern, &self.first[..points], &mut self.bent);
-        for k in 0..points {
-            self.right[k] -= self.first[k] * sheet.masses[k] + self.bent[k] * curb;
-        }
-        for (number, free) in self.free.iter().enumerate() {
-            let start = points + 2 * number;
-            self.right[start] -= self.first[start] * free.mass;
-            self.right[start + 1] -= free.inertia * self.first[start + 1];
-        }
-        let bodies = Bodies { points, numbers: &self.numbers };
-        bodies.resist(&self.contacts, |contact| contact.stiffness * curb, &self.first, &mut self.right);
-    }
-
     /// Sizes, free solids, and whether contacts can be found in a step of this length.
     fn begin(&mut self, around: Around, time: f64, h: f64, before: &State) -> Result<(), Rejection> {
         let Around { sheet, solids, .. } = around;
         places(solids, time, &before.bodies, &mut self.places);
-        self.numbers.clear();
-        self.free.clear();
+        let Newton { numbers, free, .. } = &mut self.newton;
+        numbers.clear();
+        free.clear();
         for (solid, place) in solids.iter().zip(&self.places) {
-            let free = inertia(solid, place);
-            self.numbers.push(free.map(|_| self.free.len()));
-            self.free.extend(free);
+            let found = inertia(solid, place);
+            numbers.push(found.map(|_| free.len()));
+            free.extend(found);
         }
         self.margins.clear();
         for (index, (solid, place)) in solids.iter().zip(&self.places).enumerate() {
@@ -217,167 +262,6 @@ impl Workspace {
         Ok(())
     }
 
-    /// Forces and matrices of the first stage.
-    fn assemble(&mut self, around: Around, time: f64, h: f64, before: &State) {
-        let Around { sheet, solids, wind, settings } = around;
-        let (points, step) = (sheet.len(), GAMMA * h);
-        let (x, v) = (&before.positions, &before.velocities);
-        self.forces.clear();
-        self.forces.resize(points + 2 * self.free.len(), Vector::zeros());
-        self.stiffness.clear(&sheet.pattern);
-        self.blocks.clear(&sheet.pattern);
-        for (block, mass) in self.blocks.diagonal.iter_mut().zip(&sheet.masses) {
-            *block = Matrix::from_diagonal_element(*mass);
-        }
-        let weights = Weights { delay: sheet.tissue.delay(), stiffness: step * step, damping: step };
-        let mut assembly =
-            Assembly { forces: &mut self.forces, stiffness: &mut self.stiffness, step: &mut self.blocks };
-        sheet.assemble_elastic(x, v, &weights, &mut assembly);
-        sheet.assemble_loads(&settings.air, wind, time, (x, v), &weights, &mut assembly);
-        // Contacts at the places that are predicted for the stage.
-        let middle = &mut self.middle;
-        middle.positions.clear();
-        middle.positions.extend(x.iter().zip(v).map(|(x, v)| x + v * step));
-        middle.bodies.clear();
-        middle
-            .bodies
-            .extend(before.bodies.iter().map(|body| body.after(body.velocity * step, body.spin * step)));
-        places(solids, time + step, &middle.bodies, &mut self.places);
-        self.contacts.clear();
-        for (index, solid) in solids.iter().enumerate() {
-            let place = &self.places[index];
-            sheet.contacts((index, solid), place, &middle.positions, v, &mut self.contacts);
-        }
-        let contacts = std::mem::take(&mut self.contacts);
-        self.act(settings, &contacts, before);
-        self.contacts = contacts;
-        self.bent.resize(points, Vector::zeros());
-        self.stiffness.multiply(&sheet.pattern, v, &mut self.bent);
-        self.right.clear();
-        self.right.extend(self.forces.iter().map(|force| force * h));
-        for (right, bent) in self.right.iter_mut().zip(&self.bent) {
-            *right -= bent * (step * h);
-        }
-    }
-
-    /// Adds forces of contacts, and of weight and gyration on free solids.
-    fn act(&mut self, settings: &Settings, contacts: &[Contact], state: &State) {
-        let points = self.forces.len() - 2 * self.free.len();
-        for (number, (free, body)) in self.free.iter().zip(&state.bodies).enumerate() {
-            let start = points + 2 * number;
-            self.forces[start] = settings.air.gravity * free.mass;
-            self.forces[start + 1] = -body.spin.cross(&(free.inertia * body.spin));
-        }
-        for contact in contacts {
-            contact.spread(&contact.force, &mut self.forces);
-            if let Some(number) = self.numbers[contact.solid] {
-                let start = points + 2 * number;
-                self.forces[start] -= contact.force;
-                self.forces[start + 1] -= contact.arm.cross(&contact.force);
-            }
-        }
-    }
-
-    /// The predicted state in the middle of the step.
-    fn middle(&mut self, around: Around, h: f64, before: &State) {
-        let points = around.sheet.len();
-        let ways = |v: Vector, k: Vector| (v * h + k * (GAMMA * h)) * 0.5;
-        let (middle, first) = (&mut self.middle, &self.first);
-        middle.positions.clear();
-        middle.velocities.clear();
-        for (k, gain) in first[..points].iter().enumerate() {
-            let v = before.velocities[k];
-            let held = around.sheet.pinned[k];
-            let way = if held { Vector::zeros() } else { ways(v, *gain) };
-            middle.positions.push(before.positions[k] + way);
-            middle.velocities.push(v + gain * 0.5);
-        }
-        middle.bodies.clear();
-        for (number, body) in before.bodies.iter().enumerate() {
-            let [push, turn] = [0, 1].map(|k| first[points + 2 * number + k]);
-            let mut moved = body.after(ways(body.velocity, push), ways(body.spin, turn));
-            moved.velocity += push * 0.5;
-            moved.spin += turn * 0.5;
-            middle.bodies.push(moved);
-        }
-    }
-
-    /// Forces in the middle of the step; returns the contacts there.
-    fn mid_forces(&mut self, around: Around, time: f64, h: f64) -> Vec<Contact> {
-        let Around { sheet, solids, wind, settings } = around;
-        let middle = std::mem::take(&mut self.middle);
-        let (x, v) = (&middle.positions, &middle.velocities);
-        let mut late = std::mem::take(&mut self.late);
-        late.clear();
-        places(solids, time + 0.5 * h, &middle.bodies, &mut self.places);
-        for (index, solid) in solids.iter().enumerate() {
-            sheet.contacts((index, solid), &self.places[index], x, v, &mut late);
-        }
-        self.forces.iter_mut().for_each(|force| *force = Vector::zeros());
-        let (start, turned) = (self.free.clone(), self.turned(solids));
-        self.free = turned;
-        sheet.elastic_forces(x, v, &mut self.forces[..sheet.len()]);
-        sheet.loads(&settings.air, wind, time + 0.5 * h, x, v, &mut self.forces[..sheet.len()]);
-        self.act(settings, &late, &middle);
-        // The spin changes by the inertia in the middle, but the matrix has that of the start.
-        for (number, (now, then)) in self.free.iter().zip(&start).enumerate() {
-            let moment = &mut self.forces[sheet.len() + 2 * number + 1];
-            if let Some(inverse) = now.inertia.try_inverse().filter(|_| now.inertia != then.inertia) {
-                *moment = then.inertia * (inverse * *moment);
-            }
-        }
-        self.free = start;
-        self.middle = middle;
-        late
-    }
-
-    fn turned(&self, solids: &[Solid]) -> Vec<Free> {
-        solids.iter().zip(&self.places).filter_map(|(solid, place)| inertia(solid, place)).collect()
-    }
-
-    /// Impulses on the solids: those that the contacts gave to the sheet, with the other sign.
-    fn push(&mut self, around: Around, h: f64, curb: f64) {
-        let points = around.sheet.len();
-        let step = GAMMA * h;
-        let mut add = |contact: &Contact, impulse: Vector| {
-            let moment = contact.arm.cross(&impulse);
-            self.pushes[contact.solid] += Push { impulse: -impulse, moment: -moment };
-        };
-        for contact in &self.late {
-            add(contact, contact.force * h);
-        }
-        let bodies = Bodies { points, numbers: &self.numbers };
-        for contact in &self.contacts {
-            let [first, second] = [&self.first, &self.second].map(|x| bodies.relative(contact, x));
-            let block = contact.stiffness * (step * step) + contact.damping * step;
-            add(contact, -(block * second) - contact.stiffness * (first * curb));
-        }
-    }
-
-    /// The state at the end.
-    fn finish(&self, around: Around, h: f64, before: &State, after: &mut State) {
-        let (points, step) = (around.sheet.len(), GAMMA * h);
-        let (first, second) = (&self.first, &self.second);
-        let way =
-            |v: Vector, k: usize| v * h + (first[k] + second[k]) * step + first[k] * (h * (0.5 - GAMMA));
-        after.positions.clear();
-        after.velocities.clear();
-        for k in 0..points {
-            let (x, v) = (before.positions[k], before.velocities[k]);
-            let held = around.sheet.pinned[k];
-            after.positions.push(if held { x } else { x + way(v, k) });
-            after.velocities.push(if held { Vector::zeros() } else { v + first[k] + second[k] });
-        }
-        after.bodies.clear();
-        for (number, body) in before.bodies.iter().enumerate() {
-            let start = points + 2 * number;
-            let mut moved = body.after(way(body.velocity, start), way(body.spin, start + 1));
-            moved.velocity += first[start] + second[start];
-            moved.spin += first[start + 1] + second[start + 1];
-            after.bodies.push(moved);
-        }
-    }
-
     /// Depths at the end, whether they and the relative motion are allowed, and the estimate of the error.
     fn measure(
         &mut self,
@@ -386,7 +270,7 @@ impl Workspace {
         before: &State,
         after: &State,
     ) -> Result<Found, Rejection> {
-        let found = self.estimate(around, h)?;
+        let found = self.estimate(around, h, after)?;
         if found.displacement.is_nan() {
             return Ok(found);
         }
@@ -402,7 +286,12 @@ impl Workspace {
             sheet.contacts((index, solid), place, &after.positions, &after.velocities, &mut ends);
             let depth = ends.iter().map(|contact| contact.depth).fold(0.0, f64::max);
             self.depths.push(depth);
-            if depth > solid.allowed_depth() {
+            // What gets deeper fast must not use up the room that is left: shorter steps have impacts more often.
+            let touching = self.contacts.iter().filter(|contact| contact.solid == index);
+            let known = touching.map(|contact| contact.depth).fold(0.0, f64::max);
+            let allowed = solid.allowed_depth();
+            let is_fast = depth > 0.5 * allowed && depth - known > 0.2 * (allowed - known).max(0.0);
+            if depth > allowed || is_fast && depth > known {
                 return Err(Rejection::Deep { solid: index, depth });
             }
             let radius = solid.shape.radius();
@@ -420,41 +309,54 @@ impl Workspace {
     }
 
     /// The difference to the result of order 1. That of velocities passes the matrix once more: what is stiff would be overestimated.
-    fn estimate(&mut self, around: Around, h: f64) -> Result<Found, Rejection> {
+    fn estimate(&mut self, around: Around, h: f64, after: &State) -> Result<Found, Rejection> {
         let Around { sheet, settings, .. } = around;
         let points = sheet.len();
+        let (first, second) = (GAMMA * h, (1.0 - GAMMA) * h);
+        let euler = self.euler;
         let mut found = Found { displacement: 0.0, point: 0 };
-        let way = |k: usize| (self.second[k] * (GAMMA * h) + self.first[k] * (h * (0.5 - GAMMA))).norm();
-        (0..points).for_each(|k| found.meet(way(k), k));
-        (0..self.free.len()).for_each(|number| found.meet(way(points + 2 * number), points + number));
+        // Differences of places and of velocities, from velocities at the start, in the middle and at the end.
+        let errors = |v: Vector, w: Vector, u: Vector| {
+            if euler {
+                let way = (w - v) * (0.5 * first) + (u - w) * (0.5 * second);
+                (way, ((u - w) / second - (w - v) / first) * (0.5 * h))
+            } else {
+                let gain = 1.0 / GAMMA;
+                ((u - w) * first, u - v - (w - v) * gain)
+            }
+        };
+        self.changes.clear();
+        for k in 0..points {
+            let (way, change) =
+                errors(self.start.velocities[k], self.middle.velocities[k], after.velocities[k]);
+            found.meet(way.norm(), k);
+            self.changes.push(change);
+        }
+        let bodies = self.start.bodies.iter().zip(&self.middle.bodies).zip(&after.bodies);
+        for (number, ((v, w), u)) in bodies.enumerate() {
+            let (way, change) = errors(v.velocity, w.velocity, u.velocity);
+            found.meet(way.norm(), points + number);
+            self.changes.extend([change, errors(v.spin, w.spin, u.spin).1]);
+        }
         if settings.fixed || !found.displacement.is_finite() {
             return Ok(found);
         }
-        self.right.clear();
-        self.right.extend(self.second.iter().zip(&sheet.masses).map(|(z, mass)| z * *mass));
-        for (number, free) in self.free.iter().enumerate() {
-            let [push, turn] = [0, 1].map(|k| self.second[points + 2 * number + k]);
-            self.right.extend([push * free.mass, free.inertia * turn]);
+        // Where solids touch, velocities of points jump, and no step is short enough for them; they count as what they move in the step itself.
+        let touching = self.touching.iter().any(|contacts| !contacts.is_empty());
+        let span = if touching { h } else { settings.longest };
+        let length = if euler { second } else { first };
+        self.newton.smooth(around, length, &mut self.changes, ROUGH)?;
+        for (k, value) in self.changes[..points].iter().enumerate() {
+            found.meet(value.norm() * span, k);
         }
-        let error = self.solve(around, h, ROUGH)?;
-        for (k, value) in error[..points].iter().enumerate() {
-            found.meet(value.norm() * settings.longest, k);
-        }
-        for number in 0..self.free.len() {
-            found.meet(error[points + 2 * number].norm() * settings.longest, points + number);
+        for number in 0..self.start.bodies.len() {
+            found.meet(self.changes[points + 2 * number].norm() * settings.longest, points + number);
         }
         Ok(found)
     }
-}
 
-/// Adds those of `late` whose solid and element are not in `contacts`. Both are sorted by solid and element.
-fn join(contacts: &mut Vec<Contact>, late: &[Contact]) {
-    let key = |contact: &Contact| (contact.solid, contact.element);
-    let known = contacts.len();
-    for contact in late {
-        if contacts[..known].binary_search_by_key(&key(contact), key).is_err() {
-            contacts.push(contact.clone());
-        }
+    /// Iterations of linear systems so far.
+    pub fn iterations(&self) -> u64 {
+        self.newton.iterations
     }
-    contacts.sort_by_key(key);
 }

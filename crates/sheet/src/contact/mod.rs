@@ -281,5 +281,5 @@ fn law(
     let line = normal * normal.transpose();
     let resisting = if factor > 0.0 { press * damping } else { 0.0 };
     let force = normal * pressure - along * drag;
-    (force, line * slope, line * resisting + (Matrix::identity() - line) * drag, energy)
+    (force, line * (slope * factor), line * resisting + (Matrix::identity() - line) * drag, energy)
 }
