@@ -59,6 +59,7 @@ mod floor;
 mod formats;
 mod frames;
 mod glyphs;
+mod haze;
 mod layout;
 mod lengths;
 mod lens;

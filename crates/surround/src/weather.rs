@@ -8,7 +8,9 @@ use dlsys_expr::Program;
 use dlsys_model::{self as model, Model, Primitive, Scenery, Units};
 use dlsys_sim::Settings;
 use dlsys_sway as sway;
-use dlsys_wind::{self as wind, Description, Field, Flow, Ground, Signal, Snapshot, Spectrum};
+use dlsys_wind::{
+    self as wind, Description, Field, Flow, Ground, Hull, Obstacle, Signal, Snapshot, Spectrum,
+};
 use nalgebra::Vector3;
 
 use crate::solids::Solids;
@@ -126,6 +128,36 @@ impl<'m> Weather<'m> {
     /// The field without bodies.
     pub fn field(&self) -> &Field {
         &self.declared.field
+    }
+
+    /// The wind at an instant, in s, without bodies.
+    ///
+    /// # Errors
+    /// A value of the wind that is not finite at that time.
+    pub(crate) fn free(&self, time: f64) -> Result<Arc<Snapshot>, Error> {
+        self.declared.at(time)
+    }
+
+    /// The bodies at a time in s.
+    ///
+    /// # Errors
+    /// Their growth up to that time fails.
+    pub(crate) fn hulls(&self, time: f64) -> Result<Vec<Hull>, Error> {
+        self.solids.as_ref().map_or(Ok(Vec::new()), |solids| solids.hulls(time))
+    }
+
+    /// True if there may be bodies.
+    pub(crate) fn has_bodies(&self) -> bool {
+        self.solids.is_some()
+    }
+
+    /// A wind with bodies in it as they are at an instant.
+    ///
+    /// # Errors
+    /// One of them cannot push the wind.
+    pub(crate) fn among(&self, free: &Snapshot, hulls: &[Hull]) -> Result<Snapshot, Error> {
+        let bodies: Vec<_> = hulls.iter().map(|hull| Arc::new(hull.clone()) as Arc<dyn Obstacle>).collect();
+        free.among(&bodies).map_err(|error| self.declared.spans.locate(error))
     }
 
     /// The wind at an instant, in s.
