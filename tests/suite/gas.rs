@@ -196,13 +196,14 @@ fn the_opacity_of_a_picture_is_that_of_quadrature() {
     let mut writer = FrameWriter::new(Format::PNG, survey.fit());
     writer.page.background = None;
     let (width, data) = pixels(&writer.write(&scene, "gas"));
-    let [left, top, ..] = writer.page.picture.view_box();
-    let scale = writer.page.pixels[0] as f64 / writer.page.picture.view_box()[2];
+    let [left, bottom, wide, high] = writer.page.picture.area;
+    let [w, h] = writer.page.pixels.map(f64::from);
+    let scale = (w / wide).min(h / high);
     let smoke = &scene.gases[0];
     let mut darkest = 0;
     for (number, pixel) in data.chunks_exact(4).enumerate().step_by(97) {
         let (x, y) = ((number % width) as f64 + 0.5, (number / width) as f64 + 0.5);
-        let (x, y) = (left + x / scale, -(top + y / scale));
+        let (x, y) = (left + wide / 2.0 + (x - w / 2.0) / scale, bottom + high / 2.0 - (y - h / 2.0) / scale);
         let density = |z: f64| {
             let place = Point::new(x, y, z);
             let one = |blob: &Blob| {
@@ -226,7 +227,7 @@ fn the_opacity_of_a_picture_is_that_of_quadrature() {
 fn gas_is_drawn_in_its_depth() {
     let scene = |z: f64| {
         format!(
-            "gas fog = size 0.4, mass 1, extinction 4, color \"#ffffff\"\ncolor red = \"#c00000\"\n\
+            "gas fog = size 2, mass 1, extinction 100, color \"#ffffff\"\ncolor red = \"#c00000\"\n\
              initial string: @S(fog, 1000, 0.01) [ &(90) f({z}) ^(90) ;(red) {{ . f(1) . -(90) f(1) . -(90) f(1) . }} ]"
         )
     };
@@ -236,7 +237,7 @@ fn gas_is_drawn_in_its_depth() {
         data.chunks_exact(3).map(reddest).max().unwrap_or_default()
     };
     // The turtle pitches down, away from its up, which is towards the viewer.
-    let (one, other) = (red(2.0), red(-2.0));
+    let (one, other) = (red(6.0), red(-6.0));
     let (front, behind) = (one.max(other), one.min(other));
     assert!(front > 150 && behind < 100, "{front} {behind}");
 }

@@ -296,6 +296,7 @@ pub fn inert_modules(model: &Model, occurs: &HashMap<KindId, Span>, diagnostics:
                     || name == GROUND
                     || kind.base() == DETACH
                     || kind.base() == ELASTIC
+                    || kind.base() == SOURCE
                     || model.scenery.plants.iter().any(|plant| plant.name == name)
                     || model.appearance.surfaces.iter().any(|shape| shape.name == name) => {}
             Class::Surface => diagnostics.push(
