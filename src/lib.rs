@@ -54,6 +54,7 @@
 //! | [`sway`] | mechanics of stems that bend |
 //! | [`fall`](crate::fall) | flight and landing of plates and small bodies |
 //! | [`gas`] | smoke, steam and pollen: blobs in the wind, and light through them |
+//! | [`sheet`] | flexible surfaces and nets, and their contact with solids |
 //! | [`wind`] | the velocity of the air, as a function of place and time |
 //! | [`study`] | accuracy and cost of methods; verification |
 //! | [`cli`] | the command line |
@@ -88,6 +89,7 @@ pub use dlsys_ode as ode;
 pub use dlsys_player as player;
 pub use dlsys_render as render;
 pub use dlsys_session::{self as session, replay};
+pub use dlsys_sheet as sheet;
 pub use dlsys_sim as sim;
 pub use dlsys_study as study;
 pub use dlsys_surround as surround;

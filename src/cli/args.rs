@@ -8,6 +8,7 @@ use super::fmt::FmtArgs;
 use super::new::NewArgs;
 use super::render::args::RENDER_EXAMPLES;
 pub use super::render::args::RenderArgs;
+use super::shared::Topology;
 use super::shared::{BudgetArgs, RunFormat, SharedArgs, SolverArgs, TextFormat};
 use super::shell::{self, CompletionsArgs, ManArgs};
 use super::values::{
@@ -252,6 +253,9 @@ pub struct FileArgs {
     /// With --format glb or usda: units of the model's time in a second of the animation [default: 1, or, with `units … time S`, 1/S]
     #[arg(long, value_name = "V", allow_negative_numbers = true, value_parser = positive)]
     pub speed: Option<f64>,
+    /// With --format usda: whether meshes keep their triangles. varying: a mesh for each material whose triangles change from frame to frame, with velocities
+    #[arg(long, value_enum, default_value_t = Topology::Constant)]
+    pub topology: Topology,
     /// With --format glb or usda: write over a file of another kind
     #[arg(long)]
     pub force: bool,
@@ -361,7 +365,7 @@ pub struct ReportArgs {
     /// status 1 if any fails
     #[arg(long, value_name = "DIR", num_args = 0..=1)]
     pub hard: Option<Option<PathBuf>>,
-    /// Exact cases of the wind, of stems that bend, of bodies that fall and of gases (statistics of turbulence, beams, buckling, vibrations, flutter, landing, energy, light)
+    /// Exact cases of the wind, of stems that bend, of bodies that fall, of gases and of sheets (statistics of turbulence, beams, buckling, vibrations, flutter, landing, energy, light, membranes, contact)
     /// with errors and orders, hard cases, error against work of the implicit methods, and speed. Exit status 1 if a statistic is out of its bound or a hard case fails
     #[arg(long, conflicts_with_all = ["hard", "verify", "methods", "tolerances", "step_sizes", "slices", "at", "from", "settings"])]
     pub surroundings: bool,

@@ -9,14 +9,14 @@ use super::args::{RenderArgs, RunArgs};
 use super::common::{Clock, Failure, ModelRun, count_of, out_error, size_of};
 use super::events::EventLog;
 use super::frame_source::{Frame, Pass, play_at};
-use super::one_file::{file_of, save, spare, spare_copy};
+use super::one_file::{file_of, place_of, save, spare, spare_copy};
 use super::progress::Progress;
 use super::render::flags::of_pictures;
-use super::shared::SharedArgs;
+use super::shared::{SharedArgs, Topology};
 use crate::diagnostic::Diagnostic;
-use crate::interchange::{self, Error, Growth, Options, grow};
+use crate::interchange::{self, Error, Growth, Options, Summary, grow, vary_usda};
 use crate::interrupt;
-use crate::render::{Companion, Fit, Format, FrameWriter, Layout, Survey, View};
+use crate::render::{Companion, Fit, Format, FrameWriter, Layout, Survey, View, aside};
 use crate::scene::Scene;
 use crate::sim::Stats;
 
@@ -36,6 +36,7 @@ struct Order<'a> {
     accuracy: Option<f64>,
     /// Units of the model's time in a second.
     speed: Option<f64>,
+    topology: Topology,
     threads: usize,
     limit: u64,
     force: bool,
@@ -44,6 +45,12 @@ struct Order<'a> {
 
 impl Order<'_> {
     fn spare(&self) -> Result<(), Failure> {
+        if self.topology == Topology::Varying && self.format != interchange::Format::Usda {
+            return Err(usage(format!(
+                "--topology varying does not go with --format {}: its meshes keep their triangles; choose --format usda",
+                self.format.extension()
+            )));
+        }
         let mark = self.format.mark();
         spare(&self.out, self.force, self.format.extension(), |start| start.starts_with(mark))
     }
@@ -60,6 +67,7 @@ pub fn refuse_flags(args: &RunArgs) -> Result<(), Failure> {
         ("--out", file.out.is_some()),
         ("--accuracy", file.accuracy.is_some()),
         ("--speed", file.speed.is_some()),
+        ("--topology", file.topology == Topology::Varying),
         ("--force", file.force),
     ];
     if let Some((flag, _)) = given.iter().find(|(_, given)| *given) {
@@ -97,6 +105,7 @@ pub fn run(args: &RunArgs, format: interchange::Format) -> Result<(), Failure> {
         out: file_of(out, model, format.extension())?,
         accuracy: args.file.accuracy,
         speed: args.file.speed,
+        topology: args.file.topology,
         threads: args.threads.unwrap_or_else(cores),
         limit: u64::MAX,
         force: args.file.force,
@@ -140,6 +149,7 @@ fn order_of(args: &RenderArgs, format: interchange::Format) -> Result<Order<'_>,
         out: file_of(&args.out, &args.shared.model, format.extension())?,
         accuracy: args.accuracy,
         speed: args.speed,
+        topology: args.topology,
         threads: args.threads.unwrap_or_else(cores),
         limit: args.max_output,
         force: args.force,
@@ -176,7 +186,13 @@ fn write(order: &Order<'_>, run: ModelRun, stale: &dyn Fn() -> bool) -> Result<(
         return Err(Failure::Stale);
     }
     let fit = FrameWriter::new(Format::OBJ, survey.fit()).fit;
-    let growth = follow(order, &run, &survey, fit, &mut clock)?;
+    let options = options(order, &run, &survey, &fit);
+    if order.topology == Topology::Varying {
+        let summary = varying(order, &run, options, &mut clock)?;
+        run.write_stats(order.shared, clock, stats)?;
+        return report(order, &summary, fit.accuracy / Fit::ACCURACY, begun);
+    }
+    let growth = follow(order, &run, &options, &mut clock)?;
     let before = Instant::now();
     let bytes = growth.file(order.format).map_err(|error| failure(&run, &error))?;
     if bytes.len() as u64 > order.limit {
@@ -187,12 +203,7 @@ fn write(order: &Order<'_>, run: ModelRun, stale: &dyn Fn() -> bool) -> Result<(
         )));
     }
     let companions = growth.companions(order.format);
-    for companion in &companions {
-        spare_copy(&order.out.with_file_name(&companion.name), &companion.bytes, order.force)?;
-    }
-    for Companion { name, bytes } in &companions {
-        save(&order.out.with_file_name(name), bytes)?;
-    }
+    copy(order, &companions)?;
     save(&order.out, &bytes)?;
     clock.output += before.elapsed();
     run.write_stats(order.shared, clock, stats)?;
@@ -214,6 +225,62 @@ fn write(order: &Order<'_>, run: ModelRun, stale: &dyn Fn() -> bool) -> Result<(
     if bytes.len() > LARGE && order.accuracy.is_none() {
         line += "  large: a coarser --accuracy, or a shorter time, makes a smaller file\n";
     }
+    std::io::stdout().write_all(line.as_bytes()).map_err(out_error)
+}
+
+/// Writes the pictures beside the file.
+fn copy(order: &Order<'_>, companions: &[Companion]) -> Result<(), Failure> {
+    for companion in companions {
+        spare_copy(&order.out.with_file_name(&companion.name), &companion.bytes, order.force)?;
+    }
+    companions.iter().try_for_each(|Companion { name, bytes }| save(&order.out.with_file_name(name), bytes))
+}
+
+/// Writes a file whose triangles change from frame to frame, under a temporary name until it is whole.
+fn varying(
+    order: &Order<'_>,
+    run: &ModelRun,
+    mut options: Options,
+    clock: &mut Clock,
+) -> Result<Summary, Failure> {
+    let before = Instant::now();
+    options.limits.bytes = order.limit;
+    let io = |error: std::io::Error| {
+        Failure::Model(format!("error: cannot write {}: {error}\n", order.out.display()))
+    };
+    let place = place_of(&order.out)?.0;
+    let file = aside(place).map_err(|error| Failure::Model(format!("error: {error}\n")))?;
+    let mut progress = bar(order, "writing", run.times.len());
+    let mut out = std::io::BufWriter::with_capacity(1 << 20, file);
+    let summary = vary_usda(&run.session, run.settings, &run.times, &options, &mut out, &mut |_| {
+        progress.inc();
+        !interrupt::asked()
+    });
+    drop(progress);
+    let summary = summary.map_err(|error| failure(run, &error))?;
+    copy(order, &summary.companions)?;
+    let file = out.into_inner().map_err(|error| io(error.into_error()))?;
+    file.persist(&order.out).map_err(|error| io(error.error))?;
+    clock.simulate += before.elapsed();
+    Ok(summary)
+}
+
+/// A line about a file whose triangles change.
+fn report(order: &Order<'_>, summary: &Summary, extent: f64, begun: Instant) -> Result<(), Failure> {
+    if order.quiet {
+        return Ok(());
+    }
+    let beside: String =
+        summary.companions.iter().map(|companion| format!(", with {}", companion.name)).collect();
+    let line = format!(
+        "{}{beside}: {}, {} corners in the largest, velocities to {:.0e} of the extent a second, {}, in {:.2} s\n",
+        order.out.display(),
+        count_of(summary.frames, "frame"),
+        summary.corners,
+        summary.velocity_error / extent,
+        size_of(summary.bytes),
+        begun.elapsed().as_secs_f64(),
+    );
     std::io::stdout().write_all(line.as_bytes()).map_err(out_error)
 }
 
@@ -246,15 +313,8 @@ fn measure(order: &Order<'_>, run: &ModelRun, clock: &mut Clock) -> Result<(Surv
     measured.map(|stats| (survey, stats))
 }
 
-/// The second pass.
-fn follow(
-    order: &Order<'_>,
-    run: &ModelRun,
-    survey: &Survey,
-    fit: Fit,
-    clock: &mut Clock,
-) -> Result<Growth, Failure> {
-    let before = Instant::now();
+/// How the run becomes a file.
+fn options(order: &Order<'_>, run: &ModelRun, survey: &Survey, fit: &Fit) -> Options {
     let extent = fit.accuracy / Fit::ACCURACY;
     let mut options = Options::new(&run.session.model, fit.default_width, extent);
     options.threads = order.threads;
@@ -270,13 +330,24 @@ fn follow(
         let middle = crate::scene::Point::from((low.coords + high.coords) / 2.0);
         options.floor = Some([height, middle.x, middle.z, FLOOR * extent]);
     }
+    options
+}
+
+/// The second pass.
+fn follow(
+    order: &Order<'_>,
+    run: &ModelRun,
+    options: &Options,
+    clock: &mut Clock,
+) -> Result<Growth, Failure> {
+    let before = Instant::now();
     let (first, last) = (run.times.first().copied().unwrap_or(0.0), run.times.last().copied().unwrap_or(0.0));
     let mut progress = bar(order, "following", 1000);
     let mut reached = |time: f64| {
         progress.reach((time - first) / (last - first).max(f64::MIN_POSITIVE));
         !interrupt::asked()
     };
-    let growth = grow(&run.session, run.settings, &run.times, &options, &mut reached);
+    let growth = grow(&run.session, run.settings, &run.times, options, &mut reached);
     drop(progress);
     clock.simulate += before.elapsed();
     growth.map_err(|error| failure(run, &error))
@@ -308,6 +379,10 @@ fn failure(run: &ModelRun, error: &interchange::Error) -> Failure {
         Error::TooLarge { .. } => {
             &["a coarser --accuracy needs fewer numbers; so does a shorter time with `--from A --to B`"]
         }
+        Error::Bytes { .. } => &[
+            "a coarser --accuracy has fewer triangles, and fewer frames (--step) fewer of them",
+            "without `--topology varying` shapes are shared by modules, and the file is much smaller",
+        ],
         Error::TooLong { .. } => &[&a_minute],
         _ => &[],
     };

@@ -130,11 +130,13 @@ const CHAIN: usize = 10_000;
 const TREES: std::ops::Range<u64> = 48..128;
 /// Bodies that are thrown at the ground.
 const THROWS: u64 = 400;
+/// Solids that move into a sheet.
+const PASSES: u64 = 100;
 
-/// Exact cases, hard cases and speed of wind, stems, bodies that fall and gases. Each table is printed when it is complete.
+/// Exact cases, hard cases and speed of wind, stems, bodies that fall, gases and sheets. Each table is printed when it is complete.
 fn surroundings(args: &ReportArgs) -> Result<(), Failure> {
     let defect = |error: String| Failure::Model(format!("error: {error}\n"));
-    let mut progress = Progress::of_printed("surroundings", 10);
+    let mut progress = Progress::of_printed("surroundings", 14);
     let mut show = |table: String| {
         progress.inc();
         progress.suspend(|| print(&format!("{table}\n")))
@@ -163,28 +165,41 @@ fn surroundings(args: &ReportArgs) -> Result<(), Failure> {
         gases.extend(case().map_err(|error| defect(error.to_string()))?);
     }
     show(study::exact_gas_table(&gases))?;
+    let mut sheets = Vec::new();
+    for case in crate::sheet::study::EXACT_CASES {
+        sheets.extend(case().map_err(|error| defect(error.to_string()))?);
+    }
+    show(study::exact_sheet_table(&sheets))?;
+    show(study::net_table().map_err(|error| defect(error.to_string()))?)?;
+    let passes = study::Passes::new(PASSES);
+    show(passes.table())?;
     let wind = crate::wind::study::statistics(SEEDS).map_err(|error| defect(error.to_string()))?;
     show(study::wind_table(&wind))?;
     show(study::speed_table().map_err(defect)?)?;
     show(study::gas_speed_table().map_err(|error| defect(error.to_string()))?)?;
+    show(study::sheet_speed_table().map_err(|error| defect(error.to_string()))?)?;
     drop(progress);
     if let Some(out) = &args.out {
         write(
             out,
             "surroundings.csv",
-            &study::surroundings_csv(&wind, &[("stems", &stems), ("falling", &falls), ("gas", &gases)]),
+            &study::surroundings_csv(
+                &wind,
+                &[("stems", &stems), ("falling", &falls), ("gas", &gases), ("sheets", &sheets)],
+            ),
         )?;
     }
     let bad = wind.iter().filter(|row| !row.holds()).count();
     let failed = hard.iter().filter(|case| case.failure.is_some()).count()
         + random.iter().filter(|case| case.failure.is_some()).count()
-        + landings.failed();
+        + landings.failed()
+        + passes.failed();
     match bad + failed {
         0 => Ok(()),
         _ => Err(Failure::Model(format!(
             "error: {} out of bounds, {} failed\n",
             count_of(bad, "statistic"),
-            count_of(failed, "case of stems and falls")
+            count_of(failed, "case of stems, falls and sheets")
         ))),
     }
 }

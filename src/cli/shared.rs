@@ -153,6 +153,14 @@ pub enum Scheduler {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Topology {
+    /// A prim for each module; shapes are interpolated between samples
+    Constant,
+    /// A mesh for each material, whose triangles change from frame to frame, with velocities
+    Varying,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum RunFormat {
     /// Text for reading
     Text,

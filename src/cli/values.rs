@@ -7,7 +7,7 @@ use crate::film;
 use crate::interchange;
 use crate::render::{Camera, Format, Layout, Page};
 use crate::scene::{Color, Point, Vector, Viewpoint};
-use crate::sim::{BendMethod, Method};
+use crate::sim::{BendMethod, Method, brief};
 
 /// A format for frames.
 pub(super) fn frame_format() -> impl TypedValueParser<Value = Format> {
@@ -206,6 +206,26 @@ pub(super) fn turn(text: &str) -> Result<f64, String> {
     match number(text)? {
         x if x.abs() <= MOST => Ok(x),
         _ => Err(format!("must be between -{MOST} and {MOST} degrees; a full turn has 360")),
+    }
+}
+
+/// How long the shutter is open, in frames: as Blender has it, or as an angle.
+pub(super) fn shutter(text: &str) -> Result<f64, String> {
+    let angle = ["deg", "°"].iter().find_map(|unit| text.strip_suffix(unit));
+    let (open, whole) = match angle {
+        Some(angle) => (number(angle.trim_end())?, 360.0),
+        None => (number(text)?, 1.0),
+    };
+    match open {
+        x if (0.0..=whole).contains(&x) => Ok(x / whole),
+        x if angle.is_none() && (2.0..=360.0).contains(&x) => Err(format!(
+            "is in frames, from 0 to 1; {x} degrees of 360 are {} of a frame, or `{x}deg`",
+            brief(x / 360.0, 4)
+        )),
+        _ => {
+            Err("must be from 0 to 1 frame, or from 0deg to 360deg: the shutter opens once a frame"
+                .to_owned())
+        }
     }
 }
 

@@ -200,3 +200,26 @@ fn steps_of_a_fixed_length_know_values_too() {
     assert!((states[0][0].1[0] - 4.0).abs() < 1e-6, "{states:?}");
     assert!((states[0][0].1[1] - 2.0).abs() < 1e-6, "{states:?}");
 }
+
+#[test]
+fn values_that_jump_away_from_a_threshold_take_their_readers_along() {
+    // Before t = 1 every threshold is met exactly; the reader has been followed to the instant at which its neighbour jumps.
+    for text in [
+        "axiom: S(1) S(1)\nS(w) > S(v): solve w = max(1, v)\nS(w): solve w = if t < 1 then 1 else 2\n",
+        "axiom: S(1) S(1)\nS(w) > S(v): solve w = if v > 1 then v else 1\nS(w): solve w = if t < 1 then 1 else 2\n",
+        "axiom: S(1) S(1)\nS(w) > S(v): solve w = max(1, v)\nS(w): solve w = if t < 1 then 1 else 0.5\n",
+    ] {
+        let last = if text.contains("0.5") { [1.0, 0.5] } else { [2.0, 2.0] };
+        follows(text, &TIMES, |t| {
+            let [w, v] = if t < 1.0 { [1.0, 1.0] } else { last };
+            vec![vec![w], vec![v]]
+        });
+    }
+    // The pipe model with a twig of the least width: two more twigs at t = 1.
+    let pipe =
+        "axiom: S(1) S(1) A\nS(w): solve w = max(1, sum(S(v): v))\nA: if age = 1 produce [ S(1) ] S(1)\n";
+    follows(pipe, &TIMES, |t| match t < 1.0 {
+        true => vec![vec![1.0], vec![1.0]],
+        false => vec![vec![2.0], vec![2.0], vec![1.0], vec![1.0]],
+    });
+}

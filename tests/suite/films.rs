@@ -81,6 +81,68 @@ fn a_camera_goes_round_a_plant_that_grows_or_stands_still() {
     assert!(turned == frames[4], "180 degrees the other way round");
 }
 
+/// A square of a unit that moves to the right by its `t`, beside one that stands.
+const MOVING: &str = "initial string: S\nframes 0 .. 4 step 1\ncolor c = \"#202020\"\n\
+    interpret S: [ f(3) -(90) f(-4) Box ] [ -(90) f(t) Box ] [ f(5) -(90) f(10) Box ]\n\
+    interpret Box: ;(c) { f(1) +(90) f(1) +(90) f(1) +(90) f(1) }";
+
+#[test]
+fn an_open_shutter_averages_the_light_of_what_moves() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let model = folder.path().join("moving.dls");
+    fs::write(&model, MOVING).expect("written");
+    let model = model.to_str().expect("UTF-8");
+    let render = |name: &str, flags: &[&str]| {
+        let out = folder.path().join(name);
+        let all = ["render", model, "-o", out.to_str().expect("UTF-8"), "--size", "160x80", "--format"];
+        let said = good(&[&all[..], flags].concat());
+        (out, said)
+    };
+    let one = ["--from", "2", "--to", "2", "--step", "1"];
+    let frame = |name: &str, flags: &[&str]| {
+        png(&render(name, &[&["png"][..], flags].concat()).0.join("frame-0000.png"))
+    };
+    let sharp = frame("sharp", &one);
+    assert!(frame("none", &[&one[..], &["--shutter", "0"]].concat()) == sharp);
+    let (out, said) = render("open", &[&["png"][..], &one[..], &["--shutter", "360deg"]].concat());
+    let open = png(&out.join("frame-0000.png"));
+    assert!(said.contains("moments in all") && !said.contains("something moves by"), "{said}");
+    // The light that the square takes away is the same, and spread over twice its width.
+    let linear = |value: u8| (f64::from(value) / 255.0).powf(2.2);
+    let taken = |picture: &[u8], column: usize| -> f64 {
+        let paper = linear(picture[0]);
+        picture[4 * column..].chunks(4 * 160).map(|row| paper - linear(row[0])).sum()
+    };
+    let all = |picture: &[u8]| (0..160).map(|column| taken(picture, column)).sum::<f64>();
+    assert!((all(&open) / all(&sharp) - 1.0).abs() < 0.02, "{} {}", all(&open), all(&sharp));
+    let widest = |picture: &[u8]| {
+        let dark: Vec<bool> = (0..160).map(|column| taken(picture, column) > 0.05).collect();
+        dark.chunk_by(|a, b| a == b).filter(|run| run[0]).map(<[bool]>::len).max().unwrap_or(0)
+    };
+    let (moved, stood) = (widest(&open), widest(&sharp));
+    assert!((2 * stood - 2..=2 * stood + 2).contains(&moved), "{moved} {stood}");
+    // What stands keeps its bits: the last column of the picture in which anything is drawn.
+    let last = (0..160).rev().find(|column| taken(&sharp, *column) > 0.05).expect("drawn");
+    let column = |picture: &[u8]| -> Vec<u8> {
+        picture[4 * (last - 2)..].chunks(4 * 160).flat_map(|row| row[..4].to_vec()).collect()
+    };
+    assert!(column(&open) == column(&sharp));
+    // A film shows the PNG frames, whatever the threads, and a still with the camera of the film is its frame.
+    let (out, _) = render("frames", &["png", "--shutter", "0.5", "--background", "none"]);
+    let frames: Vec<Vec<u8>> = (0..5).map(|i| png(&out.join(format!("frame-{i:04}.png")))).collect();
+    let (film, _) =
+        render("a.webp", &["webp", "--shutter", "180deg", "--background", "none", "--threads", "1"]);
+    assert!(reader::read(&fs::read(film).expect("a file")).0 == frames);
+    let seen = ["--camera", "3,3,30/3,3,0/40", "--shutter", "0.5"];
+    let (out, _) = render("some", &[&["png"][..], &seen].concat());
+    let at = frame("at", &[&["--at", "2"][..], &seen].concat());
+    assert!(png(&out.join("frame-0002.png")) == at);
+    assert!(png(&out.join("frame-0001.png")) != at);
+    // The camera moves, too.
+    let turn = ["--at", "2", "--orbit", "360", "--orbit-frames", "8"];
+    assert!(frame("orbit", &[&turn[..], &["--shutter", "0.5"]].concat()) != frame("still", &turn));
+}
+
 #[test]
 fn raw_video_goes_to_a_pipe() {
     let video = std::process::Command::new(env!("CARGO_BIN_EXE_dlsys"))
@@ -100,7 +162,7 @@ fn flags_that_make_no_film_are_refused_and_files_of_others_stay() {
     let thesis = folder.path().join("thesis.gif");
     fs::write(&thesis, "years of work").expect("written");
     let thesis = thesis.to_str().expect("UTF-8");
-    let cases: [(&[&str], &str); 11] = [
+    let cases: [(&[&str], &str); 17] = [
         (&["gif", "-o", thesis], "is not a GIF file"),
         (&["gif", "-o", "a.gif", "--background", "none"], "no transparency"),
         (&["webp", "-o", "a.gif"], "`-o a.webp`"),
@@ -112,6 +174,12 @@ fn flags_that_make_no_film_are_refused_and_files_of_others_stay() {
         (&["obj", "-o", "a", "--orbit", "90"], "--orbit is for pictures"),
         (&["png", "-o", "a", "--orbit", "90", "--layout", "grid"], "--orbit does not go with --layout grid"),
         (&["png", "-o", "a", "--orbit", "90", "--orbit-frames", "9"], "`--at T`"),
+        (&["svg", "-o", "a", "--shutter", "0.5"], "--shutter averages pixels, and SVG files have none"),
+        (&["obj", "-o", "a", "--shutter", "0.5"], "choose --format png, or a film"),
+        (&["usda", "-o", "a.usda", "--shutter", "0.5"], "--shutter does not go with --format usda"),
+        (&["png", "-o", "a", "--shutter", "0.5", "--layout", "stack"], "--shutter does not go with"),
+        (&["png", "-o", "a", "--shutter", "180"], "180 degrees of 360 are 0.5 of a frame, or `180deg`"),
+        (&["png", "-o", "a", "--shutter", "1.5"], "from 0 to 1 frame, or from 0deg to 360deg"),
     ];
     for (arguments, expected) in cases {
         let (_, message) = bad(&[&RENDER[..], arguments].concat());

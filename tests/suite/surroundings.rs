@@ -298,6 +298,9 @@ fn the_report_of_the_surroundings_has_all_its_tables() {
         "falling: exact cases",
         "gas: exact cases",
         "gas: speed",
+        "sheets: exact cases",
+        "a net of 0.03 kg",
+        "sheets: speed",
         "400 of 400",
         "statistics of the turbulence",
         "speed on one core",
@@ -307,4 +310,5 @@ fn the_report_of_the_surroundings_has_all_its_tables() {
     let csv = std::fs::read_to_string(folder.path().join("out/surroundings.csv")).expect("written");
     assert!(csv.lines().count() > 80 && csv.contains("stems,\"end load"), "{csv}");
     assert!(csv.contains("falling,\"flutter") && csv.contains("gas,\"rigid rotation"), "{csv}");
+    assert!(csv.contains("sheets,\"chain between"), "{csv}");
 }

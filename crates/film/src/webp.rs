@@ -3,7 +3,7 @@
 use std::io::{self, Seek, SeekFrom, Write};
 
 use crate::pipeline::Pipeline;
-use crate::{Encoder, Frame, Shape, Ticks, vp8l};
+use crate::{Encoder, Frame, Shape, Ticks, invalid, vp8l};
 
 const HAS_ANIMATION: u8 = 0x02;
 const HAS_ALPHA: u8 = 0x10;
@@ -11,6 +11,17 @@ const HAS_ALPHA: u8 = 0x10;
 const REPLACES: u8 = 0x02;
 /// Place of the first byte of flags.
 const FLAGS: u64 = 20;
+/// Pixels that are encoded at once, at most, where there is more than one frame in work. Each takes about 40 bytes of memory: tokens, residuals, and the tables that find copies.
+const PIXELS_AT_ONCE: u64 = 25_000_000;
+/// Most pixels of a frame: 4 GB of memory.
+const MOST_PIXELS: u64 = 100_000_000;
+
+/// The number of frames that are encoded at once, so that large ones do not fill the memory; `None` if a single one would.
+fn at_once(shape: Shape, threads: usize) -> Option<usize> {
+    let pixels = u64::from(shape.width) * u64::from(shape.height);
+    let most = (PIXELS_AT_ONCE / pixels.max(1)).clamp(1, 1024) as usize;
+    (pixels <= MOST_PIXELS).then_some(threads.min(most))
+}
 
 pub(crate) struct Webp<'w, W> {
     out: &'w mut W,
@@ -31,6 +42,12 @@ fn three(x: u32) -> [u8; 3] {
 
 impl<'w, W: Write + Seek> Webp<'w, W> {
     pub(crate) fn new(out: &'w mut W, shape: Shape, threads: usize) -> io::Result<Webp<'w, W>> {
+        let threads = at_once(shape, threads).ok_or_else(|| {
+            invalid(format!(
+                "webp films have at most {} million pixels a frame, because encoding one takes 40 bytes of memory for each; --format y4m has no such limit",
+                MOST_PIXELS / 1_000_000
+            ))
+        })?;
         let begun = out.stream_position()?;
         // The size is not known yet.
         out.write_all(b"RIFF\0\0\0\0WEBP")?;
@@ -101,5 +118,22 @@ impl<W: Write + Seek> Encoder for Webp<'_, W> {
         self.out.write_all(&[self.flags])?;
         self.out.seek(SeekFrom::End(0))?;
         self.out.flush()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn large_frames_are_encoded_one_by_one() {
+        let shape = |width, height| Shape { width, height, has_alpha: false };
+        assert_eq!(at_once(shape(480, 572), 8), Some(8));
+        assert_eq!(at_once(shape(3840, 2160), 8), Some(3));
+        assert_eq!(at_once(shape(8000, 6000), 8), Some(1));
+        assert_eq!(at_once(shape(16_384, 16_384), 1), None);
+        let mut out = io::Cursor::new(Vec::new());
+        let refused = Webp::new(&mut out, shape(16_384, 16_384), 1).err().expect("refused");
+        assert!(refused.to_string().contains("100 million pixels"), "{refused}");
     }
 }

@@ -37,6 +37,15 @@ pub enum Error {
         /// Its bytes.
         bytes: u64,
     },
+    /// The file is larger than it may be.
+    #[error("the file is larger than {limit} bytes")]
+    Bytes {
+        /// The most that it may have.
+        limit: u64,
+    },
+    /// A file cannot be written.
+    #[error("cannot write the file: {0}")]
+    Io(#[from] std::io::Error),
     /// Times of the file are 32 bit floats, which this long an animation has too few of.
     #[error(
         "the animation would last {seconds} s, and instants later than {limit} s are further apart than a millisecond in the file"

@@ -44,6 +44,7 @@ mod stem;
 mod thin;
 mod track;
 mod usd;
+mod vary;
 
 use std::collections::HashMap;
 
@@ -60,6 +61,7 @@ use mesh::Cutter;
 use motion::Clock;
 use sample::Sampler;
 use track::Tracks;
+pub use usd::varying::{Summary, vary_usda};
 
 /// Formats of files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -95,12 +97,14 @@ pub struct Limits {
     pub nodes: usize,
     /// Most numbers that are kept, of four bytes each.
     pub numbers: usize,
+    /// Most bytes of a file whose triangles change from frame to frame.
+    pub bytes: u64,
 }
 
 impl Default for Limits {
     /// As many nodes as programs for scenes still open, and a gigabyte.
     fn default() -> Limits {
-        Limits { nodes: 100_000, numbers: 250_000_000 }
+        Limits { nodes: 100_000, numbers: 250_000_000, bytes: u64::MAX }
     }
 }
 
@@ -291,11 +295,16 @@ impl Growth {
 
     /// The floor that the model declares: the corners of a large square, in metres, and its triangles.
     pub(crate) fn floor(&self) -> Option<(Vec<[f32; 3]>, Vec<u32>)> {
-        let [height, x, z, half] = self.options.floor?.map(|value| (value * self.options.metres) as f32);
-        let corners = [(-1.0, 1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
-        let corners = corners.map(|(a, b)| [x + a * half, height, z + b * half]);
-        Some((corners.to_vec(), vec![0, 1, 2, 0, 2, 3]))
+        floor_of(&self.options)
     }
+}
+
+/// The same of options.
+fn floor_of(options: &Options) -> Option<(Vec<[f32; 3]>, Vec<u32>)> {
+    let [height, x, z, half] = options.floor?.map(|value| (value * options.metres) as f32);
+    let corners = [(-1.0, 1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
+    let corners = corners.map(|(a, b)| [x + a * half, height, z + b * half]);
+    Some((corners.to_vec(), vec![0, 1, 2, 0, 2, 3]))
 }
 
 /// Of an sRGB colour, the linear channels that files take.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use dlsys_geometry::scene::{MaterialId, Mesh, Net, Palette, Patch, Point, Vector};
 use dlsys_render::{cross_section, normal, triangulate};
 
-use crate::part::{Catalogue, Form, Paint, Part, any_across, triple};
+use crate::part::{Catalogue, Form, Number, Paint, Part, any_across, triple};
 use crate::stem::{Corner, Tube};
 
 /// Corners of one material in their places.
@@ -50,12 +50,12 @@ pub(crate) struct Cutter<'a> {
 
 impl Cutter<'_> {
     /// The triangles of a form that are right for all of these shapes, the first of which is the mature one.
-    pub(crate) fn layout(&self, form: &Form, paint: &Paint, shapes: &[Vec<f32>]) -> Layout {
+    pub(crate) fn layout<N: Number>(&self, form: &Form, paint: &Paint, shapes: &[Vec<N>]) -> Layout {
         let mut layout = Layout { pieces: Vec::new(), primitives: Vec::new() };
         let mut counts: Vec<u32> = Vec::new();
         let mut first = 0;
         for (part, material) in form.iter().zip(&**paint) {
-            let own: Vec<&[f32]> = shapes.iter().map(|shape| &shape[first..first + part.numbers()]).collect();
+            let own: Vec<&[N]> = shapes.iter().map(|shape| &shape[first..first + part.numbers()]).collect();
             let material = material.unwrap_or(MaterialId::LEAF);
             match *part {
                 Part::Stem(contour) => {
@@ -105,19 +105,18 @@ impl Cutter<'_> {
         Tube::new(&cross_section(points, radius, self.accuracy))
     }
 
-    fn surface(
+    fn surface<N: Number>(
         &self,
         layout: &mut Layout,
         counts: &mut Vec<u32>,
         (place, paint, form): (usize, &Paint, &Form),
         first: usize,
-        own: &[&[f32]],
+        own: &[&[N]],
     ) {
         let Some(source) = self.catalogue.surfaces.get(&place) else { return };
         let limits = source.limits();
-        let scale = |numbers: &[f32]| {
-            (0..3).map(|k| triple(numbers, k + 1).norm() / limits[k]).fold(0.0_f64, f64::max)
-        };
+        let scale =
+            |numbers: &[N]| (0..3).map(|k| triple(numbers, k + 1).norm() / limits[k]).fold(0.0_f64, f64::max);
         let largest = own.iter().map(|numbers| scale(numbers)).fold(0.0, f64::max);
         let mesh = source.mesh(self.accuracy, largest);
         // The part's own colour, if it has one.
@@ -198,14 +197,20 @@ impl Layout {
     /// Where the corners lie for these numbers, by primitive. Where a normal has no direction it is zero.
     pub(crate) fn places(&self, numbers: &[f32]) -> Vec<Places> {
         let mut places = vec![Places::default(); self.primitives.len()];
+        self.visit(numbers, |primitive, position, normal| {
+            let out = &mut places[primitive];
+            out.positions.push(position.map(|x| x as f32).into());
+            let normal = normal.try_normalize(1e-30).unwrap_or_else(Vector::zeros);
+            out.normals.push(normal.map(|x| x as f32).into());
+        });
+        places
+    }
+
+    /// The same one after the other: the number of the primitive, the position, and a vector along the normal.
+    pub(crate) fn visit<N: Number>(&self, numbers: &[N], mut visit: impl FnMut(usize, Vector, Vector)) {
         for Piece { primitive, first, shape } in &self.pieces {
             let own = &numbers[*first..];
-            let out = &mut places[*primitive];
-            let mut put = |position: Vector, normal: Vector| {
-                out.positions.push(position.map(|x| x as f32).into());
-                let normal = normal.try_normalize(1e-30).unwrap_or_else(Vector::zeros);
-                out.normals.push(normal.map(|x| x as f32).into());
-            };
+            let mut put = |position: Vector, normal: Vector| visit(*primitive, position, normal);
             match shape {
                 PieceShape::Stem(tube) => stem(tube, own, &mut put),
                 PieceShape::Polygon(corners) => {
@@ -231,23 +236,22 @@ impl Layout {
                 PieceShape::Patch(columns, rows) => patch(&net(own), *columns, *rows, &mut put),
             }
         }
-        places
     }
 }
 
-fn stem(tube: &Tube, numbers: &[f32], put: &mut impl FnMut(Vector, Vector)) {
+fn stem<N: Number>(tube: &Tube, numbers: &[N], put: &mut impl FnMut(Vector, Vector)) {
     let ends = [triple(numbers, 0), triple(numbers, 1)];
     let along = triple(numbers, 2).try_normalize(1e-300).unwrap_or_else(Vector::y);
     let across = triple(numbers, 3).try_normalize(1e-300).unwrap_or_else(|| any_across(&along));
     let axes = [across, along.cross(&across), along];
     for corner in &tube.corners {
         let end = usize::from(corner.upper);
-        let radius = f64::from(numbers[12 + end]);
+        let radius: f64 = numbers[12 + end].into();
         put(ends[end] + Corner::turned(corner.place, axes) * radius, Corner::turned(corner.normal, axes));
     }
 }
 
-fn net(numbers: &[f32]) -> Net {
+fn net<N: Number>(numbers: &[N]) -> Net {
     let point = |i: usize| Point::from(triple(numbers, i));
     [0, 4, 8, 12].map(|row| [0, 1, 2, 3].map(|column| point(row + column)))
 }

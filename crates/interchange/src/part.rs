@@ -62,8 +62,25 @@ impl Part {
     }
 }
 
+/// The numbers of samples: 32 bits where many are kept, 64 where their differences count.
+pub(crate) trait Number: Copy + Into<f64> {
+    fn of(x: f64) -> Self;
+}
+
+impl Number for f32 {
+    fn of(x: f64) -> f32 {
+        x as f32
+    }
+}
+
+impl Number for f64 {
+    fn of(x: f64) -> f64 {
+        x
+    }
+}
+
 /// Three numbers as a vector.
-pub(crate) fn triple(numbers: &[f32], i: usize) -> Vector {
+pub(crate) fn triple<N: Number>(numbers: &[N], i: usize) -> Vector {
     Vector::new(numbers[3 * i].into(), numbers[3 * i + 1].into(), numbers[3 * i + 2].into())
 }
 

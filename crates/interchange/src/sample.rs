@@ -5,17 +5,17 @@ use std::sync::Arc;
 use dlsys_geometry::scene::{MaterialId, Owner, OwnerId, Point, Scene, Segment, Vector};
 use dlsys_tree::Lineage;
 
-use crate::part::{Frame, Part, Source};
+use crate::part::{Frame, Number, Part, Source};
 
 /// Everything that is drawn at one instant.
-#[derive(Debug, Default)]
-pub(crate) struct Sample {
+#[derive(Debug)]
+pub(crate) struct Sample<N = f32> {
     pub(crate) time: f64,
     /// In string order.
     pub(crate) modules: Vec<Module>,
     parts: Vec<Part>,
     materials: Vec<Option<MaterialId>>,
-    numbers: Vec<f32>,
+    numbers: Vec<N>,
     /// Surfaces that the parts name.
     pub(crate) sources: Vec<(usize, Source)>,
 }
@@ -31,7 +31,14 @@ pub(crate) struct Module {
     number: u32,
 }
 
-impl Sample {
+impl<N> Default for Sample<N> {
+    fn default() -> Sample<N> {
+        let (modules, parts, materials) = (Vec::new(), Vec::new(), Vec::new());
+        Sample { time: 0.0, modules, parts, materials, numbers: Vec::new(), sources: Vec::new() }
+    }
+}
+
+impl<N> Sample<N> {
     /// The parts of a module, by its number.
     pub(crate) fn parts(&self, i: usize) -> &[Part] {
         &self.parts[self.range(i, self.parts.len(), |m| m.part)]
@@ -48,7 +55,7 @@ impl Sample {
     }
 
     /// The numbers of its parts, in its frame.
-    pub(crate) fn numbers(&self, i: usize) -> &[f32] {
+    pub(crate) fn numbers(&self, i: usize) -> &[N] {
         &self.numbers[self.range(i, self.numbers.len(), |m| m.number)]
     }
 
@@ -78,7 +85,7 @@ pub(crate) struct Sampler {
 
 impl Sampler {
     /// The modules of a scene, in the order of its owners.
-    pub(crate) fn sample(&self, time: f64, scene: &Scene) -> Sample {
+    pub(crate) fn sample<N: Number>(&self, time: f64, scene: &Scene) -> Sample<N> {
         let mut elements: Vec<(OwnerId, Element)> = Vec::new();
         let visible = |segment: &Segment| segment.widths.iter().any(|w| w.resolve(self.default_width) > 0.0);
         let segments = scene.segments.iter().enumerate().filter(|(_, segment)| visible(segment));
@@ -125,10 +132,10 @@ impl Sampler {
         }
     }
 
-    fn add(&self, scene: &Scene, element: Element, frame: &Frame, sample: &mut Sample) {
+    fn add<N: Number>(&self, scene: &Scene, element: Element, frame: &Frame, sample: &mut Sample<N>) {
         let metres = self.metres;
         let numbers = &mut sample.numbers;
-        let mut put = |v: Vector| numbers.extend(v.iter().map(|x| *x as f32));
+        let mut put = |v: Vector| numbers.extend(v.iter().map(|x| N::of(*x)));
         let point = |p: Point| frame.local(p * metres - frame.origin);
         let (part, material) = match element {
             Element::Segment(i) => {

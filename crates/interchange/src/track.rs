@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use dlsys_tree::Lineage;
 
-use crate::part::{Catalogue, Form, Frame, Paint, distance, reach};
+use crate::part::{Catalogue, Form, Frame, Paint, Part, distance, reach, triple};
 use crate::sample::Sample;
 use crate::thin::{thin, weight};
 
@@ -76,6 +76,32 @@ impl Phase {
         self.frames.truncate(end);
         self.numbers.truncate(end * width);
         self.fresh = end - 1;
+    }
+
+    /// Gives stems without a length the directions that they have when they have grown. A length of nearly 0 may be negative by rounding, and the stem would be upside
+    /// down: which nobody sees of it, but shapes that are mixed with that one would have thinner ends.
+    fn set_up(&mut self) {
+        /// Longest stem without a direction of its own, in radii.
+        const LONGEST: f64 = 1e-4;
+        let width = self.width();
+        let mut first = 0;
+        for part in self.form.iter() {
+            if let Part::Stem(_) = part {
+                let mut grown: Option<([f32; 6], f32)> = None;
+                for i in (0..self.times.len()).rev() {
+                    let own = &mut self.numbers[i * width + first..][..part.numbers()];
+                    let radius = own[12].max(own[13]);
+                    let length = (triple(own, 1) - triple(own, 0)).norm();
+                    match grown {
+                        Some((axes, of)) if length <= LONGEST * f64::from(radius) && of > 0.0 => {
+                            own[6..12].iter_mut().zip(axes).for_each(|(own, x)| *own = x / of * radius);
+                        }
+                        _ => grown = own[6..12].try_into().ok().map(|axes| (axes, radius)),
+                    }
+                }
+            }
+            first += part.numbers();
+        }
     }
 
     /// How far sample `k` is from the straight way between samples `i` and `j`.
@@ -214,6 +240,7 @@ impl Tracks {
     pub(crate) fn finish(&mut self, tolerance: f64) {
         for phase in &mut self.phases {
             phase.thin(tolerance);
+            phase.set_up();
             phase.ending = self.endings.get(&phase.lineage.id).copied();
         }
         self.open.clear();

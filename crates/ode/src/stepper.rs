@@ -9,6 +9,9 @@ use crate::workspace::Workspace;
 use crate::{Error, Method, Rates};
 use dlsys_expr::SimTime;
 
+/// The longest step. Where all errors are zero steps grow without end; beyond this number nothing is left to follow, and far beyond
+/// it the positions of stages are no numbers.
+const LONGEST: f64 = 1e100;
 /// The factor by which true errors of steps may exceed the estimated ones.
 const CAUTION: f64 = 4.0;
 /// The tolerated error of a single step, as a part of the tolerance, for methods that do not say otherwise.
@@ -201,7 +204,7 @@ impl Stepper {
         let first = match grid_end {
             Some(end) => end.since(start),
             // The size learnt at another time may be less than the resolution of time here.
-            None if control.size > 0.0 => control.size.max(64.0 * start.resolution()),
+            None if control.size > 0.0 => control.size.max(64.0 * start.resolution()).min(LONGEST),
             None => self.work.first_size(self.schemes.starting_order(scheme), system, y, tolerance),
         };
         self.work.resolution = if system.is_timed() { start.resolution() } else { 0.0 };

@@ -53,6 +53,7 @@ mod casters;
 mod crowd;
 mod draft;
 mod error;
+mod exposure;
 mod extent;
 mod fit;
 mod floor;
@@ -67,6 +68,7 @@ mod light;
 mod lighting;
 mod manifest;
 mod mapping;
+mod motion;
 mod name;
 mod number;
 mod page;
@@ -88,6 +90,7 @@ mod view;
 
 pub use camera::Camera;
 pub use error::Error;
+pub use exposure::Exposure;
 pub use fit::{CAMERA_SHAPE, Fit, Picture, Survey};
 pub use formats::{Companion, Content, Description, Drawing, Exporter, Format};
 pub use frames::{FrameDirectory, MANIFEST, Staged, Staging, aside, replace};
@@ -95,6 +98,7 @@ pub use layout::{Layout, Sheet, Spacing};
 pub use lengths::{CrossSection, Length, cross_section, lengths};
 pub use light::Light;
 pub use manifest::{FrameRecord, Manifest};
+pub use motion::{Motion, Positions};
 pub use name::{pictures, plain as plain_name};
 pub use number::push as push_number;
 pub use page::{Page, Size};
@@ -179,6 +183,17 @@ impl FrameWriter {
         let scene = &*self.fit.drawn(Cow::Borrowed(scene));
         let (fit, page) = self.fit.for_frame(scene, &self.page);
         formats::png::drawn(scene, &fit, &page, self.threads)
+    }
+
+    /// The PNG file of such pixels.
+    pub fn encoded(&self, pixels: &[u8], title: &str) -> Vec<u8> {
+        formats::png::file(&self.page, title, pixels)
+    }
+
+    /// Where the modules of a scene are in the picture of a frame.
+    pub fn positions(&self, scene: &Scene) -> Positions {
+        let (fit, page) = self.fit.for_frame(scene, &self.page);
+        Positions::new(scene, &fit, &page)
     }
 
     /// The files that all frames refer to: the material library of OBJ files, and the pictures on surfaces.

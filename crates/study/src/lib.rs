@@ -13,8 +13,8 @@
 //! - `table`, `files`, `plot`: a study as text, as CSV and JSON, and as a picture; `axis`, `diagram`: parts that plots share.
 //! - `spread`, `band`: the distribution of measures over many specimens, as tables and as a plot.
 //! - `verify`: a run computed again in an independent way.
-//! - `stems`: error of drawn positions against work for stems that bend; `surroundings`, `falls`, `gases`: exact cases and speed of wind, stems,
-//!   bodies that fall and gases.
+//! - `stems`: error of drawn positions against work for stems that bend; `surroundings`, `falls`, `gases`, `sheets`: exact cases and speed of
+//!   wind, stems, bodies that fall, gases and sheets.
 //! - `case`, `hard`, `cases`: models with exact answers in their first lines.
 //!
 //! Runs are made one after another, never in parallel, because they are timed.
@@ -36,6 +36,7 @@ mod order;
 mod plot;
 mod record;
 mod reference;
+mod sheets;
 mod spread;
 mod stems;
 mod study;
@@ -57,6 +58,7 @@ pub use order::{nominal_order, observed_order};
 pub use plot::svg;
 pub use record::{Accuracy, EarlyEnd, Record, Setup, Task, method_name};
 pub use reference::{Reference, References};
+pub use sheets::{Passes, exact_sheet_table, net_table, sheet_speed_table};
 pub use spread::{QUANTILES, Spread, SpreadSeries, spread_csv, spread_table};
 pub use stems::{StemOutcome, StemPoint, StemStudy, stem_csv, stem_study, stem_table};
 pub use study::{Outcome, Plan, Point, Series, Study, Wall, default_times, study};

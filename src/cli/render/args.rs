@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::cli::shared::SharedArgs;
+use crate::cli::shared::{SharedArgs, Topology};
 use crate::cli::values::{
     Background, LineWidth, RenderFormat, Seeds, Sky, background, bend_pixels, bytes, camera, columns,
-    direction, field_of_view, layout, line_width, pixels, positive, render_format, seeds, size, sky, threads,
-    turn, zoom,
+    direction, field_of_view, layout, line_width, pixels, positive, render_format, seeds, shutter, size, sky,
+    threads, turn, zoom,
 };
 use crate::render::{Format, Layout};
 use crate::scene::{Vector, Viewpoint};
@@ -45,6 +45,9 @@ pub struct RenderArgs {
     /// With a format of whole animations: units of the model's time in a second of the animation [default: 1, or, with `units … time S`, 1/S]
     #[arg(long, value_name = "V", allow_negative_numbers = true, value_parser = positive)]
     pub speed: Option<f64>,
+    /// With --format usda: whether meshes keep their triangles
+    #[arg(long, value_enum, default_value_t = Topology::Constant)]
+    pub topology: Topology,
     /// A file for each frame, or all frames on one sheet
     ///
     /// frames: a file for each frame. overlay: all in one place, the older the fainter. stack: each below the one before,
@@ -74,6 +77,12 @@ pub struct RenderArgs {
     /// With --orbit and one time: frames, 25 in a second of a film [default: 120]
     #[arg(long, value_name = "N", value_parser = columns, requires = "orbit")]
     pub orbit_frames: Option<usize>,
+    /// Motion blur: how long the shutter is open, in frames, or as an angle: 0.5 and 180deg are half of the interval between frames
+    ///
+    /// From 0 (no blur) to 1, or 360deg; each frame is in the middle of the time for which its shutter is open. For --format png and films. A frame is drawn at as many moments as it takes
+    /// for nothing to move by more than about a pixel between two of them, at most 127, and their light is averaged.
+    #[arg(long, value_name = "FRAMES", allow_negative_numbers = true, value_parser = shutter)]
+    pub shutter: Option<f64>,
     /// A camera in perspective: eye/aim, or eye/aim/angle of view in degrees across the smaller side (1 to 120) [default angle: 40]
     ///
     /// Points in scene units, such as 4,2,6/0,1,0/35.

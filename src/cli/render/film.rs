@@ -8,7 +8,8 @@ use std::time::Instant;
 
 use super::super::one_file::{file_of, place_of, spare};
 use super::{
-    Clock, Failure, ModelRun, Render, count_of, flags, out_error, out_of_directory, play, size_of, turntable,
+    Clock, Failure, ModelRun, Moments, Orbit, Render, count_of, flags, out_error, out_of_directory, play,
+    size_of, turntable,
 };
 use crate::cli::album::Album;
 use crate::cli::args::RenderArgs;
@@ -91,7 +92,7 @@ pub fn render_run(
     let mut writer = FrameWriter::new(render.format, fit);
     writer.page = flags::page(args, writer.page.picture)?;
     let mut target = Target::begin(out.as_deref(), args.max_output)?;
-    let stats = film(&render, format, &writer, &mut target, &mut clock)?;
+    let (stats, note) = film(&render, format, &writer, &mut target, &mut clock)?;
     let bytes = target.bytes;
     target.finish(out.as_deref())?;
     run.warn();
@@ -99,7 +100,7 @@ pub fn render_run(
     let (false, Some(out)) = (args.quiet, out) else { return Ok(()) };
     let [width, height] = writer.page.pixels;
     let line = format!(
-        "{}: {} of {width}x{height} pixels, {:.2} s to play, {}, in {:.2} s\n",
+        "{}: {} of {width}x{height} pixels, {:.2} s to play, {}, in {:.2} s\n{note}",
         out.display(),
         count_of(run.times.len(), "frame"),
         ends(args, &run).last().unwrap_or(&0.0),
@@ -126,14 +127,14 @@ fn ends(args: &RenderArgs, run: &ModelRun) -> Vec<f64> {
     ends
 }
 
-/// The second pass.
+/// The second pass. Returns a line about it, too, if there is something to say.
 fn film(
     render: &Render<'_>,
     format: Format,
     writer: &FrameWriter,
     target: &mut Target,
     clock: &mut Clock,
-) -> Result<crate::sim::Stats, Failure> {
+) -> Result<(crate::sim::Stats, String), Failure> {
     let [width, height] = writer.page.pixels;
     let shape = Shape { width, height, has_alpha: writer.page.background.is_none() };
     let limit = target.limit;
@@ -145,15 +146,28 @@ fn film(
     };
     let ends = ends(render.args, render.run);
     let mut film = Film::begin(format, target, shape, ends, render.threads).map_err(failed)?;
-    let angles = turntable::angles(render.args, &render.run.times);
+    let moments = Moments::plan(render, writer, clock)?;
     let mut progress = render.bar("writing", render.run.times.len());
+    if let Some(moments) = moments {
+        let stats = moments.expose(render, writer, clock, |_, pixels| {
+            film.add(&pixels).map_err(failed)?;
+            progress.inc();
+            Ok(())
+        })?;
+        film.finish().map_err(failed)?;
+        return Ok((stats, moments.note()));
+    }
+    let orbit = Orbit::new(render.args, &render.run.times);
     let stats = play(
         render.run,
         render.writing(&writer.fit),
         render.threads_for(&writer.page),
         clock,
         None,
-        |frame, scene| turntable::turned(writer, &angles, frame.index).pixels(scene),
+        |frame, scene| {
+            let angle = orbit.map(|orbit| orbit.angle(frame.index as f64, frame.time));
+            turntable::turned(writer, angle).pixels(scene)
+        },
         |pixels| {
             film.add(&pixels).map_err(failed)?;
             progress.inc();
@@ -161,7 +175,7 @@ fn film(
         },
     )?;
     film.finish().map_err(failed)?;
-    Ok(stats)
+    Ok((stats, String::new()))
 }
 
 /// A file under a temporary name, or standard output, as long as there is room.

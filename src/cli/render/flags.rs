@@ -2,6 +2,7 @@
 
 use crate::cli::args::RenderArgs;
 use crate::cli::common::Failure;
+use crate::cli::shared::Topology;
 use crate::cli::values::{Background, LineWidth, Sky};
 use crate::render::{CAMERA_SHAPE, Content, Fit, Format, Layout, Page, Picture, Size, Spacing, Survey, View};
 use crate::scene::Surroundings;
@@ -32,11 +33,12 @@ pub fn survey(args: &RenderArgs) -> Result<Survey, Failure> {
 }
 
 /// Flags that are for pictures, and whether they are given.
-pub fn of_pictures(args: &RenderArgs) -> [(&'static str, bool); 10] {
+pub fn of_pictures(args: &RenderArgs) -> [(&'static str, bool); 11] {
     [
         ("--perspective", args.perspective.is_some()),
         ("--camera", args.camera.is_some()),
         ("--orbit", args.orbit.is_some()),
+        ("--shutter", args.shutter.is_some()),
         ("--zoom", args.zoom.is_some()),
         ("--light", args.light.is_some()),
         ("--sky", args.sky.is_some()),
@@ -67,6 +69,12 @@ pub fn agree(args: &RenderArgs, format: Format) -> Result<(), Failure> {
             name.display()
         )));
     }
+    if args.shutter.is_some() && format.content() != Content::Pixels {
+        return Err(usage(format!(
+            "--shutter averages pixels, and {} files have none; choose --format png, or a film (webp, apng, gif or y4m)",
+            format.extension().to_uppercase()
+        )));
+    }
     if format.content() == Content::Mesh {
         if args.layout != Layout::Frames {
             return Err(usage(format!(
@@ -87,9 +95,20 @@ pub fn agree(args: &RenderArgs, format: Format) -> Result<(), Failure> {
 
 /// Refuses flags of another layout.
 pub fn of_layouts(args: &RenderArgs) -> Result<(), Failure> {
+    if args.topology == Topology::Varying {
+        return Err(usage(
+            "--topology is for --format usda, whose meshes keep their triangles or change them; leave it out",
+        ));
+    }
     if args.orbit.is_some() && args.layout != Layout::Frames {
         return Err(usage(format!(
             "--orbit does not go with --layout {}: the camera turns from frame to frame, so choose a film (--format webp, apng, gif or y4m) or a file for each frame",
+            args.layout.name()
+        )));
+    }
+    if args.shutter.is_some() && args.layout != Layout::Frames {
+        return Err(usage(format!(
+            "--shutter does not go with --layout {}: stages on a sheet are sharp; choose a film (--format webp, apng, gif or y4m) or a file for each frame",
             args.layout.name()
         )));
     }

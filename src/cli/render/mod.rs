@@ -8,6 +8,7 @@
 pub(super) mod args;
 mod film;
 pub(super) mod flags;
+mod shutter;
 mod turntable;
 mod watch;
 
@@ -23,7 +24,7 @@ use super::args::RenderArgs;
 use super::common::{Clock, Failure, ModelRun, count_of, out_error, size_of};
 use super::events::EventLog;
 use super::export;
-use super::frame_source::{Frame, Pass, play};
+use super::frame_source::{Frame, Pass, play, play_at};
 use super::progress::Progress;
 use super::values::{RenderFormat, Seeds};
 use crate::render::{
@@ -33,6 +34,8 @@ use crate::render::{
 use crate::scene::Scene;
 use crate::session::SwayReport;
 use crate::sim::{Method, Settings, Stats, brief};
+use shutter::Moments;
+use turntable::Orbit;
 
 /// Runs a model and writes its frames; with `--watch`, again and again.
 pub fn render(args: &RenderArgs) -> Result<(), Failure> {
@@ -143,6 +146,7 @@ pub fn render_run(
         begun.elapsed().as_secs_f64(),
         written.names
     );
+    line += &written.note;
     if let Some(sway) = run.sway().filter(|sway| sway.by_modes > 0) {
         line += &sway_line(&sway);
     }
@@ -189,6 +193,8 @@ struct Written {
     bytes: u64,
     /// Names of the first and the last file.
     names: String,
+    /// A line of its own, if there is something to say.
+    note: String,
 }
 
 /// A render in progress.
@@ -257,11 +263,25 @@ impl Render<'_> {
         let count = self.run.times.len();
         // With fewer frames than threads, several threads share a frame.
         writer.threads = (self.threads / count.max(1)).max(1);
+        if let Some(moments) = Moments::plan(self, &writer, clock)? {
+            let mut progress = self.bar("writing", count);
+            let stats = moments.expose(self, &writer, clock, |record, pixels| {
+                let title = format!("{}, t = {}", self.title(), record.time);
+                let bytes = writer.encoded(&pixels, &title);
+                directory.write(&record.file, &bytes).map_err(out_of_directory)?;
+                manifest.frames.push(record);
+                progress.inc();
+                Ok(())
+            })?;
+            drop(progress);
+            return Ok((stats, self.finish(directory, &manifest, moments.note())?));
+        }
         let staging = directory.staging();
-        let angles = turntable::angles(self.args, &self.run.times);
+        let orbit = Orbit::new(self.args, &self.run.times);
         let work = |frame: &Frame, scene: &Scene| {
-            let writer = turntable::turned(&writer, &angles, frame.index);
-            let file = FrameDirectory::frame_name(frame.index, count, writer.format.extension());
+            let angle = orbit.map(|orbit| orbit.angle(frame.index as f64, frame.time));
+            let writer = turntable::turned(&writer, angle);
+            let file = self.file(frame.index);
             let companions = if frame.index == 0 { writer.companions(scene) } else { Vec::new() };
             let title = format!("{}, t = {}", self.title(), frame.time);
             let staged = staging
@@ -288,15 +308,31 @@ impl Render<'_> {
                 Ok(())
             },
         )?;
+        drop(progress);
+        Ok((stats, self.finish(directory, &manifest, String::new())?))
+    }
+
+    /// The name of the file of a frame.
+    fn file(&self, index: usize) -> String {
+        FrameDirectory::frame_name(index, self.run.times.len(), self.format.extension())
+    }
+
+    /// Ends the directory of a file for each frame.
+    fn finish(
+        &self,
+        directory: FrameDirectory,
+        manifest: &Manifest,
+        note: String,
+    ) -> Result<Written, Failure> {
         self.run.warn();
         let names = match &manifest.frames[..] {
             [] => self.out.display().to_string(),
             [only] => self.out.join(&only.file).display().to_string(),
             [first, .., last] => format!("{} to {}", self.out.join(&first.file).display(), last.file),
         };
-        let written = Written { bytes: directory.bytes(), names };
-        directory.finish(&manifest).map_err(out_of_directory)?;
-        Ok((stats, written))
+        let written = Written { bytes: directory.bytes(), names, note };
+        directory.finish(manifest).map_err(out_of_directory)?;
+        Ok(written)
     }
 
     /// The second pass, if all frames have one file.
@@ -336,7 +372,7 @@ impl Render<'_> {
         };
         directory.write(&writer.file(), &assembly.finish(&title)).map_err(out_of_directory)?;
         let names = self.out.join(writer.file()).display().to_string();
-        let written = Written { bytes: directory.bytes(), names };
+        let written = Written { bytes: directory.bytes(), names, note: String::new() };
         directory.finish(&manifest).map_err(out_of_directory)?;
         Ok((stats, written))
     }
@@ -384,6 +420,9 @@ impl Render<'_> {
         });
         if let Some(degrees) = args.orbit {
             described["orbit"] = degrees.into();
+        }
+        if let Some(part) = args.shutter {
+            described["shutter"] = part.into();
         }
         if settings.method.is_fixed_step() {
             described["step_size"] = settings.step_size.into();

@@ -17,32 +17,61 @@ pub fn repeat(args: &RenderArgs, times: &mut Vec<f64>) {
     }
 }
 
-/// When each frame of a plant that stands still ends, in seconds; none of one that grows.
-pub fn ends(times: &[f64]) -> Option<Vec<f64>> {
-    let stands = times.len() > 1 && times.first() == times.last();
-    stands.then(|| (1..=times.len()).map(|frame| frame as f64 / RATE).collect())
+/// Whether the plant of these frames stands still while the camera turns.
+pub fn stands(times: &[f64]) -> bool {
+    times.len() > 1 && times.first() == times.last()
 }
 
-/// The angle of each frame, in degrees; none without `--orbit`. The camera turns evenly in time, and the last frame lasts as long as the one before.
-pub fn angles(args: &RenderArgs, times: &[f64]) -> Vec<f64> {
-    let Some(degrees) = args.orbit else { return Vec::new() };
-    let count = times.len();
-    match times {
-        [first, .., before, last] if last > first => {
-            let span = 2.0 * last - before - first;
-            times.iter().map(|time| degrees * ((time - first) / span)).collect()
-        }
-        [first, last] if last > first => vec![0.0, degrees / 2.0],
-        _ => (0..count).map(|frame| degrees * (frame as f64 / count as f64)).collect(),
+/// When each frame of a plant that stands still ends, in seconds; none of one that grows.
+pub fn ends(times: &[f64]) -> Option<Vec<f64>> {
+    stands(times).then(|| (1..=times.len()).map(|frame| frame as f64 / RATE).collect())
+}
+
+/// The way of the camera.
+#[derive(Clone, Copy, Debug)]
+pub struct Orbit {
+    degrees: f64,
+    pace: Pace,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Pace {
+    /// Even in time: from this time on, all of the way in so long a time.
+    Time(f64, f64),
+    /// By frame, of so many.
+    Frames(f64),
+}
+
+impl Orbit {
+    /// The way over these frames; none without `--orbit`. The camera turns evenly in time, and the last frame lasts as long as the one before.
+    pub fn new(args: &RenderArgs, times: &[f64]) -> Option<Orbit> {
+        let degrees = args.orbit?;
+        let pace = match times {
+            [first, .., last] if last > first => {
+                let before = times[times.len() - 2];
+                Pace::Time(*first, 2.0 * last - before - first)
+            }
+            _ => Pace::Frames(times.len() as f64),
+        };
+        Some(Orbit { degrees, pace })
+    }
+
+    /// The angle at a time, in degrees; where the plant stands still, at a frame, or in parts of one after it.
+    pub fn angle(&self, frame: f64, time: f64) -> f64 {
+        self.degrees
+            * match self.pace {
+                Pace::Time(first, span) => (time - first) / span,
+                Pace::Frames(count) => frame / count,
+            }
     }
 }
 
-/// The writer of a frame, as the camera sees it from its angle.
-pub fn turned<'w>(writer: &'w FrameWriter, angles: &[f64], frame: usize) -> Cow<'w, FrameWriter> {
-    match angles.get(frame) {
+/// The writer of a frame, as the camera sees it from this angle.
+pub fn turned(writer: &FrameWriter, angle: Option<f64>) -> Cow<'_, FrameWriter> {
+    match angle {
         None => Cow::Borrowed(writer),
         Some(degrees) => {
-            Cow::Owned(FrameWriter { fit: writer.fit.clone().turned(*degrees), ..writer.clone() })
+            Cow::Owned(FrameWriter { fit: writer.fit.clone().turned(degrees), ..writer.clone() })
         }
     }
 }

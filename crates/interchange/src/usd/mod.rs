@@ -6,10 +6,11 @@
 
 mod shape;
 mod text;
+pub(crate) mod varying;
 
 use std::collections::HashMap;
 
-use dlsys_geometry::scene::{Color, MaterialId, Texture};
+use dlsys_geometry::scene::{Color, MaterialId, Palette, Texture};
 use dlsys_render::{GENERATOR, pictures, plain_name, push_number};
 
 use crate::gases::GasFrame;
@@ -17,7 +18,7 @@ use crate::life::Life;
 use crate::mesh::Cutter;
 use crate::motion::{Clock, Moved};
 use crate::track::Phase;
-use crate::{Growth, linear};
+use crate::{Growth, Options, linear};
 use shape::{Form, Primitive, Samples, Tolerance};
 use text::{BRACES, Identifiers, PARENTHESES, Text, entry, list, quoted, tuple, tuples};
 
@@ -51,8 +52,7 @@ struct Writer<'a> {
 
 /// The text of a run.
 pub(crate) fn file(growth: &Growth) -> Vec<u8> {
-    let tolerance = growth.options.tolerance();
-    let decimals = (-(LAST_DECIMAL * tolerance).log10()).ceil().clamp(0.0, 300.0) as usize;
+    let decimals = decimals(growth.options.tolerance());
     let mut writer = Writer {
         growth,
         cutter: growth.cutter(OF_TRIANGLES),
@@ -63,6 +63,36 @@ pub(crate) fn file(growth: &Growth) -> Vec<u8> {
     };
     writer.layer();
     writer.text.finish()
+}
+
+/// Decimals of points for an accuracy in metres.
+fn decimals(tolerance: f64) -> usize {
+    (-(LAST_DECIMAL * tolerance).log10()).ceil().clamp(0.0, 300.0) as usize
+}
+
+/// The first lines of a layer, for a run between two times; codes in a second, and the last code.
+fn header(text: &mut Text, title: &str, [first, last]: [f64; 2], options: &Options, (rate, end): (f64, f64)) {
+    text.line("#usda 1.0");
+    text.block("", PARENTHESES, |text| {
+        text.line("defaultPrim = \"Plant\"");
+        text.line(&format!("doc = {}", quoted(&format!("{title}, by {GENERATOR}"))));
+        text.block("customLayerData = ", BRACES, |text| {
+            text.line(&entry("double", "first_time", first));
+            text.line(&entry("double", "last_time", last));
+            text.line(&entry("double", "metres_per_unit", options.metres));
+            text.line(&entry("double", "seconds_per_unit", options.seconds));
+            text.line(&entry("string", "title", quoted(title)));
+        });
+        text.line("metersPerUnit = 1");
+        text.line("upAxis = \"Y\"");
+        text.line(&format!("timeCodesPerSecond = {rate}"));
+        text.line(&format!("framesPerSecond = {rate}"));
+        if end > 0.0 {
+            text.line("startTimeCode = 0");
+            text.long("endTimeCode = ", |out| push_number(out, end, 5));
+        }
+    });
+    text.line("");
 }
 
 impl Writer<'_> {
@@ -78,28 +108,9 @@ impl Writer<'_> {
         let form =
             |life: &Life| shape::form(life, &growth.tracks.phases[life.model], &self.cutter, tolerance);
         let lives: Vec<Form> = growth.lives.lives.iter().map(form).collect();
-        self.text.line("#usda 1.0");
         let end = Writer::code(self.clock.end());
-        self.text.block("", PARENTHESES, |text| {
-            text.line("defaultPrim = \"Plant\"");
-            text.line(&format!("doc = {}", quoted(&format!("{}, by {GENERATOR}", growth.title))));
-            text.block("customLayerData = ", BRACES, |text| {
-                text.line(&entry("double", "first_time", growth.first));
-                text.line(&entry("double", "last_time", growth.last));
-                text.line(&entry("double", "metres_per_unit", growth.options.metres));
-                text.line(&entry("double", "seconds_per_unit", growth.options.seconds));
-                text.line(&entry("string", "title", quoted(&growth.title)));
-            });
-            text.line("metersPerUnit = 1");
-            text.line("upAxis = \"Y\"");
-            text.line(&format!("timeCodesPerSecond = {RATE}"));
-            text.line(&format!("framesPerSecond = {RATE}"));
-            if end > 0.0 {
-                text.line("startTimeCode = 0");
-                text.long("endTimeCode = ", |out| push_number(out, end, 5));
-            }
-        });
-        self.text.line("");
+        let span = [growth.first, growth.last];
+        header(&mut self.text, &growth.title, span, &growth.options, (RATE, end));
         let mut text = std::mem::take(&mut self.text);
         text.prim(
             "def Xform \"Plant\"",
@@ -128,43 +139,8 @@ impl Writer<'_> {
         let mut used: Vec<MaterialId> = primitives.map(|primitive| primitive.material).collect();
         used.sort_by_key(|id| id.index());
         used.dedup();
-        let mut all: Vec<(Option<MaterialId>, &str, Color, Option<&Texture>)> = Vec::new();
-        for id in used {
-            if let Some(material) = self.growth.palette.materials().get(id.index()) {
-                all.push((Some(id), &material.name, material.color, material.texture.as_ref()));
-            }
-        }
-        if self.growth.options.floor.is_some() {
-            all.push((None, "ground", self.growth.floor_color, None));
-        }
-        let pictures = pictures(&self.growth.palette);
-        let mut names = Identifiers::default();
-        text.block("def Scope \"Materials\" ", BRACES, |text| {
-            for (id, name, color, texture) in all {
-                let name = names.choose(name);
-                let path = format!("/Plant/Materials/{name}");
-                text.block(&format!("def Material \"{name}\" "), BRACES, |text| {
-                    text.line(&format!("token outputs:surface.connect = <{path}/Shader.outputs:surface>"));
-                    text.block("def Shader \"Shader\" ", BRACES, |text| {
-                        text.line("uniform token info:id = \"UsdPreviewSurface\"");
-                        match texture {
-                            Some(texture) => colors_of(text, &path, texture),
-                            None => text.long("color3f inputs:diffuseColor = ", |out| {
-                                tuple(out, rgb(color), OF_COLORS);
-                            }),
-                        }
-                        text.line("float inputs:metallic = 0");
-                        text.line("float inputs:roughness = 0.8");
-                        text.line("token outputs:surface");
-                    });
-                    for (_, file) in pictures.iter().filter(|(p, _)| texture.is_some_and(|t| t.picture == *p))
-                    {
-                        readers(text, &path, file, texture.is_some_and(|texture| texture.repeats));
-                    }
-                });
-                self.materials.insert(id, name);
-            }
-        });
+        let floor = self.growth.options.floor.map(|_| self.growth.floor_color);
+        self.materials = materials(text, &self.growth.palette, &used, floor);
     }
 
     /// A life: its samples are at ages, in time codes.
@@ -392,6 +368,51 @@ fn bounds_of(frame: &GasFrame) -> [[f32; 3]; 2] {
         let (l, h) = (reach(blob, -1.0), reach(blob, 1.0));
         [0, 1].map(|end| [0, 1, 2].map(|k| if end == 0 { low[k].min(l[k]) } else { high[k].max(h[k]) }))
     })
+}
+
+/// Writes materials, and that of the floor, if there is one. Returns their names.
+fn materials(
+    text: &mut Text,
+    palette: &Palette,
+    used: &[MaterialId],
+    floor: Option<Color>,
+) -> HashMap<Option<MaterialId>, String> {
+    let mut all: Vec<(Option<MaterialId>, &str, Color, Option<&Texture>)> = Vec::new();
+    for id in used {
+        if let Some(material) = palette.materials().get(id.index()) {
+            all.push((Some(*id), &material.name, material.color, material.texture.as_ref()));
+        }
+    }
+    all.extend(floor.map(|color| (None, "ground", color, None)));
+    let pictures = pictures(palette);
+    let mut names = Identifiers::default();
+    let mut chosen = HashMap::new();
+    text.block("def Scope \"Materials\" ", BRACES, |text| {
+        for (id, name, color, texture) in all {
+            let name = names.choose(name);
+            let path = format!("/Plant/Materials/{name}");
+            text.block(&format!("def Material \"{name}\" "), BRACES, |text| {
+                text.line(&format!("token outputs:surface.connect = <{path}/Shader.outputs:surface>"));
+                text.block("def Shader \"Shader\" ", BRACES, |text| {
+                    text.line("uniform token info:id = \"UsdPreviewSurface\"");
+                    match texture {
+                        Some(texture) => colors_of(text, &path, texture),
+                        None => text.long("color3f inputs:diffuseColor = ", |out| {
+                            tuple(out, rgb(color), OF_COLORS);
+                        }),
+                    }
+                    text.line("float inputs:metallic = 0");
+                    text.line("float inputs:roughness = 0.8");
+                    text.line("token outputs:surface");
+                });
+                for (_, file) in pictures.iter().filter(|(p, _)| texture.is_some_and(|t| t.picture == *p)) {
+                    readers(text, &path, file, texture.is_some_and(|texture| texture.repeats));
+                }
+            });
+            chosen.insert(id, name);
+        }
+    });
+    chosen
 }
 
 /// The inputs of a surface that come from its picture.

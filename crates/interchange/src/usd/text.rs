@@ -34,18 +34,23 @@ impl Text {
         self.out.push('\n');
     }
 
-    /// Lines between brackets: `(` and `)`, or `{` and `}`.
-    pub(super) fn block(
-        &mut self,
-        beginning: &str,
-        [open, close]: [&str; 2],
-        inside: impl FnOnce(&mut Text),
-    ) {
+    /// The beginning of a block.
+    pub(super) fn open(&mut self, beginning: &str, [open, _]: [&str; 2]) {
         self.line(&format!("{beginning}{open}"));
         self.depth += 1;
-        inside(self);
+    }
+
+    /// The end of a block.
+    pub(super) fn close(&mut self, [_, close]: [&str; 2]) {
         self.depth -= 1;
         self.line(close);
+    }
+
+    /// Lines between brackets: `(` and `)`, or `{` and `}`.
+    pub(super) fn block(&mut self, beginning: &str, brackets: [&str; 2], inside: impl FnOnce(&mut Text)) {
+        self.open(beginning, brackets);
+        inside(self);
+        self.close(brackets);
     }
 
     /// A prim with its metadata.
@@ -80,6 +85,11 @@ impl Text {
             }
             out.push('}');
         });
+    }
+
+    /// Takes out what has been written so far.
+    pub(super) fn take(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.out).into_bytes()
     }
 
     pub(super) fn finish(self) -> Vec<u8> {

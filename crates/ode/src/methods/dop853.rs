@@ -171,8 +171,9 @@ pub(super) fn join_estimates(e5: f64, e3: f64) -> f64 {
     if e5 == 0.0 {
         return 0.0;
     }
-    // The quotient of e5 and the root is at most 1, and hypot does not overflow or underflow in the squares.
-    e5.abs() * (e5.abs() / e5.hypot(0.1 * e3))
+    let ratio = (0.1 * e3 / e5).abs();
+    // A square of more than that may overflow, and 1 does not count beside it.
+    if ratio > 1e100 { e5.abs() / ratio } else { e5.abs() / (1.0 + ratio * ratio).sqrt() }
 }
 
 /// Dense output weights applied to the stage rates of one component.

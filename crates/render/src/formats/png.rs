@@ -302,7 +302,7 @@ fn composed(page: &Page, sky: Option<&Sky>, image: &Image) -> Vec<u8> {
 }
 
 /// The file of a page with this data, of three bytes a pixel, or four if there is no background.
-fn file(page: &Page, title: &str, data: &[u8]) -> Vec<u8> {
+pub(crate) fn file(page: &Page, title: &str, data: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let [width, height] = page.pixels;
     let mut encoder = png::Encoder::new(&mut bytes, width, height);

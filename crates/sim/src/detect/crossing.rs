@@ -192,7 +192,23 @@ impl CrossingDetector {
         let Root { position, at, after } =
             first_root(&mut self.difference(path, atom), from, limit, sign, tolerance)?;
         let time = path.start.after(position * path.h);
-        Some(Crossing { position, time, at, after, level: None })
+        let passes = at == Sign::Zero && after == opposite(sign);
+        let level = if passes { self.level_of(path, atom) } else { None };
+        Some(Crossing { position, time, at, after, level })
+    }
+
+    /// The parameter of the module whose value is compared with a level that rests, and the level. Without it a value that
+    /// reaches a limit would be a rounding of the limit afterwards, perhaps on its other side.
+    fn level_of(&mut self, path: &Path, atom: usize) -> Option<(usize, f64)> {
+        let (variable, level) = match &path.rule.zero_crossings(path.state.solve)[atom] {
+            ZeroCrossing::Formula { variable, level } => (*variable, self.level(path, level)),
+            ZeroCrossing::Search(Some(sum)) => match sum.terms[..] {
+                [(variable, factor)] if factor.abs() == 1.0 => (variable, 0.0 - factor * sum.constant),
+                _ => return None,
+            },
+            _ => return None,
+        };
+        (variable < path.state.trajectories.len()).then_some((variable, level))
     }
 
     /// The effect of the rounding of the variables on the difference of two sides; 0 where the difference jumps.

@@ -17,6 +17,15 @@ const JUMP: f64 = 10.0;
 /// Most times at one instant that values change and conditions with them.
 const MAX_ROUNDS: usize = 100;
 
+/// Modules whose solved values are others than before.
+#[derive(Default)]
+struct Changed {
+    /// By more than rounding.
+    all: Vec<ModuleId>,
+    /// By more than an error of what was followed.
+    jumped: Vec<ModuleId>,
+}
+
 impl EventStage<'_, '_> {
     /// Makes the algebraic parameters consistent of all modules that the instant concerns. `chosen`: they have their
     /// equations, and values that were followed may have jumped. True if values have changed that conditions may read.
@@ -30,19 +39,23 @@ impl EventStage<'_, '_> {
             return Ok(false);
         }
         let solved = self.flow().solve_algebraic(&wanted)?;
-        let changed = self.take_over(&solved);
+        let Changed { all: changed, jumped } = self.take_over(&solved);
         if changed.is_empty() {
             return Ok(false);
         }
-        let mut again = changed.clone();
+        let mut again: Vec<(ModuleId, bool)> = changed.iter().map(|id| (*id, true)).collect();
         for &id in &changed {
-            self.neighbours.readers(self.world, self.setup.model, id, |reader, _| again.push(reader));
+            let jumps = jumped.contains(&id);
+            self.neighbours
+                .readers(self.world, self.setup.model, id, |reader, _| again.push((reader, jumps)));
         }
+        // Of a module that is there several times, the last says whether anything has jumped.
         again.sort_unstable();
-        again.dedup();
         let mut matters = false;
-        for id in again {
-            matters |= self.place_again(id, changed.contains(&id));
+        for (n, &(id, jumps)) in again.iter().enumerate() {
+            if again.get(n + 1).is_none_or(|next| next.0 != id) {
+                matters |= self.place_again(id, changed.contains(&id), jumps);
+            }
         }
         if matters && self.events.consistency_rounds > MAX_ROUNDS {
             let id = changed[0];
@@ -91,9 +104,9 @@ impl EventStage<'_, '_> {
     }
 
     /// Writes solved values into the tree where they differ; returns the modules that have changed by more than rounding.
-    fn take_over(&mut self, solved: &Solved) -> Vec<ModuleId> {
+    fn take_over(&mut self, solved: &Solved) -> Changed {
         let Solved { places, before, values } = solved;
-        let mut changed: Vec<ModuleId> = Vec::new();
+        let mut changed = Changed::default();
         for ((&(_, id, parameter), &before), &value) in places.iter().zip(before).zip(values) {
             let state = self.world.state(id).expect("wanted");
             let in_question = self.events.ready.contains(&id) && state.open.is_none();
@@ -108,21 +121,25 @@ impl EventStage<'_, '_> {
             let place = self.world.tree.places(id).start + parameter;
             self.world.tree.set_value(place, value);
             if jumps || step > 1e-12 * size {
-                changed.push(id);
+                changed.all.push(id);
+            }
+            if jumps {
+                changed.jumped.push(id);
             }
         }
-        changed.dedup();
+        changed.all.dedup();
         changed
     }
 
-    /// Judges the signs of a module anew by its values; true if it has any.
-    fn place_again(&mut self, id: ModuleId, own: bool) -> bool {
+    /// Judges the signs of a module anew by its values; true if it has any. `own`: its own values have changed; `jumps`: they, or values
+    /// that it reads, have jumped.
+    fn place_again(&mut self, id: ModuleId, own: bool, jumps: bool) -> bool {
         let Some(state) = self.world.state(id) else { return false };
         let Some(rule) = state.rule else { return false };
         let compiled = &self.setup.model.rules[rule];
         let is_open = state.open.is_some();
-        // Signs that were followed to the instant are valid, unless the module itself has jumped.
-        if !own && is_open && state.open.as_ref().is_some_and(|open| open.flow.is_some()) {
+        // Signs that were followed to the instant are valid, unless something has jumped.
+        if !own && !jumps && is_open && state.open.as_ref().is_some_and(|open| open.flow.is_some()) {
             return false;
         }
         if compiled.atoms.is_empty() {

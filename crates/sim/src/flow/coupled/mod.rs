@@ -23,11 +23,13 @@ pub mod reintegration;
 pub mod rows;
 mod step;
 pub mod system;
+mod traffic;
 
 use crate::flow::coupled::couple::Affected;
 use crate::flow::coupled::linear::Linear;
 use crate::flow::coupled::reintegration::Reintegration;
 use crate::flow::coupled::system::System;
+use crate::flow::coupled::traffic::Traffic;
 use crate::flow::integrator::Integrator;
 use crate::world::state::Control;
 use dlsys_tree::{ModuleId, SimTime};
@@ -67,6 +69,8 @@ pub struct Coupled {
     pub since_mark: usize,
     /// Members whose rates may have pulses.
     pulsing: Vec<ModuleId>,
+    /// How often events cut the trajectories of members.
+    traffic: Traffic,
 }
 
 impl Coupled {

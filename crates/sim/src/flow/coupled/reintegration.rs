@@ -318,6 +318,7 @@ impl FlowStage<'_, '_> {
         let solution: &mut CoupledSolution = self.world.coupled.as_mut().expect("seen above");
         solution.replace(&mut trial.stretches, &trial.components, all);
         self.flows.coupled.reintegrated = true;
+        self.flows.coupled.traffic.note_event();
         let tolerance = self.setup.coupled_settings.tolerance;
         let known = &mut self.flows.coupled.control.error;
         *known = (*known + INNER_TOLERANCE * tolerance).min(CERTAINTY * tolerance);

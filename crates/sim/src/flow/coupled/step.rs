@@ -189,7 +189,9 @@ impl FlowStage<'_, '_> {
     /// does.
     fn make_step(&mut self, from: SimTime) -> CommonStep {
         let rules = &self.setup.model.rules;
-        let limit = self.setup.settings.slice_end(from);
+        let longest = self.flows.coupled.traffic.begin(from, self.flows.coupled.members.len());
+        let limits = [self.setup.settings.slice_end(from), longest];
+        let limit = limits.into_iter().flatten().reduce(|a, b| if b < a { b } else { a });
         let settings = &self.setup.coupled_settings;
         let (mut solution, mut tries) = (None, 0);
         let step = loop {

@@ -1,0 +1,179 @@
+//! Nearest points of two convex hulls of few points: a point, a cord or a face of a sheet, and the core of a solid.
+
+use crate::Vector;
+
+/// Most steps towards the nearest points; a few are enough, unless rounding stops the progress.
+const STEPS: usize = 100;
+
+/// The nearest points of two hulls.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Nearest {
+    /// From the second hull to the first one; 0 if they meet.
+    pub way: Vector,
+    /// Weights of the corners of the first one in its nearest point.
+    pub weights: [f64; 3],
+}
+
+/// A difference of two corners, and the index of the first one.
+#[derive(Clone, Copy)]
+struct Corner {
+    place: Vector,
+    index: usize,
+}
+
+/// Up to four differences, with weights.
+#[derive(Clone, Copy)]
+struct Simplex {
+    corners: [Corner; 4],
+    weights: [f64; 4],
+    count: usize,
+}
+
+impl Simplex {
+    fn push(&mut self, corner: Corner) {
+        self.corners[self.count] = corner;
+        self.weights[self.count] = 1.0;
+        self.count += 1;
+    }
+
+    /// The point that is nearest to the origin, and the part that it lies in.
+    fn nearest(&self) -> (Vector, Simplex) {
+        let mut best = (Vector::repeat(f64::INFINITY), *self);
+        for chosen in 1_u8..1 << self.count {
+            let mut part = Simplex { count: 0, ..*self };
+            (0..self.count).filter(|i| chosen >> i & 1 == 1).for_each(|i| part.push(self.corners[i]));
+            let place = |k: usize| part.corners[k].place;
+            let found = match part.count {
+                1 => Some([1.0, 0.0, 0.0, 0.0]),
+                2 => on_edge(place(0), place(1)),
+                3 => on_triangle(place(0), place(1), place(2)),
+                _ => is_within([0, 1, 2, 3].map(place)).then_some([0.25; 4]),
+            };
+            let Some(weights) = found else { continue };
+            if part.count == 4 {
+                return (Vector::zeros(), Simplex { weights, ..part });
+            }
+            let way: Vector = (0..part.count).map(|k| place(k) * weights[k]).sum();
+            if way.norm_squared() < best.0.norm_squared() {
+                best = (way, Simplex { weights, ..part });
+            }
+        }
+        best
+    }
+}
+
+/// By the method of Gilbert, Johnson and Keerthi (*A fast procedure for computing the distance between complex objects in three-dimensional space*,
+/// 1988). There are one to three corners of the first hull.
+pub(crate) fn nearest(corners: &[Vector], core: &[Vector]) -> Nearest {
+    let difference = |direction: Vector| {
+        let along = |point: &Vector| point.dot(&direction);
+        let first = (0..corners.len()).min_by(|a, b| along(&corners[*a]).total_cmp(&along(&corners[*b])));
+        let second = core.iter().max_by(|a, b| along(a).total_cmp(&along(b)));
+        let index = first.unwrap_or(0);
+        Corner { place: corners[index] - second.copied().unwrap_or_else(Vector::zeros), index }
+    };
+    let first = difference(Vector::zeros());
+    let mut simplex = Simplex { corners: [first; 4], weights: [1.0; 4], count: 1 };
+    let mut way = first.place;
+    for _ in 0..STEPS {
+        let next = difference(way);
+        let gain = way.norm_squared() - next.place.dot(&way);
+        let known = simplex.corners[..simplex.count].iter().any(|corner| corner.place == next.place);
+        if gain <= 1e-14 * way.norm_squared() || known {
+            break;
+        }
+        let mut larger = simplex;
+        larger.push(next);
+        let (found, part) = larger.nearest();
+        // Rounding: there is no progress any more.
+        if found.norm_squared() >= way.norm_squared() {
+            break;
+        }
+        (way, simplex) = (found, part);
+        if simplex.count == 4 {
+            break;
+        }
+    }
+    let mut weights = [0.0; 3];
+    for k in 0..simplex.count {
+        weights[simplex.corners[k].index] += simplex.weights[k];
+    }
+    let sum: f64 = weights.iter().sum();
+    Nearest { way, weights: weights.map(|weight| weight / sum) }
+}
+
+/// Weights of the foot of the perpendicular from the origin, if it lies between the ends.
+fn on_edge(a: Vector, b: Vector) -> Option<[f64; 4]> {
+    let way = b - a;
+    let part = -a.dot(&way) / way.norm_squared();
+    (part > 0.0 && part < 1.0).then_some([1.0 - part, part, 0.0, 0.0])
+}
+
+/// The same in a triangle.
+fn on_triangle(a: Vector, b: Vector, c: Vector) -> Option<[f64; 4]> {
+    let normal = (b - a).cross(&(c - a));
+    let square = normal.norm_squared();
+    let foot = normal * (a.dot(&normal) / square);
+    let part = |p: Vector, q: Vector| (q - p).cross(&(foot - p)).dot(&normal) / square;
+    let (of_c, of_a, of_b) = (part(a, b), part(b, c), part(c, a));
+    let is_inside = of_a > 0.0 && of_b > 0.0 && of_c > 0.0;
+    (square > 0.0 && is_inside).then_some([of_a, of_b, of_c, 0.0])
+}
+
+/// True if the origin lies within a tetrahedron.
+fn is_within(corners: [Vector; 4]) -> bool {
+    let volume = |[a, b, c, d]: [Vector; 4]| (b - a).cross(&(c - a)).dot(&(d - a));
+    let whole = volume(corners);
+    let is_inside = |k: usize| {
+        let mut part = corners;
+        part[k] = Vector::zeros();
+        volume(part) * whole > 0.0
+    };
+    whole != 0.0 && (0..4).all(is_inside)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers in -1..1.
+    fn numbers() -> impl FnMut() -> f64 {
+        let mut state = 0.123_f64;
+        move || {
+            state = (state * 9973.13 + 0.754_877_67).fract();
+            2.0 * state - 1.0
+        }
+    }
+
+    #[test]
+    fn triangles_and_boxes_are_as_far_apart_as_a_fine_grid_says() {
+        let corner = |k: i32| Vector::new((k & 1) as f64, (k >> 1 & 1) as f64, (k >> 2) as f64);
+        let cube: Vec<Vector> = (0..8).map(corner).collect();
+        let mut number = numbers();
+        for _ in 0..300 {
+            let mut point = || Vector::new(number(), number(), number()) * 2.0 + Vector::repeat(0.5);
+            let corners = [point(), point(), point()];
+            let found = nearest(&corners, &cube);
+            let mut least = f64::INFINITY;
+            let parts = 120;
+            for i in 0..=parts {
+                for j in 0..=parts - i {
+                    let (a, b) = (i as f64 / parts as f64, j as f64 / parts as f64);
+                    let place = corners[0] * a + corners[1] * b + corners[2] * (1.0 - a - b);
+                    least = least.min(place.map(|x| x - x.clamp(0.0, 1.0)).norm());
+                }
+            }
+            let distance = found.way.norm();
+            assert!(distance < least + 1e-12 && distance > least - 0.05, "{distance} {least}");
+            let sum: f64 = found.weights.iter().sum();
+            assert!((sum - 1.0).abs() < 1e-12 && found.weights.iter().all(|x| *x >= 0.0));
+            if distance > 0.0 {
+                // No point of either body is beyond the planes across the way.
+                let place: Vector = (0..3).map(|k| corners[k] * found.weights[k]).sum();
+                let level = |point: &Vector| (point - place).dot(&found.way) / distance;
+                assert!(corners.iter().all(|point| level(point) > -1e-7));
+                assert!(cube.iter().all(|point| level(point) < -distance + 1e-7));
+            }
+        }
+    }
+}
