@@ -1,6 +1,6 @@
 //! The wind that carries gases over a tick, and what they do not pass into: bodies and the rigid ground.
 //!
-//! Turbulence is evaluated at eighths of a tick, with straight lines in between. Bodies stand at instants so close that none moves by more than a
+//! Turbulence is evaluated at quarters of a tick, with straight lines in between. Bodies stand at instants so close that none moves by more than a
 //! fourth of the layer of air around it from one to the next.
 
 use std::sync::{Arc, OnceLock};
@@ -11,8 +11,8 @@ use dlsys_wind::{Hull, Obstacle, Snapshot, Wind};
 use crate::Error;
 use crate::weather::Weather;
 
-/// Parts of a tick at whose ends turbulence is evaluated: all stages of steps of a tick and of its half are there.
-const EIGHTHS: usize = 8;
+/// Parts of a tick at whose ends turbulence is evaluated: all stages of steps of a tick are there.
+const QUARTERS: usize = 4;
 /// Most instants with bodies in a tick, a power of 2.
 const MOST_PARTS: usize = 1024;
 /// Instants at which the speed of bodies is looked at.
@@ -26,7 +26,7 @@ pub(crate) struct Drift<'a, 'm> {
     weather: Option<&'a Weather<'m>>,
     begin: f64,
     tick: f64,
-    free: [Kept<Arc<Snapshot>>; EIGHTHS + 1],
+    free: [Kept<Arc<Snapshot>>; QUARTERS + 1],
     among: Vec<Kept<Instant>>,
     /// Bodies on their way through the tick.
     ways: Vec<Way>,
@@ -38,7 +38,7 @@ pub(crate) struct Drift<'a, 'm> {
 
 type Kept<T> = OnceLock<Result<T, Error>>;
 
-/// The wind at an instant with bodies in it: at the eighths before and after, and the part of the second one.
+/// The wind at an instant with bodies in it: at the quarters before and after, and the part of the second one.
 struct Instant {
     hulls: Vec<Hull>,
     before: Snapshot,
@@ -93,7 +93,7 @@ impl<'a, 'm> Drift<'a, 'm> {
 
     /// Looks at the bodies of the tick.
     fn look(&mut self, weather: &Weather<'m>, fall: f64) -> Result<(), Error> {
-        let mut parts = EIGHTHS;
+        let mut parts = QUARTERS;
         let times = (0..=LOOKS).map(|k| self.begin + self.tick * (k as f64 / LOOKS as f64));
         let looks = times.map(|time| weather.hulls(time)).collect::<Result<Vec<_>, Error>>()?;
         let free = weather.free(self.begin)?;
@@ -133,8 +133,8 @@ impl<'a, 'm> Drift<'a, 'm> {
     }
 
     fn free(&self, weather: &Weather<'m>, number: usize) -> Result<&Arc<Snapshot>, &Error> {
-        let number = number.min(EIGHTHS);
-        self.free[number].get_or_init(|| weather.free(self.time_of(number, EIGHTHS))).as_ref()
+        let number = number.min(QUARTERS);
+        self.free[number].get_or_init(|| weather.free(self.time_of(number, QUARTERS))).as_ref()
     }
 
     fn among(&self, weather: &Weather<'m>, number: usize) -> Result<&Instant, &Error> {
@@ -142,12 +142,12 @@ impl<'a, 'm> Drift<'a, 'm> {
         let number = number.min(parts);
         let make = || {
             let hulls = weather.hulls(self.time_of(number, parts))?;
-            let place = (number * EIGHTHS) as f64 / parts as f64;
-            let (eighth, part) = (place as usize, place.fract());
+            let place = (number * QUARTERS) as f64 / parts as f64;
+            let (quarter, part) = (place as usize, place.fract());
             let with =
-                |eighth: usize| weather.among(self.free(weather, eighth).map_err(Clone::clone)?, &hulls);
-            let before = with(eighth)?;
-            let after = if part > 0.0 { Some((with(eighth + 1)?, part)) } else { None };
+                |quarter: usize| weather.among(self.free(weather, quarter).map_err(Clone::clone)?, &hulls);
+            let before = with(quarter)?;
+            let after = if part > 0.0 { Some((with(quarter + 1)?, part)) } else { None };
             Ok(Instant { hulls, before, after })
         };
         self.among[number].get_or_init(make).as_ref()
@@ -175,7 +175,7 @@ impl Wind for Drift<'_, '_> {
     fn velocity(&self, point: Vector, time: f64) -> Vector {
         let Some(weather) = self.weather else { return Vector::zeros() };
         let has_bodies = !self.ways.is_empty();
-        let parts = if has_bodies { self.among.len() - 1 } else { EIGHTHS };
+        let parts = if has_bodies { self.among.len() - 1 } else { QUARTERS };
         let (number, part) = self.place(time, parts);
         let at = |number: usize| {
             let found = match has_bodies {

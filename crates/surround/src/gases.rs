@@ -34,7 +34,7 @@ pub const TICK: f64 = 1.0 / 32.0;
 /// Most blobs of one gas.
 pub const MOST_BLOBS: usize = 2_000_000;
 /// Blobs are not replaced by smaller ones beyond so many.
-const MOST_SPLIT: usize = 100_000;
+const MOST_SPLIT: usize = 20_000;
 /// Most blobs of the ticks that are kept for times that come a little late, and of marks.
 const MOST_KEPT: usize = 500_000;
 const MOST_MARKED: usize = 1_000_000;
@@ -49,7 +49,8 @@ pub struct Gases<'m> {
     model: &'m Model,
     settings: Settings,
     place: Place,
-    weather: Option<Arc<Weather<'m>>>,
+    /// The wind as blobs of each gas feel it; empty in still air.
+    weathers: Vec<Weather<'m>>,
     state: Mutex<State<'m>>,
 }
 
@@ -135,6 +136,15 @@ impl<'m> Gases<'m> {
             Cloud::new(physics, settings).map_err(failed)
         };
         let clouds = model.scenery.gases.iter().map(cloud).collect::<Result<Vec<_>, Error>>()?;
+        let averaged = |weather: &Arc<Weather<'m>>| {
+            let scenery = &model.scenery;
+            scenery
+                .gases
+                .iter()
+                .map(|gas| weather.averaged(scenery, gas.size))
+                .collect::<Result<Vec<_>, Error>>()
+        };
+        let weathers = weather.as_ref().map_or(Ok(Vec::new()), averaged)?;
         let growth = coupled::start(model, settings, place)?;
         let (here, ahead) = (Arc::default(), Ok(Arc::default()));
         let moment = Moment { number: 0, clouds: Arc::new(clouds), here, ahead };
@@ -148,7 +158,7 @@ impl<'m> Gases<'m> {
             spent: Duration::ZERO,
             scene: turtle::blank(model),
         };
-        Ok(Some(Gases { model, settings, place, weather, state: Mutex::new(state) }))
+        Ok(Some(Gases { model, settings, place, weathers, state: Mutex::new(state) }))
     }
 
     /// The gases at a time of the model, with sources on stems that move as they do here.
@@ -282,7 +292,7 @@ impl<'m> Gases<'m> {
                 passed.map_err(|error| self.failed(number, error, (begin, &ahead), None))?;
                 continue;
             }
-            let drift = self.drift(begin, cloud)?;
+            let drift = self.drift(begin, (number, cloud))?;
             let done = cloud.advance_among(sources, &drift, &drift);
             done.map_err(|error| self.failed(number, error, (begin, &ahead), drift.failure()))?;
         }
@@ -292,8 +302,9 @@ impl<'m> Gases<'m> {
         Ok(())
     }
 
-    fn drift(&self, begin: f64, cloud: &Cloud) -> Result<Drift<'_, 'm>, Error> {
-        Drift::new(self.weather.as_deref(), [begin, TICK], cloud.gas().fall, self.place.ground)
+    /// The wind of a gas, by its number.
+    fn drift(&self, begin: f64, (number, cloud): (usize, &Cloud)) -> Result<Drift<'_, 'm>, Error> {
+        Drift::new(self.weathers.get(number), [begin, TICK], cloud.gas().fall, self.place.ground)
     }
 
     /// The blobs at a time in s after a tick, in scene units.
@@ -314,7 +325,7 @@ impl<'m> Gases<'m> {
                 gases.push(self.gas(declared, cloud));
                 continue;
             }
-            let drift = self.drift(begin, cloud)?.showing(seconds)?;
+            let drift = self.drift(begin, (number, cloud))?.showing(seconds)?;
             let shown = cloud.shown_among(seconds, sources, &drift, &drift);
             let shown = shown.map_err(|error| self.failed(number, error, (begin, ahead), drift.failure()))?;
             gases.push(self.gas(declared, &shown));

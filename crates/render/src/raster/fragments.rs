@@ -172,7 +172,8 @@ impl<const N: usize> Fragments<N> {
         won
     }
 
-    /// The mean colour of the samples, of which those of no surface have the colour `open`. Each surface is shaded where its first sample is: the first ones are in the middle.
+    /// The mean colour of the samples, of which those of no surface have the colour `open`. Each surface is shaded where its first sample is:
+    /// the first ones are in the middle.
     pub(super) fn mean(
         &self,
         surface: impl Fn(u32) -> u32,
