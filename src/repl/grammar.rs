@@ -1,8 +1,8 @@
 //! Classification of lines as commands or text of the model, and detection of complete statements.
 //!
 //! - `:word …` is always a command, and so is `?`.
-//! - A line that begins with a keyword of the language (`param`, `interpret`, …), or that has a `:` outside parentheses,
-//!   is a declaration or a rule.
+//! - A line that begins with a keyword of the language (`param`, `interpret`, …), or that has a `:` or the arrow of a discrete
+//!   rule outside parentheses, is a declaration or a rule.
 //! - A line that begins with `if`, `solve`, `produce`, `at` (rate) or `or` is a further clause of the rule typed last.
 //! - A line that begins with the name of a command is that command. A module may have the name of a command: its rule
 //!   is recognised by the `(`, `<`, `>` or `:` after the name.
@@ -73,11 +73,14 @@ pub fn classify(line: &str) -> StatementKind {
     }
     let colon = has_colon(body);
     let apart = body.len() == word.len() || body[word.len()..].starts_with(char::is_whitespace);
-    let head = rest.starts_with([':', '<', '>']) || rest.starts_with('(') && colon;
+    let arrow = has_arrow(body);
+    let is_step = rest.starts_with("->") || rest.starts_with("-->");
+    let head = rest.starts_with([':', '<', '>']) || is_step || rest.starts_with('(') && (colon || arrow);
     if commands::find(word).is_some() && apart && !head {
         return StatementKind::Command;
     }
-    if colon || body.ends_with(['<', '>']) { StatementKind::Model } else { StatementKind::Unknown }
+    let is_model = colon || arrow || body.ends_with(['<', '>']);
+    if is_model { StatementKind::Model } else { StatementKind::Unknown }
 }
 
 /// True if a `:` stands outside parentheses.
@@ -86,6 +89,17 @@ fn has_colon(text: &str) -> bool {
     text.chars().any(|c| {
         depth += i64::from(c == '(') - i64::from(c == ')');
         c == ':' && depth <= 0
+    })
+}
+
+/// True if the arrow of a discrete rule, `->` or `-->`, stands outside parentheses.
+fn has_arrow(text: &str) -> bool {
+    let mut depth = 0i64;
+    let mut before = ' ';
+    text.chars().any(|c| {
+        depth += i64::from(c == '(') - i64::from(c == ')');
+        let last = std::mem::replace(&mut before, c);
+        c == '>' && last == '-' && depth <= 0
     })
 }
 

@@ -336,8 +336,29 @@ fn check_frames(&Frames { from, to, step }: &Frames, span: Span, scope: &mut Sco
     scope.diagnostics.push(Diagnostic::error("these frames are invalid").at(span, fault).help(help));
 }
 
+/// The modules of all strings of a document.
+fn strings(document: &Document) -> impl Iterator<Item = &ast::Module> {
+    let parts = document.items.iter().flat_map(|(item, _)| {
+        let mut all: Vec<&[ast::Part]> = Vec::new();
+        match item {
+            Item::Axiom(parts) | Item::Interpret { drawn: parts, .. } => all.push(parts),
+            Item::Rule(rule) => {
+                for clause in &rule.clauses {
+                    if let ast::Action::Produce(alternatives) = &clause.action {
+                        all.extend(alternatives.iter().map(|alternative| &alternative.modules[..]));
+                    }
+                }
+            }
+            _ => {}
+        }
+        all
+    });
+    parts.flat_map(ast::modules_of)
+}
+
 /// Warns of unused constants and functions.
 fn unused(document: &Document, scope: &mut Scope) {
+    let goes_on = strings(document).any(|module| &*module.name == ";" && module.arguments.is_empty());
     for (item, _) in document.own_items() {
         let text = |name: &ast::Name| name.text.clone();
         let (what, name, use_it) = match item {
@@ -356,6 +377,8 @@ fn unused(document: &Document, scope: &mut Scope) {
                 ("curve", name, format!("use it, as in `{}(age)`", text(name)))
             }
             Item::Table { name, .. } => ("table", name, format!("use it, as in `{}(t)`", text(name))),
+            // `;` goes on to the colours declared behind the one that is named.
+            Item::Color { .. } if goes_on => continue,
             Item::Color { name, .. } => {
                 ("colour", name, format!("draw with it: `;({})` in a string", text(name)))
             }

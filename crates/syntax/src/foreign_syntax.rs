@@ -8,7 +8,7 @@ use dlsys_diagnostic::{Diagnostic, Span};
 const PAGE: &str = "the book has a page for this: “Coming from cpfg or L-Py”, docs/src/moving.md";
 
 /// Beginnings of lines, as words and signs, each with its remedy.
-const LINES: [(&[&str], &str); 29] = [
+const LINES: [(&[&str], &str); 33] = [
     (&["lsystem", ":"], "remove this line: a file is one model, from its first line to its last"),
     (&["endlsystem"], "remove this line: a model ends with its file"),
     (&["axiom", ":"], "small letters: `axiom: …`, or `initial string: …`"),
@@ -58,6 +58,16 @@ const LINES: [(&[&str], &str); 29] = [
         &["while"],
         "a model is no program: actions that repeat are productions: `A(n): if age = 1 & n > 0 produce F(1) A(n - 1)`",
     ),
+    (&["delta", "angle"], "the angle of turns without a parameter is written `angle 22.5`"),
+    (
+        &["initial", "line"],
+        "a width stands in the string, in units of length and not in pixels: `initial string: !(0.05) F(1)`",
+    ),
+    (
+        &["initial", "color"],
+        "a colour stands in the string: `color bark = \"#7a5a3a\"`, then `initial string: ;(bark) F(1)`",
+    ),
+    (&["line", "style"], "lines that have a width are round stems: `initial string: !(0.05) F(1)`"),
     (&["return"], "a model is no program: a function is one expression: `def f(x) = x^2`"),
 ];
 
@@ -143,6 +153,11 @@ pub fn symbol(text: &str, after_symbol: bool) -> Option<String> {
             };
             let reads = match name {
                 "" => return Some("a surface is written with `@` before its name: `@L(s)`".to_owned()),
+                "C" | "D" | "E" | "G" | "H" | "M" | "O" | "R" | "S" | "T" | "V" | "W" => {
+                    return Some(format!(
+                        "a surface is written with `@` before its name, and `@{name}` is a command: give it another name, `@Organ{size}` with `surface @Organ from \"{name}.s\"`"
+                    ));
+                }
                 "L" | "K" | "P" | "B" => {
                     "that one is built in, and `surface` reads others from files".to_owned()
                 }
@@ -157,7 +172,7 @@ pub fn symbol(text: &str, after_symbol: bool) -> Option<String> {
         ',' if after_symbol || rest.starts_with('(') => {
             format!("a colour is chosen by its number or its name: `;{}`, `;(rose)`", arguments())
         }
-        '\'' => "a colour is chosen by its number or its name: `;(n)`, `;(rose)`; `;` alone is the next one"
+        '\'' => "a colour is chosen by its number or its name: `;(n)`, `;(bark)`; `;` alone goes on to the next number, so begin with a colour of your own"
             .to_owned(),
         '₀'..='₉' if after_symbol => "the subscript of a symbol begins with `_`: `+_1`".to_owned(),
         _ => return None,
@@ -234,6 +249,10 @@ pub fn function(name: &str, arguments: &[String]) -> Option<String> {
             return Some("the seed is no part of the model: `dlsys run MODEL --seed N`".to_owned());
         }
         "trunc" | "int" => format!("floor({})", argument(0, "x")),
+        "fmod" => {
+            let (x, y) = (argument(0, "x"), argument(1, "y"));
+            return Some(format!("a remainder is written `{x} - {y}*floor(({x})/({y}))`"));
+        }
         "fabs" => format!("abs({})", argument(0, "x")),
         _ => return None,
     };

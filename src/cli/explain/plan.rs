@@ -58,6 +58,9 @@ pub enum Work {
     /// Productions, but no equations.
     #[serde(rename = "at rest")]
     AtRest,
+    /// Discrete rules only.
+    #[serde(rename = "in steps")]
+    InSteps,
     /// Never stepped.
     #[serde(rename = "formulas")]
     Formulas,
@@ -134,6 +137,8 @@ pub struct Summary {
     pub alone: Vec<String>,
     pub coupled: Vec<String>,
     pub at_rest: Vec<String>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub in_steps: Vec<String>,
     pub no_rules: Vec<String>,
     pub closed_form: bool,
 }
@@ -160,6 +165,7 @@ impl Explanation {
             let list = match work {
                 Work::NoRules => &mut summary.no_rules,
                 Work::AtRest => &mut summary.at_rest,
+                Work::InSteps => &mut summary.in_steps,
                 Work::Formulas => &mut summary.formulas,
                 Work::Alone => &mut summary.alone,
                 Work::Coupled => &mut summary.coupled,
@@ -173,8 +179,8 @@ impl Explanation {
                 name: kind.name.clone(),
                 arity: kind.arity,
                 work,
-                rules: kind.rules.clone(),
-                // A kind without rules has nothing to evaluate.
+                rules: kind.all_rules().collect(),
+                // A kind without equations has nothing to evaluate.
                 drawn_only: if kind.rules.is_empty() { Vec::new() } else { drawn_only.collect() },
             });
         }
@@ -223,7 +229,8 @@ fn works(model: &Model) -> Vec<Work> {
         .map(|(id, kind)| {
             let mut solves = kind.rules.iter().flat_map(|rule| &model.rules[*rule].solves);
             match () {
-                () if kind.rules.is_empty() => Work::NoRules,
+                () if kind.has_no_rules() => Work::NoRules,
+                () if kind.rules.is_empty() => Work::InSteps,
                 () if numeric[id.index()] => Work::Alone,
                 () if solves.all(|solve| solve.of.is_empty() && solve.algebraic.is_empty()) => Work::AtRest,
                 () => Work::Formulas,
@@ -256,10 +263,14 @@ impl Facts<'_> {
 
     fn rule(&self, index: usize) -> RulePlan {
         let rule = &self.model.rules[index];
-        let kinds = self.model.kinds.iter().filter(|(_, kind)| kind.rules.contains(&index));
+        let kinds = self.model.kinds.iter().filter(|(_, kind)| kind.all_rules().any(|rule| rule == index));
         let clause = |guard: &Condition, span: crate::diagnostic::Span| ClausePlan {
             line: self.line(span.start),
-            condition: if guard.is_always() { String::new() } else { self.guard(span) },
+            condition: match guard.is_always() {
+                true => String::new(),
+                false if rule.discrete => self.discrete_guard(rule),
+                false => self.guard(span),
+            },
             successors: None,
         };
         let production = |p: &Produce| ClausePlan {
@@ -280,6 +291,14 @@ impl Facts<'_> {
             produces: real.map(production).collect(),
             conditions: (0..rule.atoms.len()).map(|atom| self.condition(rule, atom)).collect(),
         }
+    }
+
+    /// The condition of a discrete rule as written, on one line: it stands between the first colon and the arrow.
+    fn discrete_guard(&self, rule: &Rule) -> String {
+        let text = self.source.slice(rule.span);
+        let (_, behind) = text.split_once(':').unwrap_or_default();
+        let before = behind.find("->").map_or(behind, |arrow| behind[..arrow].trim_end_matches('-'));
+        before.split_whitespace().collect::<Vec<_>>().join(" ")
     }
 
     /// The condition of a clause as written, on one line.
@@ -390,6 +409,12 @@ impl Facts<'_> {
     }
 
     fn watch(&self, rule: &Rule, solve: Option<usize>, atom: usize) -> (&'static str, String) {
+        if rule.discrete {
+            return (
+                "judged at each step",
+                "discrete rules apply at whole multiples of the period".to_owned(),
+            );
+        }
         let watch = &rule.zero_crossings(solve)[atom];
         let solve = solve.map(|s| &rule.solves[s]);
         if matches!(watch, ZeroCrossing::Constant) {

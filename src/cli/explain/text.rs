@@ -90,6 +90,7 @@ fn kind_line(plan: &Explanation, group: &[&KindPlan]) -> String {
     let work = match group[0].work {
         Work::NoRules => "no rules",
         Work::AtRest => "nothing but productions",
+        Work::InSteps => "replaced step by step, by discrete rules",
         Work::Formulas => "never stepped: formulas only",
         Work::Alone => "integrated alone",
         Work::Coupled => "integrated together with its neighbours",
@@ -192,6 +193,7 @@ pub fn show(plan: &Explanation) -> String {
         row("alone", "stepped each by itself", &summary.alone),
         row("coupled", "stepped together with neighbours", &summary.coupled),
         row("at rest", "productions, no equations", &summary.at_rest),
+        row("in steps", "discrete rules", &summary.in_steps),
         row("no rules", "never change", &summary.no_rules),
     ];
     Table(rows.into_iter().filter(|row| !row[2].is_empty()).collect()).show(2, &mut out);

@@ -63,8 +63,9 @@ pub fn agree(args: &RenderArgs, format: Format) -> Result<(), Failure> {
         .chain(["gif", "webp", "apng", "y4m", "mp4", "webm", "glb", "usda"]);
     if !args.out.is_dir() && known.into_iter().any(is_file) {
         let name = args.out.with_extension("");
+        let one = if args.shared.at.is_some() { "" } else { ", or `--at T` for one frame" };
         return Err(usage(format!(
-            "-o names a folder, and {} looks like a file: every frame is a file in it; `-o {}` and --format svg, png or obj, or `--at T` for one frame; a whole film in one file is --format webp, apng, gif or y4m",
+            "-o names a folder, and {} looks like a file: every frame is a file in it; `-o {}` and --format svg, png or obj{one}; a whole film in one file is --format webp, apng, gif or y4m",
             args.out.display(),
             name.display()
         )));

@@ -9,7 +9,7 @@ use crate::detect::signs::{Reach, opposite, rate_at, reach, sign_of};
 use crate::world::path::Path;
 use crate::world::state::State;
 use dlsys_expr::{Binary, Dual, Interval, Program, Scratch, Value};
-use dlsys_model::{Rule, Sign, ZeroCrossing};
+use dlsys_model::{Condition, Rule, Sign, ZeroCrossing};
 use dlsys_ode::{Function, Root, first_root};
 use dlsys_tree::SimTime;
 
@@ -197,9 +197,13 @@ impl CrossingDetector {
         Some(Crossing { position, time, at, after, level })
     }
 
-    /// The parameter of the module whose value is compared with a level that rests, and the level. Without it a value that
-    /// reaches a limit would be a rounding of the limit afterwards, perhaps on its other side.
+    /// The parameter of the module whose value the condition of a production compares with a level that rests, and the level.
+    /// Without it a successor that gets a value at its limit would get a rounding of the limit, perhaps on its other side.
     fn level_of(&mut self, path: &Path, atom: usize) -> Option<(usize, f64)> {
+        let decides = |condition: &Condition| condition.atoms().any(|(other, _)| other == atom);
+        if !path.rule.produces.iter().any(|produce| decides(&produce.guard)) {
+            return None;
+        }
         let (variable, level) = match &path.rule.zero_crossings(path.state.solve)[atom] {
             ZeroCrossing::Formula { variable, level } => (*variable, self.level(path, level)),
             ZeroCrossing::Search(Some(sum)) => match sum.terms[..] {

@@ -19,10 +19,10 @@ use pest::Parser;
 use crate::Errors;
 use crate::ast::{Document, Expression, HeadModule, Item, Part, modules_of};
 use crate::declarations::{Body, Named};
-use crate::foreign_syntax;
 use crate::grammar::{Grammar, Pair, Rule};
 use crate::layout::{ItemKind, RawItem, layout};
 use crate::lexeme::in_name;
+use crate::{foreign_lines, foreign_syntax};
 use dlsys_diagnostic::{Diagnostic, Source, Span};
 
 /// Maximum number of errors that are collected from one text.
@@ -55,6 +55,7 @@ pub(super) struct Reader {
 impl Reader {
     /// The items of a text.
     pub fn read(&mut self, text: &str) -> Vec<(Item, Span)> {
+        let before = self.errors.len();
         let cut = layout(text);
         self.errors.extend(cut.errors);
         if text.contains("#define") {
@@ -86,6 +87,13 @@ impl Reader {
             let (expressions, interner) = (&mut self.document.expressions, &mut self.interner);
             let mut builder =
                 build::Builder { expressions, interner, offset: 0, defined: Some(&self.defined) };
+            let foreign = (item.kind == ItemKind::Step)
+                .then(|| foreign_lines::rule(&cut.text[item.start..item.end], item.start))
+                .flatten();
+            if let Some(error) = foreign {
+                self.errors.push(error);
+                continue;
+            }
             match read_item(&cut.text, item, &mut builder) {
                 Ok(read) => items.push((read, trimmed(&cut.text, item))),
                 Err(error) => {
@@ -93,6 +101,13 @@ impl Reader {
                     self.document.unread.extend(declared_name(&cut.text, item));
                 }
             }
+        }
+        // Errors in the text of a comment say nothing about the comment.
+        if self.errors.len() > before
+            && let Some(error) = foreign_lines::comment(text)
+        {
+            self.errors.truncate(before);
+            self.errors.push(error);
         }
         items
     }
@@ -201,6 +216,10 @@ fn read_axiom(text: &str, item: &RawItem, builder: &mut build::Builder) -> Resul
     let words: Vec<&str> = head.split_whitespace().collect();
     let Some(mut at) = item.after_colon.filter(|_| matches!(words[..], ["axiom"] | ["initial", "string"]))
     else {
+        let line = text[item.start..item.end].lines().next().unwrap_or_default();
+        if let Some(said) = foreign_syntax::line(line, item.start) {
+            return Err(Box::new(said));
+        }
         return Err(Box::new(
             Diagnostic::error("the initial string is written `initial string: …` or `axiom: …`")
                 .at(
@@ -211,7 +230,7 @@ fn read_axiom(text: &str, item: &RawItem, builder: &mut build::Builder) -> Resul
                         "expected a `:` after this"
                     },
                 )
-                .help(advice::initial_string(text[item.start..item.end].lines().next().unwrap_or_default())),
+                .help(advice::initial_string(line)),
         ));
     };
     let mut modules: Vec<Part> = Vec::new();

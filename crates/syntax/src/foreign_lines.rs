@@ -1,0 +1,117 @@
+//! Notations of cpfg that concern a whole line or rule: comments of C, labels of productions, probabilities behind successors.
+//!
+//! What they would mean here, if anything, is far from what was meant, so one message about the notation replaces those about its parts.
+
+use dlsys_diagnostic::{Diagnostic, Span};
+
+/// The error for a discrete rule that is written as in cpfg, given its text and the byte at which it begins.
+pub fn rule(text: &str, start: usize) -> Option<Diagnostic> {
+    label(text, start).or_else(|| probability(text, start))
+}
+
+/// A label of a production: `p1: A --> F A`, `p1 : A : x > 3 --> F A`.
+fn label(text: &str, start: usize) -> Option<Diagnostic> {
+    let (before, behind) = text.split_once(':')?;
+    let name = before.trim();
+    let digits = name.strip_prefix(['p', 'P'])?;
+    let condition = behind.split("->").next()?.trim_start();
+    let is_label = !digits.is_empty()
+        && digits.chars().all(|c| c.is_ascii_digit())
+        && condition.starts_with(|c: char| c.is_uppercase());
+    is_label.then(|| {
+        Diagnostic::error(format!("`{name}:` is a label, and rules have none"))
+            .at(Span::new(start, start + name.len()), "in ABOP and cpfg it names the production")
+            .help(format!("leave it out: `{}`", first_line(behind)))
+    })
+}
+
+/// A probability: `A --> F A : 0.3`, or `A : 0.3 --> F A`.
+fn probability(text: &str, start: usize) -> Option<Diagnostic> {
+    let arrow = text.find("->")?;
+    let (head, successor) = (text[..arrow].trim_end_matches('-'), text[arrow + 2..].trim());
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|value| (0.0..=1.0).contains(value));
+    let behind = successor.rsplit_once(':').filter(|(_, value)| number(value).is_some());
+    let before = head.split_once(':').filter(|(_, value)| number(value).is_some());
+    let (predecessor, string, value) = match (behind, before) {
+        (Some((string, value)), _) => (head.split(':').next()?, string, value),
+        (None, Some((predecessor, value))) => (predecessor, successor, value),
+        (None, None) => return None,
+    };
+    let (predecessor, string, value) = (predecessor.trim(), first_line(string), value.trim());
+    let at = match behind {
+        Some(_) => text.rfind(value)?,
+        None => text.find(':').and_then(|colon| Some(colon + text[colon..].find(value)?))?,
+    };
+    let rest = 1.0 - number(value)?;
+    let rest = (rest * 1e6).round() / 1e6;
+    Some(
+        Diagnostic::error("a probability stands before its successor")
+            .at(Span::new(start + at, start + at + value.len()), "in cpfg it stands here")
+            .help(format!(
+                "write all successors in one rule: `{predecessor} -> {value}: {string} or {rest}: …`"
+            ))
+            .help("the values are weights: they need not add up to 1"),
+    )
+}
+
+/// The error for a comment of C, if a line of a text begins one: `/* … */`, or `// words`.
+pub fn comment(text: &str) -> Option<Diagnostic> {
+    let mut start = 0;
+    for line in text.split_inclusive('\n') {
+        let body = line.trim_start();
+        let at = start + line.len() - body.len();
+        let is_word = |rest: &str| rest.trim_start().starts_with(|c: char| c.is_alphabetic());
+        let is_comment = body.starts_with("/*") || body.strip_prefix("//").is_some_and(is_word);
+        if is_comment {
+            return Some(
+                Diagnostic::error(format!("`{}` begins no comment", &body[..2]))
+                    .at(Span::new(at, at + 2), "here it is a turn of the turtle, or a quotient")
+                    .help("a comment begins with `#` and ends with its line"),
+            );
+        }
+        start += line.len();
+    }
+    None
+}
+
+/// The first line of a text, not too long for a message.
+fn first_line(text: &str) -> String {
+    text.trim().lines().next().unwrap_or_default().trim().chars().take(60).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn help(found: Option<Diagnostic>) -> String {
+        found.map_or(String::new(), |found| found.help.join("\n"))
+    }
+
+    #[test]
+    fn labels_and_probabilities_are_told_from_conditions() {
+        for (text, wanted) in [
+            ("p1: A --> F A", "leave it out: `A --> F A`"),
+            ("p12 : A(x) : x > 3 --> F(x) A(x)", "leave it out: `A(x) : x > 3 --> F(x) A(x)`"),
+            ("A --> F A : 0.3", "`A -> 0.3: F A or 0.7: …`"),
+            ("A(x) : 0.25 -> F(x)", "`A(x) -> 0.25: F(x) or 0.75: …`"),
+        ] {
+            assert!(help(rule(text, 7)).contains(wanted), "{text}: {}", help(rule(text, 7)));
+        }
+        // A module may have such a name, and a weight such a place.
+        for text in
+            ["p1 : t > 3 -> F", "A(x) : x > 0.3 -> F(x)", "A -> 0.3: F A or 0.7: F", "A : * -> F(0.3)"]
+        {
+            assert!(rule(text, 0).is_none(), "{text}");
+        }
+    }
+
+    #[test]
+    fn comments_of_c_are_told_from_rolls() {
+        for text in ["/* a tree */\nangle 20", "angle 20\n  // Figure 1\n"] {
+            let found = comment(text).expect("a comment");
+            let at = found.labels[0].0.start as usize;
+            assert!(text[at..].starts_with('/'), "{text}");
+        }
+        assert!(comment("initial string: F\n//(30) F\n/ F # // no\n").is_none());
+    }
+}
